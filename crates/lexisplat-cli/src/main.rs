@@ -1,0 +1,2 @@
+//! The `lexisplat` command.
+fn main() {}

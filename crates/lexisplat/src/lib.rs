@@ -1,0 +1,23 @@
+//! Codec for trained 3D Gaussian Splatting scenes.
+//!
+//! placeholder
+
+mod codes;
+mod dictionary;
+mod error;
+mod limits;
+mod model;
+pub mod output;
+mod parallel;
+mod progress;
+pub mod sh;
+mod splats;
+
+pub use codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
+pub use dictionary::Dictionary;
+pub use error::{Error, FormatError, Result};
+pub use limits::{Limits, MAX_ATOMS};
+pub use model::{Layout, Model, Pursuit, Record};
+pub use progress::{Progress, Silent, Stage};
+pub use sh::ShDegree;
+pub use splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats};
