@@ -3,17 +3,23 @@
 //! placeholder
 
 mod codes;
+mod compress;
 mod dictionary;
 mod error;
+pub mod learn;
 mod limits;
 mod model;
 pub mod output;
 mod parallel;
 mod progress;
+pub mod pursuit;
+mod rng;
 pub mod sh;
 mod splats;
+mod stopwatch;
 
 pub use codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
+pub use compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
 pub use dictionary::Dictionary;
 pub use error::{Error, FormatError, Result};
 pub use limits::{Limits, MAX_ATOMS};

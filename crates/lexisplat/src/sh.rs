@@ -47,6 +47,8 @@ pub struct ShDegree(u8);
 impl ShDegree {
     /// No view dependence.
     pub const ZERO: Self = Self(0);
+    /// The first view-dependent degree.
+    pub const ONE: Self = Self(1);
     /// What INRIA's trainer writes.
     pub const THREE: Self = Self(3);
 

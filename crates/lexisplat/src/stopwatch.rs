@@ -1,0 +1,31 @@
+//! Elapsed time, where there is a clock.
+
+/// Time since it was started.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Stopwatch {
+    #[cfg(not(target_family = "wasm"))]
+    start: std::time::Instant,
+}
+
+impl Stopwatch {
+    /// Starts now.
+    pub(crate) fn start() -> Self {
+        Self {
+            #[cfg(not(target_family = "wasm"))]
+            start: std::time::Instant::now(),
+        }
+    }
+
+    /// Seconds since the start; 0 where `Instant` would panic, in a browser.
+    #[cfg_attr(target_family = "wasm", expect(clippy::unused_self, reason = "there is no clock"))]
+    pub(crate) fn seconds(self) -> f64 {
+        #[cfg(not(target_family = "wasm"))]
+        {
+            self.start.elapsed().as_secs_f64()
+        }
+        #[cfg(target_family = "wasm")]
+        {
+            0.0
+        }
+    }
+}
