@@ -1,1 +1,48 @@
-//! placeholder
+//! Cameras and rasterisers that draw 3D Gaussian Splatting scenes.
+//!
+//! A [`Scene`] is a trained model with dense SH or a compressed one; [`render`] draws either through
+//! the same [`Radiance`] interface, the compressed one straight from its sparse codes. The rules are
+//! those of the 3DGS authors' rasteriser, number by number: see [`conventions`].
+//!
+//! ```
+//! use lexisplat::{Geometry, ShDegree, Splats};
+//! use lexisplat_render::{RenderOptions, Scene, orbit, render};
+//!
+//! let splats = Splats {
+//!     geometry: Geometry {
+//!         positions: vec![[0.0, 0.0, 0.0]],
+//!         dc: vec![[1.0, 0.0, -1.0]],
+//!         opacities: vec![4.0],
+//!         scales: vec![[-1.0; 3]],
+//!         rotations: vec![[1.0, 0.0, 0.0, 0.0]],
+//!         ..Geometry::default()
+//!     },
+//!     degree: ShDegree::ZERO,
+//!     sh_rest: Vec::new(),
+//!     meta: Default::default(),
+//! };
+//! for camera in orbit(&splats.geometry, 3, 64, 48) {
+//!     let image = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+//!     let [red, _, blue] = image.pixels[24 * 64 + 32];
+//!     assert!(red > 0.7 && red > blue);
+//! }
+//! ```
+
+mod camera;
+mod cameras_json;
+pub mod conventions;
+mod cpu;
+mod error;
+mod image;
+mod orbit;
+mod radiance;
+mod scene;
+
+pub use camera::{Camera, MAX_SIDE, Split};
+pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
+pub use cpu::{RenderOptions, render};
+pub use error::{Error, Result};
+pub use image::Image;
+pub use orbit::orbit;
+pub use radiance::Radiance;
+pub use scene::Scene;

@@ -1,0 +1,175 @@
+//! Pinhole cameras.
+
+use crate::error::{Error, Result};
+
+/// Largest width or height of a picture, in pixels.
+pub const MAX_SIDE: u32 = 16_384;
+
+/// How far `rotation * rotation^T` may be from the identity in any entry. Files written by trainers are
+/// within 1e-6; more than this is a scaled or skewed view and no camera.
+const ORTHONORMAL_TOLERANCE: f32 = 1e-2;
+
+/// Which part of a data set a camera belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Split {
+    /// Seen in training.
+    Train,
+    /// Held out.
+    Test,
+}
+
+/// A pinhole camera whose optical axis meets the picture in its centre, as INRIA's `cameras.json`
+/// describes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// Name of the photo, as the file has it, or of the generated view.
+    pub name: String,
+    /// Picture width in pixels, 1 to [`MAX_SIDE`].
+    pub width: u32,
+    /// Picture height in pixels, 1 to [`MAX_SIDE`].
+    pub height: u32,
+    /// Focal length in pixel widths, above 0.
+    pub fx: f32,
+    /// Focal length in pixel heights, above 0.
+    pub fy: f32,
+    /// Camera centre in world units.
+    pub position: [f32; 3],
+    /// Camera-to-world rotation, row by row. Its columns are the camera's right, down and forward
+    /// directions in the world.
+    pub rotation: [[f32; 3]; 3],
+    /// Which part of the data set it belongs to, where the file says so.
+    pub split: Option<Split>,
+}
+
+impl Camera {
+    /// This camera with pictures at most `width` pixels wide, of the same field of view: a wider one is
+    /// scaled down, its height rounded to whole pixels.
+    #[must_use]
+    pub fn with_max_width(&self, width: u32) -> Self {
+        let width = width.max(1);
+        if self.width <= width {
+            return self.clone();
+        }
+        let (from_width, from_height) = (u64::from(self.width), u64::from(self.height));
+        let height = (from_height * u64::from(width) + from_width / 2) / from_width;
+        // Below the old height, which fits.
+        let height = u32::try_from(height).unwrap_or(self.height).max(1);
+        let ratio = |new: u32, old: u32| f64::from(new) / f64::from(old);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let scale = |focal: f32, ratio: f64| (f64::from(focal) * ratio) as f32;
+        Self {
+            width,
+            height,
+            fx: scale(self.fx, ratio(width, self.width)),
+            fy: scale(self.fy, ratio(height, self.height)),
+            ..self.clone()
+        }
+    }
+
+    /// `point`, in world units, in this camera's view space: x right, y down, z forward.
+    #[must_use]
+    #[inline]
+    pub fn to_view(&self, point: [f32; 3]) -> [f32; 3] {
+        let d: [f32; 3] = std::array::from_fn(|i| point[i] - self.position[i]);
+        let r = &self.rotation;
+        std::array::from_fn(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
+    }
+
+    /// Checks the ranges the fields state, and that the rotation is orthonormal within 1e-2. Mirrored
+    /// rotations are accepted: some files in the wild have them.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the field and its value.
+    pub fn validate(&self) -> Result<()> {
+        for (name, side) in [("width", self.width), ("height", self.height)] {
+            if !(1..=MAX_SIDE).contains(&side) {
+                return Err(Error::parameter(name, side, format!("1 to {MAX_SIDE} pixels")));
+            }
+        }
+        for (name, focal) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(focal.is_finite() && focal > 0.0) {
+                return Err(Error::parameter(name, focal, "a finite number above 0"));
+            }
+        }
+        if !self.position.iter().all(|v| v.is_finite()) {
+            return Err(Error::parameter("position", format!("{:?}", self.position), "finite numbers"));
+        }
+        for (i, a) in self.rotation.iter().enumerate() {
+            for (j, b) in self.rotation.iter().enumerate() {
+                let dot: f32 = a.iter().zip(b).map(|(x, y)| x * y).sum();
+                let off = (dot - if i == j { 1.0 } else { 0.0 }).abs();
+                if off.is_nan() || off > ORTHONORMAL_TOLERANCE {
+                    let expected = format!(
+                        "an orthonormal matrix (rows {i} and {j} multiply to {dot}, off by more than {ORTHONORMAL_TOLERANCE})"
+                    );
+                    return Err(Error::parameter("rotation", format!("{:?}", self.rotation), expected));
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+pub(crate) fn straight_ahead(width: u32, height: u32, focal: f32) -> Camera {
+    Camera {
+        name: "straight ahead".into(),
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        position: [0.0; 3],
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        split: None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_wide_camera_is_scaled_with_its_field_of_view() {
+        let camera = Camera { fy: 4285.0, ..straight_ahead(5025, 3312, 4328.0) };
+        let small = camera.with_max_width(1600);
+        assert_eq!((small.width, small.height), (1600, 1055));
+        assert!((small.fx - 4328.0 * 1600.0 / 5025.0).abs() < 1e-3);
+        assert!((small.fy - 4285.0 * 1055.0 / 3312.0).abs() < 1e-3);
+        assert_eq!(camera.with_max_width(5025), camera);
+        let sliver = straight_ahead(10_000, 1, 1.0).with_max_width(10);
+        assert_eq!((sliver.width, sliver.height), (10, 1));
+    }
+
+    #[test]
+    fn the_camera_sees_its_columns_as_axes() {
+        // Looks along world x, its right is world -y, its down world -z.
+        let camera = Camera {
+            position: [1.0, 2.0, 3.0],
+            rotation: [[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]],
+            ..straight_ahead(8, 8, 8.0)
+        };
+        camera.validate().unwrap();
+        assert_eq!(camera.to_view([6.0, 2.0, 3.0]), [0.0, 0.0, 5.0]);
+        assert_eq!(camera.to_view([1.0, 1.0, 3.0]), [1.0, 0.0, 0.0]);
+        assert_eq!(camera.to_view([1.0, 2.0, 1.0]), [0.0, 2.0, 0.0]);
+    }
+
+    #[test]
+    fn impossible_cameras_are_refused_by_field() {
+        let good = straight_ahead(8, 8, 8.0);
+        let mut scaled = good.clone();
+        scaled.rotation[1][1] = 1.1;
+        let bad = [
+            ("width", Camera { width: 0, ..good.clone() }),
+            ("height", Camera { height: MAX_SIDE + 1, ..good.clone() }),
+            ("fx", Camera { fx: 0.0, ..good.clone() }),
+            ("fy", Camera { fy: f32::NAN, ..good.clone() }),
+            ("position", Camera { position: [0.0, f32::INFINITY, 0.0], ..good }),
+            ("rotation", scaled),
+        ];
+        for (field, camera) in bad {
+            let message = camera.validate().unwrap_err().to_string();
+            assert!(message.starts_with(field), "{message}");
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Every number of the 3DGS authors' rasteriser, once.
+//!
+//! Sources are files of `graphdeco-inria/diff-gaussian-rasterization` at commit 59f5f77 unless stated
+//! otherwise. Changing any of them changes every picture.
+//!
+//! Conventions that are no numbers: view space is OpenCV's (x right, y down, z forward); pixel centres
+//! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`); Gaussians are blended in order of view-space
+//! z, ties in order of index; a pixel is `colour + transmittance * background`, not clamped.
+
+/// Gaussians whose view-space z, in world units, is not above this are not drawn
+/// (`auxiliary.h`, `in_frustum`).
+pub const NEAR_Z: f32 = 0.2;
+
+/// Added to the homogeneous w, in world units, before dividing by it (`forward.cu`, `preprocessCUDA`).
+pub const W_EPSILON: f32 = 1e-7;
+
+/// Limit of `x / z` and `y / z` in the Jacobian, in units of the tangent of half the field of view
+/// (`forward.cu`, `computeCov2D`).
+pub const TAN_LIMIT: f32 = 1.3;
+
+/// Added to both variances on screen, in square pixels (`forward.cu`, `computeCov2D`; `h_var` in the
+/// `dr_aa` branch).
+pub const DILATION: f32 = 0.3;
+
+/// Least value under the square root that separates the eigenvalues, in pixels to the fourth
+/// (`forward.cu`, `preprocessCUDA`).
+pub const EIGEN_FLOOR: f32 = 0.1;
+
+/// Radius of a Gaussian on screen, in standard deviations of its long axis (`forward.cu`,
+/// `preprocessCUDA`).
+pub const RADIUS_SIGMAS: f32 = 3.0;
+
+/// Side of a tile in pixels (`config.h`, `BLOCK_X` and `BLOCK_Y`).
+pub const TILE: usize = 16;
+
+/// Largest opacity of one Gaussian in one pixel (`forward.cu`, `renderCUDA`).
+pub const ALPHA_MAX: f32 = 0.99;
+
+/// Gaussians below this opacity in a pixel are left out of it (`forward.cu`, `renderCUDA`).
+pub const ALPHA_MIN: f32 = 1.0 / 255.0;
+
+/// A pixel is finished by the first Gaussian that would take its transmittance below this; that
+/// Gaussian is not added (`forward.cu`, `renderCUDA`).
+pub const TRANSMITTANCE_MIN: f32 = 1e-4;
+
+/// Least ratio of the determinants before and after the dilation, whose square root scales the opacity
+/// of anti-aliased scenes (`forward.cu` of the `dr_aa` branch, `preprocessCUDA`).
+pub const ANTIALIAS_FLOOR: f32 = 0.000_025;
+
+/// Least length a quaternion is divided by (`graphdeco-inria/gaussian-splatting`,
+/// `scene/gaussian_model.py`, `rotation_activation`: the default of `torch.nn.functional.normalize`).
+/// The zero quaternion stays zero, and its rotation matrix is then the identity.
+pub const QUATERNION_FLOOR: f32 = 1e-12;

@@ -1,0 +1,133 @@
+//! Drawing one tile: its splats from front to back, a row of 16 pixels at a time.
+
+use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
+
+use super::math::exp;
+use super::project::Splat;
+
+/// One value for each pixel of a row of a tile.
+type Lanes = [f32; TILE];
+
+/// A row of pixels being drawn.
+#[derive(Debug, Clone, Copy)]
+struct Row {
+    red: Lanes,
+    green: Lanes,
+    blue: Lanes,
+    /// What is left for splats further back; 0 once the pixel is finished.
+    open: Lanes,
+    /// What is left for the background.
+    transmittance: Lanes,
+}
+
+const EMPTY: Row = Row {
+    red: [0.0; TILE],
+    green: [0.0; TILE],
+    blue: [0.0; TILE],
+    open: [1.0; TILE],
+    transmittance: [1.0; TILE],
+};
+
+/// A finished tile.
+#[derive(Debug, Clone)]
+pub(super) struct TilePixels([[Lanes; 3]; TILE]);
+
+impl TilePixels {
+    pub(super) fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
+        std::array::from_fn(|c| self.0[y][c][x])
+    }
+}
+
+/// Draws the tile at `[column, row]` from the splats in `list`, sorted from front to back.
+pub(super) fn tile(
+    splats: &[Splat],
+    list: impl Iterator<Item = u32>,
+    at: [usize; 2],
+    background: [f32; 3],
+) -> TilePixels {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || draw(splats, list, at, background),
+    )
+}
+
+#[inline(always)]
+fn draw(
+    splats: &[Splat],
+    list: impl Iterator<Item = u32>,
+    [column, row]: [usize; 2],
+    background: [f32; 3],
+) -> TilePixels {
+    let mut rows = [EMPTY; TILE];
+    let mut row_open = [true; TILE];
+    let mut rows_open = TILE;
+    // Pixel coordinates are below 2^24, so they are exact.
+    #[expect(clippy::cast_precision_loss, reason = "far below 2^24")]
+    let x: Lanes = std::array::from_fn(|lane| (column * TILE + lane) as f32);
+    let top = row * TILE;
+    for splat in list {
+        let splat = &splats[splat as usize];
+        let first = (splat.rows[0] as usize).saturating_sub(top);
+        let end = (splat.rows[1] as usize).saturating_sub(top).min(TILE);
+        for y in first..end {
+            if !row_open[y] {
+                continue;
+            }
+            #[expect(clippy::cast_precision_loss, reason = "far below 2^24")]
+            let finished = blend(&mut rows[y], splat, &x, (top + y) as f32);
+            if finished {
+                row_open[y] = false;
+                rows_open -= 1;
+            }
+        }
+        if rows_open == 0 {
+            break;
+        }
+    }
+    TilePixels(std::array::from_fn(|y| {
+        let row = &rows[y];
+        let over = |colour: &Lanes, background: f32| -> Lanes {
+            std::array::from_fn(|lane| colour[lane] + row.transmittance[lane] * background)
+        };
+        [over(&row.red, background[0]), over(&row.green, background[1]), over(&row.blue, background[2])]
+    }))
+}
+
+/// Adds `splat` to the pixels of a row; whether that finished the last of them.
+#[inline(always)]
+fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
+    let [a, b, c] = splat.conic;
+    let dy = splat.centre[1] - y;
+    let mut power = [0.0; TILE];
+    let mut any = false;
+    for lane in 0..TILE {
+        let dx = splat.centre[0] - x[lane];
+        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
+        power[lane] = p;
+        any |= p >= splat.cutoff;
+    }
+    if !any {
+        return false;
+    }
+    let mut most_open = 0.0_f32;
+    let mut ended = false;
+    for lane in 0..TILE {
+        let p = power[lane];
+        let alpha = splat.opacity * exp(p);
+        let alpha = if alpha < ALPHA_MAX { alpha } else { ALPHA_MAX };
+        let left = row.open[lane] * (1.0 - alpha);
+        let counts = (p <= 0.0) & (alpha >= ALPHA_MIN);
+        let add = counts & (left >= TRANSMITTANCE_MIN);
+        let end = counts & !add;
+        let weight = if add { alpha * row.open[lane] } else { 0.0 };
+        row.red[lane] += splat.colour[0] * weight;
+        row.green[lane] += splat.colour[1] * weight;
+        row.blue[lane] += splat.colour[2] * weight;
+        row.transmittance[lane] = if add { left } else { row.transmittance[lane] };
+        let open = if end { 0.0 } else { row.open[lane] };
+        row.open[lane] = if add { left } else { open };
+        ended |= end;
+        most_open = if row.open[lane] > most_open { row.open[lane] } else { most_open };
+    }
+    ended && most_open == 0.0
+}

@@ -1,0 +1,214 @@
+//! From Gaussians in the world to ellipses on screen.
+
+use lexisplat::Geometry;
+use rayon::prelude::*;
+
+use crate::camera::Camera;
+use crate::conventions::{
+    ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, QUATERNION_FLOOR, RADIUS_SIGMAS, TAN_LIMIT,
+    W_EPSILON,
+};
+use crate::radiance::Radiance;
+
+use super::math::{exp, sigmoid};
+use super::tiles::{Grid, Rect};
+
+/// Gaussians in one unit of work.
+const CHUNK: usize = 1024;
+
+/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]: covers the error of `exp`
+/// and of the logarithm, 1e-6 together, many times over.
+const POWER_SLACK: f32 = 1e-4;
+/// Bound on the relative rounding error of each term of a power, and of the distances in it: 16 units
+/// in the last place, where at most six roundings happen.
+const TERM_ERROR: f64 = 1e-6;
+
+/// A Gaussian on screen.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Splat {
+    /// Centre in pixels; pixel centres are integers.
+    pub(super) centre: [f32; 2],
+    /// Inverse covariance in 1 / square pixels: xx, xy, yy.
+    pub(super) conic: [f32; 3],
+    /// Opacity at the centre, 0 to 1.
+    pub(super) opacity: f32,
+    /// Colour towards the camera, not below 0.
+    pub(super) colour: [f32; 3],
+    /// Powers below this surely give an opacity below [`ALPHA_MIN`].
+    pub(super) cutoff: f32,
+    /// First pixel row that it may touch, and the first below that it surely does not.
+    pub(super) rows: [u32; 2],
+}
+
+/// A splat with what sorting and tiling need.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Visible {
+    pub(super) splat: Splat,
+    /// Bits of the view-space z, which is positive: ordered as the number is.
+    pub(super) depth: u32,
+    /// Tiles it may touch.
+    pub(super) rect: Rect,
+}
+
+/// What is the same for all Gaussians of a picture.
+#[derive(Debug, Clone)]
+pub(super) struct Projection {
+    camera: Camera,
+    tan: [f32; 2],
+    focal: [f32; 2],
+    size: [f32; 2],
+    grid: Grid,
+    antialiased: bool,
+}
+
+impl Projection {
+    pub(super) fn new(camera: &Camera, grid: Grid, antialiased: bool) -> Self {
+        // Sides are at most 16384: exact.
+        #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
+        let size = [camera.width as f32, camera.height as f32];
+        let focal = [camera.fx, camera.fy];
+        let tan = [size[0] / (2.0 * focal[0]), size[1] / (2.0 * focal[1])];
+        Self { camera: camera.clone(), tan, focal, size, grid, antialiased }
+    }
+
+    /// Gaussian `i` on screen, if any of it may be seen.
+    fn project(&self, geometry: &Geometry, radiance: &Radiance<'_>, i: usize) -> Option<Visible> {
+        let position = geometry.positions[i];
+        let view = self.camera.to_view(position);
+        let z = view[2];
+        if z.is_nan() || z <= NEAR_Z {
+            return None;
+        }
+        let centre: [f32; 2] = std::array::from_fn(|k| {
+            let ndc = view[k] / self.tan[k] * (1.0 / (z + W_EPSILON));
+            ((ndc + 1.0) * self.size[k] - 1.0) * 0.5
+        });
+        let axes = axes(geometry.scales[i], geometry.rotations[i]);
+        let Ellipse { conic, radius, shrink } = self.ellipse(view, &axes)?;
+        let mut opacity = sigmoid(geometry.opacities[i]);
+        if self.antialiased {
+            opacity *= shrink;
+        }
+        let finite = centre.iter().chain(&conic).all(|v| v.is_finite()) && opacity.is_finite();
+        if !finite || opacity < ALPHA_MIN {
+            return None;
+        }
+        let cutoff = (ALPHA_MIN / opacity).ln() - POWER_SLACK;
+        let rect = self.grid.rect(centre, radius)?;
+        let extent = self.extent(centre, conic, cutoff);
+        let rect = rect.intersect(self.grid.touched(centre, extent))?;
+        let rows = self.grid.rows(rect, centre[1], extent[1])?;
+        let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
+        let length = offset.iter().map(|v| v * v).sum::<f32>().sqrt();
+        let colour = radiance.colour(i, offset.map(|v| v / length));
+        if !colour.iter().all(|v| v.is_finite()) {
+            return None;
+        }
+        let splat = Splat { centre, conic, opacity, colour, cutoff, rows };
+        Some(Visible { splat, depth: z.to_bits(), rect })
+    }
+
+    /// The dilated covariance on screen of a Gaussian with these axes at `view`.
+    fn ellipse(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> Option<Ellipse> {
+        let z = view[2];
+        let [tx, ty]: [f32; 2] = std::array::from_fn(|k| {
+            let limit = TAN_LIMIT * self.tan[k];
+            (view[k] / z).clamp(-limit, limit) * z
+        });
+        let jacobian = [
+            [self.focal[0] / z, 0.0, -(self.focal[0] * tx) / (z * z)],
+            [0.0, self.focal[1] / z, -(self.focal[1] * ty) / (z * z)],
+        ];
+        // Each standard deviation's axis in view space, then on screen; the covariance is the sum of
+        // their squares. INRIA multiplies the covariance through instead, which is the same sum but
+        // loses thin Gaussians to cancellation.
+        let r = &self.camera.rotation;
+        let on_screen: [[f32; 2]; 3] = std::array::from_fn(|a| {
+            let axis = axes[a];
+            let seen: [f32; 3] =
+                std::array::from_fn(|k| r[0][k] * axis[0] + r[1][k] * axis[1] + r[2][k] * axis[2]);
+            [
+                jacobian[0][0] * seen[0] + jacobian[0][2] * seen[2],
+                jacobian[1][1] * seen[1] + jacobian[1][2] * seen[2],
+            ]
+        });
+        let sum = |f: fn([f32; 2]) -> f32| f(on_screen[0]) + f(on_screen[1]) + f(on_screen[2]);
+        let (a, b, c) = (sum(|v| v[0] * v[0]), sum(|v| v[0] * v[1]), sum(|v| v[1] * v[1]));
+        // The determinant as a sum of squares (Cauchy-Binet): never negative.
+        let cross = |p: [f32; 2], q: [f32; 2]| {
+            let w = p[0] * q[1] - p[1] * q[0];
+            w * w
+        };
+        let before = cross(on_screen[0], on_screen[1])
+            + cross(on_screen[1], on_screen[2])
+            + cross(on_screen[2], on_screen[0]);
+        let det = before + DILATION * (a + c) + DILATION * DILATION;
+        if det == 0.0 || !det.is_finite() {
+            return None;
+        }
+        let (a, c) = (a + DILATION, c + DILATION);
+        let mid = 0.5 * (a + c);
+        let half = 0.5 * (a - c);
+        let spread = (half * half + b * b).max(EIGEN_FLOOR).sqrt();
+        let radius = (RADIUS_SIGMAS * (mid + spread).sqrt()).ceil();
+        let shrink = (before / det).max(ANTIALIAS_FLOOR).sqrt();
+        Some(Ellipse { conic: [c / det, -b / det, a / det], radius, shrink })
+    }
+
+    /// Distances from the centre in x and y, in pixels, beyond which no power, as `blend` computes it,
+    /// reaches `cutoff`. Infinite where that cannot be bounded.
+    fn extent(&self, centre: [f32; 2], conic: [f32; 3], cutoff: f32) -> [f64; 2] {
+        let [a, b, c] = conic.map(f64::from);
+        // How far a pixel can be: terms, and with them rounding errors, are largest there.
+        let far: [f64; 2] = std::array::from_fn(|k| {
+            let (centre, size) = (f64::from(centre[k]), f64::from(self.size[k]));
+            centre.abs().max((size - 1.0 - centre).abs())
+        });
+        let terms = 0.5 * (a * far[0] * far[0] + c * far[1] * far[1]) + (b * far[0] * far[1]).abs();
+        // Pixels that count satisfy a dx^2 + 2 b dx dy + c dy^2 <= level.
+        let level = 2.0 * (-f64::from(cutoff) + TERM_ERROR * terms).max(0.0);
+        let det = a * c - b * b;
+        // A determinant lost to rounding says nothing.
+        if det.is_nan() || det <= TERM_ERROR * a * c || a <= 0.0 {
+            return [f64::INFINITY; 2];
+        }
+        let reach = |diagonal: f64| (level * diagonal / det).sqrt() * (1.0 + TERM_ERROR) + TERM_ERROR;
+        [reach(c), reach(a)]
+    }
+}
+
+struct Ellipse {
+    conic: [f32; 3],
+    /// In whole pixels.
+    radius: f32,
+    /// Factor of the opacity in anti-aliased scenes.
+    shrink: f32,
+}
+
+/// The three standard deviations as vectors in the world: columns of rotation * scale.
+fn axes(scales: [f32; 3], rotation: [f32; 4]) -> [[f32; 3]; 3] {
+    let length = rotation.iter().map(|v| v * v).sum::<f32>().sqrt().max(QUATERNION_FLOOR);
+    let [w, x, y, z] = rotation.map(|v| v / length);
+    let s = scales.map(exp);
+    [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)].map(|v| v * s[0]),
+        [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)].map(|v| v * s[1]),
+        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)].map(|v| v * s[2]),
+    ]
+}
+
+/// All Gaussians that may be seen, in order.
+pub(super) fn project(
+    geometry: &Geometry,
+    radiance: &Radiance<'_>,
+    projection: &Projection,
+) -> Vec<Vec<Visible>> {
+    let count = geometry.len();
+    (0..count.div_ceil(CHUNK))
+        .into_par_iter()
+        .map(|chunk| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
+            range.filter_map(|i| projection.project(geometry, radiance, i)).collect()
+        })
+        .collect()
+}

@@ -1,0 +1,56 @@
+//! What can go wrong, split by who is to blame.
+
+use std::path::Path;
+
+/// Result with this crate's [`Error`].
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// Any failure of this crate. The variant tells whose fault it is.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The operating system refused a read. Retry or fix permissions.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file, as the caller named it.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The bytes are not what they claim to be. The file is at fault; the text names the camera, the
+    /// field and the value.
+    #[error("{file}: {problem}")]
+    Format {
+        /// The file, as the caller named it.
+        file: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// An argument is out of range. The caller is at fault.
+    #[error("{name} = {value}: expected {expected}")]
+    Parameter {
+        /// The parameter's name.
+        name: &'static str,
+        /// The value given.
+        value: String,
+        /// What would have been accepted.
+        expected: String,
+    },
+}
+
+impl Error {
+    /// An [`Error::Io`] about `file`.
+    pub(crate) fn io(file: impl AsRef<Path>, source: std::io::Error) -> Self {
+        Self::Io { file: file.as_ref().display().to_string(), source }
+    }
+
+    /// An [`Error::Format`] about `file`.
+    pub(crate) fn format(file: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Format { file: file.into(), problem: problem.into() }
+    }
+
+    /// An [`Error::Parameter`].
+    pub(crate) fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
+        Self::Parameter { name, value: value.to_string(), expected: expected.into() }
+    }
+}

@@ -1,0 +1,137 @@
+//! Colour of a Gaussian seen from a direction, whatever its SH-rest is stored as.
+
+use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
+use lexisplat::{Dictionary, Row, ShDegree, SparseCodes};
+
+use crate::scene::Scene;
+
+/// Independent sums of a dot product, so that additions need not wait for each other. Part of the
+/// rounding, so the same everywhere.
+const LANES: usize = 4;
+/// Channels of an interleaved atom: red, green, blue and one zero, so that each fills a register.
+const PADDED: usize = 4;
+
+/// A scene's view-dependent colour.
+///
+/// Sparse codes are never expanded: for each nonzero the atom's three channels are multiplied with the
+/// basis and only three sums are kept, which is `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
+#[derive(Debug)]
+pub struct Radiance<'a> {
+    degree: ShDegree,
+    dc: &'a [[f32; 3]],
+    rest: Rest<'a>,
+}
+
+#[derive(Debug)]
+enum Rest<'a> {
+    Dense(&'a [f32]),
+    Sparse { codes: &'a SparseCodes, atoms: Vec<[f32; PADDED]> },
+}
+
+type Basis = [f32; MAX_COEFFICIENTS - 1];
+
+impl<'a> Radiance<'a> {
+    /// The radiance of `scene`. Copies the dictionary, nothing else.
+    #[must_use]
+    pub fn new(scene: &Scene<'a>) -> Self {
+        let rest = match scene {
+            Scene::Dense(splats) => Rest::Dense(&splats.sh_rest),
+            Scene::Sparse(model) => {
+                Rest::Sparse { codes: &model.codes, atoms: interleave(&model.dictionary) }
+            }
+        };
+        Self { degree: scene.degree(), dc: &scene.geometry().dc, rest }
+    }
+
+    /// Colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
+    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel.
+    ///
+    /// # Panics
+    /// If the scene has no Gaussian `i`.
+    #[must_use]
+    #[inline]
+    pub fn colour(&self, i: usize, direction: [f32; 3]) -> [f32; 3] {
+        let per_channel = self.degree.rest_per_channel();
+        let mut rest = [0.0; CHANNELS];
+        if per_channel > 0 {
+            let basis = rest_basis(self.degree, direction);
+            rest = match &self.rest {
+                Rest::Dense(all) => {
+                    let dim = self.degree.rest();
+                    dense(&all[i * dim..(i + 1) * dim], per_channel, &basis)
+                }
+                Rest::Sparse { codes, atoms } => match codes.row(i) {
+                    Row::Exact(row) => dense(row, per_channel, &basis),
+                    Row::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
+                },
+            };
+        }
+        std::array::from_fn(|c| (COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c]).max(0.0))
+    }
+}
+
+/// Dot products of the three channels of a channel-major row with the basis.
+#[inline]
+fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
+    let mut sums = [0.0; CHANNELS];
+    for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(per_channel)) {
+        let mut lanes = [0.0_f32; LANES];
+        for (channel, basis) in channel.chunks(LANES).zip(basis.chunks(LANES)) {
+            for ((lane, value), b) in lanes.iter_mut().zip(channel).zip(basis) {
+                *lane += value * b;
+            }
+        }
+        *sum = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    }
+    sums
+}
+
+/// The same for a code: `sum_j value_j * (basis . atom_j)`.
+#[inline]
+fn sparse(
+    code: impl Iterator<Item = (usize, f32)>,
+    atoms: &[[f32; PADDED]],
+    per_channel: usize,
+    basis: &Basis,
+) -> [f32; CHANNELS] {
+    let basis = &basis[..per_channel];
+    let mut sums = [0.0_f32; PADDED];
+    for (atom, value) in code {
+        let atom = &atoms[atom * per_channel..(atom + 1) * per_channel];
+        let mut even = [0.0_f32; PADDED];
+        let mut odd = [0.0_f32; PADDED];
+        let mut pairs = atom.chunks_exact(2).zip(basis.chunks_exact(2));
+        for (atom, b) in &mut pairs {
+            for c in 0..PADDED {
+                even[c] += b[0] * atom[0][c];
+                odd[c] += b[1] * atom[1][c];
+            }
+        }
+        if per_channel % 2 == 1 {
+            for c in 0..PADDED {
+                even[c] += basis[per_channel - 1] * atom[per_channel - 1][c];
+            }
+        }
+        for c in 0..PADDED {
+            sums[c] += value * (even[c] + odd[c]);
+        }
+    }
+    [sums[0], sums[1], sums[2]]
+}
+
+/// The atoms with the channels of each coefficient side by side.
+fn interleave(dictionary: &Dictionary) -> Vec<[f32; PADDED]> {
+    let per_channel = dictionary.degree().rest_per_channel();
+    let mut atoms = Vec::with_capacity(dictionary.len() * per_channel);
+    for j in 0..dictionary.len() {
+        let atom = dictionary.atom(j);
+        atoms.extend((0..per_channel).map(|k| {
+            let mut coefficient = [0.0; PADDED];
+            for (c, value) in coefficient.iter_mut().take(CHANNELS).enumerate() {
+                *value = atom[c * per_channel + k];
+            }
+            coefficient
+        }));
+    }
+    atoms
+}
