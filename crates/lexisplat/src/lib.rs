@@ -8,6 +8,7 @@ mod dictionary;
 mod error;
 mod input;
 pub mod learn;
+pub mod lexi;
 mod limits;
 mod model;
 pub mod output;

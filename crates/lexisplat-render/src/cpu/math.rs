@@ -9,8 +9,7 @@ const ROUND: f32 = 12_582_912.0;
 const LN2_HIGH: f32 = 0.693_359_4;
 const LN2_LOW: f32 = -2.121_944_4e-4;
 /// exp(r) = 1 + r + r^2 P(r) on [-ln 2 / 2, ln 2 / 2], highest power first (Cephes `expf`).
-const POLYNOMIAL: [f32; 6] =
-    [1.987_569_2e-4, 1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
+const POLYNOMIAL: [f32; 6] = [1.987_569_2e-4, 1.398_2e-3, 8.333_452e-3, 4.166_579_6e-2, 1.666_666_5e-1, 0.5];
 /// Exponent bias and position in an f32.
 const BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;

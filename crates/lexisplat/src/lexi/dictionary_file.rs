@@ -1,0 +1,59 @@
+//! A dictionary on its own, for reuse on other scenes.
+
+use std::path::Path;
+
+use safetensors::Dtype;
+
+use super::read;
+use super::schema::{DICTIONARY_FORMAT, FORMAT, key, tensor};
+use super::tensors::{Checked, Draft, Tensor, preamble};
+use crate::dictionary::Dictionary;
+use crate::error::{Error, Result};
+use crate::input::Input;
+use crate::limits::Limits;
+use crate::output::write_whole;
+use crate::sh::ShDegree;
+
+/// Reads the dictionary of a dictionary file or of a .lexi scene.
+///
+/// # Errors
+/// As [`super::read()`]; a scene of degree 0 has none.
+pub fn read_dictionary(path: &Path, limits: &Limits) -> Result<Dictionary> {
+    let bytes = Input::open(path)?;
+    read_dictionary_bytes(&path.display().to_string(), &bytes, limits)
+}
+
+/// Reads the dictionary of a file in memory. `file` is its name in errors.
+///
+/// # Errors
+/// As [`read_dictionary`].
+pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Dictionary> {
+    let checked = Checked::open(file, bytes, &[DICTIONARY_FORMAT, FORMAT], limits)?;
+    let degree = ShDegree::new(checked.number(key::DEGREE)?)
+        .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))?;
+    if degree == ShDegree::ZERO {
+        return Err(checked.malformed("a scene of SH degree 0 has no dictionary"));
+    }
+    read::dictionary(&checked, degree)
+}
+
+/// Writes `dictionary` to `path`, whole or not at all. Returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Parameter`] for the empty dictionary of degree 0, [`Error::Io`] for the file.
+pub fn write_dictionary(path: &Path, dictionary: &Dictionary) -> Result<u64> {
+    if dictionary.is_empty() {
+        return Err(Error::parameter("dictionary", "empty", "a scene with view-dependent colour"));
+    }
+    let mut metadata = preamble(DICTIONARY_FORMAT);
+    metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
+    let shape = [dictionary.len(), dictionary.dim()];
+    let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());
+    let draft = Draft::new(metadata, vec![tensor]);
+    let mut bytes = 0;
+    write_whole(path, |writer| {
+        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
+        Ok(())
+    })?;
+    Ok(bytes)
+}

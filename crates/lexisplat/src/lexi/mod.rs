@@ -1,0 +1,15 @@
+//! The .lexi file: a safetensors file whose tensors are a [`Model`](crate::Model).
+//!
+//! docs/FORMAT.md is the specification. Every byte is covered by a CRC-32: each tensor by an entry of the
+//! metadata key `checksums`, the header by the tensor `checksum.header`.
+
+mod dictionary_file;
+mod read;
+mod schema;
+mod tensors;
+mod write;
+
+pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
+pub use read::{is_lexi, read, read_bytes};
+pub use schema::{MAX_VERSION, VERSION};
+pub use write::{attribute_bytes, file_bytes, sh_bytes, write, write_to};

@@ -1,0 +1,58 @@
+//! Names and numbers of the file format, once.
+
+/// Newest version of the format that is written.
+pub const VERSION: u64 = 1;
+/// Newest version of the format that is read.
+pub const MAX_VERSION: u64 = 1;
+
+/// Header and data start at multiples of this, as the safetensors format asks.
+pub(super) const HEADER_ALIGNMENT: usize = 8;
+/// Bytes of the length that precedes the JSON header.
+pub(super) const LENGTH_BYTES: usize = 8;
+
+/// Value of [`key::FORMAT`] in a scene.
+pub(super) const FORMAT: &str = "lexi";
+/// Value of [`key::FORMAT`] in a file that holds only a dictionary.
+pub(super) const DICTIONARY_FORMAT: &str = "lexi-dictionary";
+
+/// Prefix of tensors that hold per-Gaussian properties 3DGS does not define.
+pub(super) const EXTRA_PREFIX: &str = "extra.";
+/// Prefix of tensors a reader may ignore.
+pub(super) const IGNORED_PREFIX: &str = "x-";
+
+/// Names of tensors.
+pub(super) mod tensor {
+    pub(crate) const POSITION: &str = "position";
+    pub(crate) const NORMAL: &str = "normal";
+    pub(crate) const DC: &str = "dc";
+    pub(crate) const OPACITY: &str = "opacity";
+    pub(crate) const SCALE: &str = "scale";
+    pub(crate) const ROTATION: &str = "rotation";
+    pub(crate) const DICTIONARY: &str = "dictionary";
+    pub(crate) const COUNTS: &str = "codes.counts";
+    pub(crate) const POINTERS: &str = "codes.pointers";
+    pub(crate) const INDICES: &str = "codes.indices";
+    pub(crate) const VALUES: &str = "codes.values";
+    pub(crate) const ESCAPED: &str = "escapes.gaussians";
+    pub(crate) const ESCAPE_ROWS: &str = "escapes.rows";
+    pub(crate) const HEADER_CHECKSUM: &str = "checksum.header";
+}
+
+/// Keys of the metadata.
+pub(super) mod key {
+    pub(crate) const FORMAT: &str = "format";
+    pub(crate) const VERSION: &str = "version";
+    pub(crate) const GENERATOR: &str = "generator";
+    pub(crate) const DEGREE: &str = "degree";
+    pub(crate) const LAYOUT: &str = "layout";
+    pub(crate) const PURSUIT: &str = "pursuit";
+    pub(crate) const TOLERANCE: &str = "tolerance";
+    pub(crate) const MAX_NONZEROS: &str = "max_nonzeros";
+    pub(crate) const SEED: &str = "seed";
+    pub(crate) const MAX_RESIDUAL: &str = "max_residual";
+    pub(crate) const RMS_RESIDUAL: &str = "rms_residual";
+    pub(crate) const OVER_TOLERANCE: &str = "over_tolerance";
+    pub(crate) const ANTIALIASED: &str = "antialiased";
+    pub(crate) const COMMENTS: &str = "comments";
+    pub(crate) const CHECKSUMS: &str = "checksums";
+}

@@ -1,0 +1,187 @@
+//! Writing a [`Model`].
+
+use std::io::Write;
+use std::path::Path;
+
+use safetensors::Dtype;
+
+use super::schema::{EXTRA_PREFIX, FORMAT, key, tensor};
+use super::tensors::{Draft, Source, Tensor, preamble};
+use crate::codes::{Indices, Values};
+use crate::error::{Error, Result};
+use crate::limits::Limits;
+use crate::model::{Layout, Model};
+use crate::output::write_whole;
+use crate::splats::ExtraValues;
+
+/// Writes `model` to `path`, whole or not at all. Returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Io`] for the file; [`Error::Parameter`] if the values' type is not the layout's;
+/// [`Error::Limit`] if the paper's 32-bit pointers cannot count the nonzeros.
+pub fn write(path: &Path, model: &Model) -> Result<u64> {
+    let draft = draft(model)?;
+    let mut bytes = 0;
+    write_whole(path, |writer| {
+        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
+        Ok(())
+    })?;
+    Ok(bytes)
+}
+
+/// Writes `model` to `writer`. Returns the number of bytes.
+///
+/// # Errors
+/// As [`write`]; an [`Error::Io`] names no file.
+pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
+    draft(model)?.write_to(writer).map_err(|e| Error::io("output", e))
+}
+
+/// Bytes of each tensor as written, in file order, and of the header under `header`. They sum to the
+/// file's size.
+///
+/// # Errors
+/// As [`write`], without the I/O.
+pub fn attribute_bytes(model: &Model) -> Result<Vec<(String, u64)>> {
+    let mut out: Vec<(String, u64)> =
+        tensors(model)?.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
+    out.push(("header".to_owned(), draft(model)?.header_bytes()));
+    Ok(out)
+}
+
+/// Bytes of the whole file as written.
+///
+/// # Errors
+/// As [`write`], without the I/O.
+pub fn file_bytes(model: &Model) -> Result<u64> {
+    Ok(attribute_bytes(model)?.iter().map(|a| a.1).sum())
+}
+
+/// Bytes that stand for SH-rest: dictionary, codes and escapes.
+///
+/// # Errors
+/// As [`write`], without the I/O.
+pub fn sh_bytes(model: &Model) -> Result<u64> {
+    let is_sh =
+        |name: &str| name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.");
+    Ok(tensors(model)?.iter().filter(|t| is_sh(&t.name)).map(|t| t.bytes() as u64).sum())
+}
+
+fn draft(model: &Model) -> Result<Draft<'_>> {
+    let record = &model.record;
+    let mut metadata = preamble(FORMAT);
+    let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
+    put(key::DEGREE, model.degree().to_string());
+    put(key::LAYOUT, record.layout.to_string());
+    put(key::PURSUIT, record.pursuit.to_string());
+    put(key::SEED, record.seed.to_string());
+    put(key::MAX_RESIDUAL, record.max_residual.to_string());
+    put(key::RMS_RESIDUAL, record.rms_residual.to_string());
+    put(key::OVER_TOLERANCE, record.over_tolerance.to_string());
+    put(key::ANTIALIASED, model.meta.antialiased.to_string());
+    put(key::COMMENTS, serde_json::to_string(&model.meta.comments).unwrap_or_default());
+    if let Some(tolerance) = record.tolerance {
+        put(key::TOLERANCE, tolerance.to_string());
+    }
+    if let Some(cap) = record.max_nonzeros {
+        put(key::MAX_NONZEROS, cap.to_string());
+    }
+    Ok(Draft::new(metadata, tensors(model)?))
+}
+
+fn tensors(model: &Model) -> Result<Vec<Tensor<'_>>> {
+    model.geometry.validate()?;
+    let (g, codes, n) = (&model.geometry, &model.codes, model.len());
+    if codes.len() != n {
+        return Err(Error::parameter("codes", codes.len(), format!("{n} columns, one a Gaussian")));
+    }
+    let mut out = vec![
+        Tensor::plain(tensor::POSITION, Dtype::F32, &[n, 3], &g.positions),
+        Tensor::plain(tensor::DC, Dtype::F32, &[n, 3], &g.dc),
+        Tensor::plain(tensor::OPACITY, Dtype::F32, &[n], &g.opacities),
+        Tensor::plain(tensor::SCALE, Dtype::F32, &[n, 3], &g.scales),
+        Tensor::plain(tensor::ROTATION, Dtype::F32, &[n, 4], &g.rotations),
+    ];
+    if !g.normals.is_empty() {
+        out.push(Tensor::plain(tensor::NORMAL, Dtype::F32, &[n, 3], &g.normals));
+    }
+    for extra in &g.extras {
+        let name = format!("{EXTRA_PREFIX}{}", extra.name);
+        out.push(match &extra.values {
+            ExtraValues::I8(v) => Tensor::plain(&name, Dtype::I8, &[n], v),
+            ExtraValues::U8(v) => Tensor::plain(&name, Dtype::U8, &[n], v),
+            ExtraValues::I16(v) => Tensor::plain(&name, Dtype::I16, &[n], v),
+            ExtraValues::U16(v) => Tensor::plain(&name, Dtype::U16, &[n], v),
+            ExtraValues::I32(v) => Tensor::plain(&name, Dtype::I32, &[n], v),
+            ExtraValues::U32(v) => Tensor::plain(&name, Dtype::U32, &[n], v),
+            ExtraValues::F32(v) => Tensor::plain(&name, Dtype::F32, &[n], v),
+            ExtraValues::F64(v) => Tensor::plain(&name, Dtype::F64, &[n], v),
+        });
+    }
+    let dim = model.dictionary.dim();
+    if dim == 0 {
+        return Ok(out);
+    }
+    let shape = [model.dictionary.len(), dim];
+    out.push(Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, model.dictionary.as_slice()));
+    push_codes(&mut out, model)?;
+    let escapes = codes.escapes();
+    if !escapes.gaussians.is_empty() {
+        let count = escapes.gaussians.len();
+        out.push(Tensor::plain(tensor::ESCAPED, Dtype::U32, &[count], &escapes.gaussians));
+        out.push(Tensor::plain(tensor::ESCAPE_ROWS, Dtype::F32, &[count, dim], &escapes.rows));
+    }
+    Ok(out)
+}
+
+fn push_codes<'a>(out: &mut Vec<Tensor<'a>>, model: &'a Model) -> Result<()> {
+    let (codes, layout) = (&model.codes, model.record.layout);
+    let nonzeros = codes.nonzeros();
+    let counts = codes.counts();
+    out.push(match (codes.values(), layout) {
+        (Values::F16(v), Layout::F16) => Tensor::plain(tensor::VALUES, Dtype::F16, &[nonzeros], as_bits(v)),
+        (Values::F32(v), Layout::F32 | Layout::Paper) => {
+            Tensor::plain(tensor::VALUES, Dtype::F32, &[nonzeros], v)
+        }
+        (values, _) => {
+            let expected = format!("values of another type than these of {} bytes", values.width());
+            return Err(Error::parameter("layout", layout, expected));
+        }
+    });
+    if layout != Layout::Paper {
+        out.push(match codes.indices() {
+            Indices::U8(v) => Tensor::plain(tensor::INDICES, Dtype::U8, &[nonzeros], v),
+            Indices::U16(v) => Tensor::plain(tensor::INDICES, Dtype::U16, &[nonzeros], v),
+        });
+        out.push(Tensor::plain(tensor::COUNTS, Dtype::U8, &[counts.len()], counts));
+        return Ok(());
+    }
+    let largest = i32::MAX.unsigned_abs().into();
+    Limits::check("nonzeros in layout 'paper', whose pointers are i32", nonzeros as u64, largest)?;
+    let pointers = Source::i32(|| {
+        let ends = counts.iter().scan(0_i32, |end, &count| {
+            *end += i32::from(count);
+            Some(*end)
+        });
+        Box::new(std::iter::once(0).chain(ends))
+    });
+    let indices = Source::i32(|| match codes.indices() {
+        Indices::U8(v) => Box::new(v.iter().map(|&i| i32::from(i))),
+        Indices::U16(v) => Box::new(v.iter().map(|&i| i32::from(i))),
+    });
+    let tensor = |name: &str, len, source| Tensor {
+        name: name.to_owned(),
+        dtype: Dtype::I32,
+        shape: vec![len],
+        source,
+    };
+    out.push(tensor(tensor::POINTERS, counts.len() + 1, pointers));
+    out.push(tensor(tensor::INDICES, nonzeros, indices));
+    Ok(())
+}
+
+/// The bits of half floats, which `bytemuck` knows as integers.
+fn as_bits(values: &[half::f16]) -> &[u16] {
+    use half::slice::HalfFloatSliceExt;
+    values.reinterpret_cast()
+}
