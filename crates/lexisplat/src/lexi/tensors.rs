@@ -308,6 +308,6 @@ pub(super) fn preamble(format: &str) -> BTreeMap<String, String> {
     BTreeMap::from([
         (key::FORMAT.to_owned(), format.to_owned()),
         (key::VERSION.to_owned(), VERSION.to_string()),
-        (key::GENERATOR.to_owned(), concat!("lexisplat ", env!("CARGO_PKG_VERSION")).to_owned()),
+        (key::GENERATOR.to_owned(), "lexisplat".to_owned()),
     ])
 }

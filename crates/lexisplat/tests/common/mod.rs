@@ -1,0 +1,105 @@
+//! Small hand-made models that several tests share.
+#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part")]
+
+use half::f16;
+use lexisplat::{
+    Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Pursuit, Record, SceneMeta,
+    ShDegree, SparseCodes, Values,
+};
+
+/// A number in a small range, exact in f16, from an index: no library decides what the files hold.
+pub fn plain(i: usize) -> f32 {
+    let steps = u8::try_from(i * 37 % 64).unwrap();
+    f32::from(steps) / 16.0 - 2.0
+}
+
+fn rows<const W: usize>(n: usize, start: usize) -> Vec<[f32; W]> {
+    (0..n).map(|i| std::array::from_fn(|c| plain(start + i * W + c))).collect()
+}
+
+fn geometry(n: usize) -> Geometry {
+    Geometry {
+        positions: rows(n, 1),
+        normals: Vec::new(),
+        dc: rows(n, 2),
+        opacities: (0..n).map(|i| plain(i + 3)).collect(),
+        scales: rows(n, 4),
+        rotations: rows(n, 5),
+        extras: Vec::new(),
+    }
+}
+
+/// Atoms 0.6 e_a + 0.8 e_b.
+fn dictionary(degree: ShDegree, atoms: usize) -> Dictionary {
+    let dim = degree.rest();
+    let mut values = vec![0.0; atoms * dim];
+    for (j, atom) in values.chunks_exact_mut(dim).enumerate() {
+        let first = j % dim;
+        atom[first] = 0.6;
+        atom[(first + 1 + (j / dim) % (dim - 1)) % dim] = 0.8;
+    }
+    Dictionary::new(degree, values).unwrap()
+}
+
+fn model(degree: u8, atoms: usize, layout: Layout, escape: bool) -> Model {
+    let (n, degree) = (5, ShDegree::new(degree).unwrap());
+    let record = Record {
+        tolerance: Some(0.1),
+        max_nonzeros: None,
+        pursuit: Pursuit::Ols,
+        seed: 7,
+        layout,
+        max_residual: 0.0625,
+        rms_residual: 0.03125,
+        over_tolerance: 0,
+    };
+    let counts: Vec<u8> = if degree.rest() == 0 { vec![0; n] } else { vec![2, 0, 3, 0, 1] };
+    let nonzeros = counts.iter().map(|&c| usize::from(c)).sum::<usize>();
+    let dictionary = if degree.rest() == 0 { Dictionary::empty() } else { dictionary(degree, atoms) };
+    // Ascending within each Gaussian, whatever the number of atoms.
+    let picks: Vec<usize> = [0, atoms.saturating_sub(1), 0, 1, 2, 3][..nonzeros].to_vec();
+    let indices = match Indices::for_atoms(atoms) {
+        Indices::U8(_) => Indices::U8(picks.iter().map(|&p| u8::try_from(p).unwrap()).collect()),
+        Indices::U16(_) => Indices::U16(picks.iter().map(|&p| u16::try_from(p).unwrap()).collect()),
+    };
+    let numbers: Vec<f32> = (0..nonzeros).map(|k| plain(k + 11)).collect();
+    let values = match layout {
+        Layout::F16 => Values::F16(numbers.iter().map(|&v| f16::from_f32(v)).collect()),
+        _ => Values::F32(numbers),
+    };
+    let escapes = if escape {
+        Escapes { gaussians: vec![3], rows: (0..degree.rest()).map(|d| plain(d + 23)).collect() }
+    } else {
+        Escapes::default()
+    };
+    let codes = SparseCodes::new(&dictionary, counts, indices, values, escapes).unwrap();
+    let meta = SceneMeta { comments: vec!["made by \"hand\"".to_owned()], antialiased: escape };
+    Model { geometry: geometry(n), meta, dictionary, codes, record }
+}
+
+/// Every kind of file, by the name of its golden copy.
+pub fn models() -> Vec<(&'static str, Model)> {
+    let mut rich = model(1, 300, Layout::F32, true);
+    rich.geometry.normals = rows(5, 9);
+    rich.geometry.extras = vec![
+        Extra { name: "label".to_owned(), values: ExtraValues::U8(vec![1, 2, 3, 4, 255]) },
+        Extra { name: "time".to_owned(), values: ExtraValues::F64(vec![0.5, -1.0, f64::MAX, 0.0, 3.25]) },
+    ];
+    rich.record.tolerance = None;
+    rich.record.max_nonzeros = Some(3);
+    vec![
+        ("f32", model(3, 8, Layout::F32, false)),
+        ("f16", model(3, 8, Layout::F16, false)),
+        ("paper", model(2, 8, Layout::Paper, false)),
+        ("degree0", model(0, 0, Layout::F16, false)),
+        ("degree4", model(4, 5, Layout::F16, true)),
+        ("degree1_u16_escapes", rich),
+    ]
+}
+
+/// The bytes of `model` as written today.
+pub fn written(model: &Model) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    lexisplat::lexi::write_to(&mut bytes, model).unwrap();
+    bytes
+}

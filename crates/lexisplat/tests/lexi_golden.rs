@@ -1,0 +1,126 @@
+//! Files written by released versions stay readable, and today's bytes are theirs.
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::{models, written};
+use lexisplat::{Error, FormatError, Limits, Splats, lexi};
+
+fn golden(name: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect()
+}
+
+/// Makes the golden files of a new format version. Never run it to make a failing test pass.
+#[test]
+#[ignore = "writes tests/golden"]
+fn regenerate() {
+    for (name, model) in models() {
+        std::fs::write(golden(name), written(&model)).unwrap();
+    }
+}
+
+#[test]
+fn golden_files_read_as_they_were_written() {
+    for (name, model) in models() {
+        let read = lexi::read(&golden(name), &Limits::default()).unwrap();
+        assert_eq!(read, model, "{name}");
+    }
+}
+
+#[test]
+fn todays_bytes_are_the_golden_ones() {
+    for (name, model) in models() {
+        let bytes = written(&model);
+        assert!(bytes == std::fs::read(golden(name)).unwrap(), "{name} is written differently now");
+        assert_eq!(lexi::file_bytes(&model).unwrap(), bytes.len() as u64, "{name}");
+        let listed: u64 = lexi::attribute_bytes(&model).unwrap().iter().map(|a| a.1).sum();
+        assert_eq!(listed, bytes.len() as u64, "{name}");
+    }
+}
+
+#[test]
+fn other_readers_of_safetensors_take_them() {
+    for (name, model) in models() {
+        let bytes = written(&model);
+        let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        assert_eq!(tensors.tensor("position").unwrap().shape(), [5, 3], "{name}");
+        assert_eq!(
+            tensors.tensor("position").unwrap().data(),
+            bytemuck::cast_slice::<_, u8>(&model.geometry.positions)
+        );
+        for (_, view) in tensors.iter() {
+            let size = view.dtype().bitsize() / 8;
+            let offset = view.data().as_ptr() as usize - bytes.as_ptr() as usize;
+            assert!(offset.is_multiple_of(size), "{name}: a tensor is not aligned to its entries");
+        }
+    }
+}
+
+#[test]
+fn a_dictionary_travels_alone() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, model) in models() {
+        let path = folder.path().join("d.lexi");
+        if model.dictionary.is_empty() {
+            assert!(matches!(lexi::write_dictionary(&path, &model.dictionary), Err(Error::Parameter { .. })));
+            assert!(lexi::read_dictionary(&golden(name), &Limits::default()).is_err());
+            continue;
+        }
+        lexi::write_dictionary(&path, &model.dictionary).unwrap();
+        assert_eq!(lexi::read_dictionary(&path, &Limits::default()).unwrap(), model.dictionary, "{name}");
+        assert_eq!(lexi::read_dictionary(&golden(name), &Limits::default()).unwrap(), model.dictionary);
+        let error = lexi::read(&path, &Limits::default()).unwrap_err().to_string();
+        assert!(error.contains("'lexi-dictionary'"), "{error}");
+    }
+}
+
+#[test]
+fn dense_values_are_the_sum_of_atoms() {
+    for (name, model) in models() {
+        let Splats { sh_rest, degree, .. } = model.to_splats();
+        let dim = degree.rest();
+        let mut k = 0;
+        for (i, &count) in model.codes.counts().iter().enumerate() {
+            let mut expected = vec![0.0_f32; dim];
+            if let Some(e) = model.codes.escapes().gaussians.iter().position(|&g| g as usize == i) {
+                expected.copy_from_slice(&model.codes.escapes().rows[e * dim..][..dim]);
+            }
+            for _ in 0..count {
+                let (atom, value) = (model.codes.indices().get(k), model.codes.values().get(k));
+                for (e, a) in expected.iter_mut().zip(model.dictionary.atom(atom)) {
+                    *e += value * a;
+                }
+                k += 1;
+            }
+            assert_eq!(&sh_rest[i * dim..][..dim], expected, "{name}, Gaussian {i}");
+        }
+    }
+}
+
+#[test]
+fn newer_versions_are_refused_by_number() {
+    let (_, model) = models().swap_remove(1);
+    let mut bytes = written(&model);
+    let text = b"\"version\":\"1\"";
+    let at = bytes.windows(text.len()).position(|w| w == text).unwrap();
+    bytes[at + text.len() - 2] = b'9';
+    let error = lexi::read_bytes("future.lexi", &bytes, &Limits::default()).unwrap_err();
+    assert!(
+        matches!(error, Error::Format { problem: FormatError::Version { found: 9, supported: 1 }, .. }),
+        "{error}"
+    );
+}
+
+/// docs/FORMAT.md shows a file byte by byte; it must be this one.
+#[test]
+fn the_documented_example_is_true() {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "docs", "FORMAT.md"].iter().collect();
+    let Ok(document) = std::fs::read_to_string(path) else { return };
+    let bytes = std::fs::read(golden("degree0")).unwrap();
+    for (row, chunk) in bytes.chunks(16).enumerate() {
+        let hex: Vec<String> = chunk.iter().map(|b| format!("{b:02x}")).collect();
+        let line = format!("{:04x}  {}", row * 16, hex.join(" "));
+        assert!(document.contains(&line), "docs/FORMAT.md lacks the line\n{line}");
+    }
+}
