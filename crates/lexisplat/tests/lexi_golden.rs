@@ -1,5 +1,7 @@
 //! Files written by released versions stay readable, and today's bytes are theirs.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod common;
 
 use std::path::PathBuf;

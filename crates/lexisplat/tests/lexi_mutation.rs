@@ -1,5 +1,7 @@
 //! Damaged and hostile .lexi files: refused, without panic, within memory.
 
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
 mod common;
 
 use std::alloc::{GlobalAlloc, Layout, System};

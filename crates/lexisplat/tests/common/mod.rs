@@ -1,5 +1,10 @@
 //! Small hand-made models that several tests share.
-#![allow(dead_code, unreachable_pub, reason = "each test binary uses a part")]
+#![allow(
+    dead_code,
+    unreachable_pub,
+    clippy::unwrap_used,
+    reason = "each test binary uses a part; a test may panic"
+)]
 
 use half::f16;
 use lexisplat::{
@@ -29,7 +34,7 @@ fn geometry(n: usize) -> Geometry {
     }
 }
 
-/// Atoms 0.6 e_a + 0.8 e_b.
+/// Atoms `0.6 e_a + 0.8 e_b`.
 fn dictionary(degree: ShDegree, atoms: usize) -> Dictionary {
     let dim = degree.rest();
     let mut values = vec![0.0; atoms * dim];

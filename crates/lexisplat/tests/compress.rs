@@ -1,0 +1,221 @@
+//! The encoder as a whole: the promise, every degree, odd scenes, and bytes that depend on nothing but
+//! the input.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod common;
+
+use common::written;
+use lexisplat::{
+    CompressOptions, Dictionary, Error, Geometry, Layout, Limits, Pursuit, SceneMeta, ShDegree, Silent,
+    Splats, compress, lexi,
+};
+
+struct Random(u64);
+
+impl Random {
+    /// Uniform in -1..1.
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        f32::from(u16::try_from(self.0 >> 48).unwrap()) / 32_768.0 - 1.0
+    }
+
+    fn row<const W: usize>(&mut self) -> [f32; W] {
+        std::array::from_fn(|_| self.next())
+    }
+}
+
+/// A scene whose SH-rest is a few common directions and noise, with norms spread over decades.
+fn scene(count: usize, degree: u8, seed: u64) -> Splats {
+    let degree = ShDegree::new(degree).unwrap();
+    let dim = degree.rest();
+    let mut random = Random(seed);
+    let shapes: Vec<Vec<f32>> = (0..6).map(|_| (0..dim).map(|_| random.next()).collect()).collect();
+    let mut sh_rest = Vec::new();
+    for i in 0..count {
+        let strength = [0.0, 0.01, 0.05, 0.1, 0.2][i % 5];
+        let weights: Vec<f32> = shapes.iter().map(|_| strength * random.next()).collect();
+        for d in 0..dim {
+            let signal: f32 = shapes.iter().zip(&weights).map(|(s, w)| s[d] * w).sum();
+            sh_rest.push(signal + 0.02 * random.next());
+        }
+    }
+    let geometry = Geometry {
+        positions: (0..count).map(|_| random.row()).collect(),
+        normals: Vec::new(),
+        dc: (0..count).map(|_| random.row()).collect(),
+        opacities: (0..count).map(|_| random.next()).collect(),
+        scales: (0..count).map(|_| random.row()).collect(),
+        rotations: (0..count).map(|_| random.row()).collect(),
+        extras: Vec::new(),
+    };
+    Splats { geometry, degree, sh_rest, meta: SceneMeta::default() }
+}
+
+/// Largest error of any Gaussian, in f64, on the values a decoder writes.
+fn worst(original: &Splats, decoded: &Splats) -> f64 {
+    let dim = original.degree.rest().max(1);
+    let rows = original.sh_rest.chunks_exact(dim).zip(decoded.sh_rest.chunks_exact(dim));
+    let error = |(a, b): (&[f32], &[f32])| {
+        let squares = a.iter().zip(b).map(|(x, y)| (f64::from(*x) - f64::from(*y)).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    rows.map(error).fold(0.0, f64::max)
+}
+
+fn options(change: impl FnOnce(&mut CompressOptions)) -> CompressOptions {
+    let mut options = CompressOptions::default();
+    change(&mut options);
+    options
+}
+
+#[test]
+fn every_degree_and_layout_keeps_the_promise_and_the_geometry() {
+    for degree in 0..=4 {
+        for layout in [Layout::F32, Layout::F16, Layout::Paper] {
+            let splats = scene(700, degree, 3);
+            let options = options(|o| o.layout = layout);
+            let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
+            let read = lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap();
+            assert_eq!(read, model, "degree {degree} {layout}");
+            let decoded = read.into_splats();
+            assert_eq!(decoded.geometry, splats.geometry);
+            let error = worst(&splats, &decoded);
+            assert!(error <= 0.1, "degree {degree} {layout}: {error}");
+            assert!(
+                (error - model.record.max_residual).abs() < 1e-12,
+                "{error} {}",
+                model.record.max_residual
+            );
+            assert_eq!(model.record.over_tolerance, 0);
+            assert_eq!(model.dictionary.len(), 2 * splats.degree.rest());
+            if degree > 0 {
+                assert!(error > 0.02, "degree {degree}: an error of {error} wastes the tolerance");
+                assert!(report.mean_nonzeros < 12.0, "degree {degree}: {}", report.mean_nonzeros);
+            }
+            let counted: u64 = report.nonzero_histogram.iter().sum();
+            assert_eq!(counted + report.escapes, 700);
+        }
+    }
+}
+
+#[test]
+fn threads_do_not_change_the_bytes() {
+    // More Gaussians than one chunk, so that there is something to share out.
+    let splats = scene(9000, 2, 4);
+    let bytes = |threads: usize, seed: u64| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let options = options(|o| o.seed = seed);
+        written(&pool.install(|| compress(splats.clone(), &options, &Silent)).unwrap().0)
+    };
+    let one = bytes(1, 0);
+    for threads in [2, 5] {
+        assert!(bytes(threads, 0) == one, "{threads} threads");
+    }
+    assert!(bytes(1, 1) != one, "the seed must matter");
+}
+
+#[test]
+fn learning_beats_the_first_guess_and_generalises() {
+    let splats = scene(6000, 3, 5);
+    let unlearned = {
+        let axes: Vec<f32> = (0..45 * 45).map(|i| if i % 46 == 0 { 1.0 } else { 0.0 }).collect();
+        let options = options(|o| o.dictionary = Some(Dictionary::new(ShDegree::THREE, axes).unwrap()));
+        compress(splats.clone(), &options, &Silent).unwrap().1.mean_nonzeros
+    };
+    let (_, report) = compress(splats, &CompressOptions::default(), &Silent).unwrap();
+    let learned = report.learned.unwrap();
+    assert!(report.mean_nonzeros < 0.3 * unlearned, "{} {unlearned}", report.mean_nonzeros);
+    assert!((learned.held_out_nonzeros - report.mean_nonzeros).abs() < 0.6, "{learned:?}");
+}
+
+#[test]
+fn ols_needs_no_more_than_omp() {
+    let splats = scene(4000, 3, 6);
+    let mean = |pursuit| {
+        let options = options(|o| o.pursuit = pursuit);
+        compress(splats.clone(), &options, &Silent).unwrap().1.mean_nonzeros
+    };
+    assert!(mean(Pursuit::Ols) <= mean(Pursuit::Omp));
+}
+
+#[test]
+fn a_cap_lifts_the_promise_and_is_counted() {
+    let splats = scene(500, 3, 7);
+    let options = options(|o| o.max_nonzeros = Some(1));
+    let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
+    assert!(model.codes.counts().iter().all(|&c| c <= 1));
+    let decoded = model.to_splats();
+    let over = (0..splats.len()).filter(|&i| {
+        let squares = splats.rest(i).iter().zip(decoded.rest(i)).map(|(x, y)| f64::from(x - y).powi(2));
+        squares.sum::<f64>().sqrt() > 0.1
+    });
+    assert_eq!(over.count() as u64, model.record.over_tolerance);
+    assert!(model.record.over_tolerance > 0 && report.escapes == 0);
+    let mut only_cap = options;
+    only_cap.tolerance = None;
+    let (model, _) = compress(splats, &only_cap, &Silent).unwrap();
+    assert_eq!((model.record.tolerance, model.record.over_tolerance), (None, 0));
+}
+
+#[test]
+fn odd_scenes_have_results() {
+    for count in [0, 1, 2, 9] {
+        let splats = scene(count, 3, 8);
+        let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent).unwrap();
+        assert_eq!(lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap(), model, "{count}");
+        assert!(worst(&splats, &model.into_splats()) <= 0.1);
+    }
+    let mut flat = scene(300, 3, 9);
+    flat.sh_rest.fill(0.0);
+    let (model, report) = compress(flat, &CompressOptions::default(), &Silent).unwrap();
+    assert_eq!((model.codes.nonzeros(), report.mean_nonzeros, report.coefficient_ratio()), (0, 0.0, None));
+
+    let mut huge = scene(300, 3, 10);
+    huge.sh_rest[..45].fill(1e7);
+    huge.sh_rest[45..90].fill(f32::MAX);
+    let (model, report) = compress(huge.clone(), &CompressOptions::default(), &Silent).unwrap();
+    assert_eq!((report.escapes, &model.codes.escapes().gaussians[..]), (2, &[0, 1][..]));
+    let decoded = lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap().into_splats();
+    assert_eq!(decoded.rest(1), huge.rest(1), "an escape is exact");
+    assert!(worst(&huge, &decoded) <= 0.1);
+
+    let same = {
+        let mut splats = scene(200, 3, 11);
+        let row = splats.rest(4).to_vec();
+        splats.sh_rest = row.repeat(200);
+        splats
+    };
+    let (model, _) = compress(same, &CompressOptions::default(), &Silent).unwrap();
+    assert!(model.codes.counts().iter().all(|&c| c == 1), "one atom is the vector itself");
+}
+
+#[test]
+fn any_number_of_atoms_works() {
+    let splats = scene(1200, 1, 12);
+    for atoms in [1, 2, 9, 255, 256, 257, 1024] {
+        let options = options(|o| o.atoms = Some(atoms));
+        let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
+        assert_eq!(model.dictionary.len(), atoms);
+        assert_eq!(lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap(), model, "{atoms}");
+        assert!(worst(&splats, &model.into_splats()) <= 0.1, "{atoms} atoms");
+        assert!(report.escapes == 0 || atoms < 9);
+    }
+}
+
+#[test]
+fn wrong_options_are_named() {
+    let run = |change: fn(&mut CompressOptions)| {
+        let error = compress(scene(20, 3, 13), &options(change), &Silent).unwrap_err();
+        assert!(matches!(error, Error::Parameter { .. }), "{error}");
+        error.to_string()
+    };
+    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tol = 0"));
+    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tol = NaN"));
+    assert!(run(|o| o.tolerance = None).starts_with("tol = none"));
+    assert!(run(|o| o.atoms = Some(0)).starts_with("atoms = 0"));
+    assert!(run(|o| o.atoms = Some(1025)).contains("1 to 1024"));
+    assert!(run(|o| o.dictionary = Some(Dictionary::empty())).contains("degree 3"));
+    let mut broken = scene(20, 3, 14);
+    broken.sh_rest[100] = f32::NAN;
+    assert!(compress(broken, &CompressOptions::default(), &Silent).is_err());
+}
