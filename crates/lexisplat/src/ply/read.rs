@@ -103,9 +103,12 @@ pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Ply
 /// of a row, so this is at most four times the file. Zeroed memory comes untouched from the system;
 /// the threads that fill it are the first to write it.
 fn allocate(file: &str, layout: &Layout, count: usize) -> Result<Splats> {
-    let rest = count
-        .checked_mul(layout.degree.rest())
-        .ok_or_else(|| Error::malformed(file, format!("{count} vertices do not fit in memory")))?;
+    let rest = layout.degree.rest();
+    // 14 floats and 3 for normals; extras are 8 bytes at most. Only 32-bit systems can fail this.
+    let row = (17 + rest) * size_of::<f32>() + layout.extras.len() * size_of::<f64>();
+    if count.checked_mul(row).is_none_or(|bytes| isize::try_from(bytes).is_err()) {
+        return Err(Error::malformed(file, format!("{count} vertices do not fit in memory")));
+    }
     let extras = layout.extras.iter().map(|(name, field)| {
         let values = match field.ty {
             ScalarType::I8 => ExtraValues::I8(vec![0; count]),
@@ -130,7 +133,7 @@ fn allocate(file: &str, layout: &Layout, count: usize) -> Result<Splats> {
             extras: extras.collect(),
         },
         degree: layout.degree,
-        sh_rest: vec![0.0; rest],
+        sh_rest: vec![0.0; rest * count],
         meta: SceneMeta::default(),
     })
 }

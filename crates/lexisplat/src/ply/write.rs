@@ -37,10 +37,11 @@ pub fn write(path: &Path, splats: &Splats) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Writes `splats` as [`write`] does; the number of bytes.
+/// Writes `splats` as [`write()`] does; the number of bytes.
 ///
 /// # Errors
-/// Whatever `writer` returns, or [`io::ErrorKind::InvalidInput`] for a scene [`write`] refuses.
+/// Whatever `writer` returns, or [`io::ErrorKind::InvalidInput`] for a scene that
+/// [`write()`] refuses.
 pub fn write_to(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
     check(splats).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
     write_checked(writer, splats)
