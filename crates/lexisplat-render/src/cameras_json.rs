@@ -117,7 +117,8 @@ impl<'de> Visitor<'de> for CameraAt {
         let side = |field: &str, value: Option<f64>| {
             let value = value.ok_or_else(|| missing(field))?;
             whole(value).ok_or_else(|| {
-                let text = format!("camera {index}: field '{field}' is {value}, not a whole number of pixels");
+                let text =
+                    format!("camera {index}: field '{field}' is {value}, not a whole number of pixels");
                 A::Error::custom(text)
             })
         };
@@ -140,7 +141,9 @@ impl<'de> Visitor<'de> for CameraAt {
             name,
             split,
         };
-        camera.validate().map_err(|e| A::Error::custom(format!("camera {index} ('{}'): {e}", camera.name)))?;
+        camera
+            .validate()
+            .map_err(|e| A::Error::custom(format!("camera {index} ('{}'): {e}", camera.name)))?;
         Ok(camera)
     }
 }
@@ -152,7 +155,10 @@ fn whole(value: f64) -> Option<u32> {
     (f64::from(integer) == value).then_some(integer)
 }
 
-#[expect(clippy::cast_possible_truncation, reason = "rounding is meant; what overflows is refused as infinite")]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "rounding is meant; what overflows is refused as infinite"
+)]
 fn single(value: f64) -> f32 {
     value as f32
 }

@@ -46,7 +46,8 @@ mod tests {
 
     #[test]
     fn eight_bits_round_half_up_and_clip() {
-        let pixels = vec![[-1.0, 0.0, 2.0], [0.5, 1.0, f32::NAN], [0.499 / 255.0, 0.5 / 255.0, 254.6 / 255.0]];
+        let pixels =
+            vec![[-1.0, 0.0, 2.0], [0.5, 1.0, f32::NAN], [0.499 / 255.0, 0.5 / 255.0, 254.6 / 255.0]];
         let image = Image { width: 3, height: 1, pixels };
         assert_eq!(image.to_8bit(), [[0, 0, 255], [128, 255, 0], [0, 1, 255]]);
     }

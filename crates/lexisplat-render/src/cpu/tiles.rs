@@ -61,7 +61,8 @@ impl Grid {
     pub(super) fn rect(self, centre: [f32; 2], radius: f32) -> Option<Rect> {
         let most = [self.columns, self.rows];
         let min = std::array::from_fn(|k| truncated((centre[k] - radius) / TILE_F32, most[k]));
-        let max = std::array::from_fn(|k| truncated((centre[k] + radius + (TILE_F32 - 1.0)) / TILE_F32, most[k]));
+        let max =
+            std::array::from_fn(|k| truncated((centre[k] + radius + (TILE_F32 - 1.0)) / TILE_F32, most[k]));
         Rect { min, max }.intersect(Rect { min, max })
     }
 
@@ -214,7 +215,8 @@ mod tests {
                         (r.min[0] as usize..r.max[0] as usize).contains(&column)
                             && (r.min[1] as usize..r.max[1] as usize).contains(&row)
                     };
-                    let expected: Vec<u32> = (0..).zip(&rects).filter(|(_, r)| inside(r)).map(|(i, _)| i).collect();
+                    let expected: Vec<u32> =
+                        (0..).zip(&rects).filter(|(_, r)| inside(r)).map(|(i, _)| i).collect();
                     let found: Vec<u32> = lists.of((row - band.start) * grid.columns + column).collect();
                     assert_eq!(found, expected, "tile {column}, {row}");
                 }

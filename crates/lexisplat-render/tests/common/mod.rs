@@ -7,7 +7,7 @@ use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
 use lexisplat_render::Image;
 
 /// `name` in the data folder: `LEXISPLAT_DATA`, else `../shared/data` beside the workspace.
-pub fn data(name: &str) -> Option<PathBuf> {
+pub(crate) fn data(name: &str) -> Option<PathBuf> {
     let folder = std::env::var_os("LEXISPLAT_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
         PathBuf::from,
@@ -21,7 +21,7 @@ pub fn data(name: &str) -> Option<PathBuf> {
 }
 
 /// Reads a PLY of 62 floats a Gaussian by property name.
-pub fn load(name: &str) -> Option<Splats> {
+pub(crate) fn load(name: &str) -> Option<Splats> {
     let bytes = std::fs::read(data(name)?).unwrap();
     let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap();
     let header = std::str::from_utf8(&bytes[..end]).unwrap();
@@ -48,7 +48,7 @@ pub fn load(name: &str) -> Option<Splats> {
 }
 
 /// Peak signal-to-noise ratio in dB of two pictures, clipped to \[0, 1\] if `clip`; infinite if equal.
-pub fn psnr(a: &Image, b: &Image, clip: bool) -> f64 {
+pub(crate) fn psnr(a: &Image, b: &Image, clip: bool) -> f64 {
     assert_eq!((a.width, a.height), (b.width, b.height));
     let level = |v: f32| if clip { f64::from(v.clamp(0.0, 1.0)) } else { f64::from(v) };
     let squares: f64 = a
@@ -62,7 +62,7 @@ pub fn psnr(a: &Image, b: &Image, clip: bool) -> f64 {
 }
 
 /// The photo beside a scene that `camera` names.
-pub fn photo(folder: &str, camera: &str) -> Option<Image> {
+pub(crate) fn photo(folder: &str, camera: &str) -> Option<Image> {
     let stem = camera.split('.').next().unwrap();
     let picture = image::open(data(&format!("{folder}/{stem}.png"))?).unwrap().to_rgb8();
     let pixels: Vec<[u8; 3]> = picture.pixels().map(|p| p.0).collect();
