@@ -5,13 +5,16 @@
 mod codes;
 mod dictionary;
 mod error;
+mod input;
 mod limits;
 mod model;
 pub mod output;
 mod parallel;
+pub mod ply;
 mod progress;
 pub mod sh;
 mod splats;
+pub mod stats;
 
 pub use codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
 pub use dictionary::Dictionary;

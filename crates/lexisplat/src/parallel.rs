@@ -39,3 +39,16 @@ pub(crate) fn for_each_chunk_mut<T: Send>(
         values.chunks_mut(chunk).enumerate().for_each(|(c, piece)| f(c, piece));
     }
 }
+
+/// `f` over `items`, which are consumed; results in order.
+pub(crate) fn map_vec<T: Send, R: Send>(items: Vec<T>, f: impl Fn(T) -> R + Sync + Send) -> Vec<R> {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        items.into_par_iter().map(f).collect()
+    }
+    #[cfg(not(feature = "parallel"))]
+    {
+        items.into_iter().map(f).collect()
+    }
+}

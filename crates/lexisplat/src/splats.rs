@@ -70,6 +70,7 @@ macro_rules! for_extra {
         }
     };
 }
+pub(crate) use for_extra;
 
 impl ExtraValues {
     /// Number of values.
@@ -202,6 +203,18 @@ impl Splats {
         } else {
             Err(Error::parameter("sh_rest", self.sh_rest.len(), format!("{expected} values")))
         }
+    }
+
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    pub fn retain(&mut self, keep: &[bool]) {
+        self.geometry.retain(keep);
+        let dim = self.degree.rest();
+        let mut kept = 0;
+        for i in (0..keep.len()).filter(|&i| keep[i]) {
+            self.sh_rest.copy_within(i * dim..(i + 1) * dim, kept * dim);
+            kept += 1;
+        }
+        self.sh_rest.truncate(kept * dim);
     }
 
     /// The same scene with SH of at most `degree`: higher coefficients are cut off.

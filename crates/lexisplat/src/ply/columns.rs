@@ -1,0 +1,210 @@
+//! Copies columns out of packed rows: type and byte order are fixed before the loop over rows.
+
+use super::header::ScalarType;
+
+/// A scalar as it lies in a row.
+pub(super) trait Scalar: Copy {
+    /// Bytes of one value.
+    const BYTES: usize;
+    /// The value in `bytes`, which has [`Self::BYTES`] of them.
+    fn load<const BIG: bool>(bytes: &[u8]) -> Self;
+    /// The nearest f32; infinite if there is none.
+    fn to_f32(self) -> f32;
+}
+
+macro_rules! scalar {
+    ($($ty:ty),*) => {$(
+        impl Scalar for $ty {
+            const BYTES: usize = size_of::<$ty>();
+
+            #[inline(always)]
+            fn load<const BIG: bool>(bytes: &[u8]) -> Self {
+                match bytes.first_chunk() {
+                    Some(&bytes) if BIG => Self::from_be_bytes(bytes),
+                    Some(&bytes) => Self::from_le_bytes(bytes),
+                    None => Self::default(),
+                }
+            }
+
+            #[inline(always)]
+            #[allow(clippy::cast_possible_truncation, trivial_numeric_casts, reason = "rounding is meant")]
+            fn to_f32(self) -> f32 {
+                self as f32
+            }
+        }
+    )*};
+}
+scalar!(i8, u8, i16, u16, i32, u32, f32, f64);
+
+/// Calls `$call` with the type parameters of `$ty` and `$big`, written as `(T, BIG)`.
+macro_rules! monomorphise {
+    ($ty:expr, $big:expr, $name:ident($($arg:expr),*)) => {
+        match ($ty, $big) {
+            (ScalarType::I8, _) => $name::<i8, false>($($arg),*),
+            (ScalarType::U8, _) => $name::<u8, false>($($arg),*),
+            (ScalarType::I16, false) => $name::<i16, false>($($arg),*),
+            (ScalarType::I16, true) => $name::<i16, true>($($arg),*),
+            (ScalarType::U16, false) => $name::<u16, false>($($arg),*),
+            (ScalarType::U16, true) => $name::<u16, true>($($arg),*),
+            (ScalarType::I32, false) => $name::<i32, false>($($arg),*),
+            (ScalarType::I32, true) => $name::<i32, true>($($arg),*),
+            (ScalarType::U32, false) => $name::<u32, false>($($arg),*),
+            (ScalarType::U32, true) => $name::<u32, true>($($arg),*),
+            (ScalarType::F32, false) => $name::<f32, false>($($arg),*),
+            (ScalarType::F32, true) => $name::<f32, true>($($arg),*),
+            (ScalarType::F64, false) => $name::<f64, false>($($arg),*),
+            (ScalarType::F64, true) => $name::<f64, true>($($arg),*),
+        }
+    };
+}
+
+/// Packed rows of one size and byte order.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Packed<'a> {
+    /// Whole rows, one after another.
+    pub(super) bytes: &'a [u8],
+    /// Bytes of one row, not 0.
+    pub(super) row_bytes: usize,
+    /// Most significant byte first.
+    pub(super) big: bool,
+}
+
+/// Where a property lies in a row.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Field {
+    /// First byte.
+    pub(super) offset: usize,
+    /// Type there.
+    pub(super) ty: ScalarType,
+}
+
+/// Properties that become one array of f32, `width` to a Gaussian.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Group {
+    width: usize,
+    runs: Vec<Run>,
+}
+
+/// Fields of one type that follow each other both in the row and in the array.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Run {
+    first: Field,
+    /// Place of the first one in the array's row.
+    slot: usize,
+    len: usize,
+}
+
+impl Group {
+    /// The group whose column `i` is `fields[i]`.
+    pub(super) fn new(fields: &[Field]) -> Self {
+        let mut runs: Vec<Run> = Vec::new();
+        for (slot, &field) in fields.iter().enumerate() {
+            match runs.last_mut() {
+                Some(run)
+                    if run.first.ty == field.ty
+                        && run.first.offset + run.len * field.ty.bytes() == field.offset =>
+                {
+                    run.len += 1;
+                }
+                _ => runs.push(Run { first: field, slot, len: 1 }),
+            }
+        }
+        Self { width: fields.len(), runs }
+    }
+
+    /// Values a Gaussian.
+    pub(super) fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Fills `out`, `width` values a row of `rows`.
+    pub(super) fn read(&self, rows: Packed<'_>, out: &mut [f32]) {
+        for &run in &self.runs {
+            monomorphise!(run.first.ty, rows.big, read_run(rows, run, out, self.width));
+        }
+    }
+}
+
+fn read_run<T: Scalar, const BIG: bool>(rows: Packed<'_>, run: Run, out: &mut [f32], width: usize) {
+    // The lengths every layout has get loops the compiler unrolls.
+    match run.len {
+        1 => copy_run::<T, BIG>(rows, Run { len: 1, ..run }, out, width),
+        3 => copy_run::<T, BIG>(rows, Run { len: 3, ..run }, out, width),
+        4 => copy_run::<T, BIG>(rows, Run { len: 4, ..run }, out, width),
+        45 => copy_run::<T, BIG>(rows, Run { len: 45, ..run }, out, width),
+        _ => copy_run::<T, BIG>(rows, run, out, width),
+    }
+}
+
+#[inline(always)]
+fn copy_run<T: Scalar, const BIG: bool>(rows: Packed<'_>, run: Run, out: &mut [f32], width: usize) {
+    let source = run.first.offset..run.first.offset + run.len * T::BYTES;
+    let target = run.slot..run.slot + run.len;
+    for (row, out) in rows.bytes.chunks_exact(rows.row_bytes).zip(out.chunks_exact_mut(width)) {
+        let values = row[source.clone()].chunks_exact(T::BYTES).map(T::load::<BIG>);
+        for (out, value) in out[target.clone()].iter_mut().zip(values) {
+            *out = value.to_f32();
+        }
+    }
+}
+
+/// Fills `out` with the values at `offset` of each row, in their own type.
+pub(super) fn read_column<T: Scalar>(rows: Packed<'_>, offset: usize, out: &mut [T]) {
+    let place = offset..offset + T::BYTES;
+    let values = rows.bytes.chunks_exact(rows.row_bytes).map(|row| &row[place.clone()]);
+    if rows.big {
+        out.iter_mut().zip(values).for_each(|(out, bytes)| *out = T::load::<true>(bytes));
+    } else {
+        out.iter_mut().zip(values).for_each(|(out, bytes)| *out = T::load::<false>(bytes));
+    }
+}
+
+/// Whether any value is NaN or infinite.
+pub(super) fn any_not_finite(values: &[f32]) -> bool {
+    // No early exit, so that this runs at vector speed; the answer is nearly always no.
+    values.iter().fold(false, |any, v| any | !v.is_finite())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_of_one_type_become_one_run() {
+        let field = |offset, ty| Field { offset, ty };
+        let f32s = ScalarType::F32;
+        let group = Group::new(&[field(8, f32s), field(12, f32s), field(0, f32s), field(4, ScalarType::I32)]);
+        let runs: Vec<_> = group.runs.iter().map(|r| (r.first.offset, r.slot, r.len)).collect();
+        assert_eq!(runs, [(8, 0, 2), (0, 2, 1), (4, 3, 1)]);
+    }
+
+    #[test]
+    fn values_land_in_their_slots() {
+        let rows: Vec<u8> = (0..2_u8)
+            .flat_map(|r| [f32::from(r) + 0.25, 7.0, -1.5].into_iter().flat_map(f32::to_be_bytes).chain([r]))
+            .collect();
+        let field = |offset, ty| Field { offset, ty };
+        let group =
+            Group::new(&[field(8, ScalarType::F32), field(0, ScalarType::F32), field(12, ScalarType::U8)]);
+        let mut out = [0.0; 6];
+        let rows = Packed { bytes: &rows, row_bytes: 13, big: true };
+        group.read(rows, &mut out);
+        assert_eq!(out, [-1.5, 0.25, 0.0, -1.5, 1.25, 1.0]);
+        let mut bytes = [9_u8; 2];
+        read_column(rows, 12, &mut bytes);
+        assert_eq!(bytes, [0, 1]);
+    }
+
+    #[test]
+    fn not_finite_is_found_anywhere() {
+        let mut values = [1.0_f32; 37];
+        assert!(!any_not_finite(&values));
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for i in 0..values.len() {
+                values[i] = bad;
+                assert!(any_not_finite(&values));
+                values[i] = f32::MAX;
+            }
+        }
+    }
+}

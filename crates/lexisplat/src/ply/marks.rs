@@ -1,0 +1,70 @@
+//! The anti-aliasing mark, which trainers leave in a comment.
+//!
+//! Brush writes `SplatRenderMode: mip` or `SplatRenderMode: default`, Postshot `antialiased 1` or
+//! `antialiased 0`. The mark decides how a scene is drawn, so it must survive every conversion.
+
+/// Postshot's mark; what the writer adds when no comment says it.
+pub(super) const ANTIALIASED: &str = "antialiased 1";
+
+/// What one comment says about anti-aliasing, if anything.
+pub(super) fn mark(comment: &str) -> Option<bool> {
+    let lower = comment.to_ascii_lowercase();
+    let mut words =
+        lower.split(|c: char| c.is_whitespace() || c == ':' || c == '=').filter(|w| !w.is_empty());
+    match (words.next()?, words.next()?, words.next()) {
+        ("splatrendermode", mode, None) => match mode {
+            "mip" => Some(true),
+            "default" => Some(false),
+            _ => None,
+        },
+        ("antialiased", value, None) => match value {
+            "1" | "true" => Some(true),
+            "0" | "false" => Some(false),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+/// What all comments together say.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Marks {
+    /// At least one says yes. A scene with both is taken as anti-aliased: the yes needs a trainer that
+    /// supports it, the no is a default.
+    pub(super) antialiased: bool,
+    /// One says yes and another says no.
+    pub(super) contradict: bool,
+}
+
+/// Reads the marks of all comments.
+pub(super) fn marks<S: AsRef<str>>(comments: &[S]) -> Marks {
+    let (mut yes, mut no) = (false, false);
+    for said in comments.iter().filter_map(|c| mark(c.as_ref())) {
+        yes |= said;
+        no |= !said;
+    }
+    Marks { antialiased: yes, contradict: yes && no }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_trainers_mark_is_understood() {
+        assert_eq!(mark("SplatRenderMode: mip"), Some(true));
+        assert_eq!(mark("SplatRenderMode: default"), Some(false));
+        assert_eq!(mark("antialiased 1"), Some(true));
+        assert_eq!(mark("antialiased 0"), Some(false));
+        assert_eq!(mark("antialiased 2"), None);
+        assert_eq!(mark("not antialiased 1 at all"), None);
+        assert_eq!(mark("Vertical axis: y"), None);
+    }
+
+    #[test]
+    fn contradicting_marks_are_noticed() {
+        let both = marks(&["SplatRenderMode: mip", "antialiased 0"]);
+        assert_eq!(both, Marks { antialiased: true, contradict: true });
+        assert_eq!(marks::<&str>(&[]), Marks { antialiased: false, contradict: false });
+    }
+}

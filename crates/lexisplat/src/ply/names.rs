@@ -1,0 +1,41 @@
+//! Property names of the INRIA layout (`scene/gaussian_model.py`, `construct_list_of_attributes`).
+
+/// Centres.
+pub(super) const POSITION: [&str; 3] = ["x", "y", "z"];
+/// Normals, zeros in every trainer's file.
+pub(super) const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
+/// SH coefficient 0.
+pub(super) const DC: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
+/// What precedes the number of an SH-rest coefficient.
+pub(super) const REST_PREFIX: &str = "f_rest_";
+/// Opacity before the sigmoid.
+pub(super) const OPACITY: [&str; 1] = ["opacity"];
+/// Logarithmic scales.
+pub(super) const SCALE: [&str; 3] = ["scale_0", "scale_1", "scale_2"];
+/// Quaternion, w first.
+pub(super) const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
+/// The element that holds Gaussians.
+pub(super) const VERTEX: &str = "vertex";
+
+/// Longest part of a name or token from a file that a message repeats, in characters.
+const SHOWN: usize = 48;
+
+/// A name or token from a file, made fit for a one-line message: control characters escaped, and cut.
+pub(super) fn shown(text: &str) -> String {
+    let mut out: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
+    if text.chars().nth(SHOWN).is_some() {
+        out.push_str("...");
+    }
+    out
+}
+
+/// `names` for a message: the first few, and how many more.
+pub(super) fn listed<S: AsRef<str>>(names: &[S]) -> String {
+    /// Names spelt out before "and n more".
+    const SPELT: usize = 6;
+    let mut text = names.iter().take(SPELT).map(|n| shown(n.as_ref())).collect::<Vec<_>>().join(", ");
+    if names.len() > SPELT {
+        text.push_str(&format!(" and {} more", names.len() - SPELT));
+    }
+    text
+}

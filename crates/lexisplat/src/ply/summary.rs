@@ -1,0 +1,98 @@
+//! What a PLY was like, for people and reports.
+
+use serde::Serialize;
+
+use super::header::{Format, Header, Kind, ScalarType};
+use super::layout::vertex_index;
+use super::marks::mark;
+use super::names::{DC, NORMAL, POSITION};
+
+/// Which program probably wrote a file, from its comments and the order of its properties.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Dialect {
+    /// INRIA's layout, which 3DGS-MCMC, Pixel-GS and this crate write too.
+    Inria,
+    /// gsplat's exporter: INRIA's order without normals.
+    Gsplat,
+    /// nerfstudio's `ns-export`.
+    Nerfstudio,
+    /// Brush.
+    Brush,
+    /// Postshot.
+    Postshot,
+    /// None of these.
+    Other,
+}
+
+/// What a PLY was like, before its values became a [`Splats`](crate::Splats).
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct PlySummary {
+    /// Probable writer.
+    pub dialect: Dialect,
+    /// How values are stored.
+    pub format: Format,
+    /// Size of the whole file.
+    pub file_bytes: u64,
+    /// Size of the header.
+    pub header_bytes: u64,
+    /// Bytes one vertex would take in binary.
+    pub row_bytes: u64,
+    /// Vertices in the file, before any were dropped.
+    pub vertices: u64,
+    /// Vertices dropped because of NaN or infinite values.
+    pub dropped: u64,
+    /// Vertex properties in file order.
+    pub properties: Vec<(String, ScalarType)>,
+    /// Names of the elements other than the vertices.
+    pub other_elements: Vec<String>,
+}
+
+impl PlySummary {
+    /// Summary of a file of `file_bytes` with this header; the caller fills in `dropped`.
+    pub(super) fn new(header: &Header, file_bytes: u64, row_bytes: u64) -> Self {
+        let vertex = vertex_index(header).map(|i| &header.elements[i]);
+        let mut properties = Vec::new();
+        for property in vertex.iter().flat_map(|v| &v.properties) {
+            if let Kind::Scalar(ty) = property.kind {
+                properties.push((property.name.clone(), ty));
+            }
+        }
+        let others = header.elements.iter().filter(|e| Some(*e) != vertex);
+        Self {
+            dialect: dialect(&header.comments, &properties),
+            format: header.format,
+            file_bytes,
+            header_bytes: header.bytes as u64,
+            row_bytes,
+            vertices: vertex.map_or(0, |v| v.count),
+            dropped: 0,
+            other_elements: others.map(|e| e.name.clone()).collect(),
+            properties,
+        }
+    }
+}
+
+fn dialect(comments: &[String], properties: &[(String, ScalarType)]) -> Dialect {
+    let says = |part: &str| comments.iter().any(|c| c.to_ascii_lowercase().contains(part));
+    let starts = |groups: &[&[&str]]| {
+        let expected = groups.iter().copied().flatten();
+        properties.len() >= groups.iter().map(|g| g.len()).sum()
+            && expected.zip(properties).all(|(name, (found, _))| name == found)
+    };
+    if says("brush") || says("splatrendermode") {
+        Dialect::Brush
+    } else if says("nerfstudio") {
+        Dialect::Nerfstudio
+    } else if says("postshot") || comments.iter().any(|c| mark(c).is_some()) {
+        Dialect::Postshot
+    } else if starts(&[&POSITION, &NORMAL, &DC]) {
+        Dialect::Inria
+    } else if starts(&[&POSITION, &DC]) {
+        Dialect::Gsplat
+    } else {
+        Dialect::Other
+    }
+}
