@@ -1,6 +1,11 @@
 //! Drawing from codes against drawing the same scene made dense.
 
-#![expect(clippy::cast_precision_loss, clippy::cast_possible_truncation, reason = "made-up scenes")]
+#![expect(
+    clippy::cast_precision_loss,
+    clippy::cast_possible_truncation,
+    clippy::unwrap_used,
+    reason = "tests: small numbers, and failing is their way to tell"
+)]
 
 mod common;
 mod made;

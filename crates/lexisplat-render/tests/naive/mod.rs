@@ -165,7 +165,7 @@ fn factorial(n: u32) -> f64 {
     (1..=n).map(f64::from).product()
 }
 
-/// P_l^m(x) with the Condon-Shortley phase, by the usual recurrence.
+/// `P_l^m(x)` with the Condon-Shortley phase, by the usual recurrence.
 fn legendre(l: u32, m: u32, x: f64) -> f64 {
     let mut previous = 0.0;
     let mut value: f64 = (1..=m).map(|k| -f64::from(2 * k - 1) * (1.0 - x * x).max(0.0).sqrt()).product();
