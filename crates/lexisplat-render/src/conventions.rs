@@ -3,7 +3,7 @@
 //! Sources are files of `graphdeco-inria/diff-gaussian-rasterization` at commit 59f5f77 unless stated
 //! otherwise. Changing any of them changes every picture.
 //!
-//! Conventions that are no numbers: view space is OpenCV's (x right, y down, z forward); pixel centres
+//! Conventions that are no numbers: view space is that of `OpenCV` (x right, y down, z forward); pixel centres
 //! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`); Gaussians are blended in order of view-space
 //! z, ties in order of index; a pixel is `colour + transmittance * background`, not clamped.
 

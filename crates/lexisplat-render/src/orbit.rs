@@ -1,12 +1,170 @@
 //! Views around a scene that comes without cameras.
 
+use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
 
-/// Cameras on a ring around `geometry`.
+/// Share of the opacity, on each side and axis, that is left out when the bulk is measured: floaters
+/// and far backgrounds are many but thin.
+const TRIM: f64 = 0.2;
+/// Field of view along the picture's shorter side, in degrees.
+const FIELD_OF_VIEW: f64 = 50.0;
+/// Height of the ring above the centre and how far it sways, in degrees of elevation.
+const ELEVATION: f64 = 20.0;
+/// See [`ELEVATION`].
+const ELEVATION_SWAY: f64 = 10.0;
+/// Times the ring sways on one turn.
+const SWAYS: f64 = 3.0;
+/// Radius of what is looked at, in units of the half diagonal of the trimmed box: a little air around.
+const AIR: f64 = 1.2;
+/// Radius of a scene that has none, in world units.
+const MIN_RADIUS: f64 = 1e-3;
+/// Nearest distance to the centre, in world units: well beyond [`crate::conventions::NEAR_Z`].
+const MIN_DISTANCE: f64 = 0.5;
+/// Up in the world: scenes trained from COLMAP's cameras are about upright with y down.
+const UP: DVec3 = DVec3::NEG_Y;
+
+/// `count` cameras on a swaying ring around the bulk of `geometry`, all looking at its centre, named
+/// `orbit_000`, `orbit_001` and so on; the same for the same input.
+///
+/// The bulk is where most of the opacity is, so floaters do not count; its radius fits the field of
+/// view. World y is taken to point down, as in scenes trained from COLMAP's cameras.
 #[must_use]
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
-    let _ = (geometry, count, width, height);
-    Vec::new()
+    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
+    let (centre, radius) = bulk(geometry);
+    let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
+    let focal = f64::from(width.min(height)) / 2.0 / half_view.tan();
+    let distance = (radius / half_view.sin()).max(MIN_DISTANCE);
+    let steps = u32::try_from(count).unwrap_or(u32::MAX);
+    (0..steps)
+        .map(|i| {
+            let turn = f64::from(i) / f64::from(steps) * std::f64::consts::TAU;
+            let elevation = (ELEVATION + ELEVATION_SWAY * (SWAYS * turn).sin()).to_radians();
+            let out = DVec3::new(turn.sin(), 0.0, -turn.cos()) * elevation.cos() + UP * elevation.sin();
+            let forward = -out;
+            let right = forward.cross(UP).normalize();
+            let down = forward.cross(right);
+            let columns = [right, down, forward];
+            Camera {
+                name: format!("orbit_{i:03}"),
+                width,
+                height,
+                fx: single(focal),
+                fy: single(focal),
+                position: (centre + out * distance).to_array().map(single),
+                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
+                split: None,
+            }
+        })
+        .collect()
+}
+
+/// Centre and radius of where most of the opacity is.
+fn bulk(geometry: &Geometry) -> (DVec3, f64) {
+    let weights: Vec<f64> = geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect();
+    let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
+        let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
+        quantiles(values.zip(weights.iter().copied()), [TRIM, 0.5, 1.0 - TRIM])
+    });
+    let centre = DVec3::from_array(spans.map(|[_, median, _]| median));
+    let half = spans.map(|[low, _, high]| (high - low) / 2.0);
+    let radius = DVec3::from_array(half).length() * AIR;
+    (centre, radius.max(MIN_RADIUS))
+}
+
+/// The values below which the given shares of the weight lie; 0 if there is none. Pairs that are not
+/// finite do not count.
+fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [f64; N]) -> [f64; N] {
+    let mut sorted: Vec<(f64, f64)> = values.filter(|(v, w)| v.is_finite() && w.is_finite()).collect();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let total: f64 = sorted.iter().map(|(_, w)| w).sum();
+    shares.map(|share| {
+        let mut sum = 0.0;
+        let found = sorted.iter().find(|(_, weight)| {
+            sum += weight;
+            sum >= share * total
+        });
+        found.or(sorted.last()).map_or(0.0, |(value, _)| *value)
+    })
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::conventions::NEAR_Z;
+
+    fn cloud() -> Geometry {
+        // A cube of side 2 around (5, -3, 1), and floaters far away.
+        let mut positions = Vec::new();
+        for i in 0_u16..1000 {
+            let (x, y, z) = (i % 10, i / 10 % 10, i / 100);
+            let at = |v: u16, centre: f32| centre + (f32::from(v) - 4.5) / 4.5;
+            positions.push([at(x, 5.0), at(y, -3.0), at(z, 1.0)]);
+        }
+        positions.extend([[1e4, 1e5, -1e6]; 20]);
+        let n = positions.len();
+        Geometry {
+            positions,
+            dc: vec![[0.0; 3]; n],
+            opacities: vec![2.0; n],
+            scales: vec![[-3.0; 3]; n],
+            rotations: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            ..Geometry::default()
+        }
+    }
+
+    #[test]
+    fn every_view_is_upright_and_shows_the_bulk() {
+        let geometry = cloud();
+        let cameras = orbit(&geometry, 12, 320, 200);
+        assert_eq!(cameras.len(), 12);
+        assert_eq!(cameras[7].name, "orbit_007");
+        for camera in &cameras {
+            camera.validate().unwrap();
+            // Right is level, and what is above in the world (smaller y) is above in the picture.
+            assert!(camera.rotation[1][0].abs() < 1e-6 && camera.rotation[1][1] > 0.5);
+            let r = &camera.rotation;
+            let cross = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1])
+                - r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0])
+                + r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
+            assert!((cross - 1.0).abs() < 1e-5, "a rotation, not a mirror");
+            let inside = geometry.positions[..1000].iter().filter(|p| {
+                let [x, y, z] = camera.to_view(**p);
+                z > NEAR_Z && (x / z * camera.fx).abs() < 160.0 && (y / z * camera.fy).abs() < 100.0
+            });
+            assert!(inside.count() >= 900);
+        }
+        assert_eq!(cameras, orbit(&geometry, 12, 320, 200));
+    }
+
+    #[test]
+    fn degenerate_scenes_still_give_cameras() {
+        let one = Geometry {
+            positions: vec![[1.0, f32::NAN, 3.0]],
+            dc: vec![[0.0; 3]],
+            opacities: vec![f32::NAN],
+            scales: vec![[0.0; 3]],
+            rotations: vec![[0.0; 4]],
+            ..Geometry::default()
+        };
+        for geometry in [Geometry::default(), one] {
+            for camera in orbit(&geometry, 3, 0, 10) {
+                camera.validate().unwrap();
+            }
+        }
+        assert!(orbit(&cloud(), 0, 10, 10).is_empty());
+    }
+
+    #[test]
+    fn quantiles_weigh() {
+        let pairs = [(3.0, 1.0), (1.0, 1.0), (2.0, 2.0), (f64::NAN, 9.0)];
+        assert_eq!(quantiles(pairs.into_iter(), [0.0, 0.25, 0.5, 0.75, 1.0]), [1.0, 1.0, 2.0, 2.0, 3.0]);
+    }
 }

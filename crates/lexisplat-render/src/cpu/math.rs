@@ -2,6 +2,7 @@
 
 /// Below this `exp` is 0, above [`EXP_MAX`] infinite: there the result leaves the normal f32 range.
 const EXP_MIN: f32 = -87.0;
+/// See [`EXP_MIN`].
 const EXP_MAX: f32 = 88.0;
 /// 1.5 * 2^23: adding and subtracting it rounds to the nearest integer.
 const ROUND: f32 = 12_582_912.0;
@@ -15,15 +16,23 @@ const BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;
 
 /// e to the power `x`, within 2e-7 of it relatively, with the same bits on every machine.
+#[inline]
+pub(super) fn exp(x: f32) -> f32 {
+    match x {
+        x if x < EXP_MIN => 0.0,
+        x if x > EXP_MAX => f32::INFINITY,
+        x => exp_in_range(x),
+    }
+}
+
+/// [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`]; elsewhere any number.
 ///
 /// Free of branches and calls so that loops over it become vector instructions.
 #[inline(always)]
-pub(super) fn exp(x: f32) -> f32 {
-    let clamped = if x > EXP_MIN { x } else { EXP_MIN };
-    let clamped = if clamped < EXP_MAX { clamped } else { EXP_MAX };
-    let shifted = clamped * std::f32::consts::LOG2_E + ROUND;
+pub(super) fn exp_in_range(x: f32) -> f32 {
+    let shifted = x * std::f32::consts::LOG2_E + ROUND;
     let n = shifted - ROUND;
-    let r = clamped - n * LN2_HIGH;
+    let r = x - n * LN2_HIGH;
     let r = r - n * LN2_LOW;
     let mut p = POLYNOMIAL[0];
     p = p * r + POLYNOMIAL[1];
@@ -34,9 +43,7 @@ pub(super) fn exp(x: f32) -> f32 {
     let fraction = p * (r * r) + r + 1.0;
     // The low bits of `shifted` hold the integer n, in two's complement.
     let power = f32::from_bits(shifted.to_bits().wrapping_add(BIAS) << MANTISSA_BITS);
-    let result = fraction * power;
-    let result = if x < EXP_MIN { 0.0 } else { result };
-    if x > EXP_MAX { f32::INFINITY } else { result }
+    fraction * power
 }
 
 /// 1 / (1 + e^-x).

@@ -53,22 +53,35 @@ pub(super) struct Visible {
 /// What is the same for all Gaussians of a picture.
 #[derive(Debug, Clone)]
 pub(super) struct Projection {
-    camera: Camera,
+    pub(super) camera: Camera,
     tan: [f32; 2],
     focal: [f32; 2],
     size: [f32; 2],
-    grid: Grid,
+    pub(super) grid: Grid,
     antialiased: bool,
+    /// Whether to leave out what cannot reach [`ALPHA_MIN`]. Makes no difference to the picture, which
+    /// tests check by drawing without.
+    tighten: bool,
 }
 
+/// Stands for no [`Splat::cutoff`]: far below any that could matter, and within the range of `exp`.
+const NO_CUTOFF: f32 = -80.0;
+
 impl Projection {
-    pub(super) fn new(camera: &Camera, grid: Grid, antialiased: bool) -> Self {
+    pub(super) fn new(camera: &Camera, antialiased: bool) -> Self {
+        let grid = Grid::new(camera.width as usize, camera.height as usize);
         // Sides are at most 16384: exact.
         #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
         let size = [camera.width as f32, camera.height as f32];
         let focal = [camera.fx, camera.fy];
         let tan = [size[0] / (2.0 * focal[0]), size[1] / (2.0 * focal[1])];
-        Self { camera: camera.clone(), tan, focal, size, grid, antialiased }
+        Self { camera: camera.clone(), tan, focal, size, grid, antialiased, tighten: true }
+    }
+
+    /// The same without leaving anything out.
+    #[cfg(test)]
+    pub(super) fn untightened(self) -> Self {
+        Self { tighten: false, ..self }
     }
 
     /// Gaussian `i` on screen, if any of it may be seen.
@@ -95,7 +108,10 @@ impl Projection {
         }
         let cutoff = (ALPHA_MIN / opacity).ln() - POWER_SLACK;
         let rect = self.grid.rect(centre, radius)?;
-        let extent = self.extent(centre, conic, cutoff);
+        let (cutoff, extent) = match self.tighten {
+            true => (cutoff, self.extent(centre, conic, cutoff)),
+            false => (NO_CUTOFF, [f64::INFINITY; 2]),
+        };
         let rect = rect.intersect(self.grid.touched(centre, extent))?;
         let rows = self.grid.rows(rect, centre[1], extent[1])?;
         let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
@@ -211,4 +227,92 @@ pub(super) fn project(
             range.filter_map(|i| projection.project(geometry, radiance, i)).collect()
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::{SceneMeta, ShDegree, Splats};
+
+    use super::*;
+    use crate::camera::straight_ahead;
+    use crate::scene::Scene;
+
+    fn one(position: [f32; 3], scale: f32) -> Splats {
+        let geometry = Geometry {
+            positions: vec![position],
+            dc: vec![[1.0, 0.0, -3.0]],
+            opacities: vec![0.0],
+            scales: vec![[scale; 3]],
+            rotations: vec![[1.0, 0.0, 0.0, 0.0]],
+            ..Geometry::default()
+        };
+        Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() }
+    }
+
+    fn draw(splats: &Splats, antialiased: bool) -> Option<Visible> {
+        let camera = straight_ahead(100, 80, 100.0);
+        let projection = Projection::new(&camera, antialiased);
+        projection.project(&splats.geometry, &Radiance::new(&Scene::from(splats)), 0)
+    }
+
+    fn near(a: f32, b: f32) -> bool {
+        (a - b).abs() < 1e-4 * b.abs().max(1.0)
+    }
+
+    #[test]
+    fn a_point_lands_where_ndc2pix_puts_it() {
+        let visible = draw(&one([0.5, -0.25, 2.0], -20.0), false).unwrap();
+        let splat = visible.splat;
+        assert!(near(splat.centre[0], 49.5 + 25.0) && near(splat.centre[1], 39.5 - 12.5), "{splat:?}");
+        // A point is the dilation alone.
+        assert!(splat.conic.iter().zip([1.0 / 0.3, 0.0, 1.0 / 0.3]).all(|(a, b)| near(*a, b)), "{splat:?}");
+        assert!(near(splat.opacity, 0.5));
+        assert!(near(splat.colour[0], 0.782_094_8) && near(splat.colour[1], 0.5) && splat.colour[2] == 0.0);
+        assert_eq!(visible.depth, 2.0_f32.to_bits());
+    }
+
+    #[test]
+    fn a_sphere_on_the_axis_has_the_variance_of_similar_triangles() {
+        // Deviation e^-1 at distance 4 with focal length 100.
+        let splat = draw(&one([0.0, 0.0, 4.0], -1.0), false).unwrap().splat;
+        let variance = (100.0 * (-1.0_f32).exp() / 4.0).powi(2) + DILATION;
+        assert!(near(splat.conic[0] * variance, 1.0) && splat.conic[1] == 0.0, "{splat:?}");
+    }
+
+    #[test]
+    fn antialiasing_keeps_the_light_of_a_point() {
+        let far = draw(&one([0.0, 0.0, 4.0], -20.0), true);
+        // The factor's floor is 0.005, and 0.5 * 0.005 is below 1/255.
+        assert!(far.is_none());
+        let splat = draw(&one([0.0, 0.0, 4.0], -4.0), true).unwrap().splat;
+        let variance = (100.0 * (-4.0_f32).exp() / 4.0).powi(2);
+        assert!(near(splat.opacity, 0.5 * variance / (variance + DILATION)), "{splat:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_seen_is_left_out() {
+        assert!(draw(&one([0.0, 0.0, 0.2], -3.0), false).is_none(), "at the near limit");
+        assert!(draw(&one([0.0, 0.0, 0.201], -3.0), false).is_some());
+        assert!(draw(&one([0.0, 0.0, -5.0], 3.0), false).is_none(), "behind");
+        assert!(draw(&one([50.0, 0.0, 5.0], -3.0), false).is_none(), "beside");
+        assert!(draw(&one([0.0, 0.0, 5.0], 60.0), false).is_none(), "overflows");
+        assert!(draw(&one([f32::NAN, 0.0, 5.0], 0.0), false).is_none());
+        let mut faint = one([0.0, 0.0, 5.0], 0.0);
+        faint.geometry.opacities = vec![-5.6];
+        assert!(draw(&faint, false).is_none(), "below 1/255 everywhere");
+    }
+
+    #[test]
+    fn quaternions_are_normalised_and_zero_is_the_identity() {
+        let scales = [0.0, -1.0, -2.0];
+        let identity = axes(scales, [1.0, 0.0, 0.0, 0.0]);
+        assert_eq!(axes(scales, [0.0; 4]), identity);
+        assert_eq!(axes(scales, [7.0, 0.0, 0.0, 0.0]), identity);
+        // A quarter turn about z takes x to y and y to -x.
+        let turned = axes(scales, [2.0, 0.0, 0.0, 2.0]);
+        let expected = [[0.0, 1.0, 0.0], [-(-1.0_f32).exp(), 0.0, 0.0], [0.0, 0.0, (-2.0_f32).exp()]];
+        for (axis, expected) in turned.iter().zip(expected) {
+            assert!(axis.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6), "{turned:?}");
+        }
+    }
 }

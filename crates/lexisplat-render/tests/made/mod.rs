@@ -1,0 +1,84 @@
+//! Made-up scenes and cameras for tests, the same for the same seed.
+#![allow(dead_code, reason = "each test file uses a part")]
+
+use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
+use lexisplat_render::Camera;
+
+/// A small generator (Steele, Lea and Flood's `SplitMix64`).
+pub(crate) struct Random(u64);
+
+impl Random {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed)
+    }
+
+    /// The next number, 0 to 1.
+    pub(crate) fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
+    }
+
+    /// The next number, `low` to `high`.
+    pub(crate) fn within(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// `count` Gaussians around the origin; every tenth is odd in one way: huge, a point, a needle, far
+/// off, without rotation, opaque, or invisible.
+pub(crate) fn scene(seed: u64, count: usize, degree: ShDegree, antialiased: bool) -> Splats {
+    let mut random = Random::new(seed);
+    let mut g = Geometry::default();
+    for i in 0..count {
+        g.positions.push(std::array::from_fn(|_| random.within(-2.0, 2.0)));
+        g.dc.push(std::array::from_fn(|_| random.within(-1.5, 1.5)));
+        g.opacities.push(random.within(-4.0, 5.0));
+        g.scales.push(std::array::from_fn(|_| random.within(-5.0, -1.0)));
+        g.rotations.push(std::array::from_fn(|_| random.within(-1.0, 1.0)));
+        match i % 70 {
+            10 => g.scales[i] = [random.within(0.0, 3.0); 3],
+            20 => g.scales[i] = [-30.0; 3],
+            30 => g.scales[i] = [1.0, -9.0, -9.0],
+            40 => g.positions[i] = g.positions[i].map(|v| v * 30.0),
+            50 => g.rotations[i] = [0.0; 4],
+            60 => g.opacities[i] = 20.0,
+            69 => g.opacities[i] = -20.0,
+            _ => {}
+        }
+    }
+    let sh_rest = (0..count * degree.rest()).map(|_| random.within(-0.3, 0.3)).collect();
+    Splats { geometry: g, degree, sh_rest, meta: SceneMeta { antialiased, ..SceneMeta::default() } }
+}
+
+/// A camera at the origin that looks along z.
+pub(crate) fn straight(width: u32, height: u32, focal: f32) -> Camera {
+    Camera {
+        name: "straight".into(),
+        width,
+        height,
+        fx: focal,
+        fy: focal,
+        position: [0.0; 3],
+        rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        split: None,
+    }
+}
+
+/// A camera a few units from the origin, looking about there, turned in all three axes.
+pub(crate) fn camera(seed: u64, width: u32, height: u32) -> Camera {
+    let mut random = Random::new(seed ^ 0xcafe);
+    let mut angle = || f64::from(random.within(-3.0, 3.0));
+    let rotation = glam::DMat3::from_euler(glam::EulerRot::ZYX, angle(), angle(), angle());
+    let position = rotation * glam::DVec3::new(0.1, -0.2, -4.0);
+    let rows = rotation.transpose();
+    let row = |v: glam::DVec3| v.to_array().map(|v| v as f32);
+    Camera {
+        position: row(position),
+        rotation: [row(rows.x_axis), row(rows.y_axis), row(rows.z_axis)],
+        fy: 120.0,
+        ..straight(width, height, 130.0)
+    }
+}
