@@ -110,6 +110,7 @@ pub fn compress(
                 stop,
                 seed: options.seed,
                 sample: options.sample,
+                ..LearnOptions::new(stop)
             };
             let learned = learn(splats.degree, &splats.sh_rest, &learn_options, progress)?;
             (learned.dictionary.clone(), Some(learned))
