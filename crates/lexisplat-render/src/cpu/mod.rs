@@ -35,16 +35,23 @@ pub struct RenderOptions {
 /// memory (see [`Camera::validate`]).
 #[must_use]
 pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Image {
-    draw(scene, &project::Projection::new(camera, scene.meta().antialiased), options)
+    let projection = project::Projection::new(camera, scene.meta().antialiased);
+    draw(scene, &projection, options, tiles::MAX_ENTRIES)
 }
 
-fn draw(scene: &Scene<'_>, projection: &project::Projection, options: &RenderOptions) -> Image {
+/// [`render`] with at most `max_entries` in the tiles' lists at once.
+fn draw(
+    scene: &Scene<'_>,
+    projection: &project::Projection,
+    options: &RenderOptions,
+    max_entries: u64,
+) -> Image {
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![options.background; width * height];
     let visible = project::project(scene.geometry(), &Radiance::new(scene), projection);
     let (splats, rects) = order::by_depth(visible);
-    for band in tiles::bands(&rects, grid) {
+    for band in tiles::bands(&rects, grid, max_entries) {
         let lists = tiles::TileLists::new(&rects, grid, band.clone());
         let count = band.len() * grid.columns;
         let drawn: Vec<blend::TilePixels> = (0..count)
@@ -88,6 +95,7 @@ mod tests {
 
     proptest! {
         /// Leaving out what cannot reach the least opacity changes not one bit: it is no rule of its own.
+        /// Nor does drawing every row of tiles by itself.
         #[test]
         fn tightening_changes_nothing(
             gaussians in gaussians(),
@@ -107,8 +115,8 @@ mod tests {
             let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta };
             let options = RenderOptions { background: [0.3, 0.6, 0.9] };
             let projection = project::Projection::new(&straight_ahead(width, height, focal), antialiased);
-            let tight = draw(&Scene::from(&splats), &projection, &options);
-            let plain = draw(&Scene::from(&splats), &projection.untightened(), &options);
+            let tight = draw(&Scene::from(&splats), &projection, &options, tiles::MAX_ENTRIES);
+            let plain = draw(&Scene::from(&splats), &projection.untightened(), &options, 1);
             prop_assert_eq!(tight.pixels, plain.pixels);
         }
     }
