@@ -9,7 +9,7 @@ use crate::conventions::TILE;
 /// Pieces the sorted splats are cut into, each listed by one task; a tile's list is theirs in order.
 const PIECES: usize = 8;
 /// Most list entries in memory at once, unless one row of tiles needs more: 256 MB.
-const MAX_ENTRIES: u64 = 1 << 26;
+pub(super) const MAX_ENTRIES: u64 = 1 << 26;
 
 /// The tiles of a picture.
 #[derive(Debug, Clone, Copy)]
@@ -89,8 +89,8 @@ impl Grid {
     }
 }
 
-/// Rows of tiles cut into bands whose lists fit [`MAX_ENTRIES`].
-pub(super) fn bands(rects: &[Rect], grid: Grid) -> Vec<Range<usize>> {
+/// Rows of tiles cut into bands whose lists have at most `max_entries`, or of one row.
+pub(super) fn bands(rects: &[Rect], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
     // Differences of the number of entries from one row of tiles to the next.
     let mut steps = vec![0_i64; grid.rows + 1];
     for rect in rects {
@@ -103,7 +103,7 @@ pub(super) fn bands(rects: &[Rect], grid: Grid) -> Vec<Range<usize>> {
     for (row, step) in steps.iter().take(grid.rows).enumerate() {
         in_row += step;
         let entries = in_row.unsigned_abs();
-        if row > start && in_band + entries > MAX_ENTRIES {
+        if row > start && in_band + entries > max_entries {
             bands.push(start..row);
             (start, in_band) = (row, 0);
         }
@@ -228,7 +228,7 @@ mod tests {
     fn bands_cover_all_rows_and_stay_small() {
         let grid = Grid::new(16_384, 16_384);
         let everywhere = Rect { min: [0, 0], max: [1024, 1024] };
-        let bands = bands(&[everywhere; 1000], grid);
+        let bands = bands(&[everywhere; 1000], grid, 1 << 26);
         assert_eq!(bands.first().map(|b| b.start), Some(0));
         assert_eq!(bands.last().map(|b| b.end), Some(1024));
         assert!(bands.windows(2).all(|w| w[0].end == w[1].start));
