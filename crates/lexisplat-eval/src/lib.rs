@@ -1,1 +1,40 @@
-//! placeholder
+//! Metrics, view sets and comparison of 3D Gaussian Splatting scenes, without photos.
+//!
+//! ```
+//! use lexisplat::{CompressOptions, Silent, compress};
+//! # use lexisplat::{Geometry, ShDegree, Splats};
+//! use lexisplat_eval::{CompareOptions, compare};
+//! use lexisplat_render::{Scene, orbit};
+//!
+//! # let n = 50;
+//! # let at = |i: usize| f32::from(u8::try_from(i).unwrap()) / 50.0;
+//! # let splats = Splats {
+//! #     geometry: Geometry {
+//! #         positions: (0..n).map(|i| [at(i), at(i * 7 % n), at(i * 3 % n)]).collect(),
+//! #         dc: vec![[0.5; 3]; n],
+//! #         opacities: vec![2.0; n],
+//! #         scales: vec![[-3.0; 3]; n],
+//! #         rotations: vec![[1.0, 0.0, 0.0, 0.0]; n],
+//! #         ..Geometry::default()
+//! #     },
+//! #     degree: ShDegree::ONE,
+//! #     sh_rest: (0..9 * n).map(|i| at(i * 31 % n) - 0.5).collect(),
+//! #     meta: Default::default(),
+//! # };
+//! let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent)?;
+//! let cameras = orbit(&splats.geometry, 2, 64, 48);
+//! let (a, b) = (Scene::from(&splats), Scene::from(&model));
+//! let comparison = compare(&a, &b, &cameras, &CompareOptions::default(), &mut |_, _, _| ())?;
+//! assert!(comparison.psnr.min.is_none_or(|psnr| psnr > 30.0));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod compare;
+mod error;
+pub mod metrics;
+pub mod montage;
+mod views;
+
+pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
+pub use error::{Error, Result};
+pub use views::{DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, choose_views};

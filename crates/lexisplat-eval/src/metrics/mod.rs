@@ -1,0 +1,67 @@
+//! How far two pictures are apart. Pixels are clipped to 0..1 first, NaN counts as 0, and nothing is
+//! rounded to 8 bits unless the caller did so.
+
+mod psnr;
+mod ssim;
+
+pub use psnr::psnr;
+pub use ssim::ssim;
+
+use lexisplat_render::Image;
+
+use crate::error::{Error, Result};
+
+/// A colour value as the metrics see it.
+#[inline]
+fn clipped(value: f32) -> f64 {
+    f64::from(clip(value))
+}
+
+/// `value` within 0..1; NaN is 0.
+#[inline]
+pub(crate) fn clip(value: f32) -> f32 {
+    if value > 0.0 { value.min(1.0) } else { 0.0 }
+}
+
+/// `Ok` if both pictures have the same size and their pixels fill it.
+fn same_size(a: &Image, b: &Image) -> Result<()> {
+    let describe = |image: &Image| format!("{} x {}", image.width, image.height);
+    if (a.width, a.height) != (b.width, b.height) {
+        return Err(Error::parameter("picture", describe(b), format!("the other's size, {}", describe(a))));
+    }
+    for image in [a, b] {
+        let pixels = u64::from(image.width) * u64::from(image.height);
+        if pixels == 0 || image.pixels.len() as u64 != pixels {
+            return Err(Error::parameter(
+                "picture",
+                image.pixels.len(),
+                format!("{} pixels", describe(image)),
+            ));
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+pub(crate) mod testing {
+    use lexisplat_render::Image;
+
+    /// Made-up content with edges, gradients, noise, and values outside 0..1.
+    pub(crate) fn picture(width: u32, height: u32, seed: u64) -> Image {
+        let mut state = seed;
+        let mut noise = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            f32::from(u16::try_from(state >> 48).unwrap()) / 65_536.0
+        };
+        let mut pixels = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                let edge = if (x / 7 + y / 5) % 2 == 0 { 0.7 } else { 0.1 };
+                let gradient =
+                    f32::from(u16::try_from(x).unwrap()) / f32::from(u16::try_from(width).unwrap());
+                pixels.push([edge + 0.1 * noise(), gradient, 1.4 * noise() - 0.2]);
+            }
+        }
+        Image { width, height, pixels }
+    }
+}

@@ -1,0 +1,63 @@
+//! Peak signal-to-noise ratio.
+
+use lexisplat_render::Image;
+
+use super::{clipped, same_size};
+use crate::error::Result;
+
+/// PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
+/// `None` if the clipped pictures are identical, where it would be infinite.
+///
+/// # Errors
+/// [`crate::Error::Parameter`] if the sizes differ or a picture is empty.
+pub fn psnr(a: &Image, b: &Image) -> Result<Option<f64>> {
+    same_size(a, b)?;
+    let squares: f64 = a
+        .pixels
+        .iter()
+        .flatten()
+        .zip(b.pixels.iter().flatten())
+        .map(|(&x, &y)| {
+            let difference = clipped(x) - clipped(y);
+            difference * difference
+        })
+        .sum();
+    let mean = squares / (a.pixels.len() * 3) as f64;
+    Ok((mean > 0.0).then(|| -10.0 * mean.log10()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::metrics::testing::picture;
+
+    fn flat(value: f32) -> Image {
+        Image { width: 4, height: 2, pixels: vec![[value; 3]; 8] }
+    }
+
+    #[test]
+    fn known_differences_give_known_decibels() {
+        assert!((psnr(&flat(0.5), &flat(0.6)).unwrap().unwrap() - 20.0).abs() < 1e-5);
+        assert!((psnr(&flat(0.0), &flat(1.0)).unwrap().unwrap()).abs() < 1e-12);
+        let mut one = flat(0.5);
+        one.pixels[3][1] = 0.75;
+        let expected = -10.0 * (0.0625_f64 / 24.0).log10();
+        assert!((psnr(&one, &flat(0.5)).unwrap().unwrap() - expected).abs() < 1e-9);
+    }
+
+    #[test]
+    fn clipping_comes_first_and_identity_is_none() {
+        assert_eq!(psnr(&flat(1.5), &flat(1.0)).unwrap(), None);
+        assert_eq!(psnr(&flat(-3.0), &flat(f32::NAN)).unwrap(), None);
+        assert_eq!(psnr(&flat(f32::INFINITY), &flat(1.0)).unwrap(), None);
+        let a = picture(20, 10, 1);
+        assert_eq!(psnr(&a, &a).unwrap(), None);
+    }
+
+    #[test]
+    fn sizes_must_match() {
+        assert!(psnr(&picture(4, 5, 1), &picture(5, 4, 1)).is_err());
+        let short = Image { width: 4, height: 2, pixels: vec![[0.0; 3]; 7] };
+        assert!(psnr(&short, &short).is_err());
+    }
+}
