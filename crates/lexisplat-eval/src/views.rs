@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 /// Widest picture drawn unless asked otherwise, as the field does (INRIA `utils/camera_utils.py`).
 pub const DEFAULT_MAX_WIDTH: u32 = 1600;
 /// Views of an automatic orbit.
-pub const DEFAULT_ORBIT: usize = 8;
+pub const DEFAULT_ORBIT: u16 = 8;
 /// Size of an orbit's pictures before the width cap, in pixels.
 pub const ORBIT_SIZE: (u32, u32) = (960, 640);
 
@@ -33,13 +33,13 @@ pub enum SplitFilter {
 pub fn choose_views(
     cameras: Option<&Path>,
     filter: SplitFilter,
-    orbit_views: usize,
+    orbit_views: u16,
     max_width: u32,
     geometry: &Geometry,
 ) -> Result<Vec<Camera>> {
     let found = match cameras {
         Some(path) => read_cameras(path)?,
-        None => orbit(geometry, orbit_views, ORBIT_SIZE.0, ORBIT_SIZE.1),
+        None => orbit(geometry, orbit_views.into(), ORBIT_SIZE.0, ORBIT_SIZE.1),
     };
     let wanted = match filter {
         SplitFilter::All => None,

@@ -1,0 +1,110 @@
+//! `lexisplat compare`.
+
+use std::fmt::Write as _;
+
+use anyhow::Result;
+use lexisplat::Progress;
+use lexisplat_eval::{CompareOptions, Comparison, choose_views, compare, montage};
+use serde_json::json;
+
+use crate::args::{Common, Compare};
+use crate::files::{Input, check_output, load, make_folder, png, print, print_json, view_name, write_bytes};
+use crate::progress::Bars;
+use crate::text;
+
+pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
+    let (a, b) = (load(&args.a, false)?, load(&args.b, false)?);
+    a.warn();
+    b.warn();
+    let (scene_a, scene_b) = (a.scene(), b.scene());
+    let views = &args.views;
+    let cameras = choose_views(
+        views.cameras.as_deref(),
+        views.split.into(),
+        views.orbit,
+        views.width,
+        scene_a.geometry(),
+    )?;
+    let mut saved = Vec::new();
+    if let Some(folder) = &args.save_views {
+        for (i, camera) in cameras.iter().enumerate() {
+            let path = folder.join(view_name(i, cameras.len(), &camera.name));
+            check_output(&path, &[], common.overwrite)?;
+            saved.push(path);
+        }
+        make_folder(folder)?;
+    }
+    let bars = Bars::new(common.quiet);
+    bars.start("comparing", "views", cameras.len() as u64);
+    let mut paths = saved.iter();
+    let mut failure = None;
+    let options = CompareOptions::new(views.background, args.eight_bit);
+    let comparison = compare(&scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
+        bars.advance(1);
+        if let Some(path) = paths.next() {
+            let (width, height, pixels) = montage::montage(image_a, image_b);
+            let written = png(width, height, &pixels).and_then(|bytes| write_bytes(path, &bytes));
+            failure = failure.take().or(written.err());
+        }
+    })?;
+    bars.end();
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    if common.json {
+        return print_json(&json!({
+            "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
+            "b": { "file": b.name, "bytes": b.bytes, "gaussians": scene_b.len() },
+            "ratio": if b.bytes > 0 { Some(a.bytes as f64 / b.bytes as f64) } else { None },
+            "eight_bit": args.eight_bit,
+            "identical": comparison.identical,
+            "psnr": comparison.psnr,
+            "ssim": comparison.ssim,
+            "views": comparison.views,
+            "saved": saved.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+        }));
+    }
+    if common.quiet {
+        return Ok(());
+    }
+    print(&table(&a, &b, &comparison, args)?)
+}
+
+fn table(a: &Input, b: &Input, comparison: &Comparison, args: &Compare) -> Result<String> {
+    let mut out = String::new();
+    let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
+    writeln!(out, "{:<width$}  {:>11}  {:>10}  {:>8}", "view", "size", "PSNR", "SSIM")?;
+    for view in &comparison.views {
+        let size = format!("{}x{}", view.width, view.height);
+        writeln!(
+            out,
+            "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
+            view.name,
+            text::decibels(view.psnr),
+            view.ssim
+        )?;
+    }
+    if comparison.identical {
+        writeln!(out, "all views are identical")?;
+    } else {
+        let (psnr, ssim) = (comparison.psnr, comparison.ssim);
+        let rows = [
+            ("mean", psnr.mean, ssim.mean),
+            ("minimum", psnr.min, ssim.min),
+            ("maximum", psnr.max, ssim.max),
+        ];
+        for (label, psnr, ssim) in rows {
+            let (psnr, ssim) = (text::decibels(psnr), ssim.unwrap_or(1.0));
+            writeln!(out, "{label:<width$}  {:>11}  {psnr:>10}  {ssim:>8.5}", "")?;
+        }
+    }
+    for input in [a, b] {
+        writeln!(out, "{:>10}  {}", text::bytes(input.bytes), input.name)?;
+    }
+    writeln!(out, "{:>10}  first file over second, whole files", text::ratio(a.bytes, b.bytes))?;
+    if let Some(folder) = &args.save_views {
+        let times = montage::AMPLIFICATION;
+        writeln!(out, "saved to {}: first, second, difference times {times}", folder.display())?;
+    }
+    Ok(out)
+}

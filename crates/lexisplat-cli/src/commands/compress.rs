@@ -1,0 +1,240 @@
+//! `lexisplat compress`.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use lexisplat::ply::{PlyRead, ReadOptions};
+use lexisplat::{
+    CompressOptions, CompressReport, DEFAULT_TOLERANCE, Error, Limits, Model, compress, lexi, ply,
+};
+use serde_json::json;
+
+use crate::args::{Common, Compress};
+use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input, warn};
+use crate::progress::Bars;
+use crate::text;
+
+/// Bytes of SH-rest a coefficient takes in a PLY.
+const COEFFICIENT_BYTES: u64 = 4;
+
+pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
+    let start = Instant::now();
+    let output = output_path(&args.input, args.output.as_deref(), "lexi")?;
+    if is_pipe(&output) && common.json {
+        let expected = "a file: with --json standard output carries the report";
+        return Err(Error::parameter("output", "-", expected).into());
+    }
+    let mut inputs = vec![args.input.as_path()];
+    inputs.extend(args.dictionary.as_deref());
+    check_output(&output, &inputs, common.overwrite)?;
+    if let Some(path) = &args.save_dictionary {
+        check_output(path, &inputs, common.overwrite)?;
+    }
+    let mut options = CompressOptions::default();
+    options.tolerance = match (args.tol, args.max_nnz) {
+        (None, Some(_)) => None,
+        (tol, _) => Some(tol.unwrap_or(DEFAULT_TOLERANCE)),
+    };
+    options.max_nonzeros = args.max_nnz;
+    options.atoms = args.atoms;
+    options.pursuit = args.pursuit;
+    options.layout = args.layout;
+    options.sample = args.sample;
+    options.seed = args.seed;
+    if let Some(path) = &args.dictionary {
+        options.dictionary = Some(lexi::read_dictionary(path, &Limits::default())?);
+    }
+
+    let (name, PlyRead { splats, warnings, source }) = read(args)?;
+    warn(&name, &warnings);
+    let read_seconds = start.elapsed().as_secs_f64();
+    let bars = Bars::new(common.quiet);
+    let (model, report) = compress(splats, &options, &bars)?;
+
+    let clock = Instant::now();
+    let file_bytes = write(&output, &model)?;
+    if let Some(path) = &args.save_dictionary {
+        lexi::write_dictionary(path, &model.dictionary)?;
+    }
+    let write_seconds = clock.elapsed().as_secs_f64();
+    let outcome = Outcome {
+        output: &output,
+        model: &model,
+        report: &report,
+        ply_bytes: source.file_bytes,
+        file_bytes,
+        seconds: [read_seconds, write_seconds, start.elapsed().as_secs_f64()],
+    };
+    if common.json {
+        print_json(&outcome.json(&warnings)?)
+    } else if common.quiet {
+        Ok(())
+    } else if is_pipe(&output) {
+        eprint!("{}", outcome.text()?);
+        Ok(())
+    } else {
+        print(&outcome.text()?)
+    }
+}
+
+fn read(args: &Compress) -> Result<(String, PlyRead)> {
+    let options = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
+    if is_pipe(&args.input) {
+        let name = "standard input".to_owned();
+        let read = ply::read_bytes(&name, &standard_input()?, &options)?;
+        return Ok((name, read));
+    }
+    Ok((args.input.display().to_string(), ply::read(&args.input, &options)?))
+}
+
+fn write(output: &Path, model: &Model) -> Result<u64> {
+    if !is_pipe(output) {
+        return Ok(lexi::write(output, model)?);
+    }
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let bytes = lexi::write_to(&mut out, model)?;
+    out.flush().context("standard output")?;
+    Ok(bytes)
+}
+
+/// What was done, to be told in text or JSON.
+struct Outcome<'a> {
+    output: &'a Path,
+    model: &'a Model,
+    report: &'a CompressReport,
+    ply_bytes: u64,
+    file_bytes: u64,
+    /// Reading, writing, everything.
+    seconds: [f64; 3],
+}
+
+impl Outcome<'_> {
+    fn dense_sh_bytes(&self) -> u64 {
+        (self.model.len() * self.model.degree().rest()) as u64 * COEFFICIENT_BYTES
+    }
+
+    fn json(&self, warnings: &[String]) -> Result<serde_json::Value> {
+        let (model, report, record) = (self.model, self.report, &self.model.record);
+        let attributes: serde_json::Map<String, serde_json::Value> =
+            lexi::attribute_bytes(model)?.into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
+        Ok(json!({
+            "output": self.output.display().to_string(),
+            "gaussians": model.len(),
+            "sh_degree": model.degree().get(),
+            "atoms": model.dictionary.len(),
+            "pursuit": record.pursuit.name(),
+            "layout": record.layout.name(),
+            "tol": record.tolerance,
+            "max_nnz": record.max_nonzeros,
+            "seed": record.seed,
+            "mean_nonzeros": report.mean_nonzeros,
+            "coefficient_ratio": report.coefficient_ratio(),
+            "nonzero_histogram": report.nonzero_histogram,
+            "escapes": report.escapes,
+            "over_tolerance": record.over_tolerance,
+            "max_residual": record.max_residual,
+            "rms_residual": record.rms_residual,
+            "ply_bytes": self.ply_bytes,
+            "file_bytes": self.file_bytes,
+            "sh_bytes": lexi::sh_bytes(model)?,
+            "dense_sh_bytes": self.dense_sh_bytes(),
+            "attribute_bytes": attributes,
+            "learn_rounds": report.learned.as_ref().map(|l| l.rounds),
+            "learn_sample": report.learned.as_ref().map(|l| l.sample),
+            "held_out_nonzeros": report.learned.as_ref().map(|l| l.held_out_nonzeros),
+            "read_seconds": self.seconds[0],
+            "learn_seconds": report.learn_seconds,
+            "code_seconds": report.code_seconds,
+            "write_seconds": self.seconds[1],
+            "total_seconds": self.seconds[2],
+            "warnings": warnings,
+        }))
+    }
+
+    fn text(&self) -> Result<String> {
+        use std::fmt::Write as _;
+        let (model, report, record) = (self.model, self.report, &self.model.record);
+        let dim = model.degree().rest();
+        let mut out = String::new();
+        let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
+        let gaussians = text::count(model.len() as u64);
+        line(
+            "wrote",
+            format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), model.degree()),
+        )?;
+        match &report.learned {
+            Some(l) if dim > 0 => {
+                let sample = text::count(l.sample as u64);
+                let atoms = model.dictionary.len();
+                line(
+                    "dictionary",
+                    format!(
+                        "{atoms} atoms from {sample} Gaussians in {} rounds, {:.1} s",
+                        l.rounds, report.learn_seconds
+                    ),
+                )?;
+            }
+            Some(_) => line("dictionary", "none: no view-dependent colour".to_owned())?,
+            None => line("dictionary", format!("{} atoms, given", model.dictionary.len()))?,
+        }
+        if let Some(ratio) = report.coefficient_ratio() {
+            let rate = model.len() as f64 / report.code_seconds.max(1e-9);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rate to look at")]
+            let rate = text::count(rate as u64);
+            line(
+                "codes",
+                format!(
+                    "{:.2} of {dim} nonzeros a Gaussian: {ratio:.2}x fewer coefficients (the paper's ratio), {:.1} s, {rate} a second",
+                    report.mean_nonzeros, report.code_seconds
+                ),
+            )?;
+        }
+        line("error", error_line(record))?;
+        if report.escapes > 0 {
+            line("escapes", format!("{} Gaussians stored exactly", text::count(report.escapes)))?;
+        }
+        let sh = lexi::sh_bytes(model)?;
+        if dim > 0 {
+            let dense = self.dense_sh_bytes();
+            line(
+                "SH bytes",
+                format!(
+                    "{} of {}: {} smaller (dictionary, codes, escapes; against dense f32)",
+                    text::bytes(sh),
+                    text::bytes(dense),
+                    text::ratio(dense, sh)
+                ),
+            )?;
+        }
+        line(
+            "file bytes",
+            format!(
+                "{} of {}: {} smaller (whole file against the PLY)",
+                text::bytes(self.file_bytes),
+                text::bytes(self.ply_bytes),
+                text::ratio(self.ply_bytes, self.file_bytes)
+            ),
+        )?;
+        let parts: Vec<String> = lexi::attribute_bytes(model)?
+            .iter()
+            .map(|(name, bytes)| format!("{name} {}", text::bytes(*bytes)))
+            .collect();
+        line("of which", parts.join(", "))?;
+        Ok(out)
+    }
+}
+
+/// The realised error beside what was promised.
+pub(crate) fn error_line(record: &lexisplat::Record) -> String {
+    let realised = format!("maximum {:.6}, RMS {:.6}", record.max_residual, record.rms_residual);
+    match (record.tolerance, record.max_nonzeros) {
+        (Some(tol), None) => format!("{realised}; promised: at most {tol} for every Gaussian"),
+        (Some(tol), Some(cap)) => format!(
+            "{realised}; {} Gaussians are over {tol} (at most {cap} nonzeros were allowed, so nothing is promised)",
+            text::count(record.over_tolerance)
+        ),
+        (None, _) => format!("{realised}; nothing is promised without --tol"),
+    }
+}

@@ -1,0 +1,31 @@
+//! One file a command, glue only.
+
+mod compare;
+mod completions;
+mod compress;
+mod decompress;
+mod demo;
+mod info;
+mod render;
+
+use anyhow::{Context, Result};
+
+use crate::args::{Cli, Command};
+
+/// Sets up threads and runs the command.
+pub(crate) fn run(cli: Cli) -> Result<()> {
+    let Cli { common, command } = cli;
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(common.threads)
+        .build_global()
+        .context("cannot start the worker threads")?;
+    match command {
+        Command::Compress(args) => compress::run(&args, &common),
+        Command::Decompress(args) => decompress::run(&args, &common),
+        Command::Info(args) => info::run(&args, &common),
+        Command::Render(args) => render::run(&args, &common),
+        Command::Compare(args) => compare::run(&args, &common),
+        Command::Demo(args) => demo::run(&args, &common),
+        Command::Completions(args) => completions::run(&args),
+    }
+}

@@ -1,0 +1,80 @@
+//! `lexisplat render`.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use anyhow::Result;
+use lexisplat::Progress;
+use lexisplat_eval::choose_views;
+use lexisplat_render::{RenderOptions, render};
+use serde_json::json;
+
+use crate::args::{Common, Render};
+use crate::files::{
+    check_output, is_pipe, load, make_folder, png, print, print_json, view_name, write_bytes,
+};
+use crate::progress::Bars;
+
+pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
+    let folder = args.output.clone().unwrap_or_else(|| {
+        let stem = if is_pipe(&args.file) {
+            "stdin".into()
+        } else {
+            args.file.file_stem().unwrap_or_default().to_owned()
+        };
+        let mut name = stem;
+        name.push("-views");
+        args.file.with_file_name(name)
+    });
+    let input = load(&args.file, false)?;
+    input.warn();
+    let scene = input.scene();
+    let views = &args.views;
+    let cameras = choose_views(
+        views.cameras.as_deref(),
+        views.split.into(),
+        views.orbit,
+        views.width,
+        scene.geometry(),
+    )?;
+    let paths: Vec<PathBuf> =
+        cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
+    for path in &paths {
+        check_output(path, &[], common.overwrite)?;
+    }
+    make_folder(&folder)?;
+    let options = RenderOptions { background: views.background };
+    let bars = Bars::new(common.quiet);
+    bars.start("drawing", "views", cameras.len() as u64);
+    let mut done = Vec::new();
+    let mut drawing = 0.0;
+    for (camera, path) in cameras.iter().zip(&paths) {
+        camera.validate()?;
+        let clock = Instant::now();
+        let picture = render(&scene, camera, &options);
+        let seconds = clock.elapsed().as_secs_f64();
+        drawing += seconds;
+        write_bytes(path, &png(picture.width, picture.height, &picture.to_8bit())?)?;
+        bars.advance(1);
+        done.push(json!({
+            "camera": camera.name,
+            "file": path.display().to_string(),
+            "width": picture.width,
+            "height": picture.height,
+            "milliseconds": seconds * 1000.0,
+        }));
+    }
+    bars.end();
+    if common.json {
+        return print_json(&json!({ "scene": input.name, "device": "cpu", "views": done }));
+    }
+    if common.quiet {
+        return Ok(());
+    }
+    let each = drawing * 1000.0 / cameras.len() as f64;
+    print(&format!(
+        "wrote {} pictures to {}, {each:.0} ms each to draw (CPU)\n",
+        cameras.len(),
+        folder.display()
+    ))
+}

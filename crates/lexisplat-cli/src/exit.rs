@@ -1,0 +1,81 @@
+//! How the program ends: one line of error, one of help, and a code that says whose fault it was.
+
+use std::process::ExitCode;
+
+/// Shown at the end of `--help`.
+pub(crate) const CODES: &str = "Exit codes:
+  0  done
+  1  unexpected failure
+  2  wrong usage
+  3  a file could not be read or written
+  4  a file is damaged, or not of a supported kind
+  5  an option or argument is out of range
+  6  a size is over a limit
+  7  an output exists and --overwrite was not given";
+
+/// An output that is already there.
+#[derive(Debug)]
+pub(crate) struct OutputExists(pub(crate) String);
+
+impl std::fmt::Display for OutputExists {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} exists", self.0)
+    }
+}
+
+impl std::error::Error for OutputExists {}
+
+/// Exit code of an error, and what to do about it.
+fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
+    if error.is::<OutputExists>() {
+        return (7, Some("give --overwrite to replace it, or another name with -o"));
+    }
+    if let Some(e) = error.downcast_ref::<lexisplat_eval::Error>() {
+        return match e {
+            lexisplat_eval::Error::Codec(e) => codec(e),
+            lexisplat_eval::Error::Render(e) => (render(e), None),
+            _ => (5, None),
+        };
+    }
+    if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
+        return (render(e), None);
+    }
+    error.downcast_ref::<lexisplat::Error>().map_or((1, None), codec)
+}
+
+fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
+    match error {
+        lexisplat::Error::Io { .. } => (3, None),
+        lexisplat::Error::Format { .. } => (4, Some("`lexisplat info FILE` says more about a file")),
+        lexisplat::Error::Parameter { .. } => (5, None),
+        lexisplat::Error::Limit { .. } => (6, None),
+        _ => (1, None),
+    }
+}
+
+fn render(error: &lexisplat_render::Error) -> u8 {
+    match error {
+        lexisplat_render::Error::Io { .. } => 3,
+        lexisplat_render::Error::Format { .. } => 4,
+        lexisplat_render::Error::Parameter { .. } => 5,
+        _ => 1,
+    }
+}
+
+/// Prints `error` and gives its exit code.
+pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
+    // A reader that closed the pipe has seen enough.
+    if error.chain().any(|cause| {
+        cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+    }) {
+        return ExitCode::SUCCESS;
+    }
+    let (code, help) = classify(error);
+    let mut line = format!("{error:#}");
+    line = line.replace('\n', " ");
+    eprintln!("error: {line}");
+    if let Some(help) = help {
+        eprintln!("help: {help}");
+    }
+    ExitCode::from(code)
+}
