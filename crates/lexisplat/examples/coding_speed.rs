@@ -2,7 +2,7 @@
 //!
 //! `cargo run --release -p lexisplat --example coding_speed -- SCENE.ply DICTIONARY.lexi TOL PURSUIT THREADS REPEATS`
 //! prints one JSON object. The dictionary may be a dictionary file or a compressed scene;
-//! `benches/spams.py` runs this beside SPAMS.
+//! `benches/coding_beside_spams.py` runs this beside SPAMS.
 
 use std::error::Error;
 use std::path::Path;

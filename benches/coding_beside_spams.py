@@ -2,7 +2,7 @@
 """Coding speed beside SPAMS: same dictionary, same tolerance, float32, coding step alone.
 
     pip install spams-bin numpy scipy safetensors
-    python3 benches/spams.py MODEL.ply [MODEL.ply ...] [--tol 0.1] [--threads 1 2]
+    python3 benches/coding_beside_spams.py MODEL.ply [MODEL.ply ...] [--tol 0.1] [--threads 1 2]
 
 For each model: learns a dictionary with `lexisplat compress`, codes with `spams.omp` (which is OLS; its
 eps is the squared norm) and with `lexisplat` (`--pursuit ols`, bound verified), and prints a table.
@@ -31,7 +31,8 @@ def sh_rest(path):
     end = data.index(b"end_header\n") + len(b"end_header\n")
     names = [l.split()[-1] for l in data[:end].decode().splitlines() if l.startswith("property float")]
     rows = np.frombuffer(data[end:], "<f4").reshape(-1, len(names))
-    return np.asfortranarray(rows[:, names.index("f_rest_0"):][:, :45].T)
+    # By name: Brush writes them in alphabetical order.
+    return np.asfortranarray(rows[:, [names.index(f"f_rest_{i}") for i in range(45)]].T)
 
 
 def spams_speed(x, d, tol, threads):
