@@ -12,6 +12,7 @@ pub mod output;
 mod parallel;
 pub mod ply;
 mod progress;
+pub mod sample;
 pub mod sh;
 mod splats;
 pub mod stats;
