@@ -15,8 +15,14 @@ const GATHER_RAYS: usize = 32;
 const LIFT: f64 = 0.012;
 /// Roughness from which reflections of other objects are not traced, only those of the studio.
 const TRACED_ROUGHNESS: f64 = 0.5;
-/// Times the light of the wall that a point sees by itself.
-const EXPOSURE: f64 = 0.95;
+/// Light to film, before the film's curve.
+const EXPOSURE: f64 = 0.45;
+/// Integral of [`Studio::surroundings`]'s profile of a lamp over its argument: pi / 4.
+const PROFILE: f64 = std::f64::consts::FRAC_PI_4;
+/// Share of the guessed light of a neighbour that is really there; most guesses forget shadows.
+const BOUNCE: f64 = 0.45;
+/// The golden angle in turns.
+const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
 /// A soft box far away.
 #[derive(Debug, Clone, Copy)]
@@ -81,7 +87,7 @@ impl Studio {
         Self {
             bodies: bodies.into_iter().map(|(body, material)| (body, material.mean())).collect(),
             lamps: [
-                lamp([-0.75, -1.0, -0.55], [3.0, 2.75, 2.35], 0.03),
+                lamp([-0.75, -1.0, -0.55], [3.0, 2.75, 2.35], 0.05),
                 lamp([0.95, -0.65, 0.35], [0.75, 1.0, 1.5], 0.05),
                 lamp([-0.1, -0.55, 1.0], [1.1, 0.8, 0.75], 0.04),
                 lamp([0.25, -1.0, -0.9], [0.7, 0.68, 0.65], 0.08),
@@ -107,8 +113,9 @@ impl Studio {
         for (lamp, &seen) in self.lamps.iter().zip(seen) {
             let width = lamp.width + 0.5 * spread;
             let off = (1.0 - dot(direction, lamp.to)) / width;
-            // As much light in all however wide it is spread, but no lamp is brighter than it is.
-            let strength = LAMP_SHINE * lamp.width / width;
+            // A lamp that lights a white surface facing it to 1 sends pi into a solid angle of
+            // 2 pi width PROFILE, however wide roughness spreads it.
+            let strength = 0.5 / (PROFILE * width);
             light = add(light, scale(lamp.colour, seen * strength / ((1.0 + off * off) * (1.0 + off))));
         }
         light
@@ -133,7 +140,7 @@ impl Studio {
 
     /// Diffuse light from the lamps and the wall, nothing in the way, times `albedo`.
     fn rough_guess(&self, normal: Vec3, albedo: Vec3) -> Vec3 {
-        let mut light = scale(Self::wall(normal), 0.6);
+        let mut light = scale(Self::wall(normal), 0.5);
         for lamp in &self.lamps {
             light = add(light, scale(lamp.colour, 0.55 * dot(normal, lamp.to).max(0.0)));
         }
@@ -155,7 +162,7 @@ impl Studio {
         let turn = random.uniform();
         for k in 0..GATHER_RAYS {
             // Cosine-weighted directions on a turned spiral.
-            let share = (f64::from(u32::try_from(k).unwrap_or(0)) + 0.5) / GATHER_RAYS as f64;
+            let share = (k as f64 + 0.5) / GATHER_RAYS as f64;
             let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
             let flat = share.sqrt();
             let direction = add(
@@ -196,13 +203,6 @@ impl Studio {
     }
 }
 
-/// How bright a lamp is in a mirror, in units of its diffuse light.
-const LAMP_SHINE: f64 = 9.0;
-/// Share of the guessed light of a neighbour that is really there; most guesses forget shadows.
-const BOUNCE: f64 = 0.6;
-/// The golden angle in turns.
-const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
-
 impl Lit<'_> {
     /// Display colour, 0 to 1, seen by a viewer in the unit direction `to_viewer`. From behind the
     /// surface shows the mirror image of its front, so that colour has no jump.
@@ -214,17 +214,15 @@ impl Lit<'_> {
         let Surface { mirror, roughness, .. } = self.surface;
         // Schlick's Fresnel term, held back on rough surfaces.
         let grazing = (1.0 - facing) * (1.0 - facing);
-        let grazing = grazing * grazing * (1.0 - facing) * (1.0 - roughness);
+        let grazing = grazing * grazing * (1.0 - facing) * (1.0 - roughness) * (1.0 - roughness);
         let strength = mix(mirror, [1.0; 3], grazing);
         let direction = reflect(to_viewer, self.normal);
-        let hit = match roughness < TRACED_ROUGHNESS {
-            true => self.studio.hit(self.position, direction),
-            false => None,
-        };
+        let traced = roughness < TRACED_ROUGHNESS;
+        let hit = if traced { self.studio.hit(self.position, direction) } else { None };
         let reflected = match hit {
             Some((_, normal, colour)) => self.studio.rough_guess(normal, colour),
             None => {
-                let open = if roughness < TRACED_ROUGHNESS { 1.0 } else { self.open };
+                let open = if traced { 1.0 } else { self.open };
                 self.studio.surroundings(direction, roughness, &self.seen, open)
             }
         };

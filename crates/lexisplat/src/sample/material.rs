@@ -2,13 +2,14 @@
 
 use super::math::{Vec3, dot, mix, scale, sin_cos_turns, smoothstep};
 use super::random::value_noise;
+use super::shapes::Edge;
 
 /// Reflectance of anything that is no metal, seen head-on.
 const DIELECTRIC: f64 = 0.04;
 /// Squares of the table top, in world units a side.
-const SQUARE: f64 = 0.26;
+const SQUARE: f64 = 0.25;
 /// Radius of the chequered part of the table top.
-const CHEQUERED: f64 = 1.56;
+const CHEQUERED: f64 = 1.5;
 const MAPLE: Vec3 = [0.62, 0.41, 0.22];
 const WALNUT: Vec3 = [0.17, 0.075, 0.035];
 const DOUGH: Vec3 = [0.58, 0.32, 0.11];
@@ -58,15 +59,15 @@ impl Material {
             Self::Chequered => {
                 let radius = (local[0] * local[0] + local[2] * local[2]).sqrt();
                 if radius > CHEQUERED {
-                    return coated(wood(local, WALNUT), 0.22);
+                    return coated(wood(local, WALNUT), 0.62);
                 }
                 let (a, b) = (local[0] / SQUARE, local[2] / SQUARE);
                 let dark = (a.floor() + b.floor()).rem_euclid(2.0) > 0.5;
                 let grain = if dark { [local[2], local[1], local[0]] } else { local };
                 let albedo = wood(grain, if dark { WALNUT } else { MAPLE });
-                coated(albedo, if dark { 0.18 } else { 0.26 })
+                coated(albedo, if dark { 0.58 } else { 0.66 })
             }
-            Self::DarkWood => coated(wood([local[1], local[0], local[2]], WALNUT), 0.25),
+            Self::DarkWood => coated(wood([local[1], local[0], local[2]], WALNUT), 0.65),
             Self::Paint { colour, roughness } => coated(*colour, *roughness),
             Self::Clay { colour } => {
                 let grain = value_noise(scale(local, 18.0)) + 0.5 * value_noise(scale(local, 41.0));
@@ -75,7 +76,7 @@ impl Material {
             Self::Metal { colour, roughness } => {
                 Surface { albedo: [0.0; 3], mirror: *colour, roughness: *roughness }
             }
-            Self::Marble => coated(marble(local), 0.2),
+            Self::Marble => coated(marble(local), 0.55),
             Self::Doughnut => doughnut(local, dot(normal, up)),
             Self::Book { colour } => {
                 if dot(normal, up) > 0.5 {
@@ -86,6 +87,27 @@ impl Material {
             }
             Self::Backdrop => Surface { albedo: [0.0; 3], mirror: [0.0; 3], roughness: 1.0 },
         }
+    }
+
+    /// The nearest line of the pattern at `local`, if colours meet along straight lines.
+    pub(super) fn edge(&self, local: Vec3) -> Option<Edge> {
+        if !matches!(self, Self::Chequered) {
+            return None;
+        }
+        let radius = (local[0] * local[0] + local[2] * local[2]).sqrt();
+        let round = Edge {
+            distance: (radius - CHEQUERED).abs(),
+            along: [-local[2] / radius, 0.0, local[0] / radius],
+        };
+        if radius > CHEQUERED {
+            return Some(round);
+        }
+        let line = |v: f64, along| {
+            let from = (v / SQUARE).rem_euclid(1.0);
+            Some(Edge { distance: from.min(1.0 - from) * SQUARE, along })
+        };
+        let grid = Edge::nearer(line(local[0], [0.0, 0.0, 1.0]), line(local[2], [1.0, 0.0, 0.0]));
+        Edge::nearer(grid, Some(round))
     }
 
     /// One colour that stands for the whole where it is seen in a reflection.
@@ -117,7 +139,7 @@ fn marble(p: Vec3) -> Vec3 {
     let warp = value_noise(scale(p, 3.0)) + 0.5 * value_noise(scale(p, 7.0));
     let (vein, _) = sin_cos_turns(p[0] * 1.1 + p[1] * 1.9 + p[2] * 0.7 + warp * 1.1);
     let vein = 1.0 - smoothstep(0.0, 0.25, vein.abs());
-    mix([0.80, 0.78, 0.74], [0.30, 0.32, 0.36], 0.75 * vein)
+    mix([0.66, 0.64, 0.60], [0.30, 0.32, 0.36], 0.75 * vein)
 }
 
 fn doughnut(p: Vec3, upward: f64) -> Surface {
@@ -128,9 +150,9 @@ fn doughnut(p: Vec3, upward: f64) -> Surface {
         let albedo = scale(DOUGH, 0.75 + 0.35 * (1.0 - baked) + 0.2 * value_noise(scale(p, 25.0)));
         return Surface { albedo, mirror: [0.02; 3], roughness: 0.75 };
     }
-    let cell = value_noise([p[0] * 21.0, 7.5, p[2] * 21.0]);
+    let cell = value_noise([p[0] * 17.0, 7.5, p[2] * 17.0]);
     let kind = value_noise([p[0] * 9.0 + 40.0, 3.5, p[2] * 9.0]);
     let sprinkle = [0.30, 0.45, 0.58].iter().filter(|&&limit| kind > limit).count();
-    let albedo = if cell > 0.78 { SPRINKLES[sprinkle] } else { ICING };
+    let albedo = if cell > 0.72 { SPRINKLES[sprinkle] } else { ICING };
     Surface { albedo, mirror: [DIELECTRIC; 3], roughness: 0.16 }
 }

@@ -1,15 +1,15 @@
 //! Seeded numbers: one independent stream a Gaussian, so that threads cannot change them.
 
-/// Step of the SplitMix64 state (Steele, Lea, Flood 2014): 2^64 over the golden ratio.
+/// Step of the `SplitMix64` state (Steele, Lea, Flood 2014): 2^64 over the golden ratio.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 /// Uniform numbers added up for one that is nearly normal; their variance is then 1.
 const UNIFORMS: u32 = 12;
 
-/// A SplitMix64 stream.
+/// A `SplitMix64` stream.
 #[derive(Debug, Clone)]
 pub(super) struct Random(u64);
 
-/// SplitMix64's output function.
+/// `SplitMix64`'s output function.
 fn scramble(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -18,9 +18,7 @@ fn scramble(mut z: u64) -> u64 {
 
 /// The top 53 bits as a number in \[0, 1).
 fn to_unit(bits: u64) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "53 bits fit")]
-    let mantissa = (bits >> 11) as f64;
-    mantissa / (1_u64 << 53) as f64
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 impl Random {

@@ -39,18 +39,36 @@ pub(super) struct Point {
     pub(super) tangent: Vec3,
     /// Position relative to the shape, in its own axes where it has some; patterns use it.
     pub(super) local: Vec3,
+    /// The nearest end of the surface, where it has one.
+    pub(super) edge: Option<Edge>,
+}
+
+/// A line that Gaussians should not reach across.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Edge {
+    /// How far it is, in world units.
+    pub(super) distance: f64,
+    /// Unit vector along it.
+    pub(super) along: Vec3,
+}
+
+impl Edge {
+    /// The nearer of two.
+    pub(super) fn nearer(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        match (a, b) {
+            (Some(a), Some(b)) => Some(if b.distance < a.distance { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
 }
 
 /// The share of the way through `count` points at point `index`, 0 to 1.
 fn share(index: usize, count: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "fewer points than 2^52")]
-    let share = (index as f64 + 0.5) / count as f64;
-    share
+    (index as f64 + 0.5) / count as f64
 }
 
 /// Golden multiple of `index`, in \[0, 1).
 fn golden(index: usize) -> f64 {
-    #[expect(clippy::cast_precision_loss, reason = "fewer points than 2^52")]
     let turns = index as f64 * GOLDEN;
     turns - turns.floor()
 }
@@ -84,13 +102,16 @@ impl Shape {
             Self::Disc { centre, radius } => {
                 let (sin, cos) = sin_cos_turns(v);
                 let r = radius * u.sqrt();
-                on(*centre, [r * cos, 0.0, r * sin], UP, [cos, 0.0, sin])
+                let edge = Some(Edge { distance: radius - r, along: [-sin, 0.0, cos] });
+                Point { edge, ..on(*centre, [r * cos, 0.0, r * sin], UP, [cos, 0.0, sin]) }
             }
             Self::Rim { centre, radius, thickness } => {
                 let (sin, cos) = sin_cos_turns(u);
                 let out = [cos, 0.0, sin];
                 let down = thickness * v;
-                on(*centre, add(scale(out, *radius), scale(UP, -down)), out, [-sin, 0.0, cos])
+                let along = [-sin, 0.0, cos];
+                let edge = Some(Edge { distance: down.min(thickness - down), along });
+                Point { edge, ..on(*centre, add(scale(out, *radius), scale(UP, -down)), out, along) }
             }
             Self::Torus { centre, ring, tube } => {
                 let (sin, cos) = sin_cos_turns(u);
@@ -125,14 +146,18 @@ impl Shape {
                 local[face.v] = half[face.v] * (2.0 * v - 1.0);
                 let offset = (0..3).fold([0.0; 3], |sum, a| add(sum, scale(axes[a], local[a])));
                 let normal = scale(axes[face.axis], face.sign);
-                Point { position: add(*centre, offset), normal, tangent: axes[face.u], local }
+                let end = |axis: usize, along: usize| {
+                    Some(Edge { distance: half[axis] - local[axis].abs(), along: axes[along] })
+                };
+                let edge = Edge::nearer(end(face.u, face.v), end(face.v, face.u));
+                Point { position: add(*centre, offset), normal, tangent: axes[face.u], local, edge }
             }
         }
     }
 }
 
 fn on(centre: Vec3, local: Vec3, normal: Vec3, tangent: Vec3) -> Point {
-    Point { position: add(centre, local), normal, tangent, local }
+    Point { position: add(centre, local), normal, tangent, local, edge: None }
 }
 
 /// A face of a box: which axis it faces, which way, and its own two axes.
@@ -204,9 +229,7 @@ fn knot_at_length(u: f64) -> f64 {
     let piece = lengths.partition_point(|&l| l < target).min(lengths.len() - 1);
     let before = if piece == 0 { 0.0 } else { lengths[piece - 1] };
     let inside = (target - before) / (lengths[piece] - before);
-    #[expect(clippy::cast_precision_loss, reason = "a few hundred pieces")]
-    let turns = (piece as f64 + inside) / f64::from(KNOT_PIECES);
-    turns
+    (piece as f64 + inside) / f64::from(KNOT_PIECES)
 }
 
 /// Centres of `count` balls along the knot.

@@ -6,7 +6,7 @@ use super::math::{Vec3, sin_cos_turns};
 use super::shapes::{Shape, knot_beads, torus_beads};
 
 /// Radius of the table.
-const TABLE: f64 = 1.8;
+const TABLE: f64 = 1.7;
 /// Radius of the studio's wall: well outside a camera that shows the whole table.
 const WALL: f64 = 12.0;
 /// Balls that stand for a torus or knot where it blocks light.
@@ -57,11 +57,11 @@ pub(super) fn things() -> Vec<Thing> {
             Material::DarkWood,
             0.7,
         ),
-        block(at(0.0, 0.22, 0.1), [0.36, 0.22, 0.36], 0.06, Material::Marble),
+        block(at(0.0, 0.15, 0.1), [0.36, 0.15, 0.36], 0.06, Material::Marble),
         Thing {
-            shape: Shape::Knot { centre: at(0.0, 1.06, 0.1), size: 0.175, tube: 0.095 },
+            shape: Shape::Knot { centre: at(0.0, 0.80, 0.1), size: 0.14, tube: 0.08 },
             material: metal([0.95, 0.55, 0.28], 0.22),
-            density: 1.1,
+            density: 0.85,
         },
         ball(-0.92, -0.42, 0.40, paint([0.62, 0.015, 0.02], 0.06)),
         ball(-0.34, -0.92, 0.27, paint([0.01, 0.05, 0.42], 0.1)),
@@ -86,7 +86,7 @@ pub(super) fn things() -> Vec<Thing> {
         Thing {
             shape: Shape::Sphere { centre: at(0.0, 0.0, 0.0), radius: WALL, inward: true },
             material: Material::Backdrop,
-            density: 0.0006,
+            density: 0.0012,
         },
     ]
 }
