@@ -17,6 +17,7 @@ pub mod ply;
 mod progress;
 pub mod pursuit;
 mod rng;
+pub mod sample;
 pub mod sh;
 mod splats;
 pub mod stats;
