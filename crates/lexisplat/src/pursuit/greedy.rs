@@ -304,19 +304,20 @@ fn accumulate_group<const GROUP: usize>(
     offset: usize,
     f: impl Fn(f32, f32, f32) -> f32 + Copy,
 ) {
-    let mut group = [ZERO; GROUP];
-    for (g, sum) in group.iter_mut().zip(&*sums) {
-        *g = *sum;
-    }
-    for (&factor, row) in factors.iter().zip(rows.chunks_exact(blocks)) {
-        let row = &row[offset..offset + GROUP];
-        for (sum, lane) in group.iter_mut().zip(row) {
-            *sum = sum.zip(*lane, |s, x| f(s, factor, x));
+    // Arrays of a known length, so that the group stays in registers and nothing is checked in the loop.
+    let Some(sums) = sums.first_chunk_mut::<GROUP>() else { return };
+    let mut group = *sums;
+    for (l, &factor) in factors.iter().enumerate() {
+        let Some(row) = rows.get(l * blocks + offset..).and_then(<[Lane]>::first_chunk::<GROUP>) else {
+            return;
+        };
+        for g in 0..GROUP {
+            for i in 0..LANES {
+                group[g].0[i] = f(group[g].0[i], factor, row[g].0[i]);
+            }
         }
     }
-    for (g, sum) in group.iter().zip(sums) {
-        *sum = *g;
-    }
+    *sums = group;
 }
 
 /// The atom with the largest `correlation^2 / distance`: the one that lowers the residual most.

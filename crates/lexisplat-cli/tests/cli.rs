@@ -1,0 +1,302 @@
+//! The program as a user runs it.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::{Path, PathBuf};
+
+use assert_cmd::Command;
+use lexisplat::ply::{self, ReadOptions};
+use lexisplat::sample::{SampleOptions, scene};
+use serde_json::Value;
+
+/// Gaussians of the test scene: enough to learn from, quick to draw.
+const GAUSSIANS: usize = 1500;
+
+fn lexisplat() -> Command {
+    Command::cargo_bin("lexisplat").unwrap()
+}
+
+/// A folder with a scene in it.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        ply::write(&folder.path("scene.ply"), &scene(&SampleOptions::new(GAUSSIANS, 0))).unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    /// Runs in the folder; asserts success; standard output.
+    fn run(&self, arguments: &[&str]) -> String {
+        let output = lexisplat().current_dir(self.0.path()).args(arguments).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{arguments:?}: {error}");
+        String::from_utf8(output.stdout).unwrap()
+    }
+
+    fn json(&self, arguments: &[&str]) -> Value {
+        let mut all = arguments.to_vec();
+        all.push("--json");
+        serde_json::from_str(&self.run(&all)).unwrap()
+    }
+
+    /// Runs in the folder; asserts the exit code; standard error.
+    fn fail(&self, arguments: &[&str], code: i32) -> String {
+        let output = lexisplat().current_dir(self.0.path()).args(arguments).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
+        assert!(!error.contains("panicked"), "{error}");
+        error
+    }
+
+    fn names(&self) -> Vec<String> {
+        let entries = std::fs::read_dir(self.0.path()).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+}
+
+fn read(path: &Path) -> lexisplat::Splats {
+    ply::read(path, &ReadOptions::default()).unwrap().splats
+}
+
+#[test]
+fn a_scene_goes_in_and_comes_back_within_the_promise() {
+    let folder = Folder::new();
+    for layout in ["f16", "f32", "paper"] {
+        let report = folder.json(&[
+            "compress",
+            "scene.ply",
+            "-o",
+            "c.lexi",
+            "--overwrite",
+            "--layout",
+            layout,
+            "--tol",
+            "0.08",
+        ]);
+        assert_eq!(report["gaussians"], GAUSSIANS);
+        assert_eq!((&report["over_tolerance"], &report["layout"]), (&Value::from(0), &Value::from(layout)));
+        assert!(report["max_residual"].as_f64().unwrap() <= 0.08);
+        let on_disk = folder.path("c.lexi").metadata().unwrap().len();
+        assert_eq!(report["file_bytes"], on_disk);
+        let listed: u64 =
+            report["attribute_bytes"].as_object().unwrap().values().map(|v| v.as_u64().unwrap()).sum();
+        assert_eq!(listed, on_disk);
+        let ratio = 45.0 / report["mean_nonzeros"].as_f64().unwrap();
+        assert!((report["coefficient_ratio"].as_f64().unwrap() - ratio).abs() < 1e-9);
+        for key in ["ply_bytes", "sh_bytes", "rms_residual", "learn_seconds", "code_seconds"] {
+            assert!(report[key].is_number(), "{key}");
+        }
+
+        folder.run(&["decompress", "c.lexi", "-o", "back.ply", "--overwrite"]);
+        let (original, back) = (read(&folder.path("scene.ply")), read(&folder.path("back.ply")));
+        assert_eq!(original.geometry, back.geometry);
+        assert_eq!(original.meta, back.meta);
+        for i in 0..GAUSSIANS {
+            let squares = original.rest(i).iter().zip(back.rest(i));
+            let error = squares.map(|(x, y)| (f64::from(*x) - f64::from(*y)).powi(2)).sum::<f64>().sqrt();
+            assert!(error <= 0.08, "Gaussian {i}: {error}");
+        }
+    }
+}
+
+#[test]
+fn codes_draw_as_the_decompressed_scene_does() {
+    let folder = Folder::new();
+    folder.run(&["compress", "scene.ply", "--quiet"]);
+    folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
+    let small = ["--orbit", "3", "--width", "120"];
+    let score = folder.json(&[&["compare", "back.ply", "scene.lexi"], &small[..]].concat());
+    if score["identical"] != Value::Bool(true) {
+        assert!(score["psnr"]["min"].as_f64().unwrap() >= 70.0, "{score}");
+    }
+    let score =
+        folder.json(&[&["compare", "scene.ply", "scene.lexi", "--save-views", "seen"], &small[..]].concat());
+    assert!(score["psnr"]["min"].as_f64().unwrap() > 35.0, "{score}");
+    assert_eq!(score["views"].as_array().unwrap().len(), 3);
+    for file in score["saved"].as_array().unwrap() {
+        let picture = image::open(folder.path(file.as_str().unwrap())).unwrap();
+        assert_eq!((picture.width(), picture.height()), (3 * 120 + 8, 80));
+    }
+    let same = folder.json(&[&["compare", "scene.ply", "scene.ply", "--8bit"], &small[..]].concat());
+    assert_eq!(same["identical"], true);
+    assert!(same["views"][0]["psnr"].is_null() && same["psnr"]["mean"].is_null());
+    let text = folder.run(&[&["compare", "scene.ply", "scene.lexi"], &small[..]].concat());
+    assert!(text.contains("minimum") && text.contains("orbit_002"), "{text}");
+}
+
+#[test]
+fn pictures_sort_as_the_cameras_do() {
+    let folder = Folder::new();
+    let camera = |name: &str, x: f32, split: &str| {
+        serde_json::json!({
+            "id": 0, "img_name": name, "width": 64, "height": 48, "fx": 60.0, "fy": 60.0, "split": split,
+            "position": [x, -0.5, -4.0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+        })
+    };
+    let cameras =
+        Value::from(vec![camera("z", 0.0, "test"), camera("a/b", 0.3, "train"), camera("m", 0.5, "test")]);
+    std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
+    let report = folder.json(&["render", "scene.ply", "--cameras", "cameras.json", "-o", "out"]);
+    let files: Vec<&str> =
+        report["views"].as_array().unwrap().iter().map(|v| v["file"].as_str().unwrap()).collect();
+    assert_eq!(files.len(), 3);
+    assert!(files.is_sorted(), "{files:?}");
+    let picture = image::open(folder.path(files[0])).unwrap();
+    assert_eq!((picture.width(), picture.height()), (64, 48));
+    assert!(picture.to_rgb8().pixels().any(|p| p.0 != [0, 0, 0]), "something is drawn");
+    folder.fail(&["render", "scene.ply", "--cameras", "cameras.json", "-o", "out"], 7);
+    let test = folder.json(&[
+        "render",
+        "scene.ply",
+        "--cameras",
+        "cameras.json",
+        "--split",
+        "test",
+        "-o",
+        "t",
+        "--width",
+        "32",
+    ]);
+    assert_eq!(test["views"].as_array().unwrap().len(), 2);
+    assert_eq!(
+        (&test["views"][0]["width"], &test["views"][0]["height"]),
+        (&Value::from(32), &Value::from(24))
+    );
+}
+
+#[test]
+fn pipes_carry_scenes() {
+    let folder = Folder::new();
+    let scene = std::fs::read(folder.path("scene.ply")).unwrap();
+    let small = lexisplat().args(["compress", "-", "-o", "-"]).write_stdin(scene).output().unwrap();
+    assert!(small.status.success());
+    folder.run(&["compress", "scene.ply", "-q"]);
+    assert!(small.stdout == std::fs::read(folder.path("scene.lexi")).unwrap(), "a pipe gives the same bytes");
+    let back = lexisplat().args(["decompress", "-"]).write_stdin(small.stdout.clone()).output().unwrap();
+    folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
+    assert!(back.stdout == std::fs::read(folder.path("back.ply")).unwrap());
+    let info = lexisplat().args(["info", "-", "--json"]).write_stdin(small.stdout).output().unwrap();
+    let info: Value = serde_json::from_slice(&info.stdout).unwrap();
+    assert_eq!((&info["kind"], &info["lexi"]["checksums"]), (&Value::from("lexi"), &Value::from("ok")));
+    folder.fail(&["compress", "scene.ply", "-o", "-", "--json"], 5);
+}
+
+#[test]
+fn threads_do_not_change_the_file() {
+    let folder = Folder::new();
+    for threads in ["1", "2"] {
+        folder.run(&["compress", "scene.ply", "-o", &format!("{threads}.lexi"), "--threads", threads]);
+    }
+    let file = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert!(file("1.lexi") == file("2.lexi"));
+}
+
+#[test]
+fn a_dictionary_serves_another_scene() {
+    let folder = Folder::new();
+    ply::write(&folder.path("other.ply"), &scene(&SampleOptions::new(GAUSSIANS, 9))).unwrap();
+    folder.run(&["compress", "scene.ply", "--save-dictionary", "d.lexi", "-q"]);
+    let own = folder.json(&["compress", "scene.ply", "-o", "own.lexi", "--dictionary", "d.lexi"]);
+    let first = std::fs::read(folder.path("scene.lexi")).unwrap();
+    assert!(
+        first == std::fs::read(folder.path("own.lexi")).unwrap(),
+        "the same dictionary gives the same file"
+    );
+    assert!(own["learn_rounds"].is_null());
+    let other = folder.json(&["compress", "other.ply", "--dictionary", "scene.lexi"]);
+    assert!(other["max_residual"].as_f64().unwrap() <= 0.1);
+}
+
+#[test]
+fn info_lints() {
+    let folder = Folder::new();
+    let mut splats = scene(&SampleOptions::new(50, 0));
+    splats.geometry.rotations[3] = [0.0; 4];
+    ply::write(&folder.path("odd.ply"), &splats).unwrap();
+    let info = folder.json(&["info", "odd.ply"]);
+    assert_eq!((&info["kind"], &info["gaussians"]), (&Value::from("ply"), &Value::from(50)));
+    assert_eq!(info["statistics"]["zero_quaternions"], 1);
+    let text = folder.run(&["info", "scene.ply"]);
+    assert!(text.contains("opacity") && text.contains("norm of a Gaussian's SH"), "{text}");
+}
+
+#[test]
+fn outputs_in_the_way_are_kept() {
+    let folder = Folder::new();
+    std::fs::write(folder.path("scene.lexi"), b"precious").unwrap();
+    let error = folder.fail(&["compress", "scene.ply"], 7);
+    assert!(error.contains("scene.lexi exists") && error.contains("help: give --overwrite"), "{error}");
+    assert_eq!(std::fs::read(folder.path("scene.lexi")).unwrap(), b"precious");
+    folder.fail(&["compress", "scene.ply", "-o", "scene.ply", "--overwrite"], 5);
+    folder.fail(&["compress", "scene.ply", "-o", ".", "--overwrite"], 5);
+    folder.run(&["compress", "scene.ply", "--overwrite"]);
+    assert_eq!(folder.names(), ["scene.lexi", "scene.ply"], "nothing temporary is left");
+}
+
+#[test]
+fn each_blame_has_its_exit_code() {
+    let folder = Folder::new();
+    folder.fail(&["compress"], 2);
+    folder.fail(&["compress", "scene.ply", "--pursuit", "magic"], 2);
+    let error = folder.fail(&["compress", "missing.ply"], 3);
+    assert!(error.contains("missing.ply"), "{error}");
+    folder.fail(&["compress", "scene.ply", "-o", "no/such/folder/x.lexi"], 3);
+    std::fs::write(folder.path("text.ply"), "hello").unwrap();
+    folder.fail(&["compress", "text.ply"], 4);
+    folder.fail(&["compress", "scene.ply", "--tol", "0"], 5);
+    folder.fail(&["compress", "scene.ply", "--atoms", "2000"], 5);
+    folder.run(&["compress", "scene.ply", "-q"]);
+    let mut bytes = std::fs::read(folder.path("scene.lexi")).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    std::fs::write(folder.path("bad.lexi"), bytes).unwrap();
+    let error = folder.fail(&["decompress", "bad.lexi"], 4);
+    assert!(
+        error.contains("checksum") && error.contains("bad.lexi") && error.lines().count() <= 2,
+        "{error}"
+    );
+    assert!(!folder.path("bad.ply").exists());
+}
+
+#[test]
+fn invalid_gaussians_are_refused_or_dropped() {
+    let folder = Folder::new();
+    let mut splats = scene(&SampleOptions::new(60, 0));
+    splats.geometry.opacities[7] = f32::NAN;
+    splats.sh_rest[45 * 20] = f32::INFINITY;
+    ply::write(&folder.path("nan.ply"), &splats).unwrap();
+    let error = folder.fail(&["compress", "nan.ply"], 4);
+    assert!(
+        error.contains("2 Gaussians") && error.contains("number 7") && error.contains("--drop-invalid"),
+        "{error}"
+    );
+    let report = folder.json(&["compress", "nan.ply", "--drop-invalid"]);
+    assert_eq!(report["gaussians"], 58);
+    assert!(report["warnings"].to_string().contains('2'), "{report}");
+}
+
+#[test]
+fn a_cap_on_nonzeros_lifts_the_promise() {
+    let folder = Folder::new();
+    let report = folder.json(&["compress", "scene.ply", "--max-nnz", "2"]);
+    assert!(report["tol"].is_null() && report["mean_nonzeros"].as_f64().unwrap() <= 2.0);
+    let report = folder.json(&["compress", "scene.ply", "--max-nnz", "2", "--tol", "0.05", "--overwrite"]);
+    assert!(report["over_tolerance"].as_u64().unwrap() > 0);
+}
+
+#[test]
+fn quiet_is_silent_and_completions_are_not() {
+    let folder = Folder::new();
+    let output =
+        lexisplat().current_dir(folder.0.path()).args(["compress", "scene.ply", "--quiet"]).output().unwrap();
+    assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
+    for shell in ["bash", "zsh", "fish"] {
+        assert!(folder.run(&["completions", shell]).contains("lexisplat"), "{shell}");
+    }
+}
