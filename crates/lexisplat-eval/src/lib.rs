@@ -33,6 +33,7 @@ mod compare;
 mod error;
 pub mod metrics;
 pub mod montage;
+pub mod report;
 mod views;
 
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
