@@ -1,6 +1,34 @@
-//! Codec for trained 3D Gaussian Splatting scenes.
+//! Codec for trained 3D Gaussian Splatting scenes: a learned dictionary, sparse codes, a promised error.
 //!
-//! placeholder
+//! The 45 view-dependent SH coefficients of a Gaussian become a few atoms of a dictionary learned from
+//! the scene itself, without photos, cameras or retraining, and no Gaussian ends further from its
+//! original than the tolerance.
+//!
+//! ```
+//! use lexisplat::sample::{SampleOptions, scene};
+//! use lexisplat::{CompressOptions, Limits, Silent, compress, lexi, ply};
+//!
+//! let folder = tempfile::tempdir()?;
+//! let (input, output) = (folder.path().join("scene.ply"), folder.path().join("scene.lexi"));
+//! ply::write(&input, &scene(&SampleOptions::new(2000, 0)))?; // or bring your own
+//!
+//! let original = ply::read(&input, &ply::ReadOptions::default())?.splats;
+//! let (model, report) = compress(original.clone(), &CompressOptions::default(), &Silent)?;
+//! lexi::write(&output, &model)?;
+//! println!("{:.1} of 45 nonzeros a Gaussian", report.mean_nonzeros);
+//!
+//! let decoded = lexi::read(&output, &Limits::default())?.into_splats();
+//! assert!(model.record.max_residual <= 0.1);
+//! assert_eq!(decoded.geometry, original.geometry);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! [`compress()`] does everything; [`mod@learn`] and [`pursuit`] are its parts. [`ply`] and [`lexi`] are the
+//! files, [`Splats`] and [`Model`] what they hold. docs/METHOD.md has the mathematics, docs/FORMAT.md the
+//! file.
+//!
+//! The features `parallel` and `mmap` are on by default. Without them the crate needs neither threads nor
+//! files and builds for `wasm32-unknown-unknown`; results are the same bit for bit.
 
 mod codes;
 mod compress;

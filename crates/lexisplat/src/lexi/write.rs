@@ -32,7 +32,7 @@ pub fn write(path: &Path, model: &Model) -> Result<u64> {
 /// Writes `model` to `writer`. Returns the number of bytes.
 ///
 /// # Errors
-/// As [`write`]; an [`Error::Io`] names no file.
+/// As [`write()`]; an [`Error::Io`] names no file.
 pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
     draft(model)?.write_to(writer).map_err(|e| Error::io("output", e))
 }
@@ -41,7 +41,7 @@ pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
 /// file's size.
 ///
 /// # Errors
-/// As [`write`], without the I/O.
+/// As [`write()`], without the I/O.
 pub fn attribute_bytes(model: &Model) -> Result<Vec<(String, u64)>> {
     let mut out: Vec<(String, u64)> =
         tensors(model)?.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
@@ -52,7 +52,7 @@ pub fn attribute_bytes(model: &Model) -> Result<Vec<(String, u64)>> {
 /// Bytes of the whole file as written.
 ///
 /// # Errors
-/// As [`write`], without the I/O.
+/// As [`write()`], without the I/O.
 pub fn file_bytes(model: &Model) -> Result<u64> {
     Ok(attribute_bytes(model)?.iter().map(|a| a.1).sum())
 }
@@ -60,7 +60,7 @@ pub fn file_bytes(model: &Model) -> Result<u64> {
 /// Bytes that stand for SH-rest: dictionary, codes and escapes.
 ///
 /// # Errors
-/// As [`write`], without the I/O.
+/// As [`write()`], without the I/O.
 pub fn sh_bytes(model: &Model) -> Result<u64> {
     let is_sh =
         |name: &str| name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.");
