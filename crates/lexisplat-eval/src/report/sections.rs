@@ -24,6 +24,9 @@ pub(super) struct Facts<'a> {
     parts: Vec<Part>,
 }
 
+/// Group of what is none of the others.
+const OTHER: usize = 6;
+
 /// The group of a part of either file.
 fn group(name: &str) -> usize {
     match name.split('.').next().unwrap_or(name) {
@@ -33,7 +36,7 @@ fn group(name: &str) -> usize {
         "rotation" => 3,
         "scale" => 4,
         "opacity" => 5,
-        _ => 6,
+        _ => OTHER,
     }
 }
 
@@ -50,20 +53,25 @@ impl<'a> Facts<'a> {
             ("Rotations", "g-rotation"),
             ("Sizes", "g-scale"),
             ("Opacities", "g-opacity"),
-            ("Headers, normals, extras", "g-other"),
+            ("Headers, normals if any, extras", "g-other"),
         ];
         let mut parts = names.map(|(name, class)| Part { name, class, before: 0, after: 0 });
         for (part, values) in parts.iter_mut().zip(per_gaussian) {
             part.before = values * gaussians * PLY_VALUE;
         }
         let named: u64 = parts.iter().map(|part| part.before).sum();
-        parts[6].before = report.ply_bytes.saturating_sub(named);
+        parts[OTHER].before = report.ply_bytes.saturating_sub(named);
         for (name, bytes) in report.attributes {
             parts[group(name)].after += bytes;
         }
         let mean_nonzeros = model.codes.nonzeros() as f64 / (gaussians.max(1)) as f64;
         let (sh_before, sh_after) = (parts[0].before, parts[0].after);
         Self { report, gaussians, dim, mean_nonzeros, sh_before, sh_after, parts: parts.into() }
+    }
+
+    /// Whether view-dependent colour is more than half of the PLY.
+    fn sh_dominates(&self) -> bool {
+        self.sh_before > self.report.ply_bytes / 2
     }
 
     /// Whether every Gaussian is within the tolerance, if there is one.
@@ -100,7 +108,7 @@ pub(super) fn header(page: &mut String, facts: &Facts<'_>) {
         );
         card(
             format!("{:.1} <small>of {}</small>", facts.mean_nonzeros, facts.dim),
-            "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, in the mean",
+            "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
         );
     }
     if report.comparison.identical {
@@ -181,7 +189,7 @@ pub(super) fn steps(page: &mut String, facts: &Facts<'_>) {
         page,
         "<section aria-labelledby=\"how\"><h2 id=\"how\">What happened</h2>\n<ol class=\"steps\">\
          <li><strong>Look</strong>Each Gaussian has {dim} numbers (spherical harmonics of degree {degree}) \
-         that say how its colour changes with direction. They are most of the file.</li>\
+         that say how its colour changes with direction{most}.</li>\
          <li><strong>Learn words</strong>From a sample of them, {atoms} typical patterns were learnt: the \
          dictionary\u{2019}s atoms.{learn}</li>\
          <li><strong>Spell</strong>{pursuit} picked a few atoms and their amounts for every Gaussian, one by one, \
@@ -189,6 +197,7 @@ pub(super) fn steps(page: &mut String, facts: &Facts<'_>) {
          <li><strong>Check</strong>Every Gaussian was put together again from what the file holds, in double \
          precision, and measured. {escapes}</li></ol></section>",
         dim = facts.dim,
+        most = if facts.sh_dominates() { ": most of the file" } else { "" },
         degree = model.degree(),
         atoms = text::count(model.dictionary.len() as u64),
         learn = seconds(report.learn_seconds),
@@ -219,11 +228,12 @@ pub(super) fn promise(page: &mut String, facts: &Facts<'_>) {
             page,
             "<div class=\"promise\"><p><b>Kept for all {count} Gaussians.</b> None is further than \
              {tolerance} from its original, measured as the length of the difference of its {dim} numbers. \
-             The furthest is at {max:.6}, the typical one (root mean square) at {rms:.4}.</p></div>\n\
-             <div class=\"gauge\" role=\"img\" aria-label=\"Largest error {max:.6} of {tolerance} allowed, \
+             The furthest is at {max:.8}, the typical one (root mean square) at {rms:.4}.</p></div>\n\
+             <div class=\"gauge\" role=\"img\" aria-label=\"Largest error {max:.8} of {tolerance} allowed, \
              root mean square {rms:.4}\"><i style=\"width:{max_share:.2}%\"></i>\
              <i style=\"width:{rms_share:.2}%\"></i></div>\
-             <p class=\"note\">Full width: {tolerance}. Dark: root mean square. Green: largest.</p>\n\
+             <p class=\"note\">The whole width is the promise, {tolerance}. The bar ends at the largest error; its muted part ends \
+             at the root mean square.</p>\n\
              <p class=\"note\">In colour, where 1 is the whole range and before blending: averaged over all directions \
              a Gaussian is off by at most {all_error:.4} in the three channels together (root mean \
              square), by at most {single_error:.4} in one channel alone. Blending many Gaussians into a \
@@ -250,7 +260,7 @@ pub(super) fn promise(page: &mut String, facts: &Facts<'_>) {
         });
         let _ = write!(
             page,
-            "<div class=\"promise lifted\"><p><b>{over}{cap}.</b> The largest error is {:.6}, the root mean \
+            "<div class=\"promise lifted\"><p><b>{over}{cap}.</b> The largest error is {:.8}, the root mean \
              square {:.4}.</p></div>",
             record.max_residual, record.rms_residual
         );
@@ -263,12 +273,19 @@ pub(super) fn sizes(page: &mut String, facts: &Facts<'_>) {
     let _ = write!(
         page,
         "<section aria-labelledby=\"bytes\"><h2 id=\"bytes\">Where the bytes are</h2>\n\
-         <p>The view-dependent colour was most of the PLY. It shrank; the rest stays as it was.</p>\n\
+         <p>{}</p>\n\
          <div class=\"panel\">{}<div class=\"scroll\"><table><thead><tr><th scope=\"col\">What</th>\
          <th scope=\"col\">PLY</th><th scope=\"col\">.lexi</th><th scope=\"col\">Ratio</th></tr></thead><tbody>",
+        if facts.sh_dominates() {
+            "View-dependent colour was most of the PLY. It shrank; the rest is as it was."
+        } else {
+            "View-dependent colour was the smaller part of the PLY. The rest is as it was."
+        },
         charts::bars(&facts.parts, ("PLY", report.ply_bytes), (".lexi", report.file_bytes)),
     );
-    for part in &facts.parts {
+    for (k, part) in facts.parts.iter().enumerate() {
+        // What holds no information has no ratio.
+        let ratio = if k == OTHER { 0 } else { part.after };
         let _ = write!(
             page,
             "<tr><th scope=\"row\"><span class=\"key {}\"></span>{}</th><td>{}</td><td>{}</td><td>{}</td></tr>",
@@ -276,7 +293,7 @@ pub(super) fn sizes(page: &mut String, facts: &Facts<'_>) {
             part.name,
             text::bytes(part.before),
             text::bytes(part.after),
-            text::ratio(part.before as f64, part.after as f64)
+            text::ratio(part.before as f64, ratio as f64)
         );
     }
     let _ = write!(
