@@ -3,6 +3,7 @@
 use std::cmp::Reverse;
 
 use super::LearnOptions;
+use super::axes::principal_axes;
 use super::training::Training;
 use super::update::{dot, normalised};
 use crate::dictionary::Dictionary;
@@ -24,12 +25,19 @@ fn direction(vector: &[f32]) -> Option<Vec<f32>> {
     normalised(&wide)
 }
 
-/// `atoms` unit vectors: directions of random samples that differ, then whatever is left, then axes and
-/// random directions when there are too few samples.
+/// `atoms` unit vectors: the principal axes, directions of random samples that differ, then whatever is
+/// left, then coordinate axes and random directions when there are too few samples.
+///
+/// Without the principal axes learning ends in worse optima: samples alone share their strongest
+/// directions, and the weak ones, which small tolerances need, are found late or never.
 pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &LearnOptions) -> Vec<f32> {
     let vectors = sample.len() / dim;
     let mut rng = SplitMix64::new(options.seed ^ FIRST_STREAM);
     let mut out: Vec<f32> = Vec::with_capacity(atoms * dim);
+    // At least half must be samples, or a small dictionary would have nothing to tell apart.
+    for axis in principal_axes(dim, sample).iter().take(atoms / 2) {
+        out.extend(normalised(axis).into_iter().flatten());
+    }
     if vectors > 0 {
         for draw in 0..DRAWS_PER_ATOM[1] * atoms {
             if out.len() >= atoms * dim {

@@ -5,6 +5,7 @@
 //! accelerated: each atom moves by its K-SVD step plus a share of how it moved before. Plain K-SVD
 //! creeps; with momentum the same rounds end at 3 to 16 % fewer nonzeros (docs/METHOD.md has the figures). The sample grows as learning goes on, since early rounds need only the direction.
 
+mod axes;
 mod hygiene;
 mod sample;
 mod training;
