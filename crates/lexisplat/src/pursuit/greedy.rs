@@ -244,6 +244,12 @@ impl Scratch {
         self.len
     }
 
+    /// The atoms chosen so far, in order.
+    #[cfg(test)]
+    pub(super) fn chosen(&self) -> &[u16] {
+        &self.chosen[..self.len]
+    }
+
     /// The vector [`Plan::error`] made last, padded with zeros.
     pub(super) fn reconstruction(&self) -> &[f32] {
         &self.reconstruction
