@@ -16,13 +16,12 @@ pub(crate) enum Path {
 impl Path {
     /// All ways this CPU offers, slowest first.
     pub(crate) fn available() -> Vec<Self> {
-        let mut paths = vec![Self::Plain];
+        let plain = std::iter::once(Self::Plain);
         #[cfg(target_arch = "x86_64")]
-        {
-            paths.extend(pulp::x86::V3::try_new().map(Self::V3));
-            paths.extend(pulp::x86::V4::try_new().map(Self::V4));
-        }
-        paths
+        let plain = plain
+            .chain(pulp::x86::V3::try_new().map(Self::V3))
+            .chain(pulp::x86::V4::try_new().map(Self::V4));
+        plain.collect()
     }
 
     /// The fastest way this CPU offers.
