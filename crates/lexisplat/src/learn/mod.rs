@@ -3,7 +3,8 @@
 //! One round is a pursuit with the very tolerance of the final coding, followed by approximate K-SVD
 //! (Rubinstein et al. 2008), which refits each atom and the values of its users in turn. Rounds are
 //! accelerated: each atom moves by its K-SVD step plus a share of how it moved before. Plain K-SVD
-//! creeps; with momentum the same rounds end at 3 to 16 % fewer nonzeros (docs/METHOD.md has the figures). The sample grows as learning goes on, since early rounds need only the direction.
+//! creeps; with momentum fewer rounds end at 2 to 3 % fewer nonzeros (docs/METHOD.md
+//! has the figures). The sample grows as learning goes on, since early rounds need only the direction.
 
 mod axes;
 mod hygiene;

@@ -18,9 +18,8 @@ impl Path {
     pub(crate) fn available() -> Vec<Self> {
         let plain = std::iter::once(Self::Plain);
         #[cfg(target_arch = "x86_64")]
-        let plain = plain
-            .chain(pulp::x86::V3::try_new().map(Self::V3))
-            .chain(pulp::x86::V4::try_new().map(Self::V4));
+        let plain =
+            plain.chain(pulp::x86::V3::try_new().map(Self::V3)).chain(pulp::x86::V4::try_new().map(Self::V4));
         plain.collect()
     }
 
