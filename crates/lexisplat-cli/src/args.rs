@@ -53,37 +53,153 @@ pub(crate) struct Compress {
     /// The compressed scene; `-` for standard output [default: the input with extension .lexi].
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
-    /// Largest error of a Gaussian's SH vector (L2 norm, not squared). Half is about 6 dB better
-    /// [default: 0.1, unless --max-nnz is given].
+    /// How good: `small`, `balanced`, `high` or `archive` [default: balanced].
+    #[arg(long, value_enum, group = "goal", value_name = "NAME")]
+    pub(crate) preset: Option<Preset>,
+    /// The smallest file whose pictures reach this PSNR on average, in dB.
+    #[arg(long, group = "goal", value_name = "DB")]
+    pub(crate) psnr: Option<f64>,
+    /// The smallest file whose worst picture reaches this PSNR, in dB.
+    #[arg(long, group = "goal", value_name = "DB")]
+    pub(crate) min_psnr: Option<f64>,
+    /// The best file of at most this size, such as `10MB` or `800kB`.
+    #[arg(long, group = "goal", value_name = "BYTES", value_parser = size)]
+    pub(crate) size: Option<u64>,
+    /// The best file this many times smaller than the PLY.
+    #[arg(long, group = "goal", value_name = "R")]
+    pub(crate) ratio: Option<f64>,
+    /// Cameras from an INRIA cameras.json to judge by [default: views generated around the scene].
+    #[arg(long, value_name = "FILE")]
+    pub(crate) cameras: Option<PathBuf>,
+    /// Keep each Gaussian's index in the source, for 4 bytes each: packed files are in another order.
+    #[arg(long)]
+    pub(crate) keep_order: bool,
+    /// Promise: no Gaussian's SH vector is off by more (L2 norm, not squared). Without --layout everything
+    /// else is then kept exactly (layout f16); with --layout packed it is quantised all the same.
     #[arg(long, value_name = "T")]
     pub(crate) tol: Option<f64>,
     /// Most nonzeros of a Gaussian. Lifts the promise of --tol; what is over it is counted.
     #[arg(long, value_name = "K")]
     pub(crate) max_nnz: Option<u8>,
-    /// Atoms of the dictionary, 1 to 1024 [default: twice the dimension, 90 for SH degree 3].
+    /// Atoms of the dictionary, 1 to 1024 [default: packed, as many as pay; else twice the dimension, 90
+    /// for SH degree 3].
     #[arg(long, value_name = "M")]
     pub(crate) atoms: Option<usize>,
-    /// How atoms are chosen: `ols` needs fewer, `omp` is the paper's.
-    #[arg(long, default_value_t = Pursuit::Ols, value_name = "omp|ols")]
-    pub(crate) pursuit: Pursuit,
-    /// How codes are stored: `f16` is smallest, `paper` is the paper's own count.
-    #[arg(long, default_value_t = Layout::F16, value_name = "f32|f16|paper")]
-    pub(crate) layout: Layout,
+    /// How atoms are chosen: `ols` needs fewer, `omp` is the paper's. Not for packed files, which weigh
+    /// bits against error [default: ols].
+    #[arg(long, value_name = "omp|ols")]
+    pub(crate) pursuit: Option<Pursuit>,
+    /// `packed` quantises and entropy-codes everything; `f16` and `f32` keep geometry exactly; `paper` is
+    /// the paper's own count [default: packed, or f16 with --tol, --max-nnz, --pursuit or a dictionary].
+    #[arg(long, value_name = "packed|f32|f16|paper")]
+    pub(crate) layout: Option<Layout>,
     /// Use the dictionary of this file (a dictionary or a .lexi) instead of learning one.
     #[arg(long, value_name = "FILE", conflicts_with = "atoms")]
     pub(crate) dictionary: Option<PathBuf>,
     /// Also write the dictionary on its own, for other scenes.
     #[arg(long, value_name = "FILE")]
     pub(crate) save_dictionary: Option<PathBuf>,
-    /// Gaussians to learn from at most.
-    #[arg(long, default_value_t = lexisplat::learn::DEFAULT_SAMPLE, value_name = "N")]
-    pub(crate) sample: usize,
+    /// Gaussians to learn from at most. Not for packed files [default: 65536].
+    #[arg(long, value_name = "N")]
+    pub(crate) sample: Option<usize>,
     /// Seed of the learning sample.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub(crate) seed: u64,
     /// Leave out Gaussians with NaN or infinite values instead of refusing the file.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
+}
+
+impl Compress {
+    /// Options that only layouts with exact geometry have, as given.
+    fn exact_only(&self) -> [(&'static str, bool); 5] {
+        [
+            ("--max-nnz", self.max_nnz.is_some()),
+            ("--pursuit", self.pursuit.is_some()),
+            ("--dictionary", self.dictionary.is_some()),
+            ("--save-dictionary", self.save_dictionary.is_some()),
+            ("--sample", self.sample.is_some()),
+        ]
+    }
+
+    /// Options that only packed files have, as given.
+    fn packed_only(&self) -> [(&'static str, bool); 7] {
+        [
+            ("--preset", self.preset.is_some()),
+            ("--psnr", self.psnr.is_some()),
+            ("--min-psnr", self.min_psnr.is_some()),
+            ("--size", self.size.is_some()),
+            ("--ratio", self.ratio.is_some()),
+            ("--cameras", self.cameras.is_some()),
+            ("--keep-order", self.keep_order),
+        ]
+    }
+
+    /// The layout asked for, or the one the other options ask for.
+    ///
+    /// # Errors
+    /// Two options that do not go together.
+    pub(crate) fn chosen_layout(&self) -> Result<Layout, lexisplat::Error> {
+        let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
+        let (exact, packed) = (given(&self.exact_only()), given(&self.packed_only()));
+        let layout = self.layout.unwrap_or(match (exact, packed, self.tol) {
+            (None, Some(_), _) | (None, None, None) => Layout::Packed,
+            _ => Layout::F16,
+        });
+        let wrong = if layout == Layout::Packed { exact } else { packed };
+        match wrong {
+            None => Ok(layout),
+            Some(option) => {
+                let other = if layout == Layout::Packed { "f16, f32 or paper" } else { "packed" };
+                Err(lexisplat::Error::parameter("layout", layout, format!("{other}, which {option} is for")))
+            }
+        }
+    }
+}
+
+/// Qualities of packed files, by what they are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Preset {
+    /// To look at on a phone: about 35 dB.
+    Small,
+    /// Hard to tell from the original: about 40 dB.
+    Balanced,
+    /// Not to be told from the original: about 44 dB.
+    High,
+    /// To keep instead of the original: about 50 dB.
+    Archive,
+}
+
+impl Preset {
+    /// The overall step of [`lexisplat::packed::Packer::pack`].
+    pub(crate) fn step(self) -> f64 {
+        match self {
+            Self::Small => 2e-5,
+            Self::Balanced => 8e-6,
+            Self::High => 4e-6,
+            Self::Archive => 1.2e-6,
+        }
+    }
+}
+
+/// A number of bytes: plain, or with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (of 1024).
+fn size(text: &str) -> Result<u64, String> {
+    let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
+    let unit = match text[digits.len()..].to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "kib" => 1024.0,
+        "mib" => 1024.0 * 1024.0,
+        "gib" => 1024.0 * 1024.0 * 1024.0,
+        _ => return Err("a size such as 800kB, 10MB or 1.5MiB".to_owned()),
+    };
+    match digits.trim().parse::<f64>() {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+        Ok(v) if v.is_finite() && v > 0.0 && v * unit < 1e18 => Ok((v * unit) as u64),
+        _ => Err("a size such as 800kB, 10MB or 1.5MiB".to_owned()),
+    }
 }
 
 /// Turn a .lexi file back into a PLY in INRIA's layout.
@@ -216,6 +332,16 @@ mod tests {
     fn the_definition_is_consistent() {
         use clap::CommandFactory;
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_have_units() {
+        assert_eq!(size("10MB"), Ok(10_000_000));
+        assert_eq!(size("1.5KiB"), Ok(1536));
+        assert_eq!(size("77"), Ok(77));
+        for bad in ["", "MB", "-3kB", "10 furlongs", "1e30GB"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

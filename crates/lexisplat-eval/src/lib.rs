@@ -34,8 +34,10 @@ mod error;
 pub mod metrics;
 pub mod montage;
 pub mod report;
+mod target;
 mod views;
 
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
 pub use error::{Error, Result};
+pub use target::{Goal, Judge, Views, pack_to};
 pub use views::{DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, choose_views};

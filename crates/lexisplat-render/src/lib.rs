@@ -37,12 +37,14 @@ mod image;
 mod orbit;
 mod radiance;
 mod scene;
+mod surround;
 
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
-pub use cpu::{RenderOptions, render};
+pub use cpu::{RenderOptions, render, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
 pub use orbit::orbit;
 pub use radiance::Radiance;
 pub use scene::Scene;
+pub use surround::surround;

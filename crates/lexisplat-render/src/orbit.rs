@@ -76,7 +76,10 @@ fn bulk(geometry: &Geometry) -> (DVec3, f64) {
 
 /// The values below which the given shares of the weight lie; 0 if there is none. Pairs that are not
 /// finite do not count.
-fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [f64; N]) -> [f64; N] {
+pub(crate) fn quantiles<const N: usize>(
+    values: impl Iterator<Item = (f64, f64)>,
+    shares: [f64; N],
+) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.filter(|(v, w)| v.is_finite() && w.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = sorted.iter().map(|(_, w)| w).sum();

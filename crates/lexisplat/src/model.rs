@@ -30,6 +30,8 @@ pub enum Layout {
     F16,
     /// The paper's own count: i32 pointers, i32 indices, f32 values.
     Paper,
+    /// Everything quantised and entropy-coded, geometry included ([`crate::packed`]).
+    Packed,
 }
 
 /// Which greedy pursuit chose the atoms.
@@ -88,7 +90,7 @@ macro_rules! named {
         }
     };
 }
-named!(Layout, "layout", F32 => "f32", F16 => "f16", Paper => "paper");
+named!(Layout, "layout", F32 => "f32", F16 => "f16", Paper => "paper", Packed => "packed");
 named!(Pursuit, "pursuit", Omp => "omp", Ols => "ols");
 
 impl Model {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, Result};
 use lexisplat::ply::{PlyRead, ReadOptions};
 use lexisplat::{
-    CompressOptions, CompressReport, DEFAULT_TOLERANCE, Error, Limits, Model, compress, lexi, ply,
+    CompressOptions, CompressReport, DEFAULT_TOLERANCE, Error, Layout, Limits, Model, compress, lexi, ply,
 };
 use serde_json::json;
 
@@ -32,6 +32,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if let Some(path) = &args.save_dictionary {
         check_output(path, &inputs, common.overwrite)?;
     }
+    let layout = args.chosen_layout()?;
     let mut options = CompressOptions::default();
     options.tolerance = match (args.tol, args.max_nnz) {
         (None, Some(_)) => None,
@@ -39,16 +40,20 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     };
     options.max_nonzeros = args.max_nnz;
     options.atoms = args.atoms;
-    options.pursuit = args.pursuit;
-    options.layout = args.layout;
-    options.sample = args.sample;
+    options.pursuit = args.pursuit.unwrap_or(options.pursuit);
+    options.layout = layout;
+    options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
     if let Some(path) = &args.dictionary {
         options.dictionary = Some(lexi::read_dictionary(path, &Limits::default())?);
     }
 
-    let (name, PlyRead { splats, warnings, source }) = read(args)?;
-    warn(&name, &warnings);
+    let (name, read) = read(args)?;
+    warn(&name, &read.warnings);
+    if layout == Layout::Packed {
+        return super::pack::run(args, common, &output, read, start);
+    }
+    let PlyRead { splats, warnings, source } = read;
     let read_seconds = start.elapsed().as_secs_f64();
     let bars = Bars::new(common.quiet);
     let (model, report) = compress(splats, &options, &bars)?;

@@ -6,6 +6,7 @@ mod compress;
 mod decompress;
 mod demo;
 mod info;
+mod pack;
 mod render;
 
 use anyhow::{Context, Result};

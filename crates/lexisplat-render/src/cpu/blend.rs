@@ -30,7 +30,7 @@ const EMPTY: Row = Row {
 
 /// A finished tile.
 #[derive(Debug, Clone)]
-pub(super) struct TilePixels([[Lanes; 3]; TILE]);
+pub(super) struct TilePixels(pub(super) [[Lanes; 3]; TILE]);
 
 impl TilePixels {
     pub(super) fn pixel(&self, x: usize, y: usize) -> [f32; 3] {

@@ -7,8 +7,10 @@
 
 mod blend;
 mod math;
+mod moments;
 mod order;
 mod project;
+mod sensitivity;
 mod tiles;
 
 use rayon::prelude::*;
@@ -18,6 +20,8 @@ use crate::conventions::TILE;
 use crate::image::Image;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
+
+pub use sensitivity::sensitivity;
 
 /// How to draw. Whether the anti-aliased rules apply is the scene's own mark.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -16,6 +16,12 @@ pub(super) fn by_depth(visible: Vec<Vec<Visible>>) -> (Vec<Splat>, Vec<Rect>) {
     (splats, rects)
 }
 
+/// Indices of the same splats' Gaussians, in the same order.
+pub(super) fn gaussians_by_depth(visible: &[Vec<Visible>]) -> Vec<u32> {
+    let visible: Vec<&Visible> = visible.iter().flatten().collect();
+    sorted(visible.iter().map(|v| v.depth)).into_iter().map(|k| visible[k as usize].gaussian).collect()
+}
+
 /// Indices of `keys` in ascending order of key, ties in order of index: a stable radix sort.
 ///
 /// There are at most 2^32 keys.

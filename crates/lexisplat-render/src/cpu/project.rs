@@ -48,6 +48,8 @@ pub(super) struct Visible {
     pub(super) depth: u32,
     /// Tiles it may touch.
     pub(super) rect: Rect,
+    /// Its index in the scene.
+    pub(super) gaussian: u32,
 }
 
 /// What is the same for all Gaussians of a picture.
@@ -121,11 +123,29 @@ impl Projection {
             return None;
         }
         let splat = Splat { centre, conic, opacity, colour, cutoff, rows };
-        Some(Visible { splat, depth: z.to_bits(), rect })
+        // Gaussians are counted in u32 since `order`.
+        let gaussian = u32::try_from(i).unwrap_or(u32::MAX);
+        Some(Visible { splat, depth: z.to_bits(), rect, gaussian })
     }
 
-    /// The dilated covariance on screen of a Gaussian with these axes at `view`.
-    fn ellipse(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> Option<Ellipse> {
+    /// How the centre of Gaussian `i` on screen moves with each world coordinate, in pixels, and its
+    /// three standard deviations as vectors on screen.
+    pub(super) fn derivatives(&self, geometry: &Geometry, i: usize) -> ([[f32; 2]; 3], [[f32; 2]; 3]) {
+        let view = self.camera.to_view(geometry.positions[i]);
+        let [x, y, z] = view;
+        let r = &self.camera.rotation;
+        let by_position = std::array::from_fn(|k| {
+            [
+                self.focal[0] * (r[k][0] * z - r[k][2] * x) / (z * z),
+                self.focal[1] * (r[k][1] * z - r[k][2] * y) / (z * z),
+            ]
+        });
+        (by_position, self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i])))
+    }
+
+    /// Each standard deviation's axis on screen, by the approximation at `view`.
+    #[inline]
+    fn on_screen(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
         let z = view[2];
         let [tx, ty]: [f32; 2] = std::array::from_fn(|k| {
             let limit = TAN_LIMIT * self.tan[k];
@@ -135,11 +155,8 @@ impl Projection {
             [self.focal[0] / z, 0.0, -(self.focal[0] * tx) / (z * z)],
             [0.0, self.focal[1] / z, -(self.focal[1] * ty) / (z * z)],
         ];
-        // Each standard deviation's axis in view space, then on screen; the covariance is the sum of
-        // their squares. INRIA multiplies the covariance through instead, which is the same sum but
-        // loses thin Gaussians to cancellation.
         let r = &self.camera.rotation;
-        let on_screen: [[f32; 2]; 3] = std::array::from_fn(|a| {
+        std::array::from_fn(|a| {
             let axis = axes[a];
             let seen: [f32; 3] =
                 std::array::from_fn(|k| r[0][k] * axis[0] + r[1][k] * axis[1] + r[2][k] * axis[2]);
@@ -147,7 +164,14 @@ impl Projection {
                 jacobian[0][0] * seen[0] + jacobian[0][2] * seen[2],
                 jacobian[1][1] * seen[1] + jacobian[1][2] * seen[2],
             ]
-        });
+        })
+    }
+
+    /// The dilated covariance on screen of a Gaussian with these axes at `view`.
+    fn ellipse(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> Option<Ellipse> {
+        // The covariance is the sum of the squares of the axes on screen. INRIA multiplies the covariance
+        // through instead, which is the same sum but loses thin Gaussians to cancellation.
+        let on_screen = self.on_screen(view, axes);
         let sum = |f: fn([f32; 2]) -> f32| f(on_screen[0]) + f(on_screen[1]) + f(on_screen[2]);
         let (a, b, c) = (sum(|v| v[0] * v[0]), sum(|v| v[0] * v[1]), sum(|v| v[1] * v[1]));
         // The determinant as a sum of squares (Cauchy-Binet): never negative.

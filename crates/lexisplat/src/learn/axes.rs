@@ -10,7 +10,7 @@ const SWEEPS: usize = 12;
 ///
 /// Cyclic Jacobi rotations in f64: slow beside a library, but exact operations in a fixed order, so the
 /// result is the same everywhere.
-pub(super) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
+pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     if sample.is_empty() {
         return Vec::new();
     }

@@ -19,6 +19,7 @@ use crate::model::Pursuit;
 use crate::progress::{Progress, Stage};
 use crate::pursuit::{Coder, Stop, ValueType};
 use crate::sh::ShDegree;
+pub(crate) use axes::principal_axes;
 use sample::Sample;
 use training::Training;
 

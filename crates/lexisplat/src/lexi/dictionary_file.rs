@@ -5,7 +5,7 @@ use std::path::Path;
 use safetensors::Dtype;
 
 use super::read;
-use super::schema::{DICTIONARY_FORMAT, FORMAT, key, tensor};
+use super::schema::{DICTIONARY_FORMAT, FORMAT, VERSION, key, tensor};
 use super::tensors::{Checked, Draft, Tensor, preamble};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
@@ -45,7 +45,7 @@ pub fn write_dictionary(path: &Path, dictionary: &Dictionary) -> Result<u64> {
     if dictionary.is_empty() {
         return Err(Error::parameter("dictionary", "empty", "a scene with view-dependent colour"));
     }
-    let mut metadata = preamble(DICTIONARY_FORMAT);
+    let mut metadata = preamble(DICTIONARY_FORMAT, VERSION);
     metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
     let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());

@@ -4,12 +4,16 @@
 //! metadata key `checksums`, the header by the tensor `checksum.header`.
 
 mod dictionary_file;
+mod packed;
 mod read;
 mod schema;
 mod tensors;
 mod write;
 
 pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
+pub use packed::{
+    packed_bytes, packed_tensor_bytes, read_packed, read_packed_bytes, write_packed, write_packed_to,
+};
 pub use read::{is_lexi, read, read_bytes};
-pub use schema::{MAX_VERSION, VERSION};
+pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};
 pub use write::{attribute_bytes, file_bytes, sh_bytes, write, write_to};

@@ -39,6 +39,10 @@ pub fn is_lexi(bytes: &[u8]) -> bool {
 pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
     let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
     let record = record(&checked)?;
+    if record.layout == Layout::Packed {
+        let packed = super::packed::from_checked(&checked, bytes.len() as u64, limits)?;
+        return packed.unpack().map_err(|e| checked.malformed(e.to_string()));
+    }
     let n = match checked.view(tensor::POSITION)?.shape() {
         [n, 3] => *n,
         shape => return Err(checked.malformed(format!("tensor 'position' has shape {shape:?}, not [N, 3]"))),
@@ -67,8 +71,7 @@ pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
     }
     all_finite(file, &geometry)?;
     geometry.extras = extras(&checked, n)?;
-    let degree = ShDegree::new(checked.number(key::DEGREE)?)
-        .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))?;
+    let degree = degree(&checked)?;
     let (dictionary, codes) = if degree == ShDegree::ZERO {
         let dictionary = Dictionary::empty();
         let none = match record.layout {
@@ -90,10 +93,18 @@ pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
         let text = format!("tensor '{name}' is not known for layout '{}' and degree {degree}", record.layout);
         return Err(checked.malformed(text));
     }
+    Ok(Model { geometry, meta: meta(&checked)?, dictionary, codes, record })
+}
+
+pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
+    ShDegree::new(checked.number(key::DEGREE)?)
+        .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))
+}
+
+pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
     let comments = serde_json::from_str(checked.text(key::COMMENTS)?)
         .map_err(|e| checked.malformed(format!("metadata 'comments': {e}")))?;
-    let meta = SceneMeta { comments, antialiased: checked.number(key::ANTIALIASED)? };
-    Ok(Model { geometry, meta, dictionary, codes, record })
+    Ok(SceneMeta { comments, antialiased: checked.number(key::ANTIALIASED)? })
 }
 
 /// The dictionary tensor of a scene or a dictionary file.
@@ -110,7 +121,7 @@ pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree) -> Result<Dict
     Dictionary::new(degree, values).map_err(|e| checked.malformed(format!("tensor 'dictionary': {e}")))
 }
 
-fn record(checked: &Checked<'_>) -> Result<Record> {
+pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     let layout = checked.text(key::LAYOUT)?;
     let pursuit = checked.text(key::PURSUIT)?;
     let record = Record {
@@ -197,7 +208,7 @@ fn codes(
         .map_err(|e| checked.malformed(e.to_string()))
 }
 
-fn extras(checked: &Checked<'_>, n: usize) -> Result<Vec<Extra>> {
+pub(super) fn extras(checked: &Checked<'_>, n: usize) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
     for full in checked.names() {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };

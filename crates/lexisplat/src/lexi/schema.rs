@@ -1,9 +1,11 @@
 //! Names and numbers of the file format, once.
 
-/// Newest version of the format that is written.
+/// Version of files in the layouts `f32`, `f16` and `paper`.
 pub const VERSION: u64 = 1;
+/// Version of files in the layout `packed`.
+pub const PACKED_VERSION: u64 = 2;
 /// Newest version of the format that is read.
-pub const MAX_VERSION: u64 = 1;
+pub const MAX_VERSION: u64 = 2;
 
 /// Header and data start at multiples of this, as the safetensors format asks.
 pub(super) const HEADER_ALIGNMENT: usize = 8;
@@ -35,6 +37,11 @@ pub(super) mod tensor {
     pub(crate) const VALUES: &str = "codes.values";
     pub(crate) const ESCAPED: &str = "escapes.gaussians";
     pub(crate) const ESCAPE_ROWS: &str = "escapes.rows";
+    pub(crate) const PARAMETERS: &str = "packed.parameters";
+    pub(crate) const LENGTHS: &str = "packed.lengths";
+    pub(crate) const TABLES: &str = "packed.tables";
+    pub(crate) const DATA: &str = "packed.data";
+    pub(crate) const ORDER: &str = "packed.order";
     pub(crate) const HEADER_CHECKSUM: &str = "checksum.header";
 }
 
@@ -54,5 +61,9 @@ pub(super) mod key {
     pub(crate) const OVER_TOLERANCE: &str = "over_tolerance";
     pub(crate) const ANTIALIASED: &str = "antialiased";
     pub(crate) const COMMENTS: &str = "comments";
+    pub(crate) const GAUSSIANS: &str = "gaussians";
+    pub(crate) const ATOMS: &str = "atoms";
+    pub(crate) const ATOM_BITS: &str = "atom_bits";
+    pub(crate) const PROMISE: &str = "promise";
     pub(crate) const CHECKSUMS: &str = "checksums";
 }

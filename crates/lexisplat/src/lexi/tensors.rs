@@ -6,7 +6,7 @@ use std::io::Write;
 use safetensors::tensor::{SafeTensorError, TensorView};
 use safetensors::{Dtype, SafeTensors};
 
-use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, VERSION, key, tensor};
+use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
 use crate::parallel::map_chunks;
@@ -304,10 +304,10 @@ impl<'a> Checked<'a> {
 }
 
 /// The metadata every file begins with.
-pub(super) fn preamble(format: &str) -> BTreeMap<String, String> {
+pub(super) fn preamble(format: &str, version: u64) -> BTreeMap<String, String> {
     BTreeMap::from([
         (key::FORMAT.to_owned(), format.to_owned()),
-        (key::VERSION.to_owned(), VERSION.to_string()),
+        (key::VERSION.to_owned(), version.to_string()),
         (key::GENERATOR.to_owned(), "lexisplat".to_owned()),
     ])
 }

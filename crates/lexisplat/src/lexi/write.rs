@@ -1,18 +1,20 @@
 //! Writing a [`Model`].
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
 use safetensors::Dtype;
 
-use super::schema::{EXTRA_PREFIX, FORMAT, key, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, VERSION, key, tensor};
 use super::tensors::{Draft, Source, Tensor, preamble};
 use crate::codes::{Indices, Values};
 use crate::error::{Error, Result};
 use crate::limits::Limits;
-use crate::model::{Layout, Model};
+use crate::model::{Layout, Model, Record};
 use crate::output::write_whole;
-use crate::splats::ExtraValues;
+use crate::sh::ShDegree;
+use crate::splats::{Extra, ExtraValues, SceneMeta};
 
 /// Writes `model` to `path`, whole or not at all. Returns the file's size in bytes.
 ///
@@ -68,25 +70,39 @@ pub fn sh_bytes(model: &Model) -> Result<u64> {
 }
 
 fn draft(model: &Model) -> Result<Draft<'_>> {
-    let record = &model.record;
-    let mut metadata = preamble(FORMAT);
+    if model.record.layout == Layout::Packed {
+        let expected =
+            "f32, f16 or paper: a packed file is written from a `Packed`, not from what it decodes to";
+        return Err(Error::parameter("layout", model.record.layout, expected));
+    }
+    let mut metadata = preamble(FORMAT, VERSION);
+    put_record(&mut metadata, model.degree(), &model.record, &model.meta);
+    Ok(Draft::new(metadata, tensors(model)?))
+}
+
+/// The metadata all layouts share.
+pub(super) fn put_record(
+    metadata: &mut BTreeMap<String, String>,
+    degree: ShDegree,
+    record: &Record,
+    meta: &SceneMeta,
+) {
     let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
-    put(key::DEGREE, model.degree().to_string());
+    put(key::DEGREE, degree.to_string());
     put(key::LAYOUT, record.layout.to_string());
     put(key::PURSUIT, record.pursuit.to_string());
     put(key::SEED, record.seed.to_string());
     put(key::MAX_RESIDUAL, record.max_residual.to_string());
     put(key::RMS_RESIDUAL, record.rms_residual.to_string());
     put(key::OVER_TOLERANCE, record.over_tolerance.to_string());
-    put(key::ANTIALIASED, model.meta.antialiased.to_string());
-    put(key::COMMENTS, serde_json::to_string(&model.meta.comments).unwrap_or_default());
+    put(key::ANTIALIASED, meta.antialiased.to_string());
+    put(key::COMMENTS, serde_json::to_string(&meta.comments).unwrap_or_default());
     if let Some(tolerance) = record.tolerance {
         put(key::TOLERANCE, tolerance.to_string());
     }
     if let Some(cap) = record.max_nonzeros {
         put(key::MAX_NONZEROS, cap.to_string());
     }
-    Ok(Draft::new(metadata, tensors(model)?))
 }
 
 fn tensors(model: &Model) -> Result<Vec<Tensor<'_>>> {
@@ -105,19 +121,7 @@ fn tensors(model: &Model) -> Result<Vec<Tensor<'_>>> {
     if !g.normals.is_empty() {
         out.push(Tensor::plain(tensor::NORMAL, Dtype::F32, &[n, 3], &g.normals));
     }
-    for extra in &g.extras {
-        let name = format!("{EXTRA_PREFIX}{}", extra.name);
-        out.push(match &extra.values {
-            ExtraValues::I8(v) => Tensor::plain(&name, Dtype::I8, &[n], v),
-            ExtraValues::U8(v) => Tensor::plain(&name, Dtype::U8, &[n], v),
-            ExtraValues::I16(v) => Tensor::plain(&name, Dtype::I16, &[n], v),
-            ExtraValues::U16(v) => Tensor::plain(&name, Dtype::U16, &[n], v),
-            ExtraValues::I32(v) => Tensor::plain(&name, Dtype::I32, &[n], v),
-            ExtraValues::U32(v) => Tensor::plain(&name, Dtype::U32, &[n], v),
-            ExtraValues::F32(v) => Tensor::plain(&name, Dtype::F32, &[n], v),
-            ExtraValues::F64(v) => Tensor::plain(&name, Dtype::F64, &[n], v),
-        });
-    }
+    out.extend(extra_tensors(&g.extras, n));
     let dim = model.dictionary.dim();
     if dim == 0 {
         return Ok(out);
@@ -132,6 +136,25 @@ fn tensors(model: &Model) -> Result<Vec<Tensor<'_>>> {
         out.push(Tensor::plain(tensor::ESCAPE_ROWS, Dtype::F32, &[count, dim], &escapes.rows));
     }
     Ok(out)
+}
+
+/// Properties 3DGS does not define, as they are.
+pub(super) fn extra_tensors(extras: &[Extra], n: usize) -> Vec<Tensor<'_>> {
+    let mut out = Vec::new();
+    for extra in extras {
+        let name = format!("{EXTRA_PREFIX}{}", extra.name);
+        out.push(match &extra.values {
+            ExtraValues::I8(v) => Tensor::plain(&name, Dtype::I8, &[n], v),
+            ExtraValues::U8(v) => Tensor::plain(&name, Dtype::U8, &[n], v),
+            ExtraValues::I16(v) => Tensor::plain(&name, Dtype::I16, &[n], v),
+            ExtraValues::U16(v) => Tensor::plain(&name, Dtype::U16, &[n], v),
+            ExtraValues::I32(v) => Tensor::plain(&name, Dtype::I32, &[n], v),
+            ExtraValues::U32(v) => Tensor::plain(&name, Dtype::U32, &[n], v),
+            ExtraValues::F32(v) => Tensor::plain(&name, Dtype::F32, &[n], v),
+            ExtraValues::F64(v) => Tensor::plain(&name, Dtype::F64, &[n], v),
+        });
+    }
+    out
 }
 
 fn push_codes<'a>(out: &mut Vec<Tensor<'a>>, model: &'a Model) -> Result<()> {

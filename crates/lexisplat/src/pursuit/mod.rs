@@ -15,6 +15,6 @@ mod engine;
 mod greedy;
 #[cfg(test)]
 mod oracle;
-mod path;
+pub(crate) mod path;
 
 pub use engine::{Coder, Encoded, Stop, ValueType, Visit};

@@ -1,0 +1,238 @@
+//! `lexisplat compress` in the packed layout.
+
+use std::io::Write;
+use std::path::Path;
+use std::time::Instant;
+
+use anyhow::{Context, Result};
+use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
+use lexisplat::ply::PlyRead;
+use lexisplat::{Error, Progress, Splats, lexi};
+use lexisplat_eval::{Goal, Judge, Views, pack_to};
+use lexisplat_render::read_cameras;
+use serde_json::{Value, json};
+
+use super::compress::error_line;
+use crate::args::{Common, Compress, Preset};
+use crate::files::{is_pipe, print, print_json};
+use crate::progress::Bars;
+use crate::text;
+
+/// Packs `read` and writes it to `output`. `start` is when the command began.
+pub(crate) fn run(
+    args: &Compress,
+    common: &Common,
+    output: &Path,
+    read: PlyRead,
+    start: Instant,
+) -> Result<()> {
+    let read_seconds = start.elapsed().as_secs_f64();
+    let splats = read.splats;
+    let mut options = PackOptions::default();
+    options.tolerance = args.tol;
+    options.atoms = args.atoms;
+    options.keep_order = args.keep_order;
+    options.seed = args.seed;
+    let goal = goal(args, read.source.file_bytes)?;
+    let bars = Bars::new(common.quiet);
+
+    let clock = Instant::now();
+    let views = match &args.cameras {
+        Some(path) => Views::given(&read_cameras(path)?)?,
+        None => Views::generated(&splats),
+    };
+    bars.start("looking", "views", views.len() as u64);
+    let sensitivity = views.sensitivity(&splats, &mut || bars.advance(1));
+    bars.end();
+    let look_seconds = clock.elapsed().as_secs_f64();
+
+    let clock = Instant::now();
+    let packer = Packer::new(&splats, &sensitivity, &options)?;
+    drop(sensitivity);
+    let (packed, report) = match goal {
+        Some(goal) => pack_to(&packer, &Judge::new(&splats, &views), goal, &bars)?,
+        None => packer.pack(args.preset.unwrap_or(Preset::Balanced).step(), &bars)?,
+    };
+    drop(packer);
+    let pack_seconds = clock.elapsed().as_secs_f64();
+    let clock = Instant::now();
+    let file_bytes = write(output, &packed)?;
+    let write_seconds = clock.elapsed().as_secs_f64();
+    let outcome = Outcome {
+        output,
+        splats: &splats,
+        packed: &packed,
+        report: &report,
+        ply_bytes: read.source.file_bytes,
+        file_bytes,
+        seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
+    };
+    if common.json {
+        print_json(&outcome.json(&read.warnings)?)
+    } else if common.quiet {
+        Ok(())
+    } else if is_pipe(output) {
+        eprint!("{}", outcome.text()?);
+        Ok(())
+    } else {
+        print(&outcome.text()?)
+    }
+}
+
+fn goal(args: &Compress, ply_bytes: u64) -> Result<Option<Goal>> {
+    if let Some(ratio) = args.ratio {
+        if !ratio.is_finite() || ratio <= 1.0 {
+            return Err(Error::parameter("ratio", ratio, "a finite number above 1").into());
+        }
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the PLY's size")]
+        return Ok(Some(Goal::Size((ply_bytes as f64 / ratio) as u64)));
+    }
+    Ok(args.psnr.map(Goal::MeanPsnr).or(args.min_psnr.map(Goal::MinPsnr)).or(args.size.map(Goal::Size)))
+}
+
+fn write(output: &Path, packed: &Packed) -> Result<u64> {
+    if !is_pipe(output) {
+        return Ok(lexi::write_packed(output, packed)?);
+    }
+    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
+    let bytes = lexi::write_packed_to(&mut out, packed)?;
+    out.flush().context("standard output")?;
+    Ok(bytes)
+}
+
+/// Bytes of each attribute, of tables and of the header; they sum to the file's size, up to rounding of
+/// streams to whole words.
+pub(crate) fn attribute_bytes(packed: &Packed, streams: &[StreamBits]) -> Vec<(String, f64)> {
+    let mut out: Vec<(String, f64)> = Vec::new();
+    for stream in streams {
+        match out.iter_mut().find(|a| a.0 == stream.attribute) {
+            Some(found) => found.1 += stream.bits / 8.0,
+            None => out.push((stream.attribute.to_owned(), stream.bits / 8.0)),
+        }
+    }
+    for (name, bytes) in lexi::packed_tensor_bytes(packed) {
+        if name != "packed.data" {
+            out.push((name, bytes as f64));
+        }
+    }
+    out
+}
+
+/// Bytes that stand for SH-rest: dictionary and codes.
+pub(crate) fn sh_bytes(streams: &[StreamBits]) -> f64 {
+    let is_sh = |s: &&StreamBits| s.attribute == "dictionary" || s.attribute.starts_with("codes.");
+    streams.iter().filter(is_sh).map(|s| s.bits / 8.0).sum()
+}
+
+/// What was done, to be told in text or JSON.
+struct Outcome<'a> {
+    output: &'a Path,
+    splats: &'a Splats,
+    packed: &'a Packed,
+    report: &'a PackReport,
+    ply_bytes: u64,
+    file_bytes: u64,
+    /// Reading, looking, packing, writing, everything.
+    seconds: [f64; 5],
+}
+
+impl Outcome<'_> {
+    fn json(&self, warnings: &[String]) -> Result<Value> {
+        let (packed, report, record) = (self.packed, self.report, &self.packed.record);
+        let streams = packed.stream_bits()?;
+        let whole = |bytes: f64| bytes.round();
+        let attributes: serde_json::Map<String, Value> = attribute_bytes(packed, &streams)
+            .into_iter()
+            .map(|(name, bytes)| (name, json!(whole(bytes))))
+            .collect();
+        let dim = self.splats.degree.rest();
+        let nonzeros = report.mean_nonzeros;
+        Ok(json!({
+            "output": self.output.display().to_string(),
+            "gaussians": packed.gaussians,
+            "sh_degree": packed.degree.get(),
+            "atoms": packed.atoms,
+            "layout": record.layout.name(),
+            "tol": record.tolerance,
+            "seed": record.seed,
+            "mean_nonzeros": nonzeros,
+            "coefficient_ratio": (nonzeros > 0.0).then(|| dim as f64 / nonzeros),
+            "nonzero_histogram": report.nonzero_histogram,
+            "escapes": report.escapes,
+            "over_tolerance": record.over_tolerance,
+            "max_residual": record.max_residual,
+            "rms_residual": record.rms_residual,
+            "ply_bytes": self.ply_bytes,
+            "file_bytes": self.file_bytes,
+            "sh_bytes": whole(sh_bytes(&streams)),
+            "dense_sh_bytes": packed.gaussians * dim * 4,
+            "attribute_bytes": attributes,
+            "promise": packed.promise,
+            "read_seconds": self.seconds[0],
+            "look_seconds": self.seconds[1],
+            "learn_seconds": report.learn_seconds,
+            "code_seconds": report.code_seconds,
+            "pack_seconds": self.seconds[2],
+            "write_seconds": self.seconds[3],
+            "total_seconds": self.seconds[4],
+            "warnings": warnings,
+        }))
+    }
+
+    fn text(&self) -> Result<String> {
+        use std::fmt::Write as _;
+        let (packed, report) = (self.packed, self.report);
+        let mut out = String::new();
+        let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
+        let gaussians = text::count(packed.gaussians as u64);
+        line(
+            "wrote",
+            format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), packed.degree),
+        )?;
+        line(
+            "file bytes",
+            format!(
+                "{} of {}: {} smaller (whole file against the PLY), {:.2} bytes a Gaussian",
+                text::bytes(self.file_bytes),
+                text::bytes(self.ply_bytes),
+                text::ratio(self.ply_bytes, self.file_bytes),
+                self.file_bytes as f64 / packed.gaussians.max(1) as f64
+            ),
+        )?;
+        if let Some(p) = &packed.promise {
+            line("pictures", promise_line(p))?;
+        }
+        if packed.degree.rest() > 0 {
+            line(
+                "codes",
+                format!("{:.2} nonzeros a Gaussian over {} atoms", report.mean_nonzeros, packed.atoms),
+            )?;
+        }
+        if packed.record.tolerance.is_some() {
+            line("error", error_line(&packed.record))?;
+            if report.escapes > 0 {
+                line("escapes", format!("{} Gaussians' SH stored exactly", text::count(report.escapes)))?;
+            }
+        }
+        let bits = |(name, bytes): &(String, f64)| {
+            format!("{name} {:.1}", 8.0 * bytes / packed.gaussians.max(1) as f64)
+        };
+        let parts: Vec<String> = attribute_bytes(packed, &packed.stream_bits()?).iter().map(bits).collect();
+        line("bits each", parts.join(", "))?;
+        let [read, look, pack, write, all] = self.seconds;
+        line(
+            "seconds",
+            format!("{all:.1}: reading {read:.1}, looking {look:.1}, packing {pack:.1}, writing {write:.1}"),
+        )?;
+        Ok(out)
+    }
+}
+
+/// What a file of a given quality or size reached.
+pub(crate) fn promise_line(p: &lexisplat::packed::Promise) -> String {
+    let kind = if p.cameras { "given cameras" } else { "generated views" };
+    format!(
+        "{:.2} dB on average, {:.2} dB at worst, over {} {kind} kept out of the search's own",
+        p.mean_psnr, p.min_psnr, p.views
+    )
+}

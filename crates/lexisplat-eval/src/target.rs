@@ -1,0 +1,300 @@
+//! Packing to a target: the smallest file of a quality, or the best quality of a size. No photos needed.
+
+use lexisplat::packed::{PackReport, Packed, Packer, Promise};
+use lexisplat::{Model, Progress, Sensitivity, Splats, lexi};
+use lexisplat_render::{Camera, Image, RenderOptions, Scene, Split, render, sensitivity, surround};
+
+use crate::error::{Error, Result};
+use crate::metrics::psnr;
+
+/// Views generated for a scene without cameras.
+const GENERATED_VIEWS: usize = 120;
+/// Their size in pixels.
+const GENERATED_SIZE: (u32, u32) = (384, 256);
+/// Widest picture of given cameras; sharper ones say the same about what shows.
+const MAX_WIDTH: u32 = 480;
+/// Of given cameras at most so many are used, evenly spread.
+const MAX_VIEWS: usize = 150;
+/// One view in so many judges; the others say what shows. Judging by the same views would flatter.
+const JUDGE_SHARE: usize = 5;
+/// Say of the guess that knows no views in [`Sensitivity::blended`]: measured on held-out views
+/// (docs/METHOD.md).
+const GUESS_SHARE: f32 = 0.3;
+/// Identical pictures count as this many decibels, so that means stay numbers.
+const IDENTICAL: f64 = 100.0;
+/// A quality may exceed what was asked by this, in dB, and a size fall short of it by this share.
+const CLOSE_DB: f64 = 0.1;
+const CLOSE_SIZE: f64 = 0.01;
+/// Packings tried at most.
+const MAX_TRIES: usize = 9;
+/// First guess: a step that gives this many decibels, and what halving it adds.
+const FIRST_STEP: f64 = 8e-6;
+const FIRST_DB: f64 = 40.0;
+const DB_PER_HALVING: f64 = 4.2;
+/// First guess of bytes a Gaussian at [`FIRST_STEP`], and by how much halving the step multiplies them.
+const FIRST_BYTES: f64 = 8.0;
+const BYTES_PER_HALVING: f64 = 1.4;
+/// Largest change of the step's binary logarithm from one try to the next.
+const MAX_MOVE: f64 = 3.0;
+/// Steps outside of this are useless.
+const STEPS: [f64; 2] = [1e-9, 1e-2];
+
+/// Views of a scene, split into those that say what shows and those that judge.
+#[derive(Debug, Clone)]
+pub struct Views {
+    measure: Vec<Camera>,
+    judge: Vec<Camera>,
+    given: bool,
+}
+
+impl Views {
+    /// Views from all around.
+    #[must_use]
+    pub fn generated(splats: &Splats) -> Self {
+        let (width, height) = GENERATED_SIZE;
+        Self::split(surround(&splats.geometry, GENERATED_VIEWS, width, height), false)
+    }
+
+    /// The given cameras; those marked as training ones where there are marks.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are fewer than two.
+    pub fn given(cameras: &[Camera]) -> Result<Self> {
+        let marked = cameras.iter().any(|c| c.split == Some(Split::Train));
+        let used: Vec<&Camera> =
+            cameras.iter().filter(|c| !marked || c.split == Some(Split::Train)).collect();
+        if used.len() < 2 {
+            return Err(Error::parameter("cameras", used.len(), "at least two to search with"));
+        }
+        let stride = used.len().div_ceil(MAX_VIEWS);
+        let chosen = used.into_iter().step_by(stride).map(|c| c.with_max_width(MAX_WIDTH));
+        Ok(Self::split(chosen.collect(), true))
+    }
+
+    fn split(cameras: Vec<Camera>, given: bool) -> Self {
+        let mut views = Self { measure: Vec::new(), judge: Vec::new(), given };
+        for (i, camera) in cameras.into_iter().enumerate() {
+            let side = if i % JUDGE_SHARE == 1 { &mut views.judge } else { &mut views.measure };
+            side.push(camera);
+        }
+        views
+    }
+
+    /// Number of views that say what shows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.measure.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.measure.is_empty()
+    }
+
+    /// How much the views' pictures depend on each value of each Gaussian, tempered by a guess for views
+    /// that are not among them.
+    #[must_use]
+    pub fn sensitivity(&self, splats: &Splats, on_view: &mut dyn FnMut()) -> Sensitivity {
+        let guess = Sensitivity::guess(&splats.geometry);
+        sensitivity(&Scene::from(splats), &self.measure, on_view).blended(&guess, GUESS_SHARE)
+    }
+}
+
+/// The original's pictures from the judging views.
+#[derive(Debug)]
+pub struct Judge<'a> {
+    views: &'a Views,
+    pictures: Vec<Image>,
+}
+
+impl<'a> Judge<'a> {
+    /// Draws the original.
+    #[must_use]
+    pub fn new(splats: &Splats, views: &'a Views) -> Self {
+        let scene = Scene::from(splats);
+        let draw = |camera| render(&scene, camera, &RenderOptions::default());
+        Self { views, pictures: views.judge.iter().map(draw).collect() }
+    }
+
+    /// Mean and least PSNR of `model` against the original.
+    ///
+    /// # Errors
+    /// None in practice: the pictures have the same sizes.
+    pub fn score(&self, model: &Model) -> Result<[f64; 2]> {
+        let scene = Scene::from(model);
+        let (mut sum, mut least) = (0.0, IDENTICAL);
+        for (camera, original) in self.views.judge.iter().zip(&self.pictures) {
+            let picture = render(&scene, camera, &RenderOptions::default());
+            let decibels = psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL);
+            sum += decibels;
+            least = f64::min(least, decibels);
+        }
+        Ok([sum / self.pictures.len().max(1) as f64, least])
+    }
+}
+
+/// What to pack to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Goal {
+    /// A mean PSNR of at least this, in dB.
+    MeanPsnr(f64),
+    /// At least this PSNR, in dB, in every judging view.
+    MinPsnr(f64),
+    /// A file of at most this many bytes.
+    Size(u64),
+}
+
+impl Goal {
+    fn name(self) -> &'static str {
+        match self {
+            Self::MeanPsnr(_) => "psnr",
+            Self::MinPsnr(_) => "min-psnr",
+            Self::Size(_) => "size",
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "file sizes are far below 2^52")]
+    fn asked(self) -> f64 {
+        match self {
+            Self::MeanPsnr(db) | Self::MinPsnr(db) => db,
+            Self::Size(bytes) => bytes as f64,
+        }
+    }
+}
+
+/// One packing tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Try {
+    log_step: f64,
+    /// Decibels, or minus the binary logarithm of the bytes: what grows as the step falls.
+    value: f64,
+}
+
+/// Packs until `goal` is met as closely as it can be. The promise is recorded in the file.
+///
+/// # Errors
+/// [`Error::Parameter`] if it cannot be met; what packing and drawing say.
+pub fn pack_to(
+    packer: &Packer<'_>,
+    judge: &Judge<'_>,
+    goal: Goal,
+    progress: &dyn Progress,
+) -> Result<(Packed, PackReport)> {
+    let size = matches!(goal, Goal::Size(_));
+    let wanted = if size { -goal.asked().log2() } else { goal.asked() };
+    if !goal.asked().is_finite() || goal.asked() <= 0.0 {
+        return Err(Error::parameter(goal.name(), goal.asked(), "a finite number above 0"));
+    }
+    let close = if size { -(1.0 - CLOSE_SIZE).log2() } else { CLOSE_DB };
+    let mut slope = if size { -BYTES_PER_HALVING.log2() } else { -DB_PER_HALVING };
+    let mut log_step = FIRST_STEP.log2();
+    log_step += if size {
+        #[expect(clippy::cast_precision_loss, reason = "a count of Gaussians")]
+        let first = -(FIRST_BYTES * packer.len().max(1) as f64).log2();
+        (wanted - first) / slope
+    } else {
+        (wanted - FIRST_DB) / slope
+    };
+    let mut tries: Vec<Try> = Vec::new();
+    let mut best: Option<(f64, Packed, PackReport, [f64; 2])> = None;
+    for _ in 0..MAX_TRIES {
+        log_step = log_step.clamp(STEPS[0].log2(), STEPS[1].log2());
+        let (packed, report) = packer.pack(log_step.exp2(), progress)?;
+        let bytes = lexi::packed_bytes(&packed);
+        let mut reached = [f64::NAN; 2];
+        #[expect(clippy::cast_precision_loss, reason = "file sizes are far below 2^52")]
+        let value = if size {
+            // The promise is written into the header too.
+            -((bytes + PROMISE_BYTES) as f64).log2()
+        } else {
+            reached = judge.score(&packed.unpack()?)?;
+            if matches!(goal, Goal::MinPsnr(_)) { reached[1] } else { reached[0] }
+        };
+        tries.push(Try { log_step, value });
+        let met = value >= wanted;
+        // Of those that meet a quality the one with the largest step is smallest; of those that meet a
+        // size the one with the smallest step is best.
+        let better = |other: f64| if size { log_step < other } else { log_step > other };
+        if met && best.as_ref().is_none_or(|b| better(b.0)) {
+            best = Some((log_step, packed, report, reached));
+        }
+        let over = value - wanted;
+        if met && over <= close {
+            break;
+        }
+        let Some(next) = next_step(&tries, wanted + 0.5 * close, &mut slope) else { break };
+        log_step = next;
+    }
+    let Some((_, mut packed, report, mut reached)) = best else {
+        let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
+        let expected = if size {
+            format!("at least {:.0} bytes: nothing smaller can be made of this scene", (-found).exp2())
+        } else {
+            format!("at most {found:.1} dB: nothing better can be made of this scene")
+        };
+        return Err(Error::parameter(goal.name(), goal.asked(), expected));
+    };
+    if reached[0].is_nan() {
+        reached = judge.score(&packed.unpack()?)?;
+    }
+    let views = u32::try_from(judge.pictures.len()).unwrap_or(u32::MAX);
+    packed.promise =
+        Some(Promise::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.views.given));
+    Ok((packed, report))
+}
+
+/// Room kept for the promise in the header of a file of a given size.
+const PROMISE_BYTES: u64 = 256;
+
+/// Decibels as they are worth recording.
+fn rounded(decibels: f64) -> f64 {
+    (decibels * 1000.0).round() / 1000.0
+}
+
+/// Where to try next: on the line through the two tries around the wanted value, or beyond the last.
+/// `None` if nothing new would be tried.
+fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
+    let above = tries.iter().filter(|t| t.value >= wanted).min_by(|a, b| a.value.total_cmp(&b.value));
+    let below = tries.iter().filter(|t| t.value < wanted).max_by(|a, b| a.value.total_cmp(&b.value));
+    let next = match (above, below) {
+        (Some(a), Some(b)) => {
+            let t = (wanted - b.value) / (a.value - b.value);
+            // Not too near either end, so that the interval shrinks.
+            b.log_step + (a.log_step - b.log_step) * t.clamp(0.05, 0.95)
+        }
+        (one, other) => {
+            if let [.., p, q] = tries
+                && (p.log_step - q.log_step).abs() > 1e-3
+            {
+                let measured = (q.value - p.value) / (q.log_step - p.log_step);
+                *slope = measured.clamp(3.0 * *slope, *slope / 3.0);
+            }
+            let from = one.or(other)?;
+            from.log_step + ((wanted - from.value) / *slope).clamp(-MAX_MOVE, MAX_MOVE)
+        }
+    };
+    tries.iter().all(|t| (t.log_step - next).abs() > 1e-4).then_some(next)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_search_closes_in_on_a_curve() {
+        // Decibels as a curve of the step's logarithm, steeper on one side.
+        let curve = |x: f64| 40.0 - 4.0 * (x + 17.0) - 0.2 * (x + 17.0).powi(2) * (x + 17.0).signum();
+        for wanted in [25.0, 40.0, 47.3, 60.0] {
+            let mut slope = -DB_PER_HALVING;
+            let mut tries = vec![Try { log_step: -17.0, value: curve(-17.0) }];
+            while tries.len() < MAX_TRIES {
+                let Some(next) = next_step(&tries, wanted, &mut slope) else { break };
+                tries.push(Try { log_step: next, value: curve(next) });
+            }
+            let nearest = tries.iter().map(|t| (t.value - wanted).abs()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 0.02, "{wanted}: {tries:?}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! How a tile's pixels change with its splats: sums over pixels of products of derivatives.
+
+use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
+
+use super::blend::TilePixels;
+use super::math::exp_in_range;
+use super::project::Splat;
+
+type Lanes = [f32; TILE];
+
+/// Number of sums a splat has.
+pub(super) const MOMENTS: usize = 10;
+
+/// Sums over pixels, for one splat. With alpha its opacity at a pixel, T what was open before it, C the
+/// pixel's colour and v = conic * (centre - pixel):
+///
+/// - `[0]`: (T alpha)^2, the squared derivative by one colour channel;
+/// - `[1]`: g = |dC / d ln alpha|^2;
+/// - `[2..5]`: g vx^2, g vx vy, g vy^2: those by the centre, since d ln alpha / d centre = -v;
+/// - `[5..10]`: g vx^4, g vx^3 vy, g vx^2 vy^2, g vx vy^3, g vy^4: those by the shape.
+pub(super) type Moments = [f32; MOMENTS];
+
+/// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
+pub(super) fn tile(
+    splats: &[Splat],
+    list: impl Iterator<Item = u32>,
+    at: [usize; 2],
+    size: [usize; 2],
+    picture: &TilePixels,
+) -> Vec<(u32, Moments)> {
+    pulp::Arch::new().dispatch(
+        #[inline(always)]
+        || walk(splats, list, at, size, picture),
+    )
+}
+
+/// What has been drawn of a row so far.
+#[derive(Clone, Copy)]
+struct Row {
+    colour: [Lanes; 3],
+    open: Lanes,
+}
+
+#[inline(always)]
+#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
+fn walk(
+    splats: &[Splat],
+    list: impl Iterator<Item = u32>,
+    [column, row]: [usize; 2],
+    [width, height]: [usize; 2],
+    picture: &TilePixels,
+) -> Vec<(u32, Moments)> {
+    let mut out = Vec::new();
+    let (left, top) = (column * TILE, row * TILE);
+    let x: Lanes = std::array::from_fn(|lane| (left + lane) as f32);
+    // Pixels beyond the picture's border are drawn but not looked at.
+    let open = std::array::from_fn(|lane| if left + lane < width { 1.0 } else { 0.0 });
+    let mut rows = [Row { colour: [[0.0; TILE]; 3], open }; TILE];
+    let mut row_open: [bool; TILE] = std::array::from_fn(|y| top + y < height);
+    for index in list {
+        let splat = &splats[index as usize];
+        let first = (splat.rows[0] as usize).saturating_sub(top);
+        let end = (splat.rows[1] as usize).saturating_sub(top).min(TILE);
+        let mut sums = [[0.0_f32; TILE]; MOMENTS];
+        let mut seen = false;
+        for y in first..end {
+            if row_open[y] {
+                let drawn = add(&mut rows[y], splat, &x, (top + y) as f32, &picture.0[y], &mut sums);
+                seen |= drawn;
+                row_open[y] = !drawn || rows[y].open.iter().any(|&o| o > 0.0);
+            }
+        }
+        if seen {
+            out.push((index, sums.map(|lanes| lanes.iter().sum())));
+        }
+    }
+    out
+}
+
+/// Draws `splat` on a row as `blend` does and adds to its sums; whether it may show there.
+#[inline(always)]
+#[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
+fn add(
+    row: &mut Row,
+    splat: &Splat,
+    x: &Lanes,
+    y: f32,
+    picture: &[Lanes; 3],
+    sums: &mut [Lanes; MOMENTS],
+) -> bool {
+    let [a, b, c] = splat.conic;
+    let dy = splat.centre[1] - y;
+    let mut power = [0.0; TILE];
+    let mut any = false;
+    for lane in 0..TILE {
+        let dx = splat.centre[0] - x[lane];
+        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
+        power[lane] = p;
+        any |= p >= splat.cutoff;
+    }
+    if !any {
+        return false;
+    }
+    for lane in 0..TILE {
+        let p = power[lane];
+        let value = splat.opacity * exp_in_range(p);
+        let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
+        let counts = (p >= splat.cutoff) & (p <= 0.0) & (value >= ALPHA_MIN);
+        let alpha = if counts { value } else { 0.0 };
+        let left = row.open[lane] * (1.0 - alpha);
+        let shows = left >= TRANSMITTANCE_MIN;
+        let weight = if shows { alpha * row.open[lane] } else { 0.0 };
+        row.open[lane] = if shows { left } else { 0.0 };
+        // alpha / (1 - alpha): what of the light behind one more unit of ln alpha takes away.
+        let taken = if weight > 0.0 { alpha / (1.0 - alpha) } else { 0.0 };
+        let mut g = 0.0;
+        for channel in 0..3 {
+            let own = weight * splat.colour[channel];
+            row.colour[channel][lane] += own;
+            let behind = picture[channel][lane] - row.colour[channel][lane];
+            let change = own - behind * taken;
+            g += change * change;
+        }
+        let dx = splat.centre[0] - x[lane];
+        let (vx, vy) = (a * dx + b * dy, b * dx + c * dy);
+        let (xx, xy, yy) = (vx * vx, vx * vy, vy * vy);
+        let terms = [
+            weight * weight,
+            g,
+            g * xx,
+            g * xy,
+            g * yy,
+            g * xx * xx,
+            g * xx * xy,
+            g * xx * yy,
+            g * xy * yy,
+            g * yy * yy,
+        ];
+        for (sum, term) in sums.iter_mut().zip(terms) {
+            sum[lane] += term;
+        }
+    }
+    true
+}

@@ -1,0 +1,131 @@
+//! How much pictures change with every parameter of every Gaussian.
+
+use lexisplat::{Geometry, Sensitivity};
+use rayon::prelude::*;
+
+use crate::camera::Camera;
+use crate::radiance::Radiance;
+use crate::scene::Scene;
+
+use super::moments::{self, MOMENTS, Moments};
+use super::project::{self, Projection};
+use super::{blend, order, tiles};
+
+/// How much the pictures of `scene` from `cameras`, over black, change with each value of each Gaussian,
+/// averaged over views. Views count alike, whatever their size. `on_view` is called after each.
+///
+/// If every value is off by an independent small error, the expected mean squared error of the pictures
+/// is the sum of these times the squared errors.
+///
+/// # Panics
+/// As [`crate::render`].
+#[must_use]
+pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], on_view: &mut dyn FnMut()) -> Sensitivity {
+    let mut total = Sensitivity::zeros(scene.len());
+    for camera in cameras {
+        add_view(&mut total, scene, camera, cameras.len());
+        on_view();
+    }
+    total
+}
+
+fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: usize) {
+    let projection = Projection::new(camera, scene.meta().antialiased);
+    let visible = project::project(scene.geometry(), &Radiance::new(scene), &projection);
+    let gaussians = order::gaussians_by_depth(&visible);
+    let (splats, rects) = order::by_depth(visible);
+    let grid = projection.grid;
+    let size = [camera.width as usize, camera.height as usize];
+    let mut sums = vec![[0.0_f32; MOMENTS]; splats.len()];
+    for band in tiles::bands(&rects, grid, tiles::MAX_ENTRIES) {
+        let lists = tiles::TileLists::new(&rects, grid, band.clone());
+        // Tile rows are summed in order, so that results do not depend on the number of threads.
+        for row in band.clone() {
+            let parts: Vec<Vec<(u32, Moments)>> = (0..grid.columns)
+                .into_par_iter()
+                .map(|column| {
+                    let list = || lists.of((row - band.start) * grid.columns + column);
+                    let picture = blend::tile(&splats, list(), [column, row], [0.0; 3]);
+                    moments::tile(&splats, list(), [column, row], size, &picture)
+                })
+                .collect();
+            for (splat, part) in parts.into_iter().flatten() {
+                for (sum, value) in sums[splat as usize].iter_mut().zip(part) {
+                    *sum += value;
+                }
+            }
+        }
+    }
+    #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
+    let share = 1.0 / (size[0] as f32 * size[1] as f32 * CHANNELS * views as f32);
+    let geometry = scene.geometry();
+    let changes: Vec<Change> = gaussians
+        .par_iter()
+        .zip(&sums)
+        .map(|(&i, m)| Change::of(&projection, geometry, i as usize, m))
+        .collect();
+    for ((&i, change), m) in gaussians.iter().zip(changes).zip(&sums) {
+        let i = i as usize;
+        if m[0] <= 0.0 || !change.is_finite() {
+            continue;
+        }
+        total.colour[i] += m[0] * share;
+        total.opacity[i] += m[1] * share;
+        let to = |sums: &mut [f32], values: &[f32]| {
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += value * share;
+            }
+        };
+        to(&mut total.position[i], &change.position);
+        to(&mut total.scale[i], &change.scale);
+        to(&mut total.rotation[i], &change.rotation);
+    }
+}
+
+/// Colour channels of a picture.
+const CHANNELS: f32 = 3.0;
+
+/// Squared derivatives of one picture by one Gaussian's shape.
+struct Change {
+    position: [f32; 6],
+    scale: [f32; 3],
+    rotation: [f32; 3],
+}
+
+impl Change {
+    /// Carries the moments on screen over to the world.
+    fn of(projection: &Projection, geometry: &Geometry, i: usize, m: &Moments) -> Self {
+        let (by_position, axes) = projection.derivatives(geometry, i);
+        let [xx, xy, yy] = [m[2], m[3], m[4]];
+        let mut position = [0.0; 6];
+        for (entry, (p, q)) in position.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
+            let (u, w) = (by_position[p], by_position[q]);
+            *entry = xx * u[0] * w[0] + xy * (u[0] * w[1] + u[1] * w[0]) + yy * u[1] * w[1];
+        }
+        // With the covariance the sum of a a^T over the axes on screen, d ln alpha / d ln s_k is (v . a_k)^2
+        // and a rotation in the plane of j and k by one radian makes
+        // (v . a_j) (v . a_k) (s_j^2 - s_k^2) / (s_j s_k).
+        let fourth = |p: [f32; 2], q: [f32; 2]| {
+            // (v . p)^2 (v . q)^2 as a polynomial in v.
+            let square = |a: [f32; 2]| [a[0] * a[0], 2.0 * a[0] * a[1], a[1] * a[1]];
+            let (p, q) = (square(p), square(q));
+            p[0] * q[0] * m[5]
+                + (p[0] * q[1] + p[1] * q[0]) * m[6]
+                + (p[0] * q[2] + p[1] * q[1] + p[2] * q[0]) * m[7]
+                + (p[1] * q[2] + p[2] * q[1]) * m[8]
+                + p[2] * q[2] * m[9]
+        };
+        let scales = geometry.scales[i];
+        let rotation = std::array::from_fn(|k| {
+            let (j, l) = ((k + 1) % 3, (k + 2) % 3);
+            let ratio = (scales[j] - scales[l]).exp();
+            let lever = ratio - 1.0 / ratio;
+            fourth(axes[j], axes[l]).max(0.0) * lever * lever
+        });
+        Self { position, scale: axes.map(|a| fourth(a, a).max(0.0)), rotation }
+    }
+
+    fn is_finite(&self) -> bool {
+        self.position.iter().chain(&self.scale).chain(&self.rotation).all(|v| v.is_finite())
+    }
+}

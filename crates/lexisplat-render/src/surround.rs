@@ -1,0 +1,129 @@
+//! Views from all around a scene that comes without cameras, to learn what shows in it.
+
+use glam::DVec3;
+use lexisplat::Geometry;
+
+use crate::camera::Camera;
+use crate::orbit::quantiles;
+
+/// Nearest and farthest view, in radii of the scene's detail. Photographers stand 3 to 6 such radii away
+/// in the scenes measured (docs/METHOD.md).
+const DISTANCES: [f64; 2] = [2.0, 12.0];
+/// Share of the detail, at either end of each axis, that does not count for its radius.
+const TRIM: f64 = 0.2;
+/// Angle between neighbouring points of a Fibonacci spiral: the golden angle.
+const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+/// Steps of the low-discrepancy sequences that spread distances and the points looked at: powers of the
+/// reciprocal plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences").
+const PLASTIC: [f64; 4] =
+    [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.430_159_709_001_946_8, 0.324_717_957_244_746];
+/// Focal length in picture widths: a field of view of 53 degrees.
+const FOCAL: f64 = 1.0;
+/// Radius of a scene without extent, in world units.
+const MIN_RADIUS: f64 = 1e-3;
+/// A direction this much along the world's y needs another up.
+const STEEP: f64 = 0.9;
+
+/// `count` cameras on all sides of the scene's detail, near and far, looking at points of it; the same
+/// for the same input. Named `surround_000` and so on.
+///
+/// Detail is where small opaque Gaussians are: that is where training cameras looked. Some of the views
+/// are from where no photographer stood, behind walls or below the floor; that is the price of not
+/// knowing.
+#[must_use]
+pub fn surround(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
+    let (centre, half) = detail(geometry);
+    let radius = half.length().max(MIN_RADIUS);
+    let focal = single(f64::from(width) * FOCAL);
+    let steps = u32::try_from(count).unwrap_or(u32::MAX);
+    (0..steps)
+        .map(|i| {
+            let spread = |k: usize| (f64::from(i) * PLASTIC[k]).fract();
+            let y = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(steps);
+            let around = (1.0 - y * y).max(0.0).sqrt();
+            let turn = f64::from(i) * GOLDEN_ANGLE;
+            let out = DVec3::new(around * turn.cos(), y, around * turn.sin());
+            let [near, far] = DISTANCES.map(f64::ln);
+            let position = centre + out * radius * (near + spread(0) * (far - near)).exp();
+            let offset = DVec3::new(spread(1), spread(2), spread(3)) * 2.0 - DVec3::ONE;
+            let target = centre + offset * half.max_element();
+            let forward = (target - position).normalize_or(-out);
+            let up = if forward.y.abs() > STEEP { DVec3::X } else { DVec3::NEG_Y };
+            let right = forward.cross(up).normalize();
+            let columns = [right, forward.cross(right), forward];
+            Camera {
+                name: format!("surround_{i:03}"),
+                width,
+                height,
+                fx: focal,
+                fy: focal,
+                position: position.to_array().map(single),
+                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
+                split: None,
+            }
+        })
+        .collect()
+}
+
+/// Centre of the detail and half its extent along each axis.
+fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
+    let weights: Vec<f64> = geometry
+        .opacities
+        .iter()
+        .zip(&geometry.scales)
+        .map(|(&o, scales)| {
+            let mut sorted = scales.map(f64::from);
+            sorted.sort_by(f64::total_cmp);
+            (-sorted[1] - sorted[2]).clamp(-60.0, 60.0).exp() / (1.0 + f64::from(-o).exp())
+        })
+        .collect();
+    let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
+        let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
+        quantiles(values.zip(weights.iter().copied()), [TRIM, 0.5, 1.0 - TRIM])
+    });
+    (DVec3::from_array(spans.map(|s| s[1])), DVec3::from_array(spans.map(|s| (s[2] - s[0]) / 2.0)))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
+fn single(value: f64) -> f32 {
+    value as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_surround_the_detail_and_look_at_it() {
+        // A ball of small Gaussians in a shell of large ones far away.
+        let mut g = Geometry::default();
+        for i in 0..2000_u16 {
+            let t = f64::from(i);
+            let y = 1.0 - (2.0 * t + 1.0) / 2000.0;
+            let around = (1.0 - y * y).sqrt();
+            let (radius, scale) = if i % 2 == 0 { (1.0, -4.0) } else { (50.0, 0.0) };
+            let p = DVec3::new(around * (t * 2.4).cos(), y, around * (t * 2.4).sin()) * radius;
+            g.positions.push((p + DVec3::new(5.0, -2.0, 7.0)).to_array().map(single));
+            g.scales.push([scale; 3]);
+            g.opacities.push(1.0);
+        }
+        let cameras = surround(&g, 40, 96, 64);
+        assert_eq!(cameras.len(), 40);
+        let mut sum = DVec3::ZERO;
+        for camera in &cameras {
+            camera.validate().unwrap();
+            let [x, y, z] = camera.to_view([5.0, -2.0, 7.0]).map(f64::from);
+            let distance = (x * x + y * y + z * z).sqrt();
+            assert!((1.0..15.0).contains(&distance) && z > 0.6 * distance, "{camera:?}");
+            sum +=
+                (DVec3::from_array(camera.position.map(f64::from)) - DVec3::new(5.0, -2.0, 7.0)) / distance;
+        }
+        assert!(sum.length() < 6.0, "on all sides: {sum}");
+        assert_eq!(cameras, surround(&g, 40, 96, 64));
+        assert!(surround(&g, 0, 10, 10).is_empty());
+        for camera in surround(&Geometry::default(), 3, 10, 10) {
+            camera.validate().unwrap();
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! Packed scenes in the container: four tensors instead of one for each attribute.
+
+use std::io::Write;
+use std::path::Path;
+
+use safetensors::Dtype;
+
+use super::read::{degree, extras, meta, record};
+use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, PACKED_VERSION, key, tensor};
+use super::tensors::{Checked, Draft, Tensor, preamble};
+use super::write::{extra_tensors, put_record};
+use crate::error::{Error, Result};
+use crate::input::Input;
+use crate::limits::Limits;
+use crate::model::Layout;
+use crate::output::write_whole;
+use crate::packed::{CHUNK, Packed, Promise};
+
+/// Gaussians a byte of a packed file may stand for at most: fewer would cost more than an eighth of a bit
+/// each, which no real scene reaches, and a lying header is refused before anything is allocated.
+const GAUSSIANS_PER_BYTE: u64 = 64;
+
+/// Writes `packed` to `path`, whole or not at all. Returns the file's size in bytes.
+///
+/// # Errors
+/// [`Error::Io`] for the file.
+pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
+    let draft = draft(packed);
+    let mut bytes = 0;
+    write_whole(path, |writer| {
+        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
+        Ok(())
+    })?;
+    Ok(bytes)
+}
+
+/// Writes `packed` to `writer`. Returns the number of bytes.
+///
+/// # Errors
+/// [`Error::Io`], which names no file.
+pub fn write_packed_to(writer: &mut impl Write, packed: &Packed) -> Result<u64> {
+    draft(packed).write_to(writer).map_err(|e| Error::io("output", e))
+}
+
+/// Bytes of the whole file as written.
+#[must_use]
+pub fn packed_bytes(packed: &Packed) -> u64 {
+    tensors(packed).iter().map(|t| t.bytes() as u64).sum::<u64>() + draft(packed).header_bytes()
+}
+
+/// Bytes of each tensor as written, and of the header under `header`. They sum to the file's size.
+#[must_use]
+pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
+    let mut out: Vec<(String, u64)> =
+        tensors(packed).iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
+    out.push(("header".to_owned(), draft(packed).header_bytes()));
+    out
+}
+
+/// Reads a packed .lexi file that is in memory, without decoding it. `None` if it is a .lexi file of
+/// another layout. `file` is its name in errors.
+///
+/// # Errors
+/// As [`super::read()`].
+pub fn read_packed_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Option<Packed>> {
+    let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
+    if record(&checked)?.layout != Layout::Packed {
+        return Ok(None);
+    }
+    from_checked(&checked, bytes.len() as u64, limits).map(Some)
+}
+
+/// Reads a packed .lexi file without decoding it. `None` if it is a .lexi file of another layout.
+///
+/// # Errors
+/// As [`super::read()`].
+pub fn read_packed(path: &Path, limits: &Limits) -> Result<Option<Packed>> {
+    let bytes = Input::open(path)?;
+    read_packed_bytes(&path.display().to_string(), &bytes, limits)
+}
+
+/// The packed scene of a file whose checksums hold.
+pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
+    let gaussians: u64 = checked.number(key::GAUSSIANS)?;
+    Limits::check("Gaussians in a packed file", gaussians, limits.gaussians)?;
+    Limits::check(
+        "Gaussians in a packed file of this size",
+        gaussians,
+        file_bytes.saturating_mul(GAUSSIANS_PER_BYTE),
+    )?;
+    let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
+    let whole = |name: &str, dtype: Dtype| -> Result<Vec<usize>> {
+        match checked.view(name)?.shape() {
+            [len] => Ok(vec![*len]),
+            shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
+        }
+    };
+    let mut known =
+        vec![tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::HEADER_CHECKSUM];
+    let order = if checked.has(tensor::ORDER) {
+        known.push(tensor::ORDER);
+        let order: Vec<u32> = checked.values(tensor::ORDER, Dtype::U32, &[gaussians])?;
+        if !is_permutation(&order) {
+            return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
+        }
+        Some(order)
+    } else {
+        None
+    };
+    let ignored = |name: &str| name.starts_with(EXTRA_PREFIX) || name.starts_with(IGNORED_PREFIX);
+    if let Some(name) = checked.names().iter().find(|name| !known.contains(name) && !ignored(name)) {
+        return Err(checked.malformed(format!("tensor '{name}' is not known for layout 'packed'")));
+    }
+    let chunks = gaussians.div_ceil(CHUNK);
+    let promise = match checked.optional::<String>(key::PROMISE)? {
+        None => None,
+        Some(text) => Some(
+            serde_json::from_str::<Promise>(&text)
+                .map_err(|e| checked.malformed(format!("metadata 'promise': {e}")))?,
+        ),
+    };
+    Ok(Packed {
+        degree: degree(checked)?,
+        gaussians,
+        atoms: checked.number(key::ATOMS)?,
+        atom_bits: checked.number(key::ATOM_BITS)?,
+        record: record(checked)?,
+        meta: meta(checked)?,
+        extras: extras(checked, gaussians)?,
+        order,
+        promise,
+        parameters: checked.values(
+            tensor::PARAMETERS,
+            Dtype::F32,
+            &whole(tensor::PARAMETERS, Dtype::F32)?,
+        )?,
+        lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
+        tables: checked.values(tensor::TABLES, Dtype::U8, &whole(tensor::TABLES, Dtype::U8)?)?,
+        data: checked.values(tensor::DATA, Dtype::U8, &whole(tensor::DATA, Dtype::U8)?)?,
+    })
+}
+
+fn is_permutation(order: &[u32]) -> bool {
+    let mut seen = vec![false; order.len()];
+    order.iter().all(|&i| seen.get_mut(i as usize).is_some_and(|s| !std::mem::replace(s, true)))
+}
+
+fn draft(packed: &Packed) -> Draft<'_> {
+    let mut metadata = preamble(FORMAT, PACKED_VERSION);
+    put_record(&mut metadata, packed.degree, &packed.record, &packed.meta);
+    let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
+    put(key::GAUSSIANS, packed.gaussians.to_string());
+    put(key::ATOMS, packed.atoms.to_string());
+    put(key::ATOM_BITS, packed.atom_bits.to_string());
+    if let Some(promise) = &packed.promise {
+        put(key::PROMISE, serde_json::to_string(promise).unwrap_or_default());
+    }
+    Draft::new(metadata, tensors(packed))
+}
+
+fn tensors(packed: &Packed) -> Vec<Tensor<'_>> {
+    let n = packed.gaussians;
+    let mut out = vec![
+        Tensor::plain(tensor::PARAMETERS, Dtype::F32, &[packed.parameters.len()], &packed.parameters),
+        Tensor::plain(tensor::LENGTHS, Dtype::U32, &[packed.lengths.len()], &packed.lengths),
+        Tensor::plain(tensor::TABLES, Dtype::U8, &[packed.tables.len()], &packed.tables),
+        Tensor::plain(tensor::DATA, Dtype::U8, &[packed.data.len()], &packed.data),
+    ];
+    if let Some(order) = &packed.order {
+        out.push(Tensor::plain(tensor::ORDER, Dtype::U32, &[n], order));
+    }
+    out.extend(extra_tensors(&packed.extras, n));
+    out
+}

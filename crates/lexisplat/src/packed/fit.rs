@@ -1,0 +1,238 @@
+//! Steps and predictors fitted to a scene.
+
+use super::canonical::{Canonical, Grid};
+use super::neighbours::{AVERAGES, Neighbours};
+use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
+use crate::maths::Vec3;
+use crate::sh::C0;
+
+/// A weight is at least this share of what nine tenths of all are below: what the views did not see may
+/// yet be seen.
+const WEIGHT_FLOOR: f64 = 1e-4;
+const FLOOR_QUANTILE: f64 = 0.9;
+/// Weights above this share of all do not make the finest class finer.
+const TOP_QUANTILE: f64 = 0.9995;
+/// The least weighted tell nothing about how steps depend on shape.
+const FIT_QUANTILE: f64 = 0.05;
+/// Added to squared derivatives, as a share of that by opacity, before logarithms are taken.
+const DERIVATIVE_FLOOR: f64 = 1e-4;
+/// Factors on steps, found by trial: derivatives are those of small errors, and small errors are not
+/// what is made (docs/METHOD.md). Colour, SH values, opacity, scale, rotation, position.
+const DC_FACTOR: f32 = 1.6;
+const VALUE_FACTOR: f32 = 1.6;
+const OPACITY_FACTOR: f32 = 1.2;
+const SCALE_FACTOR: f64 = 0.7;
+const ROTATION_FACTOR: f64 = 1.0;
+const POSITION_FACTOR: f64 = 0.9;
+/// Keeps the normal equations solvable.
+const RIDGE: f64 = 1e-6;
+
+/// Everything but the overall step.
+#[derive(Debug, Clone)]
+pub(super) struct Fit {
+    pub(super) parameters: Parameters,
+    /// Colour and shape class of each Gaussian.
+    pub(super) classes: Vec<[u8; 2]>,
+    /// Step of class 0 when the overall step is 1: colour, shape.
+    units: [f64; 2],
+}
+
+impl Fit {
+    pub(super) fn new(scene: &[Canonical], grid: &Grid) -> Self {
+        let (colour, colour_unit) = classes(scene.iter().map(|g| g.weights[0]));
+        let (shape, shape_unit) = classes(scene.iter().map(|g| g.weights[1]));
+        let classes: Vec<[u8; 2]> = colour.into_iter().zip(shape).map(|(c, s)| [c, s]).collect();
+        let (dc_mean, dc_axes) = colour_axes(scene);
+        let [scale_rows, rotation, position] = derivatives(scene);
+        let mut parameters = Parameters {
+            origin: grid.origin,
+            cell: grid.cell,
+            base: [1.0, 1.0],
+            factors: [
+                DC_FACTOR / C0,
+                VALUE_FACTOR / C0,
+                OPACITY_FACTOR,
+                // Scales have no scales before them to depend on: their rows are constants.
+                single(scale_rows[0][0].exp2()),
+                single(scale_rows[1][0].exp2()),
+                single(scale_rows[2][0].exp2()),
+            ],
+            promised: 0.0,
+            rotation: rotation.map(|row| row.map(single)),
+            position: position.map(|row| row.map(single)),
+            dc_mean,
+            dc_axes,
+            means: [0.0; TARGETS],
+            predictors: [[0.0; FEATURES]; TARGETS],
+        };
+        predictors(scene, &classes, &mut parameters);
+        Self { parameters, classes, units: [colour_unit, shape_unit] }
+    }
+
+    /// The parameters for an overall step: about the square root of the mean squared error of pictures
+    /// that one value of one Gaussian may make.
+    pub(super) fn with_step(&self, step: f64) -> Parameters {
+        Parameters { base: self.units.map(|unit| single(unit * step)), ..self.parameters.clone() }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]
+fn single(x: f64) -> f32 {
+    x as f32
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+    let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
+    sorted.get(index).copied().unwrap_or(0.0)
+}
+
+/// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight). Returns also the
+/// step of class 0 for an overall step of 1.
+fn classes(weights: impl Iterator<Item = f32>) -> (Vec<u8>, f64) {
+    let weights: Vec<f64> = weights.map(f64::from).collect();
+    let floor = (quantile(&weights, FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
+    let logs: Vec<f64> = weights.iter().map(|w| 0.5 * libm::log2(w + floor)).collect();
+    let top = quantile(&logs, TOP_QUANTILE).round();
+    let class = |log: &f64| {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let class = (top - log).round().clamp(0.0, f64::from(LAST_CLASS)) as u8;
+        class
+    };
+    (logs.iter().map(class).collect(), libm::exp2(-top))
+}
+
+/// Mean base colour and its principal axes, strongest first.
+fn colour_axes(scene: &[Canonical]) -> (Vec3, [Vec3; 3]) {
+    let n = scene.len().max(1) as f64;
+    let mean: Vec3 =
+        std::array::from_fn(|c| single(scene.iter().map(|g| f64::from(g.dc[c])).sum::<f64>() / n));
+    let deviations: Vec<f32> =
+        scene.iter().flat_map(|g| std::array::from_fn::<f32, 3, _>(|c| g.dc[c] - mean[c])).collect();
+    let axes = crate::learn::principal_axes(3, &deviations);
+    let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for (row, axis) in out.iter_mut().zip(&axes) {
+        *row = std::array::from_fn(|c| single(axis[c]));
+    }
+    (mean, out)
+}
+
+/// For scaling, turning and moving along each axis: the binary logarithm of the step, relative to that
+/// of the opacity, as a linear function of 1 and the scales. Scaling depends on nothing.
+fn derivatives(scene: &[Canonical]) -> [[[f64; 4]; 3]; 3] {
+    let weights: Vec<f64> = scene.iter().map(|g| f64::from(g.weights[1])).collect();
+    let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
+    let factors = [POSITION_FACTOR, SCALE_FACTOR, ROTATION_FACTOR].map(libm::log2);
+    let row = |kind: usize, axis: usize| -> [f64; 4] {
+        let mut equations = Equations::<4>::new();
+        for g in scene.iter().filter(|g| f64::from(g.weights[1]) > least) {
+            let by_opacity = f64::from(g.weights[1]);
+            // Positions are measured in standard deviations for the floor.
+            let unit = if kind == 0 { libm::exp(-2.0 * f64::from(g.scales[0])) } else { 1.0 };
+            let by_axis = f64::from(g.by_axis[kind][axis].max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
+            let scales = if kind == 1 { [0.0; 3] } else { g.scales.map(f64::from) };
+            equations.add(
+                [1.0, scales[0], scales[1], scales[2]],
+                -0.5 * libm::log2(by_axis / by_opacity),
+                1.0,
+            );
+        }
+        let mut row = equations.solve();
+        row[0] += factors[kind];
+        row
+    };
+    let rows = |kind| std::array::from_fn(|axis| row(kind, axis));
+    [rows(1), rows(2), rows(0)]
+}
+
+/// Fits the predictions to the scene's own values, as if coded without error.
+fn predictors(scene: &[Canonical], classes: &[[u8; 2]], parameters: &mut Parameters) {
+    let values: Vec<[f32; TARGETS]> = scene
+        .iter()
+        .map(|g| {
+            let dc = parameters.dc_coordinates(g.dc);
+            [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
+        })
+        .collect();
+    let n = scene.len().max(1) as f64;
+    for (t, mean) in parameters.means.iter_mut().enumerate() {
+        *mean = single(values.iter().map(|v| f64::from(v[t])).sum::<f64>() / n);
+    }
+    let mut equations: [Equations<FEATURES>; TARGETS] = std::array::from_fn(|_| Equations::new());
+    let mut neighbours = Neighbours::new();
+    for ((g, values), class) in scene.iter().zip(&values).zip(classes) {
+        if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
+            for (t, equations) in equations.iter_mut().enumerate() {
+                let known = |k: usize| if t > k { f64::from(values[k]) } else { 0.0 };
+                let features = [
+                    1.0,
+                    f64::from(around[t]),
+                    f64::from(class[0]),
+                    f64::from(class[1]),
+                    known(0),
+                    known(1),
+                    known(2),
+                ];
+                equations.add(features, f64::from(values[t]), 1.0);
+            }
+        }
+        let mut pushed = [0.0; AVERAGES];
+        pushed[..TARGETS].copy_from_slice(values);
+        neighbours.push(g.position, pushed);
+    }
+    for (row, equations) in parameters.predictors.iter_mut().zip(&equations) {
+        *row = equations.solve().map(single);
+    }
+}
+
+/// Least squares by normal equations.
+struct Equations<const N: usize> {
+    matrix: [[f64; N]; N],
+    right: [f64; N],
+}
+
+impl<const N: usize> Equations<N> {
+    fn new() -> Self {
+        Self { matrix: [[0.0; N]; N], right: [0.0; N] }
+    }
+
+    fn add(&mut self, features: [f64; N], value: f64, weight: f64) {
+        for i in 0..N {
+            for j in 0..N {
+                self.matrix[i][j] += weight * features[i] * features[j];
+            }
+            self.right[i] += weight * features[i] * value;
+        }
+    }
+
+    /// The coefficients; zero for features that never vary from zero.
+    fn solve(&self) -> [f64; N] {
+        let (mut m, mut r) = (self.matrix, self.right);
+        let scale = (0..N).map(|i| m[i][i]).fold(1e-30, f64::max);
+        for (i, row) in m.iter_mut().enumerate() {
+            row[i] += RIDGE * (row[i] + 1e-6 * scale);
+        }
+        for c in 0..N {
+            let pivot = m[c];
+            if pivot[c] <= 0.0 {
+                continue;
+            }
+            let right = r[c];
+            for i in c + 1..N {
+                let factor = m[i][c] / pivot[c];
+                for (value, p) in m[i].iter_mut().zip(&pivot) {
+                    *value -= factor * p;
+                }
+                r[i] -= factor * right;
+            }
+        }
+        let mut x = [0.0; N];
+        for c in (0..N).rev() {
+            let known: f64 = (c + 1..N).map(|j| m[c][j] * x[j]).sum();
+            x[c] = if m[c][c] > 0.0 { (r[c] - known) / m[c][c] } else { 0.0 };
+        }
+        x
+    }
+}

@@ -1,0 +1,27 @@
+//! The packed form: every attribute quantised as far as pictures allow and entropy-coded.
+//!
+//! [`Packer`] takes a scene and its [`Sensitivity`] and makes [`Packed`] files of any quality;
+//! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
+//! the mathematics, docs/FORMAT.md the bytes.
+//!
+//! `walk.rs` is the heart: one walk over the Gaussians of a chunk that encoder and decoder share.
+
+mod bits;
+mod canonical;
+mod codebook;
+mod entropy;
+mod fit;
+mod morton;
+mod neighbours;
+mod pack;
+mod parameters;
+mod stream;
+mod unpack;
+mod walk;
+
+pub use pack::{PackOptions, PackReport, Packer};
+pub use unpack::{Packed, Promise, StreamBits};
+
+/// Gaussians of a chunk: decoded apart from all others, so that decoding is parallel and a viewer need
+/// not wait for the whole file.
+pub const CHUNK: usize = 32_768;

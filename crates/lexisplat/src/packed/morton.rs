@@ -1,0 +1,53 @@
+//! Cells of a grid in the order of the Morton curve.
+
+/// Bits of each coordinate.
+pub(super) const BITS: u32 = 21;
+
+/// The cell (x, y, z) as a number whose bits are theirs interleaved; coordinates are below 2^21.
+pub(super) fn encode(cell: [u32; 3]) -> u64 {
+    spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
+}
+
+/// Inverse of [`encode`]; `None` for numbers it does not give.
+pub(super) fn decode(code: u64) -> Option<[u32; 3]> {
+    (code >> (3 * BITS) == 0).then(|| [gather(code), gather(code >> 1), gather(code >> 2)])
+}
+
+const MASKS: [(u32, u64); 5] = [
+    (32, 0x001f_0000_0000_ffff),
+    (16, 0x001f_0000_ff00_00ff),
+    (8, 0x100f_00f0_0f00_f00f),
+    (4, 0x10c3_0c30_c30c_30c3),
+    (2, 0x1249_2492_4924_9249),
+];
+
+fn spread(x: u32) -> u64 {
+    MASKS.iter().fold(u64::from(x), |x, &(shift, mask)| (x | (x << shift)) & mask)
+}
+
+fn gather(code: u64) -> u32 {
+    let mut x = code & MASKS[4].1;
+    for k in (0..5).rev() {
+        let mask = if k == 0 { (1 << BITS) - 1 } else { MASKS[k - 1].1 };
+        x = (x | (x >> MASKS[k].0)) & mask;
+    }
+    u32::try_from(x).unwrap_or(u32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_come_back() {
+        for cell in
+            [[0, 0, 0], [1, 2, 3], [0x1f_ffff, 0, 0x15_5555], [0x1f_ffff; 3], [123_456, 654_321, 2_000_000]]
+        {
+            assert_eq!(decode(encode(cell)), Some(cell));
+        }
+        assert_eq!(encode([1, 0, 0]), 1);
+        assert_eq!(encode([0, 1, 0]), 2);
+        assert_eq!(encode([0, 0, 3]), 0b10_0100);
+        assert_eq!(decode(u64::MAX), None);
+    }
+}

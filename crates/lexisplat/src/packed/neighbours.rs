@@ -1,0 +1,54 @@
+//! What the Gaussians decoded just before say about the next one.
+
+use super::parameters::TARGETS;
+use crate::maths::Vec3;
+
+/// Gaussians remembered. More gain little: neighbours on the Morton curve are neighbours in space.
+const WINDOW: usize = 16;
+/// Values averaged: those that are predicted, the two classes and the number of nonzeros.
+pub(super) const AVERAGES: usize = TARGETS + 3;
+
+/// The last few Gaussians of a chunk.
+#[derive(Debug, Clone)]
+pub(super) struct Neighbours {
+    positions: [Vec3; WINDOW],
+    values: [[f32; AVERAGES]; WINDOW],
+    /// Number seen so far.
+    seen: usize,
+}
+
+impl Neighbours {
+    pub(super) fn new() -> Self {
+        Self { positions: [[0.0; 3]; WINDOW], values: [[0.0; AVERAGES]; WINDOW], seen: 0 }
+    }
+
+    /// Averages around `centre`, weighted by the inverse squared distance, which is taken to be at least
+    /// `near`. `None` before the first Gaussian.
+    pub(super) fn average(&self, centre: Vec3, near: f32) -> Option<[f32; AVERAGES]> {
+        let known = self.seen.min(WINDOW);
+        if known == 0 {
+            return None;
+        }
+        let floor = near * near;
+        let mut sums = [0.0_f32; AVERAGES];
+        let mut total = 0.0_f32;
+        for (position, values) in self.positions.iter().zip(&self.values).take(known) {
+            let d: Vec3 = std::array::from_fn(|k| position[k] - centre[k]);
+            let weight = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] + floor);
+            total += weight;
+            for (sum, value) in sums.iter_mut().zip(values) {
+                *sum += weight * value;
+            }
+        }
+        // Distances beyond f32 leave no weight.
+        let average = sums.map(|sum| sum / total);
+        average.iter().all(|v| v.is_finite()).then_some(average)
+    }
+
+    pub(super) fn push(&mut self, position: Vec3, values: [f32; AVERAGES]) {
+        let at = self.seen % WINDOW;
+        self.positions[at] = position;
+        self.values[at] = values;
+        self.seen += 1;
+    }
+}

@@ -1,0 +1,169 @@
+//! What every chunk is decoded with: steps, predictors, the grid. A fixed list of f32.
+
+use crate::maths::{Vec3, exp, exp2};
+
+/// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
+/// the opacity, three base colours.
+pub(super) const TARGETS: usize = 7;
+/// What a prediction is made of: 1, the neighbours' average of the same value, the two classes, and the
+/// scales known so far.
+pub(super) const FEATURES: usize = 7;
+/// Features a step depends on: 1 and the scales.
+const STEP_FEATURES: usize = 4;
+/// Number of the coarsest class of steps.
+pub(super) const LAST_CLASS: u8 = 15;
+
+/// Largest steps: beyond them a value is as good as unknown, and errors no longer small.
+const MAX_LOG_STEP: f32 = 1.5;
+const MAX_ANGLE_STEP: f32 = 1.2;
+/// The same for positions, in standard deviations along the longest axis.
+const MAX_POSITION_STEP: f32 = 2.0;
+
+/// Steps and predictors of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Parameters {
+    /// Corner of the grid, in world units.
+    pub(super) origin: Vec3,
+    /// Side of a cell of the grid, in world units.
+    pub(super) cell: f32,
+    /// Step of class 0; each further class doubles it: colour, shape.
+    pub(super) base: [f32; 2],
+    /// Factors on the steps of base colour, SH values, opacity and the three scales.
+    pub(super) factors: [f32; 6],
+    /// Step of all SH values alike, where an error was promised; else 0.
+    pub(super) promised: f32,
+    /// Binary logarithm of the factor for turning about each axis, as a linear function of 1 and the
+    /// scales.
+    pub(super) rotation: [[f32; STEP_FEATURES]; 3],
+    /// The same for moving along each axis.
+    pub(super) position: [[f32; STEP_FEATURES]; 3],
+    /// Mean base colour, and the orthonormal axes in which its deviation is coded.
+    pub(super) dc_mean: Vec3,
+    pub(super) dc_axes: [Vec3; 3],
+    /// Averages that stand for neighbours where there are none.
+    pub(super) means: [f32; TARGETS],
+    /// Coefficients of the predictions.
+    pub(super) predictors: [[f32; FEATURES]; TARGETS],
+}
+
+impl Parameters {
+    /// Number of values in the list.
+    pub(super) const LEN: usize = 3 + 1 + 2 + 6 + 1 + 24 + 3 + 9 + TARGETS + TARGETS * FEATURES;
+
+    /// All values in order.
+    pub(super) fn to_list(&self) -> Vec<f32> {
+        let mut list = Vec::with_capacity(Self::LEN);
+        list.extend(self.origin);
+        list.push(self.cell);
+        list.extend(self.base);
+        list.extend(self.factors);
+        list.push(self.promised);
+        list.extend(self.rotation.as_flattened());
+        list.extend(self.position.as_flattened());
+        list.extend(self.dc_mean);
+        list.extend(self.dc_axes.as_flattened());
+        list.extend(self.means);
+        list.extend(self.predictors.as_flattened());
+        list
+    }
+
+    /// Inverse of [`Self::to_list`]; `None` if the length differs or a value is not finite.
+    pub(super) fn from_list(list: &[f32]) -> Option<Self> {
+        if list.len() != Self::LEN || list.iter().any(|v| !v.is_finite()) {
+            return None;
+        }
+        let mut rest = list;
+        fn take<const N: usize>(rest: &mut &[f32]) -> Option<[f32; N]> {
+            let (head, tail) = rest.split_first_chunk::<N>()?;
+            *rest = tail;
+            Some(*head)
+        }
+        let parameters = Self {
+            origin: take(&mut rest)?,
+            cell: take::<1>(&mut rest)?[0],
+            base: take(&mut rest)?,
+            factors: take(&mut rest)?,
+            promised: take::<1>(&mut rest)?[0],
+            rotation: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
+            position: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
+            dc_mean: take(&mut rest)?,
+            dc_axes: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
+            means: take(&mut rest)?,
+            predictors: {
+                let mut rows = [[0.0; FEATURES]; TARGETS];
+                for row in &mut rows {
+                    *row = take(&mut rest)?;
+                }
+                rows
+            },
+        };
+        let steps = [parameters.base[0], parameters.base[1], parameters.cell];
+        let valid = steps.iter().chain(&parameters.factors).all(|&v| v > 0.0) && parameters.promised >= 0.0;
+        valid.then_some(parameters)
+    }
+
+    fn step(&self, kind: usize, class: u8) -> f32 {
+        self.base[kind] * exp2(f32::from(class))
+    }
+
+    /// Step of the base colour's three coordinates.
+    pub(super) fn dc_step(&self, colour: u8) -> f32 {
+        self.step(0, colour) * self.factors[0]
+    }
+
+    /// Step of the values of SH codes.
+    pub(super) fn value_step(&self, colour: u8) -> f32 {
+        if self.promised > 0.0 { self.promised } else { self.step(0, colour) * self.factors[1] }
+    }
+
+    /// Step of the logarithm of the opacity.
+    pub(super) fn opacity_step(&self, shape: u8) -> f32 {
+        (self.step(1, shape) * self.factors[2]).min(MAX_LOG_STEP)
+    }
+
+    /// Step of the logarithm of the standard deviation along axis `k`.
+    pub(super) fn scale_step(&self, k: usize, shape: u8) -> f32 {
+        (self.step(1, shape) * self.factors[3 + k]).min(MAX_LOG_STEP)
+    }
+
+    /// Steps of turns about each of the Gaussian's axes, in radians.
+    pub(super) fn rotation_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
+        let step = self.step(1, shape);
+        self.rotation.map(|row| (step * exp2(linear(row, scales))).min(MAX_ANGLE_STEP))
+    }
+
+    /// Steps of the position along each of the Gaussian's axes, in world units.
+    pub(super) fn position_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
+        let step = self.step(1, shape);
+        let most = MAX_POSITION_STEP * exp(scales[0].clamp(-60.0, 60.0));
+        self.position.map(|row| (step * exp2(linear(row, scales))).min(most).max(f32::MIN_POSITIVE))
+    }
+
+    /// What `target` is expected to be.
+    pub(super) fn predict(&self, target: usize, features: &[f32; FEATURES]) -> f32 {
+        self.predictors[target].iter().zip(features).fold(0.0, |sum, (p, f)| sum + p * f)
+    }
+
+    /// A base colour from its coordinates.
+    pub(super) fn dc_of(&self, coordinates: Vec3) -> Vec3 {
+        let a = &self.dc_axes;
+        std::array::from_fn(|c| {
+            self.dc_mean[c] + coordinates[0] * a[0][c] + coordinates[1] * a[1][c] + coordinates[2] * a[2][c]
+        })
+    }
+
+    /// The coordinates of a base colour.
+    pub(super) fn dc_coordinates(&self, dc: Vec3) -> Vec3 {
+        let d: Vec3 = std::array::from_fn(|c| dc[c] - self.dc_mean[c]);
+        self.dc_axes.map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
+    }
+
+    /// World coordinates of the centre of the cell (x, y, z).
+    pub(super) fn centre(&self, cell: [u32; 3]) -> [f64; 3] {
+        std::array::from_fn(|k| f64::from(self.origin[k]) + (f64::from(cell[k]) + 0.5) * f64::from(self.cell))
+    }
+}
+
+fn linear(row: [f32; STEP_FEATURES], scales: Vec3) -> f32 {
+    row[0] + row[1] * scales[0] + row[2] * scales[1] + row[3] * scales[2]
+}

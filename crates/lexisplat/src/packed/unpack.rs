@@ -1,0 +1,330 @@
+//! From a packed file's parts to a scene.
+
+use half::f16;
+use serde::{Deserialize, Serialize};
+
+use super::CHUNK;
+use super::bits::{unzigzag, zigzag};
+use super::entropy::Tables;
+use super::parameters::Parameters;
+use super::stream::{Player, Stream, Symbols};
+use super::walk::Walk;
+use crate::codes::{Escapes, Indices, SparseCodes, Values};
+use crate::dictionary::Dictionary;
+use crate::error::{Error, Result};
+use crate::limits::MAX_ATOMS;
+use crate::maths::Vec3;
+use crate::model::{Layout, Model, Record};
+use crate::parallel::map_vec;
+use crate::sh::ShDegree;
+use crate::splats::{Extra, Geometry, SceneMeta};
+
+/// Steps of atoms' coefficients are 2^-k for k up to this.
+pub(super) const MAX_ATOM_BITS: u32 = 14;
+
+/// A packed scene as it lies in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Packed {
+    /// SH degree.
+    pub degree: ShDegree,
+    /// Number of Gaussians.
+    pub gaussians: usize,
+    /// Number of atoms; 0 for degree 0.
+    pub atoms: usize,
+    /// Atoms' coefficients are multiples of 2 to the power of minus this.
+    pub atom_bits: u32,
+    /// How it was made and what it promises.
+    pub record: Record,
+    /// Comments and marks of the source.
+    pub meta: SceneMeta,
+    /// Properties 3DGS does not define, in the packed order.
+    pub extras: Vec<Extra>,
+    /// For each Gaussian its index in the source, if that was to be kept.
+    pub order: Option<Vec<u32>>,
+    /// What was aimed at and reached, if something was.
+    pub promise: Option<Promise>,
+    /// Steps and predictors.
+    pub parameters: Vec<f32>,
+    /// Probabilities of all symbols.
+    pub tables: Vec<u8>,
+    /// Bytes of each part in `data`: modelled symbols and raw bits, of the dictionary first and then of each
+    /// chunk of [`CHUNK`] Gaussians.
+    pub lengths: Vec<u32>,
+    /// All parts.
+    pub data: Vec<u8>,
+}
+
+/// What a search for a quality or a size aimed at and reached.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct Promise {
+    /// `psnr`, `min-psnr` or `size`.
+    pub target: String,
+    /// Decibels or bytes asked for.
+    pub asked: f64,
+    /// Mean PSNR over the views searched with, in decibels.
+    pub mean_psnr: f64,
+    /// PSNR of the worst of them.
+    pub min_psnr: f64,
+    /// Number of views.
+    pub views: u32,
+    /// Whether they were given; else they were generated.
+    pub cameras: bool,
+}
+
+impl Promise {
+    /// A promise of all its parts.
+    #[must_use]
+    pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
+        let [mean_psnr, min_psnr] = reached;
+        Self { target: target.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
+    }
+}
+
+/// What one stream takes.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct StreamBits {
+    /// The stream's name.
+    pub name: String,
+    /// The attribute it belongs to.
+    pub attribute: &'static str,
+    /// Bits in all.
+    pub bits: f64,
+}
+
+/// One chunk, decoded.
+struct Piece {
+    positions: Vec<Vec3>,
+    dc: Vec<Vec3>,
+    opacities: Vec<f32>,
+    scales: Vec<Vec3>,
+    rotations: Vec<[f32; 4]>,
+    counts: Vec<u8>,
+    atoms: Vec<u16>,
+    values: Vec<f16>,
+    escaped: Vec<u32>,
+    rows: Vec<f32>,
+    spent: Option<[f64; Stream::ALL.len()]>,
+}
+
+impl Packed {
+    /// The scene, its SH as sparse codes.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the part that is not as it should be.
+    pub fn unpack(&self) -> Result<Model> {
+        Ok(self.decode(false)?.0)
+    }
+
+    /// Bits each stream takes, tables and parameters apart.
+    ///
+    /// # Errors
+    /// As [`Self::unpack`].
+    pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
+        let spent = self.decode(true)?.1;
+        let stream = |(stream, bits): (Stream, f64)| StreamBits {
+            name: format!("{stream:?}"),
+            attribute: stream.attribute(),
+            bits,
+        };
+        Ok(Stream::ALL.into_iter().zip(spent).map(stream).collect())
+    }
+
+    fn decode(&self, count_bits: bool) -> Result<(Model, [f64; Stream::ALL.len()])> {
+        let bad = |what: &str| Error::parameter("packed", what, "what the encoder writes");
+        let parameters = Parameters::from_list(&self.parameters).ok_or_else(|| bad("parameters"))?;
+        let tables = Tables::read(&self.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
+        let chunks = self.gaussians.div_ceil(CHUNK);
+        let total: u64 = self.lengths.iter().map(|&l| u64::from(l)).sum();
+        if self.lengths.len() != 2 * (chunks + 1) || total != self.data.len() as u64 {
+            return Err(bad("lengths"));
+        }
+        let mut parts = Vec::with_capacity(self.lengths.len());
+        let mut rest = self.data.as_slice();
+        for &length in &self.lengths {
+            let (part, tail) = rest.split_at_checked(length as usize).ok_or_else(|| bad("lengths"))?;
+            parts.push(part);
+            rest = tail;
+        }
+        let mut spent = [0.0; Stream::ALL.len()];
+        let mut add = |more: &Option<[f64; Stream::ALL.len()]>| {
+            for (a, b) in spent.iter_mut().zip(more.iter().flatten()) {
+                *a += b;
+            }
+        };
+        let (dictionary, bits) =
+            self.dictionary(&tables, parts[0], parts[1], count_bits).ok_or_else(|| bad("dictionary"))?;
+        add(&bits);
+        let work: Vec<(usize, &[u8], &[u8])> =
+            (0..chunks).map(|c| (c, parts[2 * c + 2], parts[2 * c + 3])).collect();
+        let pieces = map_vec(work, |(c, symbols, raw)| {
+            let count = CHUNK.min(self.gaussians - c * CHUNK);
+            let mut player = Player::new(&tables, symbols, raw)?;
+            player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
+            piece(&parameters, &dictionary, player, c * CHUNK, count)
+        });
+        let mut model = self.empty_model(dictionary)?;
+        let mut codes = (Vec::new(), Vec::new(), Vec::new());
+        let mut escapes = Escapes::default();
+        for (c, piece) in pieces.into_iter().enumerate() {
+            let piece = piece.ok_or_else(|| bad(&format!("chunk {c}")))?;
+            add(&piece.spent);
+            let g = &mut model.geometry;
+            g.positions.extend(piece.positions);
+            g.dc.extend(piece.dc);
+            g.opacities.extend(piece.opacities);
+            g.scales.extend(piece.scales);
+            g.rotations.extend(piece.rotations);
+            codes.0.extend(piece.counts);
+            codes.1.extend(piece.atoms);
+            codes.2.extend(piece.values);
+            escapes.gaussians.extend(piece.escaped);
+            escapes.rows.extend(piece.rows);
+        }
+        let (counts, atoms, values) = codes;
+        let indices = if model.dictionary.len() <= 256 {
+            Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
+        } else {
+            Indices::U16(atoms)
+        };
+        model.codes = SparseCodes::new(&model.dictionary, counts, indices, Values::F16(values), escapes)?;
+        Ok((model, spent))
+    }
+
+    fn empty_model(&self, dictionary: Dictionary) -> Result<Model> {
+        let codes = SparseCodes::new(
+            &dictionary,
+            Vec::new(),
+            Indices::for_atoms(0),
+            Values::F16(Vec::new()),
+            Escapes::default(),
+        )?;
+        let geometry = Geometry { extras: self.extras.clone(), ..Geometry::default() };
+        let record = Record { layout: Layout::Packed, ..self.record.clone() };
+        Ok(Model { geometry, meta: self.meta.clone(), dictionary, codes, record })
+    }
+
+    fn dictionary(
+        &self,
+        tables: &Tables,
+        symbols: &[u8],
+        raw: &[u8],
+        count_bits: bool,
+    ) -> Option<(Dictionary, Option<[f64; Stream::ALL.len()]>)> {
+        let dim = self.degree.rest();
+        if dim == 0 {
+            return (self.atoms == 0 && symbols.is_empty() && raw.is_empty())
+                .then(|| (Dictionary::empty(), None));
+        }
+        if !(1..=MAX_ATOMS).contains(&self.atoms) || self.atom_bits > MAX_ATOM_BITS {
+            return None;
+        }
+        let mut player = Player::new(tables, symbols, raw)?;
+        player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
+        let rows = dictionary_walk(&mut player, self.degree, self.atoms, self.atom_bits, None);
+        if !player.exhausted() {
+            return None;
+        }
+        Some((Dictionary::new(self.degree, rows).ok()?, player.spent))
+    }
+}
+
+/// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
+/// the encoder's.
+pub(super) fn dictionary_walk<S: Symbols>(
+    s: &mut S,
+    degree: ShDegree,
+    atoms: usize,
+    bits: u32,
+    target: Option<&[f32]>,
+) -> Vec<f32> {
+    let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
+    let steps = f64::from(1_u32 << bits);
+    let mut rows = Vec::with_capacity(atoms * dim);
+    for j in 0..atoms {
+        let mut row = Vec::with_capacity(dim);
+        for d in 0..dim {
+            // Coefficients of one degree are alike, whatever the channel.
+            let context = (d % per_channel + 1).isqrt() - 1;
+            let coded = s.integer(Stream::Dictionary, context, || {
+                #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
+                let whole = target.map_or(0, |t| (f64::from(t[j * dim + d]) * steps).round() as i64);
+                zigzag(whole)
+            });
+            #[expect(clippy::cast_precision_loss, reason = "small, or the norm check refuses it")]
+            row.push(unzigzag(coded) as f64 / steps);
+        }
+        let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
+        // An atom of zeros cannot be used; the first axis stands in so that the rest can be read.
+        if norm == 0.0 {
+            row[0] = 1.0;
+        }
+        let norm = if norm == 0.0 { 1.0 } else { norm };
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        rows.extend(row.iter().map(|x| (x / norm) as f32));
+    }
+    rows
+}
+
+fn piece(
+    parameters: &Parameters,
+    dictionary: &Dictionary,
+    mut player: Player<'_>,
+    first: usize,
+    count: usize,
+) -> Option<Piece> {
+    let mut piece = Piece {
+        positions: Vec::with_capacity(count),
+        dc: Vec::with_capacity(count),
+        opacities: Vec::with_capacity(count),
+        scales: Vec::with_capacity(count),
+        rotations: Vec::with_capacity(count),
+        counts: Vec::with_capacity(count),
+        atoms: Vec::new(),
+        values: Vec::new(),
+        escaped: Vec::new(),
+        rows: Vec::new(),
+        spent: None,
+    };
+    let mut walk = Walk::new(parameters, dictionary.dim());
+    let mut code = Vec::with_capacity(dictionary.dim());
+    for i in 0..count {
+        let decoded = walk.step(&mut player, None)?;
+        piece.positions.push(decoded.position);
+        piece.dc.push(decoded.dc);
+        piece.opacities.push(decoded.opacity);
+        piece.scales.push(decoded.scales);
+        piece.rotations.push(decoded.rotation);
+        if !walk.exact.is_empty() {
+            piece.escaped.push(u32::try_from(first + i).ok()?);
+            piece.rows.extend_from_slice(&walk.exact);
+        }
+        resident(&walk.code, parameters.value_step(decoded.colour_class), &mut code);
+        piece.counts.push(u8::try_from(code.len()).ok()?);
+        for &(atom, value) in &code {
+            if usize::from(atom) >= dictionary.len() || !value.is_finite() {
+                return None;
+            }
+            piece.atoms.push(atom);
+            piece.values.push(value);
+        }
+        // A damaged file could ask for more than it holds.
+        if i % 256 == 255 && player.overrun() {
+            return None;
+        }
+    }
+    if !player.exhausted() {
+        return None;
+    }
+    piece.spent = player.spent;
+    Some(piece)
+}
+
+/// A code as it is kept in memory: by ascending atom, values in f16.
+pub(super) fn resident(code: &[(u16, i32)], step: f32, out: &mut Vec<(u16, f16)>) {
+    out.clear();
+    #[expect(clippy::cast_precision_loss, reason = "f16 keeps less")]
+    out.extend(code.iter().map(|&(atom, value)| (atom, f16::from_f32(value as f32 * step))));
+    out.sort_by_key(|p| p.0);
+}
