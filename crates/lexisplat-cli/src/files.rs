@@ -6,8 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use image::ImageEncoder;
-use lexisplat::ply::{PlyRead, ReadOptions};
-use lexisplat::{Error, Limits, Model, lexi, ply};
+use lexisplat::lexi::{self, Contents};
+use lexisplat::packed::Packed;
+use lexisplat::ply::{self, PlyRead, ReadOptions};
+use lexisplat::{Error, Limits, Model};
 use lexisplat_render::Scene;
 
 use crate::exit::OutputExists;
@@ -18,7 +20,19 @@ const PEEK: usize = 16;
 /// A scene of either kind.
 pub(crate) enum Loaded {
     Ply(Box<PlyRead>),
-    Lexi(Box<Model>),
+    /// A .lexi, and before it was decoded if it is a packed one.
+    Lexi(Box<Model>, Option<Box<Packed>>),
+}
+
+impl Loaded {
+    fn lexi(contents: Contents, name: &str) -> Result<Self> {
+        Ok(match contents {
+            Contents::Packed(packed) => {
+                Self::Lexi(Box::new(lexi::unpack(name, &packed)?), Some(Box::new(packed)))
+            }
+            contents => Self::Lexi(Box::new(contents.into_model(name)?), None),
+        })
+    }
 }
 
 /// A scene, its name and its size.
@@ -32,7 +46,7 @@ impl Input {
     pub(crate) fn scene(&self) -> Scene<'_> {
         match &self.loaded {
             Loaded::Ply(read) => Scene::from(&read.splats),
-            Loaded::Lexi(model) => Scene::from(&**model),
+            Loaded::Lexi(model, _) => Scene::from(&**model),
         }
     }
 
@@ -71,7 +85,7 @@ pub(crate) fn load(path: &Path, drop_invalid: bool) -> Result<Input> {
         let bytes = standard_input()?;
         let name = "standard input".to_owned();
         let loaded = if lexi::is_lexi(&bytes) {
-            Loaded::Lexi(Box::new(lexi::read_bytes(&name, &bytes, &limits)?))
+            Loaded::lexi(lexi::open_bytes(&name, &bytes, &limits)?, &name)?
         } else {
             Loaded::Ply(Box::new(ply::read_bytes(&name, &bytes, &options)?))
         };
@@ -84,7 +98,7 @@ pub(crate) fn load(path: &Path, drop_invalid: bool) -> Result<Input> {
     let bytes = file.metadata().map_err(io)?.len();
     file.take(PEEK as u64).read_to_end(&mut start).map_err(io)?;
     let loaded = if lexi::is_lexi(&start) {
-        Loaded::Lexi(Box::new(lexi::read(path, &limits)?))
+        Loaded::lexi(lexi::open(path, &limits)?, &name)?
     } else {
         Loaded::Ply(Box::new(ply::read(path, &options)?))
     };

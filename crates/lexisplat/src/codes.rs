@@ -269,6 +269,16 @@ impl SparseCodes {
         &self.values
     }
 
+    /// Bytes these codes take in memory: counts, offsets, indices, values, escapes.
+    #[must_use]
+    pub fn resident_bytes(&self) -> usize {
+        self.counts.len()
+            + size_of_val(self.checkpoints.as_slice())
+            + self.nonzeros() * (self.indices.width() + self.values.width())
+            + size_of_val(self.escapes.gaussians.as_slice())
+            + size_of_val(self.escapes.rows.as_slice())
+    }
+
     /// The Gaussians stored exactly.
     #[must_use]
     pub fn escapes(&self) -> &Escapes {

@@ -112,6 +112,14 @@ impl Model {
         self.dictionary.degree()
     }
 
+    /// Bytes that all SH take in memory while drawing: codes, base colours, dictionary. A dense degree-3
+    /// scene takes 192 a Gaussian.
+    #[must_use]
+    pub fn resident_sh_bytes(&self) -> usize {
+        let dictionary = self.dictionary.len() * self.dictionary.dim() * size_of::<f32>();
+        self.codes.resident_bytes() + size_of_val(self.geometry.dc.as_slice()) + dictionary
+    }
+
     /// Dense SH-rest of every Gaussian, channel-major: the values `decompress` writes.
     #[must_use]
     pub fn dense_rest(&self) -> Vec<f32> {

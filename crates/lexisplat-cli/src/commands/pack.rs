@@ -100,8 +100,8 @@ fn write(output: &Path, packed: &Packed) -> Result<u64> {
     Ok(bytes)
 }
 
-/// Bytes of each attribute, of tables and of the header; they sum to the file's size, up to rounding of
-/// streams to whole words.
+/// Bytes of each attribute, of tables, of the header, and of what is lost by rounding streams to whole
+/// words; they sum to the file's size.
 pub(crate) fn attribute_bytes(packed: &Packed, streams: &[StreamBits]) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
     for stream in streams {
@@ -110,9 +110,12 @@ pub(crate) fn attribute_bytes(packed: &Packed, streams: &[StreamBits]) -> Vec<(S
             None => out.push((stream.attribute.to_owned(), stream.bits / 8.0)),
         }
     }
+    let coded: f64 = out.iter().map(|a| a.1).sum();
     for (name, bytes) in lexi::packed_tensor_bytes(packed) {
-        if name != "packed.data" {
-            out.push((name, bytes as f64));
+        match name.strip_prefix("packed.") {
+            Some("data") => out.push(("rounding".to_owned(), bytes as f64 - coded)),
+            Some(name) => out.push((name.to_owned(), bytes as f64)),
+            None => out.push((name, bytes as f64)),
         }
     }
     out
@@ -140,7 +143,7 @@ impl Outcome<'_> {
     fn json(&self, warnings: &[String]) -> Result<Value> {
         let (packed, report, record) = (self.packed, self.report, &self.packed.record);
         let streams = packed.stream_bits()?;
-        let whole = |bytes: f64| bytes.round();
+        let whole = |bytes: f64| (bytes * 8.0).round() / 8.0;
         let attributes: serde_json::Map<String, Value> = attribute_bytes(packed, &streams)
             .into_iter()
             .map(|(name, bytes)| (name, json!(whole(bytes))))

@@ -11,9 +11,7 @@ mod tensors;
 mod write;
 
 pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
-pub use packed::{
-    packed_bytes, packed_tensor_bytes, read_packed, read_packed_bytes, write_packed, write_packed_to,
-};
-pub use read::{is_lexi, read, read_bytes};
+pub use packed::{packed_bytes, packed_tensor_bytes, write_packed, write_packed_to};
+pub use read::{Contents, is_lexi, open, open_bytes, read, read_bytes, unpack};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};
 pub use write::{attribute_bytes, file_bytes, sh_bytes, write, write_to};

@@ -10,9 +10,7 @@ use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, PACKED_VERSION, key, t
 use super::tensors::{Checked, Draft, Tensor, preamble};
 use super::write::{extra_tensors, put_record};
 use crate::error::{Error, Result};
-use crate::input::Input;
 use crate::limits::Limits;
-use crate::model::Layout;
 use crate::output::write_whole;
 use crate::packed::{CHUNK, Packed, Promise};
 
@@ -55,28 +53,6 @@ pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
         tensors(packed).iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
     out.push(("header".to_owned(), draft(packed).header_bytes()));
     out
-}
-
-/// Reads a packed .lexi file that is in memory, without decoding it. `None` if it is a .lexi file of
-/// another layout. `file` is its name in errors.
-///
-/// # Errors
-/// As [`super::read()`].
-pub fn read_packed_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Option<Packed>> {
-    let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
-    if record(&checked)?.layout != Layout::Packed {
-        return Ok(None);
-    }
-    from_checked(&checked, bytes.len() as u64, limits).map(Some)
-}
-
-/// Reads a packed .lexi file without decoding it. `None` if it is a .lexi file of another layout.
-///
-/// # Errors
-/// As [`super::read()`].
-pub fn read_packed(path: &Path, limits: &Limits) -> Result<Option<Packed>> {
-    let bytes = Input::open(path)?;
-    read_packed_bytes(&path.display().to_string(), &bytes, limits)
 }
 
 /// The packed scene of a file whose checksums hold.

@@ -13,6 +13,7 @@ use crate::error::{Error, FormatError, Result};
 use crate::input::Input;
 use crate::limits::{Limits, MAX_ATOMS};
 use crate::model::{Layout, Model, Record};
+use crate::packed::Packed;
 use crate::sh::ShDegree;
 use crate::splats::{Extra, ExtraValues, Geometry, SceneMeta};
 
@@ -37,11 +38,58 @@ pub fn is_lexi(bytes: &[u8]) -> bool {
 /// # Errors
 /// As [`read`].
 pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
+    open_bytes(file, bytes, limits)?.into_model(file)
+}
+
+/// What a .lexi file holds, before packed scenes are decoded.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum Contents {
+    /// A scene with its geometry as it was: layouts `f32`, `f16` and `paper`.
+    Model(Model),
+    /// A packed scene.
+    Packed(Packed),
+}
+
+impl Contents {
+    /// The scene, unpacked if need be. `file` is its name in errors.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if a packed scene's streams are not what an encoder writes.
+    pub fn into_model(self, file: &str) -> Result<Model> {
+        match self {
+            Self::Model(model) => Ok(model),
+            Self::Packed(packed) => unpack(file, &packed),
+        }
+    }
+}
+
+/// Decodes a packed scene. `file` is its name in errors.
+///
+/// # Errors
+/// [`Error::Format`] if its streams are not what an encoder writes.
+pub fn unpack(file: &str, packed: &Packed) -> Result<Model> {
+    packed.unpack().map_err(|e| Error::malformed(file, e.to_string()))
+}
+
+/// Reads a .lexi file; packed scenes stay packed.
+///
+/// # Errors
+/// As [`read`].
+pub fn open(path: &Path, limits: &Limits) -> Result<Contents> {
+    let bytes = Input::open(path)?;
+    open_bytes(&path.display().to_string(), &bytes, limits)
+}
+
+/// Reads a .lexi file that is in memory; packed scenes stay packed. `file` is its name in errors.
+///
+/// # Errors
+/// As [`read`].
+pub fn open_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents> {
     let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
     let record = record(&checked)?;
     if record.layout == Layout::Packed {
-        let packed = super::packed::from_checked(&checked, bytes.len() as u64, limits)?;
-        return packed.unpack().map_err(|e| checked.malformed(e.to_string()));
+        return Ok(Contents::Packed(super::packed::from_checked(&checked, bytes.len() as u64, limits)?));
     }
     let n = match checked.view(tensor::POSITION)?.shape() {
         [n, 3] => *n,
@@ -93,7 +141,7 @@ pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
         let text = format!("tensor '{name}' is not known for layout '{}' and degree {degree}", record.layout);
         return Err(checked.malformed(text));
     }
-    Ok(Model { geometry, meta: meta(&checked)?, dictionary, codes, record })
+    Ok(Contents::Model(Model { geometry, meta: meta(&checked)?, dictionary, codes, record }))
 }
 
 pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {

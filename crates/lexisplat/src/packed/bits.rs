@@ -4,8 +4,6 @@
 const DIRECT: u64 = 16;
 /// Bits of [`DIRECT`] minus one: the length of the last direct integers.
 const DIRECT_BITS: u32 = 4;
-/// Tokens there are: 16 direct ones and two for each length from 5 to 64 bits.
-pub(super) const TOKENS: usize = 16 + 2 * 60;
 
 /// `value` as a token and the number and value of its low bits.
 ///
@@ -132,6 +130,9 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+
+    /// Tokens there are: 16 direct ones and two for each length from 5 to 64 bits.
+    const TOKENS: usize = 16 + 2 * 60;
 
     proptest! {
         #[test]

@@ -41,10 +41,10 @@ impl Costs {
     pub(super) fn guess(atoms: usize, dim: usize) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let bits = |x: f64| x as f32;
-        let value = |k: usize| bits(1.0 + 2.0 * ((k + 1) as f64).log2() + 1.0);
+        let value = |k: usize| bits(1.0 + 2.0 * libm::log2((k + 1) as f64) + 1.0);
         let count = |n: usize| bits(0.5 + 0.8 * n as f64);
         Self {
-            atoms: vec![bits((atoms as f64).log2()); atoms],
+            atoms: vec![bits(libm::log2(atoms as f64)); atoms],
             values: (0..VALUE_COSTS).map(value).collect(),
             counts: vec![(0..=dim + 1).map(count).collect(); COUNT_CLASSES],
         }
@@ -55,7 +55,7 @@ impl Costs {
         let bits = |counts: &[f64]| -> Vec<f32> {
             let total: f64 = counts.iter().map(|c| c + SMOOTHING).sum();
             #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-            let cost = |c: &f64| -((c + SMOOTHING) / total).log2() as f32;
+            let cost = |c: &f64| -libm::log2((c + SMOOTHING) / total) as f32;
             counts.iter().map(cost).collect()
         };
         let mut values = bits(&usage.values);
@@ -73,7 +73,7 @@ impl Costs {
         let index = (size as usize).saturating_sub(1);
         match self.values.get(index) {
             Some(&bits) => bits,
-            None => self.values[VALUE_COSTS - 1] + 2.0 * (size / VALUE_COSTS as f32).log2(),
+            None => self.values[VALUE_COSTS - 1] + 2.0 * crate::maths::log2(size / VALUE_COSTS as f32),
         }
     }
 }
@@ -135,7 +135,6 @@ impl Codes {
 #[derive(Debug)]
 pub(super) struct Codebook {
     dim: usize,
-    atoms: usize,
     blocks: usize,
     /// Row by row the atoms.
     rows: Vec<f32>,
@@ -183,7 +182,7 @@ impl Codebook {
                 }
             }
         }
-        Self { dim, atoms, blocks, rows, transposed, gram, costs }
+        Self { dim, blocks, rows, transposed, gram, costs }
     }
 
     fn atom(&self, j: usize) -> &[f32] {

@@ -64,7 +64,7 @@ impl Histogram {
         for &count in self.counts.iter().filter(|&&c| c > 0) {
             // No probability is below one unit of precision.
             let share = (f64::from(count) / total).max(1.0 / f64::from(TOTAL));
-            bits -= f64::from(count) * share.log2();
+            bits -= f64::from(count) * libm::log2(share);
             used += 1;
         }
         let gaps = self.counts.len() - used;

@@ -1,6 +1,6 @@
 //! The packed form: every attribute quantised as far as pictures allow and entropy-coded.
 //!
-//! [`Packer`] takes a scene and its [`Sensitivity`] and makes [`Packed`] files of any quality;
+//! [`Packer`] takes a scene and its [`Sensitivity`](crate::Sensitivity) and makes [`Packed`] files of any quality;
 //! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
 //! the mathematics, docs/FORMAT.md the bytes.
 //!
@@ -15,6 +15,7 @@ mod morton;
 mod neighbours;
 mod pack;
 mod parameters;
+mod restore;
 mod stream;
 mod unpack;
 mod walk;

@@ -39,7 +39,7 @@ const TOLERANCE_SHARE: f32 = 0.995;
 const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 
 /// How to pack.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PackOptions {
     /// Promise: un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
@@ -51,12 +51,6 @@ pub struct PackOptions {
     pub keep_order: bool,
     /// Seed of the learning sample.
     pub seed: u64,
-}
-
-impl Default for PackOptions {
-    fn default() -> Self {
-        Self { tolerance: None, atoms: None, keep_order: false, seed: 0 }
-    }
 }
 
 /// What packing did.

@@ -109,12 +109,16 @@ struct Piece {
 }
 
 impl Packed {
-    /// The scene, its SH as sparse codes.
+    /// The scene, its SH as sparse codes; in the order of its source if that was kept.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the part that is not as it should be.
     pub fn unpack(&self) -> Result<Model> {
-        Ok(self.decode(false)?.0)
+        let model = self.decode(false)?.0;
+        match &self.order {
+            Some(order) => super::restore::restored(model, order),
+            None => Ok(model),
+        }
     }
 
     /// Bits each stream takes, tables and parameters apart.

@@ -1,0 +1,70 @@
+//! Unpacked Gaussians back in the order of their source.
+
+use crate::codes::{Escapes, Indices, SparseCodes, Values};
+use crate::error::Result;
+use crate::model::Model;
+use crate::splats::for_extra;
+
+/// `model` with Gaussian k moved to `order[k]`. `order` is a permutation.
+pub(super) fn restored(model: Model, order: &[u32]) -> Result<Model> {
+    let mut from = vec![0_usize; order.len()];
+    for (k, &source) in order.iter().enumerate() {
+        from[source as usize] = k;
+    }
+    let Model { mut geometry, meta, dictionary, codes, record } = model;
+    let g = &mut geometry;
+    gather(&mut g.positions, &from);
+    gather(&mut g.normals, &from);
+    gather(&mut g.dc, &from);
+    gather(&mut g.opacities, &from);
+    gather(&mut g.scales, &from);
+    gather(&mut g.rotations, &from);
+    for extra in &mut g.extras {
+        for_extra!(&mut extra.values, v => gather(v, &from));
+    }
+    let codes = reordered(&codes, &from, &dictionary)?;
+    Ok(Model { geometry, meta, dictionary, codes, record })
+}
+
+/// Entry k becomes what entry `from[k]` was; arrays that are left out stay so.
+fn gather<T: Copy>(values: &mut Vec<T>, from: &[usize]) {
+    if !values.is_empty() {
+        *values = from.iter().map(|&k| values[k]).collect();
+    }
+}
+
+fn reordered(
+    codes: &SparseCodes,
+    from: &[usize],
+    dictionary: &crate::dictionary::Dictionary,
+) -> Result<SparseCodes> {
+    let counts = codes.counts();
+    let mut starts = Vec::with_capacity(counts.len());
+    let mut start = 0;
+    for &count in counts {
+        starts.push(start);
+        start += usize::from(count);
+    }
+    let spans = || from.iter().map(|&k| starts[k]..starts[k] + usize::from(counts[k]));
+    let indices = match codes.indices() {
+        Indices::U8(v) => Indices::U8(spans().flat_map(|span| &v[span]).copied().collect()),
+        Indices::U16(v) => Indices::U16(spans().flat_map(|span| &v[span]).copied().collect()),
+    };
+    let values = match codes.values() {
+        Values::F16(v) => Values::F16(spans().flat_map(|span| &v[span]).copied().collect()),
+        Values::F32(v) => Values::F32(spans().flat_map(|span| &v[span]).copied().collect()),
+    };
+    let mut escapes = Escapes::default();
+    let old = codes.escapes();
+    if !old.gaussians.is_empty() {
+        let dim = dictionary.dim();
+        for (to, &k) in (0_u32..).zip(from) {
+            if let Ok(at) = old.gaussians.binary_search_by(|&g| (g as usize).cmp(&k)) {
+                escapes.gaussians.push(to);
+                escapes.rows.extend_from_slice(&old.rows[at * dim..(at + 1) * dim]);
+            }
+        }
+    }
+    let counts = from.iter().map(|&k| counts[k]).collect();
+    SparseCodes::new(dictionary, counts, indices, values, escapes)
+}
