@@ -7,15 +7,23 @@ use lexisplat_render::{Camera, Image, RenderOptions, Scene, Split, render, sensi
 use crate::error::{Error, Result};
 use crate::metrics::psnr;
 
-/// Views generated for a scene without cameras.
-const GENERATED_VIEWS: usize = 120;
+/// Views generated for a scene without cameras, to see what shows.
+const GENERATED_VIEWS: usize = 96;
 /// Their size in pixels.
-const GENERATED_SIZE: (u32, u32) = (384, 256);
+const GENERATED_SIZE: [u32; 2] = [384, 256];
+/// Their distances, in radii of the scene's detail.
+const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
+/// Views generated to judge from. Most are less demanding than photographs, which are taken of what has
+/// detail; so the share of them with the most detail judges (docs/METHOD.md has the measurements).
+const CANDIDATES: usize = 72;
+const JUDGES: usize = 18;
+/// Their distances: photographers stand 2 to 6 radii away in the scenes measured.
+const JUDGE_DISTANCES: [f64; 2] = [2.0, 6.0];
 /// Widest picture of given cameras; sharper ones say the same about what shows.
 const MAX_WIDTH: u32 = 480;
 /// Of given cameras at most so many are used, evenly spread.
 const MAX_VIEWS: usize = 150;
-/// One view in so many judges; the others say what shows. Judging by the same views would flatter.
+/// One given camera in so many judges; the others say what shows. Judging by the same views would flatter.
 const JUDGE_SHARE: usize = 5;
 /// Say of the guess that knows no views in [`Sensitivity::blended`]: measured on held-out views
 /// (docs/METHOD.md).
@@ -43,6 +51,7 @@ const STEPS: [f64; 2] = [1e-9, 1e-2];
 #[derive(Debug, Clone)]
 pub struct Views {
     measure: Vec<Camera>,
+    /// Those that judge, or from among which the judging ones are chosen.
     judge: Vec<Camera>,
     given: bool,
 }
@@ -51,8 +60,12 @@ impl Views {
     /// Views from all around.
     #[must_use]
     pub fn generated(splats: &Splats) -> Self {
-        let (width, height) = GENERATED_SIZE;
-        Self::split(surround(&splats.geometry, GENERATED_VIEWS, width, height), false)
+        let around = |count, distances| surround(&splats.geometry, count, GENERATED_SIZE, distances);
+        Self {
+            measure: around(GENERATED_VIEWS, GENERATED_DISTANCES),
+            judge: around(CANDIDATES, JUDGE_DISTANCES),
+            given: false,
+        }
     }
 
     /// The given cameras; those marked as training ones where there are marks.
@@ -67,17 +80,12 @@ impl Views {
             return Err(Error::parameter("cameras", used.len(), "at least two to search with"));
         }
         let stride = used.len().div_ceil(MAX_VIEWS);
-        let chosen = used.into_iter().step_by(stride).map(|c| c.with_max_width(MAX_WIDTH));
-        Ok(Self::split(chosen.collect(), true))
-    }
-
-    fn split(cameras: Vec<Camera>, given: bool) -> Self {
-        let mut views = Self { measure: Vec::new(), judge: Vec::new(), given };
-        for (i, camera) in cameras.into_iter().enumerate() {
+        let mut views = Self { measure: Vec::new(), judge: Vec::new(), given: true };
+        for (i, camera) in used.into_iter().step_by(stride).enumerate() {
             let side = if i % JUDGE_SHARE == 1 { &mut views.judge } else { &mut views.measure };
-            side.push(camera);
+            side.push(camera.with_max_width(MAX_WIDTH));
         }
-        views
+        Ok(views)
     }
 
     /// Number of views that say what shows.
@@ -101,11 +109,11 @@ impl Views {
     }
 }
 
-/// The original's pictures from the judging views.
+/// The judging views and the original's pictures from them.
 #[derive(Debug)]
 pub struct Judge<'a> {
-    views: &'a Views,
-    pictures: Vec<Image>,
+    views: Vec<(&'a Camera, Image)>,
+    given: bool,
 }
 
 impl<'a> Judge<'a> {
@@ -113,8 +121,13 @@ impl<'a> Judge<'a> {
     #[must_use]
     pub fn new(splats: &Splats, views: &'a Views) -> Self {
         let scene = Scene::from(splats);
-        let draw = |camera| render(&scene, camera, &RenderOptions::default());
-        Self { views, pictures: views.judge.iter().map(draw).collect() }
+        let draw = |camera| (camera, render(&scene, camera, &RenderOptions::default()));
+        let mut drawn: Vec<(&Camera, Image)> = views.judge.iter().map(draw).collect();
+        if !views.given {
+            drawn.sort_by_cached_key(|(_, picture)| std::cmp::Reverse(detail(picture).to_bits()));
+            drawn.truncate(JUDGES);
+        }
+        Self { views: drawn, given: views.given }
     }
 
     /// Mean and least PSNR of `model` against the original.
@@ -124,14 +137,34 @@ impl<'a> Judge<'a> {
     pub fn score(&self, model: &Model) -> Result<[f64; 2]> {
         let scene = Scene::from(model);
         let (mut sum, mut least) = (0.0, IDENTICAL);
-        for (camera, original) in self.views.judge.iter().zip(&self.pictures) {
+        for (camera, original) in &self.views {
             let picture = render(&scene, camera, &RenderOptions::default());
             let decibels = psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL);
             sum += decibels;
             least = f64::min(least, decibels);
         }
-        Ok([sum / self.pictures.len().max(1) as f64, least])
+        Ok([sum / self.views.len().max(1) as f64, least])
     }
+}
+
+/// Mean squared difference of neighbouring pixels; never negative.
+fn detail(picture: &Image) -> f64 {
+    let width = picture.width as usize;
+    let mut sum = 0.0;
+    let mut add = |a: &[f32; 3], b: &[f32; 3]| {
+        for (a, b) in a.iter().zip(b) {
+            sum += f64::from(a - b).powi(2);
+        }
+    };
+    for row in picture.pixels.chunks_exact(width.max(1)) {
+        for pair in row.windows(2) {
+            add(&pair[0], &pair[1]);
+        }
+    }
+    for (above, below) in picture.pixels.iter().zip(picture.pixels.iter().skip(width)) {
+        add(above, below);
+    }
+    sum / picture.pixels.len().max(1) as f64
 }
 
 /// What to pack to.
@@ -239,9 +272,8 @@ pub fn pack_to(
     if reached[0].is_nan() {
         reached = judge.score(&packed.unpack()?)?;
     }
-    let views = u32::try_from(judge.pictures.len()).unwrap_or(u32::MAX);
-    packed.promise =
-        Some(Promise::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.views.given));
+    let views = u32::try_from(judge.views.len()).unwrap_or(u32::MAX);
+    packed.promise = Some(Promise::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.given));
     Ok((packed, report))
 }
 

@@ -6,9 +6,6 @@ use lexisplat::Geometry;
 use crate::camera::Camera;
 use crate::orbit::quantiles;
 
-/// Nearest and farthest view, in radii of the scene's detail. Photographers stand 3 to 6 such radii away
-/// in the scenes measured (docs/METHOD.md).
-const DISTANCES: [f64; 2] = [2.0, 12.0];
 /// Share of the detail, at either end of each axis, that does not count for its radius.
 const TRIM: f64 = 0.2;
 /// Angle between neighbouring points of a Fibonacci spiral: the golden angle.
@@ -24,14 +21,15 @@ const MIN_RADIUS: f64 = 1e-3;
 /// A direction this much along the world's y needs another up.
 const STEEP: f64 = 0.9;
 
-/// `count` cameras on all sides of the scene's detail, near and far, looking at points of it; the same
-/// for the same input. Named `surround_000` and so on.
+/// `count` cameras on all sides of the scene's detail, at `distances` (nearest and farthest, in radii of
+/// that detail), looking at points of it; the same for the same input. Named `surround_000` and so on.
 ///
 /// Detail is where small opaque Gaussians are: that is where training cameras looked. Some of the views
 /// are from where no photographer stood, behind walls or below the floor; that is the price of not
 /// knowing.
 #[must_use]
-pub fn surround(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f64; 2]) -> Vec<Camera> {
+    let [width, height] = size;
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
     let (centre, half) = detail(geometry);
     let radius = half.length().max(MIN_RADIUS);
@@ -44,7 +42,7 @@ pub fn surround(geometry: &Geometry, count: usize, width: u32, height: u32) -> V
             let around = (1.0 - y * y).max(0.0).sqrt();
             let turn = f64::from(i) * GOLDEN_ANGLE;
             let out = DVec3::new(around * turn.cos(), y, around * turn.sin());
-            let [near, far] = DISTANCES.map(f64::ln);
+            let [near, far] = distances.map(f64::ln);
             let position = centre + out * radius * (near + spread(0) * (far - near)).exp();
             let offset = DVec3::new(spread(1), spread(2), spread(3)) * 2.0 - DVec3::ONE;
             let target = centre + offset * half.max_element();
@@ -108,7 +106,7 @@ mod tests {
             g.scales.push([scale; 3]);
             g.opacities.push(1.0);
         }
-        let cameras = surround(&g, 40, 96, 64);
+        let cameras = surround(&g, 40, [96, 64], [2.0, 12.0]);
         assert_eq!(cameras.len(), 40);
         let mut sum = DVec3::ZERO;
         for camera in &cameras {
@@ -120,9 +118,9 @@ mod tests {
                 (DVec3::from_array(camera.position.map(f64::from)) - DVec3::new(5.0, -2.0, 7.0)) / distance;
         }
         assert!(sum.length() < 6.0, "on all sides: {sum}");
-        assert_eq!(cameras, surround(&g, 40, 96, 64));
-        assert!(surround(&g, 0, 10, 10).is_empty());
-        for camera in surround(&Geometry::default(), 3, 10, 10) {
+        assert_eq!(cameras, surround(&g, 40, [96, 64], [2.0, 12.0]));
+        assert!(surround(&g, 0, [10, 10], [2.0, 12.0]).is_empty());
+        for camera in surround(&Geometry::default(), 3, [10, 10], [2.0, 12.0]) {
             camera.validate().unwrap();
         }
     }

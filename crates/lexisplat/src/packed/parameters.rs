@@ -103,7 +103,8 @@ impl Parameters {
     }
 
     fn step(&self, kind: usize, class: u8) -> f32 {
-        self.base[kind] * exp2(f32::from(class))
+        // 2 to the power of the class, which is at most 15.
+        self.base[kind] * f32::from_bits((127 + u32::from(class)) << 23)
     }
 
     /// Step of the base colour's three coordinates.

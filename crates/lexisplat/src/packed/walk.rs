@@ -10,7 +10,7 @@ use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use super::stream::{Stream, Symbols};
 use crate::maths::{
-    Vec3, atan2, axis_of_square, cross, dot, frame, log2, logit_of_log, quaternion, sin_cos, square_of_axis,
+    Vec3, atan2, axis_of_square, cross, dot, frame, logit_of_log, quaternion, sin_cos, square_of_axis,
 };
 
 /// Share of a step by which a difference must exceed the middle between two values to be rounded away
@@ -26,6 +26,10 @@ const MAX_AXIS_BITS: u32 = 15;
 const SQUARE_ANGLE: f32 = 1.25;
 /// Sort of a turn: it repeats after half a circle.
 const HALF_TURN: f32 = std::f32::consts::PI;
+/// Widths of a cell, in steps of a position, that are told apart as contexts: 24 half octaves. The first
+/// is that of 2^-2.25 and less.
+const MIN_FINENESS: f32 = 0.210_224_1;
+const MAX_FINENESS: f32 = MIN_FINENESS * 4000.0;
 /// Gaps with at least this many bits share a context.
 const GAP_CONTEXTS: u32 = 23;
 /// Averages that are not predicted: the classes and the number of nonzeros.
@@ -279,10 +283,14 @@ fn level(x: f32) -> usize {
     (x + 0.5).floor().clamp(0.0, f32::from(LAST_CLASS)) as usize
 }
 
-/// How many half octaves of steps a cell is wide, as a context.
-#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+/// How many half octaves of steps a cell is wide, from a quarter of a step on, as a context.
 fn fineness(steps: f32) -> usize {
-    (2.0 * log2(steps.max(1e-3)) + 4.0).round().clamp(0.0, 23.0) as usize
+    // The exponent, and whether the rest is beyond half an octave: a logarithm would take longer.
+    let scaled = steps.clamp(MIN_FINENESS, MAX_FINENESS) / MIN_FINENESS;
+    let bits = scaled.to_bits();
+    let octaves = (bits >> 23) - 127;
+    let half = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000) >= std::f32::consts::SQRT_2;
+    (2 * octaves + u32::from(half)) as usize
 }
 
 /// `value` as `prediction` plus whole steps; returns what the decoder makes of it.
