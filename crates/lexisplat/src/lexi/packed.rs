@@ -14,9 +14,9 @@ use crate::limits::Limits;
 use crate::output::write_whole;
 use crate::packed::{CHUNK, Packed, Promise};
 
-/// Gaussians a byte of a packed file may stand for at most: fewer would cost more than an eighth of a bit
-/// each, which no real scene reaches, and a lying header is refused before anything is allocated.
-const GAUSSIANS_PER_BYTE: u64 = 64;
+/// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
+/// header is refused before anything is allocated.
+const GAUSSIANS_PER_BYTE: u64 = 3;
 
 /// Writes `packed` to `path`, whole or not at all. Returns the file's size in bytes.
 ///
