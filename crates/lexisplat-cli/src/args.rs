@@ -74,6 +74,10 @@ pub(crate) struct Compress {
     /// Keep each Gaussian's index in the source, for 4 bytes each: packed files are in another order.
     #[arg(long)]
     pub(crate) keep_order: bool,
+    /// Leave out Gaussians without which, all together, no pixel of any view changes by more than this many
+    /// of 255 levels; 1 if no number is given. How many is reported.
+    #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, conflicts_with = "keep_order")]
+    pub(crate) prune: Option<f32>,
     /// Promise: no Gaussian's SH vector is off by more (L2 norm, not squared). Without --layout everything
     /// else is then kept exactly (layout f16); with --layout packed it is quantised all the same.
     #[arg(long, value_name = "T")]
@@ -123,7 +127,7 @@ impl Compress {
     }
 
     /// Options that only packed files have, as given.
-    fn packed_only(&self) -> [(&'static str, bool); 7] {
+    fn packed_only(&self) -> [(&'static str, bool); 8] {
         [
             ("--preset", self.preset.is_some()),
             ("--psnr", self.psnr.is_some()),
@@ -132,6 +136,7 @@ impl Compress {
             ("--ratio", self.ratio.is_some()),
             ("--cameras", self.cameras.is_some()),
             ("--keep-order", self.keep_order),
+            ("--prune", self.prune.is_some()),
         ]
     }
 

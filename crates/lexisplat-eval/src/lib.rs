@@ -33,11 +33,13 @@ mod compare;
 mod error;
 pub mod metrics;
 pub mod montage;
+mod prune;
 pub mod report;
 mod target;
 mod views;
 
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
 pub use error::{Error, Result};
+pub use prune::{Pruned, prune};
 pub use target::{Goal, Judge, Views, pack_to};
 pub use views::{DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, choose_views};

@@ -100,6 +100,23 @@ impl Views {
         self.measure.is_empty()
     }
 
+    /// Whether they were given, not generated.
+    #[must_use]
+    pub fn are_given(&self) -> bool {
+        self.given
+    }
+
+    /// The views that say what shows.
+    #[must_use]
+    pub fn measuring(&self) -> &[Camera] {
+        &self.measure
+    }
+
+    /// All of them.
+    pub fn all(&self) -> impl Iterator<Item = &Camera> {
+        self.measure.iter().chain(&self.judge)
+    }
+
     /// How much the views' pictures depend on each value of each Gaussian, tempered by a guess for views
     /// that are not among them.
     #[must_use]

@@ -19,6 +19,9 @@ pub struct Sensitivity {
     pub scale: Vec<[f32; 3]>,
     /// By a rotation about each of the Gaussian's own axes, in radians.
     pub rotation: Vec<[f32; 3]>,
+    /// Largest change of any colour value of any picture when the Gaussian is left out; infinite where
+    /// that is not known.
+    pub removal: Vec<f32>,
 }
 
 /// Share of a picture's squared colour that a change of opacity shows as, beside one of colour: what
@@ -42,6 +45,7 @@ impl Sensitivity {
             position: vec![[0.0; 6]; count],
             scale: vec![[0.0; 3]; count],
             rotation: vec![[0.0; 3]; count],
+            removal: vec![0.0; count],
         }
     }
 
@@ -57,12 +61,31 @@ impl Sensitivity {
         self.colour.is_empty()
     }
 
+    /// Keeps what `keep`, one entry a Gaussian, says.
+    ///
+    /// # Panics
+    /// If `keep` differs in length.
+    pub fn retain(&mut self, keep: &[bool]) {
+        assert_eq!(self.len(), keep.len(), "one entry a Gaussian");
+        fn filter<T>(values: &mut Vec<T>, keep: &[bool]) {
+            let mut keep = keep.iter();
+            values.retain(|_| keep.next() == Some(&true));
+        }
+        filter(&mut self.colour, keep);
+        filter(&mut self.opacity, keep);
+        filter(&mut self.position, keep);
+        filter(&mut self.scale, keep);
+        filter(&mut self.rotation, keep);
+        filter(&mut self.removal, keep);
+    }
+
     /// An estimate from the Gaussians alone: what is opaque and large shows. Knows nothing of what hides
     /// what, so files made with it are larger for the same quality than with a measured one.
     #[must_use]
     pub fn guess(geometry: &Geometry) -> Self {
         let n = geometry.len();
         let mut out = Self::zeros(n);
+        out.removal.fill(f32::INFINITY);
         let mut total = 0.0_f64;
         for i in 0..n {
             let mut sorted = geometry.scales[i];

@@ -8,7 +8,7 @@ use anyhow::{Context, Result};
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::PlyRead;
 use lexisplat::{Error, Progress, Splats, lexi};
-use lexisplat_eval::{Goal, Judge, Views, pack_to};
+use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune};
 use lexisplat_render::read_cameras;
 use serde_json::{Value, json};
 
@@ -17,6 +17,9 @@ use crate::args::{Common, Compress, Preset};
 use crate::files::{is_pipe, print, print_json};
 use crate::progress::Bars;
 use crate::text;
+
+/// Levels of an 8-bit channel above 0.
+const LEVELS: f32 = 255.0;
 
 /// Packs `read` and writes it to `output`. `start` is when the command began.
 pub(crate) fn run(
@@ -27,7 +30,7 @@ pub(crate) fn run(
     start: Instant,
 ) -> Result<()> {
     let read_seconds = start.elapsed().as_secs_f64();
-    let splats = read.splats;
+    let mut splats = read.splats;
     let mut options = PackOptions::default();
     options.tolerance = args.tol;
     options.atoms = args.atoms;
@@ -42,8 +45,15 @@ pub(crate) fn run(
         None => Views::generated(&splats),
     };
     bars.start("looking", "views", views.len() as u64);
-    let sensitivity = views.sensitivity(&splats, &mut || bars.advance(1));
+    let mut sensitivity = views.sensitivity(&splats, &mut || bars.advance(1));
     bars.end();
+    let pruned = match args.prune {
+        Some(levels) if !levels.is_finite() || levels <= 0.0 => {
+            return Err(Error::parameter("prune", levels, "a finite number above 0").into());
+        }
+        Some(levels) => Some(prune(&mut splats, &mut sensitivity, &views, levels / LEVELS)),
+        None => None,
+    };
     let look_seconds = clock.elapsed().as_secs_f64();
 
     let clock = Instant::now();
@@ -63,6 +73,7 @@ pub(crate) fn run(
         splats: &splats,
         packed: &packed,
         report: &report,
+        pruned,
         ply_bytes: read.source.file_bytes,
         file_bytes,
         seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
@@ -133,6 +144,7 @@ struct Outcome<'a> {
     splats: &'a Splats,
     packed: &'a Packed,
     report: &'a PackReport,
+    pruned: Option<Pruned>,
     ply_bytes: u64,
     file_bytes: u64,
     /// Reading, looking, packing, writing, everything.
@@ -171,6 +183,11 @@ impl Outcome<'_> {
             "dense_sh_bytes": packed.gaussians * dim * 4,
             "attribute_bytes": attributes,
             "promise": packed.promise,
+            "pruned": self.pruned.map(|p| json!({
+                "gaussians": p.removed,
+                "largest_change": p.largest_change,
+                "views": p.views,
+            })),
             "read_seconds": self.seconds[0],
             "look_seconds": self.seconds[1],
             "learn_seconds": report.learn_seconds,
@@ -202,6 +219,17 @@ impl Outcome<'_> {
                 self.file_bytes as f64 / packed.gaussians.max(1) as f64
             ),
         )?;
+        if let Some(p) = self.pruned {
+            line(
+                "pruned",
+                format!(
+                    "{} Gaussians; no pixel of {} views changes by more than {:.2} of 255 levels for it",
+                    text::count(p.removed as u64),
+                    p.views,
+                    p.largest_change * LEVELS
+                ),
+            )?;
+        }
         if let Some(p) = &packed.promise {
             line("pictures", promise_line(p))?;
         }

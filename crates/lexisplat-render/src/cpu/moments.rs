@@ -9,7 +9,7 @@ use super::project::Splat;
 type Lanes = [f32; TILE];
 
 /// Number of sums a splat has.
-pub(super) const MOMENTS: usize = 10;
+const SUMS: usize = 10;
 
 /// Sums over pixels, for one splat. With alpha its opacity at a pixel, T what was open before it, C the
 /// pixel's colour and v = conic * (centre - pixel):
@@ -18,7 +18,23 @@ pub(super) const MOMENTS: usize = 10;
 /// - `[1]`: g = |dC / d ln alpha|^2;
 /// - `[2..5]`: g vx^2, g vx vy, g vy^2: those by the centre, since d ln alpha / d centre = -v;
 /// - `[5..10]`: g vx^4, g vx^3 vy, g vx^2 vy^2, g vx vy^3, g vy^4: those by the shape.
-pub(super) type Moments = [f32; MOMENTS];
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Moments {
+    pub(super) sums: [f32; SUMS],
+    /// Largest change of any channel of any pixel when the splat is left out: dC / d ln alpha happens to
+    /// be just that, since what it adds goes and what it covers comes back.
+    pub(super) removal: f32,
+}
+
+impl Moments {
+    /// Adds those of other pixels.
+    pub(super) fn add(&mut self, other: &Self) {
+        for (sum, value) in self.sums.iter_mut().zip(other.sums) {
+            *sum += value;
+        }
+        self.removal = self.removal.max(other.removal);
+    }
+}
 
 /// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
 pub(super) fn tile(
@@ -61,17 +77,20 @@ fn walk(
         let splat = &splats[index as usize];
         let first = (splat.rows[0] as usize).saturating_sub(top);
         let end = (splat.rows[1] as usize).saturating_sub(top).min(TILE);
-        let mut sums = [[0.0_f32; TILE]; MOMENTS];
+        let mut sums = [[0.0_f32; TILE]; SUMS];
+        let mut removal = [0.0_f32; TILE];
         let mut seen = false;
         for y in first..end {
             if row_open[y] {
-                let drawn = add(&mut rows[y], splat, &x, (top + y) as f32, &picture.0[y], &mut sums);
+                let drawn =
+                    add(&mut rows[y], splat, &x, (top + y) as f32, &picture.0[y], &mut sums, &mut removal);
                 seen |= drawn;
                 row_open[y] = !drawn || rows[y].open.iter().any(|&o| o > 0.0);
             }
         }
         if seen {
-            out.push((index, sums.map(|lanes| lanes.iter().sum())));
+            let sums = sums.map(|lanes| lanes.iter().sum());
+            out.push((index, Moments { sums, removal: removal.into_iter().fold(0.0, f32::max) }));
         }
     }
     out
@@ -86,7 +105,8 @@ fn add(
     x: &Lanes,
     y: f32,
     picture: &[Lanes; 3],
-    sums: &mut [Lanes; MOMENTS],
+    sums: &mut [Lanes; SUMS],
+    removal: &mut Lanes,
 ) -> bool {
     let [a, b, c] = splat.conic;
     let dy = splat.centre[1] - y;
@@ -114,13 +134,16 @@ fn add(
         // alpha / (1 - alpha): what of the light behind one more unit of ln alpha takes away.
         let taken = if weight > 0.0 { alpha / (1.0 - alpha) } else { 0.0 };
         let mut g = 0.0;
+        let mut largest = removal[lane];
         for channel in 0..3 {
             let own = weight * splat.colour[channel];
             row.colour[channel][lane] += own;
             let behind = picture[channel][lane] - row.colour[channel][lane];
             let change = own - behind * taken;
             g += change * change;
+            largest = if change.abs() > largest { change.abs() } else { largest };
         }
+        removal[lane] = largest;
         let dx = splat.centre[0] - x[lane];
         let (vx, vy) = (a * dx + b * dy, b * dx + c * dy);
         let (xx, xy, yy) = (vx * vx, vx * vy, vy * vy);

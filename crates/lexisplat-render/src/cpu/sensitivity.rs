@@ -7,7 +7,7 @@ use crate::camera::Camera;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::moments::{self, MOMENTS, Moments};
+use super::moments::{self, Moments};
 use super::project::{self, Projection};
 use super::{blend, order, tiles};
 
@@ -36,7 +36,7 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     let (splats, rects) = order::by_depth(visible);
     let grid = projection.grid;
     let size = [camera.width as usize, camera.height as usize];
-    let mut sums = vec![[0.0_f32; MOMENTS]; splats.len()];
+    let mut sums = vec![Moments::default(); splats.len()];
     for band in tiles::bands(&rects, grid, tiles::MAX_ENTRIES) {
         let lists = tiles::TileLists::new(&rects, grid, band.clone());
         // Tile rows are summed in order, so that results do not depend on the number of threads.
@@ -50,9 +50,7 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
                 })
                 .collect();
             for (splat, part) in parts.into_iter().flatten() {
-                for (sum, value) in sums[splat as usize].iter_mut().zip(part) {
-                    *sum += value;
-                }
+                sums[splat as usize].add(&part);
             }
         }
     }
@@ -62,10 +60,12 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     let changes: Vec<Change> = gaussians
         .par_iter()
         .zip(&sums)
-        .map(|(&i, m)| Change::of(&projection, geometry, i as usize, m))
+        .map(|(&i, m)| Change::of(&projection, geometry, i as usize, &m.sums))
         .collect();
     for ((&i, change), m) in gaussians.iter().zip(changes).zip(&sums) {
         let i = i as usize;
+        total.removal[i] = total.removal[i].max(m.removal);
+        let m = m.sums;
         if m[0] <= 0.0 || !change.is_finite() {
             continue;
         }
@@ -94,7 +94,7 @@ struct Change {
 
 impl Change {
     /// Carries the moments on screen over to the world.
-    fn of(projection: &Projection, geometry: &Geometry, i: usize, m: &Moments) -> Self {
+    fn of(projection: &Projection, geometry: &Geometry, i: usize, m: &[f32; 10]) -> Self {
         let (by_position, axes) = projection.derivatives(geometry, i);
         let [xx, xy, yy] = [m[2], m[3], m[4]];
         let mut position = [0.0; 6];
