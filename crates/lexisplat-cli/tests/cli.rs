@@ -1,68 +1,12 @@
 //! The program as a user runs it.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::path::{Path, PathBuf};
+mod folder;
 
-use assert_cmd::Command;
-use lexisplat::ply::{self, ReadOptions};
+use folder::{Folder, GAUSSIANS, lexisplat, read};
+use lexisplat::ply;
 use lexisplat::sample::{SampleOptions, scene};
 use serde_json::Value;
-
-/// Gaussians of the test scene: enough to learn from, quick to draw.
-const GAUSSIANS: usize = 1500;
-
-fn lexisplat() -> Command {
-    Command::cargo_bin("lexisplat").unwrap()
-}
-
-/// A folder with a scene in it.
-struct Folder(tempfile::TempDir);
-
-impl Folder {
-    fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        ply::write(&folder.path("scene.ply"), &scene(&SampleOptions::new(GAUSSIANS, 0))).unwrap();
-        folder
-    }
-
-    fn path(&self, name: &str) -> PathBuf {
-        self.0.path().join(name)
-    }
-
-    /// Runs in the folder; asserts success; standard output.
-    fn run(&self, arguments: &[&str]) -> String {
-        let output = lexisplat().current_dir(self.0.path()).args(arguments).output().unwrap();
-        let error = String::from_utf8(output.stderr).unwrap();
-        assert!(output.status.success(), "{arguments:?}: {error}");
-        String::from_utf8(output.stdout).unwrap()
-    }
-
-    fn json(&self, arguments: &[&str]) -> Value {
-        let mut all = arguments.to_vec();
-        all.push("--json");
-        serde_json::from_str(&self.run(&all)).unwrap()
-    }
-
-    /// Runs in the folder; asserts the exit code; standard error.
-    fn fail(&self, arguments: &[&str], code: i32) -> String {
-        let output = lexisplat().current_dir(self.0.path()).args(arguments).output().unwrap();
-        let error = String::from_utf8(output.stderr).unwrap();
-        assert_eq!(output.status.code(), Some(code), "{arguments:?}: {error}");
-        assert!(!error.contains("panicked"), "{error}");
-        error
-    }
-
-    fn names(&self) -> Vec<String> {
-        let entries = std::fs::read_dir(self.0.path()).unwrap();
-        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
-        names.sort();
-        names
-    }
-}
-
-fn read(path: &Path) -> lexisplat::Splats {
-    ply::read(path, &ReadOptions::default()).unwrap().splats
-}
 
 #[test]
 fn a_scene_goes_in_and_comes_back_within_the_promise() {

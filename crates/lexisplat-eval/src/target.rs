@@ -35,11 +35,10 @@ const CLOSE_DB: f64 = 0.1;
 const CLOSE_SIZE: f64 = 0.01;
 /// Packings tried at most.
 const MAX_TRIES: usize = 9;
-/// First guess: a step that gives this many decibels, and what halving it adds.
-const FIRST_STEP: f64 = 8e-6;
+/// First guess of by how many decibels pictures gain when the step is halved.
+const DB_PER_HALVING: f64 = 4.5;
+/// First guess of bytes a Gaussian at [`FIRST_DB`], and by how much halving the step multiplies them.
 const FIRST_DB: f64 = 40.0;
-const DB_PER_HALVING: f64 = 4.2;
-/// First guess of bytes a Gaussian at [`FIRST_STEP`], and by how much halving the step multiplies them.
 const FIRST_BYTES: f64 = 8.0;
 const BYTES_PER_HALVING: f64 = 1.4;
 /// Largest change of the step's binary logarithm from one try to the next.
@@ -218,7 +217,7 @@ impl Goal {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Try {
     log_step: f64,
-    /// Decibels, or minus the binary logarithm of the bytes: what grows as the step falls.
+    /// Decibels, which fall as the step grows; or minus the binary logarithm of the bytes, which grows.
     value: f64,
 }
 
@@ -238,14 +237,13 @@ pub fn pack_to(
         return Err(Error::parameter(goal.name(), goal.asked(), "a finite number above 0"));
     }
     let close = if size { -(1.0 - CLOSE_SIZE).log2() } else { CLOSE_DB };
-    let mut slope = if size { -BYTES_PER_HALVING.log2() } else { -DB_PER_HALVING };
-    let mut log_step = FIRST_STEP.log2();
-    log_step += if size {
+    let mut slope = if size { BYTES_PER_HALVING.log2() } else { -DB_PER_HALVING };
+    let mut log_step = if size {
         #[expect(clippy::cast_precision_loss, reason = "a count of Gaussians")]
         let first = -(FIRST_BYTES * packer.len().max(1) as f64).log2();
-        (wanted - first) / slope
+        packer.step_for(FIRST_DB).log2() + (wanted - first) / slope
     } else {
-        (wanted - FIRST_DB) / slope
+        packer.step_for(wanted).log2()
     };
     let mut tries: Vec<Try> = Vec::new();
     let mut best: Option<(f64, Packed, PackReport, [f64; 2])> = None;
@@ -318,7 +316,7 @@ fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
                 && (p.log_step - q.log_step).abs() > 1e-3
             {
                 let measured = (q.value - p.value) / (q.log_step - p.log_step);
-                *slope = measured.clamp(3.0 * *slope, *slope / 3.0);
+                *slope = slope.signum() * (measured / *slope).clamp(1.0 / 3.0, 3.0) * slope.abs();
             }
             let from = one.or(other)?;
             from.log_step + ((wanted - from.value) / *slope).clamp(-MAX_MOVE, MAX_MOVE)
@@ -331,19 +329,32 @@ fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
 mod tests {
     use super::*;
 
+    /// The nearest value to `wanted` the search finds on `curve`.
+    fn nearest(curve: impl Fn(f64) -> f64, wanted: f64, mut slope: f64) -> f64 {
+        let mut tries = vec![Try { log_step: -17.0, value: curve(-17.0) }];
+        while tries.len() < MAX_TRIES {
+            let Some(next) = next_step(&tries, wanted, &mut slope) else { break };
+            tries.push(Try { log_step: next, value: curve(next) });
+        }
+        tries.iter().map(|t| (t.value - wanted).abs()).fold(f64::INFINITY, f64::min)
+    }
+
     #[test]
-    fn the_search_closes_in_on_a_curve() {
-        // Decibels as a curve of the step's logarithm, steeper on one side.
+    fn the_search_closes_in_on_decibels() {
+        // As a curve of the step's logarithm, steeper on one side.
         let curve = |x: f64| 40.0 - 4.0 * (x + 17.0) - 0.2 * (x + 17.0).powi(2) * (x + 17.0).signum();
         for wanted in [25.0, 40.0, 47.3, 60.0] {
-            let mut slope = -DB_PER_HALVING;
-            let mut tries = vec![Try { log_step: -17.0, value: curve(-17.0) }];
-            while tries.len() < MAX_TRIES {
-                let Some(next) = next_step(&tries, wanted, &mut slope) else { break };
-                tries.push(Try { log_step: next, value: curve(next) });
-            }
-            let nearest = tries.iter().map(|t| (t.value - wanted).abs()).fold(f64::INFINITY, f64::min);
-            assert!(nearest < 0.02, "{wanted}: {tries:?}");
+            assert!(nearest(curve, wanted, -DB_PER_HALVING) < 0.02, "{wanted}");
+        }
+    }
+
+    #[test]
+    fn the_search_closes_in_on_sizes() {
+        // Minus the logarithm of bytes: a floor of dictionary and tables, and a part that shrinks.
+        let curve = |x: f64| -(5000.0 + 90_000.0 * (-0.45 * (x + 17.0)).exp2()).log2();
+        for bytes in [8e3_f64, 2e4, 1e5, 1e6] {
+            let wanted = -bytes.log2();
+            assert!(nearest(curve, wanted, BYTES_PER_HALVING.log2()) < 0.01, "{bytes}");
         }
     }
 }

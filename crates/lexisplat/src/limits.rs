@@ -7,8 +7,9 @@ pub const MAX_ATOMS: usize = 1024;
 
 /// How much a file may ask for.
 ///
-/// A reader allocates at most a small constant times the file's own size, whatever the header says:
-/// counts are compared with the bytes present first. These limits come on top of that.
+/// A reader allocates at most a constant times the file's own size, whatever the header says: counts are
+/// compared with the bytes present first. The constant is small but for packed files, where a byte may
+/// stand for 3 Gaussians of some hundred bytes. These limits come on top of that.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {

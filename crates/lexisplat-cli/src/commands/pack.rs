@@ -61,7 +61,7 @@ pub(crate) fn run(
     drop(sensitivity);
     let (packed, report) = match goal {
         Some(goal) => pack_to(&packer, &Judge::new(&splats, &views), goal, &bars)?,
-        None => packer.pack(args.preset.unwrap_or(Preset::Balanced).step(), &bars)?,
+        None => packer.pack(packer.step_for(args.preset.unwrap_or(Preset::Balanced).decibels()), &bars)?,
     };
     drop(packer);
     let pack_seconds = clock.elapsed().as_secs_f64();

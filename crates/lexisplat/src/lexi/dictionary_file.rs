@@ -11,6 +11,7 @@ use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::limits::Limits;
+use crate::model::Layout;
 use crate::output::write_whole;
 use crate::sh::ShDegree;
 
@@ -33,6 +34,10 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
         .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))?;
     if degree == ShDegree::ZERO {
         return Err(checked.malformed("a scene of SH degree 0 has no dictionary"));
+    }
+    if checked.text(key::FORMAT)? == FORMAT && read::record(&checked)?.layout == Layout::Packed {
+        let packed = super::packed::from_checked(&checked, bytes.len() as u64, limits)?;
+        return packed.unpack_dictionary().map_err(|e| checked.malformed(e.to_string()));
     }
     read::dictionary(&checked, degree)
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 use half::f16;
 use safetensors::Dtype;
 
-use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, LENGTH_BYTES, key, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, LENGTH_BYTES, PACKED_VERSION, key, tensor};
 use super::tensors::Checked;
 use crate::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::dictionary::Dictionary;
@@ -88,7 +88,13 @@ pub fn open(path: &Path, limits: &Limits) -> Result<Contents> {
 pub fn open_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents> {
     let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
     let record = record(&checked)?;
-    if record.layout == Layout::Packed {
+    let packed = record.layout == Layout::Packed;
+    let version: u64 = checked.number(key::VERSION)?;
+    if packed != (version == PACKED_VERSION) {
+        let text = format!("metadata 'version' is {version}, which has no layout '{}'", record.layout);
+        return Err(checked.malformed(text));
+    }
+    if packed {
         return Ok(Contents::Packed(super::packed::from_checked(&checked, bytes.len() as u64, limits)?));
     }
     let n = match checked.view(tensor::POSITION)?.shape() {

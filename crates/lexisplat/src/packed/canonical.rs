@@ -11,7 +11,7 @@ const MAX_THINNESS: f32 = 9.0;
 /// Largest logarithm of a standard deviation, either sign: beyond it exp leaves f32.
 const MAX_LOG_SCALE: f32 = 40.0;
 /// Cells along the longest side of the bulk, for each Gaussian in it.
-const CELLS_PER_GAUSSIAN: f64 = 1500.0;
+const CELLS_PER_GAUSSIAN: f64 = 3000.0;
 /// Share of the Gaussians, at either end of each axis, that is not the bulk.
 const TRIM: f64 = 0.01;
 

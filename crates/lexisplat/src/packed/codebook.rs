@@ -9,7 +9,7 @@ use crate::pursuit::path::Path;
 
 /// Squared error, in steps, that a bit may cost. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit; dead zones and short codes make more of it pay.
-pub(super) const PRICE: f32 = 0.16;
+pub(super) const PRICE: f32 = 0.208;
 /// Entries of per-atom arrays handled together.
 const LANES: usize = 16;
 /// Rows coded by one task.

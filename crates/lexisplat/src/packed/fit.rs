@@ -8,7 +8,7 @@ use crate::sh::C0;
 
 /// A weight is at least this share of what nine tenths of all are below: what the views did not see may
 /// yet be seen.
-const WEIGHT_FLOOR: f64 = 1e-4;
+const WEIGHT_FLOOR: f64 = 1e-3;
 const FLOOR_QUANTILE: f64 = 0.9;
 /// Weights above this share of all do not make the finest class finer.
 const TOP_QUANTILE: f64 = 0.9995;
@@ -18,12 +18,12 @@ const FIT_QUANTILE: f64 = 0.05;
 const DERIVATIVE_FLOOR: f64 = 1e-4;
 /// Factors on steps, found by trial: derivatives are those of small errors, and small errors are not
 /// what is made (docs/METHOD.md). Colour, SH values, opacity, scale, rotation, position.
-const DC_FACTOR: f32 = 1.6;
-const VALUE_FACTOR: f32 = 1.6;
-const OPACITY_FACTOR: f32 = 1.2;
-const SCALE_FACTOR: f64 = 0.7;
-const ROTATION_FACTOR: f64 = 1.0;
-const POSITION_FACTOR: f64 = 0.9;
+const DC_FACTOR: f32 = 2.0;
+const VALUE_FACTOR: f32 = 1.28;
+const OPACITY_FACTOR: f32 = 1.8;
+const SCALE_FACTOR: f64 = 1.1;
+const ROTATION_FACTOR: f64 = 0.8;
+const POSITION_FACTOR: f64 = 1.12;
 /// Keeps the normal equations solvable.
 const RIDGE: f64 = 1e-6;
 

@@ -26,15 +26,25 @@ use crate::stopwatch::Stopwatch;
 /// Rows to learn a dictionary from at most.
 const SAMPLE: usize = 24_576;
 /// Gaussians that pay for one more atom.
-const GAUSSIANS_PER_ATOM: usize = 160;
-/// Atoms learned unless asked otherwise: fewest, and most that one byte counts.
-const ATOMS: std::ops::RangeInclusive<usize> = 32..=256;
+const GAUSSIANS_PER_ATOM: usize = 64;
+/// Atoms learned unless asked otherwise at most: as many as one byte counts. At least there are as many as
+/// a row has coefficients, without which nothing comes near.
+const MAX_LEARNED: usize = 256;
 /// Steps an atom's coefficient is rounded to, for each step of an average value.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
 const VALUE_STEP_PER_TOLERANCE: f64 = 0.35;
 /// Share of the squared tolerance a code is first asked to stay below; the rest is for f16.
 const TOLERANCE_SHARE: f32 = 0.995;
+/// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians, how it
+/// grows as the step halves, and by how much faster: fitted to held-out views of the models measured in
+/// docs/METHOD.md, which it misses by up to 3 dB.
+const EXPECTED_DB: f64 = 40.0;
+const EXPECTED_STEP: f64 = 2.3e-3;
+const DB_PER_OCTAVE: f64 = 4.5;
+const DB_PER_OCTAVE_2: f64 = 0.15;
+/// Better than this nothing is expected to become.
+const MOST_DB: f64 = 100.0;
 /// Mixed into the seed of the sample.
 const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 
@@ -131,6 +141,17 @@ impl<'a> Packer<'a> {
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.scene.is_empty()
+    }
+
+    /// The overall step that pictures of about this PSNR, in dB, are expected of: errors of all Gaussians
+    /// add up, so it falls with the root of their number.
+    #[must_use]
+    pub fn step_for(&self, decibels: f64) -> f64 {
+        // decibels = EXPECTED_DB + DB_PER_OCTAVE x + DB_PER_OCTAVE_2 x^2, with x the octaves below.
+        let over = decibels.clamp(0.0, MOST_DB) - EXPECTED_DB;
+        let root = (DB_PER_OCTAVE * DB_PER_OCTAVE + 4.0 * DB_PER_OCTAVE_2 * over).max(0.0).sqrt();
+        let octaves = (root - DB_PER_OCTAVE) / (2.0 * DB_PER_OCTAVE_2);
+        EXPECTED_STEP * libm::exp2(-octaves) / (self.len().max(1) as f64).sqrt()
     }
 
     /// Packs with an overall step: roughly, the root of the mean squared error of pictures that each
@@ -271,10 +292,9 @@ impl<'a> Packer<'a> {
             order.swap(i, j);
         }
         let (rows, classes) = self.scaled(order[..wanted].iter().copied(), parameters);
-        let atoms = self
-            .options
-            .atoms
-            .unwrap_or_else(|| (n / GAUSSIANS_PER_ATOM).clamp(*ATOMS.start(), *ATOMS.end()));
+        // A promise is cheaper to keep with more atoms than exact rows.
+        let fewest = if self.options.tolerance.is_some() { 2 * dim } else { dim };
+        let atoms = self.options.atoms.unwrap_or_else(|| (n / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED));
         let first = first_atoms(dim, atoms, &rows);
         progress.begin(Stage::Learn, super::codebook::ROUNDS as u64);
         let learned = learn(dim, &rows, &classes, first, until, &mut || progress.advance(1));

@@ -93,6 +93,11 @@ pub struct StreamBits {
     pub bits: f64,
 }
 
+/// A part that no encoder writes so.
+fn bad(what: &str) -> Error {
+    Error::parameter("packed", what, "what the encoder writes")
+}
+
 /// One chunk, decoded.
 struct Piece {
     positions: Vec<Vec3>,
@@ -135,10 +140,24 @@ impl Packed {
         Ok(Stream::ALL.into_iter().zip(spent).map(stream).collect())
     }
 
-    fn decode(&self, count_bits: bool) -> Result<(Model, [f64; Stream::ALL.len()])> {
-        let bad = |what: &str| Error::parameter("packed", what, "what the encoder writes");
-        let parameters = Parameters::from_list(&self.parameters).ok_or_else(|| bad("parameters"))?;
-        let tables = Tables::read(&self.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
+    /// The dictionary alone.
+    ///
+    /// # Errors
+    /// As [`Self::unpack`].
+    pub fn unpack_dictionary(&self) -> Result<Dictionary> {
+        let tables = self.tables()?;
+        let parts = self.parts()?;
+        let (dictionary, _) =
+            self.dictionary(&tables, parts[0], parts[1], false).ok_or_else(|| bad("dictionary"))?;
+        Ok(dictionary)
+    }
+
+    fn tables(&self) -> Result<Tables> {
+        Tables::read(&self.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))
+    }
+
+    /// The pieces of `data`: two for the dictionary and two for each chunk.
+    fn parts(&self) -> Result<Vec<&[u8]>> {
         let chunks = self.gaussians.div_ceil(CHUNK);
         let total: u64 = self.lengths.iter().map(|&l| u64::from(l)).sum();
         if self.lengths.len() != 2 * (chunks + 1) || total != self.data.len() as u64 {
@@ -151,6 +170,14 @@ impl Packed {
             parts.push(part);
             rest = tail;
         }
+        Ok(parts)
+    }
+
+    fn decode(&self, count_bits: bool) -> Result<(Model, [f64; Stream::ALL.len()])> {
+        let parameters = Parameters::from_list(&self.parameters).ok_or_else(|| bad("parameters"))?;
+        let tables = self.tables()?;
+        let parts = self.parts()?;
+        let chunks = self.gaussians.div_ceil(CHUNK);
         let mut spent = [0.0; Stream::ALL.len()];
         let mut add = |more: &Option<[f64; Stream::ALL.len()]>| {
             for (a, b) in spent.iter_mut().zip(more.iter().flatten()) {

@@ -195,7 +195,8 @@ impl<'p> Walk<'p> {
             dc,
             colour_class: colour,
         };
-        let finite = position.iter().chain(&scales).chain(&dc).all(|v| v.is_finite());
+        let values = position.iter().chain(&scales).chain(&dc).chain(&decoded.rotation);
+        let finite = values.chain([&decoded.opacity]).all(|v| v.is_finite());
         finite.then_some(decoded)
     }
 
@@ -247,7 +248,7 @@ impl<'p> Walk<'p> {
             let size =
                 s.integer(Stream::Value, context, || given.map_or(0, |g| u64::from(g.1.unsigned_abs()) - 1));
             let negative = s.bits(Stream::Value, 1, || given.map_or(0, |g| u64::from(g.1 < 0)));
-            let value = i32::try_from(size + 1).ok()?;
+            let value = i32::try_from(size.checked_add(1)?).ok()?;
             self.code.push((atom, if negative == 1 { -value } else { value }));
             last = Some(size);
         }

@@ -1,0 +1,175 @@
+//! Packed files as a user makes and reads them.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod folder;
+
+use folder::{Folder, read};
+use serde_json::Value;
+
+/// Few views, small: enough to tell qualities apart.
+const SMALL: [&str; 4] = ["--orbit", "4", "--width", "160"];
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
+}
+
+fn mean_psnr(folder: &Folder, file: &str) -> f64 {
+    let score = folder.json(&[&["compare", "scene.ply", file], &SMALL[..]].concat());
+    number(&score["psnr"]["mean"])
+}
+
+#[test]
+fn presets_are_ordered_and_the_default_is_balanced() {
+    let folder = Folder::new();
+    let (mut last_bytes, mut last_psnr) = (0, 0.0);
+    for preset in ["small", "balanced", "high", "archive"] {
+        let file = format!("{preset}.lexi");
+        let report = folder.json(&["compress", "scene.ply", "-o", &file, "--preset", preset]);
+        assert_eq!(report["layout"], "packed");
+        let on_disk = folder.path(&file).metadata().unwrap().len();
+        assert_eq!(report["file_bytes"], on_disk);
+        let listed: f64 = report["attribute_bytes"].as_object().unwrap().values().map(number).sum();
+        assert!((listed - on_disk as f64).abs() < 8.0, "{listed} {on_disk}");
+        let psnr = mean_psnr(&folder, &file);
+        assert!(on_disk > last_bytes && psnr > last_psnr + 2.0, "{preset}: {on_disk} bytes, {psnr} dB");
+        (last_bytes, last_psnr) = (on_disk, psnr);
+    }
+    let default = folder.json(&["compress", "scene.ply"]);
+    assert!(default["promise"].is_null() && default["tol"].is_null());
+    let file = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert!(file("scene.lexi") == file("balanced.lexi"));
+    folder.json(&["compress", "scene.ply", "-o", "exact.lexi", "--layout", "f16"]);
+    assert!(file("scene.lexi").len() * 4 < file("exact.lexi").len());
+}
+
+#[test]
+fn a_quality_is_reached_and_recorded() {
+    let folder = Folder::new();
+    for (option, key) in [("--psnr", "mean_psnr"), ("--min-psnr", "min_psnr")] {
+        let report = folder.json(&["compress", "scene.ply", option, "38", "--overwrite"]);
+        let promise = &report["promise"];
+        assert_eq!((&promise["target"], &promise["asked"]), (&option[2..].into(), &38.0.into()));
+        let reached = number(&promise[key]);
+        assert!((38.0..38.6).contains(&reached), "{report}");
+        assert_eq!(promise["cameras"], false);
+        let info = folder.json(&["info", "scene.lexi"]);
+        assert_eq!(&info["lexi"]["promise"], promise);
+        assert!(folder.run(&["info", "scene.lexi"]).contains("dB at worst"));
+    }
+    let error = folder.fail(&["compress", "scene.ply", "--psnr=-3", "--overwrite"], 5);
+    assert!(error.contains("psnr"), "{error}");
+    let error = folder.fail(&["compress", "scene.ply", "--psnr", "400", "--overwrite"], 5);
+    assert!(error.contains("at most") && error.contains("dB"), "{error}");
+}
+
+#[test]
+fn a_size_is_never_exceeded() {
+    let folder = Folder::new();
+    for (option, most) in [("20kB", 20_000), ("40000", 40_000)] {
+        let report = folder.json(&["compress", "scene.ply", "--size", option, "--overwrite"]);
+        let bytes = folder.path("scene.lexi").metadata().unwrap().len();
+        assert_eq!(report["file_bytes"], bytes);
+        assert!(bytes <= most && bytes > most * 9 / 10, "{bytes} of {most}");
+        assert!(number(&report["promise"]["mean_psnr"]) > 20.0);
+    }
+    let ply = folder.path("scene.ply").metadata().unwrap().len();
+    folder.run(&["compress", "scene.ply", "--ratio", "12", "--overwrite"]);
+    assert!(folder.path("scene.lexi").metadata().unwrap().len() <= ply / 12);
+    let before = std::fs::read(folder.path("scene.lexi")).unwrap();
+    let error = folder.fail(&["compress", "scene.ply", "--size", "300", "--overwrite"], 5);
+    assert!(error.contains("nothing smaller can be made"), "{error}");
+    assert!(before == std::fs::read(folder.path("scene.lexi")).unwrap(), "the old file stays");
+}
+
+#[test]
+fn given_cameras_are_searched_with() {
+    let folder = Folder::new();
+    let cameras: Vec<Value> = (0..12)
+        .map(|i| {
+            let x = 0.2 * f64::from(i) - 1.0;
+            serde_json::json!({
+                "id": i, "img_name": format!("c{i}"), "width": 120, "height": 80, "fx": 100.0, "fy": 100.0,
+                "position": [x, -0.5, -4.0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+            })
+        })
+        .collect();
+    std::fs::write(folder.path("cameras.json"), Value::from(cameras).to_string()).unwrap();
+    let report = folder.json(&["compress", "scene.ply", "--psnr", "40", "--cameras", "cameras.json"]);
+    assert_eq!(report["promise"]["cameras"], true);
+    let score = folder.json(&["compare", "scene.ply", "scene.lexi", "--cameras", "cameras.json"]);
+    let mean = number(&score["psnr"]["mean"]);
+    assert!((39.0..41.5).contains(&mean), "{mean}");
+}
+
+#[test]
+fn the_tolerance_holds_in_packed_files() {
+    let folder = Folder::new();
+    for tol in ["0.05", "0.2"] {
+        let report = folder.json(&[
+            "compress",
+            "scene.ply",
+            "--layout",
+            "packed",
+            "--tol",
+            tol,
+            "--keep-order",
+            "--overwrite",
+        ]);
+        assert_eq!((&report["layout"], &report["over_tolerance"]), (&"packed".into(), &0.into()));
+        folder.run(&["decompress", "scene.lexi", "-o", "back.ply", "--overwrite"]);
+        let (original, back) = (read(&folder.path("scene.ply")), read(&folder.path("back.ply")));
+        let tol: f64 = tol.parse().unwrap();
+        for i in 0..original.len() {
+            let pairs = original.rest(i).iter().zip(back.rest(i));
+            let error = pairs.map(|(x, y)| (f64::from(*x) - f64::from(*y)).powi(2)).sum::<f64>().sqrt();
+            assert!(error <= tol, "Gaussian {i}: {error}");
+        }
+    }
+}
+
+#[test]
+fn info_says_what_a_packed_file_is_made_of() {
+    let folder = Folder::new();
+    folder.run(&["compress", "scene.ply", "-q"]);
+    let info = folder.json(&["info", "scene.lexi"]);
+    let lexi = &info["lexi"];
+    assert_eq!(
+        (&lexi["layout"], &lexi["version"], &lexi["order_kept"]),
+        (&"packed".into(), &2.into(), &false.into())
+    );
+    let bits = lexi["stream_bits_per_gaussian"].as_object().unwrap();
+    assert_eq!(bits.len(), 18);
+    let listed: f64 = lexi["attribute_bytes"].as_object().unwrap().values().map(number).sum();
+    assert!((listed - number(&info["file_bytes"])).abs() < 8.0);
+    let histogram = lexi["nonzero_histogram"].as_array().unwrap();
+    assert_eq!(histogram.iter().map(number).sum::<f64>(), number(&info["gaussians"]));
+    let usage = lexi["atom_usage"].as_array().unwrap();
+    assert_eq!(usage.iter().map(number).sum::<f64>(), number(&lexi["nonzeros"]));
+    assert!(number(&lexi["resident_sh_bytes_per_gaussian"]) < 192.0);
+    let text = folder.run(&["info", "scene.lexi"]);
+    for part in ["bits a Gaussian", "beside 192 dense", "Gaussians by nonzeros", "atoms:", "Position0"] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+}
+
+#[test]
+fn pruning_is_reported() {
+    let folder = Folder::new();
+    let report = folder.json(&["compress", "scene.ply", "--prune=2"]);
+    let removed = number(&report["pruned"]["gaussians"]);
+    assert_eq!(number(&report["gaussians"]) + removed, folder::GAUSSIANS as f64);
+    assert!(number(&report["pruned"]["largest_change"]) <= 2.0 / 255.0);
+    folder.fail(&["compress", "scene.ply", "--prune=0", "--overwrite"], 5);
+    folder.fail(&["compress", "scene.ply", "--prune", "--keep-order", "--overwrite"], 2);
+}
+
+#[test]
+fn options_that_do_not_go_together_are_refused() {
+    let folder = Folder::new();
+    folder.fail(&["compress", "scene.ply", "--psnr", "40", "--size", "10kB"], 2);
+    let error = folder.fail(&["compress", "scene.ply", "--layout", "f16", "--preset", "high"], 5);
+    assert!(error.contains("--preset") && error.contains("packed"), "{error}");
+    let error = folder.fail(&["compress", "scene.ply", "--psnr", "40", "--pursuit", "omp"], 5);
+    assert!(error.contains("layout"), "{error}");
+    assert_eq!(folder.names(), ["scene.ply"]);
+}
