@@ -7,8 +7,10 @@ use lexisplat_render::{Camera, Image, RenderOptions, Scene, Split, render, sensi
 use crate::error::{Error, Result};
 use crate::metrics::psnr;
 
-/// Views generated for a scene without cameras, to see what shows.
-const GENERATED_VIEWS: usize = 96;
+/// Views generated for a scene without cameras, to see what shows: this many, or as few as that for
+/// scenes so large that a view of this many Gaussians each would take minutes.
+const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
+const GAUSSIANS_DRAWN: usize = 48_000_000;
 /// Their size in pixels.
 const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Their distances, in radii of the scene's detail.
@@ -25,7 +27,7 @@ const MAX_WIDTH: u32 = 480;
 const MAX_VIEWS: usize = 150;
 /// One given camera in so many judges; the others say what shows. Judging by the same views would flatter.
 const JUDGE_SHARE: usize = 5;
-/// Say of the guess that knows no views in [`Sensitivity::blended`]: measured on held-out views
+/// Say of the guess that knows no views in [`Sensitivity::temper`]: measured on held-out views
 /// (docs/METHOD.md).
 const GUESS_SHARE: f32 = 0.3;
 /// Identical pictures count as this many decibels, so that means stay numbers.
@@ -59,9 +61,11 @@ impl Views {
     /// Views from all around.
     #[must_use]
     pub fn generated(splats: &Splats) -> Self {
+        let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
+        let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
         let around = |count, distances| surround(&splats.geometry, count, GENERATED_SIZE, distances);
         Self {
-            measure: around(GENERATED_VIEWS, GENERATED_DISTANCES),
+            measure: around(views, GENERATED_DISTANCES),
             judge: around(CANDIDATES, JUDGE_DISTANCES),
             given: false,
         }
@@ -120,8 +124,9 @@ impl Views {
     /// that are not among them.
     #[must_use]
     pub fn sensitivity(&self, splats: &Splats, on_view: &mut dyn FnMut()) -> Sensitivity {
-        let guess = Sensitivity::guess(&splats.geometry);
-        sensitivity(&Scene::from(splats), &self.measure, on_view).blended(&guess, GUESS_SHARE)
+        let mut seen = sensitivity(&Scene::from(splats), &self.measure, on_view);
+        seen.temper(&splats.geometry, GUESS_SHARE);
+        seen
     }
 }
 
@@ -137,13 +142,19 @@ impl<'a> Judge<'a> {
     #[must_use]
     pub fn new(splats: &Splats, views: &'a Views) -> Self {
         let scene = Scene::from(splats);
-        let draw = |camera| (camera, render(&scene, camera, &RenderOptions::default()));
-        let mut drawn: Vec<(&Camera, Image)> = views.judge.iter().map(draw).collect();
-        if !views.given {
-            drawn.sort_by_cached_key(|(_, picture)| std::cmp::Reverse(detail(picture).to_bits()));
-            drawn.truncate(JUDGES);
+        let most = if views.given { usize::MAX } else { JUDGES };
+        let mut drawn: Vec<(f64, &Camera, Image)> = Vec::new();
+        for camera in &views.judge {
+            let picture = render(&scene, camera, &RenderOptions::default());
+            drawn.push((detail(&picture), camera, picture));
+            if drawn.len() > most
+                && let Some(least) = (0..drawn.len()).min_by(|&a, &b| drawn[a].0.total_cmp(&drawn[b].0))
+            {
+                drawn.remove(least);
+            }
         }
-        Self { views: drawn, given: views.given }
+        let views_drawn = drawn.into_iter().map(|(_, camera, picture)| (camera, picture)).collect();
+        Self { views: views_drawn, given: views.given }
     }
 
     /// Mean and least PSNR of `model` against the original.
@@ -232,30 +243,30 @@ pub fn pack_to(
     progress: &dyn Progress,
 ) -> Result<(Packed, PackReport)> {
     let size = matches!(goal, Goal::Size(_));
-    let wanted = if size { -goal.asked().log2() } else { goal.asked() };
+    let wanted = if size { -libm::log2(goal.asked()) } else { goal.asked() };
     if !goal.asked().is_finite() || goal.asked() <= 0.0 {
         return Err(Error::parameter(goal.name(), goal.asked(), "a finite number above 0"));
     }
-    let close = if size { -(1.0 - CLOSE_SIZE).log2() } else { CLOSE_DB };
-    let mut slope = if size { BYTES_PER_HALVING.log2() } else { -DB_PER_HALVING };
+    let close = if size { -libm::log2(1.0 - CLOSE_SIZE) } else { CLOSE_DB };
+    let mut slope = if size { libm::log2(BYTES_PER_HALVING) } else { -DB_PER_HALVING };
     let mut log_step = if size {
         #[expect(clippy::cast_precision_loss, reason = "a count of Gaussians")]
-        let first = -(FIRST_BYTES * packer.len().max(1) as f64).log2();
-        packer.step_for(FIRST_DB).log2() + (wanted - first) / slope
+        let first = -libm::log2(FIRST_BYTES * packer.len().max(1) as f64);
+        libm::log2(packer.step_for(FIRST_DB)) + (wanted - first) / slope
     } else {
-        packer.step_for(wanted).log2()
+        libm::log2(packer.step_for(wanted))
     };
     let mut tries: Vec<Try> = Vec::new();
     let mut best: Option<(f64, Packed, PackReport, [f64; 2])> = None;
     for _ in 0..MAX_TRIES {
-        log_step = log_step.clamp(STEPS[0].log2(), STEPS[1].log2());
-        let (packed, report) = packer.pack(log_step.exp2(), progress)?;
+        log_step = log_step.clamp(libm::log2(STEPS[0]), libm::log2(STEPS[1]));
+        let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
         let bytes = lexi::packed_bytes(&packed);
         let mut reached = [f64::NAN; 2];
         #[expect(clippy::cast_precision_loss, reason = "file sizes are far below 2^52")]
         let value = if size {
             // The promise is written into the header too.
-            -((bytes + PROMISE_BYTES) as f64).log2()
+            -libm::log2((bytes + PROMISE_BYTES) as f64)
         } else {
             reached = judge.score(&packed.unpack()?)?;
             if matches!(goal, Goal::MinPsnr(_)) { reached[1] } else { reached[0] }
@@ -278,7 +289,7 @@ pub fn pack_to(
     let Some((_, mut packed, report, mut reached)) = best else {
         let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
         let expected = if size {
-            format!("at least {:.0} bytes: nothing smaller can be made of this scene", (-found).exp2())
+            format!("at least {:.0} bytes: nothing smaller can be made of this scene", libm::exp2(-found))
         } else {
             format!("at most {found:.1} dB: nothing better can be made of this scene")
         };

@@ -41,9 +41,10 @@ pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f
             let y = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(steps);
             let around = (1.0 - y * y).max(0.0).sqrt();
             let turn = f64::from(i) * GOLDEN_ANGLE;
-            let out = DVec3::new(around * turn.cos(), y, around * turn.sin());
-            let [near, far] = distances.map(f64::ln);
-            let position = centre + out * radius * (near + spread(0) * (far - near)).exp();
+            let (sine, cosine) = libm::sincos(turn);
+            let out = DVec3::new(around * cosine, y, around * sine);
+            let [near, far] = distances.map(libm::log);
+            let position = centre + out * radius * libm::exp(near + spread(0) * (far - near));
             let offset = DVec3::new(spread(1), spread(2), spread(3)) * 2.0 - DVec3::ONE;
             let target = centre + offset * half.max_element();
             let forward = (target - position).normalize_or(-out);
@@ -73,7 +74,7 @@ fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
         .map(|(&o, scales)| {
             let mut sorted = scales.map(f64::from);
             sorted.sort_by(f64::total_cmp);
-            (-sorted[1] - sorted[2]).clamp(-60.0, 60.0).exp() / (1.0 + f64::from(-o).exp())
+            libm::exp((-sorted[1] - sorted[2]).clamp(-60.0, 60.0)) / (1.0 + libm::exp(f64::from(-o)))
         })
         .collect();
     let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {

@@ -32,6 +32,12 @@ const SCALE_SHARES: [f32; 3] = [0.6, 0.1, 0.05];
 /// The same for a turn, per squared lever.
 const ROTATION_SHARE: f32 = 0.1;
 
+/// Powers of opacity and of the two longest standard deviations' product that weights measured with a
+/// renderer go with.
+const ALPHA_POWER: f32 = 1.7;
+const AREA_POWER: f32 = 0.6;
+/// A sum of guessed weights is taken to be at least this, so that its reciprocal is an f32.
+const LEAST_TOTAL: f64 = 1e-30;
 /// A weight below this share of what nine tenths are below counts as not seen.
 const UNSEEN: f32 = 1e-4;
 
@@ -86,82 +92,88 @@ impl Sensitivity {
         let n = geometry.len();
         let mut out = Self::zeros(n);
         out.removal.fill(f32::INFINITY);
-        let mut total = 0.0_f64;
-        for i in 0..n {
-            let mut sorted = geometry.scales[i];
-            sorted.sort_by(|a, b| b.total_cmp(a));
-            let alpha = maths::log_sigmoid(geometry.opacities[i]);
-            let weight = maths::exp(1.7 * alpha + 0.6 * (sorted[0] + sorted[1]));
-            out.colour[i] = if weight.is_finite() { weight } else { 0.0 };
-            total += f64::from(out.colour[i]);
-        }
+        let total: f64 = (0..n).map(|i| f64::from(guessed_weight(geometry, i))).sum();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-        let unit = (1.0 / (3.0 * total.max(f64::MIN_POSITIVE))) as f32;
+        let unit = (1.0 / (3.0 * total.max(LEAST_TOTAL))) as f32;
         for i in 0..n {
-            out.colour[i] *= unit;
-            let shape = CONTRAST * out.colour[i];
-            out.opacity[i] = shape;
-            let scales = geometry.scales[i];
-            let mut order = [0, 1, 2];
-            order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
-            for (&axis, share) in order.iter().zip(SCALE_SHARES) {
-                out.scale[i][axis] = share * shape;
-            }
-            for k in 0..3 {
-                let ratio = maths::exp(scales[(k + 1) % 3] - scales[(k + 2) % 3]);
-                let lever = (ratio - 1.0 / ratio).clamp(-100.0, 100.0);
-                out.rotation[i][k] = ROTATION_SHARE * shape * lever * lever;
-            }
-            let middle = scales[order[1]];
-            let along = shape * maths::exp(-2.0 * middle.clamp(-30.0, 30.0));
-            out.position[i] = [along, 0.0, 0.0, along, 0.0, along];
+            out.set_guess(geometry, i, guessed_weight(geometry, i) * unit);
         }
         out
     }
 
-    /// This one, measured, mixed with a guess that knows nothing of views: weights are the geometric mean
+    /// Everything of Gaussian `i` but its removal, guessed from its sensitivity to colour.
+    fn set_guess(&mut self, geometry: &Geometry, i: usize, colour: f32) {
+        let shape = CONTRAST * colour;
+        self.colour[i] = colour;
+        self.opacity[i] = shape;
+        let scales = geometry.scales[i];
+        let mut order = [0, 1, 2];
+        order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
+        for (&axis, share) in order.iter().zip(SCALE_SHARES) {
+            self.scale[i][axis] = share * shape;
+        }
+        for k in 0..3 {
+            let ratio = maths::exp(scales[(k + 1) % 3] - scales[(k + 2) % 3]);
+            let lever = (ratio - 1.0 / ratio).clamp(-100.0, 100.0);
+            self.rotation[i][k] = ROTATION_SHARE * shape * lever * lever;
+        }
+        let middle = scales[order[1]];
+        let along = shape * maths::exp(-2.0 * middle.clamp(-30.0, 30.0));
+        self.position[i] = [along, 0.0, 0.0, along, 0.0, along];
+    }
+
+    /// Mixes what was measured with a guess that knows nothing of views: weights become the geometric mean
     /// of both, the guess having `share` of the say. What the views hardly showed then keeps a weight,
-    /// for other views may show it.
+    /// for other views may show it. `geometry` is that of the same Gaussians.
     ///
     /// # Panics
     /// If the two differ in length.
-    #[must_use]
-    pub fn blended(&self, guess: &Self, share: f32) -> Self {
-        assert_eq!(self.len(), guess.len(), "one entry a Gaussian in both");
-        let sum = |values: &[f32]| values.iter().map(|&v| f64::from(v)).sum::<f64>();
-        let total = sum(&self.colour);
+    pub fn temper(&mut self, geometry: &Geometry, share: f32) {
+        assert_eq!(self.len(), geometry.len(), "one entry a Gaussian in both");
+        let n = self.len();
+        let total: f64 = self.colour.iter().map(|&v| f64::from(v)).sum();
         if total <= 0.0 {
-            return guess.clone();
+            let removal = std::mem::take(&mut self.removal);
+            *self = Self { removal, ..Self::guess(geometry) };
+            return;
         }
         let mut sorted = self.colour.clone();
         sorted.sort_by(f32::total_cmp);
         let floor = sorted[sorted.len() * 9 / 10] * UNSEEN;
+        drop(sorted);
+        let guessed: f64 = (0..n).map(|i| f64::from(guessed_weight(geometry, i))).sum();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-        let unit = (total / sum(&guess.colour).max(f64::MIN_POSITIVE)) as f32;
-        let mixed: Vec<f32> = self
-            .colour
-            .iter()
-            .zip(&guess.colour)
-            .map(|(&seen, &guessed)| {
-                let guessed = (guessed * unit).max(f32::MIN_POSITIVE);
-                let log = (1.0 - share) * maths::ln(seen.max(floor).max(f32::MIN_POSITIVE))
-                    + share * maths::ln(guessed);
-                maths::exp(log)
+        let unit = (total / guessed.max(LEAST_TOTAL)) as f32;
+        let mixed: Vec<f32> = (0..n)
+            .map(|i| {
+                let guessed = (guessed_weight(geometry, i) * unit).max(f32::MIN_POSITIVE);
+                let seen = self.colour[i].max(floor).max(f32::MIN_POSITIVE);
+                maths::exp((1.0 - share) * maths::ln(seen) + share * maths::ln(guessed))
             })
             .collect();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-        let back = (total / sum(&mixed)) as f32;
-        let mut out = self.clone();
-        for (i, mixed) in mixed.iter().enumerate() {
+        let back = (total / mixed.iter().map(|&v| f64::from(v)).sum::<f64>()) as f32;
+        for (i, &mixed) in mixed.iter().enumerate() {
+            let wanted = mixed * back;
             let seen = self.colour[i];
-            let (source, weight) = if seen > floor { (self, seen) } else { (guess, guess.colour[i]) };
-            let factor = mixed * back / weight.max(f32::MIN_POSITIVE);
-            out.colour[i] = source.colour[i] * factor;
-            out.opacity[i] = source.opacity[i] * factor;
-            out.position[i] = source.position[i].map(|v| v * factor);
-            out.scale[i] = source.scale[i].map(|v| v * factor);
-            out.rotation[i] = source.rotation[i].map(|v| v * factor);
+            if seen <= floor {
+                self.set_guess(geometry, i, wanted);
+                continue;
+            }
+            let factor = wanted / seen;
+            self.colour[i] = wanted;
+            self.opacity[i] *= factor;
+            let rows = self.position[i].iter_mut().chain(&mut self.scale[i]).chain(&mut self.rotation[i]);
+            rows.for_each(|v| *v *= factor);
         }
-        out
     }
+}
+
+/// What a Gaussian's weight is expected to be proportional to.
+fn guessed_weight(geometry: &Geometry, i: usize) -> f32 {
+    let mut sorted = geometry.scales[i];
+    sorted.sort_by(|a, b| b.total_cmp(a));
+    let alpha = maths::log_sigmoid(geometry.opacities[i]);
+    let weight = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (sorted[0] + sorted[1]));
+    if weight.is_finite() { weight } else { 0.0 }
 }

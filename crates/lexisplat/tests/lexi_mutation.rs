@@ -7,7 +7,7 @@ mod common;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-use common::{models, written};
+use common::{models, reseal, written};
 use lexisplat::{Limits, lexi};
 use serde_json::Value;
 
@@ -71,42 +71,6 @@ impl Random {
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         usize::try_from(self.0 >> 33).unwrap() % bound
     }
-}
-
-/// `file` with its header replaced and all checksums made to fit again, as far as the header allows.
-fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
-    let range = |entry: &Value| -> Option<std::ops::Range<usize>> {
-        let offsets = entry.get("data_offsets")?;
-        let at = |i: usize| usize::try_from(offsets.get(i)?.as_u64()?).ok();
-        Some(at(0)?..at(1)?)
-    };
-    let mut sums = serde_json::Map::new();
-    let mut own = None;
-    for (name, entry) in header.as_object().unwrap() {
-        if name == "checksum.header" {
-            own = range(entry);
-        } else if name != "__metadata__"
-            && let Some(bytes) = range(entry).and_then(|r| data.get(r))
-        {
-            sums.insert(name.clone(), Value::String(format!("{:08x}", crc32fast::hash(bytes))));
-        }
-    }
-    if let Some(slot) = header.get_mut("__metadata__").and_then(|m| m.get_mut("checksums"))
-        && slot.is_string()
-    {
-        *slot = Value::String(Value::Object(sums).to_string());
-    }
-    let text = header.to_string();
-    let mut out = (text.len() as u64).to_le_bytes().to_vec();
-    out.extend_from_slice(text.as_bytes());
-    let sum = crc32fast::hash(&out).to_le_bytes();
-    if let Some(slot) = own.and_then(|r| data.get_mut(r))
-        && slot.len() == sum.len()
-    {
-        slot.copy_from_slice(&sum);
-    }
-    out.extend_from_slice(data);
-    out
 }
 
 /// Changes one thing of the header.

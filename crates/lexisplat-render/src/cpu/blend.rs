@@ -3,7 +3,7 @@
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
 use super::math::exp_in_range;
-use super::project::Splat;
+use super::project::{Splat, Visible};
 
 /// One value for each pixel of a row of a tile.
 type Lanes = [f32; TILE];
@@ -40,7 +40,7 @@ impl TilePixels {
 
 /// Draws the tile at `[column, row]` from the splats in `list`, sorted from front to back.
 pub(super) fn tile(
-    splats: &[Splat],
+    splats: &[Visible],
     list: impl Iterator<Item = u32>,
     at: [usize; 2],
     background: [f32; 3],
@@ -53,7 +53,7 @@ pub(super) fn tile(
 
 #[inline(always)]
 fn draw(
-    splats: &[Splat],
+    splats: &[Visible],
     list: impl Iterator<Item = u32>,
     [column, row]: [usize; 2],
     background: [f32; 3],
@@ -66,9 +66,9 @@ fn draw(
     let x: Lanes = std::array::from_fn(|lane| (column * TILE + lane) as f32);
     let top = row * TILE;
     for splat in list {
-        let splat = &splats[splat as usize];
-        let first = (splat.rows[0] as usize).saturating_sub(top);
-        let end = (splat.rows[1] as usize).saturating_sub(top).min(TILE);
+        let splat = &splats[splat as usize].splat;
+        let first = usize::from(splat.rows[0]).saturating_sub(top);
+        let end = usize::from(splat.rows[1]).saturating_sub(top).min(TILE);
         for y in first..end {
             if !row_open[y] {
                 continue;
@@ -151,7 +151,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             low + (high - low) * f32::from(u16::try_from(state >> 16).unwrap()) / 65_536.0
         };
-        let splats: Vec<Splat> = (0..300)
+        let splats: Vec<Visible> = (0..300)
             .map(|_| Splat {
                 centre: [random(-10.0, 60.0), random(20.0, 90.0)],
                 conic: [random(0.01, 0.5), random(-0.01, 0.01), random(0.01, 0.5)],
@@ -160,6 +160,7 @@ mod tests {
                 cutoff: -8.0,
                 rows: [0, 100],
             })
+            .map(|splat| Visible { splat, ..Visible::default() })
             .collect();
         let (at, background) = ([1, 3], [0.1, 0.5, 0.9]);
         let chosen = tile(&splats, 0..300, at, background);

@@ -53,10 +53,9 @@ fn draw(
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![options.background; width * height];
-    let visible = project::project(scene.geometry(), &Radiance::new(scene), projection);
-    let (splats, rects) = order::by_depth(visible);
-    for band in tiles::bands(&rects, grid, max_entries) {
-        let lists = tiles::TileLists::new(&rects, grid, band.clone());
+    let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), projection));
+    for band in tiles::bands(&splats, grid, max_entries) {
+        let lists = tiles::TileLists::new(&splats, grid, band.clone());
         let count = band.len() * grid.columns;
         let drawn: Vec<blend::TilePixels> = (0..count)
             .into_par_iter()

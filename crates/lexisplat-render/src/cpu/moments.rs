@@ -4,7 +4,7 @@ use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
 use super::blend::TilePixels;
 use super::math::exp_in_range;
-use super::project::Splat;
+use super::project::{Splat, Visible};
 
 type Lanes = [f32; TILE];
 
@@ -38,7 +38,7 @@ impl Moments {
 
 /// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
 pub(super) fn tile(
-    splats: &[Splat],
+    splats: &[Visible],
     list: impl Iterator<Item = u32>,
     at: [usize; 2],
     size: [usize; 2],
@@ -60,7 +60,7 @@ struct Row {
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
 fn walk(
-    splats: &[Splat],
+    splats: &[Visible],
     list: impl Iterator<Item = u32>,
     [column, row]: [usize; 2],
     [width, height]: [usize; 2],
@@ -74,9 +74,9 @@ fn walk(
     let mut rows = [Row { colour: [[0.0; TILE]; 3], open }; TILE];
     let mut row_open: [bool; TILE] = std::array::from_fn(|y| top + y < height);
     for index in list {
-        let splat = &splats[index as usize];
-        let first = (splat.rows[0] as usize).saturating_sub(top);
-        let end = (splat.rows[1] as usize).saturating_sub(top).min(TILE);
+        let splat = &splats[index as usize].splat;
+        let first = usize::from(splat.rows[0]).saturating_sub(top);
+        let end = usize::from(splat.rows[1]).saturating_sub(top).min(TILE);
         let mut sums = [[0.0_f32; TILE]; SUMS];
         let mut removal = [0.0_f32; TILE];
         let mut seen = false;
@@ -91,6 +91,9 @@ fn walk(
         if seen {
             let sums = sums.map(|lanes| lanes.iter().sum());
             out.push((index, Moments { sums, removal: removal.into_iter().fold(0.0, f32::max) }));
+        }
+        if row_open == [false; TILE] {
+            break;
         }
     }
     out

@@ -1,32 +1,34 @@
 //! Sorting by depth: once per picture, so that every tile's list comes out sorted.
 
-use super::project::{Splat, Visible};
-use super::tiles::Rect;
+use super::project::{Projected, Visible};
 
 /// Bits of a key sorted in one pass; three passes cover 32.
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
-/// Splats and their tiles, nearest first; at equal depth, in order of index.
-pub(super) fn by_depth(visible: Vec<Vec<Visible>>) -> (Vec<Splat>, Vec<Rect>) {
-    let visible: Vec<Visible> = visible.concat();
-    let order = sorted(visible.iter().map(|v| v.depth));
-    let splats = order.iter().map(|&i| visible[i as usize].splat).collect();
-    let rects = order.iter().map(|&i| visible[i as usize].rect).collect();
-    (splats, rects)
+/// The splats nearest first; at equal depth, in order of index.
+pub(super) fn by_depth(visible: Projected) -> Vec<Visible> {
+    let mut splats = visible.into_splats();
+    let mut order = sorted(splats.iter().map(|v| v.depth).zip(0..).collect());
+    // In place, cycle by cycle, since a copy of millions of splats is worth avoiding. Places that are done
+    // name themselves.
+    for start in 0..order.len() {
+        let mut place = start;
+        loop {
+            let from = order[place] as usize;
+            order[place] = u32::try_from(place).unwrap_or(u32::MAX);
+            if from == start {
+                break;
+            }
+            splats.swap(place, from);
+            place = from;
+        }
+    }
+    splats
 }
 
-/// Indices of the same splats' Gaussians, in the same order.
-pub(super) fn gaussians_by_depth(visible: &[Vec<Visible>]) -> Vec<u32> {
-    let visible: Vec<&Visible> = visible.iter().flatten().collect();
-    sorted(visible.iter().map(|v| v.depth)).into_iter().map(|k| visible[k as usize].gaussian).collect()
-}
-
-/// Indices of `keys` in ascending order of key, ties in order of index: a stable radix sort.
-///
-/// There are at most 2^32 keys.
-fn sorted(keys: impl Iterator<Item = u32>) -> Vec<u32> {
-    let mut pairs: Vec<(u32, u32)> = keys.zip(0..).collect();
+/// The second of (key, name) in ascending order of key, ties as they come: a stable radix sort.
+fn sorted(mut pairs: Vec<(u32, u32)>) -> Vec<u32> {
     let mut other = vec![(0, 0); pairs.len()];
     for shift in (0..u32::BITS).step_by(DIGIT_BITS as usize) {
         let digit = |key: u32| (key >> shift) as usize % DIGITS;
@@ -64,7 +66,7 @@ mod tests {
             .collect();
         let mut expected: Vec<u32> = (0..5000).collect();
         expected.sort_by_key(|&i| keys[i as usize]);
-        assert_eq!(sorted(keys.iter().copied()), expected);
-        assert!(sorted(std::iter::empty()).is_empty());
+        assert_eq!(sorted(keys.iter().copied().zip(0..).collect()), expected);
+        assert!(sorted(Vec::new()).is_empty());
     }
 }

@@ -24,7 +24,7 @@ const POWER_SLACK: f32 = 1e-4;
 const TERM_ERROR: f64 = 1e-6;
 
 /// A Gaussian on screen.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Splat {
     /// Centre in pixels; pixel centres are integers.
     pub(super) centre: [f32; 2],
@@ -37,11 +37,11 @@ pub(super) struct Splat {
     /// Powers below this surely give an opacity below [`ALPHA_MIN`].
     pub(super) cutoff: f32,
     /// First pixel row that it may touch, and the first below that it surely does not.
-    pub(super) rows: [u32; 2],
+    pub(super) rows: [u16; 2],
 }
 
 /// A splat with what sorting and tiling need.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Visible {
     pub(super) splat: Splat,
     /// Bits of the view-space z, which is positive: ordered as the number is.
@@ -237,20 +237,41 @@ fn axes(scales: [f32; 3], rotation: [f32; 4]) -> [[f32; 3]; 3] {
     ]
 }
 
-/// All Gaussians that may be seen, in order.
-pub(super) fn project(
-    geometry: &Geometry,
-    radiance: &Radiance<'_>,
-    projection: &Projection,
-) -> Vec<Vec<Visible>> {
-    let count = geometry.len();
-    (0..count.div_ceil(CHUNK))
-        .into_par_iter()
-        .map(|chunk| {
-            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(count);
-            range.filter_map(|i| projection.project(geometry, radiance, i)).collect()
+/// All Gaussians that may be seen: the first `counts[k]` of each [`CHUNK`] slots, in order.
+pub(super) struct Projected {
+    /// One allocation for all, since many small ones from many threads would not go back to the system.
+    slots: Vec<Visible>,
+    counts: Vec<usize>,
+}
+
+impl Projected {
+    /// The splats alone, in order.
+    pub(super) fn into_splats(self) -> Vec<Visible> {
+        let Self { mut slots, counts } = self;
+        let mut len = 0;
+        for (piece, count) in counts.into_iter().enumerate() {
+            slots.copy_within(piece * CHUNK..piece * CHUNK + count, len);
+            len += count;
+        }
+        slots.truncate(len);
+        slots
+    }
+}
+
+/// Projects all Gaussians.
+pub(super) fn project(geometry: &Geometry, radiance: &Radiance<'_>, projection: &Projection) -> Projected {
+    let mut slots = vec![Visible::default(); geometry.len()];
+    let counts = slots
+        .par_chunks_mut(CHUNK)
+        .enumerate()
+        .map(|(chunk, slots)| {
+            let range = chunk * CHUNK..chunk * CHUNK + slots.len();
+            let seen = range.filter_map(|i| projection.project(geometry, radiance, i));
+            // As many slots as Gaussians: the slots never run out first.
+            slots.iter_mut().zip(seen).map(|(slot, splat)| *slot = splat).count()
         })
-        .collect()
+        .collect();
+    Projected { slots, counts }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use crate::camera::Camera;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
+use super::math::exp;
 use super::moments::{self, Moments};
 use super::project::{self, Projection};
 use super::{blend, order, tiles};
@@ -31,22 +32,22 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], on_view: &mut dyn FnMu
 
 fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: usize) {
     let projection = Projection::new(camera, scene.meta().antialiased);
-    let visible = project::project(scene.geometry(), &Radiance::new(scene), &projection);
-    let gaussians = order::gaussians_by_depth(&visible);
-    let (splats, rects) = order::by_depth(visible);
+    let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
     let grid = projection.grid;
     let size = [camera.width as usize, camera.height as usize];
     let mut sums = vec![Moments::default(); splats.len()];
-    for band in tiles::bands(&rects, grid, tiles::MAX_ENTRIES) {
-        let lists = tiles::TileLists::new(&rects, grid, band.clone());
-        // Tile rows are summed in order, so that results do not depend on the number of threads.
-        for row in band.clone() {
-            let parts: Vec<Vec<(u32, Moments)>> = (0..grid.columns)
+    for band in tiles::bands(&splats, grid, tiles::MAX_ENTRIES) {
+        let lists = tiles::TileLists::new(&splats, grid, band.clone());
+        // Tiles are summed in order, so that results do not depend on the number of threads; a few at a
+        // time, since what they hold until then is large.
+        let tiles = band.len() * grid.columns;
+        for first in (0..tiles).step_by(TILES) {
+            let parts: Vec<Vec<(u32, Moments)>> = (first..(first + TILES).min(tiles))
                 .into_par_iter()
-                .map(|column| {
-                    let list = || lists.of((row - band.start) * grid.columns + column);
-                    let picture = blend::tile(&splats, list(), [column, row], [0.0; 3]);
-                    moments::tile(&splats, list(), [column, row], size, &picture)
+                .map(|tile| {
+                    let at = [tile % grid.columns, band.start + tile / grid.columns];
+                    let picture = blend::tile(&splats, lists.of(tile), at, [0.0; 3]);
+                    moments::tile(&splats, lists.of(tile), at, size, &picture)
                 })
                 .collect();
             for (splat, part) in parts.into_iter().flatten() {
@@ -57,31 +58,37 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
     let share = 1.0 / (size[0] as f32 * size[1] as f32 * CHANNELS * views as f32);
     let geometry = scene.geometry();
-    let changes: Vec<Change> = gaussians
-        .par_iter()
-        .zip(&sums)
-        .map(|(&i, m)| Change::of(&projection, geometry, i as usize, &m.sums))
-        .collect();
-    for ((&i, change), m) in gaussians.iter().zip(changes).zip(&sums) {
-        let i = i as usize;
-        total.removal[i] = total.removal[i].max(m.removal);
-        let m = m.sums;
-        if m[0] <= 0.0 || !change.is_finite() {
-            continue;
+    for (splats, sums) in splats.chunks(CHUNK).zip(sums.chunks(CHUNK)) {
+        let changes: Vec<Option<Change>> = splats
+            .par_iter()
+            .zip(sums)
+            .map(|(splat, m)| {
+                let seen = m.sums[0] > 0.0;
+                seen.then(|| Change::of(&projection, geometry, splat.gaussian as usize, &m.sums))
+            })
+            .collect();
+        for ((splat, change), m) in splats.iter().zip(changes).zip(sums) {
+            let i = splat.gaussian as usize;
+            total.removal[i] = total.removal[i].max(m.removal);
+            let Some(change) = change.filter(Change::is_finite) else { continue };
+            total.colour[i] += m.sums[0] * share;
+            total.opacity[i] += m.sums[1] * share;
+            let to = |sums: &mut [f32], values: &[f32]| {
+                for (sum, value) in sums.iter_mut().zip(values) {
+                    *sum += value * share;
+                }
+            };
+            to(&mut total.position[i], &change.position);
+            to(&mut total.scale[i], &change.scale);
+            to(&mut total.rotation[i], &change.rotation);
         }
-        total.colour[i] += m[0] * share;
-        total.opacity[i] += m[1] * share;
-        let to = |sums: &mut [f32], values: &[f32]| {
-            for (sum, value) in sums.iter_mut().zip(values) {
-                *sum += value * share;
-            }
-        };
-        to(&mut total.position[i], &change.position);
-        to(&mut total.scale[i], &change.scale);
-        to(&mut total.rotation[i], &change.rotation);
     }
 }
 
+/// Tiles looked at together.
+const TILES: usize = 16;
+/// Splats carried over to the world at a time.
+const CHUNK: usize = 1 << 16;
 /// Colour channels of a picture.
 const CHANNELS: f32 = 3.0;
 
@@ -118,7 +125,7 @@ impl Change {
         let scales = geometry.scales[i];
         let rotation = std::array::from_fn(|k| {
             let (j, l) = ((k + 1) % 3, (k + 2) % 3);
-            let ratio = (scales[j] - scales[l]).exp();
+            let ratio = exp(scales[j] - scales[l]);
             let lever = ratio - 1.0 / ratio;
             fourth(axes[j], axes[l]).max(0.0) * lever * lever
         });

@@ -6,10 +6,12 @@ use rayon::prelude::*;
 
 use crate::conventions::TILE;
 
+use super::project::Visible;
+
 /// Pieces the sorted splats are cut into, each listed by one task; a tile's list is theirs in order.
 const PIECES: usize = 8;
-/// Most list entries in memory at once, unless one row of tiles needs more: 256 MB.
-pub(super) const MAX_ENTRIES: u64 = 1 << 26;
+/// Most list entries in memory at once, unless one row of tiles needs more: 16 MB.
+pub(super) const MAX_ENTRIES: u64 = 1 << 22;
 
 /// The tiles of a picture.
 #[derive(Debug, Clone, Copy)]
@@ -20,30 +22,31 @@ pub(super) struct Grid {
 }
 
 /// Tiles from `min` to before `max`, as (column, row).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Rect {
-    min: [u32; 2],
-    max: [u32; 2],
+    min: [u16; 2],
+    max: [u16; 2],
 }
 
 impl Rect {
     /// What both cover, if anything.
     pub(super) fn intersect(self, other: Self) -> Option<Self> {
-        let min: [u32; 2] = std::array::from_fn(|k| self.min[k].max(other.min[k]));
-        let max: [u32; 2] = std::array::from_fn(|k| self.max[k].min(other.max[k]));
+        let min: [u16; 2] = std::array::from_fn(|k| self.min[k].max(other.min[k]));
+        let max: [u16; 2] = std::array::from_fn(|k| self.max[k].min(other.max[k]));
         (min[0] < max[0] && min[1] < max[1]).then_some(Self { min, max })
     }
 }
 
-/// `value` as an integer within `0..=most`, truncated toward zero as C does.
+/// `value` as an integer within `0..=most`, truncated toward zero as C does. `most` is at most
+/// [`crate::MAX_SIDE`].
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     clippy::cast_possible_wrap,
     reason = "saturates, then clamped"
 )]
-fn truncated(value: impl Into<f64>, most: usize) -> u32 {
-    (value.into() as i32).clamp(0, most as i32) as u32
+fn truncated(value: impl Into<f64>, most: usize) -> u16 {
+    (value.into() as i32).clamp(0, most as i32) as u16
 }
 
 #[expect(clippy::cast_precision_loss, reason = "16")]
@@ -80,23 +83,24 @@ impl Grid {
     }
 
     /// Pixel rows within `rect` and `extent` of `centre`, or one more on either side.
-    pub(super) fn rows(self, rect: Rect, centre: f32, extent: f64) -> Option<[u32; 2]> {
-        let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
+    pub(super) fn rows(self, rect: Rect, centre: f32, extent: f64) -> Option<[u16; 2]> {
+        let tile = u16::try_from(TILE).unwrap_or(u16::MAX);
         let centre = f64::from(centre);
-        let first = truncated((centre - extent).floor(), self.height).max(rect.min[1] * tile);
-        let end = truncated((centre + extent).ceil() + 1.0, self.height).min(rect.max[1] * tile);
+        let first = truncated((centre - extent).floor(), self.height).max(rect.min[1].saturating_mul(tile));
+        let end =
+            truncated((centre + extent).ceil() + 1.0, self.height).min(rect.max[1].saturating_mul(tile));
         (first < end).then_some([first, end])
     }
 }
 
 /// Rows of tiles cut into bands whose lists have at most `max_entries`, or of one row.
-pub(super) fn bands(rects: &[Rect], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
+pub(super) fn bands(splats: &[Visible], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
     // Differences of the number of entries from one row of tiles to the next.
     let mut steps = vec![0_i64; grid.rows + 1];
-    for rect in rects {
+    for Visible { rect, .. } in splats {
         let columns = i64::from(rect.max[0] - rect.min[0]);
-        steps[rect.min[1] as usize] += columns;
-        steps[rect.max[1] as usize] -= columns;
+        steps[usize::from(rect.min[1])] += columns;
+        steps[usize::from(rect.max[1])] -= columns;
     }
     let mut bands = Vec::new();
     let (mut start, mut in_row, mut in_band) = (0, 0_i64, 0_u64);
@@ -129,13 +133,13 @@ struct Piece {
 }
 
 impl TileLists {
-    /// Lists the splats, given by their tiles, over the rows of tiles in `band`.
-    pub(super) fn new(rects: &[Rect], grid: Grid, band: Range<usize>) -> Self {
-        let size = rects.len().div_ceil(PIECES).max(1);
-        let pieces = rects
+    /// Lists the splats over the rows of tiles in `band`.
+    pub(super) fn new(splats: &[Visible], grid: Grid, band: Range<usize>) -> Self {
+        let size = splats.len().div_ceil(PIECES).max(1);
+        let pieces = splats
             .par_chunks(size)
             .enumerate()
-            .map(|(piece, rects)| Piece::new(rects, piece * size, grid, &band))
+            .map(|(piece, splats)| Piece::new(splats, piece * size, grid, &band))
             .collect();
         Self { pieces }
     }
@@ -147,18 +151,18 @@ impl TileLists {
 }
 
 impl Piece {
-    fn new(rects: &[Rect], first: usize, grid: Grid, band: &Range<usize>) -> Self {
+    fn new(splats: &[Visible], first: usize, grid: Grid, band: &Range<usize>) -> Self {
         let tiles = |rect: &Rect| {
-            let [left, right] = [rect.min[0] as usize, rect.max[0] as usize];
-            let top = (rect.min[1] as usize).max(band.start) - band.start;
-            let bottom = (rect.max[1] as usize).min(band.end).saturating_sub(band.start);
+            let [left, right] = [usize::from(rect.min[0]), usize::from(rect.max[0])];
+            let top = usize::from(rect.min[1]).max(band.start) - band.start;
+            let bottom = usize::from(rect.max[1]).min(band.end).saturating_sub(band.start);
             let columns = grid.columns;
             (top..bottom).flat_map(move |row| row * columns + left..row * columns + right)
         };
         // Counts are gathered two places up, so that after the sums `starts[t + 1]` is where tile t's
         // list begins, and after filling where it ends.
         let mut starts = vec![0_usize; band.len() * grid.columns + 2];
-        for rect in rects {
+        for Visible { rect, .. } in splats {
             tiles(rect).for_each(|tile| starts[tile + 2] += 1);
         }
         for tile in 2..starts.len() {
@@ -166,7 +170,7 @@ impl Piece {
         }
         let total = starts.last().copied().unwrap_or(0);
         let mut entries = vec![0; total];
-        for (rect, splat) in rects.iter().zip(first..) {
+        for (Visible { rect, .. }, splat) in splats.iter().zip(first..) {
             // Splats are counted in u32 since `order`.
             let splat = u32::try_from(splat).unwrap_or(u32::MAX);
             for tile in tiles(rect) {
@@ -201,22 +205,23 @@ mod tests {
     #[test]
     fn lists_hold_every_splat_of_every_tile_in_order() {
         let grid = Grid::new(100, 70);
-        let rects: Vec<Rect> = (0_u8..60)
+        let splats: Vec<Visible> = (0_u8..60)
             .filter_map(|i| {
                 let i = f32::from(i);
-                grid.rect([i * 37.0 % 120.0 - 10.0, i * 23.0 % 90.0 - 10.0], 1.0 + i % 30.0)
+                let rect = grid.rect([i * 37.0 % 120.0 - 10.0, i * 23.0 % 90.0 - 10.0], 1.0 + i % 30.0)?;
+                Some(Visible { rect, ..Visible::default() })
             })
             .collect();
         for band in [0..grid.rows, 1..3] {
-            let lists = TileLists::new(&rects, grid, band.clone());
+            let lists = TileLists::new(&splats, grid, band.clone());
             for row in band.clone() {
                 for column in 0..grid.columns {
                     let inside = |r: &Rect| {
-                        (r.min[0] as usize..r.max[0] as usize).contains(&column)
-                            && (r.min[1] as usize..r.max[1] as usize).contains(&row)
+                        (usize::from(r.min[0])..usize::from(r.max[0])).contains(&column)
+                            && (usize::from(r.min[1])..usize::from(r.max[1])).contains(&row)
                     };
                     let expected: Vec<u32> =
-                        (0..).zip(&rects).filter(|(_, r)| inside(r)).map(|(i, _)| i).collect();
+                        (0..).zip(&splats).filter(|(_, v)| inside(&v.rect)).map(|(i, _)| i).collect();
                     let found: Vec<u32> = lists.of((row - band.start) * grid.columns + column).collect();
                     assert_eq!(found, expected, "tile {column}, {row}");
                 }
@@ -228,7 +233,7 @@ mod tests {
     fn bands_cover_all_rows_and_stay_small() {
         let grid = Grid::new(16_384, 16_384);
         let everywhere = Rect { min: [0, 0], max: [1024, 1024] };
-        let bands = bands(&[everywhere; 1000], grid, 1 << 26);
+        let bands = bands(&[Visible { rect: everywhere, ..Visible::default() }; 1000], grid, 1 << 26);
         assert_eq!(bands.first().map(|b| b.start), Some(0));
         assert_eq!(bands.last().map(|b| b.end), Some(1024));
         assert!(bands.windows(2).all(|w| w[0].end == w[1].start));

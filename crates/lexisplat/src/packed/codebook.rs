@@ -9,13 +9,16 @@ use crate::pursuit::path::Path;
 
 /// Squared error, in steps, that a bit may cost. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit; dead zones and short codes make more of it pay.
-pub(super) const PRICE: f32 = 0.208;
+pub(super) const PRICE: f32 = 0.16;
 /// Entries of per-atom arrays handled together.
 const LANES: usize = 16;
 /// Rows coded by one task.
 pub(super) const CHUNK: usize = 2048;
 /// Largest value, in steps; rounding a residual never needs more.
 const MAX_VALUE: f32 = 1e6;
+/// Atoms taken at most for each value of a row, repeats among them: of rows so long that f32 no longer sees
+/// a value being taken there would be no end.
+const TAKES_PER_VALUE: usize = 8;
 /// Sizes of values whose cost is kept; larger ones are extrapolated.
 const VALUE_COSTS: usize = 64;
 /// Colour classes told apart in the cost of counts, as in [`Stream::Count`]'s contexts.
@@ -241,7 +244,10 @@ impl Codebook {
                 }
             }
         }
-        while s.code.len() < self.dim && energy > goal {
+        for _ in 0..TAKES_PER_VALUE * self.dim {
+            if s.code.len() >= self.dim || energy <= goal {
+                break;
+            }
             let Some(best) = best(&s.correlations, &s.prices) else { break };
             let correlation = s.correlations[best / LANES][best % LANES];
             let value = correlation.round().clamp(-MAX_VALUE, MAX_VALUE);

@@ -142,7 +142,7 @@ impl Table {
         let rank = self.ranks.get(usize::from(symbol)).copied().unwrap_or(u16::MAX);
         self.shares
             .get(usize::from(rank))
-            .map_or(f64::from(TOTAL), |&share| PRECISION as f64 - f64::from(share).log2())
+            .map_or(f64::from(TOTAL), |&share| PRECISION as f64 - libm::log2(f64::from(share)))
     }
 }
 
@@ -322,5 +322,143 @@ impl SymbolReader {
     /// Whether exactly everything was decoded.
     pub(super) fn exhausted(&self) -> bool {
         self.coder.is_empty()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    const STREAMS: usize = 3;
+
+    /// Contexts and symbols, few of them often, from an alphabet as wide as atoms.
+    fn sequences() -> impl Strategy<Value = Vec<(usize, u16)>> {
+        let wide = (0..STREAMS * CONTEXTS, 0..1024_u16);
+        let narrow = (0..STREAMS * CONTEXTS, 0..6_u16);
+        let one = (0..4_usize, 0..3_u16);
+        let pair = prop_oneof![2 => wide, 5 => narrow, 5 => one];
+        let long = (prop::collection::vec(pair, 1..400), 1..20_usize);
+        long.prop_map(|(pairs, times)| pairs.repeat(times))
+    }
+
+    fn tables_of(sequence: &[(usize, u16)]) -> Tables {
+        let mut histograms = vec![Histogram::default(); STREAMS * CONTEXTS];
+        for &(context, symbol) in sequence {
+            histograms[context].add(symbol);
+        }
+        Tables::new(&histograms).unwrap()
+    }
+
+    fn table(tables: &Tables, context: usize) -> &Table {
+        tables.table(context / CONTEXTS, context % CONTEXTS).unwrap()
+    }
+
+    fn encoded(tables: &Tables, sequence: &[(usize, u16)]) -> Vec<u8> {
+        encode(sequence.iter().map(|&(context, symbol)| (table(tables, context), symbol)))
+    }
+
+    /// What is read from `bytes` in the contexts of `sequence`, and whether nothing is left.
+    fn decoded(tables: &Tables, sequence: &[(usize, u16)], bytes: &[u8]) -> Option<(Vec<u16>, bool)> {
+        let mut reader = SymbolReader::new(bytes)?;
+        let symbols = sequence.iter().map(|&(context, _)| reader.take(table(tables, context))).collect();
+        Some((symbols, reader.exhausted()))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn tables_come_back(sequence in sequences()) {
+            let tables = tables_of(&sequence);
+            let bytes = tables.write();
+            let read = Tables::read(&bytes, STREAMS).unwrap();
+            prop_assert_eq!(read.write(), bytes.clone());
+            for &(context, symbol) in &sequence {
+                prop_assert_eq!(tables.map[context], read.map[context]);
+                let (old, new) = (table(&tables, context), table(&read, context));
+                prop_assert_eq!((&old.symbols, &old.shares), (&new.symbols, &new.shares));
+                prop_assert_eq!(new.shares.iter().map(|&s| u32::from(s)).sum::<u32>(), TOTAL);
+                prop_assert!(new.symbols.binary_search(&symbol).is_ok());
+                prop_assert!(new.bits(symbol) <= PRECISION as f64);
+            }
+            prop_assert!(Tables::read(&bytes[..bytes.len() - 1], STREAMS).is_none());
+            let longer = [bytes.as_slice(), &[0]].concat();
+            prop_assert!(Tables::read(&longer, STREAMS).is_none());
+        }
+
+        #[test]
+        fn symbols_come_back(sequence in sequences()) {
+            let tables = tables_of(&sequence);
+            let read = Tables::read(&tables.write(), STREAMS).unwrap();
+            let bytes = encoded(&tables, &sequence);
+            let symbols: Vec<u16> = sequence.iter().map(|s| s.1).collect();
+            prop_assert_eq!(decoded(&read, &sequence, &bytes), Some((symbols, true)));
+            let bits: f64 = sequence.iter().map(|&(context, s)| table(&read, context).bits(s)).sum();
+            prop_assert!((bytes.len() * 8) as f64 <= bits + 64.0, "{} bytes for {bits} bits", bytes.len());
+        }
+
+        /// Coding is one to one: words that are not the encoder's are left over, or say something else.
+        #[test]
+        fn other_words_are_noticed(sequence in sequences(), word in 1..u32::MAX) {
+            let tables = tables_of(&sequence);
+            let bytes = encoded(&tables, &sequence);
+            let mine = decoded(&tables, &sequence, &bytes);
+            let more = [bytes.as_slice(), &word.to_le_bytes()].concat();
+            let before = [&word.to_le_bytes(), bytes.as_slice()].concat();
+            let mut changed = bytes.clone();
+            changed.iter_mut().take(4).zip(word.to_le_bytes()).for_each(|(a, b)| *a ^= b);
+            for other in [&more, &before, &changed, &bytes[4.min(bytes.len())..].to_vec()] {
+                prop_assert!(*other == bytes || decoded(&tables, &sequence, other) != mine);
+            }
+            prop_assert!(SymbolReader::new(&[bytes.as_slice(), &[1]].concat()).is_none());
+        }
+
+        /// But for a table's first symbol, which an empty coder codes as nothing.
+        #[test]
+        fn symbols_left_over_are_noticed(sequence in sequences(), pick in any::<prop::sample::Index>()) {
+            let last = sequence[pick.index(sequence.len())];
+            let longer = [sequence.as_slice(), &[last]].concat();
+            let tables = tables_of(&longer);
+            let first = table(&tables, last.0).symbols[0] == last.1;
+            let bytes = encoded(&tables, &longer);
+            let (_, exhausted) = decoded(&tables, &sequence, &bytes).unwrap();
+            prop_assert_eq!(exhausted, first);
+        }
+
+        #[test]
+        fn any_bytes_are_tables_or_not(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+            if let Some(tables) = Tables::read(&bytes, STREAMS) {
+                prop_assert_eq!(Tables::read(&tables.write(), STREAMS).unwrap().map, tables.map);
+            }
+        }
+    }
+
+    #[test]
+    fn a_lone_symbol_costs_nothing() {
+        let sequence = vec![(7, 500_u16); 10_000];
+        let tables = tables_of(&sequence);
+        assert_eq!(table(&tables, 7).bits(500), 0.0);
+        let bytes = encoded(&tables, &sequence);
+        assert!(bytes.is_empty());
+        assert_eq!(decoded(&tables, &sequence, &bytes), Some((vec![500; 10_000], true)));
+    }
+
+    #[test]
+    fn nothing_at_all_has_tables() {
+        let tables = tables_of(&[]);
+        let read = Tables::read(&tables.write(), STREAMS).unwrap();
+        assert!((0..STREAMS * CONTEXTS).all(|c| read.table(c / CONTEXTS, c % CONTEXTS).is_none()));
+    }
+
+    #[test]
+    fn contexts_that_look_alike_share_a_table() {
+        let fair = (0..4000).map(|i: u16| (usize::from(i % 2), i / 2 % 4));
+        let lopsided = (0..4000).map(|i: u16| (2, if i.is_multiple_of(50) { 3 } else { 0 }));
+        let tables = tables_of(&fair.chain(lopsided).collect::<Vec<_>>());
+        assert_eq!(tables.map[0], tables.map[1]);
+        assert_ne!(tables.map[0], tables.map[2]);
+        assert!(table(&tables, 2).bits(0) < 0.1 && (table(&tables, 0).bits(0) - 2.0).abs() < 0.1);
     }
 }

@@ -1,10 +1,12 @@
 //! Steps and predictors fitted to a scene.
 
-use super::canonical::{Canonical, Grid};
+use super::canonical::{Canonical, Grid, Placed, canonical};
 use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::maths::Vec3;
+use crate::sensitivity::Sensitivity;
 use crate::sh::C0;
+use crate::splats::Geometry;
 
 /// A weight is at least this share of what nine tenths of all are below: what the views did not see may
 /// yet be seen.
@@ -18,12 +20,15 @@ const FIT_QUANTILE: f64 = 0.05;
 const DERIVATIVE_FLOOR: f64 = 1e-4;
 /// Factors on steps, found by trial: derivatives are those of small errors, and small errors are not
 /// what is made (docs/METHOD.md). Colour, SH values, opacity, scale, rotation, position.
-const DC_FACTOR: f32 = 2.0;
-const VALUE_FACTOR: f32 = 1.28;
+const DC_FACTOR: f32 = 1.6;
+const VALUE_FACTOR: f32 = 1.1;
 const OPACITY_FACTOR: f32 = 1.8;
 const SCALE_FACTOR: f64 = 1.1;
 const ROTATION_FACTOR: f64 = 0.8;
 const POSITION_FACTOR: f64 = 1.12;
+/// Steps of class 0: below, values around 1 have no more digits in f32, and differences too many; above,
+/// everything is as good as unknown.
+const STEPS: [f64; 2] = [1.0 / 16_777_216.0, 1e6];
 /// Keeps the normal equations solvable.
 const RIDGE: f64 = 1e-6;
 
@@ -38,12 +43,13 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    pub(super) fn new(scene: &[Canonical], grid: &Grid) -> Self {
-        let (colour, colour_unit) = classes(scene.iter().map(|g| g.weights[0]));
-        let (shape, shape_unit) = classes(scene.iter().map(|g| g.weights[1]));
+    /// `scene` is the order of the Gaussians of `geometry`.
+    pub(super) fn new(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[Placed], grid: &Grid) -> Self {
+        let (colour, colour_unit) = classes(scene.iter().map(|g| sensitivity.colour[g.index()]));
+        let (shape, shape_unit) = classes(scene.iter().map(|g| sensitivity.opacity[g.index()]));
         let classes: Vec<[u8; 2]> = colour.into_iter().zip(shape).map(|(c, s)| [c, s]).collect();
-        let (dc_mean, dc_axes) = colour_axes(scene);
-        let [scale_rows, rotation, position] = derivatives(scene);
+        let (dc_mean, dc_axes) = colour_axes(geometry, scene);
+        let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
         let mut parameters = Parameters {
             origin: grid.origin,
             cell: grid.cell,
@@ -53,9 +59,9 @@ impl Fit {
                 VALUE_FACTOR / C0,
                 OPACITY_FACTOR,
                 // Scales have no scales before them to depend on: their rows are constants.
-                single(scale_rows[0][0].exp2()),
-                single(scale_rows[1][0].exp2()),
-                single(scale_rows[2][0].exp2()),
+                single(libm::exp2(scale_rows[0][0])),
+                single(libm::exp2(scale_rows[1][0])),
+                single(libm::exp2(scale_rows[2][0])),
             ],
             promised: 0.0,
             rotation: rotation.map(|row| row.map(single)),
@@ -65,14 +71,15 @@ impl Fit {
             means: [0.0; TARGETS],
             predictors: [[0.0; FEATURES]; TARGETS],
         };
-        predictors(scene, &classes, &mut parameters);
+        predictors(geometry, scene, &classes, &mut parameters);
         Self { parameters, classes, units: [colour_unit, shape_unit] }
     }
 
     /// The parameters for an overall step: about the square root of the mean squared error of pictures
     /// that one value of one Gaussian may make.
     pub(super) fn with_step(&self, step: f64) -> Parameters {
-        Parameters { base: self.units.map(|unit| single(unit * step)), ..self.parameters.clone() }
+        let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
+        Parameters { base: self.units.map(base), ..self.parameters.clone() }
     }
 }
 
@@ -105,12 +112,12 @@ fn classes(weights: impl Iterator<Item = f32>) -> (Vec<u8>, f64) {
 }
 
 /// Mean base colour and its principal axes, strongest first.
-fn colour_axes(scene: &[Canonical]) -> (Vec3, [Vec3; 3]) {
+fn colour_axes(geometry: &Geometry, scene: &[Placed]) -> (Vec3, [Vec3; 3]) {
+    let dc = || scene.iter().map(|g| geometry.dc[g.index()]);
     let n = scene.len().max(1) as f64;
-    let mean: Vec3 =
-        std::array::from_fn(|c| single(scene.iter().map(|g| f64::from(g.dc[c])).sum::<f64>() / n));
+    let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
     let deviations: Vec<f32> =
-        scene.iter().flat_map(|g| std::array::from_fn::<f32, 3, _>(|c| g.dc[c] - mean[c])).collect();
+        dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
     let axes = crate::learn::principal_axes(3, &deviations);
     let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for (row, axis) in out.iter_mut().zip(&axes) {
@@ -121,48 +128,71 @@ fn colour_axes(scene: &[Canonical]) -> (Vec3, [Vec3; 3]) {
 
 /// For scaling, turning and moving along each axis: the binary logarithm of the step, relative to that
 /// of the opacity, as a linear function of 1 and the scales. Scaling depends on nothing.
-fn derivatives(scene: &[Canonical]) -> [[[f64; 4]; 3]; 3] {
-    let weights: Vec<f64> = scene.iter().map(|g| f64::from(g.weights[1])).collect();
+fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[Placed]) -> [[[f64; 4]; 3]; 3] {
+    let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
     let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
-    let factors = [POSITION_FACTOR, SCALE_FACTOR, ROTATION_FACTOR].map(libm::log2);
-    let row = |kind: usize, axis: usize| -> [f64; 4] {
-        let mut equations = Equations::<4>::new();
-        for g in scene.iter().filter(|g| f64::from(g.weights[1]) > least) {
-            let by_opacity = f64::from(g.weights[1]);
+    let mut equations: [[Equations<4>; 3]; 3] =
+        std::array::from_fn(|_| std::array::from_fn(|_| Equations::new()));
+    for placed in scene.iter().filter(|g| weights[g.index()] > least) {
+        let by_opacity = weights[placed.index()];
+        let g = canonical(geometry, placed.index());
+        let by_axis = by_axis(sensitivity, placed.index(), &g);
+        let scales = g.scales.map(f64::from);
+        for (kind, equations) in equations.iter_mut().enumerate() {
             // Positions are measured in standard deviations for the floor.
-            let unit = if kind == 0 { libm::exp(-2.0 * f64::from(g.scales[0])) } else { 1.0 };
-            let by_axis = f64::from(g.by_axis[kind][axis].max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
-            let scales = if kind == 1 { [0.0; 3] } else { g.scales.map(f64::from) };
-            equations.add(
-                [1.0, scales[0], scales[1], scales[2]],
-                -0.5 * libm::log2(by_axis / by_opacity),
-                1.0,
-            );
+            let unit = if kind == POSITION { libm::exp(-2.0 * scales[0]) } else { 1.0 };
+            let features = match kind {
+                SCALE => [1.0, 0.0, 0.0, 0.0],
+                _ => [1.0, scales[0], scales[1], scales[2]],
+            };
+            for (by_axis, equations) in by_axis[kind].iter().zip(equations) {
+                let by_axis = f64::from(by_axis.max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
+                equations.add(features, -0.5 * libm::log2(by_axis / by_opacity), 1.0);
+            }
         }
-        let mut row = equations.solve();
-        row[0] += factors[kind];
-        row
+    }
+    let rows = |kind: usize, factor: f64| {
+        std::array::from_fn(|axis| {
+            let mut row: [f64; 4] = equations[kind][axis].solve();
+            row[0] += libm::log2(factor);
+            row
+        })
     };
-    let rows = |kind| std::array::from_fn(|axis| row(kind, axis));
-    [rows(1), rows(2), rows(0)]
+    [rows(SCALE, SCALE_FACTOR), rows(ROTATION, ROTATION_FACTOR), rows(POSITION, POSITION_FACTOR)]
+}
+
+/// Kinds of derivatives by an axis.
+const SCALE: usize = 0;
+const ROTATION: usize = 1;
+const POSITION: usize = 2;
+
+/// Sensitivity of Gaussian `i` to scaling, turning and moving along each of its axes in canonical order.
+fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
+    let p = sensitivity.position[i];
+    let along = |a: Vec3| {
+        p[0] * a[0] * a[0]
+            + p[3] * a[1] * a[1]
+            + p[5] * a[2] * a[2]
+            + 2.0 * (p[1] * a[0] * a[1] + p[2] * a[0] * a[2] + p[4] * a[1] * a[2])
+    };
+    [g.order.map(|k| sensitivity.scale[i][k]), g.order.map(|k| sensitivity.rotation[i][k]), g.axes.map(along)]
 }
 
 /// Fits the predictions to the scene's own values, as if coded without error.
-fn predictors(scene: &[Canonical], classes: &[[u8; 2]], parameters: &mut Parameters) {
-    let values: Vec<[f32; TARGETS]> = scene
-        .iter()
-        .map(|g| {
-            let dc = parameters.dc_coordinates(g.dc);
-            [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
-        })
-        .collect();
-    let n = scene.len().max(1) as f64;
-    for (t, mean) in parameters.means.iter_mut().enumerate() {
-        *mean = single(values.iter().map(|v| f64::from(v[t])).sum::<f64>() / n);
-    }
+fn predictors(geometry: &Geometry, scene: &[Placed], classes: &[[u8; 2]], parameters: &mut Parameters) {
+    let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
+        let dc = parameters.dc_coordinates(g.dc);
+        [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
+    };
+    let mut sums = [0.0_f64; TARGETS];
     let mut equations: [Equations<FEATURES>; TARGETS] = std::array::from_fn(|_| Equations::new());
     let mut neighbours = Neighbours::new();
-    for ((g, values), class) in scene.iter().zip(&values).zip(classes) {
+    for (placed, class) in scene.iter().zip(classes) {
+        let g = canonical(geometry, placed.index());
+        let values = values(&g, parameters);
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += f64::from(value);
+        }
         if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
             for (t, equations) in equations.iter_mut().enumerate() {
                 let known = |k: usize| if t > k { f64::from(values[k]) } else { 0.0 };
@@ -179,9 +209,11 @@ fn predictors(scene: &[Canonical], classes: &[[u8; 2]], parameters: &mut Paramet
             }
         }
         let mut pushed = [0.0; AVERAGES];
-        pushed[..TARGETS].copy_from_slice(values);
+        pushed[..TARGETS].copy_from_slice(&values);
         neighbours.push(g.position, pushed);
     }
+    let n = scene.len().max(1) as f64;
+    parameters.means = sums.map(|sum| single(sum / n));
     for (row, equations) in parameters.predictors.iter_mut().zip(&equations) {
         *row = equations.solve().map(single);
     }

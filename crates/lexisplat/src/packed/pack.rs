@@ -3,7 +3,7 @@
 use half::f16;
 
 use super::CHUNK;
-use super::canonical::{Canonical, Grid, canonical};
+use super::canonical::{Grid, Placed, canonical, placed};
 use super::codebook::{Codebook, Codes, Costs, Until, learn};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
@@ -16,7 +16,7 @@ use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::limits::{Limits, MAX_ATOMS};
 use crate::model::{Layout, Pursuit, Record};
-use crate::parallel::{map_chunks, map_vec};
+use crate::parallel::map_chunks;
 use crate::progress::{Progress, Stage};
 use crate::rng::SplitMix64;
 use crate::sensitivity::Sensitivity;
@@ -45,6 +45,8 @@ const DB_PER_OCTAVE: f64 = 4.5;
 const DB_PER_OCTAVE_2: f64 = 0.15;
 /// Better than this nothing is expected to become.
 const MOST_DB: f64 = 100.0;
+/// A code whose error is above this, the largest f16, is no code, promise or not: the row is stored exactly.
+const MAX_ERROR: f64 = 65_504.0;
 /// Mixed into the seed of the sample.
 const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 
@@ -84,7 +86,7 @@ pub struct PackReport {
 pub struct Packer<'a> {
     splats: &'a Splats,
     options: PackOptions,
-    scene: Vec<Canonical>,
+    scene: Vec<Placed>,
     fit: Fit,
 }
 
@@ -92,14 +94,26 @@ impl<'a> Packer<'a> {
     /// Prepares `splats`, of whose values pictures depend as `sensitivity` says.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values that are not
-    /// finite.
+    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or weights that
+    /// are not finite.
     pub fn new(splats: &'a Splats, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
         splats.validate()?;
         Limits::check("Gaussians", splats.len() as u64, Limits::default().gaussians)?;
-        if sensitivity.len() != splats.len() {
-            let expected = format!("{} entries, one a Gaussian", splats.len());
-            return Err(Error::parameter("sensitivity", sensitivity.len(), expected));
+        let weights = [
+            (sensitivity.colour.len(), sensitivity.colour.as_slice()),
+            (sensitivity.opacity.len(), &sensitivity.opacity),
+            (sensitivity.position.len(), sensitivity.position.as_flattened()),
+            (sensitivity.scale.len(), sensitivity.scale.as_flattened()),
+            (sensitivity.rotation.len(), sensitivity.rotation.as_flattened()),
+        ];
+        for (len, values) in weights {
+            if len != splats.len() {
+                let expected = format!("{} entries, one a Gaussian", splats.len());
+                return Err(Error::parameter("sensitivity", len, expected));
+            }
+            if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+                return Err(Error::parameter("sensitivity", value, "finite values"));
+            }
         }
         if let Some(atoms) = options.atoms
             && !(1..=MAX_ATOMS).contains(&atoms)
@@ -126,8 +140,8 @@ impl<'a> Packer<'a> {
             }
         }
         let grid = Grid::fit(&g.positions);
-        let scene = canonical(splats, sensitivity, &grid);
-        let fit = Fit::new(&scene, &grid);
+        let scene = placed(g, &grid);
+        let fit = Fit::new(g, sensitivity, &scene, &grid);
         Ok(Self { splats, options: options.clone(), scene, fit })
     }
 
@@ -158,7 +172,8 @@ impl<'a> Packer<'a> {
     /// value of each Gaussian may make on its own. Half the step is about 5 dB better.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `step` is not finite and above 0.
+    /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
+    /// leave f32.
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, PackReport)> {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
@@ -167,7 +182,11 @@ impl<'a> Packer<'a> {
         let mut parameters = self.fit.with_step(step);
         #[expect(clippy::cast_possible_truncation, reason = "a step is f32")]
         if let Some(tol) = self.options.tolerance {
-            parameters.promised = (tol * VALUE_STEP_PER_TOLERANCE) as f32;
+            let step = tol * VALUE_STEP_PER_TOLERANCE;
+            parameters.promised = step.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32;
+        }
+        if Parameters::from_list(&parameters.to_list()).is_none() {
+            return Err(too_large());
         }
         let degree = self.splats.degree;
         let dim = degree.rest();
@@ -176,7 +195,7 @@ impl<'a> Packer<'a> {
             Some(_) => Until::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE),
             None => Until::Balanced,
         };
-        let mut recorders = vec![Recorder::default()];
+        let mut first = Recorder::default();
         let mut dictionary = Dictionary::empty();
         let mut codes = None;
         let mut atom_bits = 0;
@@ -184,7 +203,7 @@ impl<'a> Packer<'a> {
             let (rows, costs) = self.learn(&parameters, until, progress);
             atom_bits = self.atom_bits(&rows, &costs, &parameters, until);
             let atoms = rows.len() / dim;
-            let rounded = dictionary_walk(&mut recorders[0], degree, atoms, atom_bits, Some(&rows));
+            let rounded = dictionary_walk(&mut first, degree, atoms, atom_bits, Some(&rows));
             dictionary = Dictionary::new(degree, rounded.clone())?;
             let book = Codebook::new(dim, rounded, costs);
             codes = Some(self.code(&book, &parameters, until, progress));
@@ -192,18 +211,29 @@ impl<'a> Packer<'a> {
             // A scene without Gaussians still needs one atom to be valid.
             let mut atom = vec![0.0; dim];
             atom[0] = 1.0;
-            let rounded = dictionary_walk(&mut recorders[0], degree, 1, 0, Some(&atom));
+            let rounded = dictionary_walk(&mut first, degree, 1, 0, Some(&atom));
             dictionary = Dictionary::new(degree, rounded)?;
         }
         let learn_seconds = clock.seconds();
         let clock = Stopwatch::start();
-        let chunks = map_chunks(self.scene.len(), CHUNK, |range| {
-            self.chunk(range, &parameters, &dictionary, codes.as_ref())
+        // Twice: once to count what the tables are made of, once to code. To keep all symbols in between
+        // would take more memory than the scene's geometry.
+        let n = self.scene.len();
+        let record = |range| self.chunk(range, &parameters, &dictionary, codes.as_ref());
+        let chunks = map_chunks(n, CHUNK, |range| {
+            let mut chunk = record(range);
+            let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
+            std::mem::take(&mut chunk.recorder).count(&mut histograms);
+            (chunk, histograms)
         });
         let mut histogram = vec![0_u64; dim + 1];
         let (mut escapes, mut max_error, mut squared, mut nonzeros) = (0_u64, 0.0_f64, 0.0_f64, 0_u64);
-        for chunk in chunks {
-            recorders.push(chunk.recorder);
+        let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
+        first.count(&mut histograms);
+        for (chunk, counted) in chunks {
+            for (sum, histogram) in histograms.iter_mut().zip(&counted) {
+                sum.merge(histogram);
+            }
             for (a, b) in histogram.iter_mut().zip(&chunk.histogram) {
                 *a += b;
             }
@@ -211,14 +241,14 @@ impl<'a> Packer<'a> {
             max_error = max_error.max(chunk.max_error);
             squared += chunk.squared_error;
             nonzeros += chunk.nonzeros;
-        }
-        let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
-        for recorder in &recorders {
-            recorder.count(&mut histograms);
+            if chunk.impossible {
+                return Err(too_large());
+            }
         }
         let tables =
             Tables::new(&histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
-        let parts = map_vec(recorders, |recorder| recorder.finish(&tables));
+        let mut parts = vec![first.finish(&tables)];
+        parts.extend(map_chunks(n, CHUNK, |range| record(range).recorder.finish(&tables)));
         let mut lengths = Vec::with_capacity(2 * parts.len());
         let mut data = Vec::new();
         for part in parts.iter().flatten() {
@@ -228,7 +258,6 @@ impl<'a> Packer<'a> {
             );
             data.extend_from_slice(part);
         }
-        let n = self.scene.len();
         let count = n.max(1) as f64;
         let packed = Packed {
             degree,
@@ -265,7 +294,7 @@ impl<'a> Packer<'a> {
     }
 
     fn row(&self, i: usize) -> &[f32] {
-        self.splats.rest(self.scene[i].source as usize)
+        self.splats.rest(self.scene[i].index())
     }
 
     /// The rows of Gaussians `range` in units of their value steps, appended to `out`.
@@ -359,7 +388,8 @@ impl<'a> Packer<'a> {
         let mut values: Vec<(u16, f16)> = Vec::new();
         let mut rebuilt = vec![0.0_f32; dim];
         for i in range.clone() {
-            let g = &self.scene[i];
+            let placed = self.scene[i];
+            let g = canonical(&self.splats.geometry, placed.index());
             let classes = self.fit.classes[i];
             let row = self.row(i);
             let mut code = Code::Atoms(codes.map_or(&[], |c| c.row(i - range.start)));
@@ -372,7 +402,8 @@ impl<'a> Packer<'a> {
                 let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
                 let error = squares.sum::<f64>().sqrt();
                 let storable = values.iter().all(|v| v.1.is_finite());
-                if !storable || self.options.tolerance.is_some_and(|tol| error > tol) {
+                let most = self.options.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR);
+                if !storable || error > most {
                     code = Code::Exact(row);
                     chunk.escapes += 1;
                 } else {
@@ -383,7 +414,7 @@ impl<'a> Packer<'a> {
                 }
             }
             let target = Target {
-                cell: g.cell,
+                cell: placed.cell,
                 classes,
                 scales: g.scales,
                 axes: g.axes,
@@ -392,8 +423,7 @@ impl<'a> Packer<'a> {
                 dc: parameters.dc_coordinates(g.dc),
                 code,
             };
-            // The encoder's values are all possible ones.
-            let _ = walk.step(&mut chunk.recorder, Some(&target));
+            chunk.impossible |= walk.step(&mut chunk.recorder, Some(&target)).is_none();
         }
         chunk
     }
@@ -401,8 +431,8 @@ impl<'a> Packer<'a> {
     fn extras(&self) -> Vec<crate::splats::Extra> {
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
-            fn reorder<T: Copy>(values: &mut Vec<T>, scene: &[Canonical]) {
-                *values = scene.iter().map(|g| values[g.source as usize]).collect();
+            fn reorder<T: Copy>(values: &mut Vec<T>, scene: &[Placed]) {
+                *values = scene.iter().map(|g| values[g.index()]).collect();
             }
             for_extra!(&mut extra.values, v => reorder(v, &self.scene));
         }
@@ -419,6 +449,12 @@ struct Chunk {
     max_error: f64,
     squared_error: f64,
     nonzeros: u64,
+    /// A decoder would refuse it.
+    impossible: bool,
+}
+
+fn too_large() -> Error {
+    Error::parameter("values", "too large", "positions and colours whose sums f32 can hold")
 }
 
 /// Atoms to start learning from: principal axes, then rows of the sample.

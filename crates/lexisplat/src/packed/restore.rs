@@ -1,16 +1,27 @@
 //! Unpacked Gaussians back in the order of their source.
 
 use crate::codes::{Escapes, Indices, SparseCodes, Values};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::splats::for_extra;
 
-/// `model` with Gaussian k moved to `order[k]`. `order` is a permutation.
-pub(super) fn restored(model: Model, order: &[u32]) -> Result<Model> {
-    let mut from = vec![0_usize; order.len()];
+/// For each Gaussian of the source where in the file it is; `None` if `order` is not a permutation.
+fn sources(model: &Model, order: &[u32]) -> Option<Vec<usize>> {
+    let mut from = vec![usize::MAX; model.len()];
     for (k, &source) in order.iter().enumerate() {
-        from[source as usize] = k;
+        let slot = from.get_mut(source as usize)?;
+        if *slot != usize::MAX {
+            return None;
+        }
+        *slot = k;
     }
+    (order.len() == model.len()).then_some(from)
+}
+
+/// `model` with Gaussian k moved to `order[k]`.
+pub(super) fn restored(model: Model, order: &[u32]) -> Result<Model> {
+    let from = sources(&model, order)
+        .ok_or_else(|| Error::parameter("packed", "order", "a permutation of the Gaussians"))?;
     let Model { mut geometry, meta, dictionary, codes, record } = model;
     let g = &mut geometry;
     gather(&mut g.positions, &from);

@@ -98,14 +98,19 @@ fn bad(what: &str) -> Error {
     Error::parameter("packed", what, "what the encoder writes")
 }
 
-/// One chunk, decoded.
+/// Where a chunk's geometry goes.
+struct Place<'a> {
+    positions: &'a mut [Vec3],
+    dc: &'a mut [Vec3],
+    opacities: &'a mut [f32],
+    scales: &'a mut [Vec3],
+    rotations: &'a mut [[f32; 4]],
+    /// Nonzeros of each Gaussian.
+    counts: &'a mut [u8],
+}
+
+/// The rest of a chunk: what is not of one length for every Gaussian.
 struct Piece {
-    positions: Vec<Vec3>,
-    dc: Vec<Vec3>,
-    opacities: Vec<f32>,
-    scales: Vec<Vec3>,
-    rotations: Vec<[f32; 4]>,
-    counts: Vec<u8>,
     atoms: Vec<u16>,
     values: Vec<f16>,
     escaped: Vec<u32>,
@@ -120,6 +125,7 @@ impl Packed {
     /// [`Error::Parameter`] naming the part that is not as it should be.
     pub fn unpack(&self) -> Result<Model> {
         let model = self.decode(false)?.0;
+        model.geometry.validate()?;
         match &self.order {
             Some(order) => super::restore::restored(model, order),
             None => Ok(model),
@@ -187,33 +193,49 @@ impl Packed {
         let (dictionary, bits) =
             self.dictionary(&tables, parts[0], parts[1], count_bits).ok_or_else(|| bad("dictionary"))?;
         add(&bits);
-        let work: Vec<(usize, &[u8], &[u8])> =
-            (0..chunks).map(|c| (c, parts[2 * c + 2], parts[2 * c + 3])).collect();
-        let pieces = map_vec(work, |(c, symbols, raw)| {
-            let count = CHUNK.min(self.gaussians - c * CHUNK);
+        let n = self.gaussians;
+        let mut model = self.empty_model(dictionary)?;
+        let g = &mut model.geometry;
+        g.positions = vec![[0.0; 3]; n];
+        g.dc = vec![[0.0; 3]; n];
+        g.opacities = vec![0.0; n];
+        g.scales = vec![[0.0; 3]; n];
+        g.rotations = vec![[0.0; 4]; n];
+        let mut counts = vec![0; n];
+        // Chunks write straight to where they belong, so that a scene is in memory once.
+        let places = g
+            .positions
+            .chunks_mut(CHUNK)
+            .zip(g.dc.chunks_mut(CHUNK))
+            .zip(g.opacities.chunks_mut(CHUNK))
+            .zip(g.scales.chunks_mut(CHUNK))
+            .zip(g.rotations.chunks_mut(CHUNK))
+            .zip(counts.chunks_mut(CHUNK))
+            .map(|(((((positions, dc), opacities), scales), rotations), counts)| Place {
+                positions,
+                dc,
+                opacities,
+                scales,
+                rotations,
+                counts,
+            });
+        let work: Vec<(usize, &[u8], &[u8], Place<'_>)> =
+            (0..chunks).zip(places).map(|(c, p)| (c, parts[2 * c + 2], parts[2 * c + 3], p)).collect();
+        let pieces = map_vec(work, |(c, symbols, raw, place)| {
             let mut player = Player::new(&tables, symbols, raw)?;
             player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-            piece(&parameters, &dictionary, player, c * CHUNK, count)
+            piece(&parameters, &model.dictionary, player, c * CHUNK, place)
         });
-        let mut model = self.empty_model(dictionary)?;
-        let mut codes = (Vec::new(), Vec::new(), Vec::new());
+        let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
         for (c, piece) in pieces.into_iter().enumerate() {
             let piece = piece.ok_or_else(|| bad(&format!("chunk {c}")))?;
             add(&piece.spent);
-            let g = &mut model.geometry;
-            g.positions.extend(piece.positions);
-            g.dc.extend(piece.dc);
-            g.opacities.extend(piece.opacities);
-            g.scales.extend(piece.scales);
-            g.rotations.extend(piece.rotations);
-            codes.0.extend(piece.counts);
-            codes.1.extend(piece.atoms);
-            codes.2.extend(piece.values);
+            atoms.extend(piece.atoms);
+            values.extend(piece.values);
             escapes.gaussians.extend(piece.escaped);
             escapes.rows.extend(piece.rows);
         }
-        let (counts, atoms, values) = codes;
         let indices = if model.dictionary.len() <= 256 {
             Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
         } else {
@@ -298,41 +320,31 @@ pub(super) fn dictionary_walk<S: Symbols>(
     rows
 }
 
+/// Decodes the chunk whose first Gaussian is number `first`.
 fn piece(
     parameters: &Parameters,
     dictionary: &Dictionary,
     mut player: Player<'_>,
     first: usize,
-    count: usize,
+    place: Place<'_>,
 ) -> Option<Piece> {
-    let mut piece = Piece {
-        positions: Vec::with_capacity(count),
-        dc: Vec::with_capacity(count),
-        opacities: Vec::with_capacity(count),
-        scales: Vec::with_capacity(count),
-        rotations: Vec::with_capacity(count),
-        counts: Vec::with_capacity(count),
-        atoms: Vec::new(),
-        values: Vec::new(),
-        escaped: Vec::new(),
-        rows: Vec::new(),
-        spent: None,
-    };
+    let mut piece =
+        Piece { atoms: Vec::new(), values: Vec::new(), escaped: Vec::new(), rows: Vec::new(), spent: None };
     let mut walk = Walk::new(parameters, dictionary.dim());
     let mut code = Vec::with_capacity(dictionary.dim());
-    for i in 0..count {
+    for i in 0..place.counts.len() {
         let decoded = walk.step(&mut player, None)?;
-        piece.positions.push(decoded.position);
-        piece.dc.push(decoded.dc);
-        piece.opacities.push(decoded.opacity);
-        piece.scales.push(decoded.scales);
-        piece.rotations.push(decoded.rotation);
+        place.positions[i] = decoded.position;
+        place.dc[i] = decoded.dc;
+        place.opacities[i] = decoded.opacity;
+        place.scales[i] = decoded.scales;
+        place.rotations[i] = decoded.rotation;
         if !walk.exact.is_empty() {
             piece.escaped.push(u32::try_from(first + i).ok()?);
             piece.rows.extend_from_slice(&walk.exact);
         }
         resident(&walk.code, parameters.value_step(decoded.colour_class), &mut code);
-        piece.counts.push(u8::try_from(code.len()).ok()?);
+        place.counts[i] = u8::try_from(code.len()).ok()?;
         for &(atom, value) in &code {
             if usize::from(atom) >= dictionary.len() || !value.is_finite() {
                 return None;

@@ -11,6 +11,7 @@ use lexisplat::{
     Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Pursuit, Record, SceneMeta,
     ShDegree, SparseCodes, Values,
 };
+use serde_json::Value;
 
 /// A number in a small range, exact in f16, from an index: no library decides what the files hold.
 pub fn plain(i: usize) -> f32 {
@@ -107,4 +108,40 @@ pub fn written(model: &Model) -> Vec<u8> {
     let mut bytes = Vec::new();
     lexisplat::lexi::write_to(&mut bytes, model).unwrap();
     bytes
+}
+
+/// A file of `header` and `data` with all checksums made to fit again, as far as the header allows.
+pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
+    let range = |entry: &Value| -> Option<std::ops::Range<usize>> {
+        let offsets = entry.get("data_offsets")?;
+        let at = |i: usize| usize::try_from(offsets.get(i)?.as_u64()?).ok();
+        Some(at(0)?..at(1)?)
+    };
+    let mut sums = serde_json::Map::new();
+    let mut own = None;
+    for (name, entry) in header.as_object().unwrap() {
+        if name == "checksum.header" {
+            own = range(entry);
+        } else if name != "__metadata__"
+            && let Some(bytes) = range(entry).and_then(|r| data.get(r))
+        {
+            sums.insert(name.clone(), Value::String(format!("{:08x}", crc32fast::hash(bytes))));
+        }
+    }
+    if let Some(slot) = header.get_mut("__metadata__").and_then(|m| m.get_mut("checksums"))
+        && slot.is_string()
+    {
+        *slot = Value::String(Value::Object(sums).to_string());
+    }
+    let text = header.to_string();
+    let mut out = (text.len() as u64).to_le_bytes().to_vec();
+    out.extend_from_slice(text.as_bytes());
+    let sum = crc32fast::hash(&out).to_le_bytes();
+    if let Some(slot) = own.and_then(|r| data.get_mut(r))
+        && slot.len() == sum.len()
+    {
+        slot.copy_from_slice(&sum);
+    }
+    out.extend_from_slice(data);
+    out
 }

@@ -1,0 +1,11 @@
+//! The packed form: what comes back, what is promised, odd scenes, and what is refused.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod convergence;
+mod odd;
+mod order;
+mod promises;
+mod refusals;
+mod round_trips;
+mod support;

@@ -1,0 +1,141 @@
+//! Pack, write, read, unpack: the same every way, whatever the degree and the number of Gaussians.
+
+use lexisplat::lexi::Contents;
+use lexisplat::packed::{CHUNK, PackOptions, Packed, Promise};
+use lexisplat::{Layout, Limits, Splats, lexi};
+
+use crate::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
+
+/// Every way to read `packed` gives it back.
+fn assert_travels(packed: &Packed, what: &str) {
+    let bytes = bytes(packed);
+    let read = lexi::open_bytes("p.lexi", &bytes, &Limits::default()).unwrap();
+    assert_eq!(read, Contents::Packed(packed.clone()), "{what}");
+    let model = lexi::read_bytes("p.lexi", &bytes, &Limits::default()).unwrap();
+    assert_eq!(model, packed.unpack().unwrap(), "{what}");
+    assert_eq!((model.len(), model.degree()), (packed.gaussians, packed.degree), "{what}");
+    assert_eq!((&model.meta, &model.record), (&packed.meta, &packed.record), "{what}");
+    assert_eq!(model.record.layout, Layout::Packed, "{what}");
+    assert_eq!(packed.unpack_dictionary().unwrap(), model.dictionary, "{what}");
+    assert_eq!(lexi::packed_bytes(packed), bytes.len() as u64, "{what}");
+    let listed: u64 = lexi::packed_tensor_bytes(packed).iter().map(|t| t.1).sum();
+    assert_eq!(listed, bytes.len() as u64, "{what}");
+}
+
+#[test]
+fn every_degree_travels() {
+    for degree in 0..=4 {
+        for tolerance in [None, Some(0.1)] {
+            let splats = with_extras(sample(700, 1, degree));
+            let (packed, report) = pack(&splats, STEP, &options(|o| o.tolerance = tolerance));
+            assert_travels(&packed, &format!("degree {degree}, {tolerance:?}"));
+            assert_eq!(packed.degree.get(), degree);
+            assert_eq!(packed.atoms == 0, degree == 0);
+            let counted: u64 = report.nonzero_histogram.iter().sum();
+            assert_eq!(counted + report.escapes, if degree == 0 { 0 } else { 700 });
+        }
+    }
+}
+
+#[test]
+fn a_file_holds_comments_marks_and_promise() {
+    let mut splats = with_extras(sample(90, 2, 1));
+    splats.meta.comments = vec!["made by \"hand\"".to_owned(), String::new(), "größer".to_owned()];
+    splats.meta.antialiased = true;
+    let (mut packed, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
+    packed.promise = Some(Promise::new("min-psnr", 38.5, [41.127, 38.507], 18, true));
+    assert_travels(&packed, "everything");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.lexi");
+    let written = lexi::write_packed(&path, &packed).unwrap();
+    assert_eq!(std::fs::read(&path).unwrap(), bytes(&packed));
+    assert_eq!(written, lexi::packed_bytes(&packed));
+    let Contents::Packed(read) = lexi::open(&path, &Limits::default()).unwrap() else {
+        panic!("it is packed");
+    };
+    assert_eq!((&read.meta, &read.promise), (&splats.meta, &packed.promise));
+    assert_eq!(lexi::read(&path, &Limits::default()).unwrap().meta, splats.meta);
+}
+
+#[test]
+fn hardly_any_gaussians_travel() {
+    for count in [0, 1, 2, 3] {
+        for degree in [0, 1, 3] {
+            for tolerance in [None, Some(0.01)] {
+                let what = format!("{count} of degree {degree}, {tolerance:?}");
+                let splats = with_extras(sample(count, 3, degree));
+                let options = options(|o| {
+                    o.keep_order = true;
+                    o.tolerance = tolerance;
+                });
+                let (packed, _) = pack(&splats, STEP, &options);
+                assert_travels(&packed, &what);
+                let back = packed.unpack().unwrap().into_splats();
+                assert_eq!((back.len(), &back.geometry.extras), (count, &splats.geometry.extras), "{what}");
+                assert!(row_errors(&splats, &back).iter().all(|&e| e < 0.01), "{what}");
+            }
+        }
+    }
+}
+
+/// More than a chunk: the second one is decoded without the first, and order and extras run through both.
+#[test]
+fn more_than_a_chunk_travels() {
+    let splats = with_extras(sample(40_000, 4, 1));
+    assert!(splats.len() > CHUNK);
+    let (packed, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
+    assert_travels(&packed, "two chunks");
+    assert_eq!(packed.lengths.len(), 6);
+    let back = packed.unpack().unwrap().into_splats();
+    assert_eq!(back.geometry.extras, splats.geometry.extras);
+    let worst = row_errors(&splats, &back).into_iter().fold(0.0, f64::max);
+    assert!((worst - packed.record.max_residual).abs() < 1e-12);
+}
+
+fn packed_on(threads: usize, splats: &Splats, options: &PackOptions) -> Vec<u8> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    pool.install(|| bytes(&pack(splats, STEP, options).0))
+}
+
+#[test]
+fn threads_change_neither_bytes_nor_scenes() {
+    // Two chunks for the walk, many for the codes.
+    let splats = sample(33_500, 5, 1);
+    let options = options(|o| o.tolerance = Some(0.1));
+    let one = packed_on(1, &splats, &options);
+    assert!(packed_on(1, &splats, &options) == one, "the second time");
+    for threads in [2, 7] {
+        assert!(packed_on(threads, &splats, &options) == one, "{threads} threads");
+    }
+    let read_on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| lexi::read_bytes("p.lexi", &one, &Limits::default()).unwrap())
+    };
+    assert_eq!(read_on(1), read_on(7));
+}
+
+#[test]
+fn another_seed_is_another_file_of_the_same_scene() {
+    let splats = sample(2000, 6, 3);
+    let make = |seed| pack(&splats, STEP, &options(|o| o.seed = seed)).0;
+    let (one, other) = (make(1), make(2));
+    assert_travels(&other, "seed 2");
+    assert_ne!(one.data, other.data, "the seed decides what is learned from");
+    let geometry = |packed: &Packed| packed.unpack().unwrap().geometry;
+    assert_eq!(geometry(&one), geometry(&other), "and nothing else");
+}
+
+#[test]
+fn streams_sum_to_the_data() {
+    for (count, degree) in [(0, 3), (1, 3), (3000, 3), (900, 0)] {
+        let (packed, _) = pack(&sample(count, 7, degree), STEP, &PackOptions::default());
+        let streams = packed.stream_bits().unwrap();
+        assert_eq!(streams.len(), 18);
+        assert!(streams.iter().all(|s| s.bits >= 0.0));
+        let sum: f64 = streams.iter().map(|s| s.bits).sum();
+        let data = packed.data.len() as f64 * 8.0;
+        // A part of symbols ends with a whole word and may begin with one, a part of bits with a byte.
+        let parts = packed.lengths.iter().filter(|&&l| l > 0).count() as f64;
+        assert!((sum..=sum + 64.0 * parts + 1.0).contains(&data), "{count}: {sum} bits, {data} written");
+    }
+}

@@ -1,0 +1,163 @@
+//! Packed files written by released versions decode to the same bits, on every machine.
+//!
+//! Nothing is packed here but by hand, so a better encoder changes nothing.
+
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::path::PathBuf;
+
+use lexisplat::lexi::Contents;
+use lexisplat::packed::{PackOptions, Packed, Packer, Promise};
+use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::{
+    Extra, ExtraValues, Layout, Limits, Model, Sensitivity, ShDegree, Silent, Splats, lexi, ply,
+};
+
+const NAMES: [&str; 3] = ["packed", "packed_degree0", "packed_escapes"];
+
+fn golden(name: &str, kind: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.{kind}")].iter().collect()
+}
+
+fn opened(name: &str) -> Packed {
+    match lexi::open(&golden(name, "lexi"), &Limits::default()).unwrap() {
+        Contents::Packed(packed) => packed,
+        other => panic!("{name}: {other:?}"),
+    }
+}
+
+fn decoded(name: &str) -> Model {
+    lexi::read(&golden(name, "lexi"), &Limits::default()).unwrap()
+}
+
+fn ply_bytes(splats: &Splats) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    ply::write_to(&mut bytes, splats).unwrap();
+    bytes
+}
+
+fn promise() -> Promise {
+    Promise::new("psnr", 38.5, [38.562, 33.25], 18, false)
+}
+
+/// Makes the golden files of a new format version. Never run it to make a failing test pass.
+#[test]
+#[ignore = "writes tests/golden"]
+fn regenerate() {
+    let pack = |splats: &Splats, change: fn(&mut PackOptions)| {
+        let mut options = PackOptions::default();
+        change(&mut options);
+        let sensitivity = Sensitivity::guess(&splats.geometry);
+        Packer::new(splats, &sensitivity, &options).unwrap().pack(2e-5, &Silent).unwrap()
+    };
+    let write = |name: &str, packed: &Packed| {
+        lexi::write_packed(&golden(name, "lexi"), packed).unwrap();
+        let splats = packed.unpack().unwrap().into_splats();
+        std::fs::write(golden(name, "ply"), ply_bytes(&splats)).unwrap();
+    };
+
+    let mut splats = scene(&SampleOptions::new(300, 1));
+    splats.meta.comments.push("made by \"hand\"".to_owned());
+    splats.meta.antialiased = true;
+    let numbers = 0..300_u16;
+    splats.geometry.extras = vec![
+        Extra {
+            name: "label".to_owned(),
+            values: ExtraValues::U8(numbers.clone().map(|i| i.to_le_bytes()[0]).collect()),
+        },
+        Extra { name: "time".to_owned(), values: ExtraValues::F32(numbers.map(f32::from).collect()) },
+    ];
+    let (mut packed, _) = pack(&splats, |o| o.keep_order = true);
+    packed.promise = Some(promise());
+    write("packed", &packed);
+
+    let splats = scene(&SampleOptions::new(40, 2)).with_degree_cut(ShDegree::ZERO);
+    write("packed_degree0", &pack(&splats, |o| o.seed = 7).0);
+
+    let mut splats = scene(&SampleOptions::new(80, 3)).with_degree_cut(ShDegree::ONE);
+    for row in splats.sh_rest.chunks_exact_mut(9).step_by(32) {
+        row.fill(1e6);
+    }
+    let (packed, report) = pack(&splats, |o| o.tolerance = Some(0.05));
+    assert!(report.escapes >= 3 && report.mean_nonzeros > 1.0);
+    write("packed_escapes", &packed);
+}
+
+/// Decoding adds and multiplies f32 and takes the rest from libm, so no bit may differ.
+#[test]
+fn golden_files_decode_bit_for_bit() {
+    for name in NAMES {
+        let expected = std::fs::read(golden(name, "ply")).unwrap();
+        let found = ply_bytes(&decoded(name).into_splats());
+        assert!(found == expected, "{name} decodes to something else: first at {:?}", {
+            found.iter().zip(&expected).position(|(a, b)| a != b)
+        });
+    }
+}
+
+#[test]
+fn golden_files_are_the_same_on_any_number_of_threads() {
+    for name in NAMES {
+        let bytes = std::fs::read(golden(name, "lexi")).unwrap();
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let model = pool.install(|| lexi::read_bytes(name, &bytes, &Limits::default()).unwrap());
+            assert_eq!(model, decoded(name), "{name} on {threads} threads");
+        }
+    }
+}
+
+#[test]
+fn golden_files_say_how_they_were_made() {
+    let (packed, model) = (opened("packed"), decoded("packed"));
+    assert_eq!((packed.gaussians, packed.degree, model.len()), (300, ShDegree::THREE, 300));
+    assert_eq!(packed.promise, Some(promise()));
+    assert_eq!(packed.meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
+    assert!(packed.meta.antialiased && packed.order.is_some() && packed.record.tolerance.is_none());
+    assert_eq!(model.meta, packed.meta);
+    // Back in the source's order they count up again.
+    let [label, time] = model.geometry.extras.as_slice() else { panic!("two extras") };
+    assert_eq!((label.name.as_str(), time.name.as_str()), ("label", "time"));
+    assert_eq!(time.values, ExtraValues::F32((0..300_u16).map(f32::from).collect()));
+
+    let (packed, model) = (opened("packed_degree0"), decoded("packed_degree0"));
+    assert_eq!((packed.gaussians, packed.atoms, packed.record.seed), (40, 0, 7));
+    assert!(packed.promise.is_none() && packed.order.is_none() && model.dictionary.is_empty());
+
+    let (packed, model) = (opened("packed_escapes"), decoded("packed_escapes"));
+    assert_eq!((packed.gaussians, packed.degree), (80, ShDegree::ONE));
+    assert_eq!((packed.record.tolerance, packed.record.over_tolerance), (Some(0.05), 0));
+    assert!((0.01..=0.05).contains(&packed.record.max_residual));
+    let escapes = model.codes.escapes();
+    assert!(escapes.gaussians.len() >= 3 && model.codes.nonzeros() > 80);
+    assert!(escapes.rows.chunks_exact(9).filter(|row| **row == [1e6; 9]).count() == 3);
+
+    for name in NAMES {
+        assert_eq!(decoded(name).record.layout, Layout::Packed, "{name}");
+        let packed = opened(name);
+        assert_eq!(packed.unpack_dictionary().unwrap(), decoded(name).dictionary, "{name}");
+    }
+}
+
+#[test]
+fn their_bytes_are_still_written() {
+    for name in NAMES {
+        let mut bytes = Vec::new();
+        lexi::write_packed_to(&mut bytes, &opened(name)).unwrap();
+        assert!(bytes == std::fs::read(golden(name, "lexi")).unwrap(), "{name} is written differently now");
+    }
+}
+
+#[test]
+fn other_readers_of_safetensors_take_them() {
+    for name in NAMES {
+        let bytes = std::fs::read(golden(name, "lexi")).unwrap();
+        let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+        for (tensor, view) in tensors.iter() {
+            let size = view.dtype().bitsize() / 8;
+            let offset = view.data().as_ptr() as usize - bytes.as_ptr() as usize;
+            assert!(offset.is_multiple_of(size), "{name}: {tensor} is not aligned to its entries");
+        }
+        assert_eq!(tensors.tensor("packed.data").unwrap().data(), opened(name).data, "{name}");
+    }
+}

@@ -1,0 +1,56 @@
+//! Small packed files of every kind.
+
+use lexisplat::packed::{PackOptions, Packer, Promise};
+use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::{Extra, ExtraValues, Geometry, SceneMeta, Sensitivity, ShDegree, Silent, Splats, lexi};
+
+fn packed(splats: &Splats, step: f64, change: fn(&mut PackOptions), promise: Option<Promise>) -> Vec<u8> {
+    let mut options = PackOptions::default();
+    change(&mut options);
+    let sensitivity = Sensitivity::guess(&splats.geometry);
+    let packer = Packer::new(splats, &sensitivity, &options).unwrap();
+    let (mut packed, _) = packer.pack(step, &Silent).unwrap();
+    packed.promise = promise;
+    let mut bytes = Vec::new();
+    lexi::write_packed_to(&mut bytes, &packed).unwrap();
+    bytes
+}
+
+/// Of 60 Gaussians or fewer, by name.
+pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
+    let mut rich = scene(&SampleOptions::new(60, 1)).with_degree_cut(ShDegree::ONE);
+    rich.geometry.extras =
+        vec![Extra { name: "label".to_owned(), values: ExtraValues::U8((0..60).collect()) }];
+    rich.sh_rest[90..99].fill(1e6);
+    let promise = Promise::new("size", 3000.0, [31.5, 25.0], 18, false);
+    let change = |o: &mut PackOptions| {
+        o.tolerance = Some(0.05);
+        o.keep_order = true;
+    };
+    let plain = scene(&SampleOptions::new(60, 2));
+    let flat = plain.with_degree_cut(ShDegree::ZERO);
+    let one = scene(&SampleOptions::new(1, 4)).with_degree_cut(ShDegree::ZERO);
+    vec![
+        ("rich", packed(&rich, 1e-4, change, Some(promise))),
+        ("plain", packed(&plain, 1e-4, |_| (), None)),
+        ("flat", packed(&flat, 1e-3, |_| (), None)),
+        // Where one wrong value does not make all that follow it garbage, which would be refused anyway.
+        ("pair", packed(&scene(&SampleOptions::new(2, 3)), 1e-3, |_| (), None)),
+        ("one", packed(&one, 1e-3, |_| (), None)),
+    ]
+}
+
+/// One Gaussian again and again.
+pub(crate) fn copies(count: usize) -> Vec<u8> {
+    let one = scene(&SampleOptions::new(1, 1)).geometry;
+    let geometry = Geometry {
+        positions: one.positions.repeat(count),
+        dc: one.dc.repeat(count),
+        opacities: one.opacities.repeat(count),
+        scales: one.scales.repeat(count),
+        rotations: one.rotations.repeat(count),
+        ..Geometry::default()
+    };
+    let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() };
+    packed(&splats, 1e300, |_| (), None)
+}

@@ -1,0 +1,174 @@
+//! Ways to change a packed file that leave its container whole.
+
+use serde_json::Value;
+
+use crate::common::reseal;
+
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn below(&mut self, bound: usize) -> usize {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        usize::try_from(self.0 >> 33).unwrap() % bound
+    }
+
+    fn byte(&mut self) -> u8 {
+        u8::try_from(self.below(256)).unwrap()
+    }
+}
+
+/// A file as its parts, which can be changed and put together again.
+pub(crate) struct Parts {
+    pub(crate) metadata: serde_json::Map<String, Value>,
+    /// Name, type, shape and bytes of each tensor.
+    tensors: Vec<(String, Value, Value, Vec<u8>)>,
+}
+
+impl Parts {
+    pub(crate) fn of(bytes: &[u8]) -> Self {
+        let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk().unwrap())).unwrap();
+        let header: Value = serde_json::from_slice(&bytes[8..8 + length]).unwrap();
+        let data = &bytes[8 + length..];
+        let mut entries = header.as_object().unwrap().clone();
+        let metadata = entries.remove("__metadata__").unwrap().as_object().unwrap().clone();
+        let tensor = |(name, entry): (String, Value)| {
+            let at = |i: usize| usize::try_from(entry["data_offsets"][i].as_u64().unwrap()).unwrap();
+            (name, entry["dtype"].clone(), entry["shape"].clone(), data[at(0)..at(1)].to_vec())
+        };
+        Self { metadata, tensors: entries.into_iter().map(tensor).collect() }
+    }
+
+    /// The file, with offsets and checksums that fit.
+    pub(crate) fn sealed(&self) -> Vec<u8> {
+        let mut header = serde_json::Map::new();
+        let mut data = Vec::new();
+        for (name, dtype, shape, bytes) in &self.tensors {
+            let start = data.len();
+            data.extend_from_slice(bytes);
+            let entry =
+                serde_json::json!({"dtype": dtype, "shape": shape, "data_offsets": [start, data.len()]});
+            header.insert(name.clone(), entry);
+        }
+        header.insert("__metadata__".to_owned(), Value::Object(self.metadata.clone()));
+        reseal(&mut Value::Object(header), &mut data)
+    }
+
+    pub(crate) fn tensor(&mut self, name: &str) -> Option<&mut Vec<u8>> {
+        self.tensors.iter_mut().find(|t| t.0 == name).map(|t| &mut t.3)
+    }
+
+    /// Shapes of lists that were cut or extended.
+    pub(crate) fn fit_shapes(&mut self) {
+        for (_, dtype, shape, bytes) in &mut self.tensors {
+            let size = if matches!(dtype.as_str(), Some("F32" | "U32")) { 4 } else { 1 };
+            bytes.truncate(bytes.len() / size * size);
+            *shape = serde_json::json!([bytes.len() / size]);
+        }
+    }
+}
+
+const TENSORS: [&str; 5] =
+    ["packed.parameters", "packed.lengths", "packed.tables", "packed.data", "packed.order"];
+
+pub(crate) fn change_tensor(parts: &mut Parts, random: &mut Random) {
+    let name = TENSORS[random.below(TENSORS.len())];
+    let Some(bytes) = parts.tensor(name) else { return };
+    let at = random.below(bytes.len().max(1));
+    let several = 1 + random.below(16);
+    let noise: Vec<u8> = (0..4 * several).map(|_| random.byte()).collect();
+    match random.below(9) {
+        0..=2 => bytes.iter_mut().skip(at).take(several).for_each(|b| *b = noise[0]),
+        3 => bytes.iter_mut().skip(at).take(several).for_each(|b| *b ^= 1 << (noise[0] % 8)),
+        4 => bytes.truncate(at),
+        5 => bytes.extend_from_slice(&noise),
+        6 => drop(bytes.splice(at..(at + several).min(bytes.len()), noise)),
+        7 => bytes.fill_with(|| random.byte()),
+        _ => bytes.fill(noise[0]),
+    }
+    if random.below(4) > 0 {
+        parts.fit_shapes();
+    }
+}
+
+/// Steps and predictors become what no encoder fits, one or a few at a time.
+pub(crate) fn change_parameters(parts: &mut Parts, random: &mut Random) {
+    let values =
+        [0.0, -1.0, 1e-45, 1e-30, 1e10, 1e30, -1e30, f32::MAX, f32::MAX, f32::MIN, f32::MIN, f32::NAN];
+    let list = parts.tensor("packed.parameters").unwrap().as_chunks_mut().0;
+    let (together, first) = (random.below(2) == 0, random.below(list.len()));
+    for k in 0..1 + random.below(6) {
+        let at = if together { first + k } else { random.below(list.len()) };
+        let value = values[random.below(values.len())].to_le_bytes();
+        list.iter_mut().skip(at).take(1).for_each(|entry| *entry = value);
+    }
+}
+
+pub(crate) fn change_metadata(parts: &mut Parts, random: &mut Random) {
+    let keys = ["gaussians", "atoms", "atom_bits", "degree", "layout", "version", "promise", "tolerance"];
+    let values = ",0,1,2,3,4,5,14,15,59,61,180,256,1024,1025,4000,32769,4294967294,18446744073709551615,-1,nan,\
+        inf,0.5,f32,paper,packed,null,{},{\"target\":\"psnr\"}";
+    let values: Vec<&str> = values.split(',').map(str::trim).collect();
+    let key = keys[random.below(keys.len())];
+    let value = values[random.below(values.len())];
+    match random.below(4) {
+        0 => {
+            let old = parts.metadata.get(key).and_then(Value::as_str).unwrap_or_default();
+            let cut = old.get(..old.len().saturating_sub(1)).unwrap_or_default().to_owned();
+            parts.metadata.insert(key.to_owned(), Value::from(cut));
+        }
+        1 => drop(parts.metadata.remove(key)),
+        _ => drop(parts.metadata.insert(key.to_owned(), Value::from(value))),
+    }
+}
+
+/// Tables as a reader takes them, of symbols no encoder would count. Those of the dictionary say nothing,
+/// so that it takes no data and the chunk is reached.
+fn made_up_tables(random: &mut Random) -> Vec<u8> {
+    let mut bits: Vec<bool> = Vec::new();
+    let mut put = |count: usize, value: usize| bits.extend((0..count).map(|k| value >> k & 1 == 1));
+    let most = [1, 2, 5, 31][random.below(4)];
+    for stream in 0..18 {
+        let dictionary = stream == 17;
+        let clusters = if dictionary { 1 } else { 1 + random.below(most) };
+        for _ in 0..24 {
+            let changes = random.below(2);
+            put(1, changes);
+            if changes == 1 {
+                put(5, random.below(clusters));
+            }
+        }
+        put(5, clusters);
+        for _ in 0..clusters {
+            let symbols = if dictionary { 1 } else { [1, 2, 2, 3, 17, 135, 136, 137, 1024][random.below(9)] };
+            put(11, symbols);
+            for k in 0..symbols {
+                let last = k + 1 == symbols;
+                let length = if last || random.below(8) == 0 { 1 + random.below(15) } else { 0 };
+                put(4, length);
+                put(length.saturating_sub(1).min(3), random.below(8));
+            }
+        }
+    }
+    let byte = |bits: &[bool]| bits.iter().rev().fold(0, |byte, &bit| byte << 1 | u8::from(bit));
+    bits.chunks(8).map(byte).collect()
+}
+
+/// A file whose symbols are made up, over data that may be nothing but zeros or ones.
+pub(crate) fn make_up(parts: &mut Parts, random: &mut Random) {
+    *parts.tensor("packed.tables").unwrap() = made_up_tables(random);
+    let data = parts.tensor("packed.data").unwrap();
+    let symbols = random.below(data.len() / 4 + 1) * 4;
+    match random.below(4) {
+        0 => data.fill_with(|| random.byte()),
+        1 => data.fill(0),
+        2 => data.fill(0xff),
+        _ => {
+            // The largest integers of either sign differ in their lowest bit.
+            data.fill(0xff);
+            data.iter_mut().skip(symbols).take(1).for_each(|b| *b = 0xfe);
+        }
+    }
+    let lengths = [0, 0, symbols, data.len() - symbols].map(|l| u32::try_from(l).unwrap().to_le_bytes());
+    *parts.tensor("packed.lengths").unwrap() = lengths.concat();
+    parts.fit_shapes();
+}
