@@ -19,21 +19,22 @@ const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
 /// detail; so the share of them with the most detail judges (docs/METHOD.md has the measurements).
 const CANDIDATES: usize = 72;
 const JUDGES: usize = 18;
-/// Their distances: photographers stand 2 to 6 radii away in the scenes measured.
-const JUDGE_DISTANCES: [f64; 2] = [2.0, 6.0];
+/// Their distances.
+const JUDGE_DISTANCES: [f64; 2] = [2.0, 10.0];
 /// Widest picture of given cameras; sharper ones say the same about what shows.
 const MAX_WIDTH: u32 = 480;
 /// Of given cameras at most so many are used, evenly spread.
 const MAX_VIEWS: usize = 150;
-/// One given camera in so many judges; the others say what shows. Judging by the same views would flatter.
-const JUDGE_SHARE: usize = 5;
+/// One given camera in so many judges. All say what shows: that flatters those that judge by less than
+/// 0.1 dB (docs/METHOD.md).
+const JUDGE_SHARE: usize = 2;
 /// Say of the guess that knows no views in [`Sensitivity::temper`]: measured on held-out views
 /// (docs/METHOD.md).
 const GUESS_SHARE: f32 = 0.3;
 /// Identical pictures count as this many decibels, so that means stay numbers.
 const IDENTICAL: f64 = 100.0;
 /// A quality may exceed what was asked by this, in dB, and a size fall short of it by this share.
-const CLOSE_DB: f64 = 0.1;
+const CLOSE_DB: f64 = 0.06;
 const CLOSE_SIZE: f64 = 0.01;
 /// Packings tried at most.
 const MAX_TRIES: usize = 9;
@@ -48,7 +49,7 @@ const MAX_MOVE: f64 = 3.0;
 /// Steps outside of this are useless.
 const STEPS: [f64; 2] = [1e-9, 1e-2];
 
-/// Views of a scene, split into those that say what shows and those that judge.
+/// Views of a scene: those that say what shows, and those that judge.
 #[derive(Debug, Clone)]
 pub struct Views {
     measure: Vec<Camera>,
@@ -85,8 +86,11 @@ impl Views {
         let stride = used.len().div_ceil(MAX_VIEWS);
         let mut views = Self { measure: Vec::new(), judge: Vec::new(), given: true };
         for (i, camera) in used.into_iter().step_by(stride).enumerate() {
-            let side = if i % JUDGE_SHARE == 1 { &mut views.judge } else { &mut views.measure };
-            side.push(camera.with_max_width(MAX_WIDTH));
+            let camera = camera.with_max_width(MAX_WIDTH);
+            if i % JUDGE_SHARE == 1 {
+                views.judge.push(camera.clone());
+            }
+            views.measure.push(camera);
         }
         Ok(views)
     }
@@ -115,9 +119,11 @@ impl Views {
         &self.measure
     }
 
-    /// All of them.
+    /// All of them, each once.
     pub fn all(&self) -> impl Iterator<Item = &Camera> {
-        self.measure.iter().chain(&self.judge)
+        // Given cameras that judge are among those that measure.
+        let judge = if self.given { &[] } else { self.judge.as_slice() };
+        self.measure.iter().chain(judge)
     }
 
     /// How much the views' pictures depend on each value of each Gaussian, tempered by a guess for views

@@ -262,8 +262,5 @@ impl Outcome<'_> {
 /// What a file of a given quality or size reached.
 pub(crate) fn promise_line(p: &lexisplat::packed::Promise) -> String {
     let kind = if p.cameras { "given cameras" } else { "generated views" };
-    format!(
-        "{:.2} dB on average, {:.2} dB at worst, over {} {kind} kept out of the search's own",
-        p.mean_psnr, p.min_psnr, p.views
-    )
+    format!("{:.2} dB on average, {:.2} dB at worst, over {} {kind}", p.mean_psnr, p.min_psnr, p.views)
 }
