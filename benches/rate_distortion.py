@@ -391,7 +391,8 @@ def main():
         table = csv.DictWriter(file, FIELDS)
         table.writeheader()
         table.writerows(rows)
-    command = shlex.join(["python3", "benches/rate_distortion.py", *sys.argv[1:]])
+    # Where things lie on the machine this ran on says nothing.
+    command = shlex.join(["python3", "benches/rate_distortion.py", *(Path(a).name if "/" in a else a for a in sys.argv[1:])])
     top = ["# Rate and distortion", "", f"{date.today()}, by", "", f"    {command}", "",
            "PSNR and SSIM are against the original's own pictures. Bytes are whole files. Seconds are wall time of the whole program, start-up and reading included; "
            "those of the other codecs are from the day their file entered the cache. Curves are straight in log(bytes) between a codec's own points, flat below its cheapest and absent above its best; "

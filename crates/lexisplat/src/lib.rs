@@ -23,6 +23,26 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
+//! For files several times smaller, quantised throughout by what shows in pictures, there is [`packed`]:
+//!
+//! ```
+//! use lexisplat::packed::{PackOptions, Packer};
+//! use lexisplat::sample::{SampleOptions, scene};
+//! use lexisplat::{Limits, Sensitivity, Silent, lexi};
+//!
+//! let splats = scene(&SampleOptions::new(2000, 0));
+//! // `lexisplat_render::sensitivity` measures it; without a renderer it can be guessed.
+//! let sensitivity = Sensitivity::guess(&splats.geometry);
+//! let packer = Packer::new(&splats, &sensitivity, &PackOptions::default())?;
+//! let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?; // about 40 dB
+//!
+//! let mut file = Vec::new();
+//! lexi::write_packed_to(&mut file, &packed)?;
+//! let model = lexi::read_bytes("scene.lexi", &file, &Limits::default())?; // drawn as it is
+//! assert_eq!(model.len(), splats.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
 //! [`compress()`] does everything; [`mod@learn`] and [`pursuit`] are its parts. [`ply`] and [`lexi`] are the
 //! files, [`Splats`] and [`Model`] what they hold. docs/METHOD.md has the mathematics, docs/FORMAT.md the
 //! file.
