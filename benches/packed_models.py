@@ -13,8 +13,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-BINARY = ROOT / "target/release/lexisplat"
+sys.dont_write_bytecode = True  # no __pycache__ in the working tree
+from real_models import ROOT, lexisplat  # noqa: E402
+
 # Model and its cameras.
 MODELS = {"bonsai-3dgs": "bonsai", "bonsai-pixelgs": "bonsai", "snowmiku-mcmc": "snowmiku",
           "leica-brush": None, "fruit-drops": None}
@@ -23,9 +24,7 @@ TARGETS = ("36", "40", "44")
 
 
 def run(*arguments):
-    done = subprocess.run([str(BINARY), *map(str, arguments), "--json", "--quiet"],
-                          capture_output=True, text=True, check=True)
-    return json.loads(done.stdout)
+    return json.loads(lexisplat(*arguments, "--json", "--quiet"))
 
 
 def packed(folder, name, options):

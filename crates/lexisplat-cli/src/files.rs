@@ -1,7 +1,7 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
 use std::ffi::OsStr;
-use std::io::{Read, Write};
+use std::io::{BufWriter, Read, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -12,6 +12,7 @@ use lexisplat::ply::{self, PlyRead, ReadOptions};
 use lexisplat::{Error, Limits, Model};
 use lexisplat_render::Scene;
 
+use crate::args::Common;
 use crate::exit::OutputExists;
 
 /// Bytes that tell a PLY from a .lexi.
@@ -154,6 +155,41 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     Ok(lexisplat::output::write_whole(path, |writer| {
         writer.write_all(bytes).map_err(|e| Error::io(path, e))
     })?)
+}
+
+/// Writes an output: to its file by `save`, or by `stream` to standard output. Returns its size in bytes.
+pub(crate) fn write_output<E: Into<anyhow::Error>>(
+    output: &Path,
+    save: impl FnOnce(&Path) -> Result<u64, E>,
+    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<u64, E>,
+) -> Result<u64> {
+    if !is_pipe(output) {
+        return save(output).map_err(Into::into);
+    }
+    let mut out = BufWriter::new(std::io::stdout().lock());
+    let bytes = stream(&mut out).map_err(Into::into)?;
+    out.flush().context("standard output")?;
+    Ok(bytes)
+}
+
+/// Tells what was done: as JSON or text on standard output, as text on standard error if that carries
+/// `output`, or not at all.
+pub(crate) fn tell(
+    common: &Common,
+    output: &Path,
+    json: impl FnOnce() -> Result<serde_json::Value>,
+    text: impl FnOnce() -> Result<String>,
+) -> Result<()> {
+    if common.json {
+        print_json(&json()?)
+    } else if common.quiet {
+        Ok(())
+    } else if is_pipe(output) {
+        eprint!("{}", text()?);
+        Ok(())
+    } else {
+        print(&text()?)
+    }
 }
 
 /// Writes text to standard output, where a closed pipe is no reason to panic.

@@ -64,22 +64,24 @@ pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<
 /// Centre and radius of where most of the opacity is.
 fn bulk(geometry: &Geometry) -> (DVec3, f64) {
     let weights: Vec<f64> = geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect();
+    let (centre, half) = middle(geometry, &weights, TRIM);
+    (centre, (half.length() * AIR).max(MIN_RADIUS))
+}
+
+/// Weighted median of the positions, and half the extent along each axis of what is left without the
+/// share `trim` of the weight at either end.
+pub(crate) fn middle(geometry: &Geometry, weights: &[f64], trim: f64) -> (DVec3, DVec3) {
     let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
         let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
-        quantiles(values.zip(weights.iter().copied()), [TRIM, 0.5, 1.0 - TRIM])
+        quantiles(values.zip(weights.iter().copied()), [trim, 0.5, 1.0 - trim])
     });
     let centre = DVec3::from_array(spans.map(|[_, median, _]| median));
-    let half = spans.map(|[low, _, high]| (high - low) / 2.0);
-    let radius = DVec3::from_array(half).length() * AIR;
-    (centre, radius.max(MIN_RADIUS))
+    (centre, DVec3::from_array(spans.map(|[low, _, high]| (high - low) / 2.0)))
 }
 
 /// The values below which the given shares of the weight lie; 0 if there is none. Pairs that are not
 /// finite do not count.
-pub(crate) fn quantiles<const N: usize>(
-    values: impl Iterator<Item = (f64, f64)>,
-    shares: [f64; N],
-) -> [f64; N] {
+fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [f64; N]) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.filter(|(v, w)| v.is_finite() && w.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let total: f64 = sorted.iter().map(|(_, w)| w).sum();
@@ -94,7 +96,7 @@ pub(crate) fn quantiles<const N: usize>(
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
-fn single(value: f64) -> f32 {
+pub(crate) fn single(value: f64) -> f32 {
     value as f32
 }
 

@@ -4,7 +4,7 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
-use crate::orbit::quantiles;
+use crate::orbit::{middle, single};
 
 /// Share of the detail, at either end of each axis, that does not count for its radius.
 const TRIM: f64 = 0.2;
@@ -77,16 +77,7 @@ fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
             libm::exp((-sorted[1] - sorted[2]).clamp(-60.0, 60.0)) / (1.0 + libm::exp(f64::from(-o)))
         })
         .collect();
-    let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
-        let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
-        quantiles(values.zip(weights.iter().copied()), [TRIM, 0.5, 1.0 - TRIM])
-    });
-    (DVec3::from_array(spans.map(|s| s[1])), DVec3::from_array(spans.map(|s| (s[2] - s[0]) / 2.0)))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
-fn single(value: f64) -> f32 {
-    value as f32
+    middle(geometry, &weights, TRIM)
 }
 
 #[cfg(test)]

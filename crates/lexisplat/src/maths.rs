@@ -54,6 +54,13 @@ pub(crate) fn logit_of_log(x: f32) -> f32 {
     (x - libm::log(-libm::expm1(x))) as f32
 }
 
+/// The value below which `share` of `sorted` lies; 0 if there is none.
+pub(crate) fn at_share<T: Copy + Default>(sorted: &[T], share: f64) -> T {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
+    let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
+    sorted.get(index).copied().unwrap_or_default()
+}
+
 pub(crate) type Vec3 = [f32; 3];
 
 pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
@@ -70,6 +77,13 @@ pub(crate) fn scaled(a: Vec3, s: f32) -> Vec3 {
 
 pub(crate) fn normalised(a: Vec3) -> Vec3 {
     scaled(a, 1.0 / dot(a, a).sqrt().max(f32::MIN_POSITIVE))
+}
+
+/// Which axes are the longest, the middle and the shortest; equal ones in their own order.
+pub(crate) fn longest_first(scales: Vec3) -> [usize; 3] {
+    let mut order = [0, 1, 2];
+    order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
+    order
 }
 
 /// Columns of the rotation of a quaternion (w, x, y, z) of any length; the identity for zero.

@@ -26,4 +26,13 @@ impl SplitMix64 {
         let result = (wide >> 64) as usize;
         result
     }
+
+    /// The numbers below `count` in random order, drawn one by one (Fisher and Yates).
+    pub(crate) fn shuffled(mut self, count: usize) -> impl Iterator<Item = usize> {
+        let mut order: Vec<usize> = (0..count).collect();
+        (0..count).map(move |i| {
+            order.swap(i, i + self.below(count - i));
+            order[i]
+        })
+    }
 }

@@ -1,7 +1,7 @@
 //! How much pictures change with each value of each Gaussian, as plain numbers.
 
 use crate::maths;
-use crate::splats::Geometry;
+use crate::splats::{Geometry, filter};
 
 /// For each Gaussian the expected squared change of a picture's colour values, averaged over pixels and
 /// channels, for a squared error of 1 in one of its values (the diagonal of a Gauss-Newton matrix).
@@ -73,10 +73,6 @@ impl Sensitivity {
     /// If `keep` differs in length.
     pub fn retain(&mut self, keep: &[bool]) {
         assert_eq!(self.len(), keep.len(), "one entry a Gaussian");
-        fn filter<T>(values: &mut Vec<T>, keep: &[bool]) {
-            let mut keep = keep.iter();
-            values.retain(|_| keep.next() == Some(&true));
-        }
         filter(&mut self.colour, keep);
         filter(&mut self.opacity, keep);
         filter(&mut self.position, keep);
@@ -107,8 +103,7 @@ impl Sensitivity {
         self.colour[i] = colour;
         self.opacity[i] = shape;
         let scales = geometry.scales[i];
-        let mut order = [0, 1, 2];
-        order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
+        let order = maths::longest_first(scales);
         for (&axis, share) in order.iter().zip(SCALE_SHARES) {
             self.scale[i][axis] = share * shape;
         }
@@ -171,9 +166,9 @@ impl Sensitivity {
 
 /// What a Gaussian's weight is expected to be proportional to.
 fn guessed_weight(geometry: &Geometry, i: usize) -> f32 {
-    let mut sorted = geometry.scales[i];
-    sorted.sort_by(|a, b| b.total_cmp(a));
+    let scales = geometry.scales[i];
+    let [longest, middle, _] = maths::longest_first(scales).map(|k| scales[k]);
     let alpha = maths::log_sigmoid(geometry.opacities[i]);
-    let weight = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (sorted[0] + sorted[1]));
+    let weight = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (longest + middle));
     if weight.is_finite() { weight } else { 0.0 }
 }

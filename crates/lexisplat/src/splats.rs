@@ -152,10 +152,6 @@ impl Geometry {
 
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
-        fn filter<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
-            let mut flags = keep.iter();
-            values.retain(|_| flags.next().copied().unwrap_or(false));
-        }
         filter(&mut self.positions, keep);
         filter(&mut self.normals, keep);
         filter(&mut self.dc, keep);
@@ -166,6 +162,12 @@ impl Geometry {
             for_extra!(&mut extra.values, v => filter(v, keep));
         }
     }
+}
+
+/// Keeps the values for which `keep` is true.
+pub(crate) fn filter<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(false));
 }
 
 impl Splats {

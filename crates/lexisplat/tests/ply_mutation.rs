@@ -1,13 +1,13 @@
 //! Ten thousand damaged PLY files: no panic, and no memory beyond a multiple of the file.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use lexisplat::ply::{self, Format, ReadOptions};
 
+#[path = "common/allocator.rs"]
+mod allocator;
 #[path = "ply/support.rs"]
 mod support;
 
+use allocator::counted;
 use support::{File, Random, columns, scene};
 
 /// Damaged files read.
@@ -17,42 +17,6 @@ const INPUTS: usize = 10_000;
 const FACTOR: usize = 6;
 /// Most bytes beyond that: hash tables, thread hand-over, messages.
 const CONSTANT: usize = 64 << 10;
-
-/// The system's allocator, counting.
-struct Counting;
-
-static LIVE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "a global allocator is an unsafe trait; every call goes to the system's")]
-// SAFETY: all requests are passed on unchanged to `System`; counting does not touch the memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size());
-        // SAFETY: the caller keeps the contract, which is the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(layout.size());
-        // SAFETY: as above.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size(), Ordering::Relaxed);
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-fn count(bytes: usize) {
-    let live = LIVE.fetch_add(bytes, Ordering::Relaxed) + bytes;
-    PEAK.fetch_max(live, Ordering::Relaxed);
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
 
 /// Small files of every kind, good ones first.
 fn seeds() -> Vec<Vec<u8>> {
@@ -139,10 +103,7 @@ fn flip_bits(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 /// Reads damaged bytes; the reader must answer, in one line, within its memory.
 fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
     let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
-    let before = LIVE.load(Ordering::Relaxed);
-    PEAK.store(before, Ordering::Relaxed);
-    let result = ply::read_bytes("t.ply", bytes, &options);
-    let used = PEAK.load(Ordering::Relaxed).saturating_sub(before);
+    let (result, used) = counted(|| ply::read_bytes("t.ply", bytes, &options));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input", bytes.len());
     match result {
         Ok(read) => {

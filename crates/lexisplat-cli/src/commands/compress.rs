@@ -1,10 +1,9 @@
 //! `lexisplat compress`.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use lexisplat::ply::{PlyRead, ReadOptions};
 use lexisplat::{
     CompressOptions, CompressReport, DEFAULT_TOLERANCE, Error, Layout, Limits, Model, compress, lexi, ply,
@@ -12,7 +11,7 @@ use lexisplat::{
 use serde_json::json;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input, warn};
+use crate::files::{check_output, is_pipe, output_path, standard_input, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::text;
 
@@ -59,7 +58,8 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let (model, report) = compress(splats, &options, &bars)?;
 
     let clock = Instant::now();
-    let file_bytes = write(&output, &model)?;
+    let file_bytes =
+        write_output(&output, |path| lexi::write(path, &model), |out| lexi::write_to(out, &model))?;
     if let Some(path) = &args.save_dictionary {
         lexi::write_dictionary(path, &model.dictionary)?;
     }
@@ -72,16 +72,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         file_bytes,
         seconds: [read_seconds, write_seconds, start.elapsed().as_secs_f64()],
     };
-    if common.json {
-        print_json(&outcome.json(&warnings)?)
-    } else if common.quiet {
-        Ok(())
-    } else if is_pipe(&output) {
-        eprint!("{}", outcome.text()?);
-        Ok(())
-    } else {
-        print(&outcome.text()?)
-    }
+    tell(common, &output, || outcome.json(&warnings), || outcome.text())
 }
 
 fn read(args: &Compress) -> Result<(String, PlyRead)> {
@@ -92,16 +83,6 @@ fn read(args: &Compress) -> Result<(String, PlyRead)> {
         return Ok((name, read));
     }
     Ok((args.input.display().to_string(), ply::read(&args.input, &options)?))
-}
-
-fn write(output: &Path, model: &Model) -> Result<u64> {
-    if !is_pipe(output) {
-        return Ok(lexi::write(output, model)?);
-    }
-    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    let bytes = lexi::write_to(&mut out, model)?;
-    out.flush().context("standard output")?;
-    Ok(bytes)
 }
 
 /// What was done, to be told in text or JSON.

@@ -1,6 +1,5 @@
 //! `lexisplat decompress`.
 
-use std::io::Write;
 use std::time::Instant;
 
 use anyhow::{Context, Result};
@@ -8,7 +7,7 @@ use lexisplat::{Error, Limits, lexi, ply};
 use serde_json::json;
 
 use crate::args::{Common, Decompress};
-use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input};
+use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input, write_output};
 use crate::text;
 
 pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
@@ -26,14 +25,11 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
         lexi::read(&args.input, &limits)?
     };
     let splats = model.into_splats();
-    let bytes = if is_pipe(&output) {
-        let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-        let bytes = ply::write_to(&mut out, &splats).context("standard output")?;
-        out.flush().context("standard output")?;
-        bytes
-    } else {
-        ply::write(&output, &splats)?
-    };
+    let bytes = write_output(
+        &output,
+        |path| Ok(ply::write(path, &splats)?),
+        |out| ply::write_to(out, &splats).context("standard output"),
+    )?;
     let seconds = start.elapsed().as_secs_f64();
     let name = output.display();
     if common.json {

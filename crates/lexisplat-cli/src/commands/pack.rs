@@ -1,10 +1,9 @@
 //! `lexisplat compress` in the packed layout.
 
-use std::io::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::PlyRead;
 use lexisplat::{Error, Progress, Splats, lexi};
@@ -14,7 +13,7 @@ use serde_json::{Value, json};
 
 use super::compress::error_line;
 use crate::args::{Common, Compress, Preset};
-use crate::files::{is_pipe, print, print_json};
+use crate::files::{tell, write_output};
 use crate::progress::Bars;
 use crate::text;
 
@@ -66,7 +65,11 @@ pub(crate) fn run(
     drop(packer);
     let pack_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
-    let file_bytes = write(output, &packed)?;
+    let file_bytes = write_output(
+        output,
+        |path| lexi::write_packed(path, &packed),
+        |out| lexi::write_packed_to(out, &packed),
+    )?;
     let write_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
         output,
@@ -78,16 +81,7 @@ pub(crate) fn run(
         file_bytes,
         seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
     };
-    if common.json {
-        print_json(&outcome.json(&read.warnings)?)
-    } else if common.quiet {
-        Ok(())
-    } else if is_pipe(output) {
-        eprint!("{}", outcome.text()?);
-        Ok(())
-    } else {
-        print(&outcome.text()?)
-    }
+    tell(common, output, || outcome.json(&read.warnings), || outcome.text())
 }
 
 fn goal(args: &Compress, ply_bytes: u64) -> Result<Option<Goal>> {
@@ -99,16 +93,6 @@ fn goal(args: &Compress, ply_bytes: u64) -> Result<Option<Goal>> {
         return Ok(Some(Goal::Size((ply_bytes as f64 / ratio) as u64)));
     }
     Ok(args.psnr.map(Goal::MeanPsnr).or(args.min_psnr.map(Goal::MinPsnr)).or(args.size.map(Goal::Size)))
-}
-
-fn write(output: &Path, packed: &Packed) -> Result<u64> {
-    if !is_pipe(output) {
-        return Ok(lexi::write_packed(output, packed)?);
-    }
-    let mut out = std::io::BufWriter::new(std::io::stdout().lock());
-    let bytes = lexi::write_packed_to(&mut out, packed)?;
-    out.flush().context("standard output")?;
-    Ok(bytes)
 }
 
 /// Bytes of each attribute, of tables, of the header, and of what is lost by rounding streams to whole

@@ -6,7 +6,7 @@ use super::math::exp_in_range;
 use super::project::{Splat, Visible};
 
 /// One value for each pixel of a row of a tile.
-type Lanes = [f32; TILE];
+pub(super) type Lanes = [f32; TILE];
 
 /// A row of pixels being drawn.
 #[derive(Debug, Clone, Copy)]
@@ -99,27 +99,8 @@ fn draw(
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
-    let Splat { conic: [a, b, c], opacity, colour: [red, green, blue], cutoff, .. } = *splat;
-    let dy = splat.centre[1] - y;
-    let mut power = [0.0; TILE];
-    let mut any = false;
-    for lane in 0..TILE {
-        let dx = splat.centre[0] - x[lane];
-        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
-        power[lane] = p;
-        any |= p >= cutoff;
-    }
-    if !any {
-        return false;
-    }
-    let mut alpha = [0.0; TILE];
-    for lane in 0..TILE {
-        let p = power[lane];
-        let value = opacity * exp_in_range(p);
-        let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
-        let counts = (p >= cutoff) & (p <= 0.0) & (value >= ALPHA_MIN);
-        alpha[lane] = if counts { value } else { 0.0 };
-    }
+    let [red, green, blue] = splat.colour;
+    let Some(alpha) = alphas(splat, x, y) else { return false };
     let mut still_open = 0;
     for lane in 0..TILE {
         // An open pixel is never below the minimum, so where alpha is 0 it stays as it is; a finished one
@@ -137,6 +118,33 @@ fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
         still_open |= open.to_bits();
     }
     still_open == 0
+}
+
+/// Opacities of `splat` at the pixels of a row, 0 where it does not count; `None` if it counts nowhere.
+#[inline(always)]
+pub(super) fn alphas(splat: &Splat, x: &Lanes, y: f32) -> Option<Lanes> {
+    let Splat { conic: [a, b, c], opacity, cutoff, .. } = *splat;
+    let dy = splat.centre[1] - y;
+    let mut power = [0.0; TILE];
+    let mut any = false;
+    for lane in 0..TILE {
+        let dx = splat.centre[0] - x[lane];
+        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
+        power[lane] = p;
+        any |= p >= cutoff;
+    }
+    if !any {
+        return None;
+    }
+    let mut alpha = [0.0; TILE];
+    for lane in 0..TILE {
+        let p = power[lane];
+        let value = opacity * exp_in_range(p);
+        let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
+        let counts = (p >= cutoff) & (p <= 0.0) & (value >= ALPHA_MIN);
+        alpha[lane] = if counts { value } else { 0.0 };
+    }
+    Some(alpha)
 }
 
 #[cfg(test)]

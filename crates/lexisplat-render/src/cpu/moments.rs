@@ -1,12 +1,9 @@
 //! How a tile's pixels change with its splats: sums over pixels of products of derivatives.
 
-use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
+use crate::conventions::{TILE, TRANSMITTANCE_MIN};
 
-use super::blend::TilePixels;
-use super::math::exp_in_range;
+use super::blend::{Lanes, TilePixels, alphas};
 use super::project::{Splat, Visible};
-
-type Lanes = [f32; TILE];
 
 /// Number of sums a splat has.
 const SUMS: usize = 10;
@@ -112,24 +109,10 @@ fn add(
     removal: &mut Lanes,
 ) -> bool {
     let [a, b, c] = splat.conic;
+    let Some(alphas) = alphas(splat, x, y) else { return false };
     let dy = splat.centre[1] - y;
-    let mut power = [0.0; TILE];
-    let mut any = false;
     for lane in 0..TILE {
-        let dx = splat.centre[0] - x[lane];
-        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
-        power[lane] = p;
-        any |= p >= splat.cutoff;
-    }
-    if !any {
-        return false;
-    }
-    for lane in 0..TILE {
-        let p = power[lane];
-        let value = splat.opacity * exp_in_range(p);
-        let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
-        let counts = (p >= splat.cutoff) & (p <= 0.0) & (value >= ALPHA_MIN);
-        let alpha = if counts { value } else { 0.0 };
+        let alpha = alphas[lane];
         let left = row.open[lane] * (1.0 - alpha);
         let shows = left >= TRANSMITTANCE_MIN;
         let weight = if shows { alpha * row.open[lane] } else { 0.0 };

@@ -23,14 +23,11 @@ impl Sample {
     pub(super) fn draw(dim: usize, signals: &[f32], options: &LearnOptions) -> Self {
         let vectors = signals.len() / dim;
         let held = (vectors / HELD_OUT_SHARE).min(MAX_HELD_OUT);
-        let mut rng = SplitMix64::new(options.seed ^ SAMPLE_STREAM);
-        let mut order: Vec<usize> = (0..vectors).collect();
+        let order = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(vectors);
         let tolerance = options.stop.tolerance().unwrap_or(0.0);
         let mut sample = Self { learn: Vec::new(), held_out: Vec::with_capacity(held * dim) };
-        for i in 0..vectors {
-            let j = i + rng.below(vectors - i);
-            order.swap(i, j);
-            let signal = &signals[order[i] * dim..][..dim];
+        for (i, vector) in order.enumerate() {
+            let signal = &signals[vector * dim..][..dim];
             if i < held {
                 sample.held_out.extend_from_slice(signal);
                 continue;

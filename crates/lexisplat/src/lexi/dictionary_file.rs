@@ -12,7 +12,6 @@ use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::limits::Limits;
 use crate::model::Layout;
-use crate::output::write_whole;
 use crate::sh::ShDegree;
 
 /// Reads the dictionary of a dictionary file or of a .lexi scene.
@@ -54,11 +53,5 @@ pub fn write_dictionary(path: &Path, dictionary: &Dictionary) -> Result<u64> {
     metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
     let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());
-    let draft = Draft::new(metadata, vec![tensor]);
-    let mut bytes = 0;
-    write_whole(path, |writer| {
-        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
-        Ok(())
-    })?;
-    Ok(bytes)
+    Draft::new(metadata, vec![tensor]).save(path)
 }

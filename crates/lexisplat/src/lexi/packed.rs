@@ -1,5 +1,6 @@
 //! Packed scenes in the container: four tensors instead of one for each attribute.
 
+use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 
@@ -9,10 +10,9 @@ use super::read::{degree, extras, meta, record};
 use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, PACKED_VERSION, key, tensor};
 use super::tensors::{Checked, Draft, Tensor, preamble};
 use super::write::{extra_tensors, put_record};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::limits::Limits;
-use crate::output::write_whole;
-use crate::packed::{CHUNK, Packed, Promise};
+use crate::packed::{CHUNK, Packed, Promise, inverse};
 
 /// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
 /// header is refused before anything is allocated.
@@ -23,13 +23,7 @@ const GAUSSIANS_PER_BYTE: u64 = 3;
 /// # Errors
 /// [`Error::Io`] for the file.
 pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
-    let draft = draft(packed);
-    let mut bytes = 0;
-    write_whole(path, |writer| {
-        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
-        Ok(())
-    })?;
-    Ok(bytes)
+    draft(packed).save(path)
 }
 
 /// Writes `packed` to `writer`. Returns the number of bytes.
@@ -37,22 +31,20 @@ pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
 /// # Errors
 /// [`Error::Io`], which names no file.
 pub fn write_packed_to(writer: &mut impl Write, packed: &Packed) -> Result<u64> {
-    draft(packed).write_to(writer).map_err(|e| Error::io("output", e))
+    draft(packed).stream(writer)
 }
 
 /// Bytes of the whole file as written.
 #[must_use]
 pub fn packed_bytes(packed: &Packed) -> u64 {
-    tensors(packed).iter().map(|t| t.bytes() as u64).sum::<u64>() + draft(packed).header_bytes()
+    packed_tensor_bytes(packed).iter().map(|t| t.1).sum()
 }
 
 /// Bytes of each tensor as written, and of the header under `header`. They sum to the file's size.
 #[must_use]
 pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
-    let mut out: Vec<(String, u64)> =
-        tensors(packed).iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
-    out.push(("header".to_owned(), draft(packed).header_bytes()));
-    out
+    let (metadata, tensors) = contents(packed);
+    Draft::sizes(metadata, tensors)
 }
 
 /// The packed scene of a file whose checksums hold.
@@ -65,9 +57,9 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
         file_bytes.saturating_mul(GAUSSIANS_PER_BYTE),
     )?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    let whole = |name: &str, dtype: Dtype| -> Result<Vec<usize>> {
+    let length = |name: &str, dtype: Dtype| -> Result<[usize; 1]> {
         match checked.view(name)?.shape() {
-            [len] => Ok(vec![*len]),
+            [len] => Ok([*len]),
             shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
         }
     };
@@ -76,7 +68,7 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
     let order = if checked.has(tensor::ORDER) {
         known.push(tensor::ORDER);
         let order: Vec<u32> = checked.values(tensor::ORDER, Dtype::U32, &[gaussians])?;
-        if !is_permutation(&order) {
+        if inverse(&order, gaussians).is_none() {
             return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
         }
         Some(order)
@@ -108,20 +100,20 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
         parameters: checked.values(
             tensor::PARAMETERS,
             Dtype::F32,
-            &whole(tensor::PARAMETERS, Dtype::F32)?,
+            &length(tensor::PARAMETERS, Dtype::F32)?,
         )?,
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
-        tables: checked.values(tensor::TABLES, Dtype::U8, &whole(tensor::TABLES, Dtype::U8)?)?,
-        data: checked.values(tensor::DATA, Dtype::U8, &whole(tensor::DATA, Dtype::U8)?)?,
+        tables: checked.values(tensor::TABLES, Dtype::U8, &length(tensor::TABLES, Dtype::U8)?)?,
+        data: checked.values(tensor::DATA, Dtype::U8, &length(tensor::DATA, Dtype::U8)?)?,
     })
 }
 
-fn is_permutation(order: &[u32]) -> bool {
-    let mut seen = vec![false; order.len()];
-    order.iter().all(|&i| seen.get_mut(i as usize).is_some_and(|s| !std::mem::replace(s, true)))
+fn draft(packed: &Packed) -> Draft<'_> {
+    let (metadata, tensors) = contents(packed);
+    Draft::new(metadata, tensors)
 }
 
-fn draft(packed: &Packed) -> Draft<'_> {
+fn contents(packed: &Packed) -> (BTreeMap<String, String>, Vec<Tensor<'_>>) {
     let mut metadata = preamble(FORMAT, PACKED_VERSION);
     put_record(&mut metadata, packed.degree, &packed.record, &packed.meta);
     let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
@@ -131,7 +123,7 @@ fn draft(packed: &Packed) -> Draft<'_> {
     if let Some(promise) = &packed.promise {
         put(key::PROMISE, serde_json::to_string(promise).unwrap_or_default());
     }
-    Draft::new(metadata, tensors(packed))
+    (metadata, tensors(packed))
 }
 
 fn tensors(packed: &Packed) -> Vec<Tensor<'_>> {

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::path::Path;
 
 use safetensors::tensor::{SafeTensorError, TensorView};
 use safetensors::{Dtype, SafeTensors};
@@ -9,6 +10,7 @@ use safetensors::{Dtype, SafeTensors};
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
+use crate::output::write_whole;
 use crate::parallel::map_chunks;
 
 #[cfg(target_endian = "big")]
@@ -129,13 +131,37 @@ impl<'a> Draft<'a> {
         Self { header, header_checksum, tensors }
     }
 
+    /// Bytes of each tensor in the order given, and of the header under `header`. They sum to the file's
+    /// size.
+    pub(super) fn sizes(metadata: BTreeMap<String, String>, tensors: Vec<Tensor<'a>>) -> Vec<(String, u64)> {
+        let mut out: Vec<(String, u64)> =
+            tensors.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
+        out.push(("header".to_owned(), Self::new(metadata, tensors).header_bytes()));
+        out
+    }
+
+    /// Writes the file to `path`, whole or not at all. Returns its size in bytes.
+    pub(super) fn save(self, path: &Path) -> Result<u64> {
+        let mut bytes = 0;
+        write_whole(path, |writer| {
+            bytes = self.write_to(writer).map_err(|e| Error::io(path, e))?;
+            Ok(())
+        })?;
+        Ok(bytes)
+    }
+
+    /// Writes the file where it has no name. Returns its size in bytes.
+    pub(super) fn stream(self, writer: &mut impl Write) -> Result<u64> {
+        self.write_to(writer).map_err(|e| Error::io("output", e))
+    }
+
     /// Bytes of the length, the JSON and the header's checksum.
-    pub(super) fn header_bytes(&self) -> u64 {
+    fn header_bytes(&self) -> u64 {
         (self.header.len() + self.header_checksum.len()) as u64
     }
 
     /// Writes the whole file; returns its size.
-    pub(super) fn write_to(self, writer: &mut dyn Write) -> std::io::Result<u64> {
+    fn write_to(self, writer: &mut dyn Write) -> std::io::Result<u64> {
         let mut written = self.header_bytes();
         writer.write_all(&self.header)?;
         let mut checksum = Some(self.header_checksum);

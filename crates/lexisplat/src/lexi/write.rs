@@ -12,7 +12,6 @@ use crate::codes::{Indices, Values};
 use crate::error::{Error, Result};
 use crate::limits::Limits;
 use crate::model::{Layout, Model, Record};
-use crate::output::write_whole;
 use crate::sh::ShDegree;
 use crate::splats::{Extra, ExtraValues, SceneMeta};
 
@@ -22,13 +21,7 @@ use crate::splats::{Extra, ExtraValues, SceneMeta};
 /// [`Error::Io`] for the file; [`Error::Parameter`] if the values' type is not the layout's;
 /// [`Error::Limit`] if the paper's 32-bit pointers cannot count the nonzeros.
 pub fn write(path: &Path, model: &Model) -> Result<u64> {
-    let draft = draft(model)?;
-    let mut bytes = 0;
-    write_whole(path, |writer| {
-        bytes = draft.write_to(writer).map_err(|e| Error::io(path, e))?;
-        Ok(())
-    })?;
-    Ok(bytes)
+    draft(model)?.save(path)
 }
 
 /// Writes `model` to `writer`. Returns the number of bytes.
@@ -36,7 +29,7 @@ pub fn write(path: &Path, model: &Model) -> Result<u64> {
 /// # Errors
 /// As [`write()`]; an [`Error::Io`] names no file.
 pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
-    draft(model)?.write_to(writer).map_err(|e| Error::io("output", e))
+    draft(model)?.stream(writer)
 }
 
 /// Bytes of each tensor as written, in file order, and of the header under `header`. They sum to the
@@ -45,10 +38,8 @@ pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
 /// # Errors
 /// As [`write()`], without the I/O.
 pub fn attribute_bytes(model: &Model) -> Result<Vec<(String, u64)>> {
-    let mut out: Vec<(String, u64)> =
-        tensors(model)?.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
-    out.push(("header".to_owned(), draft(model)?.header_bytes()));
-    Ok(out)
+    let (metadata, tensors) = contents(model)?;
+    Ok(Draft::sizes(metadata, tensors))
 }
 
 /// Bytes of the whole file as written.
@@ -70,6 +61,11 @@ pub fn sh_bytes(model: &Model) -> Result<u64> {
 }
 
 fn draft(model: &Model) -> Result<Draft<'_>> {
+    let (metadata, tensors) = contents(model)?;
+    Ok(Draft::new(metadata, tensors))
+}
+
+fn contents(model: &Model) -> Result<(BTreeMap<String, String>, Vec<Tensor<'_>>)> {
     if model.record.layout == Layout::Packed {
         let expected =
             "f32, f16 or paper: a packed file is written from a `Packed`, not from what it decodes to";
@@ -77,7 +73,7 @@ fn draft(model: &Model) -> Result<Draft<'_>> {
     }
     let mut metadata = preamble(FORMAT, VERSION);
     put_record(&mut metadata, model.degree(), &model.record, &model.meta);
-    Ok(Draft::new(metadata, tensors(model)?))
+    Ok((metadata, tensors(model)?))
 }
 
 /// The metadata all layouts share.

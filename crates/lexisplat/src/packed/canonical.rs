@@ -1,7 +1,7 @@
 //! A scene as it is packed: each ellipsoid described in one of its 24 ways, in the order of its cells.
 
 use super::morton;
-use crate::maths::{Vec3, columns, cross, dot, log_sigmoid};
+use crate::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
 use crate::splats::Geometry;
 
 /// Thinnest axis kept apart, as the logarithm of its ratio to the longest: thinner ones show as lines
@@ -61,15 +61,7 @@ impl Grid {
         for k in 0..3 {
             let mut values: Vec<f32> = positions.iter().map(|p| p[k]).collect();
             values.sort_by(f32::total_cmp);
-            let at = |share: f64| {
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    clippy::cast_sign_loss,
-                    reason = "a share of a length"
-                )]
-                let index = ((n.max(1) - 1) as f64 * share) as usize;
-                values.get(index).copied().unwrap_or(0.0)
-            };
+            let at = |share| at_share(&values, share);
             origin[k] = at(0.0);
             bulk = bulk.max(f64::from(at(1.0 - TRIM)) - f64::from(at(TRIM)));
             whole = whole.max(f64::from(at(1.0)) - f64::from(at(0.0)));
@@ -108,8 +100,7 @@ pub(super) fn placed(geometry: &Geometry, grid: &Grid) -> Vec<Placed> {
 /// Gaussian `i` in canonical form.
 pub(super) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     let scales = geometry.scales[i];
-    let mut order = [0, 1, 2];
-    order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
+    let order = longest_first(scales);
     let given = columns(geometry.rotations[i]);
     let [first, second, third] = order.map(|k| given[k]);
     // Turning an axis around leaves the ellipsoid as it is.

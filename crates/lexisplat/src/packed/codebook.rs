@@ -3,7 +3,6 @@
 //! Rows come scaled so that one step of a value is 1 and every Gaussian's error counts the same. A code
 //! minimises `|y - D v|^2 + PRICE * bits(v)` over integer values v, greedily.
 
-use super::stream::Stream;
 use crate::parallel::map_chunks;
 use crate::pursuit::path::Path;
 
@@ -21,7 +20,7 @@ const MAX_VALUE: f32 = 1e6;
 const TAKES_PER_VALUE: usize = 8;
 /// Sizes of values whose cost is kept; larger ones are extrapolated.
 const VALUE_COSTS: usize = 64;
-/// Colour classes told apart in the cost of counts, as in [`Stream::Count`]'s contexts.
+/// Colour classes told apart in counts: in their cost, and in the contexts they are coded in.
 pub(super) const COUNT_CLASSES: usize = 12;
 /// Added to every count before a cost is made of it.
 const SMOOTHING: f64 = 0.25;
@@ -484,6 +483,5 @@ fn replace_unused(dim: usize, users: &[f64], atoms: &mut [f32], residuals: &[f32
     }
 }
 
-/// Context groups of [`Stream::Count`] that [`Costs`] knows.
-const _: () =
-    assert!(COUNT_CLASSES * 2 <= super::entropy::CONTEXTS && (Stream::Count as usize) < Stream::ALL.len());
+/// Each class has two contexts of [`Stream::Count`](super::stream::Stream::Count).
+const _: () = assert!(COUNT_CLASSES * 2 <= super::entropy::CONTEXTS);

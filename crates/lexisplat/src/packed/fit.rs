@@ -3,7 +3,7 @@
 use super::canonical::{Canonical, Grid, Placed, canonical};
 use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
-use crate::maths::Vec3;
+use crate::maths::{Vec3, at_share};
 use crate::sensitivity::Sensitivity;
 use crate::sh::C0;
 use crate::splats::Geometry;
@@ -91,9 +91,7 @@ fn single(x: f64) -> f32 {
 fn quantile(values: &[f64], share: f64) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
-    let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
-    sorted.get(index).copied().unwrap_or(0.0)
+    at_share(&sorted, share)
 }
 
 /// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight). Returns also the

@@ -20,6 +20,8 @@ mod stream;
 mod unpack;
 mod walk;
 
+pub(crate) use restore::inverse;
+
 pub use pack::{PackOptions, PackReport, Packer};
 pub use unpack::{Packed, Promise, StreamBits};
 

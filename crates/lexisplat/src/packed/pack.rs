@@ -8,6 +8,7 @@ use super::codebook::{Codebook, Codes, Costs, Until, learn};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::parameters::Parameters;
+use super::restore::gather;
 use super::stream::{Recorder, Stream};
 use super::unpack::{MAX_ATOM_BITS, Packed, dictionary_walk, resident};
 use super::walk::{Code, Target, Walk};
@@ -297,7 +298,7 @@ impl<'a> Packer<'a> {
         self.splats.rest(self.scene[i].index())
     }
 
-    /// The rows of Gaussians `range` in units of their value steps, appended to `out`.
+    /// The rows of Gaussians `indices` in units of their value steps, and their colour classes.
     fn scaled(&self, indices: impl Iterator<Item = usize>, parameters: &Parameters) -> (Vec<f32>, Vec<u8>) {
         let mut rows = Vec::new();
         let mut classes = Vec::new();
@@ -313,14 +314,8 @@ impl<'a> Packer<'a> {
     fn learn(&self, parameters: &Parameters, until: Until, progress: &dyn Progress) -> (Vec<f32>, Costs) {
         let dim = self.splats.degree.rest();
         let n = self.scene.len();
-        let mut rng = SplitMix64::new(self.options.seed ^ SAMPLE_STREAM);
-        let mut order: Vec<usize> = (0..n).collect();
-        let wanted = n.min(SAMPLE);
-        for i in 0..wanted {
-            let j = i + rng.below(n - i);
-            order.swap(i, j);
-        }
-        let (rows, classes) = self.scaled(order[..wanted].iter().copied(), parameters);
+        let sample = SplitMix64::new(self.options.seed ^ SAMPLE_STREAM).shuffled(n).take(SAMPLE);
+        let (rows, classes) = self.scaled(sample, parameters);
         // A promise is cheaper to keep with more atoms than exact rows.
         let fewest = if self.options.tolerance.is_some() { 2 * dim } else { dim };
         let atoms = self.options.atoms.unwrap_or_else(|| (n / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED));
@@ -431,10 +426,7 @@ impl<'a> Packer<'a> {
     fn extras(&self) -> Vec<crate::splats::Extra> {
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
-            fn reorder<T: Copy>(values: &mut Vec<T>, scene: &[Placed]) {
-                *values = scene.iter().map(|g| values[g.index()]).collect();
-            }
-            for_extra!(&mut extra.values, v => reorder(v, &self.scene));
+            for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));
         }
         extras
     }

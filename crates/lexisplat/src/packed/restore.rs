@@ -5,9 +5,10 @@ use crate::error::{Error, Result};
 use crate::model::Model;
 use crate::splats::for_extra;
 
-/// For each Gaussian of the source where in the file it is; `None` if `order` is not a permutation.
-fn sources(model: &Model, order: &[u32]) -> Option<Vec<usize>> {
-    let mut from = vec![usize::MAX; model.len()];
+/// For each of `len` Gaussians of the source where in the file it is; `None` if `order` is not a
+/// permutation of them.
+pub(crate) fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
+    let mut from = vec![usize::MAX; len];
     for (k, &source) in order.iter().enumerate() {
         let slot = from.get_mut(source as usize)?;
         if *slot != usize::MAX {
@@ -15,32 +16,32 @@ fn sources(model: &Model, order: &[u32]) -> Option<Vec<usize>> {
         }
         *slot = k;
     }
-    (order.len() == model.len()).then_some(from)
+    (order.len() == len).then_some(from)
 }
 
 /// `model` with Gaussian k moved to `order[k]`.
 pub(super) fn restored(model: Model, order: &[u32]) -> Result<Model> {
-    let from = sources(&model, order)
+    let from = inverse(order, model.len())
         .ok_or_else(|| Error::parameter("packed", "order", "a permutation of the Gaussians"))?;
     let Model { mut geometry, meta, dictionary, codes, record } = model;
     let g = &mut geometry;
-    gather(&mut g.positions, &from);
-    gather(&mut g.normals, &from);
-    gather(&mut g.dc, &from);
-    gather(&mut g.opacities, &from);
-    gather(&mut g.scales, &from);
-    gather(&mut g.rotations, &from);
+    gather(&mut g.positions, from.iter().copied());
+    gather(&mut g.normals, from.iter().copied());
+    gather(&mut g.dc, from.iter().copied());
+    gather(&mut g.opacities, from.iter().copied());
+    gather(&mut g.scales, from.iter().copied());
+    gather(&mut g.rotations, from.iter().copied());
     for extra in &mut g.extras {
-        for_extra!(&mut extra.values, v => gather(v, &from));
+        for_extra!(&mut extra.values, v => gather(v, from.iter().copied()));
     }
     let codes = reordered(&codes, &from, &dictionary)?;
     Ok(Model { geometry, meta, dictionary, codes, record })
 }
 
-/// Entry k becomes what entry `from[k]` was; arrays that are left out stay so.
-fn gather<T: Copy>(values: &mut Vec<T>, from: &[usize]) {
+/// Entries become those that `from` names, one after the other; arrays that are left out stay so.
+pub(super) fn gather<T: Copy>(values: &mut Vec<T>, from: impl Iterator<Item = usize>) {
     if !values.is_empty() {
-        *values = from.iter().map(|&k| values[k]).collect();
+        *values = from.map(|k| values[k]).collect();
     }
 }
 

@@ -194,13 +194,15 @@ impl Packed {
             self.dictionary(&tables, parts[0], parts[1], count_bits).ok_or_else(|| bad("dictionary"))?;
         add(&bits);
         let n = self.gaussians;
-        let mut model = self.empty_model(dictionary)?;
-        let g = &mut model.geometry;
-        g.positions = vec![[0.0; 3]; n];
-        g.dc = vec![[0.0; 3]; n];
-        g.opacities = vec![0.0; n];
-        g.scales = vec![[0.0; 3]; n];
-        g.rotations = vec![[0.0; 4]; n];
+        let mut g = Geometry {
+            positions: vec![[0.0; 3]; n],
+            normals: Vec::new(),
+            dc: vec![[0.0; 3]; n],
+            opacities: vec![0.0; n],
+            scales: vec![[0.0; 3]; n],
+            rotations: vec![[0.0; 4]; n],
+            extras: self.extras.clone(),
+        };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let places = g
@@ -224,7 +226,7 @@ impl Packed {
         let pieces = map_vec(work, |(c, symbols, raw, place)| {
             let mut player = Player::new(&tables, symbols, raw)?;
             player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-            piece(&parameters, &model.dictionary, player, c * CHUNK, place)
+            piece(&parameters, &dictionary, player, c * CHUNK, place)
         });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
@@ -236,26 +238,14 @@ impl Packed {
             escapes.gaussians.extend(piece.escaped);
             escapes.rows.extend(piece.rows);
         }
-        let indices = if model.dictionary.len() <= 256 {
+        let indices = if dictionary.len() <= 256 {
             Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
         } else {
             Indices::U16(atoms)
         };
-        model.codes = SparseCodes::new(&model.dictionary, counts, indices, Values::F16(values), escapes)?;
-        Ok((model, spent))
-    }
-
-    fn empty_model(&self, dictionary: Dictionary) -> Result<Model> {
-        let codes = SparseCodes::new(
-            &dictionary,
-            Vec::new(),
-            Indices::for_atoms(0),
-            Values::F16(Vec::new()),
-            Escapes::default(),
-        )?;
-        let geometry = Geometry { extras: self.extras.clone(), ..Geometry::default() };
+        let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)?;
         let record = Record { layout: Layout::Packed, ..self.record.clone() };
-        Ok(Model { geometry, meta: self.meta.clone(), dictionary, codes, record })
+        Ok((Model { geometry: g, meta: self.meta.clone(), dictionary, codes, record }, spent))
     }
 
     fn dictionary(

@@ -5,6 +5,7 @@
 //! not add up.
 
 use super::bits::{unzigzag, zigzag};
+use super::codebook::COUNT_CLASSES;
 use super::morton;
 use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
@@ -215,7 +216,7 @@ impl<'p> Walk<'p> {
         }
         // One more than the longest code marks a row stored exactly.
         let escape = u64::try_from(self.dim).ok()? + 1;
-        let context = 2 * usize::from(colour.min(11)) + usize::from(around > 1.0);
+        let context = 2 * usize::from(colour).min(COUNT_CLASSES - 1) + usize::from(around > 1.0);
         let count = s.integer(Stream::Count, context, || match target.map(|t| t.code) {
             Some(Code::Atoms(code)) => code.len() as u64,
             Some(Code::Exact(_)) => escape,

@@ -2,15 +2,16 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
+#[path = "../common/allocator.rs"]
+mod allocator;
 #[path = "../common/mod.rs"]
 mod common;
 mod files;
 mod mutations;
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
+use allocator::counted;
 use files::{copies, files};
 use lexisplat::packed::CHUNK;
 use lexisplat::{Limits, Splats, lexi};
@@ -32,38 +33,11 @@ const PATIENCE: Duration = Duration::from_secs(10);
 /// Structured mutations tried.
 const MUTATIONS: usize = 10_000;
 
-/// Counts what is allocated.
-struct Counting;
-
-static LIVE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "a counting allocator can be written in no other way")]
-// SAFETY: every call goes to the system allocator unchanged; the counters do not touch memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        PEAK.fetch_max(LIVE.fetch_add(layout.size(), Relaxed) + layout.size(), Relaxed);
-        // SAFETY: the caller keeps `alloc`'s contract.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size(), Relaxed);
-        // SAFETY: the caller keeps `dealloc`'s contract.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
-
 /// Reads `bytes`; asserts the bounds. Whether they were accepted.
 fn accepted(bytes: &[u8]) -> bool {
-    let before = LIVE.load(Relaxed);
-    PEAK.store(before, Relaxed);
     let clock = Instant::now();
-    let result = lexi::read_bytes("mutated.lexi", bytes, &Limits::default());
+    let (result, used) = counted(|| lexi::read_bytes("mutated.lexi", bytes, &Limits::default()));
     assert!(clock.elapsed() < PATIENCE, "{:?} for {} bytes", clock.elapsed(), bytes.len());
-    let used = PEAK.load(Relaxed) - before;
     let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_TABLES + ALLOWED_BASE;
     assert!(used <= allowed, "{used} bytes allocated for a file of {}, {allowed} allowed", bytes.len());
     match result {
