@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
+use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
 
 use crate::exit::CODES;
@@ -54,7 +56,7 @@ pub(crate) struct Compress {
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
     /// How good: `small`, `balanced`, `high` or `archive` [default: balanced].
-    #[arg(long, value_enum, group = "goal", value_name = "NAME")]
+    #[arg(long, value_parser = preset(), group = "goal", value_name = "NAME")]
     pub(crate) preset: Option<Preset>,
     /// The smallest file whose pictures reach this PSNR on average, in dB.
     #[arg(long, group = "goal", value_name = "DB")]
@@ -162,29 +164,9 @@ impl Compress {
     }
 }
 
-/// Qualities of packed files, by what they are for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Preset {
-    /// To look at on a phone: about 35 dB.
-    Small,
-    /// Hard to tell from the original: about 40 dB.
-    Balanced,
-    /// Not to be told from the original: about 45 dB.
-    High,
-    /// To keep instead of the original: about 54 dB.
-    Archive,
-}
-
-impl Preset {
-    /// What it stands for: the PSNR expected on average, in dB.
-    pub(crate) fn decibels(self) -> f64 {
-        match self {
-            Self::Small => 35.0,
-            Self::Balanced => 40.0,
-            Self::High => 45.0,
-            Self::Archive => 54.0,
-        }
-    }
+/// The names of presets, as `clap` lists and checks them.
+fn preset() -> impl TypedValueParser<Value = Preset> {
+    PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
 }
 
 /// A number of bytes: plain, or with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (of 1024).

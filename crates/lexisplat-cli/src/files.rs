@@ -5,65 +5,22 @@ use std::io::{BufWriter, Read, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use image::ImageEncoder;
-use lexisplat::lexi::{self, Contents};
-use lexisplat::packed::Packed;
-use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{Error, Limits, Model};
-use lexisplat_render::Scene;
+use lexisplat::Error;
+use lexisplat_eval::SceneFile;
 
 use crate::args::Common;
 use crate::exit::OutputExists;
-
-/// Bytes that tell a PLY from a .lexi.
-const PEEK: usize = 16;
-
-/// A scene of either kind.
-pub(crate) enum Loaded {
-    Ply(Box<PlyRead>),
-    /// A .lexi, and before it was decoded if it is a packed one.
-    Lexi(Box<Model>, Option<Box<Packed>>),
-}
-
-impl Loaded {
-    fn lexi(contents: Contents, name: &str) -> Result<Self> {
-        Ok(match contents {
-            Contents::Packed(packed) => {
-                Self::Lexi(Box::new(lexi::unpack(name, &packed)?), Some(Box::new(packed)))
-            }
-            contents => Self::Lexi(Box::new(contents.into_model(name)?), None),
-        })
-    }
-}
-
-/// A scene, its name and its size.
-pub(crate) struct Input {
-    pub(crate) loaded: Loaded,
-    pub(crate) name: String,
-    pub(crate) bytes: u64,
-}
-
-impl Input {
-    pub(crate) fn scene(&self) -> Scene<'_> {
-        match &self.loaded {
-            Loaded::Ply(read) => Scene::from(&read.splats),
-            Loaded::Lexi(model, _) => Scene::from(&**model),
-        }
-    }
-
-    /// Tells the user what is odd about the file.
-    pub(crate) fn warn(&self) {
-        if let Loaded::Ply(read) = &self.loaded {
-            warn(&self.name, &read.warnings);
-        }
-    }
-}
 
 /// Prints warnings about `name`.
 pub(crate) fn warn(name: &str, warnings: &[String]) {
     for warning in warnings {
         eprintln!("warning: {name}: {warning}");
     }
+}
+
+/// Tells the user what is odd about a scene's file.
+pub(crate) fn warn_of(input: &SceneFile) {
+    warn(&input.name, input.warnings());
 }
 
 /// Whether `path` means standard input or output.
@@ -79,31 +36,11 @@ pub(crate) fn standard_input() -> Result<Vec<u8>> {
 }
 
 /// Reads a PLY or a .lexi, whichever the bytes say it is.
-pub(crate) fn load(path: &Path, drop_invalid: bool) -> Result<Input> {
-    let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
-    let limits = Limits::default();
+pub(crate) fn load(path: &Path, drop_invalid: bool) -> Result<SceneFile> {
     if is_pipe(path) {
-        let bytes = standard_input()?;
-        let name = "standard input".to_owned();
-        let loaded = if lexi::is_lexi(&bytes) {
-            Loaded::lexi(lexi::open_bytes(&name, &bytes, &limits)?, &name)?
-        } else {
-            Loaded::Ply(Box::new(ply::read_bytes(&name, &bytes, &options)?))
-        };
-        return Ok(Input { loaded, name, bytes: bytes.len() as u64 });
+        return Ok(SceneFile::read_bytes("standard input", &standard_input()?, drop_invalid)?);
     }
-    let name = path.display().to_string();
-    let io = |e| Error::io(path, e);
-    let mut start = Vec::with_capacity(PEEK);
-    let file = std::fs::File::open(path).map_err(io)?;
-    let bytes = file.metadata().map_err(io)?.len();
-    file.take(PEEK as u64).read_to_end(&mut start).map_err(io)?;
-    let loaded = if lexi::is_lexi(&start) {
-        Loaded::lexi(lexi::open(path, &limits)?, &name)?
-    } else {
-        Loaded::Ply(Box::new(ply::read(path, &options)?))
-    };
-    Ok(Input { loaded, name, bytes })
+    Ok(SceneFile::read(path, drop_invalid)?)
 }
 
 /// The output: what was asked for, or the input with another extension.
@@ -140,14 +77,6 @@ pub(crate) fn check_output(path: &Path, inputs: &[&Path], overwrite: bool) -> Re
 /// Makes the folder `path` if need be.
 pub(crate) fn make_folder(path: &Path) -> Result<()> {
     Ok(std::fs::create_dir_all(path).map_err(|e| Error::io(path, e))?)
-}
-
-/// An 8-bit RGB picture as PNG bytes.
-pub(crate) fn png(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    let encoder = image::codecs::png::PngEncoder::new(&mut bytes);
-    encoder.write_image(pixels.as_flattened(), width, height, image::ExtendedColorType::Rgb8)?;
-    Ok(bytes)
 }
 
 /// Writes `bytes` to `path`, whole or not at all.

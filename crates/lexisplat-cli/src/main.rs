@@ -5,7 +5,6 @@ mod commands;
 mod exit;
 mod files;
 mod progress;
-mod text;
 
 use std::process::ExitCode;
 

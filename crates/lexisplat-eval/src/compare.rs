@@ -124,7 +124,7 @@ pub fn compare(
     if cameras.is_empty() {
         return Err(Error::parameter("cameras", "none", "at least one view"));
     }
-    let drawing = RenderOptions { background: options.background };
+    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
     let mut views = Vec::with_capacity(cameras.len());
     for camera in cameras {
         camera.validate()?;

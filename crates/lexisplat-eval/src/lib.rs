@@ -33,13 +33,18 @@ mod compare;
 mod error;
 pub mod metrics;
 pub mod montage;
+mod png;
 mod prune;
 pub mod report;
+mod scene_file;
 mod target;
+pub mod text;
 mod views;
 
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
 pub use error::{Error, Result};
+pub use png::png;
 pub use prune::{Pruned, prune};
+pub use scene_file::{Loaded, SceneFile};
 pub use target::{Goal, Judge, Views, pack_to};
 pub use views::{DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, choose_views};

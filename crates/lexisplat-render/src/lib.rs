@@ -41,10 +41,10 @@ mod surround;
 
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
-pub use cpu::{RenderOptions, render, sensitivity};
+pub use cpu::{Drawn, RenderOptions, render, render_measured, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
-pub use orbit::orbit;
+pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
 pub use scene::Scene;
 pub use surround::surround;

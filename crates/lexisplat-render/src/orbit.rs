@@ -34,6 +34,7 @@ const UP: DVec3 = DVec3::NEG_Y;
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
     let (centre, radius) = bulk(geometry);
+    let centre = DVec3::from_array(centre);
     let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
     let focal = f64::from(width.min(height)) / 2.0 / half_view.tan();
     let distance = (radius / half_view.sin()).max(MIN_DISTANCE);
@@ -61,11 +62,12 @@ pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<
         .collect()
 }
 
-/// Centre and radius of where most of the opacity is.
-fn bulk(geometry: &Geometry) -> (DVec3, f64) {
+/// Centre and radius of where most of the opacity is, in world units; the radius is above 0.
+#[must_use]
+pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
     let weights: Vec<f64> = geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect();
     let (centre, half) = middle(geometry, &weights, TRIM);
-    (centre, (half.length() * AIR).max(MIN_RADIUS))
+    (centre.to_array(), (half.length() * AIR).max(MIN_RADIUS))
 }
 
 /// Weighted median of the positions, and half the extent along each axis of what is left without the

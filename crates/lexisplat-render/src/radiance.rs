@@ -18,6 +18,8 @@ const PADDED: usize = 4;
 #[derive(Debug)]
 pub struct Radiance<'a> {
     degree: ShDegree,
+    /// Highest degree that counts, at most `degree`.
+    shown: ShDegree,
     dc: &'a [[f32; 3]],
     rest: Rest<'a>,
 }
@@ -40,11 +42,18 @@ impl<'a> Radiance<'a> {
                 Rest::Sparse { codes: &model.codes, atoms: interleave(&model.dictionary) }
             }
         };
-        Self { degree: scene.degree(), dc: &scene.geometry().dc, rest }
+        let degree = scene.degree();
+        Self { degree, shown: degree, dc: &scene.geometry().dc, rest }
+    }
+
+    /// The same with the bands above `degree` left out, if that is given and below the scene's own.
+    #[must_use]
+    pub fn up_to(self, degree: Option<ShDegree>) -> Self {
+        Self { shown: degree.map_or(self.degree, |most| most.min(self.degree)), ..self }
     }
 
     /// Colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
-    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel.
+    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count.
     ///
     /// # Panics
     /// If the scene has no Gaussian `i`.
@@ -53,8 +62,9 @@ impl<'a> Radiance<'a> {
     pub fn colour(&self, i: usize, direction: [f32; 3]) -> [f32; 3] {
         let per_channel = self.degree.rest_per_channel();
         let mut rest = [0.0; CHANNELS];
-        if per_channel > 0 {
-            let basis = rest_basis(self.degree, direction);
+        if self.shown.rest_per_channel() > 0 {
+            // Zero above the degree shown, which leaves those bands out.
+            let basis = rest_basis(self.shown, direction);
             rest = match &self.rest {
                 Rest::Dense(all) => {
                     let dim = self.degree.rest();

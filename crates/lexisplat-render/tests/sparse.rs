@@ -112,3 +112,33 @@ fn colours_agree_gaussian_by_gaussian() {
     }
     assert!(differ > 0);
 }
+
+#[test]
+fn bands_above_the_degree_asked_for_are_left_out() {
+    let model = model(ShDegree::THREE, 90, true);
+    let whole = model.to_splats();
+    let (sparse, dense) = (Scene::from(&model), Scene::from(&whole));
+    let direction = glam::Vec3::new(0.3, -0.5, 0.8).normalize().to_array();
+    for degree in (0..=4).map(|d| ShDegree::new(d).unwrap()) {
+        let mut cut = whole.clone();
+        for (k, value) in cut.sh_rest.iter_mut().enumerate() {
+            if k % 15 >= degree.rest_per_channel() {
+                *value = 0.0;
+            }
+        }
+        let cut_scene = Scene::from(&cut);
+        let expected = Radiance::new(&cut_scene);
+        let radiance = |scene| Radiance::new(scene).up_to(Some(degree));
+        let (from_codes, from_dense) = (radiance(&sparse), radiance(&dense));
+        for i in 0..whole.len() {
+            let expected = expected.colour(i, direction);
+            assert_eq!(from_dense.colour(i, direction), expected, "degree {degree}, Gaussian {i}");
+            let found = from_codes.colour(i, direction);
+            assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 2e-6), "{degree}, {i}");
+        }
+    }
+    let camera = made::camera(0, 64, 48);
+    let all = RenderOptions::default();
+    let none = RenderOptions { max_degree: Some(ShDegree::ZERO), ..all };
+    assert_ne!(render(&sparse, &camera, &all), render(&sparse, &camera, &none));
+}

@@ -27,7 +27,11 @@ fn agrees_on_every_degree_and_both_rules() {
                 let camera = made::camera(seed, 150, 110);
                 let background = [0.2, 0.5, 1.0];
                 let expected = naive::render(&splats, &camera, background);
-                let found = render(&Scene::from(&splats), &camera, &RenderOptions { background });
+                let found = render(
+                    &Scene::from(&splats),
+                    &camera,
+                    &RenderOptions { background, ..RenderOptions::default() },
+                );
                 let db = common::psnr(&found, &expected, false);
                 assert!(db >= TWIN_DB, "degree {degree}, antialiased {antialiased}, seed {seed}: {db:.1} dB");
             }
@@ -66,7 +70,7 @@ fn one_splat_and_the_background_add_up() {
     for (opacity, alpha) in [(0.0, 0.5), (30.0, 0.99)] {
         splats.geometry.opacities = vec![opacity];
         let camera = made::straight(33, 21, 30.0);
-        let options = RenderOptions { background: [0.0, 0.5, 1.0] };
+        let options = RenderOptions { background: [0.0, 0.5, 1.0], ..RenderOptions::default() };
         let image = render(&Scene::from(&splats), &camera, &options);
         let [red, green, blue] = image.pixels[10 * 33 + 16];
         let expected = [
@@ -126,7 +130,7 @@ fn broken_gaussians_never_reach_a_pixel() {
 #[test]
 fn an_empty_scene_is_background() {
     let splats = made::scene(0, 0, ShDegree::THREE, false);
-    let options = RenderOptions { background: [0.1, 0.2, 0.3] };
+    let options = RenderOptions { background: [0.1, 0.2, 0.3], ..RenderOptions::default() };
     let image = render(&Scene::from(&splats), &made::straight(17, 5, 10.0), &options);
     assert_eq!(image.pixels, vec![[0.1, 0.2, 0.3]; 85]);
 }

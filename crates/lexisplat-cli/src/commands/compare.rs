@@ -4,18 +4,17 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{CompareOptions, Comparison, choose_views, compare, montage};
+use lexisplat_eval::{CompareOptions, Comparison, SceneFile, choose_views, compare, montage, png, text};
 use serde_json::json;
 
 use crate::args::{Common, Compare};
-use crate::files::{Input, check_output, load, make_folder, png, print, print_json, view_name, write_bytes};
+use crate::files::{check_output, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
-use crate::text;
 
 pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let (a, b) = (load(&args.a, false)?, load(&args.b, false)?);
-    a.warn();
-    b.warn();
+    warn_of(&a);
+    warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
     let cameras = choose_views(
@@ -43,7 +42,8 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
         bars.advance(1);
         if let Some(path) = paths.next() {
             let (width, height, pixels) = montage::montage(image_a, image_b);
-            let written = png(width, height, &pixels).and_then(|bytes| write_bytes(path, &bytes));
+            let written =
+                png(width, height, &pixels).map_err(Into::into).and_then(|bytes| write_bytes(path, &bytes));
             failure = failure.take().or(written.err());
         }
     })?;
@@ -70,7 +70,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     print(&table(&a, &b, &comparison, args)?)
 }
 
-fn table(a: &Input, b: &Input, comparison: &Comparison, args: &Compare) -> Result<String> {
+fn table(a: &SceneFile, b: &SceneFile, comparison: &Comparison, args: &Compare) -> Result<String> {
     let mut out = String::new();
     let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
     writeln!(out, "{:<width$}  {:>11}  {:>10}  {:>8}", "view", "size", "PSNR", "SSIM")?;

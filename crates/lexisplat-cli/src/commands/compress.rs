@@ -10,10 +10,11 @@ use lexisplat::{
 };
 use serde_json::json;
 
+use lexisplat_eval::text;
+
 use crate::args::{Common, Compress};
 use crate::files::{check_output, is_pipe, output_path, standard_input, tell, warn, write_output};
 use crate::progress::Bars;
-use crate::text;
 
 /// Bytes of SH-rest a coefficient takes in a PLY.
 const COEFFICIENT_BYTES: u64 = 4;

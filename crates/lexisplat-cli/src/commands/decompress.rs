@@ -6,9 +6,10 @@ use anyhow::{Context, Result};
 use lexisplat::{Error, Limits, lexi, ply};
 use serde_json::json;
 
+use lexisplat_eval::text;
+
 use crate::args::{Common, Decompress};
 use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input, write_output};
-use crate::text;
 
 pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let start = Instant::now();

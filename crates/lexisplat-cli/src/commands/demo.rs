@@ -7,15 +7,14 @@ use anyhow::Result;
 use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
 use lexisplat_eval::report::{Picture, Report, html};
-use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage};
+use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage, png, text};
 use lexisplat_render::{Image, Scene, orbit};
 use serde_json::json;
 
 use super::compress::error_line;
 use crate::args::{Common, Demo};
-use crate::files::{check_output, make_folder, png, print, print_json, view_name, write_bytes};
+use crate::files::{check_output, make_folder, print, print_json, view_name, write_bytes};
 use crate::progress::Bars;
-use crate::text;
 
 /// Views drawn and compared.
 const VIEWS: usize = 6;

@@ -7,15 +7,14 @@ use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::PlyRead;
 use lexisplat::{Error, Progress, Splats, lexi};
-use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune};
+use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::read_cameras;
 use serde_json::{Value, json};
 
 use super::compress::error_line;
-use crate::args::{Common, Compress, Preset};
+use crate::args::{Common, Compress};
 use crate::files::{tell, write_output};
 use crate::progress::Bars;
-use crate::text;
 
 /// Levels of an 8-bit channel above 0.
 const LEVELS: f32 = 255.0;
@@ -60,7 +59,7 @@ pub(crate) fn run(
     drop(sensitivity);
     let (packed, report) = match goal {
         Some(goal) => pack_to(&packer, &Judge::new(&splats, &views), goal, &bars)?,
-        None => packer.pack(packer.step_for(args.preset.unwrap_or(Preset::Balanced).decibels()), &bars)?,
+        None => packer.pack(packer.step_for(args.preset.unwrap_or_default().decibels()), &bars)?,
     };
     drop(packer);
     let pack_seconds = clock.elapsed().as_secs_f64();

@@ -5,13 +5,13 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::choose_views;
+use lexisplat_eval::{choose_views, png};
 use lexisplat_render::{RenderOptions, render};
 use serde_json::json;
 
 use crate::args::{Common, Render};
 use crate::files::{
-    check_output, is_pipe, load, make_folder, png, print, print_json, view_name, write_bytes,
+    check_output, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
 };
 use crate::progress::Bars;
 
@@ -27,7 +27,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         args.file.with_file_name(name)
     });
     let input = load(&args.file, false)?;
-    input.warn();
+    warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
     let cameras = choose_views(
@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         check_output(path, &[], common.overwrite)?;
     }
     make_folder(&folder)?;
-    let options = RenderOptions { background: views.background };
+    let options = RenderOptions { background: views.background, ..RenderOptions::default() };
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();

@@ -13,6 +13,9 @@ mod project;
 mod sensitivity;
 mod tiles;
 
+use std::time::Instant;
+
+use lexisplat::ShDegree;
 use rayon::prelude::*;
 
 use crate::camera::Camera;
@@ -28,6 +31,20 @@ pub use sensitivity::sensitivity;
 pub struct RenderOptions {
     /// Colour behind the scene, 0 to 1 in each channel. Default black.
     pub background: [f32; 3],
+    /// Highest SH degree to draw with; bands above it are left out. Default all that the scene has.
+    pub max_degree: Option<ShDegree>,
+}
+
+/// A picture and what drawing it took.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Drawn {
+    /// The picture.
+    pub image: Image,
+    /// Gaussians that may touch it.
+    pub gaussians: usize,
+    /// What was done in order, each with its time in milliseconds.
+    pub stage_times: Vec<(&'static str, f64)>,
 }
 
 /// Draws `scene` as `camera` sees it.
@@ -39,8 +56,40 @@ pub struct RenderOptions {
 /// memory (see [`Camera::validate`]).
 #[must_use]
 pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Image {
+    render_measured(scene, camera, options).image
+}
+
+/// [`render`], and what it took.
+///
+/// # Panics
+/// As [`render`].
+#[must_use]
+pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Drawn {
     let projection = project::Projection::new(camera, scene.meta().antialiased);
     draw(scene, &projection, options, tiles::MAX_ENTRIES)
+}
+
+/// Times the stages of a picture.
+struct Stages {
+    start: Instant,
+    times: Vec<(&'static str, f64)>,
+}
+
+impl Stages {
+    fn start() -> Self {
+        Self { start: Instant::now(), times: Vec::new() }
+    }
+
+    /// The time since the last call belongs to `stage`, which may come more than once.
+    fn end(&mut self, stage: &'static str) {
+        let now = Instant::now();
+        let milliseconds = now.duration_since(self.start).as_secs_f64() * 1e3;
+        match self.times.iter_mut().find(|(name, _)| *name == stage) {
+            Some((_, sum)) => *sum += milliseconds,
+            None => self.times.push((stage, milliseconds)),
+        }
+        self.start = now;
+    }
 }
 
 /// [`render`] with at most `max_entries` in the tiles' lists at once.
@@ -49,13 +98,19 @@ fn draw(
     projection: &project::Projection,
     options: &RenderOptions,
     max_entries: u64,
-) -> Image {
+) -> Drawn {
+    let mut stages = Stages::start();
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![options.background; width * height];
-    let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), projection));
+    let radiance = Radiance::new(scene).up_to(options.max_degree);
+    let projected = project::project(scene.geometry(), &radiance, projection);
+    stages.end("project");
+    let splats = order::by_depth(projected);
+    stages.end("sort");
     for band in tiles::bands(&splats, grid, max_entries) {
         let lists = tiles::TileLists::new(&splats, grid, band.clone());
+        stages.end("tiles");
         let count = band.len() * grid.columns;
         let drawn: Vec<blend::TilePixels> = (0..count)
             .into_par_iter()
@@ -75,8 +130,10 @@ fn draw(
                 }
             }
         });
+        stages.end("blend");
     }
-    Image { width: camera.width, height: camera.height, pixels }
+    let image = Image { width: camera.width, height: camera.height, pixels };
+    Drawn { image, gaussians: splats.len(), stage_times: stages.times }
 }
 
 #[cfg(test)]
@@ -122,11 +179,11 @@ mod tests {
             }
             let meta = SceneMeta { antialiased, ..SceneMeta::default() };
             let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta };
-            let options = RenderOptions { background: [0.3, 0.6, 0.9] };
+            let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
             let projection = project::Projection::new(&straight_ahead(width, height, focal), antialiased);
             let tight = draw(&Scene::from(&splats), &projection, &options, tiles::MAX_ENTRIES);
             let plain = draw(&Scene::from(&splats), &projection.untightened(), &options, 1);
-            prop_assert_eq!(tight.pixels, plain.pixels);
+            prop_assert_eq!(tight.image.pixels, plain.image.pixels);
         }
     }
 }

@@ -15,6 +15,7 @@ mod morton;
 mod neighbours;
 mod pack;
 mod parameters;
+mod preset;
 mod restore;
 mod stream;
 mod unpack;
@@ -23,6 +24,7 @@ mod walk;
 pub(crate) use restore::inverse;
 
 pub use pack::{PackOptions, PackReport, Packer};
+pub use preset::Preset;
 pub use unpack::{Packed, Promise, StreamBits};
 
 /// Gaussians of a chunk: decoded apart from all others, so that decoding is parallel and a viewer need

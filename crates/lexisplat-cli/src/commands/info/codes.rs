@@ -8,9 +8,10 @@ use lexisplat::{Model, lexi};
 use serde_json::{Map, Value, json};
 
 use super::bars;
+use lexisplat_eval::text;
+
 use crate::commands::compress::error_line;
 use crate::commands::pack::{attribute_bytes, promise_line, sh_bytes};
-use crate::text;
 
 /// Bytes of a Gaussian's SH in a dense degree-3 scene, DC and rest, in f32.
 const DENSE_SH_BYTES: usize = 192;

@@ -7,18 +7,18 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use lexisplat::Splats;
 use lexisplat::stats::{Lint, NORM_BINS, lint};
+use lexisplat_eval::{Loaded, SceneFile, text};
 use serde_json::json;
 
 use crate::args::{Common, Info};
-use crate::files::{Input, Loaded, load, print, print_json, warn};
-use crate::text;
+use crate::files::{load, print, print_json, warn, warn_of};
 
 /// Width of the longest bar of a histogram, in characters.
 const BAR: usize = 40;
 
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let input = load(&args.file, args.drop_invalid)?;
-    input.warn();
+    warn_of(&input);
     let dense;
     let splats: &Splats = match &input.loaded {
         Loaded::Ply(read) => &read.splats,
@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     print(&as_text(&input, splats, &lint)?)
 }
 
-fn as_json(input: &Input, splats: &Splats, lint: &Lint) -> Result<serde_json::Value> {
+fn as_json(input: &SceneFile, splats: &Splats, lint: &Lint) -> Result<serde_json::Value> {
     let mut value = json!({
         "file": input.name,
         "file_bytes": input.bytes,
@@ -64,7 +64,7 @@ fn as_json(input: &Input, splats: &Splats, lint: &Lint) -> Result<serde_json::Va
     Ok(value)
 }
 
-fn as_text(input: &Input, splats: &Splats, lint: &Lint) -> Result<String> {
+fn as_text(input: &SceneFile, splats: &Splats, lint: &Lint) -> Result<String> {
     let mut out = String::new();
     let count = text::count(splats.len() as u64);
     writeln!(

@@ -1,7 +1,8 @@
 //! Numbers for people.
 
 /// Bytes in the largest unit that keeps a digit before the point (powers of 1000).
-pub(crate) fn bytes(count: u64) -> String {
+#[must_use]
+pub fn bytes(count: u64) -> String {
     let units = ["kB", "MB", "GB", "TB"];
     if count < 1000 {
         return format!("{count} B");
@@ -16,7 +17,8 @@ pub(crate) fn bytes(count: u64) -> String {
 }
 
 /// A whole number with commas.
-pub(crate) fn count(value: u64) -> String {
+#[must_use]
+pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut out = String::new();
     for (i, digit) in digits.chars().enumerate() {
@@ -29,12 +31,14 @@ pub(crate) fn count(value: u64) -> String {
 }
 
 /// Decibels, or that the pictures are the same.
-pub(crate) fn decibels(psnr: Option<f64>) -> String {
+#[must_use]
+pub fn decibels(psnr: Option<f64>) -> String {
     psnr.map_or_else(|| "identical".to_owned(), |value| format!("{value:.2} dB"))
 }
 
 /// `part / whole` as "N.NNx smaller", or a dash where there is nothing to divide.
-pub(crate) fn ratio(whole: u64, part: u64) -> String {
+#[must_use]
+pub fn ratio(whole: u64, part: u64) -> String {
     if part == 0 { "-".to_owned() } else { format!("{:.2}x", whole as f64 / part as f64) }
 }
 

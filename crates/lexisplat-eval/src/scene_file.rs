@@ -1,0 +1,101 @@
+//! Scenes of either kind from files, told apart by content.
+
+use std::io::Read;
+use std::path::Path;
+
+use lexisplat::lexi::{self, Contents};
+use lexisplat::packed::Packed;
+use lexisplat::ply::{self, PlyRead, ReadOptions};
+use lexisplat::{Error, Limits, Model, Result};
+use lexisplat_render::Scene;
+
+/// Bytes that tell a PLY from a .lexi.
+const PEEK: usize = 16;
+
+/// A scene of either kind.
+#[derive(Debug)]
+pub enum Loaded {
+    /// A PLY.
+    Ply(Box<PlyRead>),
+    /// A .lexi, and before it was decoded if it is a packed one.
+    Lexi(Box<Model>, Option<Box<Packed>>),
+}
+
+impl Loaded {
+    fn lexi(contents: Contents, name: &str) -> Result<Self> {
+        Ok(match contents {
+            Contents::Packed(packed) => {
+                Self::Lexi(Box::new(lexi::unpack(name, &packed)?), Some(Box::new(packed)))
+            }
+            contents => Self::Lexi(Box::new(contents.into_model(name)?), None),
+        })
+    }
+}
+
+/// A scene, its name and its size.
+#[derive(Debug)]
+pub struct SceneFile {
+    /// The scene.
+    pub loaded: Loaded,
+    /// The file's name as the user gave it, or what stands for it.
+    pub name: String,
+    /// Size of the file in bytes.
+    pub bytes: u64,
+}
+
+impl SceneFile {
+    /// Reads a PLY or a .lexi, whichever the bytes say it is. Gaussians of a PLY with values that are not
+    /// finite are left out with `drop_invalid`.
+    ///
+    /// # Errors
+    /// What [`ply::read`] and [`lexi::open`] say.
+    pub fn read(path: &Path, drop_invalid: bool) -> Result<Self> {
+        let name = path.display().to_string();
+        let io = |e| Error::io(path, e);
+        let mut start = Vec::with_capacity(PEEK);
+        let file = std::fs::File::open(path).map_err(io)?;
+        let bytes = file.metadata().map_err(io)?.len();
+        file.take(PEEK as u64).read_to_end(&mut start).map_err(io)?;
+        let loaded = if lexi::is_lexi(&start) {
+            Loaded::lexi(lexi::open(path, &Limits::default())?, &name)?
+        } else {
+            Loaded::Ply(Box::new(ply::read(path, &options(drop_invalid))?))
+        };
+        Ok(Self { loaded, name, bytes })
+    }
+
+    /// [`Self::read`] of a file in memory, called `name` in errors.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_bytes(name: &str, bytes: &[u8], drop_invalid: bool) -> Result<Self> {
+        let loaded = if lexi::is_lexi(bytes) {
+            Loaded::lexi(lexi::open_bytes(name, bytes, &Limits::default())?, name)?
+        } else {
+            Loaded::Ply(Box::new(ply::read_bytes(name, bytes, &options(drop_invalid))?))
+        };
+        Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
+    }
+
+    /// The scene, to draw.
+    #[must_use]
+    pub fn scene(&self) -> Scene<'_> {
+        match &self.loaded {
+            Loaded::Ply(read) => Scene::from(&read.splats),
+            Loaded::Lexi(model, _) => Scene::from(&**model),
+        }
+    }
+
+    /// What is odd about the file.
+    #[must_use]
+    pub fn warnings(&self) -> &[String] {
+        match &self.loaded {
+            Loaded::Ply(read) => &read.warnings,
+            Loaded::Lexi(..) => &[],
+        }
+    }
+}
+
+fn options(drop_invalid: bool) -> ReadOptions {
+    ReadOptions { drop_invalid, ..ReadOptions::default() }
+}
