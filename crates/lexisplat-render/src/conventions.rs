@@ -51,3 +51,7 @@ pub const ANTIALIAS_FLOOR: f32 = 0.000_025;
 /// `scene/gaussian_model.py`, `rotation_activation`: the default of `torch.nn.functional.normalize`).
 /// The zero quaternion stays zero, and its rotation matrix is then the identity.
 pub const QUATERNION_FLOOR: f32 = 1e-12;
+
+/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]: covers the error of `exp`
+/// and of the logarithm, 1e-6 together, many times over. Makes no difference to pictures.
+pub const POWER_SLACK: f32 = 1e-4;

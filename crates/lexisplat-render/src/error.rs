@@ -36,6 +36,22 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
+    /// More than a limit allows. The text names what, how much, and the limit.
+    #[error("{what}: {found} is over the limit of {limit}")]
+    Limit {
+        /// What there is too much of.
+        what: String,
+        /// How much there is.
+        found: u64,
+        /// The most allowed.
+        limit: u64,
+    },
+    /// The GPU or its driver refused, or there is none. The CPU renderer needs neither.
+    #[error("{problem}")]
+    Gpu {
+        /// What it said.
+        problem: String,
+    },
 }
 
 impl Error {

@@ -33,6 +33,8 @@ mod cameras_json;
 pub mod conventions;
 mod cpu;
 mod error;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod image;
 mod orbit;
 mod radiance;

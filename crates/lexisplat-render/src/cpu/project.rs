@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::conventions::{
-    ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, QUATERNION_FLOOR, RADIUS_SIGMAS, TAN_LIMIT,
-    W_EPSILON,
+    ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, POWER_SLACK, QUATERNION_FLOOR, RADIUS_SIGMAS,
+    TAN_LIMIT, W_EPSILON,
 };
 use crate::radiance::Radiance;
 
@@ -16,9 +16,6 @@ use super::tiles::{Grid, Rect};
 /// Gaussians in one unit of work.
 const CHUNK: usize = 1024;
 
-/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]: covers the error of `exp`
-/// and of the logarithm, 1e-6 together, many times over.
-const POWER_SLACK: f32 = 1e-4;
 /// Bound on the relative rounding error of each term of a power, and of the distances in it: 16 units
 /// in the last place, where at most six roundings happen.
 const TERM_ERROR: f64 = 1e-6;

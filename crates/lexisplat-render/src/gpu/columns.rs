@@ -1,0 +1,97 @@
+//! Sparse codes as kernels read them.
+//!
+//! For every [`COLUMN_GROUP`] Gaussians `columns` holds where their nonzeros begin, in words of `nonzeros`,
+//! and a byte each: the count, or [`ESCAPED`]. There stand the group's atom numbers, one or two bytes each,
+//! then its values, two or four bytes each, both filled up to whole words. Neighbouring Gaussians so share
+//! cache lines, and offsets cost a quarter of a byte a Gaussian.
+
+use std::ops::Range;
+
+use lexisplat::{Indices, SparseCodes, Values};
+
+use super::constants::{COLUMN_GROUP, ESCAPED};
+
+/// The codes of a run of Gaussians.
+#[derive(Debug, Default)]
+pub(super) struct Columns {
+    /// Places and counts, then the escaped Gaussians' numbers in the run.
+    pub(super) columns: Vec<u32>,
+    /// Where in `columns` the escaped Gaussians' numbers begin.
+    pub(super) escapes_at: usize,
+    pub(super) nonzeros: Vec<u32>,
+}
+
+/// Words that `counts`, of one group, take in `nonzeros`.
+pub(super) fn group_words(codes: &SparseCodes, counts: &[u8]) -> usize {
+    let total: usize = counts.iter().map(|&c| usize::from(c)).sum();
+    (total * codes.indices().width()).div_ceil(4) + (total * codes.values().width()).div_ceil(4)
+}
+
+impl Columns {
+    /// The codes of the Gaussians in `range`, which begin at nonzero `first`.
+    pub(super) fn new(codes: &SparseCodes, range: Range<usize>, first: usize) -> Self {
+        let all = &codes.escapes().gaussians;
+        let inside = |&g: &u32| range.contains(&(g as usize));
+        let escapes: Vec<u32> = all
+            .iter()
+            .copied()
+            .filter(inside)
+            // Chunks are smaller than 2^32.
+            .map(|g| g - u32::try_from(range.start).unwrap_or(u32::MAX))
+            .collect();
+        let mut out = Self::default();
+        let group = COLUMN_GROUP as usize;
+        let mut at = first;
+        for (counts, start) in codes.counts()[range].chunks(group).zip((0_u32..).step_by(group)) {
+            out.columns.push(u32::try_from(out.nonzeros.len()).unwrap_or(u32::MAX));
+            let mut bytes = [0_u8; COLUMN_GROUP as usize];
+            bytes[..counts.len()].copy_from_slice(counts);
+            let first_escape = escapes.partition_point(|&g| g < start);
+            for &g in escapes[first_escape..].iter().take_while(|&&g| g < start + COLUMN_GROUP) {
+                #[expect(clippy::cast_possible_truncation, reason = "0x80")]
+                let escaped = ESCAPED as u8;
+                bytes[(g - start) as usize] = escaped;
+            }
+            out.columns.extend(
+                bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+            );
+            let total: usize = counts.iter().map(|&c| usize::from(c)).sum();
+            match codes.indices() {
+                Indices::U8(v) => pack(&mut out.nonzeros, v[at..at + total].iter().map(|v| v.to_le_bytes())),
+                Indices::U16(v) => pack(&mut out.nonzeros, v[at..at + total].iter().map(|v| v.to_le_bytes())),
+            }
+            match codes.values() {
+                Values::F16(v) => pack(&mut out.nonzeros, v[at..at + total].iter().map(|v| v.to_le_bytes())),
+                Values::F32(v) => pack(&mut out.nonzeros, v[at..at + total].iter().map(|v| v.to_le_bytes())),
+            }
+            at += total;
+        }
+        out.escapes_at = out.columns.len();
+        out.columns.extend(escapes);
+        out
+    }
+
+    /// Number of escaped Gaussians.
+    pub(super) fn escapes(&self) -> usize {
+        self.columns.len() - self.escapes_at
+    }
+}
+
+/// Appends elements to `words`, filling the last with zeros.
+fn pack<const N: usize>(words: &mut Vec<u32>, elements: impl Iterator<Item = [u8; N]>) {
+    let mut word = 0;
+    let mut filled = 0;
+    for element in elements {
+        for byte in element {
+            word |= u32::from(byte) << (8 * filled);
+            filled += 1;
+            if filled == 4 {
+                words.push(word);
+                (word, filled) = (0, 0);
+            }
+        }
+    }
+    if filled > 0 {
+        words.push(word);
+    }
+}

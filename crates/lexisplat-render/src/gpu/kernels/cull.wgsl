@@ -1,0 +1,61 @@
+// Marks the Gaussians that may be seen: a coarse test on bounding spheres that never loses one.
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> chunk: Chunk;
+// Position, and the largest standard deviation or -1 for what is never seen.
+@group(0) @binding(2) var<storage, read> bodies: array<vec4<f32>>;
+// One bit a Gaussian.
+@group(0) @binding(3) var<storage, read_write> masks: array<u32>;
+// Gaussians marked in each block.
+@group(0) @binding(4) var<storage, read_write> starts: array<u32>;
+
+var<workgroup> words: array<atomic<u32>, MASK_WORDS>;
+
+fn may_be_seen(body: vec4<f32>) -> bool {
+    let d = body.xyz - frame.position;
+    let z = dot(frame.forward, d);
+    if !(body.w >= 0.0 && z > NEAR_Z * (1.0 - CULL_SLACK) && z < FAR_LIMIT) {
+        return false;
+    }
+    let ratio = vec2<f32>(dot(frame.right, d), dot(frame.down, d)) / z;
+    let limit = TAN_LIMIT * frame.tangents;
+    let t = clamp(ratio, -limit, limit);
+    // Variances on screen are at most the largest times the squared length of the Jacobian's row, and the
+    // larger eigenvalue at most their sum.
+    let scale = body.w * frame.focal / z;
+    let variance = dot(scale * scale, vec2<f32>(1.0) + t * t) + 2.0 * DILATION + sqrt(EIGEN_FLOOR);
+    let radius = RADIUS_SIGMAS * sqrt(variance) * (1.0 + CULL_SLACK) + 1.0;
+    let centre = ((ratio / frame.tangents + 1.0) * frame.size - 1.0) * 0.5;
+    // Two pixels more than a tile, since the centre is rounded otherwise here.
+    let margin = radius + f32(TILE) + 2.0;
+    return all(centre > vec2<f32>(-margin)) && all(centre < frame.size + margin);
+}
+
+@compute @workgroup_size(GROUP)
+fn cull(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    if lane < MASK_WORDS {
+        atomicStore(&words[lane], 0u);
+    }
+    workgroupBarrier();
+    let block = group_number(group, groups);
+    let i = block * GROUP + lane;
+    if block < chunk.blocks && i < chunk.count {
+        if may_be_seen(bodies[i]) {
+            atomicOr(&words[lane / 32u], 1u << (lane % 32u));
+        }
+    }
+    workgroupBarrier();
+    if block < chunk.blocks && lane < MASK_WORDS {
+        masks[(chunk.first_block + block) * MASK_WORDS + lane] = atomicLoad(&words[lane]);
+    }
+    if block < chunk.blocks && lane == 0u {
+        var count = 0u;
+        for (var w = 0u; w < MASK_WORDS; w++) {
+            count += countOneBits(atomicLoad(&words[w]));
+        }
+        starts[chunk.first_block + block] = count;
+    }
+}

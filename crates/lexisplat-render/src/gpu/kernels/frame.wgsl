@@ -1,0 +1,62 @@
+// What is the same for a whole picture. Twin: `gpu::uniforms::Frame`.
+struct Frame {
+    // World directions of the camera: rows of the world-to-view rotation.
+    right: vec3<f32>,
+    // SH degree to evaluate.
+    degree: u32,
+    down: vec3<f32>,
+    // Tiles in a row.
+    columns: u32,
+    forward: vec3<f32>,
+    // Rows of tiles.
+    rows: u32,
+    position: vec3<f32>,
+    // 1 for the anti-aliased rules.
+    antialiased: u32,
+    background: vec3<f32>,
+    // Slots for Gaussians that may be seen.
+    slots: u32,
+    // Tangents of half the field of view.
+    tangents: vec2<f32>,
+    focal: vec2<f32>,
+    size: vec2<f32>,
+    // Pixels in a row, and rows.
+    width: u32,
+    height: u32,
+    // Blocks of Gaussians in the scene.
+    blocks: u32,
+    chunks: u32,
+    // Room for entries of the tiles' lists.
+    entries: u32,
+    // Sequence of the exclusive scan of `starts` is this long.
+    padding: u32,
+}
+
+// A part of the scene that fits in one binding. Twin: `gpu::uniforms::Chunk`.
+struct Chunk {
+    // Its first Gaussian, a multiple of GROUP, and how many.
+    first: u32,
+    count: u32,
+    // Its first block of GROUP Gaussians, and how many.
+    first_block: u32,
+    blocks: u32,
+    // Where in `columns` the numbers of its escaped Gaussians begin, and how many.
+    escapes_at: u32,
+    escapes: u32,
+    // Which of the indirect dispatches is its.
+    index: u32,
+    padding: u32,
+}
+
+// Rows of tiles drawn at once. Twin: `gpu::uniforms::Band`.
+struct Band {
+    first: u32,
+    rows: u32,
+    tiles: u32,
+    padding: u32,
+}
+
+// The group's number where there are more than fit in one dimension.
+fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
+    return group.x + group.y * groups.x;
+}

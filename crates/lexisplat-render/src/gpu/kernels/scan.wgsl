@@ -1,0 +1,107 @@
+// Exclusive prefix sums in place, of as many numbers as a counter says or `fixed` if that is not 0.
+struct Scan {
+    counter: u32,
+    fixed_length: u32,
+    padding_a: u32,
+    padding_b: u32,
+}
+
+@group(0) @binding(0) var<uniform> scan: Scan;
+@group(0) @binding(1) var<storage, read> counters: array<u32>;
+@group(0) @binding(2) var<storage, read_write> data: array<u32>;
+// Sums of blocks.
+@group(0) @binding(3) var<storage, read_write> sums: array<u32>;
+
+var<workgroup> partial: array<u32, GROUP>;
+
+fn scan_length() -> u32 {
+    if scan.fixed_length > 0u {
+        return scan.fixed_length;
+    }
+    return counters[scan.counter];
+}
+
+// Sum of the values of lanes below; `partial[GROUP - 1]` is then the sum of all.
+fn before(lane: u32, value: u32) -> u32 {
+    workgroupBarrier();
+    partial[lane] = value;
+    workgroupBarrier();
+    for (var step = 1u; step < GROUP; step *= 2u) {
+        var more = 0u;
+        if lane >= step {
+            more = partial[lane - step];
+        }
+        workgroupBarrier();
+        partial[lane] += more;
+        workgroupBarrier();
+    }
+    return partial[lane] - value;
+}
+
+@compute @workgroup_size(GROUP)
+fn scan_reduce(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let length = scan_length();
+    let block = group_number(group, groups);
+    var sum = 0u;
+    for (var k = 0u; k < SCAN_ITEMS; k++) {
+        let i = block * SCAN_BLOCK + k * GROUP + lane;
+        if i < length {
+            sum += data[i];
+        }
+    }
+    let unused = before(lane, sum);
+    if lane == GROUP - 1u && block * SCAN_BLOCK < length {
+        sums[block] = partial[lane];
+    }
+}
+
+@compute @workgroup_size(GROUP)
+fn scan_spine(@builtin(local_invocation_index) lane: u32) {
+    let blocks = (scan_length() + SCAN_BLOCK - 1u) / SCAN_BLOCK;
+    var carry = 0u;
+    for (var first = 0u; first < blocks; first += GROUP) {
+        let i = first + lane;
+        var value = 0u;
+        if i < blocks {
+            value = sums[i];
+        }
+        let sum = carry + before(lane, value);
+        if i < blocks {
+            sums[i] = sum;
+        }
+        carry += partial[GROUP - 1u];
+    }
+}
+
+@compute @workgroup_size(GROUP)
+fn scan_spread(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let length = scan_length();
+    let block = group_number(group, groups);
+    let first = block * SCAN_BLOCK + lane * SCAN_ITEMS;
+    var values: array<u32, SCAN_ITEMS>;
+    var sum = 0u;
+    for (var k = 0u; k < SCAN_ITEMS; k++) {
+        if first + k < length {
+            values[k] = data[first + k];
+            sum += values[k];
+        }
+    }
+    var total = before(lane, sum);
+    if block * SCAN_BLOCK < length {
+        total += sums[block];
+    }
+    for (var k = 0u; k < SCAN_ITEMS; k++) {
+        if first + k < length {
+            data[first + k] = total;
+            total += values[k];
+        }
+    }
+}

@@ -1,0 +1,31 @@
+//! The rasteriser on the GPU: the rules of the CPU renderer, drawn straight from dense SH or sparse codes.
+//!
+//! `cull` marks what may be seen and `compact` gives it slots, in order; `project` makes ellipses of the
+//! slots and `radiance` colours them; a stable radix sort orders them by depth; `tiles` lists them for every
+//! tile they may touch, and another sort brings the lists of each tile together; `blend` draws the tiles.
+//! How much there is of anything is only known on the GPU, which sizes its own dispatches; buffers that
+//! turn out too small are made larger and the picture is drawn again.
+//!
+//! Kernels ask for no more than WebGPU's defaults: 8 storage buffers, 256 lanes, 16 KiB of workgroup memory
+//! (but [`ShPath::SparseShared`] with a large dictionary). Scenes larger than a binding are cut into chunks,
+//! pictures whose lists are larger into bands.
+
+mod columns;
+mod constants;
+mod device;
+mod plan;
+mod renderer;
+mod scene;
+mod shaders;
+mod table;
+#[cfg(test)]
+mod tests;
+mod uniforms;
+mod work;
+
+pub use wgpu;
+
+pub use device::{AdapterSummary, Gpu, GpuChoice, adapters};
+pub use plan::Stage;
+pub use renderer::{Frame, FrameStats, GpuRenderer};
+pub use scene::{GpuScene, SceneBytes, ShPath};

@@ -1,0 +1,372 @@
+//! Which kernels run on what, in which order.
+
+use crate::error::Result;
+
+use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
+use super::device::{Buffer, Gpu};
+use super::scene::GpuScene;
+use super::shaders::{Bound, Kernels, bind};
+use super::uniforms::{Band, Pass, Scan};
+use super::work::{PIXEL, Work};
+
+use crate::conventions::TILE;
+
+/// A part of drawing that is timed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Stage {
+    /// Which Gaussians may be seen.
+    Cull,
+    /// Ellipses on screen.
+    Project,
+    /// Colours.
+    Radiance,
+    /// Order by depth.
+    Sort,
+    /// Lists of the tiles.
+    Tiles,
+    /// Pixels.
+    Blend,
+}
+
+impl Stage {
+    /// All, in the order they run.
+    pub const ALL: [Self; 6] =
+        [Self::Cull, Self::Project, Self::Radiance, Self::Sort, Self::Tiles, Self::Blend];
+
+    /// Its name in reports.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Cull => "cull",
+            Self::Project => "project",
+            Self::Radiance => "radiance",
+            Self::Sort => "sort",
+            Self::Tiles => "tiles",
+            Self::Blend => "blend",
+        }
+    }
+}
+
+/// What a plan depends on besides the scene and the buffers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape {
+    pub(super) columns: u32,
+    pub(super) rows: u32,
+    pub(super) width: u32,
+    pub(super) height: u32,
+    /// Rows of tiles drawn at once.
+    pub(super) band_rows: u32,
+    /// Significant bits of depth keys.
+    pub(super) depth_bits: u32,
+}
+
+/// Everything to run for one picture.
+pub(super) struct Plan {
+    pub(super) shape: Shape,
+    pub(super) scene: u64,
+    pub(super) passes: Vec<StagePass>,
+    /// Alive as long as the bindings.
+    _uniforms: Vec<Buffer>,
+}
+
+/// Steps of one stage, in one compute pass.
+pub(super) struct StagePass {
+    pub(super) stage: Stage,
+    pub(super) steps: Vec<Step>,
+}
+
+pub(super) struct Step {
+    pub(super) pipeline: wgpu::ComputePipeline,
+    pub(super) bindings: wgpu::BindGroup,
+    pub(super) size: Size,
+}
+
+/// How many groups.
+pub(super) enum Size {
+    Groups(u32),
+    /// As the GPU works out: where in the buffer of arguments.
+    Indirect(u64),
+}
+
+impl Size {
+    fn of(dispatch: Dispatch) -> Self {
+        Self::Indirect(dispatch as u64 * 12)
+    }
+}
+
+/// What a sort works on.
+struct Sorting<'a> {
+    keys: [&'a Buffer; 2],
+    values: [&'a Buffer; 2],
+    bits: u32,
+    length: Counter,
+    blocks: Counter,
+    digits: Counter,
+    groups: Dispatch,
+    scan_groups: Dispatch,
+    /// Whether values are the keys' own places at first.
+    identity: bool,
+}
+
+struct Planner<'a> {
+    gpu: &'a Gpu,
+    kernels: &'a Kernels,
+    work: &'a Work,
+    uniforms: Vec<Buffer>,
+    steps: Vec<Step>,
+    passes: Vec<StagePass>,
+}
+
+impl Plan {
+    pub(super) fn new(
+        gpu: &Gpu,
+        kernels: &Kernels,
+        scene: &GpuScene,
+        work: &Work,
+        shape: Shape,
+    ) -> Result<Self> {
+        let planner =
+            Planner { gpu, kernels, work, uniforms: Vec::new(), steps: Vec::new(), passes: Vec::new() };
+        planner.plan(scene, shape)
+    }
+}
+
+fn all(buffer: &Buffer) -> Bound<'_> {
+    Bound::All(&buffer.raw)
+}
+
+impl Planner<'_> {
+    fn plan(mut self, scene: &GpuScene, shape: Shape) -> Result<Plan> {
+        let (work, kernels) = (self.work, self.kernels);
+        for chunk in &scene.chunks {
+            let bound = [
+                (0, all(&work.frame)),
+                (1, all(&chunk.uniform)),
+                (2, all(&chunk.bodies)),
+                (3, all(&work.masks)),
+                (4, all(&work.starts)),
+            ];
+            self.step(&kernels.cull, &bound, Size::Groups(chunk.blocks))?;
+        }
+        self.scan(&work.starts, Counter::Found, Some(scene.blocks() + 1), None)?;
+        let bound =
+            [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
+        self.step(&kernels.compact, &bound, Size::Groups(scene.blocks()))?;
+        let bound = [
+            (0, all(&work.frame)),
+            (1, all(&work.starts)),
+            (2, all(&scene.chunk_blocks)),
+            (3, all(&work.counters)),
+            (4, all(&work.dispatches)),
+        ];
+        self.step(&kernels.plan_slots, &bound, Size::Groups(1))?;
+        self.end(Stage::Cull);
+
+        for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
+            let bound = [
+                (0, all(&work.frame)),
+                (1, all(&chunk.uniform)),
+                (2, all(&work.starts)),
+                (3, all(&work.gaussians)),
+                (4, all(&chunk.bodies)),
+                (5, all(&chunk.shapes)),
+                (6, all(&work.centres)),
+                (7, all(&work.conics)),
+                (8, all(&work.slot_keys[0])),
+                (9, all(&work.rects)),
+            ];
+            let size = Size::Indirect((Dispatch::Chunks as u64 + k) * 12);
+            self.step(&kernels.project, &bound, size)?;
+        }
+        self.end(Stage::Project);
+
+        for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
+            let mut bound = vec![
+                (0, all(&work.frame)),
+                (1, all(&chunk.uniform)),
+                (2, all(&work.starts)),
+                (3, all(&work.gaussians)),
+                (4, all(&chunk.bodies)),
+                (5, all(&work.colours)),
+            ];
+            bound.extend(chunk.sh.iter().zip(6..).map(|(buffer, binding)| (binding, all(buffer))));
+            bound.extend(scene.table.iter().flat_map(|table| table.bound()));
+            let size = Size::Indirect((Dispatch::Chunks as u64 + k) * 12);
+            self.step(&scene.radiance, &bound, size)?;
+        }
+        self.end(Stage::Radiance);
+
+        let by_depth = self.sort(&Sorting {
+            keys: work.slot_keys.each_ref(),
+            values: work.slot_values.each_ref(),
+            bits: shape.depth_bits,
+            length: Counter::Slots,
+            blocks: Counter::SlotBlocks,
+            digits: Counter::SlotDigits,
+            groups: Dispatch::SlotBlocks,
+            scan_groups: Dispatch::SlotDigits,
+            identity: true,
+        })?;
+        self.end(Stage::Sort);
+
+        let mut first = 0;
+        while first < shape.rows {
+            let rows = shape.band_rows.min(shape.rows - first);
+            self.band(shape, &work.slot_values[by_depth], first, rows)?;
+            first += rows;
+        }
+        Ok(Plan { shape, scene: scene.id, passes: self.passes, _uniforms: self.uniforms })
+    }
+
+    /// Lists and draws some rows of tiles.
+    fn band(&mut self, shape: Shape, order: &Buffer, first: u32, rows: u32) -> Result<()> {
+        let (work, kernels) = (self.work, self.kernels);
+        let tiles = rows * shape.columns;
+        let band = self.gpu.uniform("band", &Band { first, rows, tiles, padding: 0 })?;
+        let common = || {
+            [
+                (0, all(&work.frame)),
+                (1, all(&band)),
+                (2, all(&work.counters)),
+                (3, all(order)),
+                (4, all(&work.rects)),
+                (5, all(&work.centres)),
+                (6, all(&work.conics)),
+                (7, all(&work.offsets)),
+            ]
+        };
+        self.step(&kernels.count_tiles, &common(), Size::of(Dispatch::SlotsAndEnd))?;
+        self.scan(&work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))?;
+        let bound = [
+            (0, all(&work.frame)),
+            (3, all(&work.counters)),
+            (4, all(&work.dispatches)),
+            (5, all(&work.offsets)),
+        ];
+        self.step(&kernels.plan_entries, &bound, Size::Groups(1))?;
+        let lists = [(8, all(&work.entry_keys[0])), (9, all(&work.entry_values[0]))];
+        let bound: Vec<_> = common().into_iter().chain(lists).collect();
+        self.step(&kernels.list_tiles, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+        let by_tile = self.sort(&Sorting {
+            keys: work.entry_keys.each_ref(),
+            values: work.entry_values.each_ref(),
+            // Tiles and what belongs to none.
+            bits: u32::BITS - tiles.leading_zeros(),
+            length: Counter::Entries,
+            blocks: Counter::EntryBlocks,
+            digits: Counter::EntryDigits,
+            groups: Dispatch::EntryBlocks,
+            scan_groups: Dispatch::EntryDigits,
+            identity: false,
+        })?;
+        let bound = [
+            (0, all(&band)),
+            (1, all(&work.counters)),
+            (2, all(&work.entry_keys[by_tile])),
+            (3, all(&work.ranges)),
+        ];
+        self.step(&kernels.find_ranges, &bound, Size::of(Dispatch::Entries))?;
+        self.end(Stage::Tiles);
+
+        let tile = u64::try_from(TILE).unwrap_or(u64::MAX);
+        let line = u64::from(shape.width) * PIXEL;
+        let top = u64::from(first) * tile;
+        let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
+        let bound = [
+            (0, all(&work.frame)),
+            (1, all(&band)),
+            (2, all(&work.ranges)),
+            (3, all(&work.entry_values[by_tile])),
+            (4, all(&work.centres)),
+            (5, all(&work.conics)),
+            (6, all(&work.colours)),
+            // A row of tiles is a multiple of 256 bytes, as offsets must be.
+            (7, Bound::Part(&work.pixels.raw, top * line, lines * line)),
+        ];
+        self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
+        self.end(Stage::Blend);
+        self.uniforms.push(band);
+        Ok(())
+    }
+
+    fn step(
+        &mut self,
+        pipeline: &wgpu::ComputePipeline,
+        bound: &[(u32, Bound<'_>)],
+        size: Size,
+    ) -> Result<()> {
+        let bindings = bind(self.gpu, pipeline, bound)?;
+        self.steps.push(Step { pipeline: pipeline.clone(), bindings, size });
+        Ok(())
+    }
+
+    fn end(&mut self, stage: Stage) {
+        self.passes.push(StagePass { stage, steps: std::mem::take(&mut self.steps) });
+    }
+
+    /// Exclusive sums of `data` in place: of `fixed` numbers, or as many as `counter` says.
+    fn scan(
+        &mut self,
+        data: &Buffer,
+        counter: Counter,
+        fixed: Option<u32>,
+        groups: Option<Dispatch>,
+    ) -> Result<()> {
+        let (work, kernels) = (self.work, self.kernels);
+        let scan = Scan { counter: counter as u32, fixed_length: fixed.unwrap_or(0), padding: [0; 2] };
+        let uniform = self.gpu.uniform("scan", &scan)?;
+        let bound =
+            || [(0, all(&uniform)), (1, all(&work.counters)), (2, all(data)), (3, all(&work.sums))];
+        let size = || match groups {
+            Some(dispatch) => Size::of(dispatch),
+            None => Size::Groups(fixed.unwrap_or(0).div_ceil(SCAN_BLOCK)),
+        };
+        self.step(&kernels.scan_reduce, &bound(), size())?;
+        let spine = [(0, all(&uniform)), (1, all(&work.counters)), (3, all(&work.sums))];
+        self.step(&kernels.scan_spine, &spine, Size::Groups(1))?;
+        self.step(&kernels.scan_spread, &bound(), size())?;
+        self.uniforms.push(uniform);
+        Ok(())
+    }
+
+    /// Sorts; in which of the two buffers the result is.
+    fn sort(&mut self, sorting: &Sorting<'_>) -> Result<usize> {
+        let (work, kernels) = (self.work, self.kernels);
+        let passes = sorting.bits.div_ceil(DIGIT_BITS).max(1);
+        for k in 0..passes {
+            let (from, to) = if k % 2 == 0 { (0, 1) } else { (1, 0) };
+            let pass = Pass {
+                shift: k * DIGIT_BITS,
+                length: sorting.length as u32,
+                blocks: sorting.blocks as u32,
+                identity: u32::from(sorting.identity && k == 0),
+            };
+            let uniform = self.gpu.uniform("pass", &pass)?;
+            let common = || {
+                [
+                    (0, all(&uniform)),
+                    (1, all(&work.counters)),
+                    (2, all(sorting.keys[from])),
+                    (3, all(&work.histogram)),
+                ]
+            };
+            self.step(&kernels.sort_count, &common(), Size::of(sorting.groups))?;
+            self.scan(&work.histogram, sorting.digits, None, Some(sorting.scan_groups))?;
+            let moved = [
+                (4, all(sorting.values[from])),
+                (5, all(sorting.keys[to])),
+                (6, all(sorting.values[to])),
+            ];
+            let bound: Vec<_> = common().into_iter().chain(moved).collect();
+            self.step(&kernels.sort_scatter, &bound, Size::of(sorting.groups))?;
+            self.uniforms.push(uniform);
+        }
+        Ok((passes % 2) as usize)
+    }
+}
+
+/// `groups` as two dimensions of a dispatch.
+pub(super) fn dimensions(groups: u32) -> (u32, u32) {
+    (groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS))
+}

@@ -1,0 +1,452 @@
+//! Drawing a scene.
+
+use lexisplat::ShDegree;
+
+use crate::camera::Camera;
+use crate::conventions::TILE;
+use crate::cpu::RenderOptions;
+use crate::error::{Error, Result};
+use crate::image::Image;
+
+use super::constants::{COUNTERS, Counter, KEY_FIRST};
+use super::device::{Buffer, Gpu};
+use super::plan::{Plan, Shape, Size, Stage, dimensions};
+use super::scene::{GpuScene, ShPath};
+use super::shaders::Kernels;
+use super::uniforms::Frame as FrameUniform;
+use super::work::{ENTRY_ELEMENT, PIXEL, Room, SLOT_ELEMENT, Work};
+
+/// Slots and entries there is room for at first.
+const FIRST_ROOM: u32 = 1 << 18;
+/// Room is made for this share more than was missing, so that moving a little costs no second try.
+const SPARE: f64 = 1.125;
+/// Most entries in the tiles' lists at once, unless one row of tiles needs more: 1 GiB of lists.
+const MAX_ENTRIES: u64 = 1 << 26;
+/// Passes timed at most; a view drawn in more bands than that is timed no further.
+const MAX_TIMED: u32 = 1024;
+/// Bytes of a time stamp.
+const STAMP: u64 = 8;
+
+/// A drawn picture, still on the GPU.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Frame {
+    /// `width * height` pixels of four floats: red, green, blue, not clamped, and 1. Valid until the next
+    /// picture is drawn with the same renderer.
+    pub pixels: wgpu::Buffer,
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// What it took.
+    pub stats: FrameStats,
+}
+
+/// What a picture took.
+#[derive(Debug, Clone, PartialEq, Default)]
+#[non_exhaustive]
+pub struct FrameStats {
+    /// Gaussians that passed the coarse test and were projected and shaded.
+    pub visible: u32,
+    /// Pairs of a Gaussian and a tile it may touch.
+    pub entries: u32,
+    /// Runs of rows of tiles it was drawn in: more than one where the lists do not fit at once.
+    pub bands: u32,
+    /// How often it was tried again with more room. Not 0 only where a view is fuller than all before.
+    pub retries: u32,
+    /// Milliseconds on the GPU of each stage; empty where time stamps are not to be had.
+    pub stages: Vec<(Stage, f64)>,
+    /// Milliseconds from the first stage's start to the last one's end.
+    pub total: Option<f64>,
+}
+
+/// Draws scenes on one GPU, keeping its buffers from picture to picture.
+pub struct GpuRenderer {
+    gpu: Gpu,
+    kernels: Kernels,
+    work: Option<Work>,
+    plan: Option<Plan>,
+    timer: Option<Timer>,
+    /// Rows of tiles drawn at once, once lists were found not to fit.
+    band_rows: Option<u32>,
+    limits: RoomLimits,
+}
+
+impl std::fmt::Debug for GpuRenderer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("GpuRenderer").field("gpu", self.gpu.summary()).finish_non_exhaustive()
+    }
+}
+
+/// Largest arrays.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RoomLimits {
+    pub(super) slots: u64,
+    pub(super) entries: u64,
+    /// Bytes of pixels a kernel sees at once.
+    pub(super) pixels: u64,
+}
+
+struct Timer {
+    queries: wgpu::QuerySet,
+    resolved: Buffer,
+    back: Buffer,
+    /// Milliseconds of a tick.
+    tick: f64,
+}
+
+impl Timer {
+    fn new(gpu: &Gpu) -> Result<Option<Self>> {
+        use wgpu::BufferUsages as U;
+        if !gpu.device().features().contains(wgpu::Features::TIMESTAMP_QUERY) {
+            return Ok(None);
+        }
+        let bytes = u64::from(2 * MAX_TIMED) * STAMP;
+        let queries = gpu.checked("time stamps", || {
+            gpu.device().create_query_set(&wgpu::QuerySetDescriptor {
+                label: Some("stages"),
+                ty: wgpu::QueryType::Timestamp,
+                count: 2 * MAX_TIMED,
+            })
+        })?;
+        Ok(Some(Self {
+            queries,
+            resolved: gpu.buffer("time stamps", bytes, U::QUERY_RESOLVE | U::COPY_SRC)?,
+            back: gpu.buffer("time stamps back", bytes, U::MAP_READ | U::COPY_DST)?,
+            tick: f64::from(gpu.queue().get_timestamp_period()) / 1e6,
+        }))
+    }
+}
+
+impl GpuRenderer {
+    /// A renderer on `gpu`. Compiles the kernels.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the driver refuses a kernel.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let binding = gpu.max_binding();
+        let limits = RoomLimits {
+            slots: binding / SLOT_ELEMENT,
+            entries: (binding / ENTRY_ELEMENT).min(MAX_ENTRIES),
+            pixels: binding,
+        };
+        Ok(Self {
+            gpu: gpu.clone(),
+            kernels: Kernels::new(gpu)?,
+            work: None,
+            plan: None,
+            timer: Timer::new(gpu)?,
+            band_rows: None,
+            limits,
+        })
+    }
+
+    /// The same with smaller arrays than the GPU allows.
+    #[cfg(test)]
+    pub(super) fn with_limits(mut self, limits: RoomLimits) -> Self {
+        self.limits = limits;
+        self
+    }
+
+    /// Draws `scene` as `camera` sees it and brings the picture back.
+    ///
+    /// # Errors
+    /// As [`Self::draw`].
+    pub fn render(
+        &mut self,
+        scene: &GpuScene,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<(Image, FrameStats)> {
+        let frame = self.draw(scene, camera, options)?;
+        let image = self.read(&frame)?;
+        Ok((image, frame.stats))
+    }
+
+    /// The pixels of a frame of this renderer.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if the device fails.
+    pub fn read(&self, frame: &Frame) -> Result<Image> {
+        use wgpu::BufferUsages as U;
+        let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL;
+        let back = self.gpu.buffer("pixels back", size, U::MAP_READ | U::COPY_DST)?;
+        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&frame.pixels, 0, &back.raw, 0, size);
+        self.gpu.queue().submit([encoder.finish()]);
+        let pixels: Vec<[f32; 4]> = self.gpu.read(&back, size)?;
+        let pixels = pixels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+        Ok(Image { width: frame.width, height: frame.height, pixels })
+    }
+
+    /// Draws `scene` as `camera` sees it, and waits until it is done.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the scene is on another GPU or the camera cannot be drawn with, or for a
+    /// lower degree than the scene's where radiance comes from a table; [`Error::Limit`] if the view needs
+    /// larger buffers than this GPU has; [`Error::Gpu`] if the device fails.
+    pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
+        camera.validate()?;
+        if scene.gpu().device() != self.gpu.device() {
+            return Err(Error::parameter("scene", "on another GPU", "a scene on the renderer's GPU"));
+        }
+        let degree = options.max_degree.map_or(scene.degree(), |most| most.min(scene.degree()));
+        if scene.path() == ShPath::SparseTable && degree != scene.degree() {
+            let expected = format!("{}, the scene's, since its table holds nothing else", scene.degree());
+            return Err(Error::parameter("degree", degree, expected));
+        }
+        let mut retries = 0;
+        loop {
+            let shape = self.shape(scene, camera)?;
+            self.make_room(scene, shape, None)?;
+            let (frame, found) = self.attempt(scene, camera, options, degree, shape)?;
+            match self.missing(found, shape)? {
+                None => {
+                    let stats = FrameStats { retries, ..frame.stats };
+                    return Ok(Frame { stats, ..frame });
+                }
+                Some(Missing::Room { slots, entries }) => {
+                    self.make_room(scene, shape, Some([slots, entries]))?;
+                }
+                Some(Missing::Bands) => self.band_rows = Some((shape.band_rows / 2).max(1)),
+            }
+            retries += 1;
+        }
+    }
+
+    /// Sizes of the picture, and how it is cut into bands.
+    fn shape(&mut self, scene: &GpuScene, camera: &Camera) -> Result<Shape> {
+        // Sides are at most 16384.
+        let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
+        let (columns, rows) = (camera.width.div_ceil(tile), camera.height.div_ceil(tile));
+        let line = u64::from(camera.width) * PIXEL * u64::from(tile);
+        let fit = u32::try_from(self.limits.pixels / line).unwrap_or(u32::MAX);
+        if fit == 0 {
+            let what = "bytes of a row of tiles".to_owned();
+            return Err(Error::Limit { what, found: line, limit: self.limits.pixels });
+        }
+        // A picture of another size starts from scratch.
+        if self.plan.as_ref().is_some_and(|p| (p.shape.width, p.shape.height) != (camera.width, camera.height))
+        {
+            self.band_rows = None;
+        }
+        let band_rows = self.band_rows.unwrap_or(rows).min(rows).min(fit);
+        let depth_bits = depth_bits(scene, camera);
+        Ok(Shape { columns, rows, width: camera.width, height: camera.height, band_rows, depth_bits })
+    }
+
+    /// Makes sure that buffers are large enough for the scene and the picture, and for as many slots and
+    /// entries as `wanted`.
+    fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
+        let chunks = u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX);
+        let limit = |value: u32, most: u64| value.min(u32::try_from(most).unwrap_or(u32::MAX));
+        let least = Room {
+            blocks: scene.blocks(),
+            chunks,
+            slots: limit(FIRST_ROOM.min(scene.len()), self.limits.slots).max(1),
+            entries: limit(FIRST_ROOM, self.limits.entries),
+            tiles: shape.columns * shape.band_rows,
+            pixels: u64::from(shape.width) * u64::from(shape.height),
+        };
+        let now = self.work.as_ref().map_or(least, |work| work.room);
+        let [slots, entries] = wanted.unwrap_or([0, 0]);
+        let room = Room {
+            blocks: now.blocks.max(least.blocks),
+            chunks: now.chunks.max(least.chunks),
+            slots: now.slots.max(least.slots).max(slots),
+            entries: now.entries.max(least.entries).max(entries),
+            tiles: now.tiles.max(least.tiles),
+            pixels: now.pixels.max(least.pixels),
+        };
+        if self.work.as_ref().is_none_or(|work| work.room != room) {
+            // The old buffers go first: both together may not fit.
+            self.plan = None;
+            self.work = None;
+            self.work = Some(Work::new(&self.gpu, room)?);
+        }
+        Ok(())
+    }
+
+    /// Draws once; whatever does not fit in the buffers is left out. Also the counters.
+    fn attempt(
+        &mut self,
+        scene: &GpuScene,
+        camera: &Camera,
+        options: &RenderOptions,
+        degree: ShDegree,
+        shape: Shape,
+    ) -> Result<(Frame, [u32; COUNTERS as usize])> {
+        let gpu = &self.gpu;
+        let Some(work) = &self.work else {
+            return Err(Error::Gpu { problem: "no buffers".to_owned() });
+        };
+        if self.plan.as_ref().is_none_or(|plan| plan.scene != scene.id || plan.shape != shape) {
+            self.plan = Some(Plan::new(gpu, &self.kernels, scene, work, shape)?);
+        }
+        let Some(plan) = &self.plan else {
+            return Err(Error::Gpu { problem: "no plan".to_owned() });
+        };
+        let uniform = frame_uniform(scene, camera, options, degree, shape, work.room);
+        gpu.queue().write_buffer(&work.frame.raw, 0, bytemuck::bytes_of(&uniform));
+
+        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.clear_buffer(&work.counters.raw, 0, None);
+        // The place after the last block's, which no kernel writes.
+        encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
+        let mut timed = Vec::new();
+        for stage in &plan.passes {
+            let query = u32::try_from(timed.len()).unwrap_or(u32::MAX);
+            let timestamp_writes =
+                self.timer.as_ref().filter(|_| query < MAX_TIMED).map(|timer| wgpu::ComputePassTimestampWrites {
+                    query_set: &timer.queries,
+                    beginning_of_pass_write_index: Some(2 * query),
+                    end_of_pass_write_index: Some(2 * query + 1),
+                });
+            if timestamp_writes.is_some() {
+                timed.push(stage.stage);
+            }
+            if stage.stage == Stage::Tiles {
+                encoder.clear_buffer(&work.ranges.raw, 0, None);
+            }
+            let label = Some(stage.stage.name());
+            let mut pass =
+                encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
+            for step in &stage.steps {
+                pass.set_pipeline(&step.pipeline);
+                pass.set_bind_group(0, &step.bindings, &[]);
+                match step.size {
+                    Size::Groups(groups) => {
+                        let (x, y) = dimensions(groups);
+                        pass.dispatch_workgroups(x, y, 1);
+                    }
+                    Size::Indirect(offset) => {
+                        pass.dispatch_workgroups_indirect(&work.dispatches.raw, offset);
+                    }
+                }
+            }
+        }
+        if let Some(timer) = &self.timer {
+            let stamps = u32::try_from(2 * timed.len()).unwrap_or(0);
+            let bytes = u64::from(stamps) * STAMP;
+            encoder.resolve_query_set(&timer.queries, 0..stamps, &timer.resolved.raw, 0);
+            encoder.copy_buffer_to_buffer(&timer.resolved.raw, 0, &timer.back.raw, 0, bytes);
+        }
+        let bytes = COUNTERS * 4;
+        encoder.copy_buffer_to_buffer(&work.counters.raw, 0, &work.counters_back.raw, 0, bytes);
+        gpu.queue().submit([encoder.finish()]);
+
+        let counters: Vec<u32> = gpu.read(&work.counters_back, bytes)?;
+        let found: [u32; COUNTERS as usize] = std::array::from_fn(|k| counters.get(k).copied().unwrap_or(0));
+        let (stages, total) = self.times(&timed)?;
+        let stats = FrameStats {
+            visible: found[Counter::Found as usize],
+            entries: found[Counter::EntriesAll as usize],
+            bands: shape.rows.div_ceil(shape.band_rows),
+            retries: 0,
+            stages,
+            total,
+        };
+        let pixels = work.pixels.raw.clone();
+        Ok((Frame { pixels, width: shape.width, height: shape.height, stats }, found))
+    }
+
+    /// Milliseconds of each stage, bands together, and of everything.
+    fn times(&self, timed: &[Stage]) -> Result<(Vec<(Stage, f64)>, Option<f64>)> {
+        let Some(timer) = &self.timer else { return Ok((Vec::new(), None)) };
+        let stamps: Vec<u64> = self.gpu.read(&timer.back, 2 * timed.len() as u64 * STAMP)?;
+        let between = |from: u64, to: u64| to.saturating_sub(from) as f64 * timer.tick;
+        let stages = Stage::ALL.map(|stage| {
+            let own = stamps.chunks_exact(2).zip(timed).filter(|(_, s)| **s == stage);
+            (stage, own.map(|(pair, _)| between(pair[0], pair[1])).sum())
+        });
+        let total = stamps.first().zip(stamps.last()).map(|(&first, &last)| between(first, last));
+        Ok((stages.to_vec(), total))
+    }
+
+    /// What to make larger before trying again, if anything.
+    fn missing(&self, found: [u32; COUNTERS as usize], shape: Shape) -> Result<Option<Missing>> {
+        let Some(room) = self.work.as_ref().map(|work| work.room) else { return Ok(None) };
+        let spare = |found: u32, most: u64| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the limit")]
+            let wanted = (f64::from(found) * SPARE).min(most as f64).min(f64::from(u32::MAX)) as u32;
+            wanted
+        };
+        let slots = found[Counter::Found as usize];
+        if slots > room.slots {
+            if u64::from(slots) > self.limits.slots {
+                let what = "Gaussians in view".to_owned();
+                return Err(Error::Limit { what, found: slots.into(), limit: self.limits.slots });
+            }
+            return Ok(Some(Missing::Room { slots: spare(slots, self.limits.slots), entries: 0 }));
+        }
+        let entries = found[Counter::EntriesMost as usize];
+        if entries > room.entries {
+            if u64::from(entries) <= self.limits.entries {
+                return Ok(Some(Missing::Room { slots: 0, entries: spare(entries, self.limits.entries) }));
+            }
+            if shape.band_rows == 1 {
+                let what = "pairs of a Gaussian and a tile in one row of tiles".to_owned();
+                return Err(Error::Limit { what, found: entries.into(), limit: self.limits.entries });
+            }
+            return Ok(Some(Missing::Bands));
+        }
+        Ok(None)
+    }
+}
+
+/// What a view lacked.
+enum Missing {
+    Room { slots: u32, entries: u32 },
+    Bands,
+}
+
+/// Significant bits of depth keys: those of the farthest corner of what can be seen.
+fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
+    let Some(bounds) = scene.bounds else { return 1 };
+    let farthest = (0..8)
+        .map(|corner: usize| {
+            let at = std::array::from_fn(|k| bounds[corner >> k & 1][k]);
+            camera.to_view(at)[2]
+        })
+        .fold(0.0, f32::max);
+    // The corner's depth is rounded otherwise than a Gaussian's there.
+    const ROUNDING: f32 = 1.0001;
+    let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(KEY_FIRST);
+    // One more, so that what comes last is behind everything.
+    (u32::BITS - key.leading_zeros() + 1).min(u32::BITS)
+}
+
+fn frame_uniform(
+    scene: &GpuScene,
+    camera: &Camera,
+    options: &RenderOptions,
+    degree: ShDegree,
+    shape: Shape,
+    room: Room,
+) -> FrameUniform {
+    let r = &camera.rotation;
+    let column = |k: usize| [r[0][k], r[1][k], r[2][k]];
+    #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
+    let size = [camera.width as f32, camera.height as f32];
+    FrameUniform {
+        right: column(0),
+        degree: degree.get().into(),
+        down: column(1),
+        columns: shape.columns,
+        forward: column(2),
+        rows: shape.rows,
+        position: camera.position,
+        antialiased: scene.antialiased().into(),
+        background: options.background,
+        slots: room.slots,
+        tangents: [size[0] / (2.0 * camera.fx), size[1] / (2.0 * camera.fy)],
+        focal: [camera.fx, camera.fy],
+        size,
+        width: camera.width,
+        height: camera.height,
+        blocks: scene.blocks(),
+        chunks: u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX),
+        entries: room.entries,
+        padding: 0,
+    }
+}

@@ -1,0 +1,143 @@
+//! Kernels, compiled.
+
+use crate::error::Result;
+
+use super::constants::declarations;
+use super::device::Gpu;
+
+/// Every kernel but radiance, which depends on the scene.
+#[derive(Debug, Clone)]
+pub(super) struct Kernels {
+    pub(super) cull: wgpu::ComputePipeline,
+    pub(super) compact: wgpu::ComputePipeline,
+    pub(super) plan_slots: wgpu::ComputePipeline,
+    pub(super) plan_entries: wgpu::ComputePipeline,
+    pub(super) scan_reduce: wgpu::ComputePipeline,
+    pub(super) scan_spine: wgpu::ComputePipeline,
+    pub(super) scan_spread: wgpu::ComputePipeline,
+    pub(super) project: wgpu::ComputePipeline,
+    pub(super) sort_count: wgpu::ComputePipeline,
+    pub(super) sort_scatter: wgpu::ComputePipeline,
+    pub(super) count_tiles: wgpu::ComputePipeline,
+    pub(super) list_tiles: wgpu::ComputePipeline,
+    pub(super) find_ranges: wgpu::ComputePipeline,
+    pub(super) blend: wgpu::ComputePipeline,
+}
+
+const FRAME: &str = include_str!("kernels/frame.wgsl");
+
+/// The texts of all kernels, by name: what a test validates.
+const TEXTS: [(&str, &[&str]); 9] = [
+    ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
+    ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
+    ("plan", &[FRAME, include_str!("kernels/plan.wgsl")]),
+    ("scan", &[FRAME, include_str!("kernels/scan.wgsl")]),
+    ("project", &[FRAME, include_str!("kernels/project.wgsl")]),
+    ("sort", &[FRAME, include_str!("kernels/sort.wgsl")]),
+    (
+        "tiles",
+        &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")],
+    ),
+    ("ranges", &[FRAME, include_str!("kernels/ranges.wgsl")]),
+    ("blend", &[FRAME, include_str!("kernels/blend.wgsl")]),
+];
+
+impl Kernels {
+    pub(super) fn new(gpu: &Gpu) -> Result<Self> {
+        let module = |name: &str| {
+            let parts = TEXTS.iter().find(|(found, _)| *found == name).map_or(&[][..], |(_, parts)| parts);
+            compile(gpu, name, &parts.concat())
+        };
+        let (plan, scan, sort, tiles) = (module("plan")?, module("scan")?, module("sort")?, module("tiles")?);
+        Ok(Self {
+            cull: pipeline(gpu, &module("cull")?, "cull")?,
+            compact: pipeline(gpu, &module("compact")?, "compact")?,
+            plan_slots: pipeline(gpu, &plan, "plan_slots")?,
+            plan_entries: pipeline(gpu, &plan, "plan_entries")?,
+            scan_reduce: pipeline(gpu, &scan, "scan_reduce")?,
+            scan_spine: pipeline(gpu, &scan, "scan_spine")?,
+            scan_spread: pipeline(gpu, &scan, "scan_spread")?,
+            project: pipeline(gpu, &module("project")?, "project")?,
+            sort_count: pipeline(gpu, &sort, "sort_count")?,
+            sort_scatter: pipeline(gpu, &sort, "sort_scatter")?,
+            count_tiles: pipeline(gpu, &tiles, "count_tiles")?,
+            list_tiles: pipeline(gpu, &tiles, "list_tiles")?,
+            find_ranges: pipeline(gpu, &module("ranges")?, "find_ranges")?,
+            blend: pipeline(gpu, &module("blend")?, "blend")?,
+        })
+    }
+}
+
+/// A module of `text` after the shared declarations.
+pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> Result<wgpu::ShaderModule> {
+    let source = format!("{}\n{text}", declarations());
+    gpu.checked(name, || {
+        gpu.device().create_shader_module(wgpu::ShaderModuleDescriptor {
+            label: Some(name),
+            source: wgpu::ShaderSource::Wgsl(source.into()),
+        })
+    })
+}
+
+/// The pipeline of one entry point.
+pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> Result<wgpu::ComputePipeline> {
+    gpu.checked(entry, || {
+        gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+            label: Some(entry),
+            layout: None,
+            module,
+            entry_point: Some(entry),
+            // Every kernel writes its workgroup memory before it reads it.
+            compilation_options: wgpu::PipelineCompilationOptions {
+                zero_initialize_workgroup_memory: false,
+                ..wgpu::PipelineCompilationOptions::default()
+            },
+            cache: None,
+        })
+    })
+}
+
+/// What a kernel is given at one binding.
+pub(super) enum Bound<'a> {
+    /// All of a buffer.
+    All(&'a wgpu::Buffer),
+    /// Bytes of a buffer: first, and how many.
+    Part(&'a wgpu::Buffer, u64, u64),
+    /// A texture.
+    Texture(&'a wgpu::TextureView),
+    /// How a texture is read.
+    Sampler(&'a wgpu::Sampler),
+}
+
+/// Binds `entries` to the one group of `pipeline`.
+pub(super) fn bind(
+    gpu: &Gpu,
+    pipeline: &wgpu::ComputePipeline,
+    entries: &[(u32, Bound<'_>)],
+) -> Result<wgpu::BindGroup> {
+    let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
+        .iter()
+        .map(|(binding, bound)| wgpu::BindGroupEntry {
+            binding: *binding,
+            resource: match bound {
+                Bound::All(buffer) => buffer.as_entire_binding(),
+                Bound::Part(buffer, offset, size) => {
+                    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                        buffer,
+                        offset: *offset,
+                        size: std::num::NonZeroU64::new(*size),
+                    })
+                }
+                Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
+                Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
+            },
+        })
+        .collect();
+    gpu.checked("bindings", || {
+        gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+            label: None,
+            layout: &pipeline.get_bind_group_layout(0),
+            entries: &entries,
+        })
+    })
+}

@@ -1,0 +1,129 @@
+//! Each atom's radiance over directions, so that a nonzero costs one filtered lookup instead of a dot
+//! product: the dictionary is small, fixed and shared by all Gaussians.
+//!
+//! The table is a cube of [`TABLE_SIDE`]² texels a face in half precision, sampled bilinearly. The outer
+//! texels' centres lie on the faces' edges, so a sample never mixes faces and the whole is continuous.
+
+use half::f16;
+use lexisplat::Dictionary;
+use lexisplat::sh::rest_basis;
+use rayon::prelude::*;
+
+use super::constants::TABLE_SIDE;
+
+/// Faces of a cube: +x, -x, +y, -y, +z, -z.
+pub(super) const FACES: u32 = 6;
+
+/// The direction of the texel at `column`, `row` of face `face`.
+fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
+    #[expect(clippy::cast_precision_loss, reason = "sides are small")]
+    let place = |k: u32| k as f32 / (TABLE_SIDE - 1) as f32 * 2.0 - 1.0;
+    let (u, v) = (place(column), place(row));
+    let sign = if face.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let d = match face / 2 {
+        0 => [sign, u, v],
+        1 => [u, sign, v],
+        _ => [u, v, sign],
+    };
+    let length = d.iter().map(|v| v * v).sum::<f32>().sqrt();
+    d.map(|v| v / length)
+}
+
+/// RGBA texels of all layers, one layer an atom, rows of six faces.
+pub(super) fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
+    let degree = dictionary.degree();
+    let per_channel = degree.rest_per_channel();
+    let width = FACES * TABLE_SIDE;
+    let bases: Vec<_> = (0..TABLE_SIDE)
+        .flat_map(|row| (0..width).map(move |x| (x / TABLE_SIDE, x % TABLE_SIDE, row)))
+        .map(|(face, column, row)| rest_basis(degree, direction(face, column, row)))
+        .collect();
+    (0..dictionary.len())
+        .into_par_iter()
+        .flat_map_iter(|j| {
+            let atom = dictionary.atom(j);
+            bases.iter().map(move |basis| {
+                let mut texel = [f16::ZERO; 4];
+                for (out, channel) in texel.iter_mut().zip(atom.chunks_exact(per_channel.max(1))) {
+                    *out = f16::from_f32(channel.iter().zip(basis).map(|(a, b)| a * b).sum());
+                }
+                texel
+            })
+        })
+        .collect()
+}
+
+/// The kernel's lookup, for tests: the atoms' radiance towards `d` by the table.
+#[cfg(test)]
+pub(super) fn sample(texels: &[[f16; 4]], atom: usize, d: [f32; 3]) -> [f32; 3] {
+    let size = d.map(f32::abs);
+    let (axis, on_face) = if size[1] > size[0] && size[1] >= size[2] {
+        (1, [d[0] / size[1], d[2] / size[1]])
+    } else if size[2] > size[0] {
+        (2, [d[0] / size[2], d[1] / size[2]])
+    } else {
+        (0, [d[1] / size[0], d[2] / size[0]])
+    };
+    let face = 2 * axis + usize::from(d[axis] < 0.0);
+    let side = TABLE_SIDE as usize;
+    #[expect(clippy::cast_precision_loss, reason = "sides are small")]
+    let place = on_face.map(|v| (v * 0.5 + 0.5) * (side - 1) as f32);
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the side")]
+    let low = place.map(|v| (v as usize).min(side - 2));
+    #[expect(clippy::cast_precision_loss, reason = "sides are small")]
+    let part = [place[0] - low[0] as f32, place[1] - low[1] as f32];
+    let texel = |x: usize, y: usize| {
+        let at = (atom * side + low[1] + y) * 6 * side + face * side + low[0] + x;
+        texels[at].map(f16::to_f32)
+    };
+    std::array::from_fn(|c| {
+        let row = |y: usize| texel(0, y)[c] * (1.0 - part[0]) + texel(1, y)[c] * part[0];
+        row(0) * (1.0 - part[1]) + row(1) * part[1]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::ShDegree;
+
+    use super::*;
+
+    /// The stated error: a unit atom's radiance is off by at most 0.006 anywhere and 0.0015 on average
+    /// (root of mean square); its own root mean square is 0.28 a channel.
+    #[test]
+    fn the_table_is_as_exact_as_stated() {
+        let dim = ShDegree::THREE.rest();
+        let mut state = 1_u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f32::from(u16::try_from(state >> 16).unwrap()) / 32_768.0 - 1.0
+        };
+        let mut atoms = Vec::new();
+        for _ in 0..20 {
+            let atom: Vec<f32> = (0..dim).map(|_| random()).collect();
+            let norm = atom.iter().map(|v| v * v).sum::<f32>().sqrt();
+            atoms.extend(atom.iter().map(|v| v / norm));
+        }
+        let dictionary = Dictionary::new(ShDegree::THREE, atoms).unwrap();
+        let table = texels(&dictionary);
+        let (mut worst, mut sum, mut count) = (0.0_f32, 0.0_f64, 0_u32);
+        for _ in 0..5000 {
+            let d: [f32; 3] = std::array::from_fn(|_| random());
+            let length = d.iter().map(|v| v * v).sum::<f32>().sqrt();
+            let d = d.map(|v| v / length);
+            let basis = rest_basis(ShDegree::THREE, d);
+            for j in 0..dictionary.len() {
+                let found = sample(&table, j, d);
+                for (channel, found) in dictionary.atom(j).chunks_exact(15).zip(found) {
+                    let expected: f32 = channel.iter().zip(&basis).map(|(a, b)| a * b).sum();
+                    worst = worst.max((expected - found).abs());
+                    sum += f64::from((expected - found).powi(2));
+                    count += 1;
+                }
+            }
+        }
+        let rms = (sum / f64::from(count)).sqrt();
+        assert!(worst < 0.006 && rms < 0.0015, "worst {worst}, root mean square {rms}");
+        assert!(rms > 1e-5, "suspiciously exact");
+    }
+}

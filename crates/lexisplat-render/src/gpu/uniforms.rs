@@ -1,0 +1,71 @@
+//! Small structures that kernels read, laid out as in `frame.wgsl`, `scan.wgsl` and `sort.wgsl`.
+
+use bytemuck::{Pod, Zeroable};
+
+/// What is the same for a whole picture.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Frame {
+    pub(super) right: [f32; 3],
+    pub(super) degree: u32,
+    pub(super) down: [f32; 3],
+    pub(super) columns: u32,
+    pub(super) forward: [f32; 3],
+    pub(super) rows: u32,
+    pub(super) position: [f32; 3],
+    pub(super) antialiased: u32,
+    pub(super) background: [f32; 3],
+    pub(super) slots: u32,
+    pub(super) tangents: [f32; 2],
+    pub(super) focal: [f32; 2],
+    pub(super) size: [f32; 2],
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) blocks: u32,
+    pub(super) chunks: u32,
+    pub(super) entries: u32,
+    pub(super) padding: u32,
+}
+
+/// A part of the scene that fits in one binding.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Chunk {
+    pub(super) first: u32,
+    pub(super) count: u32,
+    pub(super) first_block: u32,
+    pub(super) blocks: u32,
+    pub(super) escapes_at: u32,
+    pub(super) escapes: u32,
+    pub(super) index: u32,
+    pub(super) padding: u32,
+}
+
+/// Rows of tiles drawn at once.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Band {
+    pub(super) first: u32,
+    pub(super) rows: u32,
+    pub(super) tiles: u32,
+    pub(super) padding: u32,
+}
+
+/// What a scan works on: as many numbers as a counter says, or `fixed_length` if that is not 0.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Scan {
+    pub(super) counter: u32,
+    pub(super) fixed_length: u32,
+    pub(super) padding: [u32; 2],
+}
+
+/// One pass of a sort.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Pass {
+    pub(super) shift: u32,
+    pub(super) length: u32,
+    pub(super) blocks: u32,
+    pub(super) identity: u32,
+}
