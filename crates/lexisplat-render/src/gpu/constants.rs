@@ -178,48 +178,62 @@ pub(super) fn declarations() -> String {
     out
 }
 
-/// Statements that add the products of a dense row's vectors with the basis to `rest`, and read `dc`.
-///
-/// Four coefficients fill three vectors. `load` makes an expression of four floats from a vector's place.
-pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
+/// Coefficients of three channels in three vectors of four floats.
+const QUAD: usize = 4;
+
+/// Vectors of four floats that hold `coefficients` of three channels each.
+pub(super) fn vectors(coefficients: usize) -> usize {
+    3 * coefficients.div_ceil(QUAD)
+}
+
+/// Statements that read `coefficients` of three channels from vectors of four floats, and do `each` with
+/// them. `load` makes an expression from a vector's place; `each` a statement from a coefficient's number
+/// and expression.
+fn for_each_coefficient(
+    coefficients: usize,
+    load: impl Fn(usize) -> String,
+    each: impl Fn(usize, &str) -> String,
+) -> String {
     let mut out = String::new();
-    for group in 0..=per_channel / 4 {
-        for v in 3 * group..3 * group + 3 {
+    for group in 0..coefficients.div_ceil(QUAD) {
+        let [a, b, c] = [3 * group, 3 * group + 1, 3 * group + 2];
+        for v in [a, b, c] {
             // Writing to a String does not fail.
             let _ = writeln!(out, "let v{v} = {};", load(v));
         }
-        let [a, b, c] = [3 * group, 3 * group + 1, 3 * group + 2];
-        let coefficients = [
+        let expressions = [
             format!("v{a}.xyz"),
             format!("vec3<f32>(v{a}.w, v{b}.xy)"),
             format!("vec3<f32>(v{b}.zw, v{c}.x)"),
             format!("v{c}.yzw"),
         ];
-        for (coefficient, k) in coefficients.iter().zip(4 * group..) {
-            if k == 0 {
-                let _ = writeln!(out, "let dc = {coefficient};");
-            } else if k <= per_channel {
-                let _ = writeln!(out, "rest += b[{}] * {coefficient};", k - 1);
-            }
+        for (expression, k) in expressions.iter().zip(QUAD * group..coefficients) {
+            let _ = writeln!(out, "{}", each(k, expression));
         }
     }
     out
 }
 
-/// Vectors of four floats in a dense row of `per_channel` coefficients a channel besides DC.
-pub(super) fn dense_vectors(per_channel: usize) -> usize {
-    3 * (per_channel / 4 + 1)
+/// Statements that add the products of a dense row with the basis to `rest`, and read `dc`.
+pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
+    for_each_coefficient(per_channel + 1, load, |k, coefficient| match k {
+        0 => format!("let dc = {coefficient};"),
+        _ => format!("rest += b[{}] * {coefficient};", k - 1),
+    })
 }
 
-/// Statements that add the products of an atom's coefficients with the basis to `sum`.
-pub(super) fn atom_terms(per_channel: usize, array: &str) -> String {
+/// Statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
+pub(super) fn atom_terms(per_channel: usize) -> String {
+    let load = |v: usize| format!("atoms[at + {v}u]");
+    for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
+}
+
+/// The same for the atom whose floats begin at `atoms_here[at]`.
+pub(super) fn shared_atom_terms(per_channel: usize) -> String {
     let mut out = String::new();
     for k in 0..per_channel {
-        let [r, g, b] = [3 * k, 3 * k + 1, 3 * k + 2];
-        let _ = writeln!(
-            out,
-            "sum += b[{k}] * vec3<f32>({array}[at + {r}u], {array}[at + {g}u], {array}[at + {b}u]);"
-        );
+        let [r, g, b] = [3 * k, 3 * k + 1, 3 * k + 2].map(|c| format!("atoms_here[at + {c}u]"));
+        let _ = writeln!(out, "sum += b[{k}] * vec3<f32>({r}, {g}, {b});");
     }
     out
 }

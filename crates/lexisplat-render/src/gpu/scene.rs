@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::scene::Scene;
 
 use super::columns::{Columns, group_words};
-use super::constants::{COLUMN_GROUP, GROUP, atom_terms, dense_terms, dense_vectors};
+use super::constants::{COLUMN_GROUP, GROUP, atom_terms, dense_terms, shared_atom_terms, vectors};
 use super::device::{Buffer, Counted, Gpu};
 use super::shaders::{Bound, compile, pipeline};
 use super::table;
@@ -332,7 +332,7 @@ impl Source<'_> {
     fn fixed(&self) -> [u64; 4] {
         match self {
             Self::Dense { .. } => [0; 4],
-            Self::Codes(model) => [0, 0, size_of_val(model.dictionary.as_slice()) as u64, 0],
+            Self::Codes(model) => [0, 0, (model.dictionary.len() * atom_bytes(model)) as u64, 0],
         }
     }
 
@@ -342,7 +342,7 @@ impl Source<'_> {
         match self {
             Self::Dense { scene, half } => {
                 let vector = if *half { size_of::<[f16; 4]>() } else { size_of::<[f32; 4]>() };
-                let row = dense_vectors(scene.degree().rest_per_channel()) * vector;
+                let row = vectors(scene.degree().coefficients()) * vector;
                 [shapes, (range.len() * row) as u64, 0, 0]
             }
             Self::Codes(model) => {
@@ -352,7 +352,7 @@ impl Source<'_> {
                     .map(|counts| group_words(codes, counts))
                     .sum();
                 let escapes = escapes_in(model, &range).len();
-                let row = escapes * model.dictionary.dim() * size_of::<f32>();
+                let row = escapes * atom_bytes(model);
                 let columns = range.len() * size_of::<u32>();
                 [shapes, 4 * words as u64, row as u64, columns as u64]
             }
@@ -391,7 +391,7 @@ fn shape(geometry: &Geometry, i: usize) -> [f32; 8] {
 fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half: bool) -> Result<Buffer> {
     let per_channel = scene.degree().rest_per_channel();
     let dim = scene.degree().rest();
-    let row_len = 4 * dense_vectors(per_channel);
+    let row_len = 4 * vectors(per_channel + 1);
     let mut rows = vec![0.0_f32; range.len() * row_len];
     rows.par_chunks_exact_mut(row_len).zip(range).for_each(|(row, i)| {
         row[..CHANNELS].copy_from_slice(&scene.geometry().dc[i]);
@@ -423,16 +423,22 @@ fn interleave(row: &[f32], per_channel: usize, out: &mut [f32]) {
     }
 }
 
-/// The atoms, and the exact rows of the escaped Gaussians in `range`.
+/// Bytes of an atom or exact row as kernels read them.
+fn atom_bytes(model: &Model) -> usize {
+    vectors(model.dictionary.degree().rest_per_channel()) * size_of::<[f32; 4]>()
+}
+
+/// The atoms, and the exact rows of the escaped Gaussians in `range`, each filled up to whole vectors.
 fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
     let dictionary = &model.dictionary;
     let (dim, per_channel) = (dictionary.dim(), dictionary.degree().rest_per_channel());
     let escapes = escapes_in(model, range);
     let rows = &model.codes.escapes().rows[escapes.start * dim..escapes.end * dim];
-    let mut out = vec![0.0; dictionary.len() * dim + rows.len()];
+    let row_len = 4 * vectors(per_channel);
+    let mut out = vec![0.0; (dictionary.len() + escapes.len()) * row_len];
     if dim > 0 {
         let all = dictionary.as_slice().chunks_exact(dim).chain(rows.chunks_exact(dim));
-        for (row, out) in all.zip(out.chunks_exact_mut(dim)) {
+        for (row, out) in all.zip(out.chunks_exact_mut(row_len)) {
             interleave(row, per_channel, out);
         }
     }
@@ -454,7 +460,7 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
             };
             let terms = dense_terms(per_channel, load);
             let row = if *half { "vec2<u32>" } else { "vec4<f32>" };
-            let vectors = dense_vectors(per_channel);
+            let vectors = vectors(per_channel + 1);
             let dense = include_str!("kernels/radiance_dense.wgsl")
                 .replace("ROW_TYPE", row)
                 .replace("// DENSE_TERMS", &terms);
@@ -475,20 +481,17 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
             };
             let (index, value) = (model.codes.indices().width(), model.codes.values().width());
             let per_channel = dictionary.degree().rest_per_channel();
-            let terms = |text: &str| {
-                text.replace("// ATOM_TERMS atoms_here", &atom_terms(per_channel, "atoms_here"))
-                    .replace("// ATOM_TERMS atoms", &atom_terms(per_channel, "atoms"))
-            };
+            let codes = codes.replace("// ATOM_TERMS", &atom_terms(per_channel));
+            let entry = entry.replace("// SHARED_TERMS", &shared_atom_terms(per_channel));
             format!(
                 "const INDEX_BYTES: u32 = {index}u;\nconst INDEX_MASK: u32 = {}u;\n\
                  const VALUE_BYTES: u32 = {value}u;\nconst ATOMS: u32 = {}u;\nconst DIM: u32 = {}u;\n\
-                 const DICTIONARY: u32 = {}u;\n{common}{}{}",
+                 const ATOM_VECTORS: u32 = {}u;\nconst DICTIONARY: u32 = {}u;\n{common}{codes}{entry}",
                 if index == 1 { 0xff } else { 0xffff },
                 dictionary.len(),
                 dictionary.dim(),
+                vectors(per_channel),
                 dictionary.as_slice().len().max(1),
-                terms(codes),
-                terms(entry),
             )
         }
     };

@@ -13,10 +13,10 @@ fn radiance(
     let column = column_of(i);
     var rest = vec3<f32>(0.0);
     for (var k = 0u; k < column.count; k++) {
-        rest += value_at(column, k) * seen(atom_number(column, k) * DIM, b);
+        rest += value_at(column, k) * seen(atom_number(column, k) * ATOM_VECTORS, b);
     }
     if column.escaped {
-        rest = seen((ATOMS + escape_of(i)) * DIM, b);
+        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, b);
     }
     write_colour(slot, base_colour(i), rest);
 }

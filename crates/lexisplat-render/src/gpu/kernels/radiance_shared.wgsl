@@ -4,7 +4,7 @@ var<workgroup> atoms_here: array<f32, DICTIONARY>;
 
 fn seen_here(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    // ATOM_TERMS atoms_here
+    // SHARED_TERMS
     return sum;
 }
 
@@ -15,7 +15,8 @@ fn radiance(
     @builtin(local_invocation_index) lane: u32,
 ) {
     for (var k = lane; k < ATOMS * DIM; k += GROUP) {
-        atoms_here[k] = atoms[k];
+        let c = k % DIM;
+        atoms_here[k] = atoms[(k / DIM) * ATOM_VECTORS + c / 4u][c % 4u];
     }
     workgroupBarrier();
     let slot = slot_of(group_number(group, groups), lane);
@@ -30,7 +31,7 @@ fn radiance(
         rest += value_at(column, k) * seen_here(atom_number(column, k) * DIM, b);
     }
     if column.escaped {
-        rest = seen((ATOMS + escape_of(i)) * DIM, b);
+        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, b);
     }
     write_colour(slot, base_colour(i), rest);
 }

@@ -5,8 +5,8 @@
 @group(0) @binding(7) var<storage, read> columns: array<u32>;
 // For every COLUMN_GROUP Gaussians their atom numbers, then their values.
 @group(0) @binding(8) var<storage, read> nonzeros: array<u32>;
-// Atoms, then exact rows: coefficients in order, red, green and blue side by side.
-@group(0) @binding(9) var<storage, read> atoms: array<f32>;
+// Atoms, then exact rows, ATOM_VECTORS each: coefficients in order, red, green and blue side by side.
+@group(0) @binding(9) var<storage, read> atoms: array<vec4<f32>>;
 
 struct Column {
     // First word of the atom numbers of the group.
@@ -85,6 +85,6 @@ fn base_colour(i: u32) -> vec3<f32> {
 // Dot products of the three channels of the atom or row at `at` with the basis.
 fn seen(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
-    // ATOM_TERMS atoms
+    // ATOM_TERMS
     return sum;
 }

@@ -45,7 +45,7 @@ fn radiance(
         rest += value_at(column, k) * textureSampleLevel(table, linear, place, atom, 0.0).xyz;
     }
     if column.escaped {
-        rest = seen((ATOMS + escape_of(i)) * DIM, rest_basis(d));
+        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, rest_basis(d));
     }
     write_colour(slot, base_colour(i), rest);
 }
