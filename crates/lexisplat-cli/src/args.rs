@@ -6,6 +6,8 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
+use lexisplat_render::Device;
+use lexisplat_render::gpu::ShPath;
 
 use crate::exit::CODES;
 
@@ -43,6 +45,8 @@ pub(crate) enum Command {
     Info(Info),
     Render(Render),
     Compare(Compare),
+    Devices(Devices),
+    Bench(Bench),
     Demo(Demo),
     Completions(Completions),
 }
@@ -114,6 +118,10 @@ pub(crate) struct Compress {
     /// Leave out Gaussians with NaN or infinite values instead of refusing the file.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
+    /// What looks at the scene and judges pictures: `cpu`, so that the same input gives the same file
+    /// everywhere; or faster, and recorded in the file, `gpu`, `auto` or a number from `lexisplat devices`.
+    #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
+    pub(crate) device: Device,
 }
 
 impl Compress {
@@ -167,6 +175,11 @@ impl Compress {
 /// The names of presets, as `clap` lists and checks them.
 fn preset() -> impl TypedValueParser<Value = Preset> {
     PossibleValuesParser::new(Preset::ALL.map(Preset::name)).try_map(|name| name.parse::<Preset>())
+}
+
+/// The names of ways to hold SH, as `clap` lists and checks them.
+fn sh_path() -> impl TypedValueParser<Value = ShPath> {
+    PossibleValuesParser::new(ShPath::ALL.map(ShPath::name)).try_map(|name| name.parse::<ShPath>())
 }
 
 /// A number of bytes: plain, or with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (of 1024).
@@ -227,6 +240,10 @@ pub(crate) struct Views {
     /// Colour behind the scene: `black`, `white`, or R,G,B from 0 to 1.
     #[arg(long, default_value = "black", value_parser = colour)]
     pub(crate) background: [f32; 3],
+    /// What to draw on: `auto` (a GPU if there is one that is not software), `cpu`, `gpu`, or a number from
+    /// `lexisplat devices`.
+    #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu|N")]
+    pub(crate) device: Device,
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]
@@ -274,6 +291,33 @@ pub(crate) struct Compare {
     #[arg(long, value_name = "DIR")]
     pub(crate) save_views: Option<PathBuf>,
 }
+
+/// Time drawing, stage by stage, with SH held in every way the scene has.
+///
+/// Every view is drawn repeatedly after a warm-up; only drawing is timed, on a GPU by its own time stamps.
+#[derive(Debug, Args)]
+pub(crate) struct Bench {
+    /// A PLY or .lexi; a .lexi is also drawn dense.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: Views,
+    /// Frames timed from each view.
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) repeat: u32,
+    /// Frames drawn from each view before that.
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    pub(crate) warmup: u32,
+    /// Frames timed from each view on the processor; 0 for none.
+    #[arg(long, default_value_t = 3, value_name = "N")]
+    pub(crate) cpu_repeat: u32,
+    /// Ways to hold SH, of dense-f32, dense-f16, sparse, sparse-shared and sparse-table [default: all].
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = sh_path())]
+    pub(crate) paths: Vec<ShPath>,
+}
+
+/// List the GPUs that can draw, best first.
+#[derive(Debug, Args)]
+pub(crate) struct Devices {}
 
 /// Make a sample scene, compress, draw and compare it, and write a report to look at.
 #[derive(Debug, Args)]

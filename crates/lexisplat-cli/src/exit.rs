@@ -11,7 +11,8 @@ pub(crate) const CODES: &str = "Exit codes:
   4  a file is damaged, or not of a supported kind
   5  an option or argument is out of range
   6  a size is over a limit
-  7  an output exists and --overwrite was not given";
+  7  an output exists and --overwrite was not given
+  8  no GPU, or it failed";
 
 /// An output that is already there.
 #[derive(Debug)]
@@ -33,12 +34,12 @@ fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
     if let Some(e) = error.downcast_ref::<lexisplat_eval::Error>() {
         return match e {
             lexisplat_eval::Error::Codec(e) => codec(e),
-            lexisplat_eval::Error::Render(e) => (render(e), None),
+            lexisplat_eval::Error::Render(e) => render(e),
             _ => (5, None),
         };
     }
     if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
-        return (render(e), None);
+        return render(e);
     }
     error.downcast_ref::<lexisplat::Error>().map_or((1, None), codec)
 }
@@ -53,12 +54,17 @@ fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
     }
 }
 
-fn render(error: &lexisplat_render::Error) -> u8 {
+fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
     match error {
-        lexisplat_render::Error::Io { .. } => 3,
-        lexisplat_render::Error::Format { .. } => 4,
-        lexisplat_render::Error::Parameter { .. } => 5,
-        _ => 1,
+        lexisplat_render::Error::Io { .. } => (3, None),
+        lexisplat_render::Error::Format { .. } => (4, None),
+        lexisplat_render::Error::Parameter { name: "device", .. } => {
+            (5, Some("`lexisplat devices` lists what there is"))
+        }
+        lexisplat_render::Error::Parameter { .. } => (5, None),
+        lexisplat_render::Error::Limit { .. } => (6, Some("--device cpu draws without a GPU's limits")),
+        lexisplat_render::Error::Gpu { .. } => (8, Some("--device cpu draws without a GPU")),
+        _ => (1, None),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Two scenes drawn from the same cameras, scored view by view. No photos needed.
 
-use lexisplat_render::{Camera, Image, RenderOptions, Scene, render};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 use serde::Serialize;
 
 use crate::error::{Error, Result};
@@ -109,12 +109,14 @@ pub fn score(name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
     })
 }
 
-/// Draws `a` and `b` from every camera and scores `b` against `a`. `on_view` sees each view when it is
-/// done, with both pictures as they were scored.
+/// Draws `a` and `b` with `renderer` from every camera and scores `b` against `a`. `on_view` sees each view
+/// when it is done, with both pictures as they were scored.
 ///
 /// # Errors
-/// [`Error::Parameter`] if there are no cameras, or one cannot be drawn with.
+/// [`Error::Parameter`] if there are no cameras, or one cannot be drawn with; on a GPU [`Error::Render`] if a
+/// scene or view does not fit.
 pub fn compare(
+    renderer: &mut Renderer,
     a: &Scene<'_>,
     b: &Scene<'_>,
     cameras: &[Camera],
@@ -125,18 +127,18 @@ pub fn compare(
         return Err(Error::parameter("cameras", "none", "at least one view"));
     }
     let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let (a, b) = (renderer.prepare(*a)?, renderer.prepare(*b)?);
     let mut views = Vec::with_capacity(cameras.len());
     for camera in cameras {
-        camera.validate()?;
-        let draw = |scene| {
-            let image = render(scene, camera, &drawing);
+        let mut draw = |scene| {
+            let image = renderer.render(scene, camera, &drawing)?;
             if options.eight_bit {
                 Image::from_8bit(image.width, image.height, &image.to_8bit())
             } else {
                 Ok(image)
             }
         };
-        let (image_a, image_b) = (draw(a)?, draw(b)?);
+        let (image_a, image_b) = (draw(&a)?, draw(&b)?);
         let view = score(&camera.name, &image_a, &image_b)?;
         on_view(&view, &image_a, &image_b);
         views.push(view);

@@ -4,7 +4,7 @@
 //! use lexisplat::{CompressOptions, Silent, compress};
 //! # use lexisplat::{Geometry, ShDegree, Splats};
 //! use lexisplat_eval::{CompareOptions, compare};
-//! use lexisplat_render::{Scene, orbit};
+//! use lexisplat_render::{Renderer, Scene, orbit};
 //!
 //! # let n = 50;
 //! # let at = |i: usize| f32::from(u8::try_from(i).unwrap()) / 50.0;
@@ -24,11 +24,12 @@
 //! let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent)?;
 //! let cameras = orbit(&splats.geometry, 2, 64, 48);
 //! let (a, b) = (Scene::from(&splats), Scene::from(&model));
-//! let comparison = compare(&a, &b, &cameras, &CompareOptions::default(), &mut |_, _, _| ())?;
+//! let comparison = compare(&mut Renderer::cpu(), &a, &b, &cameras, &CompareOptions::default(), &mut |_, _, _| ())?;
 //! assert!(comparison.psnr.min.is_none_or(|psnr| psnr > 30.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod bench;
 mod compare;
 mod error;
 pub mod metrics;
@@ -41,6 +42,7 @@ mod target;
 pub mod text;
 mod views;
 
+pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
 pub use error::{Error, Result};
 pub use png::png;

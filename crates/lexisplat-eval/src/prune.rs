@@ -1,8 +1,9 @@
 //! Leaving out Gaussians that no view would miss.
 
 use lexisplat::{Sensitivity, Splats};
-use lexisplat_render::{Camera, Image, RenderOptions, Scene, render, sensitivity};
+use lexisplat_render::{Camera, RenderOptions, Renderer, Scene};
 
+use crate::error::Result;
 use crate::target::Views;
 
 /// Candidates must change pictures less, each on its own, than the bound for all together, by a power of
@@ -27,13 +28,22 @@ pub struct Pruned {
 /// than `bound` (0 to 1). Given cameras are joined by generated views, so that what no camera saw is not
 /// lost. `seen` is their [`Views::sensitivity`], and is filtered alike.
 ///
+/// # Errors
+/// None on the processor; on a GPU [`crate::Error::Render`] if the scene or a view does not fit.
+///
 /// # Panics
 /// If `seen` and `splats` differ in length.
-pub fn prune(splats: &mut Splats, seen: &mut Sensitivity, views: &Views, bound: f32) -> Pruned {
+pub fn prune(
+    renderer: &mut Renderer,
+    splats: &mut Splats,
+    seen: &mut Sensitivity,
+    views: &Views,
+    bound: f32,
+) -> Result<Pruned> {
     let mut cameras: Vec<Camera> = views.all().cloned().collect();
     if views.are_given() {
         let around = Views::generated(splats);
-        let more = sensitivity(&Scene::from(&*splats), around.measuring(), &mut || ());
+        let more = renderer.sensitivity(&Scene::from(&*splats), around.measuring(), &mut || ())?;
         for (a, b) in seen.removal.iter_mut().zip(more.removal) {
             *a = a.max(b);
         }
@@ -46,7 +56,7 @@ pub fn prune(splats: &mut Splats, seen: &mut Sensitivity, views: &Views, bound: 
         let keep: Vec<bool> = seen.removal.iter().map(|&change| change > limit).collect();
         let removed = keep.iter().filter(|&&k| !k).count();
         if removed == 0 {
-            return nothing;
+            return Ok(nothing);
         }
         if std::mem::replace(&mut last, removed) == removed {
             continue;
@@ -55,7 +65,7 @@ pub fn prune(splats: &mut Splats, seen: &mut Sensitivity, views: &Views, bound: 
         rest.retain(&keep);
         let mut largest_change = 0.0;
         for k in 0..cameras.len() {
-            largest_change = f32::max(largest_change, change(splats, &rest, &cameras[k]));
+            largest_change = f32::max(largest_change, change(renderer, splats, &rest, &cameras[k])?);
             if largest_change > bound {
                 // What fails here is likely to fail at the next try.
                 cameras.swap(0, k);
@@ -65,18 +75,21 @@ pub fn prune(splats: &mut Splats, seen: &mut Sensitivity, views: &Views, bound: 
         if largest_change <= bound {
             *splats = rest;
             seen.retain(&keep);
-            return Pruned { removed, largest_change, ..nothing };
+            return Ok(Pruned { removed, largest_change, ..nothing });
         }
     }
-    nothing
+    Ok(nothing)
 }
 
 /// Largest difference of any channel of any pixel between two scenes' pictures.
-fn change(a: &Splats, b: &Splats, camera: &Camera) -> f32 {
-    let draw = |splats: &Splats| -> Image { render(&Scene::from(splats), camera, &RenderOptions::default()) };
-    let (a, b) = (draw(a), draw(b));
+fn change(renderer: &mut Renderer, a: &Splats, b: &Splats, camera: &Camera) -> Result<f32> {
+    let mut draw = |splats: &Splats| {
+        let scene = renderer.prepare(Scene::from(splats))?;
+        renderer.render(&scene, camera, &RenderOptions::default())
+    };
+    let (a, b) = (draw(a)?, draw(b)?);
     let pairs = a.pixels.as_flattened().iter().zip(b.pixels.as_flattened());
-    pairs.map(|(a, b)| (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).abs()).fold(0.0, f32::max)
+    Ok(pairs.map(|(a, b)| (a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).abs()).fold(0.0, f32::max))
 }
 
 #[cfg(test)]
@@ -94,15 +107,16 @@ mod tests {
         }
         let original = splats.clone();
         let views = Views::generated(&splats);
-        let mut seen = views.sensitivity(&splats, &mut || ());
-        let pruned = prune(&mut splats, &mut seen, &views, 0.5 / 255.0);
+        let mut cpu = Renderer::cpu();
+        let mut seen = views.sensitivity(&mut cpu, &splats, &mut || ()).unwrap();
+        let pruned = prune(&mut cpu, &mut splats, &mut seen, &views, 0.5 / 255.0).unwrap();
         assert!(pruned.removed >= 80, "{pruned:?}");
         assert!(pruned.largest_change <= 0.5 / 255.0);
         assert_eq!(splats.len() + pruned.removed, original.len());
         assert_eq!(seen.len(), splats.len());
         assert!(splats.geometry.opacities.iter().all(|&o| o > -8.0));
         for camera in views.all() {
-            assert!(change(&original, &splats, camera) <= 0.5 / 255.0);
+            assert!(change(&mut cpu, &original, &splats, camera).unwrap() <= 0.5 / 255.0);
         }
     }
 
@@ -112,7 +126,8 @@ mod tests {
         let original = splats.clone();
         let views = Views::generated(&splats);
         let mut seen = Sensitivity::guess(&splats.geometry);
-        assert_eq!(prune(&mut splats, &mut seen, &views, 0.1).removed, 0);
+        let pruned = prune(&mut Renderer::cpu(), &mut splats, &mut seen, &views, 0.1).unwrap();
+        assert_eq!(pruned.removed, 0);
         assert_eq!(splats, original);
     }
 }

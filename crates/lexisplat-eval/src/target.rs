@@ -2,7 +2,7 @@
 
 use lexisplat::packed::{PackReport, Packed, Packer, Promise};
 use lexisplat::{Model, Progress, Sensitivity, Splats, lexi};
-use lexisplat_render::{Camera, Image, RenderOptions, Scene, Split, render, sensitivity, surround};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, Split, surround};
 
 use crate::error::{Error, Result};
 use crate::metrics::psnr;
@@ -126,32 +126,42 @@ impl Views {
         self.measure.iter().chain(judge)
     }
 
-    /// How much the views' pictures depend on each value of each Gaussian, tempered by a guess for views
-    /// that are not among them.
-    #[must_use]
-    pub fn sensitivity(&self, splats: &Splats, on_view: &mut dyn FnMut()) -> Sensitivity {
-        let mut seen = sensitivity(&Scene::from(splats), &self.measure, on_view);
+    /// How much the views' pictures, drawn with `renderer`, depend on each value of each Gaussian, tempered
+    /// by a guess for views that are not among them.
+    ///
+    /// # Errors
+    /// None on the processor; on a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn sensitivity(
+        &self,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        on_view: &mut dyn FnMut(),
+    ) -> Result<Sensitivity> {
+        let mut seen = renderer.sensitivity(&Scene::from(splats), &self.measure, on_view)?;
         seen.temper(&splats.geometry, GUESS_SHARE);
-        seen
+        Ok(seen)
     }
 }
 
 /// The judging views and the original's pictures from them.
 #[derive(Debug)]
 pub struct Judge<'a> {
+    renderer: &'a mut Renderer,
     views: Vec<(&'a Camera, Image)>,
     given: bool,
 }
 
 impl<'a> Judge<'a> {
-    /// Draws the original.
-    #[must_use]
-    pub fn new(splats: &Splats, views: &'a Views) -> Self {
-        let scene = Scene::from(splats);
+    /// Draws the original with `renderer`, as models will be.
+    ///
+    /// # Errors
+    /// None on the processor; on a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn new(renderer: &'a mut Renderer, splats: &Splats, views: &'a Views) -> Result<Self> {
+        let scene = renderer.prepare(Scene::from(splats))?;
         let most = if views.given { usize::MAX } else { JUDGES };
         let mut drawn: Vec<(f64, &Camera, Image)> = Vec::new();
         for camera in &views.judge {
-            let picture = render(&scene, camera, &RenderOptions::default());
+            let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
             drawn.push((detail(&picture), camera, picture));
             if drawn.len() > most
                 && let Some(least) = (0..drawn.len()).min_by(|&a, &b| drawn[a].0.total_cmp(&drawn[b].0))
@@ -160,18 +170,18 @@ impl<'a> Judge<'a> {
             }
         }
         let views_drawn = drawn.into_iter().map(|(_, camera, picture)| (camera, picture)).collect();
-        Self { views: views_drawn, given: views.given }
+        Ok(Self { renderer, views: views_drawn, given: views.given })
     }
 
     /// Mean and least PSNR of `model` against the original.
     ///
     /// # Errors
-    /// None in practice: the pictures have the same sizes.
-    pub fn score(&self, model: &Model) -> Result<[f64; 2]> {
-        let scene = Scene::from(model);
+    /// None on the processor; on a GPU [`Error::Render`] if the model or a view does not fit.
+    pub fn score(&mut self, model: &Model) -> Result<[f64; 2]> {
+        let scene = self.renderer.prepare(Scene::from(model))?;
         let (mut sum, mut least) = (0.0, IDENTICAL);
         for (camera, original) in &self.views {
-            let picture = render(&scene, camera, &RenderOptions::default());
+            let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
             let decibels = psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL);
             sum += decibels;
             least = f64::min(least, decibels);
@@ -244,7 +254,7 @@ struct Try {
 /// [`Error::Parameter`] if it cannot be met; what packing and drawing say.
 pub fn pack_to(
     packer: &Packer<'_>,
-    judge: &Judge<'_>,
+    judge: &mut Judge<'_>,
     goal: Goal,
     progress: &dyn Progress,
 ) -> Result<(Packed, PackReport)> {

@@ -38,6 +38,7 @@ pub mod gpu;
 mod image;
 mod orbit;
 mod radiance;
+mod renderer;
 mod scene;
 mod surround;
 
@@ -48,5 +49,6 @@ pub use error::{Error, Result};
 pub use image::Image;
 pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
+pub use renderer::{Device, Prepared, Renderer};
 pub use scene::Scene;
 pub use surround::surround;

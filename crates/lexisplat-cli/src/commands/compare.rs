@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use lexisplat::Progress;
 use lexisplat_eval::{CompareOptions, Comparison, SceneFile, choose_views, compare, montage, png, text};
+use lexisplat_render::Renderer;
 use serde_json::json;
 
 use crate::args::{Common, Compare};
@@ -38,15 +39,18 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let mut paths = saved.iter();
     let mut failure = None;
     let options = CompareOptions::new(views.background, args.eight_bit);
-    let comparison = compare(&scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
-        bars.advance(1);
-        if let Some(path) = paths.next() {
-            let (width, height, pixels) = montage::montage(image_a, image_b);
-            let written =
-                png(width, height, &pixels).map_err(Into::into).and_then(|bytes| write_bytes(path, &bytes));
-            failure = failure.take().or(written.err());
-        }
-    })?;
+    let mut renderer = Renderer::open(views.device)?;
+    let comparison =
+        compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
+            bars.advance(1);
+            if let Some(path) = paths.next() {
+                let (width, height, pixels) = montage::montage(image_a, image_b);
+                let written = png(width, height, &pixels)
+                    .map_err(Into::into)
+                    .and_then(|bytes| write_bytes(path, &bytes));
+                failure = failure.take().or(written.err());
+            }
+        })?;
     bars.end();
     if let Some(error) = failure {
         return Err(error);
@@ -56,6 +60,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
             "b": { "file": b.name, "bytes": b.bytes, "gaussians": scene_b.len() },
             "ratio": if b.bytes > 0 { Some(a.bytes as f64 / b.bytes as f64) } else { None },
+            "device": renderer.name(),
             "eight_bit": args.eight_bit,
             "identical": comparison.identical,
             "psnr": comparison.psnr,
@@ -67,10 +72,16 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     if common.quiet {
         return Ok(());
     }
-    print(&table(&a, &b, &comparison, args)?)
+    print(&table(&a, &b, &comparison, args, renderer.name())?)
 }
 
-fn table(a: &SceneFile, b: &SceneFile, comparison: &Comparison, args: &Compare) -> Result<String> {
+fn table(
+    a: &SceneFile,
+    b: &SceneFile,
+    comparison: &Comparison,
+    args: &Compare,
+    device: &str,
+) -> Result<String> {
     let mut out = String::new();
     let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
     writeln!(out, "{:<width$}  {:>11}  {:>10}  {:>8}", "view", "size", "PSNR", "SSIM")?;
@@ -102,6 +113,7 @@ fn table(a: &SceneFile, b: &SceneFile, comparison: &Comparison, args: &Compare) 
         writeln!(out, "{:>10}  {}", text::bytes(input.bytes), input.name)?;
     }
     writeln!(out, "{:>10}  first file over second, whole files", text::ratio(a.bytes, b.bytes))?;
+    writeln!(out, "{:>10}  {device}", "drawn on")?;
     if let Some(folder) = &args.save_views {
         let times = montage::AMPLIFICATION;
         writeln!(out, "saved to {}: first, second, difference times {times}", folder.display())?;

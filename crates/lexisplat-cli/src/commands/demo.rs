@@ -8,7 +8,7 @@ use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
 use lexisplat_eval::report::{Picture, Report, html};
 use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage, png, text};
-use lexisplat_render::{Image, Scene, orbit};
+use lexisplat_render::{Image, Renderer, Scene, orbit};
 use serde_json::json;
 
 use super::compress::error_line;
@@ -77,14 +77,20 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let mut drawn = Vec::new();
     let mut failure = None;
     let (a, b) = (Scene::from(&splats), Scene::from(&model));
-    let comparison =
-        compare(&a, &b, &cameras, &CompareOptions::default(), &mut |view, original, compressed| {
+    let comparison = compare(
+        &mut Renderer::cpu(),
+        &a,
+        &b,
+        &cameras,
+        &CompareOptions::default(),
+        &mut |view, original, compressed| {
             match Drawn::new(&view.name, original, compressed) {
                 Ok(view) => drawn.push(view),
                 Err(error) => failure = failure.take().or(Some(error)),
             }
             bars.advance(1);
-        })?;
+        },
+    )?;
     bars.end();
     if let Some(error) = failure {
         return Err(error);

@@ -1,10 +1,12 @@
 //! One file a command, glue only.
 
+mod bench;
 mod compare;
 mod completions;
 mod compress;
 mod decompress;
 mod demo;
+mod devices;
 mod info;
 mod pack;
 mod render;
@@ -26,6 +28,8 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Info(args) => info::run(&args, &common),
         Command::Render(args) => render::run(&args, &common),
         Command::Compare(args) => compare::run(&args, &common),
+        Command::Bench(args) => bench::run(&args, &common),
+        Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),
         Command::Completions(args) => completions::run(&args),
     }

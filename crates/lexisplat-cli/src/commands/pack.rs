@@ -8,7 +8,7 @@ use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::PlyRead;
 use lexisplat::{Error, Progress, Splats, lexi};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
-use lexisplat_render::read_cameras;
+use lexisplat_render::{Renderer, read_cameras};
 use serde_json::{Value, json};
 
 use super::compress::error_line;
@@ -42,14 +42,15 @@ pub(crate) fn run(
         Some(path) => Views::given(&read_cameras(path)?)?,
         None => Views::generated(&splats),
     };
+    let mut renderer = Renderer::open(args.device)?;
     bars.start("looking", "views", views.len() as u64);
-    let mut sensitivity = views.sensitivity(&splats, &mut || bars.advance(1));
+    let mut sensitivity = views.sensitivity(&mut renderer, &splats, &mut || bars.advance(1))?;
     bars.end();
     let pruned = match args.prune {
         Some(levels) if !levels.is_finite() || levels <= 0.0 => {
             return Err(Error::parameter("prune", levels, "a finite number above 0").into());
         }
-        Some(levels) => Some(prune(&mut splats, &mut sensitivity, &views, levels / LEVELS)),
+        Some(levels) => Some(prune(&mut renderer, &mut splats, &mut sensitivity, &views, levels / LEVELS)?),
         None => None,
     };
     let look_seconds = clock.elapsed().as_secs_f64();
@@ -57,11 +58,12 @@ pub(crate) fn run(
     let clock = Instant::now();
     let packer = Packer::new(&splats, &sensitivity, &options)?;
     drop(sensitivity);
-    let (packed, report) = match goal {
-        Some(goal) => pack_to(&packer, &Judge::new(&splats, &views), goal, &bars)?,
+    let (mut packed, report) = match goal {
+        Some(goal) => pack_to(&packer, &mut Judge::new(&mut renderer, &splats, &views)?, goal, &bars)?,
         None => packer.pack(packer.step_for(args.preset.unwrap_or_default().decibels()), &bars)?,
     };
     drop(packer);
+    packed.drawn_on = renderer.is_gpu().then(|| renderer.name().to_owned());
     let pack_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     let file_bytes = write_output(
@@ -166,6 +168,7 @@ impl Outcome<'_> {
             "dense_sh_bytes": packed.gaussians * dim * 4,
             "attribute_bytes": attributes,
             "promise": packed.promise,
+            "device": self.packed.drawn_on.as_deref().unwrap_or("cpu"),
             "pruned": self.pruned.map(|p| json!({
                 "gaussians": p.removed,
                 "largest_change": p.largest_change,

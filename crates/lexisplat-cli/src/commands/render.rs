@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::Progress;
 use lexisplat_eval::{choose_views, png};
-use lexisplat_render::{RenderOptions, render};
+use lexisplat_render::{RenderOptions, Renderer};
 use serde_json::json;
 
 use crate::args::{Common, Render};
@@ -44,14 +44,15 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     }
     make_folder(&folder)?;
     let options = RenderOptions { background: views.background, ..RenderOptions::default() };
+    let mut renderer = Renderer::open(views.device)?;
+    let prepared = renderer.prepare(scene)?;
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();
     let mut drawing = 0.0;
     for (camera, path) in cameras.iter().zip(&paths) {
-        camera.validate()?;
         let clock = Instant::now();
-        let picture = render(&scene, camera, &options);
+        let picture = renderer.render(&prepared, camera, &options)?;
         let seconds = clock.elapsed().as_secs_f64();
         drawing += seconds;
         write_bytes(path, &png(picture.width, picture.height, &picture.to_8bit())?)?;
@@ -66,15 +67,16 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     }
     bars.end();
     if common.json {
-        return print_json(&json!({ "scene": input.name, "device": "cpu", "views": done }));
+        return print_json(&json!({ "scene": input.name, "device": renderer.name(), "views": done }));
     }
     if common.quiet {
         return Ok(());
     }
     let each = drawing * 1000.0 / cameras.len() as f64;
     print(&format!(
-        "wrote {} pictures to {}, {each:.0} ms each to draw (CPU)\n",
+        "wrote {} pictures to {}, {each:.0} ms each to draw ({})\n",
         cameras.len(),
-        folder.display()
+        folder.display(),
+        renderer.name()
     ))
 }

@@ -52,9 +52,7 @@ impl Columns {
                 let escaped = ESCAPED as u8;
                 bytes[(g - start) as usize] = escaped;
             }
-            out.columns.extend(
-                bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-            );
+            out.columns.extend(bytes.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
             let total: usize = counts.iter().map(|&c| usize::from(c)).sum();
             match codes.indices() {
                 Indices::U8(v) => pack(&mut out.nonzeros, v[at..at + total].iter().map(|v| v.to_le_bytes())),

@@ -43,6 +43,8 @@ const CULL_SLACK: f32 = 1e-3;
 const REACH_SLACK: f32 = 1e-3;
 /// The same in pixels.
 const REACH_MARGIN: f32 = 0.05;
+/// Rounds of a measurement of arithmetic.
+pub(super) const MULTIPLY_ADDS: u32 = 1024;
 /// Numbers beyond this count as overflown.
 const FAR_LIMIT: f32 = 3e38;
 
@@ -72,7 +74,7 @@ pub(super) enum Counter {
 }
 
 /// Number of counters.
-pub(super) const COUNTERS: u64 = 16;
+pub(super) const COUNTERS: usize = 16;
 
 /// Dispatches whose sizes the GPU works out. Places in the buffer of their arguments.
 #[derive(Debug, Clone, Copy)]
@@ -126,6 +128,7 @@ pub(super) fn declarations() -> String {
         ("KEY_LAST", u32::MAX),
         ("NO_SLOT", u32::MAX),
         ("MAX_BASIS", basis),
+        ("MULTIPLY_ADDS", MULTIPLY_ADDS),
         ("COUNTER_FOUND", Counter::Found as u32),
         ("COUNTER_SLOTS", Counter::Slots as u32),
         ("COUNTER_SLOTS_AND_END", Counter::SlotsAndEnd as u32),

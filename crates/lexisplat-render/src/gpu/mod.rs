@@ -17,6 +17,7 @@ mod plan;
 mod renderer;
 mod scene;
 mod shaders;
+mod speed;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -27,5 +28,6 @@ pub use wgpu;
 
 pub use device::{AdapterSummary, Gpu, GpuChoice, adapters};
 pub use plan::Stage;
-pub use renderer::{Frame, FrameStats, GpuRenderer};
+pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};
 pub use scene::{GpuScene, SceneBytes, ShPath};
+pub use speed::{Speed, measure_speed};

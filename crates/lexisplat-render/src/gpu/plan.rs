@@ -316,8 +316,7 @@ impl Planner<'_> {
         let (work, kernels) = (self.work, self.kernels);
         let scan = Scan { counter: counter as u32, fixed_length: fixed.unwrap_or(0), padding: [0; 2] };
         let uniform = self.gpu.uniform("scan", &scan)?;
-        let bound =
-            || [(0, all(&uniform)), (1, all(&work.counters)), (2, all(data)), (3, all(&work.sums))];
+        let bound = || [(0, all(&uniform)), (1, all(&work.counters)), (2, all(data)), (3, all(&work.sums))];
         let size = || match groups {
             Some(dispatch) => Size::of(dispatch),
             None => Size::Groups(fixed.unwrap_or(0).div_ceil(SCAN_BLOCK)),
@@ -353,11 +352,8 @@ impl Planner<'_> {
             };
             self.step(&kernels.sort_count, &common(), Size::of(sorting.groups))?;
             self.scan(&work.histogram, sorting.digits, None, Some(sorting.scan_groups))?;
-            let moved = [
-                (4, all(sorting.values[from])),
-                (5, all(sorting.keys[to])),
-                (6, all(sorting.values[to])),
-            ];
+            let moved =
+                [(4, all(sorting.values[from])), (5, all(sorting.keys[to])), (6, all(sorting.values[to]))];
             let bound: Vec<_> = common().into_iter().chain(moved).collect();
             self.step(&kernels.sort_scatter, &bound, Size::of(sorting.groups))?;
             self.uniforms.push(uniform);

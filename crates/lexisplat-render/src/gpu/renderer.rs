@@ -42,6 +42,9 @@ pub struct Frame {
     pub stats: FrameStats,
 }
 
+/// Milliseconds of each stage.
+pub type StageTimes = Vec<(Stage, f64)>;
+
 /// What a picture took.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
@@ -55,7 +58,7 @@ pub struct FrameStats {
     /// How often it was tried again with more room. Not 0 only where a view is fuller than all before.
     pub retries: u32,
     /// Milliseconds on the GPU of each stage; empty where time stamps are not to be had.
-    pub stages: Vec<(Stage, f64)>,
+    pub stages: StageTimes,
     /// Milliseconds from the first stage's start to the last one's end.
     pub total: Option<f64>,
 }
@@ -171,7 +174,8 @@ impl GpuRenderer {
         use wgpu::BufferUsages as U;
         let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL;
         let back = self.gpu.buffer("pixels back", size, U::MAP_READ | U::COPY_DST)?;
-        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder =
+            self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&frame.pixels, 0, &back.raw, 0, size);
         self.gpu.queue().submit([encoder.finish()]);
         let pixels: Vec<[f32; 4]> = self.gpu.read(&back, size)?;
@@ -226,7 +230,10 @@ impl GpuRenderer {
             return Err(Error::Limit { what, found: line, limit: self.limits.pixels });
         }
         // A picture of another size starts from scratch.
-        if self.plan.as_ref().is_some_and(|p| (p.shape.width, p.shape.height) != (camera.width, camera.height))
+        if self
+            .plan
+            .as_ref()
+            .is_some_and(|p| (p.shape.width, p.shape.height) != (camera.width, camera.height))
         {
             self.band_rows = None;
         }
@@ -275,7 +282,7 @@ impl GpuRenderer {
         options: &RenderOptions,
         degree: ShDegree,
         shape: Shape,
-    ) -> Result<(Frame, [u32; COUNTERS as usize])> {
+    ) -> Result<(Frame, [u32; COUNTERS])> {
         let gpu = &self.gpu;
         let Some(work) = &self.work else {
             return Err(Error::Gpu { problem: "no buffers".to_owned() });
@@ -296,12 +303,13 @@ impl GpuRenderer {
         let mut timed = Vec::new();
         for stage in &plan.passes {
             let query = u32::try_from(timed.len()).unwrap_or(u32::MAX);
-            let timestamp_writes =
-                self.timer.as_ref().filter(|_| query < MAX_TIMED).map(|timer| wgpu::ComputePassTimestampWrites {
+            let timestamp_writes = self.timer.as_ref().filter(|_| query < MAX_TIMED).map(|timer| {
+                wgpu::ComputePassTimestampWrites {
                     query_set: &timer.queries,
                     beginning_of_pass_write_index: Some(2 * query),
                     end_of_pass_write_index: Some(2 * query + 1),
-                });
+                }
+            });
             if timestamp_writes.is_some() {
                 timed.push(stage.stage);
             }
@@ -331,12 +339,12 @@ impl GpuRenderer {
             encoder.resolve_query_set(&timer.queries, 0..stamps, &timer.resolved.raw, 0);
             encoder.copy_buffer_to_buffer(&timer.resolved.raw, 0, &timer.back.raw, 0, bytes);
         }
-        let bytes = COUNTERS * 4;
+        let bytes = work.counters_back.bytes();
         encoder.copy_buffer_to_buffer(&work.counters.raw, 0, &work.counters_back.raw, 0, bytes);
         gpu.queue().submit([encoder.finish()]);
 
         let counters: Vec<u32> = gpu.read(&work.counters_back, bytes)?;
-        let found: [u32; COUNTERS as usize] = std::array::from_fn(|k| counters.get(k).copied().unwrap_or(0));
+        let found: [u32; COUNTERS] = std::array::from_fn(|k| counters.get(k).copied().unwrap_or(0));
         let (stages, total) = self.times(&timed)?;
         let stats = FrameStats {
             visible: found[Counter::Found as usize],
@@ -351,7 +359,7 @@ impl GpuRenderer {
     }
 
     /// Milliseconds of each stage, bands together, and of everything.
-    fn times(&self, timed: &[Stage]) -> Result<(Vec<(Stage, f64)>, Option<f64>)> {
+    fn times(&self, timed: &[Stage]) -> Result<(StageTimes, Option<f64>)> {
         let Some(timer) = &self.timer else { return Ok((Vec::new(), None)) };
         let stamps: Vec<u64> = self.gpu.read(&timer.back, 2 * timed.len() as u64 * STAMP)?;
         let between = |from: u64, to: u64| to.saturating_sub(from) as f64 * timer.tick;
@@ -364,7 +372,7 @@ impl GpuRenderer {
     }
 
     /// What to make larger before trying again, if anything.
-    fn missing(&self, found: [u32; COUNTERS as usize], shape: Shape) -> Result<Option<Missing>> {
+    fn missing(&self, found: [u32; COUNTERS], shape: Shape) -> Result<Option<Missing>> {
         let Some(room) = self.work.as_ref().map(|work| work.room) else { return Ok(None) };
         let spare = |found: u32, most: u64| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the limit")]

@@ -68,6 +68,16 @@ impl ShPath {
     }
 }
 
+impl std::str::FromStr for ShPath {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let names = || Self::ALL.map(Self::name).join(", ");
+        let found = Self::ALL.into_iter().find(|path| path.name() == text);
+        found.ok_or_else(|| Error::parameter("path", text, format!("one of {}", names())))
+    }
+}
+
 /// Bytes of a scene on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SceneBytes {
@@ -93,6 +103,8 @@ pub struct GpuScene {
     degree: ShDegree,
     antialiased: bool,
     bytes: SceneBytes,
+    /// Of those for SH, what all Gaussians share.
+    shared_bytes: u64,
 }
 
 /// Buffers of a part of the scene.
@@ -164,6 +176,7 @@ impl GpuScene {
             degree: scene.degree(),
             antialiased: scene.meta().antialiased,
             bytes: SceneBytes { geometry: 0, sh: table.as_ref().map_or(0, |t| t.bytes.size()) },
+            shared_bytes: table.as_ref().map_or(0, |t| t.bytes.size()),
             table,
         };
         let mut chunk_blocks = vec![0];
@@ -181,7 +194,13 @@ impl GpuScene {
     }
 
     /// Uploads one chunk.
-    fn add(&mut self, geometry: &Geometry, source: &Source<'_>, range: Range<usize>, nonzero: usize) -> Result<()> {
+    fn add(
+        &mut self,
+        geometry: &Geometry,
+        source: &Source<'_>,
+        range: Range<usize>,
+        nonzero: usize,
+    ) -> Result<()> {
         let gpu = self.gpu.clone();
         let bodies: Vec<[f32; 4]> =
             range.clone().into_par_iter().map(|i| body(geometry, source.finite(i), i)).collect();
@@ -200,7 +219,8 @@ impl GpuScene {
             Source::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half)?],
             Source::Codes(model) => {
                 let columns = Columns::new(&model.codes, range.clone(), nonzero);
-                escapes = [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
+                escapes =
+                    [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
                 vec![
                     gpu.upload("base colours", &geometry.dc[range.clone()])?,
                     gpu.upload("columns", &columns.columns)?,
@@ -226,6 +246,8 @@ impl GpuScene {
                 padding: 0,
             },
         )?;
+        // Of codes, the last buffer is the atoms.
+        self.shared_bytes += sh.get(3).map_or(0, Buffer::bytes);
         self.bytes.geometry += bodies.bytes() + shapes.bytes();
         self.bytes.sh += sh.iter().map(Buffer::bytes).sum::<u64>();
         self.chunks.push(ChunkBuffers { blocks, uniform, bodies, shapes, sh });
@@ -260,6 +282,16 @@ impl GpuScene {
     #[must_use]
     pub fn bytes(&self) -> SceneBytes {
         self.bytes
+    }
+
+    /// Bytes that shading one visible Gaussian moves on average: its slot, position, SH and colour. The
+    /// dictionary or table, which caches hold, is not counted.
+    #[must_use]
+    pub fn shading_bytes(&self) -> f64 {
+        let shared: u64 = self.shared_bytes;
+        let own = self.bytes.sh.saturating_sub(shared) as f64 / f64::from(self.len.max(1));
+        let (slot, body, colour) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 3]>());
+        own + (slot + body + colour) as f64
     }
 
     /// The GPU that holds it.
@@ -408,7 +440,8 @@ fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half: bool) -> 
     });
     if half {
         let halves: Vec<f16> = rows.par_iter().map(|&v| f16::from_f32(v)).collect();
-        let bits: &[u16] = bytemuck::cast_slice(half::slice::HalfFloatSliceExt::reinterpret_cast(&halves[..]));
+        let bits: &[u16] =
+            bytemuck::cast_slice(half::slice::HalfFloatSliceExt::reinterpret_cast(&halves[..]));
         return gpu.upload("dense rows", bits);
     }
     gpu.upload("dense rows", &rows)
@@ -456,7 +489,11 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
             let per_channel = scene.degree().rest_per_channel();
             let load = |v: usize| {
                 let at = format!("rows[row + {v}u]");
-                if *half { format!("vec4<f32>(unpack2x16float({at}.x), unpack2x16float({at}.y))") } else { at }
+                if *half {
+                    format!("vec4<f32>(unpack2x16float({at}.x), unpack2x16float({at}.y))")
+                } else {
+                    at
+                }
             };
             let terms = dense_terms(per_channel, load);
             let row = if *half { "vec2<u32>" } else { "vec4<f32>" };
@@ -468,10 +505,11 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
         }
         Source::Codes(model) => {
             let dictionary = &model.dictionary;
-            let shared = dictionary.as_slice().len() * size_of::<f32>();
+            let shared = size_of_val(dictionary.as_slice());
             let most = gpu.limits().max_compute_workgroup_storage_size as usize;
             if path == ShPath::SparseShared && shared + SHARED_RESERVE > most {
-                let expected = format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
+                let expected =
+                    format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
                 return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
             }
             let entry = match path {
@@ -521,8 +559,7 @@ impl Table {
                 view_formats: &[],
             })
         })?;
-        let texels: Vec<u16> =
-            table::texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
+        let texels: Vec<u16> = table::texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
         let per_row = u32::try_from(texel).unwrap_or(0) * size.width;
         if !dictionary.is_empty() {
             gpu.queue().write_texture(

@@ -34,10 +34,7 @@ const TEXTS: [(&str, &[&str]); 9] = [
     ("scan", &[FRAME, include_str!("kernels/scan.wgsl")]),
     ("project", &[FRAME, include_str!("kernels/project.wgsl")]),
     ("sort", &[FRAME, include_str!("kernels/sort.wgsl")]),
-    (
-        "tiles",
-        &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")],
-    ),
+    ("tiles", &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")]),
     ("ranges", &[FRAME, include_str!("kernels/ranges.wgsl")]),
     ("blend", &[FRAME, include_str!("kernels/blend.wgsl")]),
 ];
@@ -121,13 +118,11 @@ pub(super) fn bind(
             binding: *binding,
             resource: match bound {
                 Bound::All(buffer) => buffer.as_entire_binding(),
-                Bound::Part(buffer, offset, size) => {
-                    wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                        buffer,
-                        offset: *offset,
-                        size: std::num::NonZeroU64::new(*size),
-                    })
-                }
+                Bound::Part(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                    buffer,
+                    offset: *offset,
+                    size: std::num::NonZeroU64::new(*size),
+                }),
                 Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
                 Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
             },

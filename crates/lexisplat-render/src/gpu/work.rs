@@ -76,7 +76,7 @@ impl Work {
             frame: gpu.uniform("frame", &Frame::default())?,
             masks: words("masks", blocks * u64::from(GROUP / u32::BITS))?,
             starts: words("starts", blocks + 1)?,
-            counters: words("counters", COUNTERS)?,
+            counters: words("counters", COUNTERS as u64)?,
             dispatches: gpu.buffer("dispatches", dispatches * WORD, U::STORAGE | U::INDIRECT)?,
             sums: words("sums", longest.div_ceil(SCAN_BLOCK.into()))?,
             gaussians: words("gaussians", slots)?,
@@ -92,7 +92,7 @@ impl Work {
             entry_values: pair("entry values", entries)?,
             ranges: words("ranges", 2 * u64::from(room.tiles))?,
             pixels: gpu.storage("pixels", room.pixels * PIXEL)?,
-            counters_back: gpu.buffer("counters back", COUNTERS * WORD, U::MAP_READ | U::COPY_DST)?,
+            counters_back: gpu.buffer("counters back", COUNTERS as u64 * WORD, U::MAP_READ | U::COPY_DST)?,
         })
     }
 }

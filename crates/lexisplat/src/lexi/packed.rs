@@ -97,6 +97,7 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
         extras: extras(checked, gaussians)?,
         order,
         promise,
+        drawn_on: checked.optional(key::DRAWN_ON)?,
         parameters: checked.values(
             tensor::PARAMETERS,
             Dtype::F32,
@@ -122,6 +123,9 @@ fn contents(packed: &Packed) -> (BTreeMap<String, String>, Vec<Tensor<'_>>) {
     put(key::ATOM_BITS, packed.atom_bits.to_string());
     if let Some(promise) = &packed.promise {
         put(key::PROMISE, serde_json::to_string(promise).unwrap_or_default());
+    }
+    if let Some(device) = &packed.drawn_on {
+        put(key::DRAWN_ON, device.clone());
     }
     (metadata, tensors(packed))
 }

@@ -279,6 +279,7 @@ impl<'a> Packer<'a> {
             extras: self.extras(),
             order: self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect()),
             promise: None,
+            drawn_on: None,
             parameters: parameters.to_list(),
             tables: tables.write(),
             lengths,

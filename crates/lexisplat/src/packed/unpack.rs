@@ -43,6 +43,9 @@ pub struct Packed {
     pub order: Option<Vec<u32>>,
     /// What was aimed at and reached, if something was.
     pub promise: Option<Promise>,
+    /// The GPU that looked at the scene and judged; `None` if the CPU renderer did, whose results are the same
+    /// everywhere.
+    pub drawn_on: Option<String>,
     /// Steps and predictors.
     pub parameters: Vec<f32>,
     /// Probabilities of all symbols.

@@ -1,0 +1,323 @@
+//! How fast a scene is drawn, each way it can be held, and how fast it could be.
+//!
+//! The field's protocol: every view is drawn repeatedly after a warm-up, and only drawing is timed (INRIA
+//! `gaussian-splatting` issues 349 and 351), on a GPU by its own time stamps.
+
+use std::time::Instant;
+
+use lexisplat::Model;
+use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath, Speed};
+use lexisplat_render::{Camera, RenderOptions, Scene, render_measured};
+use serde::Serialize;
+
+use crate::error::{Error, Result};
+
+/// How to measure.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct BenchOptions {
+    /// Frames drawn from each view before any is timed.
+    pub warmup: u32,
+    /// Frames timed from each view, at least 1.
+    pub repeat: u32,
+    /// Colour behind the scene.
+    pub background: [f32; 3],
+}
+
+impl BenchOptions {
+    /// Options with the given numbers of frames, over black.
+    #[must_use]
+    pub fn new(warmup: u32, repeat: u32) -> Self {
+        Self { warmup, repeat: repeat.max(1), background: [0.0; 3] }
+    }
+}
+
+/// Median, and tenth and ninetieth of a hundred, in milliseconds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Spread {
+    /// Half are below.
+    pub median: f64,
+    /// A tenth is below.
+    pub p10: f64,
+    /// A tenth is above.
+    pub p90: f64,
+}
+
+impl Spread {
+    /// The spread of `values`, zeros if there are none.
+    #[must_use]
+    pub fn of(mut values: Vec<f64>) -> Self {
+        values.sort_by(f64::total_cmp);
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the length")]
+        let at = |share: f64| {
+            let place = share * values.len().saturating_sub(1) as f64;
+            values.get(place.round() as usize).copied().unwrap_or(0.0)
+        };
+        Self { median: at(0.5), p10: at(0.1), p90: at(0.9) }
+    }
+}
+
+/// How one way of drawing did.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct PathTimes {
+    /// `dense-f32`, `sparse` and so on; on the processor `cpu-dense` or `cpu-sparse`.
+    pub path: String,
+    /// Milliseconds of a frame, over all frames of all views.
+    pub frame: Spread,
+    /// Frames in a second: views over the sum of their mean times.
+    pub fps: f64,
+    /// Milliseconds of each stage.
+    pub stages: Vec<(String, Spread)>,
+    /// Milliseconds of each view, by name.
+    pub views: Vec<(String, Spread)>,
+    /// Gaussians shaded, on average over views.
+    pub visible: f64,
+    /// Pairs of a Gaussian and a tile, on average over views; 0 on the processor.
+    pub entries: f64,
+    /// Bytes on the GPU, or in memory, for geometry.
+    pub geometry_bytes: u64,
+    /// The same for everything colour needs.
+    pub sh_bytes: u64,
+    /// Bytes that shading one visible Gaussian moves: slot, position, SH, colour.
+    pub shading_bytes: f64,
+}
+
+impl PathTimes {
+    /// Median milliseconds of a stage, 0 if there is none of that name.
+    #[must_use]
+    pub fn stage(&self, name: &str) -> f64 {
+        self.stages.iter().find(|(found, _)| found == name).map_or(0.0, |(_, spread)| spread.median)
+    }
+
+    /// Bytes in a second that the radiance stage moved.
+    #[must_use]
+    pub fn radiance_bandwidth(&self) -> Option<f64> {
+        let seconds = self.stage("radiance") / 1e3;
+        (seconds > 0.0).then(|| self.visible * self.shading_bytes / seconds)
+    }
+}
+
+/// One frame's times.
+struct Sample {
+    total: f64,
+    stages: Vec<(String, f64)>,
+    visible: f64,
+    entries: f64,
+}
+
+/// Draws from every camera and sums up. `frame` draws once.
+fn run(
+    path: &str,
+    cameras: &[Camera],
+    options: &BenchOptions,
+    on_view: &mut dyn FnMut(),
+    mut frame: impl FnMut(&Camera) -> Result<Sample>,
+) -> Result<PathTimes> {
+    if cameras.is_empty() {
+        return Err(Error::parameter("cameras", "none", "at least one view"));
+    }
+    let mut all = Vec::new();
+    let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
+    let mut views = Vec::new();
+    let (mut means, mut visible, mut entries) = (0.0, 0.0, 0.0);
+    for camera in cameras {
+        for _ in 0..options.warmup {
+            frame(camera)?;
+        }
+        let mut times = Vec::new();
+        for _ in 0..options.repeat.max(1) {
+            let sample = frame(camera)?;
+            times.push(sample.total);
+            for (name, time) in sample.stages {
+                match stages.iter_mut().find(|(found, _)| *found == name) {
+                    Some((_, list)) => list.push(time),
+                    None => stages.push((name, vec![time])),
+                }
+            }
+            (visible, entries) = (visible + sample.visible, entries + sample.entries);
+        }
+        means += times.iter().sum::<f64>() / times.len() as f64;
+        all.extend_from_slice(&times);
+        views.push((camera.name.clone(), Spread::of(times)));
+        on_view();
+    }
+    let frames = all.len() as f64;
+    Ok(PathTimes {
+        path: path.to_owned(),
+        frame: Spread::of(all),
+        fps: 1e3 * cameras.len() as f64 / means,
+        stages: stages.into_iter().map(|(name, times)| (name, Spread::of(times))).collect(),
+        views,
+        visible: visible / frames,
+        entries: entries / frames,
+        geometry_bytes: 0,
+        sh_bytes: 0,
+        shading_bytes: 0.0,
+    })
+}
+
+/// Times drawing on `gpu` with the scene held as `path` says.
+///
+/// # Errors
+/// What uploading and drawing say; [`Error::Parameter`] without cameras.
+pub fn bench_gpu(
+    gpu: &Gpu,
+    scene: &Scene<'_>,
+    path: ShPath,
+    cameras: &[Camera],
+    options: &BenchOptions,
+    on_view: &mut dyn FnMut(),
+) -> Result<PathTimes> {
+    let mut renderer = GpuRenderer::new(gpu)?;
+    let uploaded = GpuScene::new(gpu, scene, path)?;
+    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let times = run(path.name(), cameras, options, on_view, |camera| {
+        let clock = Instant::now();
+        let stats = renderer.draw(&uploaded, camera, &drawing)?.stats;
+        let wall = clock.elapsed().as_secs_f64() * 1e3;
+        Ok(Sample {
+            total: stats.total.unwrap_or(wall),
+            stages: stats.stages.iter().map(|(stage, ms)| (stage.name().to_owned(), *ms)).collect(),
+            visible: f64::from(stats.visible),
+            entries: f64::from(stats.entries),
+        })
+    })?;
+    let bytes = uploaded.bytes();
+    Ok(PathTimes {
+        geometry_bytes: bytes.geometry,
+        sh_bytes: bytes.sh,
+        shading_bytes: uploaded.shading_bytes(),
+        ..times
+    })
+}
+
+/// Times drawing on the processor.
+///
+/// # Errors
+/// [`Error::Parameter`] without cameras, or if one cannot be drawn with.
+pub fn bench_cpu(
+    scene: &Scene<'_>,
+    cameras: &[Camera],
+    options: &BenchOptions,
+    on_view: &mut dyn FnMut(),
+) -> Result<PathTimes> {
+    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let (path, sh_bytes) = match scene {
+        Scene::Dense(splats) => {
+            let dc = size_of_val(splats.geometry.dc.as_slice());
+            ("cpu-dense", dc + size_of_val(splats.sh_rest.as_slice()))
+        }
+        Scene::Sparse(model) => ("cpu-sparse", model.resident_sh_bytes()),
+    };
+    let times = run(path, cameras, options, on_view, |camera| {
+        camera.validate()?;
+        let clock = Instant::now();
+        let drawn = render_measured(scene, camera, &drawing);
+        Ok(Sample {
+            total: clock.elapsed().as_secs_f64() * 1e3,
+            stages: drawn.stage_times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),
+            visible: drawn.gaussians as f64,
+            entries: 0.0,
+        })
+    })?;
+    // Positions, opacities, scales, rotations.
+    let each = size_of::<[f32; 11]>();
+    Ok(PathTimes { geometry_bytes: (scene.len() * each) as u64, sh_bytes: sh_bytes as u64, ..times })
+}
+
+/// The paper's model of shading a Gaussian, held against a card's measured rates.
+///
+/// The paper (section 5, rendering) counts 96 operations and 192 bytes for dense SH, and 96 more 90 for each
+/// nonzero for codes; a stage takes as long as the slower of moving and computing.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RadianceModel {
+    /// Bytes moved for a Gaussian.
+    pub bytes: f64,
+    /// Operations for it.
+    pub operations: f64,
+    /// Milliseconds that all visible ones should take.
+    pub predicted: f64,
+    /// Milliseconds that they took.
+    pub measured: f64,
+}
+
+/// Operations of dense SH of degree 3 for one Gaussian, as the paper counts them.
+const DENSE_OPERATIONS: f64 = 96.0;
+/// Those for one nonzero: a multiplication and an addition for each of 45 coefficients.
+const NONZERO_OPERATIONS: f64 = 90.0;
+
+impl RadianceModel {
+    /// The model for one path on a card of `speed`, with `nonzeros` a Gaussian if it is sparse.
+    #[must_use]
+    pub fn new(times: &PathTimes, nonzeros: Option<f64>, speed: &Speed) -> Self {
+        let operations = DENSE_OPERATIONS + nonzeros.unwrap_or(0.0) * NONZERO_OPERATIONS;
+        let seconds = (times.shading_bytes / speed.copy).max(operations / speed.arithmetic);
+        Self {
+            bytes: times.shading_bytes,
+            operations,
+            predicted: seconds * times.visible * 1e3,
+            measured: times.stage("radiance"),
+        }
+    }
+}
+
+/// Share of lanes that work while the codes of a group of lanes are summed, which takes as long as its
+/// longest code: as the Gaussians lie, and ordered by nonzeros within blocks of `block`.
+#[must_use]
+pub fn busy_lanes(model: &Model, lanes: usize, block: usize) -> [f64; 2] {
+    let counts = model.codes.counts();
+    let busy = |counts: &[u8]| {
+        let used: u64 = counts.iter().map(|&c| u64::from(c)).sum();
+        let held: u64 = counts
+            .chunks(lanes.max(1))
+            .map(|group| u64::from(group.iter().copied().max().unwrap_or(0)) * group.len() as u64)
+            .sum();
+        if held == 0 { 1.0 } else { used as f64 / held as f64 }
+    };
+    let mut ordered = counts.to_vec();
+    ordered.chunks_mut(block.max(1)).for_each(<[u8]>::sort_unstable);
+    [busy(counts), busy(&ordered)]
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::sample::{SampleOptions, scene};
+    use lexisplat::{CompressOptions, Silent, compress};
+    use lexisplat_render::orbit;
+
+    use super::*;
+
+    #[test]
+    fn spreads_are_of_sorted_values() {
+        let spread = Spread::of((0..=100).rev().map(f64::from).collect());
+        assert_eq!((spread.p10, spread.median, spread.p90), (10.0, 50.0, 90.0));
+        assert_eq!(Spread::of(Vec::new()).median, 0.0);
+        assert_eq!(Spread::of(vec![7.0]).p90, 7.0);
+    }
+
+    #[test]
+    fn the_processor_is_measured_by_stage() {
+        let splats = scene(&SampleOptions::new(500, 1));
+        let cameras = orbit(&splats.geometry, 3, 64, 48);
+        let mut seen = 0;
+        let times =
+            bench_cpu(&Scene::from(&splats), &cameras, &BenchOptions::new(1, 4), &mut || seen += 1).unwrap();
+        assert_eq!((seen, times.views.len()), (3, 3));
+        assert_eq!(times.sh_bytes, 500 * 192);
+        assert!(times.visible > 10.0 && times.visible <= 500.0);
+        assert!(times.frame.p10 <= times.frame.median && times.frame.median <= times.frame.p90);
+        let stages: f64 = times.stages.iter().map(|(_, spread)| spread.median).sum();
+        assert!(stages > 0.0 && times.fps > 0.0);
+        assert!(bench_cpu(&Scene::from(&splats), &[], &BenchOptions::new(0, 1), &mut || ()).is_err());
+    }
+
+    #[test]
+    fn ordering_keeps_more_lanes_busy() {
+        let splats = scene(&SampleOptions::new(2000, 1));
+        let (model, _) = compress(splats, &CompressOptions::default(), &Silent).unwrap();
+        let [stored, ordered] = busy_lanes(&model, 32, 1024);
+        assert!(stored > 0.0 && stored < ordered && ordered <= 1.0, "{stored} {ordered}");
+        assert_eq!(busy_lanes(&model, 1, 1024)[0], 1.0);
+    }
+}
