@@ -310,7 +310,7 @@ pub(crate) struct Bench {
     /// Frames timed from each view on the processor; 0 for none.
     #[arg(long, default_value_t = 3, value_name = "N")]
     pub(crate) cpu_repeat: u32,
-    /// Ways to hold SH, of dense-f32, dense-f16, sparse, sparse-shared and sparse-table [default: all].
+    /// Ways to hold SH, of dense-f32, dense-f16, sparse, sparse-ordered, sparse-shared and sparse-table [default: all].
     #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = sh_path())]
     pub(crate) paths: Vec<ShPath>,
 }

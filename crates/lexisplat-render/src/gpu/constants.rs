@@ -33,6 +33,8 @@ pub(super) const COLUMN_GROUP: u32 = 16;
 pub(super) const COLUMN_WORDS: u32 = 1 + COLUMN_GROUP / 4;
 /// In the byte of a Gaussian: it is stored exactly. Counts are at most 72.
 pub(super) const ESCAPED: u32 = 0x80;
+/// Bins for counts of nonzeros, which are at most 72: a power of two.
+const COUNT_BINS: u32 = 128;
 /// Texels along a side of a face of the table of atom radiance. `gpu::table` measures the error.
 pub(super) const TABLE_SIDE: u32 = 32;
 /// The depth key of a Gaussian at the near limit; keys are bits of z above it.
@@ -123,6 +125,7 @@ pub(super) fn declarations() -> String {
         ("COLUMN_GROUP", COLUMN_GROUP),
         ("COLUMN_WORDS", COLUMN_WORDS),
         ("ESCAPED", ESCAPED),
+        ("COUNT_BINS", COUNT_BINS),
         ("TABLE_SIDE", TABLE_SIDE),
         ("KEY_FIRST", KEY_FIRST),
         ("KEY_LAST", u32::MAX),

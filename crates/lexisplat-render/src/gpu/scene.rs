@@ -29,6 +29,8 @@ pub enum ShPath {
     DenseF16,
     /// Sparse codes, the dictionary read through the cache.
     Sparse,
+    /// As [`Self::Sparse`], each group's Gaussians ordered by nonzeros before they are shaded.
+    SparseOrdered,
     /// Sparse codes, the dictionary in workgroup memory. For dictionaries that fit there.
     SparseShared,
     /// Sparse codes, each atom's radiance from a table over directions: an approximation.
@@ -37,8 +39,14 @@ pub enum ShPath {
 
 impl ShPath {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::DenseF32, Self::DenseF16, Self::Sparse, Self::SparseShared, Self::SparseTable];
+    pub const ALL: [Self; 6] = [
+        Self::DenseF32,
+        Self::DenseF16,
+        Self::Sparse,
+        Self::SparseOrdered,
+        Self::SparseShared,
+        Self::SparseTable,
+    ];
 
     /// Its name in reports and on the command line.
     #[must_use]
@@ -47,6 +55,7 @@ impl ShPath {
             Self::DenseF32 => "dense-f32",
             Self::DenseF16 => "dense-f16",
             Self::Sparse => "sparse",
+            Self::SparseOrdered => "sparse-ordered",
             Self::SparseShared => "sparse-shared",
             Self::SparseTable => "sparse-table",
         }
@@ -63,7 +72,7 @@ impl ShPath {
     pub fn of(scene: &Scene<'_>) -> Self {
         match scene {
             Scene::Dense(_) => Self::DenseF32,
-            Scene::Sparse(_) => Self::Sparse,
+            Scene::Sparse(_) => Self::SparseOrdered,
         }
     }
 }
@@ -513,6 +522,7 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
                 return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
             }
             let entry = match path {
+                ShPath::SparseOrdered => include_str!("kernels/radiance_ordered.wgsl"),
                 ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
                 ShPath::SparseTable => include_str!("kernels/radiance_table.wgsl"),
                 _ => include_str!("kernels/radiance_codes.wgsl"),
