@@ -16,7 +16,7 @@ use serde_json::json;
 
 /// Views, and their size in pixels.
 const VIEWS: usize = 2;
-const SIZE: (usize, usize) = (1600, 1064);
+const SIZE: (u32, u32) = (1600, 1064);
 
 fn repeated<T: Clone>(list: &[T], times: usize) -> Vec<T> {
     list.iter().cloned().cycle().take(list.len() * times).collect()
