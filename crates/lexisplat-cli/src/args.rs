@@ -45,6 +45,8 @@ pub(crate) enum Command {
     Info(Info),
     Render(Render),
     Compare(Compare),
+    #[cfg(feature = "view")]
+    View(View),
     Devices(Devices),
     Bench(Bench),
     Demo(Demo),
@@ -290,6 +292,25 @@ pub(crate) struct Compare {
     /// Save both pictures and their amplified difference, side by side, to this folder.
     #[arg(long, value_name = "DIR")]
     pub(crate) save_views: Option<PathBuf>,
+}
+
+/// Open a window on one or two scenes: fly, wipe, difference, live PSNR, compress.
+///
+/// Drag to orbit, with shift to pan, with ctrl to look around; wheel to come nearer; W A S D Q E to fly; [ and ]
+/// for the cameras; 1 to 5 for first, second, side by side, wipe, difference; P for a screenshot. A file
+/// dropped on the window becomes the second model, or the first if shift is held or none is open.
+#[cfg(feature = "view")]
+#[derive(Debug, Args)]
+#[command(after_long_help = lexisplat_view::SCRIPT_WORDS)]
+pub(crate) struct View {
+    /// One or two scenes: PLY or .lexi.
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) views: Views,
+    /// For tests and recordings: what to do without being asked, such as `camera=3,mode=wipe,screenshot=a.png,quit`.
+    #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
+    pub(crate) actions: String,
 }
 
 /// Time drawing, stage by stage, with SH held in every way the scene has.

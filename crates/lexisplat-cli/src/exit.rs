@@ -12,7 +12,10 @@ pub(crate) const CODES: &str = "Exit codes:
   5  an option or argument is out of range
   6  a size is over a limit
   7  an output exists and --overwrite was not given
-  8  no GPU, or it failed";
+  8  no GPU, or it failed; or no display to open a window on";
+
+/// What to do about an output that is already there.
+const OVERWRITE: &str = "give --overwrite to replace it, or another name";
 
 /// An output that is already there.
 #[derive(Debug)]
@@ -29,19 +32,55 @@ impl std::error::Error for OutputExists {}
 /// Exit code of an error, and what to do about it.
 fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
     if error.is::<OutputExists>() {
-        return (7, Some("give --overwrite to replace it, or another name with -o"));
+        return (7, Some(OVERWRITE));
+    }
+    #[cfg(feature = "view")]
+    if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
+        return view(e);
     }
     if let Some(e) = error.downcast_ref::<lexisplat_eval::Error>() {
-        return match e {
-            lexisplat_eval::Error::Codec(e) => codec(e),
-            lexisplat_eval::Error::Render(e) => render(e),
-            _ => (5, None),
-        };
+        return eval(e);
     }
     if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
         return render(e);
     }
     error.downcast_ref::<lexisplat::Error>().map_or((1, None), codec)
+}
+
+#[cfg(feature = "view")]
+fn view(error: &lexisplat_view::Error) -> (u8, Option<&'static str>) {
+    use lexisplat_view::Error;
+    match error {
+        Error::Codec(e) => codec(e),
+        Error::Render(e) => render(e),
+        Error::Eval(e) => eval(e),
+        Error::Exists(_) => (7, Some(OVERWRITE)),
+        Error::NoDisplay => (
+            8,
+            Some(
+                "a window needs X11 or Wayland (over ssh: ssh -X; without any: xvfb-run); `lexisplat render` needs neither",
+            ),
+        ),
+        Error::NoAdapter => (
+            8,
+            Some(
+                "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` works without",
+            ),
+        ),
+        Error::Window(_) => {
+            (8, Some("a window on X11 needs libxkbcommon-x11-0 too; `lexisplat render` works without any"))
+        }
+        Error::Device(_) => (8, Some("--device cpu draws without a GPU")),
+        _ => (1, None),
+    }
+}
+
+fn eval(error: &lexisplat_eval::Error) -> (u8, Option<&'static str>) {
+    match error {
+        lexisplat_eval::Error::Codec(e) => codec(e),
+        lexisplat_eval::Error::Render(e) => render(e),
+        _ => (5, None),
+    }
 }
 
 fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {

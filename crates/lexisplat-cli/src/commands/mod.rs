@@ -10,6 +10,8 @@ mod devices;
 mod info;
 mod pack;
 mod render;
+#[cfg(feature = "view")]
+mod view;
 
 use anyhow::{Context, Result};
 
@@ -28,6 +30,8 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Info(args) => info::run(&args, &common),
         Command::Render(args) => render::run(&args, &common),
         Command::Compare(args) => compare::run(&args, &common),
+        #[cfg(feature = "view")]
+        Command::View(args) => view::run(&args, &common),
         Command::Bench(args) => bench::run(&args, &common),
         Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),

@@ -1,0 +1,22 @@
+//! `lexisplat view`.
+
+use anyhow::Result;
+use lexisplat_view::Options;
+
+use crate::args::{Common, View};
+
+pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
+    let views = &args.views;
+    let options = Options {
+        files: args.files.clone(),
+        cameras: views.cameras.clone(),
+        split: views.split.into(),
+        orbit: views.orbit,
+        max_width: views.width,
+        background: views.background,
+        device: views.device,
+        overwrite: common.overwrite,
+        script: args.actions.clone(),
+    };
+    Ok(lexisplat_view::run(options)?)
+}

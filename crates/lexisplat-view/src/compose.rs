@@ -1,0 +1,97 @@
+//! What is on screen, as a picture of its own.
+
+use crate::error::{Error, Result};
+use crate::present::{Presenter, Showing};
+use crate::readback;
+
+/// Bytes that rows of a texture are padded to when copied to a buffer.
+const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
+/// Bytes of a pixel.
+const PIXEL: u32 = 4;
+/// Not encoded again: pictures already are sRGB.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+/// An 8-bit picture: width, height, pixels row by row.
+pub(crate) type Picture = (u32, u32, Vec<[u8; 3]>);
+
+/// Draws arrangements off screen, with the shader of the screen.
+#[derive(Debug)]
+pub(crate) struct Composer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    presenter: Presenter,
+}
+
+impl Composer {
+    pub(crate) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+        let presenter = Presenter::new(&device, FORMAT);
+        Self { device, queue, presenter }
+    }
+
+    /// The picture that `showing` gives at its own size.
+    ///
+    /// # Errors
+    /// [`Error::Device`] if a picture is missing, or too large for the device.
+    pub(crate) fn compose(&self, showing: &Showing) -> Result<Picture> {
+        let device = &self.device;
+        let bound = self.presenter.bind(device, showing);
+        let (Some(bound), Some((width, height))) = (bound, showing.size()) else {
+            return Err(Error::Device("there is no picture to save".to_owned()));
+        };
+        let most = device.limits().max_texture_dimension_2d;
+        if width.max(height) > most {
+            return Err(Error::Device(format!("{width} x {height} pixels: at most {most} on a side")));
+        }
+        let extent = wgpu::Extent3d { width, height, depth_or_array_layers: 1 };
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("composed"),
+            size: extent,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[],
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        let row = (width * PIXEL).next_multiple_of(ROW);
+        let target = readback::target(device, u64::from(row) * u64::from(height));
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("compose"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view: &view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..Default::default()
+            });
+            self.presenter.draw(&mut pass, &bound);
+        }
+        encoder.copy_texture_to_buffer(
+            texture.as_image_copy(),
+            wgpu::TexelCopyBufferInfo {
+                buffer: &target,
+                layout: wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(row),
+                    rows_per_image: None,
+                },
+            },
+            extent,
+        );
+        self.queue.submit([encoder.finish()]);
+        let bytes = readback::read(device, &target)?;
+        let pixels = bytes
+            .chunks_exact(row as usize)
+            .flat_map(|line| line[..(width * PIXEL) as usize].chunks_exact(PIXEL as usize))
+            .map(|pixel| [pixel[0], pixel[1], pixel[2]])
+            .collect();
+        Ok((width, height, pixels))
+    }
+}

@@ -1,0 +1,76 @@
+//! Pictures by the graphics device that also shows them.
+
+use std::sync::Arc;
+
+use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
+use lexisplat_render::{Camera, RenderOptions};
+
+use super::{PIXEL, Painted, Painter};
+use crate::command::Which;
+use crate::error::{Error, Result};
+use crate::models::Open;
+
+/// The rasteriser on the GPU. Compressed scenes stay sparse there.
+pub(crate) struct OnGpu {
+    gpu: Gpu,
+    renderer: GpuRenderer,
+    scenes: [Option<GpuScene>; 2],
+}
+
+impl OnGpu {
+    /// # Errors
+    /// If the driver refuses a kernel.
+    pub(crate) fn new(gpu: Gpu) -> Result<Self> {
+        let renderer = GpuRenderer::new(&gpu)?;
+        Ok(Self { gpu, renderer, scenes: [None, None] })
+    }
+}
+
+impl Painter for OnGpu {
+    fn name(&self) -> String {
+        self.gpu.summary().name.clone()
+    }
+
+    fn set(&mut self, which: Which, model: Option<Arc<Open>>) -> Result<()> {
+        let place = &mut self.scenes[which.index()];
+        // The old one goes first: there may be no room for both.
+        *place = None;
+        if let Some(model) = model {
+            let scene = model.scene.scene();
+            *place = Some(GpuScene::new(&self.gpu, &scene, ShPath::of(&scene))?);
+        }
+        Ok(())
+    }
+
+    fn paint(&mut self, which: Which, camera: &Camera, options: &RenderOptions) -> Result<Painted> {
+        let Some(scene) = &self.scenes[which.index()] else {
+            return Err(Error::Device(format!("no {which:?} model to draw")));
+        };
+        let frame = self.renderer.draw(scene, camera, options)?;
+        // The renderer's own is drawn over by the next picture.
+        let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL as u64;
+        let device = self.gpu.device();
+        let pixels = device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("picture"),
+            size,
+            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&frame.pixels, 0, &pixels, 0, size);
+        self.gpu.queue().submit([encoder.finish()]);
+        let stages = frame.stats.stages.iter().map(|(stage, time)| (stage.name(), *time));
+        Ok(Painted {
+            pixels,
+            width: frame.width,
+            height: frame.height,
+            gaussians: frame.stats.visible as usize,
+            stage_times: stages.collect(),
+            image: None,
+        })
+    }
+
+    fn resident_bytes(&self) -> u64 {
+        self.gpu.bytes()
+    }
+}

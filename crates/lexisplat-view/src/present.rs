@@ -1,0 +1,176 @@
+//! One or two pictures on a target: one triangle and a shader.
+
+use std::sync::Arc;
+
+use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
+use wgpu::util::DeviceExt;
+
+use crate::command::{Mode, Which};
+use crate::painter::Painted;
+use crate::state::Arrangement;
+
+/// The shader's `Arrangement`.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+struct Uniform {
+    size: [u32; 2],
+    mode: u32,
+    encodes: u32,
+    split: f32,
+    gain: f32,
+    padding: [f32; 2],
+}
+
+/// Pictures to show, of one size, in an arrangement that needs no other.
+#[derive(Debug, Clone)]
+pub(crate) struct Showing {
+    pub(crate) arrangement: Arrangement,
+    /// The picture of each model, at least one of them.
+    pub(crate) pictures: [Option<Arc<Painted>>; 2],
+}
+
+impl Showing {
+    /// The pictures on the left and on the right; the same twice if there is only one.
+    pub(crate) fn sides(&self) -> Option<[&Painted; 2]> {
+        let [first, second] = [0, 1].map(|i| self.pictures[i].as_deref());
+        match (self.arrangement.mode, first, second) {
+            (Mode::One(Which::First), Some(one), _) | (Mode::One(Which::Second), _, Some(one)) => {
+                Some([one; 2])
+            }
+            (Mode::One(_), ..) => None,
+            (_, Some(first), Some(second)) => Some([first, second]),
+            _ => None,
+        }
+    }
+
+    /// Size in pixels of what is shown.
+    pub(crate) fn size(&self) -> Option<(u32, u32)> {
+        let [picture, _] = self.sides()?;
+        Some((picture.width * self.arrangement.columns(), picture.height))
+    }
+}
+
+/// The pipeline for one format of target.
+#[derive(Debug)]
+pub(crate) struct Presenter {
+    pipeline: wgpu::RenderPipeline,
+    layout: wgpu::BindGroupLayout,
+    encodes: bool,
+}
+
+impl Presenter {
+    pub(crate) fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
+        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
+            binding,
+            visibility: wgpu::ShaderStages::FRAGMENT,
+            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
+            count: None,
+        };
+        let storage = wgpu::BufferBindingType::Storage { read_only: true };
+        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("present"),
+            entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage), entry(2, storage)],
+        });
+        let module = device.create_shader_module(wgpu::include_wgsl!("present.wgsl"));
+        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some("present"),
+            bind_group_layouts: &[Some(&layout)],
+            immediate_size: 0,
+        });
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("present"),
+            layout: Some(&pipeline_layout),
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("corner"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[],
+            },
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("colour"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(format.into())],
+            }),
+            multiview_mask: None,
+            cache: None,
+        });
+        Self { pipeline, layout, encodes: format.is_srgb() }
+    }
+
+    /// What the shader needs to show `showing`; `None` if a picture is missing.
+    pub(crate) fn bind(&self, device: &wgpu::Device, showing: &Showing) -> Option<wgpu::BindGroup> {
+        let [left, right] = showing.sides()?;
+        let uniform = Uniform {
+            size: [left.width, left.height],
+            mode: match showing.arrangement.mode {
+                Mode::One(_) => 0,
+                Mode::SideBySide => 1,
+                Mode::Wipe => 2,
+                Mode::Difference => 3,
+            },
+            encodes: u32::from(self.encodes),
+            split: showing.arrangement.split,
+            gain: showing.arrangement.gain,
+            padding: [0.0; 2],
+        };
+        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+            label: Some("arrangement"),
+            contents: bytemuck::bytes_of(&uniform),
+            usage: wgpu::BufferUsages::UNIFORM,
+        });
+        Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("present"),
+            layout: &self.layout,
+            entries: &[
+                wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 1, resource: left.pixels.as_entire_binding() },
+                wgpu::BindGroupEntry { binding: 2, resource: right.pixels.as_entire_binding() },
+            ],
+        }))
+    }
+
+    /// Draws over the whole viewport of `pass`.
+    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bound: &wgpu::BindGroup) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, bound, &[]);
+        pass.draw(0..3, 0..1);
+    }
+}
+
+/// Shows pictures inside egui.
+pub(crate) struct OnScreen {
+    pub(crate) presenter: Arc<Presenter>,
+    pub(crate) showing: Showing,
+}
+
+/// The pictures of this frame; there is one place for them on screen.
+struct Bound(Option<wgpu::BindGroup>);
+
+impl CallbackTrait for OnScreen {
+    fn prepare(
+        &self,
+        device: &wgpu::Device,
+        _: &wgpu::Queue,
+        _: &ScreenDescriptor,
+        _: &mut wgpu::CommandEncoder,
+        resources: &mut CallbackResources,
+    ) -> Vec<wgpu::CommandBuffer> {
+        resources.insert(Bound(self.presenter.bind(device, &self.showing)));
+        Vec::new()
+    }
+
+    fn paint(
+        &self,
+        _: eframe::egui::PaintCallbackInfo,
+        pass: &mut wgpu::RenderPass<'static>,
+        resources: &CallbackResources,
+    ) {
+        if let Some(Bound(Some(bound))) = resources.get() {
+            self.presenter.draw(pass, bound);
+        }
+    }
+}

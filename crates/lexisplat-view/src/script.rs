@@ -1,0 +1,161 @@
+//! Commands in words, to be done one after another.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use eframe::egui::Key;
+use lexisplat::{Error, Result, ShDegree};
+
+use crate::command::{Command, Mode, Quality, Which};
+use crate::keys;
+
+/// What the words mean.
+pub const WORDS: &str = "\
+Words of a script, with commas between them. Each is done when the picture of the one before is complete:
+  camera=N              look through camera N, from 0
+  orbit=RIGHT:DOWN      orbit by degrees
+  mode=NAME             first, second, side, wipe or difference
+  split=F               wipe at F, 0 to 1
+  gain=F                amplify differences F times
+  degree=N              draw with SH up to degree N
+  background=R:G:B      colour behind the scene, each 0 to 1
+  key=K                 press a key, such as ] or P
+  open=FILE, open2=FILE open a file as the first or second model
+  drop=FILE             drop a file on the window
+  compress=NAME         make the second model by compressing the first: small, balanced, high, archive
+  tolerance=F           the same with geometry exact, SH within F
+  screenshot=FILE       save the picture; without =FILE under a name of its own
+  report                print what is shown as a JSON object on standard output
+  quit                  close the window
+An error ends the script and the program.";
+
+/// Commands to do.
+pub(crate) type Script = VecDeque<Command>;
+
+/// The commands of `text`.
+///
+/// # Errors
+/// [`Error::Parameter`] naming the word that is none.
+pub(crate) fn parse(text: &str) -> Result<Script> {
+    text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(word).collect()
+}
+
+fn word(word: &str) -> Result<Command> {
+    let wrong = |expected: &str| Error::parameter("actions", word, expected);
+    let (name, value) = word.split_once('=').map_or((word, None), |(name, value)| (name, Some(value)));
+    let file = || value.filter(|v| !v.is_empty()).map(PathBuf::from).ok_or_else(|| wrong("a file's name"));
+    Ok(match name {
+        "camera" => Command::Camera(number(value).ok_or_else(|| wrong("a camera's number, from 0"))?),
+        "orbit" => Command::Orbit(numbers(value).ok_or_else(|| wrong("two numbers of degrees"))?),
+        "mode" => {
+            let found = Mode::ALL.into_iter().find(|mode| Some(mode.name()) == value);
+            Command::Mode(found.ok_or_else(|| wrong("first, second, side, wipe or difference"))?)
+        }
+        "split" => Command::Split(number(value).ok_or_else(|| wrong("a number from 0 to 1"))?),
+        "gain" => Command::Gain(number(value).ok_or_else(|| wrong("a number"))?),
+        "degree" => {
+            let degree = number(value).and_then(|d: u8| ShDegree::new(d).ok());
+            Command::Degree(Some(degree.ok_or_else(|| wrong("an SH degree"))?))
+        }
+        "background" => {
+            Command::Background(numbers(value).ok_or_else(|| wrong("three numbers from 0 to 1"))?)
+        }
+        "key" => {
+            let key = value.and_then(Key::from_name);
+            key.and_then(keys::command).ok_or_else(|| wrong("a key that does something"))?
+        }
+        "open" => Command::Open(file()?, Which::First),
+        "open2" => Command::Open(file()?, Which::Second),
+        "drop" => Command::Drop { paths: vec![file()?], first: false },
+        "compress" => {
+            let preset = value.unwrap_or_default().parse();
+            Command::Compress(Quality::Preset(preset.map_err(|_| wrong("a preset's name"))?))
+        }
+        "tolerance" => {
+            Command::Compress(Quality::Tolerance(number(value).ok_or_else(|| wrong("a number above 0"))?))
+        }
+        "screenshot" => Command::Screenshot(if value.is_some() { Some(file()?) } else { None }),
+        "report" => Command::Report,
+        "quit" => Command::Quit,
+        _ => return Err(wrong("one of the words that `lexisplat view --help` lists")),
+    })
+}
+
+fn number<T: FromStr>(text: Option<&str>) -> Option<T> {
+    text?.trim().parse().ok()
+}
+
+fn numbers<T: FromStr, const N: usize>(text: Option<&str>) -> Option<[T; N]> {
+    let parts: Option<Vec<T>> = text?.split(':').map(|part| number(Some(part))).collect();
+    parts?.try_into().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::packed::Preset;
+
+    use super::*;
+
+    #[test]
+    fn words_become_commands_in_order() {
+        let script =
+            parse("camera=3, mode=wipe,split=0.25,key=],screenshot=a/b=c.png,screenshot,quit,").unwrap();
+        let expected = [
+            Command::Camera(3),
+            Command::Mode(Mode::Wipe),
+            Command::Split(0.25),
+            Command::StepCamera(1),
+            Command::Screenshot(Some("a/b=c.png".into())),
+            Command::Screenshot(None),
+            Command::Quit,
+        ];
+        assert_eq!(script, expected);
+        let script =
+            parse("compress=small,tolerance=0.1,background=0:0.5:1,orbit=-3:4.5,drop=x.lexi").unwrap();
+        let expected = [
+            Command::Compress(Quality::Preset(Preset::Small)),
+            Command::Compress(Quality::Tolerance(0.1)),
+            Command::Background([0.0, 0.5, 1.0]),
+            Command::Orbit([-3.0, 4.5]),
+            Command::Drop { paths: vec!["x.lexi".into()], first: false },
+        ];
+        assert_eq!(script, expected);
+        assert!(parse("").unwrap().is_empty());
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_word() {
+        for bad in [
+            "dance",
+            "camera",
+            "camera=-1",
+            "camera=x",
+            "mode=best",
+            "split=",
+            "degree=9",
+            "background=1:2",
+            "key=hello",
+            "key=W",
+            "open",
+            "compress=tiny",
+            "screenshot=",
+            "orbit=1:2:3",
+            "tolerance",
+        ] {
+            let message = parse(&format!("report,{bad}")).unwrap_err().to_string();
+            assert!(message.contains(bad), "{message}");
+        }
+    }
+
+    #[test]
+    fn every_word_is_listed() {
+        for line in WORDS.lines().filter(|line| line.starts_with("  ")) {
+            for name in line.split("  ").nth(1).unwrap_or_default().split(", ") {
+                let name = name.split(['=', ' ']).next().unwrap_or_default();
+                let refused = parse(&format!("{name}=\u{0}")).err().map(|e| e.to_string());
+                assert!(refused.is_none_or(|e| !e.contains("--help")), "{name}");
+            }
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! What is shown and from where, whatever window shows it.
+
+use lexisplat_render::{Camera, RenderOptions};
+
+use crate::command::{Command, Mode, Which};
+use crate::eye::{Eye, Surroundings, fitted, resized};
+
+/// Amplification of differences, to begin with and at most.
+const GAIN: f32 = lexisplat_eval::montage::AMPLIFICATION;
+const GAINS: std::ops::RangeInclusive<f32> = 1.0..=100.0;
+
+/// How a view is arranged: all that its picture depends on besides what is drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Arrangement {
+    pub(crate) mode: Mode,
+    /// Where the wipe's line is, 0 to 1.
+    pub(crate) split: f32,
+    /// How much differences are amplified.
+    pub(crate) gain: f32,
+}
+
+impl Arrangement {
+    /// Pictures next to each other.
+    pub(crate) fn columns(&self) -> u32 {
+        if self.mode == Mode::SideBySide { 2 } else { 1 }
+    }
+}
+
+/// What is shown and from where.
+#[derive(Debug)]
+pub(crate) struct State {
+    /// Cameras to step through.
+    cameras: Vec<Camera>,
+    /// Whether they come from a file; else they are an orbit, whose size means nothing.
+    given: bool,
+    around: Surroundings,
+    /// The camera stepped to last.
+    pub(crate) index: usize,
+    /// Whether any camera was looked through since the beginning.
+    visited: bool,
+    /// The free camera; `None` while looking through one of the others.
+    eye: Option<Eye>,
+    pub(crate) arrangement: Arrangement,
+    pub(crate) options: RenderOptions,
+    /// Which models are open.
+    open: [bool; 2],
+    pub(crate) panel: bool,
+}
+
+impl State {
+    pub(crate) fn new(background: [f32; 3]) -> Self {
+        let around = Surroundings { centre: glam::DVec3::ZERO, radius: 1.0, up: glam::DVec3::NEG_Y };
+        Self {
+            cameras: Vec::new(),
+            given: false,
+            around,
+            index: 0,
+            visited: false,
+            eye: None,
+            arrangement: Arrangement { mode: Mode::One(Which::First), split: 0.5, gain: GAIN },
+            options: RenderOptions { background, ..RenderOptions::default() },
+            open: [false; 2],
+            panel: true,
+        }
+    }
+
+    /// Steps through `cameras` from now on, from the first. If they were generated, the first is only
+    /// where the free camera starts, so that the picture fills the window.
+    pub(crate) fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, around: Surroundings) {
+        self.cameras = cameras;
+        self.given = given;
+        self.around = around;
+        self.reset();
+    }
+
+    pub(crate) fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// Says which models are open. When there come to be two, both are shown.
+    pub(crate) fn set_open(&mut self, open: [bool; 2]) {
+        if open == [true; 2] && self.open != open {
+            self.arrangement.mode = Mode::Wipe;
+        }
+        self.open = open;
+        self.arrangement.mode = self.possible(self.arrangement.mode);
+    }
+
+    /// `mode`, or one that shows what is open.
+    fn possible(&self, mode: Mode) -> Mode {
+        match (self.open, mode) {
+            ([true, true], mode) => mode,
+            ([false, true], _) => Mode::One(Which::Second),
+            _ => Mode::One(Which::First),
+        }
+    }
+
+    fn reset(&mut self) {
+        self.index = 0;
+        self.visited = self.given;
+        self.eye = match self.cameras.first() {
+            Some(camera) if !self.given => Some(Eye::at(camera, self.around)),
+            _ => None,
+        };
+    }
+
+    /// Whether the free camera is in use.
+    pub(crate) fn is_free(&self) -> bool {
+        self.eye.is_some()
+    }
+
+    /// The free camera, which takes over from where the view is. `None` before there is any view.
+    pub(crate) fn eye(&mut self) -> Option<&mut Eye> {
+        if self.eye.is_none() {
+            self.eye = Some(Eye::at(self.cameras.get(self.index)?, self.around));
+        }
+        self.eye.as_mut()
+    }
+
+    /// Does what `command` asks, if it concerns the state at all.
+    pub(crate) fn apply(&mut self, command: &Command) {
+        let count = self.cameras.len();
+        match *command {
+            Command::Camera(index) if index < count => {
+                self.index = index;
+                self.visited = true;
+                self.eye = None;
+            }
+            Command::StepCamera(by) if count > 0 => {
+                // From a view that never was at a camera, the first step forward leads to the first one.
+                if self.visited || by < 0 {
+                    self.index = wrapped(self.index, by, count);
+                }
+                self.visited = true;
+                self.eye = None;
+            }
+            Command::Reset => self.reset(),
+            Command::Orbit([right, down]) => {
+                if let Some(eye) = self.eye() {
+                    eye.orbit(right.to_radians(), down.to_radians());
+                }
+            }
+            Command::Mode(mode) => self.arrangement.mode = self.possible(mode),
+            Command::Flip => {
+                let which = match self.arrangement.mode {
+                    Mode::One(which) => which.other(),
+                    _ => Which::First,
+                };
+                self.arrangement.mode = self.possible(Mode::One(which));
+            }
+            Command::Split(split) if split.is_finite() => self.arrangement.split = split.clamp(0.0, 1.0),
+            Command::Gain(gain) if gain.is_finite() => {
+                self.arrangement.gain = gain.clamp(*GAINS.start(), *GAINS.end());
+            }
+            Command::ScaleGain(factor) => self.apply(&Command::Gain(self.arrangement.gain * factor)),
+            Command::Degree(degree) => self.options.max_degree = degree,
+            Command::Background(colour) => {
+                self.options.background = colour.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 });
+            }
+            Command::Panel => self.panel = !self.panel,
+            _ => {}
+        }
+    }
+
+    /// The camera that fills or fits an area of `width * height` pixels, in the present arrangement.
+    /// `None` before there is any.
+    pub(crate) fn camera(&self, width: u32, height: u32) -> Option<Camera> {
+        let width = (width / self.arrangement.columns()).clamp(1, lexisplat_render::MAX_SIDE);
+        let height = height.clamp(1, lexisplat_render::MAX_SIDE);
+        if let Some(eye) = &self.eye {
+            return Some(eye.camera(width, height));
+        }
+        let camera = self.cameras.get(self.index)?;
+        let aspect = f64::from(camera.width) / f64::from(camera.height.max(1));
+        let (width, height) = fitted(aspect, width, height);
+        Some(resized(camera, width, height))
+    }
+
+    /// The camera of a screenshot: the one looked through at its own size, or the free one at the size it
+    /// has on screen.
+    pub(crate) fn screenshot_camera(&self, width: u32, height: u32, max_width: u32) -> Option<Camera> {
+        if self.eye.is_none() {
+            return Some(self.cameras.get(self.index)?.with_max_width(max_width));
+        }
+        Some(self.camera(width, height)?.with_max_width(max_width))
+    }
+}
+
+/// `index + by` around a ring of `count`, which is not 0.
+fn wrapped(index: usize, by: isize, count: usize) -> usize {
+    let turn = by.unsigned_abs() % count;
+    (index + if by < 0 { count - turn } else { turn }) % count
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    const AROUND: Surroundings = Surroundings { centre: DVec3::ZERO, radius: 1.0, up: DVec3::NEG_Y };
+
+    fn cameras() -> Vec<Camera> {
+        let at = |x: f32| Camera {
+            name: format!("{x}"),
+            width: 3000,
+            height: 2000,
+            fx: 2500.0,
+            fy: 2500.0,
+            position: [x, 0.0, -5.0],
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            split: None,
+        };
+        vec![at(0.0), at(1.0), at(2.0)]
+    }
+
+    fn state(given: bool) -> State {
+        let mut state = State::new([0.0; 3]);
+        state.set_open([true, false]);
+        state.set_cameras(cameras(), given, AROUND);
+        state
+    }
+
+    fn name(state: &State) -> String {
+        state.camera(600, 600).unwrap().name
+    }
+
+    #[test]
+    fn given_cameras_are_stepped_through_around_the_end() {
+        let mut state = state(true);
+        let mut names = vec![name(&state)];
+        for by in [1, 1, 1, -1, -1] {
+            state.apply(&Command::StepCamera(by));
+            names.push(name(&state));
+        }
+        assert_eq!(names, ["0", "1", "2", "0", "2", "1"]);
+        state.apply(&Command::Camera(7));
+        assert_eq!(name(&state), "1", "there is no such camera");
+        assert_eq!(wrapped(1, -8, 3), 2);
+    }
+
+    #[test]
+    fn an_orbit_is_where_the_free_camera_starts() {
+        let mut state = state(false);
+        assert_eq!(name(&state), "free");
+        state.apply(&Command::StepCamera(1));
+        assert_eq!(name(&state), "0", "the first step leads to the first camera");
+        state.apply(&Command::StepCamera(1));
+        assert_eq!(name(&state), "1");
+        state.apply(&Command::Orbit([10.0, 0.0]));
+        assert_eq!(name(&state), "free");
+        state.apply(&Command::StepCamera(1));
+        assert_eq!(name(&state), "2");
+        state.apply(&Command::Reset);
+        assert_eq!(name(&state), "free");
+    }
+
+    #[test]
+    fn a_camera_keeps_its_aspect_and_the_free_one_fills() {
+        let mut state = state(true);
+        let camera = state.camera(900, 900).unwrap();
+        assert_eq!((camera.width, camera.height, camera.fx), (900, 600, 750.0));
+        let shot = state.screenshot_camera(900, 900, 1500).unwrap();
+        assert_eq!((shot.width, shot.height), (1500, 1000));
+        state.apply(&Command::Orbit([0.0, 0.0]));
+        let camera = state.camera(900, 700).unwrap();
+        assert_eq!((camera.width, camera.height), (900, 700));
+        state.set_open([true, true]);
+        state.apply(&Command::Mode(Mode::SideBySide));
+        assert_eq!(state.camera(900, 700).unwrap().width, 450);
+        assert_eq!(state.screenshot_camera(900, 700, 300).unwrap().width, 300);
+        assert!(State::new([0.0; 3]).camera(10, 10).is_none());
+    }
+
+    #[test]
+    fn modes_show_what_is_open() {
+        let mut state = state(true);
+        for mode in Mode::ALL {
+            state.apply(&Command::Mode(mode));
+            assert_eq!(state.arrangement.mode, Mode::One(Which::First));
+        }
+        state.set_open([true, true]);
+        assert_eq!(state.arrangement.mode, Mode::Wipe, "the second appears");
+        state.apply(&Command::Flip);
+        assert_eq!(state.arrangement.mode, Mode::One(Which::First));
+        state.apply(&Command::Flip);
+        assert_eq!(state.arrangement.mode, Mode::One(Which::Second));
+        state.apply(&Command::Mode(Mode::Difference));
+        state.set_open([false, true]);
+        assert_eq!(state.arrangement.mode, Mode::One(Which::Second));
+    }
+
+    #[test]
+    fn numbers_stay_in_their_ranges() {
+        let mut state = state(true);
+        state.apply(&Command::Split(2.0));
+        state.apply(&Command::Split(f32::NAN));
+        state.apply(&Command::Gain(1e9));
+        state.apply(&Command::Background([-1.0, f32::NAN, 0.5]));
+        assert_eq!((state.arrangement.split, state.arrangement.gain), (1.0, 100.0));
+        assert_eq!(state.options.background, [0.0, 0.0, 0.5]);
+        state.apply(&Command::ScaleGain(0.1));
+        assert_eq!(state.arrangement.gain, 10.0);
+    }
+}
