@@ -227,6 +227,10 @@ pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) ->
 
 /// Statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
 pub(super) fn atom_terms(per_channel: usize) -> String {
+    if per_channel == 0 {
+        // The array is bound all the same, so the kernel must name it.
+        return "_ = atoms[at];".to_owned();
+    }
     let load = |v: usize| format!("atoms[at + {v}u]");
     for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
 }

@@ -527,7 +527,7 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
                  const ATOM_VECTORS: u32 = {}u;\nconst DICTIONARY: u32 = {}u;\n{common}{codes}{entry}",
                 if index == 1 { 0xff } else { 0xffff },
                 dictionary.len(),
-                dictionary.dim(),
+                dictionary.dim().max(1),
                 vectors(per_channel),
                 dictionary.as_slice().len().max(1),
             )
