@@ -329,7 +329,7 @@ impl Source<'_> {
 
     /// Cuts `len` Gaussians into runs each of whose arrays fits in `limit` bytes. All but the last are whole
     /// blocks.
-    fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
+    pub(super) fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
         let block = GROUP as usize;
         let mut chunks = Vec::new();
         let mut start = 0;
@@ -337,21 +337,18 @@ impl Source<'_> {
         for first in (0..len).step_by(block) {
             let range = first..(first + block).min(len);
             let more = self.block_bytes(range);
-            let next: [u64; 4] = std::array::from_fn(|k| used[k] + more[k]);
-            if next.iter().any(|&bytes| bytes > limit) {
-                if first == start {
-                    let found = next.into_iter().max().unwrap_or(0);
-                    let what = "bytes of 256 Gaussians on the GPU".to_owned();
-                    return Err(Error::Limit { what, found, limit });
-                }
+            let with = |used: [u64; 4]| -> [u64; 4] { std::array::from_fn(|k| used[k] + more[k]) };
+            let fits = |bytes: [u64; 4]| bytes.iter().all(|&bytes| bytes <= limit);
+            if first > start && !fits(with(used)) {
                 chunks.push(start..first);
                 start = first;
                 used = self.fixed();
-                for (used, more) in used.iter_mut().zip(more) {
-                    *used += more;
-                }
-            } else {
-                used = next;
+            }
+            used = with(used);
+            if !fits(used) {
+                let found = used.into_iter().max().unwrap_or(0);
+                let what = "bytes of 256 Gaussians on the GPU".to_owned();
+                return Err(Error::Limit { what, found, limit });
             }
         }
         if start < len {
