@@ -48,6 +48,9 @@ pub(super) const MULTIPLY_ADDS: u32 = 1024;
 /// Numbers beyond this count as overflown.
 const FAR_LIMIT: f32 = 3e38;
 
+/// Stands for a colour that overflows; others are not negative.
+const NO_COLOUR: f32 = -1.0;
+
 /// What the GPU counts. Places in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
@@ -167,6 +170,7 @@ pub(super) fn declarations() -> String {
         ("REACH_SLACK", REACH_SLACK),
         ("REACH_MARGIN", REACH_MARGIN),
         ("FAR_LIMIT", FAR_LIMIT),
+        ("NO_COLOUR", NO_COLOUR),
         ("COLOUR_OFFSET", COLOUR_OFFSET),
         ("SH_C0", C0),
         ("SH_C1", C1),
