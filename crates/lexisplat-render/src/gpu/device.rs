@@ -173,6 +173,11 @@ impl Gpu {
         Self { shared: Arc::new(shared) }
     }
 
+    /// Whether `other` is a clone of this. Devices of two instances can compare as equal.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
+    }
+
     /// What was opened.
     #[must_use]
     pub fn summary(&self) -> &AdapterSummary {
