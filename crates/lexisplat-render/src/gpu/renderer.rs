@@ -151,6 +151,12 @@ impl GpuRenderer {
         self
     }
 
+    /// The buffers that the last picture was drawn with, and how it was cut.
+    #[cfg(test)]
+    pub(super) fn inside(&self) -> (&Work, Shape) {
+        (self.work.as_ref().unwrap(), self.plan.as_ref().unwrap().shape)
+    }
+
     /// Draws `scene` as `camera` sees it and brings the picture back.
     ///
     /// # Errors

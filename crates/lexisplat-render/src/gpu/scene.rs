@@ -310,7 +310,7 @@ impl GpuScene {
 }
 
 /// Where SH comes from.
-enum Source<'a> {
+pub(super) enum Source<'a> {
     Dense { scene: &'a Scene<'a>, half: bool },
     Codes(&'a Model),
 }
@@ -479,9 +479,22 @@ fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
 const SHARED_RESERVE: usize = 64;
 
 fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgpu::ComputePipeline> {
+    if let (Source::Codes(model), ShPath::SparseShared) = (source, path) {
+        let shared = size_of_val(model.dictionary.as_slice());
+        let most = gpu.limits().max_compute_workgroup_storage_size as usize;
+        if shared + SHARED_RESERVE > most {
+            let expected = format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
+            return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
+        }
+    }
+    pipeline(gpu, &compile(gpu, path.name(), &radiance_text(source, path))?, "radiance")
+}
+
+/// The kernel that colours scenes like `source`.
+pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
     let common = concat!(include_str!("kernels/frame.wgsl"), include_str!("kernels/radiance.wgsl"));
     let codes = include_str!("kernels/radiance_sparse.wgsl");
-    let text = match source {
+    match source {
         Source::Dense { scene, half } => {
             let per_channel = scene.degree().rest_per_channel();
             let load = |v: usize| {
@@ -502,13 +515,6 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
         }
         Source::Codes(model) => {
             let dictionary = &model.dictionary;
-            let shared = size_of_val(dictionary.as_slice());
-            let most = gpu.limits().max_compute_workgroup_storage_size as usize;
-            if path == ShPath::SparseShared && shared + SHARED_RESERVE > most {
-                let expected =
-                    format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
-                return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
-            }
             let entry = match path {
                 ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
                 ShPath::SparseTable => include_str!("kernels/radiance_table.wgsl"),
@@ -529,8 +535,7 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
                 dictionary.as_slice().len().max(1),
             )
         }
-    };
-    pipeline(gpu, &compile(gpu, path.name(), &text)?, "radiance")
+    }
 }
 
 impl Table {
