@@ -28,6 +28,10 @@
 //! }
 //! ```
 
+// Tests in here share helpers with those beside the crate, which know it by its name.
+#[cfg(all(test, feature = "gpu"))]
+extern crate self as lexisplat_render;
+
 mod camera;
 mod cameras_json;
 pub mod conventions;

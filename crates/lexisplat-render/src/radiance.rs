@@ -53,7 +53,8 @@ impl<'a> Radiance<'a> {
     }
 
     /// Colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
-    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count.
+    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count. NaN where
+    /// the sum is not finite.
     ///
     /// # Panics
     /// If the scene has no Gaussian `i`.
@@ -76,7 +77,10 @@ impl<'a> Radiance<'a> {
                 },
             };
         }
-        std::array::from_fn(|c| (COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c]).max(0.0))
+        std::array::from_fn(|c| {
+            let sum = COLOUR_OFFSET + C0 * self.dc[i][c] + rest[c];
+            if sum.is_finite() { sum.max(0.0) } else { f32::NAN }
+        })
     }
 }
 

@@ -10,62 +10,8 @@
 mod common;
 mod made;
 
-use lexisplat::{
-    Dictionary, Escapes, Indices, Layout, Model, Pursuit, Record, ShDegree, SparseCodes, Values,
-};
+use lexisplat::ShDegree;
 use lexisplat_render::{Radiance, RenderOptions, Scene, render};
-
-/// A model with random atoms and codes; every 17th Gaussian is an escape, every 13th has no code.
-fn model(degree: ShDegree, atoms: usize, half: bool) -> Model {
-    let count = 400;
-    let splats = made::scene(9, count, degree, false);
-    let mut random = made::Random::new(77);
-    let dim = degree.rest();
-    let mut values: Vec<f32> = (0..atoms * dim).map(|_| random.within(-1.0, 1.0)).collect();
-    for atom in values.chunks_exact_mut(dim.max(1)) {
-        let norm = atom.iter().map(|v| v * v).sum::<f32>().sqrt();
-        atom.iter_mut().for_each(|v| *v /= norm);
-    }
-    let dictionary = Dictionary::new(degree, values).unwrap();
-    let mut counts = Vec::new();
-    let mut picked: Vec<usize> = Vec::new();
-    let mut escapes = Escapes::default();
-    for i in 0..count {
-        if dim > 0 && i % 17 == 0 {
-            escapes.gaussians.push(u32::try_from(i).unwrap());
-            escapes.rows.extend_from_slice(splats.rest(i));
-        }
-        let empty = dim == 0 || i % 17 == 0 || i % 13 == 0;
-        let chosen: Vec<usize> =
-            (0..atoms).filter(|_| random.next() * (atoms as f32) < 8.0).take(dim).collect();
-        let chosen = if empty { Vec::new() } else { chosen };
-        counts.push(u8::try_from(chosen.len()).unwrap());
-        picked.extend(chosen);
-    }
-    let indices = if atoms <= 256 {
-        Indices::U8(picked.iter().map(|&j| u8::try_from(j).unwrap()).collect())
-    } else {
-        Indices::U16(picked.iter().map(|&j| u16::try_from(j).unwrap()).collect())
-    };
-    let values: Vec<f32> = picked.iter().map(|_| random.within(-0.8, 0.8)).collect();
-    let values = if half {
-        Values::F16(values.into_iter().map(half::f16::from_f32).collect())
-    } else {
-        Values::F32(values)
-    };
-    let codes = SparseCodes::new(&dictionary, counts, indices, values, escapes).unwrap();
-    let record = Record {
-        tolerance: None,
-        max_nonzeros: None,
-        pursuit: Pursuit::Ols,
-        seed: 0,
-        layout: if half { Layout::F16 } else { Layout::F32 },
-        max_residual: 0.0,
-        rms_residual: 0.0,
-        over_tolerance: 0,
-    };
-    Model { geometry: splats.geometry, meta: splats.meta, dictionary, codes, record }
-}
 
 #[test]
 fn codes_draw_as_their_dense_scene() {
@@ -78,7 +24,7 @@ fn codes_draw_as_their_dense_scene() {
         (3, 300, true),
         (4, 144, true),
     ] {
-        let model = model(ShDegree::new(degree).unwrap(), atoms, half);
+        let model = made::model(ShDegree::new(degree).unwrap(), atoms, half);
         let splats = model.to_splats();
         let (sparse, dense) = (Scene::from(&model), Scene::from(&splats));
         assert_eq!((sparse.len(), sparse.degree()), (dense.len(), dense.degree()));
@@ -95,7 +41,7 @@ fn codes_draw_as_their_dense_scene() {
 
 #[test]
 fn colours_agree_gaussian_by_gaussian() {
-    let model = model(ShDegree::THREE, 90, true);
+    let model = made::model(ShDegree::THREE, 90, true);
     let splats = model.to_splats();
     let (sparse, dense) = (Radiance::new(&Scene::from(&model)), Radiance::new(&Scene::from(&splats)));
     let mut random = made::Random::new(4);
@@ -115,7 +61,7 @@ fn colours_agree_gaussian_by_gaussian() {
 
 #[test]
 fn bands_above_the_degree_asked_for_are_left_out() {
-    let model = model(ShDegree::THREE, 90, true);
+    let model = made::model(ShDegree::THREE, 90, true);
     let whole = model.to_splats();
     let (sparse, dense) = (Scene::from(&model), Scene::from(&whole));
     let direction = glam::Vec3::new(0.3, -0.5, 0.8).normalize().to_array();

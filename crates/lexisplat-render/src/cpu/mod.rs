@@ -12,6 +12,8 @@ mod order;
 mod project;
 mod sensitivity;
 mod tiles;
+#[cfg(all(test, feature = "gpu"))]
+pub(crate) mod twin;
 
 use std::time::Instant;
 

@@ -29,6 +29,12 @@ pub(super) struct Rect {
 }
 
 impl Rect {
+    /// First and end, as (column, row).
+    #[cfg(all(test, feature = "gpu"))]
+    pub(super) fn corners(self) -> [[u16; 2]; 2] {
+        [self.min, self.max]
+    }
+
     /// What both cover, if anything.
     pub(super) fn intersect(self, other: Self) -> Option<Self> {
         let min: [u16; 2] = std::array::from_fn(|k| self.min[k].max(other.min[k]));

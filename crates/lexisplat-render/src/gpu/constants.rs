@@ -50,6 +50,9 @@ pub(super) const MULTIPLY_ADDS: u32 = 1024;
 /// Numbers beyond this count as overflown.
 const FAR_LIMIT: f32 = 3e38;
 
+/// Stands for a colour that overflows; others are not negative.
+const NO_COLOUR: f32 = -1.0;
+
 /// What the GPU counts. Places in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
@@ -170,6 +173,7 @@ pub(super) fn declarations() -> String {
         ("REACH_SLACK", REACH_SLACK),
         ("REACH_MARGIN", REACH_MARGIN),
         ("FAR_LIMIT", FAR_LIMIT),
+        ("NO_COLOUR", NO_COLOUR),
         ("COLOUR_OFFSET", COLOUR_OFFSET),
         ("SH_C0", C0),
         ("SH_C1", C1),
@@ -230,6 +234,10 @@ pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) ->
 
 /// Statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
 pub(super) fn atom_terms(per_channel: usize) -> String {
+    if per_channel == 0 {
+        // The array is bound all the same, so the kernel must name it.
+        return "_ = atoms[at];".to_owned();
+    }
     let load = |v: usize| format!("atoms[at + {v}u]");
     for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
 }

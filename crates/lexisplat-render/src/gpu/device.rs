@@ -106,6 +106,11 @@ impl Gpu {
     /// # Errors
     /// [`Error::Gpu`] if there is none or it refuses; [`Error::Parameter`] for an index out of range.
     pub fn open(choice: GpuChoice) -> Result<Self> {
+        Self::open_with(choice, |_| {})
+    }
+
+    /// [`Self::open`], asking the device for what `reduce` leaves of the limits.
+    pub(super) fn open_with(choice: GpuChoice, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Self> {
         let found = sorted_adapters();
         let index = match choice {
             GpuChoice::Index(index) if index < found.len() => Some(index),
@@ -121,7 +126,9 @@ impl Gpu {
         let Some((index, adapter)) = index.and_then(|index| Some((index, found.get(index)?))) else {
             return Err(Error::Gpu { problem: NO_ADAPTER.to_owned() });
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&Self::descriptor(adapter)))
+        let mut descriptor = Self::descriptor(adapter);
+        reduce(&mut descriptor.required_limits);
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| Error::Gpu { problem: format!("{}: {error}", adapter.get_info().name) })?;
         Ok(Self::new(summarise(index, adapter), device, queue))
     }
@@ -171,6 +178,11 @@ impl Gpu {
             failure,
         };
         Self { shared: Arc::new(shared) }
+    }
+
+    /// Whether `other` is a clone of this. Devices of two instances can compare as equal.
+    pub(super) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.shared, &other.shared)
     }
 
     /// What was opened.
@@ -294,6 +306,18 @@ impl Gpu {
             (None, Err(error)) => Err(Error::Gpu { problem: format!("{}: {error}", self.summary().name) }),
             (None, Ok(_)) => Ok(()),
         }
+    }
+
+    /// All of a buffer made by [`Self::storage`].
+    #[cfg(test)]
+    pub(super) fn read_back<T: bytemuck::Pod>(&self, buffer: &Buffer) -> Vec<T> {
+        use wgpu::BufferUsages as U;
+        let size = buffer.bytes();
+        let back = self.buffer("back", size, U::MAP_READ | U::COPY_DST).unwrap();
+        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&buffer.raw, 0, &back.raw, 0, size);
+        self.queue().submit([encoder.finish()]);
+        self.read(&back, size).unwrap()
     }
 
     /// The first `size` bytes of `buffer`, which must be `MAP_READ`.

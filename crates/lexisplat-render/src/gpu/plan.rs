@@ -95,6 +95,10 @@ impl Size {
     }
 }
 
+#[cfg(test)]
+#[path = "tests/scan_sort.rs"]
+mod tests;
+
 /// What a sort works on.
 struct Sorting<'a> {
     keys: [&'a Buffer; 2],

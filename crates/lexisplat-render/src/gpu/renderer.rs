@@ -151,6 +151,12 @@ impl GpuRenderer {
         self
     }
 
+    /// The buffers that the last picture was drawn with, and how it was cut.
+    #[cfg(test)]
+    pub(super) fn inside(&self) -> (&Work, Shape) {
+        (self.work.as_ref().unwrap(), self.plan.as_ref().unwrap().shape)
+    }
+
     /// Draws `scene` as `camera` sees it and brings the picture back.
     ///
     /// # Errors
@@ -191,7 +197,7 @@ impl GpuRenderer {
     /// larger buffers than this GPU has; [`Error::Gpu`] if the device fails.
     pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
         camera.validate()?;
-        if scene.gpu().device() != self.gpu.device() {
+        if !scene.gpu().is(&self.gpu) {
             return Err(Error::parameter("scene", "on another GPU", "a scene on the renderer's GPU"));
         }
         let degree = options.max_degree.map_or(scene.degree(), |most| most.min(scene.degree()));

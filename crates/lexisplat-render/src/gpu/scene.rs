@@ -319,7 +319,7 @@ impl GpuScene {
 }
 
 /// Where SH comes from.
-enum Source<'a> {
+pub(super) enum Source<'a> {
     Dense { scene: &'a Scene<'a>, half: bool },
     Codes(&'a Model),
 }
@@ -338,7 +338,7 @@ impl Source<'_> {
 
     /// Cuts `len` Gaussians into runs each of whose arrays fits in `limit` bytes. All but the last are whole
     /// blocks.
-    fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
+    pub(super) fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
         let block = GROUP as usize;
         let mut chunks = Vec::new();
         let mut start = 0;
@@ -346,21 +346,18 @@ impl Source<'_> {
         for first in (0..len).step_by(block) {
             let range = first..(first + block).min(len);
             let more = self.block_bytes(range);
-            let next: [u64; 4] = std::array::from_fn(|k| used[k] + more[k]);
-            if next.iter().any(|&bytes| bytes > limit) {
-                if first == start {
-                    let found = next.into_iter().max().unwrap_or(0);
-                    let what = "bytes of 256 Gaussians on the GPU".to_owned();
-                    return Err(Error::Limit { what, found, limit });
-                }
+            let with = |used: [u64; 4]| -> [u64; 4] { std::array::from_fn(|k| used[k] + more[k]) };
+            let fits = |bytes: [u64; 4]| bytes.iter().all(|&bytes| bytes <= limit);
+            if first > start && !fits(with(used)) {
                 chunks.push(start..first);
                 start = first;
                 used = self.fixed();
-                for (used, more) in used.iter_mut().zip(more) {
-                    *used += more;
-                }
-            } else {
-                used = next;
+            }
+            used = with(used);
+            if !fits(used) {
+                let found = used.into_iter().max().unwrap_or(0);
+                let what = "bytes of 256 Gaussians on the GPU".to_owned();
+                return Err(Error::Limit { what, found, limit });
             }
         }
         if start < len {
@@ -491,9 +488,22 @@ fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
 const SHARED_RESERVE: usize = 64;
 
 fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgpu::ComputePipeline> {
+    if let (Source::Codes(model), ShPath::SparseShared) = (source, path) {
+        let shared = size_of_val(model.dictionary.as_slice());
+        let most = gpu.limits().max_compute_workgroup_storage_size as usize;
+        if shared + SHARED_RESERVE > most {
+            let expected = format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
+            return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
+        }
+    }
+    pipeline(gpu, &compile(gpu, path.name(), &radiance_text(source, path))?, "radiance")
+}
+
+/// The kernel that colours scenes like `source`.
+pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
     let common = concat!(include_str!("kernels/frame.wgsl"), include_str!("kernels/radiance.wgsl"));
     let codes = include_str!("kernels/radiance_sparse.wgsl");
-    let text = match source {
+    match source {
         Source::Dense { scene, half } => {
             let per_channel = scene.degree().rest_per_channel();
             let load = |v: usize| {
@@ -514,13 +524,6 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
         }
         Source::Codes(model) => {
             let dictionary = &model.dictionary;
-            let shared = size_of_val(dictionary.as_slice());
-            let most = gpu.limits().max_compute_workgroup_storage_size as usize;
-            if path == ShPath::SparseShared && shared + SHARED_RESERVE > most {
-                let expected =
-                    format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
-                return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
-            }
             let entry = match path {
                 ShPath::SparseOrdered => include_str!("kernels/radiance_ordered.wgsl"),
                 ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
@@ -537,13 +540,12 @@ fn radiance_pipeline(gpu: &Gpu, source: &Source<'_>, path: ShPath) -> Result<wgp
                  const ATOM_VECTORS: u32 = {}u;\nconst DICTIONARY: u32 = {}u;\n{common}{codes}{entry}",
                 if index == 1 { 0xff } else { 0xffff },
                 dictionary.len(),
-                dictionary.dim(),
+                dictionary.dim().max(1),
                 vectors(per_channel),
                 dictionary.as_slice().len().max(1),
             )
         }
-    };
-    pipeline(gpu, &compile(gpu, path.name(), &text)?, "radiance")
+    }
 }
 
 impl Table {

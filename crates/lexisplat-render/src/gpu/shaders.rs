@@ -27,7 +27,7 @@ pub(super) struct Kernels {
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 
 /// The texts of all kernels, by name: what a test validates.
-const TEXTS: [(&str, &[&str]); 9] = [
+pub(super) const TEXTS: [(&str, &[&str]); 9] = [
     ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
     ("plan", &[FRAME, include_str!("kernels/plan.wgsl")]),

@@ -1,7 +1,10 @@
 //! Made-up scenes and cameras for tests, the same for the same seed.
 #![allow(dead_code, reason = "each test file uses a part")]
 
-use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
+use lexisplat::{
+    Dictionary, Escapes, Geometry, Indices, Layout, Model, Pursuit, Record, SceneMeta, ShDegree, SparseCodes,
+    Splats, Values,
+};
 use lexisplat_render::Camera;
 
 /// A small generator (Steele, Lea and Flood's `SplitMix64`).
@@ -81,4 +84,60 @@ pub(crate) fn camera(seed: u64, width: u32, height: u32) -> Camera {
         fy: 120.0,
         ..straight(width, height, 130.0)
     }
+}
+
+/// A model with random atoms and codes; every 17th Gaussian is an escape, every 13th has no code.
+pub(crate) fn model(degree: ShDegree, atoms: usize, half: bool) -> Model {
+    model_of(scene(9, 400, degree, false), atoms, half)
+}
+
+/// [`model`] with the geometry, and the escapes' SH-rest, of `splats`.
+pub(crate) fn model_of(splats: Splats, atoms: usize, half: bool) -> Model {
+    let (count, degree) = (splats.len(), splats.degree);
+    let mut random = Random::new(77);
+    let dim = degree.rest();
+    let mut values: Vec<f32> = (0..atoms * dim).map(|_| random.within(-1.0, 1.0)).collect();
+    for atom in values.chunks_exact_mut(dim.max(1)) {
+        let norm = atom.iter().map(|v| v * v).sum::<f32>().sqrt();
+        atom.iter_mut().for_each(|v| *v /= norm);
+    }
+    let dictionary = Dictionary::new(degree, values).unwrap();
+    let mut counts = Vec::new();
+    let mut picked: Vec<usize> = Vec::new();
+    let mut escapes = Escapes::default();
+    for i in 0..count {
+        if dim > 0 && i % 17 == 0 {
+            escapes.gaussians.push(u32::try_from(i).unwrap());
+            escapes.rows.extend_from_slice(splats.rest(i));
+        }
+        let empty = dim == 0 || i % 17 == 0 || i % 13 == 0;
+        let chosen: Vec<usize> =
+            (0..atoms).filter(|_| random.next() * (atoms as f32) < 8.0).take(dim).collect();
+        let chosen = if empty { Vec::new() } else { chosen };
+        counts.push(u8::try_from(chosen.len()).unwrap());
+        picked.extend(chosen);
+    }
+    let indices = if atoms <= 256 {
+        Indices::U8(picked.iter().map(|&j| u8::try_from(j).unwrap()).collect())
+    } else {
+        Indices::U16(picked.iter().map(|&j| u16::try_from(j).unwrap()).collect())
+    };
+    let values: Vec<f32> = picked.iter().map(|_| random.within(-0.8, 0.8)).collect();
+    let values = if half {
+        Values::F16(values.into_iter().map(half::f16::from_f32).collect())
+    } else {
+        Values::F32(values)
+    };
+    let codes = SparseCodes::new(&dictionary, counts, indices, values, escapes).unwrap();
+    let record = Record {
+        tolerance: None,
+        max_nonzeros: None,
+        pursuit: Pursuit::Ols,
+        seed: 0,
+        layout: if half { Layout::F16 } else { Layout::F32 },
+        max_residual: 0.0,
+        rms_residual: 0.0,
+        over_tolerance: 0,
+    };
+    Model { geometry: splats.geometry, meta: splats.meta, dictionary, codes, record }
 }

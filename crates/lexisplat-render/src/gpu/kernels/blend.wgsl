@@ -57,8 +57,9 @@ fn blend(
             let slot = entry_slots[first + lane];
             batch_centre[lane] = centres[slot];
             let conic = conics[slot];
-            batch_conic[lane] = vec2<f32>(conic.x, conic.z);
-            batch_colour[lane] = vec3<f32>(colours[3u * slot], colours[3u * slot + 1u], colours[3u * slot + 2u]);
+            let colour = vec3<f32>(colours[3u * slot], colours[3u * slot + 1u], colours[3u * slot + 2u]);
+            batch_conic[lane] = vec2<f32>(conic.x, select(conic.z, 0.0, colour.x == NO_COLOUR));
+            batch_colour[lane] = colour;
         }
         workgroupBarrier();
         let count = min(GROUP, entries.y - first);

@@ -46,7 +46,8 @@ fn plan_entries() {
     let n = min(found, frame.entries);
     let blocks = pieces(n, SORT_BLOCK);
     counters[COUNTER_ENTRIES_MOST] = max(counters[COUNTER_ENTRIES_MOST], found);
-    counters[COUNTER_ENTRIES_ALL] += found;
+    let all = counters[COUNTER_ENTRIES_ALL];
+    counters[COUNTER_ENTRIES_ALL] = all + min(found, 0xffffffffu - all);
     counters[COUNTER_ENTRIES] = n;
     counters[COUNTER_ENTRY_BLOCKS] = blocks;
     counters[COUNTER_ENTRY_DIGITS] = blocks * DIGITS;

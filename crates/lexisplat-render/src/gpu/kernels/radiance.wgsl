@@ -67,8 +67,11 @@ fn rest_basis(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     return b;
 }
 
+// Colours that overflow become NO_COLOUR, with which nothing is drawn.
 fn write_colour(slot: u32, dc: vec3<f32>, rest: vec3<f32>) {
-    let colour = max(COLOUR_OFFSET + SH_C0 * dc + rest, vec3<f32>(0.0));
+    let sum = COLOUR_OFFSET + SH_C0 * dc + rest;
+    let finite = all(abs(sum) < vec3<f32>(FAR_LIMIT));
+    let colour = select(vec3<f32>(NO_COLOUR), max(sum, vec3<f32>(0.0)), finite);
     colours[3u * slot] = colour.x;
     colours[3u * slot + 1u] = colour.y;
     colours[3u * slot + 2u] = colour.z;

@@ -1,4 +1,4 @@
-// Exclusive prefix sums in place, of as many numbers as a counter says or `fixed` if that is not 0.
+// Exclusive prefix sums in place, which stop at the largest number instead of wrapping around, of as many numbers as a counter says or `fixed` if that is not 0.
 struct Scan {
     counter: u32,
     fixed_length: u32,
@@ -21,6 +21,10 @@ fn scan_length() -> u32 {
     return counters[scan.counter];
 }
 
+fn plus(a: u32, b: u32) -> u32 {
+    return a + min(b, 0xffffffffu - a);
+}
+
 // Sum of the values of lanes below; `partial[GROUP - 1]` is then the sum of all.
 fn before(lane: u32, value: u32) -> u32 {
     workgroupBarrier();
@@ -32,7 +36,7 @@ fn before(lane: u32, value: u32) -> u32 {
             more = partial[lane - step];
         }
         workgroupBarrier();
-        partial[lane] += more;
+        partial[lane] = plus(partial[lane], more);
         workgroupBarrier();
     }
     return partial[lane] - value;
@@ -50,7 +54,7 @@ fn scan_reduce(
     for (var k = 0u; k < SCAN_ITEMS; k++) {
         let i = block * SCAN_BLOCK + k * GROUP + lane;
         if i < length {
-            sum += data[i];
+            sum = plus(sum, data[i]);
         }
     }
     let unused = before(lane, sum);
@@ -69,11 +73,11 @@ fn scan_spine(@builtin(local_invocation_index) lane: u32) {
         if i < blocks {
             value = sums[i];
         }
-        let sum = carry + before(lane, value);
+        let sum = plus(carry, before(lane, value));
         if i < blocks {
             sums[i] = sum;
         }
-        carry += partial[GROUP - 1u];
+        carry = plus(carry, partial[GROUP - 1u]);
     }
 }
 
@@ -91,17 +95,17 @@ fn scan_spread(
     for (var k = 0u; k < SCAN_ITEMS; k++) {
         if first + k < length {
             values[k] = data[first + k];
-            sum += values[k];
+            sum = plus(sum, values[k]);
         }
     }
     var total = before(lane, sum);
     if block * SCAN_BLOCK < length {
-        total += sums[block];
+        total = plus(total, sums[block]);
     }
     for (var k = 0u; k < SCAN_ITEMS; k++) {
         if first + k < length {
             data[first + k] = total;
-            total += values[k];
+            total = plus(total, values[k]);
         }
     }
 }

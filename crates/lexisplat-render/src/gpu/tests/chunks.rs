@@ -1,0 +1,81 @@
+//! Scenes larger than a binding.
+
+use lexisplat::ShDegree;
+
+use super::super::constants::GROUP;
+use super::super::scene::Source;
+use super::super::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use super::{adapter, bits, gpu, made};
+use crate::cpu::RenderOptions;
+use crate::error::Error;
+use crate::scene::Scene;
+
+/// Bytes of an atom or exact row: 15 coefficients of three channels fill twelve vectors.
+const ROW: u64 = 192;
+
+/// A GPU whose kernels see only `binding` bytes at once.
+fn narrow(binding: u64) -> Option<Gpu> {
+    adapter::opened(Gpu::open_with(GpuChoice::Best, |limits| {
+        limits.max_storage_buffer_binding_size = binding;
+    }))
+}
+
+#[test]
+fn chunks_draw_the_same_picture() {
+    let Some(wide) = gpu() else { return };
+    let Some(small) = narrow(64 << 10) else { return };
+    let splats = made::scene(5, 5000, ShDegree::THREE, false);
+    let model = made::model_of(splats, 90, true);
+    let scene = Scene::from(&model);
+    let options = RenderOptions::default();
+    let mut renderers = [GpuRenderer::new(&wide).unwrap(), GpuRenderer::new(&small).unwrap()];
+    for path in ShPath::ALL {
+        let scenes = [&wide, &small].map(|gpu| GpuScene::new(gpu, &scene, path).unwrap());
+        assert!(scenes[0].chunks.len() == 1 && scenes[1].chunks.len() > 2, "{}", path.name());
+        for seed in 0..2 {
+            let mut camera = made::camera(seed, 60, 45);
+            // From where less is in view than such a GPU has slots for.
+            camera.position = camera.position.map(|v| v * 0.3);
+            let [a, b] = [0, 1].map(|k| renderers[k].render(&scenes[k], &camera, &options).unwrap().0);
+            assert!(bits(&a) == bits(&b), "{}, camera {seed}", path.name());
+            assert!(a.pixels.iter().any(|p| p != &a.pixels[0]));
+        }
+    }
+}
+
+#[test]
+fn chunks_are_whole_blocks_within_the_limit() {
+    let block = GROUP as usize;
+    let splats = made::scene(5, 5 * block + 7, ShDegree::THREE, false);
+    let scene = Scene::from(&splats);
+    let source = Source::Dense { scene: &scene, half: false };
+    // 16 coefficients of three channels in 32 bits fill as much.
+    let row = ROW * block as u64;
+    assert_eq!(source.chunks(scene.len(), u64::MAX).unwrap(), vec![0..scene.len()]);
+    assert_eq!(
+        source.chunks(scene.len(), 2 * row).unwrap(),
+        [0..2 * block, 2 * block..4 * block, 4 * block..scene.len()]
+    );
+    assert!(matches!(source.chunks(scene.len(), row - 1), Err(Error::Limit { found, .. }) if found == row));
+    assert!(source.chunks(0, row).unwrap().is_empty());
+}
+
+#[test]
+fn a_later_block_that_fits_nowhere_is_refused() {
+    let block = GROUP as usize;
+    let splats = made::scene(5, 2 * block, ShDegree::THREE, false);
+    let mut model = made::model_of(splats, 20, true);
+    // All of the second block escapes.
+    let mut escapes = lexisplat::Escapes::default();
+    for i in block..2 * block {
+        escapes.gaussians.push(u32::try_from(i).unwrap());
+        escapes.rows.extend([0.5; 45]);
+    }
+    let none = (lexisplat::Indices::U8(Vec::new()), lexisplat::Values::F16(Vec::new()));
+    let counts = vec![0; 2 * block];
+    model.codes = lexisplat::SparseCodes::new(&model.dictionary, counts, none.0, none.1, escapes).unwrap();
+    let source = Source::Codes(&model);
+    let escaped = (block + 20) as u64 * ROW;
+    assert_eq!(source.chunks(2 * block, escaped).unwrap().len(), 1);
+    assert!(matches!(source.chunks(2 * block, escaped - 1), Err(Error::Limit { .. })));
+}
