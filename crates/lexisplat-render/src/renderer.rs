@@ -173,6 +173,11 @@ impl Renderer {
         on_view: &mut dyn FnMut(),
     ) -> Result<Sensitivity> {
         cameras.iter().try_for_each(Camera::validate)?;
+        #[cfg(feature = "gpu")]
+        if let Some((gpu, renderer)) = &mut self.gpu {
+            let uploaded = GpuScene::new(gpu, scene, ShPath::of(scene))?;
+            return renderer.sensitivity(&uploaded, scene.geometry(), cameras, on_view);
+        }
         Ok(sensitivity(scene, cameras, on_view))
     }
 }

@@ -124,6 +124,26 @@ fn moving_is_shifting_on_screen() {
 }
 
 #[test]
+fn long_thin_ones_do_not_drown_in_rounding() {
+    // Needles longer than the picture and far thinner than a pixel, in all directions.
+    let mut splats = scene(&SampleOptions::new(GAUSSIANS, 5));
+    for i in 0..splats.len() {
+        let g = &mut splats.geometry;
+        g.scales[i] = [-8.0; 3];
+        g.scales[i][i % 3] = 1.0;
+        g.opacities[i] = g.opacities[i].clamp(-1.0, 1.0);
+        g.dc[i] = g.dc[i].map(|v| v + 2.0);
+    }
+    let cameras = surround(&splats.geometry, 3, [96, 64], [2.0, 4.0]);
+    let s = sensitivity(&Scene::from(&splats), &cameras, &mut || ());
+    let along = |i: usize| {
+        let found = measured(&splats, &cameras, |s, h| s.geometry.scales[i][i % 3] += h);
+        (f64::from(s.scale[i][i % 3]), found)
+    };
+    agree("length", (0..splats.len()).map(along).collect());
+}
+
+#[test]
 fn removal_is_what_the_pictures_lose() {
     let splats = scene(&SampleOptions::new(GAUSSIANS, 6));
     let cameras = surround(&splats.geometry, 2, [96, 64], [2.0, 4.0]);

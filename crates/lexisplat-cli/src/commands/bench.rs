@@ -242,9 +242,8 @@ impl Report<'_> {
         if let Some(times) = self.results.first() {
             writeln!(
                 out,
-                "\n{} Gaussians shaded a view on average, {} entries in tiles' lists; times are medians",
-                text::count(times.visible.round() as u64),
-                text::count(times.entries.round() as u64)
+                "\n{:.0} Gaussians shaded a view on average, {:.0} entries in tiles' lists; times are medians",
+                times.visible, times.entries
             )?;
         }
         self.model_text(&mut out)?;

@@ -26,6 +26,11 @@ use crate::image::Image;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
+#[cfg(feature = "gpu")]
+pub(crate) use moments::{Moments, SUMS};
+pub(crate) use project::Projection;
+#[cfg(feature = "gpu")]
+pub(crate) use sensitivity::carry;
 pub use sensitivity::sensitivity;
 
 /// How to draw. Whether the anti-aliased rules apply is the scene's own mark.
@@ -67,7 +72,7 @@ pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Im
 /// As [`render`].
 #[must_use]
 pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Drawn {
-    let projection = project::Projection::new(camera, scene.meta().antialiased);
+    let projection = Projection::new(camera, scene.meta().antialiased);
     draw(scene, &projection, options, tiles::MAX_ENTRIES)
 }
 
@@ -95,12 +100,7 @@ impl Stages {
 }
 
 /// [`render`] with at most `max_entries` in the tiles' lists at once.
-fn draw(
-    scene: &Scene<'_>,
-    projection: &project::Projection,
-    options: &RenderOptions,
-    max_entries: u64,
-) -> Drawn {
+fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max_entries: u64) -> Drawn {
     let mut stages = Stages::start();
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
@@ -182,7 +182,7 @@ mod tests {
             let meta = SceneMeta { antialiased, ..SceneMeta::default() };
             let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta };
             let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
-            let projection = project::Projection::new(&straight_ahead(width, height, focal), antialiased);
+            let projection = Projection::new(&straight_ahead(width, height, focal), antialiased);
             let tight = draw(&Scene::from(&splats), &projection, &options, tiles::MAX_ENTRIES);
             let plain = draw(&Scene::from(&splats), &projection.untightened(), &options, 1);
             prop_assert_eq!(tight.image.pixels, plain.image.pixels);

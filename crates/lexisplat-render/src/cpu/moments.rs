@@ -3,20 +3,22 @@
 use crate::conventions::{TILE, TRANSMITTANCE_MIN};
 
 use super::blend::{Lanes, TilePixels, alphas};
-use super::project::{Splat, Visible};
+use super::project::{Root, Splat, Visible};
 
 /// Number of sums a splat has.
-const SUMS: usize = 10;
+pub(crate) const SUMS: usize = 10;
 
 /// Sums over pixels, for one splat. With alpha its opacity at a pixel, T what was open before it, C the
-/// pixel's colour and v = conic * (centre - pixel):
+/// pixel's colour and u = R (centre - pixel), where R is the conic's [`Root`]:
 ///
 /// - `[0]`: (T alpha)^2, the squared derivative by one colour channel;
 /// - `[1]`: g = |dC / d ln alpha|^2;
-/// - `[2..5]`: g vx^2, g vx vy, g vy^2: those by the centre, since d ln alpha / d centre = -v;
-/// - `[5..10]`: g vx^4, g vx^3 vy, g vx^2 vy^2, g vx vy^3, g vy^4: those by the shape.
+/// - `[2..5]`: g ux^2, g ux uy, g uy^2: those by the centre, since d ln alpha / d (R centre) = -u;
+/// - `[5..10]`: g ux^4, g ux^3 uy, g ux^2 uy^2, g ux uy^3, g uy^4: those by the shape.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Moments {
+#[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
+#[repr(C)]
+pub(crate) struct Moments {
     pub(super) sums: [f32; SUMS],
     /// Largest change of any channel of any pixel when the splat is left out: dC / d ln alpha happens to
     /// be just that, since what it adds goes and what it covers comes back.
@@ -34,8 +36,10 @@ impl Moments {
 }
 
 /// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
+/// `roots` are those of the splats.
 pub(super) fn tile(
     splats: &[Visible],
+    roots: &[Root],
     list: impl Iterator<Item = u32>,
     at: [usize; 2],
     size: [usize; 2],
@@ -43,8 +47,16 @@ pub(super) fn tile(
 ) -> Vec<(u32, Moments)> {
     pulp::Arch::new().dispatch(
         #[inline(always)]
-        || walk(splats, list, at, size, picture),
+        || walk(splats, roots, list, at, size, picture),
     )
+}
+
+/// Where a row of pixels is, and how it looks when finished.
+#[derive(Clone, Copy)]
+struct Pixels<'a> {
+    x: &'a Lanes,
+    y: f32,
+    picture: &'a [Lanes; 3],
 }
 
 /// What has been drawn of a row so far.
@@ -58,6 +70,7 @@ struct Row {
 #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
 fn walk(
     splats: &[Visible],
+    roots: &[Root],
     list: impl Iterator<Item = u32>,
     [column, row]: [usize; 2],
     [width, height]: [usize; 2],
@@ -71,7 +84,7 @@ fn walk(
     let mut rows = [Row { colour: [[0.0; TILE]; 3], open }; TILE];
     let mut row_open: [bool; TILE] = std::array::from_fn(|y| top + y < height);
     for index in list {
-        let splat = &splats[index as usize].splat;
+        let (splat, root) = (&splats[index as usize].splat, &roots[index as usize]);
         let first = usize::from(splat.rows[0]).saturating_sub(top);
         let end = usize::from(splat.rows[1]).saturating_sub(top).min(TILE);
         let mut sums = [[0.0_f32; TILE]; SUMS];
@@ -79,8 +92,8 @@ fn walk(
         let mut seen = false;
         for y in first..end {
             if row_open[y] {
-                let drawn =
-                    add(&mut rows[y], splat, &x, (top + y) as f32, &picture.0[y], &mut sums, &mut removal);
+                let pixels = Pixels { x: &x, y: (top + y) as f32, picture: &picture.0[y] };
+                let drawn = add(&mut rows[y], splat, root, pixels, &mut sums, &mut removal);
                 seen |= drawn;
                 row_open[y] = !drawn || rows[y].open.iter().any(|&o| o > 0.0);
             }
@@ -102,13 +115,11 @@ fn walk(
 fn add(
     row: &mut Row,
     splat: &Splat,
-    x: &Lanes,
-    y: f32,
-    picture: &[Lanes; 3],
+    root: &Root,
+    Pixels { x, y, picture }: Pixels<'_>,
     sums: &mut [Lanes; SUMS],
     removal: &mut Lanes,
 ) -> bool {
-    let [a, b, c] = splat.conic;
     let Some(alphas) = alphas(splat, x, y) else { return false };
     let dy = splat.centre[1] - y;
     for lane in 0..TILE {
@@ -131,8 +142,8 @@ fn add(
         }
         removal[lane] = largest;
         let dx = splat.centre[0] - x[lane];
-        let (vx, vy) = (a * dx + b * dy, b * dx + c * dy);
-        let (xx, xy, yy) = (vx * vx, vx * vy, vy * vy);
+        let [ux, uy] = root.of([dx, dy]);
+        let (xx, xy, yy) = (ux * ux, ux * uy, uy * uy);
         let terms = [
             weight * weight,
             g,

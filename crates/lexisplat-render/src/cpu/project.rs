@@ -51,7 +51,7 @@ pub(super) struct Visible {
 
 /// What is the same for all Gaussians of a picture.
 #[derive(Debug, Clone)]
-pub(super) struct Projection {
+pub(crate) struct Projection {
     pub(super) camera: Camera,
     tan: [f32; 2],
     focal: [f32; 2],
@@ -67,7 +67,7 @@ pub(super) struct Projection {
 const NO_CUTOFF: f32 = -80.0;
 
 impl Projection {
-    pub(super) fn new(camera: &Camera, antialiased: bool) -> Self {
+    pub(crate) fn new(camera: &Camera, antialiased: bool) -> Self {
         let grid = Grid::new(camera.width as usize, camera.height as usize);
         // Sides are at most 16384: exact.
         #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
@@ -96,7 +96,7 @@ impl Projection {
             ((ndc + 1.0) * self.size[k] - 1.0) * 0.5
         });
         let axes = axes(geometry.scales[i], geometry.rotations[i]);
-        let Ellipse { conic, radius, shrink } = self.ellipse(view, &axes)?;
+        let Ellipse { conic, radius, shrink, .. } = self.ellipse(&self.on_screen(view, &axes))?;
         let mut opacity = sigmoid(geometry.opacities[i]);
         if self.antialiased {
             opacity *= shrink;
@@ -125,19 +125,30 @@ impl Projection {
         Some(Visible { splat, depth: z.to_bits(), rect, gaussian })
     }
 
-    /// How the centre of Gaussian `i` on screen moves with each world coordinate, in pixels, and its
-    /// three standard deviations as vectors on screen.
-    pub(super) fn derivatives(&self, geometry: &Geometry, i: usize) -> ([[f32; 2]; 3], [[f32; 2]; 3]) {
+    /// The root of the conic of Gaussian `i` on screen, if it has one.
+    pub(super) fn root(&self, geometry: &Geometry, i: usize) -> Option<Root> {
+        let view = self.camera.to_view(geometry.positions[i]);
+        let on_screen = self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i]));
+        self.ellipse(&on_screen).map(|ellipse| ellipse.root())
+    }
+
+    /// What carries changes of Gaussian `i` on screen over to the world, if it has an ellipse there.
+    pub(super) fn derivatives(&self, geometry: &Geometry, i: usize) -> Option<Derivatives> {
         let view = self.camera.to_view(geometry.positions[i]);
         let [x, y, z] = view;
         let r = &self.camera.rotation;
-        let by_position = std::array::from_fn(|k| {
+        let by_position: [[f32; 2]; 3] = std::array::from_fn(|k| {
             [
                 self.focal[0] * (r[k][0] * z - r[k][2] * x) / (z * z),
                 self.focal[1] * (r[k][1] * z - r[k][2] * y) / (z * z),
             ]
         });
-        (by_position, self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i])))
+        let on_screen = self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i]));
+        let root = self.ellipse(&on_screen)?.root();
+        Some(Derivatives {
+            by_position: by_position.map(|v| root.of(v)),
+            axes: on_screen.map(|v| root.of(v)),
+        })
     }
 
     /// Each standard deviation's axis on screen, by the approximation at `view`.
@@ -164,11 +175,10 @@ impl Projection {
         })
     }
 
-    /// The dilated covariance on screen of a Gaussian with these axes at `view`.
-    fn ellipse(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> Option<Ellipse> {
+    /// The dilated covariance on screen of a Gaussian with these axes there.
+    fn ellipse(&self, on_screen: &[[f32; 2]; 3]) -> Option<Ellipse> {
         // The covariance is the sum of the squares of the axes on screen. INRIA multiplies the covariance
         // through instead, which is the same sum but loses thin Gaussians to cancellation.
-        let on_screen = self.on_screen(view, axes);
         let sum = |f: fn([f32; 2]) -> f32| f(on_screen[0]) + f(on_screen[1]) + f(on_screen[2]);
         let (a, b, c) = (sum(|v| v[0] * v[0]), sum(|v| v[0] * v[1]), sum(|v| v[1] * v[1]));
         // The determinant as a sum of squares (Cauchy-Binet): never negative.
@@ -189,7 +199,7 @@ impl Projection {
         let spread = (half * half + b * b).max(EIGEN_FLOOR).sqrt();
         let radius = (RADIUS_SIGMAS * (mid + spread).sqrt()).ceil();
         let shrink = (before / det).max(ANTIALIAS_FLOOR).sqrt();
-        Some(Ellipse { conic: [c / det, -b / det, a / det], radius, shrink })
+        Some(Ellipse { conic: [c / det, -b / det, a / det], variance_y: c, radius, shrink })
     }
 
     /// Distances from the centre in x and y, in pixels, beyond which no power, as `blend` computes it,
@@ -214,12 +224,45 @@ impl Projection {
     }
 }
 
+/// How a Gaussian on screen moves with one in the world, in the coordinates of its [`Root`].
+pub(super) struct Derivatives {
+    /// The centre with each world coordinate.
+    pub(super) by_position: [[f32; 2]; 3],
+    /// The three standard deviations as vectors.
+    pub(super) axes: [[f32; 2]; 3],
+}
+
+/// The upper triangular root R of a conic, `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in standard
+/// deviations, so that products of it neither grow with a Gaussian's size nor cancel in thin ones.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Root(pub(super) [f32; 3]);
+
+impl Root {
+    /// `R v`.
+    #[inline]
+    pub(super) fn of(&self, v: [f32; 2]) -> [f32; 2] {
+        let [xx, xy, yy] = self.0;
+        [xx * v[0] + xy * v[1], yy * v[1]]
+    }
+}
+
 struct Ellipse {
     conic: [f32; 3],
+    /// Of the covariance.
+    variance_y: f32,
     /// In whole pixels.
     radius: f32,
     /// Factor of the opacity in anti-aliased scenes.
     shrink: f32,
+}
+
+impl Ellipse {
+    fn root(&self) -> Root {
+        let [xx, xy, _] = self.conic;
+        let root = xx.sqrt();
+        // What is left of yy is the determinant over xx, without its cancellation.
+        Root([root, xy / root, 1.0 / self.variance_y.sqrt()])
+    }
 }
 
 /// The three standard deviations as vectors in the world: columns of rotation * scale.

@@ -8,8 +8,8 @@ use crate::radiance::Radiance;
 use crate::scene::Scene;
 
 use super::math::exp;
-use super::moments::{self, Moments};
-use super::project::{self, Projection};
+use super::moments::{self, Moments, SUMS};
+use super::project::{self, Derivatives, Projection, Root, Visible};
 use super::{blend, order, tiles};
 
 /// How much the pictures of `scene` from `cameras`, over black, change with each value of each Gaussian,
@@ -35,6 +35,9 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
     let grid = projection.grid;
     let size = [camera.width as usize, camera.height as usize];
+    let root =
+        |splat: &Visible| projection.root(scene.geometry(), splat.gaussian as usize).unwrap_or_default();
+    let roots: Vec<Root> = splats.par_iter().map(root).collect();
     let mut sums = vec![Moments::default(); splats.len()];
     for band in tiles::bands(&splats, grid, tiles::MAX_ENTRIES) {
         let lists = tiles::TileLists::new(&splats, grid, band.clone());
@@ -47,7 +50,7 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
                 .map(|tile| {
                     let at = [tile % grid.columns, band.start + tile / grid.columns];
                     let picture = blend::tile(&splats, lists.of(tile), at, [0.0; 3]);
-                    moments::tile(&splats, lists.of(tile), at, size, &picture)
+                    moments::tile(&splats, &roots, lists.of(tile), at, size, &picture)
                 })
                 .collect();
             for (splat, part) in parts.into_iter().flatten() {
@@ -55,20 +58,33 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
             }
         }
     }
+    carry(total, &projection, scene.geometry(), views, &sums, |k| splats[k].gaussian as usize);
+}
+
+/// Carries one view's moments over to the world and adds its share to the `total` over `views`. The `k`-th
+/// moments are those of Gaussian `gaussian(k)`.
+pub(crate) fn carry(
+    total: &mut Sensitivity,
+    projection: &Projection,
+    geometry: &Geometry,
+    views: usize,
+    moments: &[Moments],
+    gaussian: impl Fn(usize) -> usize + Sync,
+) {
+    let camera = &projection.camera;
     #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
-    let share = 1.0 / (size[0] as f32 * size[1] as f32 * CHANNELS * views as f32);
-    let geometry = scene.geometry();
-    for (splats, sums) in splats.chunks(CHUNK).zip(sums.chunks(CHUNK)) {
-        let changes: Vec<Option<Change>> = splats
+    let share = 1.0 / (camera.width as f32 * camera.height as f32 * CHANNELS * views as f32);
+    for (first, moments) in (0..).step_by(CHUNK).zip(moments.chunks(CHUNK)) {
+        let changes: Vec<Option<Change>> = moments
             .par_iter()
-            .zip(sums)
-            .map(|(splat, m)| {
+            .enumerate()
+            .map(|(k, m)| {
                 let seen = m.sums[0] > 0.0;
-                seen.then(|| Change::of(&projection, geometry, splat.gaussian as usize, &m.sums))
+                seen.then(|| Change::of(projection, geometry, gaussian(first + k), &m.sums)).flatten()
             })
             .collect();
-        for ((splat, change), m) in splats.iter().zip(changes).zip(sums) {
-            let i = splat.gaussian as usize;
+        for ((k, m), change) in (first..).zip(moments).zip(changes) {
+            let i = gaussian(k);
             total.removal[i] = total.removal[i].max(m.removal);
             let Some(change) = change.filter(Change::is_finite) else { continue };
             total.colour[i] += m.sums[0] * share;
@@ -101,19 +117,19 @@ struct Change {
 
 impl Change {
     /// Carries the moments on screen over to the world.
-    fn of(projection: &Projection, geometry: &Geometry, i: usize, m: &[f32; 10]) -> Self {
-        let (by_position, axes) = projection.derivatives(geometry, i);
+    fn of(projection: &Projection, geometry: &Geometry, i: usize, m: &[f32; SUMS]) -> Option<Self> {
+        let Derivatives { by_position, axes } = projection.derivatives(geometry, i)?;
         let [xx, xy, yy] = [m[2], m[3], m[4]];
         let mut position = [0.0; 6];
         for (entry, (p, q)) in position.iter_mut().zip([(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)]) {
             let (u, w) = (by_position[p], by_position[q]);
             *entry = xx * u[0] * w[0] + xy * (u[0] * w[1] + u[1] * w[0]) + yy * u[1] * w[1];
         }
-        // With the covariance the sum of a a^T over the axes on screen, d ln alpha / d ln s_k is (v . a_k)^2
+        // With the covariance the sum of a a^T over the axes on screen, d ln alpha / d ln s_k is (u . R a_k)^2
         // and a rotation in the plane of j and k by one radian makes
-        // (v . a_j) (v . a_k) (s_j^2 - s_k^2) / (s_j s_k).
+        // (u . R a_j) (u . R a_k) (s_j^2 - s_k^2) / (s_j s_k).
         let fourth = |p: [f32; 2], q: [f32; 2]| {
-            // (v . p)^2 (v . q)^2 as a polynomial in v.
+            // (u . p)^2 (u . q)^2 as a polynomial in u.
             let square = |a: [f32; 2]| [a[0] * a[0], 2.0 * a[0] * a[1], a[1] * a[1]];
             let (p, q) = (square(p), square(q));
             p[0] * q[0] * m[5]
@@ -129,7 +145,7 @@ impl Change {
             let lever = ratio - 1.0 / ratio;
             fourth(axes[j], axes[l]).max(0.0) * lever * lever
         });
-        Self { position, scale: axes.map(|a| fourth(a, a).max(0.0)), rotation }
+        Some(Self { position, scale: axes.map(|a| fourth(a, a).max(0.0)), rotation })
     }
 
     fn is_finite(&self) -> bool {

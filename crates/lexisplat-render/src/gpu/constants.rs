@@ -9,6 +9,7 @@ use crate::conventions::{
     ALPHA_MAX, ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, POWER_SLACK, QUATERNION_FLOOR,
     RADIUS_SIGMAS, TAN_LIMIT, TILE, TRANSMITTANCE_MIN, W_EPSILON,
 };
+use crate::cpu::SUMS;
 
 /// Lanes of a group, and Gaussians of a block: what every adapter offers (WebGPU's
 /// `maxComputeInvocationsPerWorkgroup`).
@@ -27,6 +28,10 @@ pub(super) const DIGITS: u32 = 1 << DIGIT_BITS;
 const SORT_ITEMS: u32 = 8;
 /// Keys a group sorts.
 pub(super) const SORT_BLOCK: u32 = GROUP * SORT_ITEMS;
+/// Splats whose moments a group sums together.
+const MOMENT_SPLATS: u32 = 4;
+/// Splats it reads at once. With the sums this just fits in workgroup memory.
+const MOMENT_BATCH: u32 = 64;
 /// Gaussians whose codes begin at a stored place.
 pub(super) const COLUMN_GROUP: u32 = 16;
 /// Words for them: the place, and a byte each.
@@ -111,6 +116,7 @@ pub(super) fn declarations() -> String {
     };
     let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
     let basis = u32::try_from(MAX_COEFFICIENTS - 1).unwrap_or(u32::MAX);
+    let sums = u32::try_from(SUMS).unwrap_or(u32::MAX);
     let segments = GROUP / (DIGITS / 2);
     for (name, value) in [
         ("GROUP", GROUP),
@@ -130,6 +136,11 @@ pub(super) fn declarations() -> String {
         ("ESCAPED", ESCAPED),
         ("COUNT_BINS", COUNT_BINS),
         ("TABLE_SIDE", TABLE_SIDE),
+        ("MOMENT_SUMS", sums),
+        // And a maximum.
+        ("MOMENTS", sums + 1),
+        ("MOMENT_SPLATS", MOMENT_SPLATS),
+        ("MOMENT_BATCH", MOMENT_BATCH),
         ("KEY_FIRST", KEY_FIRST),
         ("KEY_LAST", u32::MAX),
         ("NO_SLOT", u32::MAX),

@@ -6,6 +6,10 @@
 //! How much there is of anything is only known on the GPU, which sizes its own dispatches; buffers that
 //! turn out too small are made larger and the picture is drawn again.
 //!
+//! To measure sensitivities, entries are sorted by their places in the lists instead of their slots;
+//! `moments` follows `blend` and sums how each entry's splat changes its tile, and `gather_moments` adds up
+//! the entries of each splat, all in fixed order. The processor carries the sums over to the world.
+//!
 //! Kernels ask for no more than WebGPU's defaults: 8 storage buffers, 256 lanes, 16 KiB of workgroup memory
 //! (but [`ShPath::SparseShared`] with a large dictionary). Scenes larger than a binding are cut into chunks,
 //! pictures whose lists are larger into bands.
@@ -13,9 +17,11 @@
 mod columns;
 mod constants;
 mod device;
+mod moments;
 mod plan;
 mod renderer;
 mod scene;
+mod sensitivity;
 mod shaders;
 mod speed;
 mod table;

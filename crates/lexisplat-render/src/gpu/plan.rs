@@ -249,7 +249,9 @@ impl Planner<'_> {
             (5, all(&work.offsets)),
         ];
         self.step(&kernels.plan_entries, &bound, Size::Groups(1))?;
-        let lists = [(8, all(&work.entry_keys[0])), (9, all(&work.entry_values[0]))];
+        let measuring = kernels.moments.as_ref().zip(work.moments.as_ref());
+        let listed_slots = measuring.map_or(&work.entry_values[0], |(_, moments)| &moments.listed_slots);
+        let lists = [(8, all(&work.entry_keys[0])), (9, all(listed_slots))];
         let bound: Vec<_> = common().into_iter().chain(lists).collect();
         self.step(&kernels.list_tiles, &bound, Size::of(Dispatch::SlotsAndEnd))?;
         let by_tile = self.sort(&Sorting {
@@ -262,8 +264,20 @@ impl Planner<'_> {
             digits: Counter::EntryDigits,
             groups: Dispatch::EntryBlocks,
             scan_groups: Dispatch::EntryDigits,
-            identity: false,
+            identity: measuring.is_some(),
         })?;
+        let mut entry_slots = &work.entry_values[by_tile];
+        if let Some((kernels, moments)) = measuring {
+            // The sort is done with the other buffer.
+            entry_slots = &work.entry_values[1 - by_tile];
+            let bound = [
+                (0, all(&work.counters)),
+                (1, all(&work.entry_values[by_tile])),
+                (2, all(&moments.listed_slots)),
+                (3, all(entry_slots)),
+            ];
+            self.step(&kernels.slots_of_entries, &bound, Size::of(Dispatch::Entries))?;
+        }
         let bound = [
             (0, all(&band)),
             (1, all(&work.counters)),
@@ -277,18 +291,43 @@ impl Planner<'_> {
         let line = u64::from(shape.width) * PIXEL;
         let top = u64::from(first) * tile;
         let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
+        // A row of tiles is a multiple of 256 bytes, as offsets must be.
+        let pixels = || Bound::Part(&work.pixels.raw, top * line, lines * line);
         let bound = [
             (0, all(&work.frame)),
             (1, all(&band)),
             (2, all(&work.ranges)),
-            (3, all(&work.entry_values[by_tile])),
+            (3, all(entry_slots)),
             (4, all(&work.centres)),
             (5, all(&work.conics)),
             (6, all(&work.colours)),
-            // A row of tiles is a multiple of 256 bytes, as offsets must be.
-            (7, Bound::Part(&work.pixels.raw, top * line, lines * line)),
+            (7, pixels()),
         ];
         self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
+        if let Some((kernels, moments)) = measuring {
+            let bound = [
+                (0, all(&work.frame)),
+                (1, all(&band)),
+                (2, all(&work.ranges)),
+                (3, all(entry_slots)),
+                (4, all(&work.entry_values[by_tile])),
+                (5, all(&work.centres)),
+                (6, all(&work.conics)),
+                (7, all(&work.colours)),
+                (8, pixels()),
+                (9, all(&moments.of_entries)),
+            ];
+            self.step(&kernels.tile_moments, &bound, Size::Groups(tiles))?;
+            let bound = [
+                (0, all(&work.frame)),
+                (1, all(&work.counters)),
+                (2, all(order)),
+                (3, all(&work.offsets)),
+                (4, all(&moments.of_entries)),
+                (5, all(&moments.of_slots)),
+            ];
+            self.step(&kernels.gather_moments, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+        }
         self.end(Stage::Blend);
         self.uniforms.push(band);
         Ok(())

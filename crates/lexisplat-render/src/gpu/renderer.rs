@@ -65,14 +65,14 @@ pub struct FrameStats {
 
 /// Draws scenes on one GPU, keeping its buffers from picture to picture.
 pub struct GpuRenderer {
-    gpu: Gpu,
-    kernels: Kernels,
-    work: Option<Work>,
-    plan: Option<Plan>,
-    timer: Option<Timer>,
+    pub(super) gpu: Gpu,
+    pub(super) kernels: Kernels,
+    pub(super) work: Option<Work>,
+    pub(super) plan: Option<Plan>,
+    pub(super) timer: Option<Timer>,
     /// Rows of tiles drawn at once, once lists were found not to fit.
-    band_rows: Option<u32>,
-    limits: RoomLimits,
+    pub(super) band_rows: Option<u32>,
+    pub(super) limits: RoomLimits,
 }
 
 impl std::fmt::Debug for GpuRenderer {
@@ -90,7 +90,7 @@ pub(super) struct RoomLimits {
     pub(super) pixels: u64,
 }
 
-struct Timer {
+pub(super) struct Timer {
     queries: wgpu::QuerySet,
     resolved: Buffer,
     back: Buffer,
@@ -275,7 +275,7 @@ impl GpuRenderer {
             // The old buffers go first: both together may not fit.
             self.plan = None;
             self.work = None;
-            self.work = Some(Work::new(&self.gpu, room)?);
+            self.work = Some(Work::new(&self.gpu, room, self.kernels.moments.is_some())?);
         }
         Ok(())
     }
@@ -306,6 +306,9 @@ impl GpuRenderer {
         encoder.clear_buffer(&work.counters.raw, 0, None);
         // The place after the last block's, which no kernel writes.
         encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
+        if let Some(moments) = &work.moments {
+            encoder.clear_buffer(&moments.of_slots.raw, 0, None);
+        }
         let mut timed = Vec::new();
         for stage in &plan.passes {
             let query = u32::try_from(timed.len()).unwrap_or(u32::MAX);
@@ -321,6 +324,9 @@ impl GpuRenderer {
             }
             if stage.stage == Stage::Tiles {
                 encoder.clear_buffer(&work.ranges.raw, 0, None);
+                if let Some(moments) = &work.moments {
+                    encoder.clear_buffer(&moments.of_entries.raw, 0, None);
+                }
             }
             let label = Some(stage.stage.name());
             let mut pass =

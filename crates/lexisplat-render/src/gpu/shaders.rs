@@ -4,6 +4,7 @@ use crate::error::Result;
 
 use super::constants::declarations;
 use super::device::Gpu;
+use super::moments::MomentKernels;
 
 /// Every kernel but radiance, which depends on the scene.
 #[derive(Debug, Clone)]
@@ -22,12 +23,14 @@ pub(super) struct Kernels {
     pub(super) list_tiles: wgpu::ComputePipeline,
     pub(super) find_ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
+    /// Only while measuring.
+    pub(super) moments: Option<MomentKernels>,
 }
 
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 
 /// The texts of all kernels, by name: what a test validates.
-pub(super) const TEXTS: [(&str, &[&str]); 9] = [
+pub(super) const TEXTS: [(&str, &[&str]); 12] = [
     ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
     ("plan", &[FRAME, include_str!("kernels/plan.wgsl")]),
@@ -37,14 +40,14 @@ pub(super) const TEXTS: [(&str, &[&str]); 9] = [
     ("tiles", &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")]),
     ("ranges", &[FRAME, include_str!("kernels/ranges.wgsl")]),
     ("blend", &[FRAME, include_str!("kernels/blend.wgsl")]),
+    ("slots_of_entries", &[FRAME, include_str!("kernels/slots_of_entries.wgsl")]),
+    ("moments", &[FRAME, include_str!("kernels/moments.wgsl")]),
+    ("gather_moments", &[FRAME, include_str!("kernels/gather_moments.wgsl")]),
 ];
 
 impl Kernels {
     pub(super) fn new(gpu: &Gpu) -> Result<Self> {
-        let module = |name: &str| {
-            let parts = TEXTS.iter().find(|(found, _)| *found == name).map_or(&[][..], |(_, parts)| parts);
-            compile(gpu, name, &parts.concat())
-        };
+        let module = |name: &str| kernel(gpu, name);
         let (plan, scan, sort, tiles) = (module("plan")?, module("scan")?, module("sort")?, module("tiles")?);
         Ok(Self {
             cull: pipeline(gpu, &module("cull")?, "cull")?,
@@ -61,8 +64,15 @@ impl Kernels {
             list_tiles: pipeline(gpu, &tiles, "list_tiles")?,
             find_ranges: pipeline(gpu, &module("ranges")?, "find_ranges")?,
             blend: pipeline(gpu, &module("blend")?, "blend")?,
+            moments: None,
         })
     }
+}
+
+/// The module of the kernel called `name`.
+pub(super) fn kernel(gpu: &Gpu, name: &str) -> Result<wgpu::ShaderModule> {
+    let parts = TEXTS.iter().find(|(found, _)| *found == name).map_or(&[][..], |(_, parts)| parts);
+    compile(gpu, name, &parts.concat())
 }
 
 /// A module of `text` after the shared declarations.

@@ -4,6 +4,7 @@ use crate::error::Result;
 
 use super::constants::{COUNTERS, DIGITS, Dispatch, GROUP, SCAN_BLOCK, SORT_BLOCK};
 use super::device::{Buffer, Gpu};
+use super::moments::MomentBuffers;
 use super::uniforms::Frame;
 
 /// How much there is room for.
@@ -50,10 +51,12 @@ pub(super) struct Work {
     pub(super) ranges: Buffer,
     pub(super) pixels: Buffer,
     pub(super) counters_back: Buffer,
+    /// Only while measuring.
+    pub(super) moments: Option<MomentBuffers>,
 }
 
 /// Bytes of a word.
-const WORD: u64 = 4;
+pub(super) const WORD: u64 = 4;
 /// Bytes of a pixel: four floats.
 pub(super) const PIXEL: u64 = 16;
 /// Largest element of an array with one element a slot, in bytes: the centres' and conics'.
@@ -62,7 +65,7 @@ pub(super) const SLOT_ELEMENT: u64 = 16;
 pub(super) const ENTRY_ELEMENT: u64 = WORD;
 
 impl Work {
-    pub(super) fn new(gpu: &Gpu, room: Room) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, room: Room, measuring: bool) -> Result<Self> {
         use wgpu::BufferUsages as U;
         let words = |label: &str, n: u64| gpu.storage(label, n * WORD);
         let [blocks, slots, entries] = [room.blocks, room.slots, room.entries].map(u64::from);
@@ -93,6 +96,7 @@ impl Work {
             ranges: words("ranges", 2 * u64::from(room.tiles))?,
             pixels: gpu.storage("pixels", room.pixels * PIXEL)?,
             counters_back: gpu.buffer("counters back", COUNTERS as u64 * WORD, U::MAP_READ | U::COPY_DST)?,
+            moments: measuring.then(|| MomentBuffers::new(gpu, room)).transpose()?,
         })
     }
 }

@@ -1,0 +1,209 @@
+// How a tile's pixels change with its splats: sums over pixels, for each splat. Each group one tile; lanes
+// are pixels while they draw, and share the pixels of one splat while they sum. Twin: `cpu::moments`.
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> band: Band;
+@group(0) @binding(2) var<storage, read> ranges: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> entry_slots: array<u32>;
+// Where each entry's moments belong.
+@group(0) @binding(4) var<storage, read> entry_places: array<u32>;
+@group(0) @binding(5) var<storage, read> centres: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> conics: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read> colours: array<f32>;
+// The finished picture over black.
+@group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
+// Zeros, where nothing shows.
+@group(0) @binding(9) var<storage, read_write> moments: array<f32>;
+
+// Numbers a splat has for each pixel.
+const PARTS: u32 = 3u;
+// Lanes that share a splat while summing, and pixels each of them looks at.
+const SHARERS: u32 = GROUP / MOMENT_SPLATS;
+const SHARE: u32 = GROUP / SHARERS;
+
+// A batch of splats: centre and the conic's xx and xy; its yy, opacity, red and green; blue; the last
+// diagonal element of the conic's root; place.
+var<workgroup> batch_centre: array<vec4<f32>, MOMENT_BATCH>;
+var<workgroup> batch_conic: array<vec4<f32>, MOMENT_BATCH>;
+var<workgroup> batch_blue: array<f32, MOMENT_BATCH>;
+var<workgroup> batch_root: array<f32, MOMENT_BATCH>;
+var<workgroup> batch_place: array<u32, MOMENT_BATCH>;
+// First the numbers of every pixel for some splats, then the moments that every lane sums.
+var<workgroup> scratch: array<f32, PARTS * MOMENT_SPLATS * GROUP>;
+// One bit for each of those splats: it shows.
+var<workgroup> shown: atomic<u32>;
+var<workgroup> range: vec2<u32>;
+// Pixels that are not finished.
+var<workgroup> open: atomic<u32>;
+var<workgroup> open_now: u32;
+
+struct Pixel {
+    at: vec2<f32>,
+    picture: vec3<f32>,
+    // What has been drawn so far.
+    colour: vec3<f32>,
+    transmittance: f32,
+    finished: bool,
+}
+
+// Draws splat `k` of the batch as `blend` does. The squared derivative by one channel of its colour, g, and
+// the largest change of a channel when it is left out; zeros where it does not show.
+fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
+    let centre = batch_centre[k];
+    let conic = batch_conic[k];
+    let d = centre.xy - (*pixel).at;
+    let power = -0.5 * (centre.z * d.x * d.x + conic.x * d.y * d.y) - centre.w * d.x * d.y;
+    if power > 0.0 {
+        return vec3<f32>(0.0);
+    }
+    let alpha = min(conic.y * exp(power), ALPHA_MAX);
+    if alpha < ALPHA_MIN {
+        return vec3<f32>(0.0);
+    }
+    let left = (*pixel).transmittance * (1.0 - alpha);
+    if left < TRANSMITTANCE_MIN {
+        (*pixel).finished = true;
+        return vec3<f32>(0.0);
+    }
+    let weight = alpha * (*pixel).transmittance;
+    let own = weight * vec3<f32>(conic.zw, batch_blue[k]);
+    (*pixel).colour += own;
+    (*pixel).transmittance = left;
+    let behind = (*pixel).picture - (*pixel).colour;
+    // alpha / (1 - alpha): what of the light behind one more unit of ln alpha takes away.
+    let change = own - behind * (alpha / (1.0 - alpha));
+    let sizes = abs(change);
+    return vec3<f32>(weight * weight, dot(change, change), max(sizes.x, max(sizes.y, sizes.z)));
+}
+
+@compute @workgroup_size(TILE, TILE)
+fn tile_moments(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_id) at: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let tile = group_number(group, groups);
+    let left = (tile % frame.columns) * TILE;
+    let row = (tile / frame.columns) * TILE;
+    let top = band.first * TILE + row;
+    let inside = tile < band.tiles && left + at.x < frame.width && top + at.y < frame.height;
+    if lane == 0u {
+        range = vec2<u32>(0u);
+        if tile < band.tiles {
+            range = ranges[tile];
+        }
+        atomicStore(&open, 0u);
+        atomicStore(&shown, 0u);
+    }
+    workgroupBarrier();
+    let entries = workgroupUniformLoad(&range);
+    var pixel: Pixel;
+    pixel.at = vec2<f32>(f32(left + at.x), f32(top + at.y));
+    pixel.transmittance = 1.0;
+    pixel.finished = !inside;
+    if inside {
+        pixel.picture = pixels[(row + at.y) * frame.width + left + at.x].xyz;
+    }
+    // While summing.
+    let splat = lane / SHARERS;
+    let sharer = lane % SHARERS;
+    for (var first = entries.x; first < entries.y; first += MOMENT_BATCH) {
+        if !pixel.finished {
+            atomicAdd(&open, 1u);
+        }
+        workgroupBarrier();
+        if lane == 0u {
+            open_now = atomicExchange(&open, 0u);
+        }
+        workgroupBarrier();
+        if workgroupUniformLoad(&open_now) == 0u {
+            break;
+        }
+        if lane < MOMENT_BATCH && first + lane < entries.y {
+            let slot = entry_slots[first + lane];
+            let conic = conics[slot];
+            let centre = centres[slot];
+            batch_centre[lane] = centre;
+            batch_root[lane] = sqrt(conic.y / centre.z);
+            batch_conic[lane] = vec4<f32>(conic.x, conic.z, colours[3u * slot], colours[3u * slot + 1u]);
+            batch_blue[lane] = colours[3u * slot + 2u];
+            batch_place[lane] = entry_places[first + lane];
+        }
+        workgroupBarrier();
+        let count = min(MOMENT_BATCH, entries.y - first);
+        for (var k = 0u; k < count; k += MOMENT_SPLATS) {
+            var seen = 0u;
+            for (var s = 0u; s < MOMENT_SPLATS; s++) {
+                var parts = vec3<f32>(0.0);
+                if !pixel.finished && k + s < count {
+                    parts = draw(&pixel, k + s);
+                }
+                seen |= select(0u, 1u << s, parts.x > 0.0);
+                let to = PARTS * GROUP * s + lane;
+                scratch[to] = parts.x;
+                scratch[to + GROUP] = parts.y;
+                scratch[to + 2u * GROUP] = parts.z;
+            }
+            if seen != 0u {
+                atomicOr(&shown, seen);
+            }
+            workgroupBarrier();
+            let shows = atomicLoad(&shown);
+            let own = ((shows >> splat) & 1u) == 1u;
+            var second = vec4<f32>(0.0);
+            var fourth = vec4<f32>(0.0);
+            var rest = vec3<f32>(0.0);
+            if own {
+                let centre = batch_centre[k + splat];
+                // The conic's root, upper triangular. Twin: `cpu::project::Root`.
+                let xx = sqrt(centre.z);
+                let xy = centre.w / xx;
+                let yy = batch_root[k + splat];
+                for (var p = 0u; p < SHARE; p++) {
+                    let other = sharer + SHARERS * p;
+                    let at_pixel = PARTS * GROUP * splat + other;
+                    let g = scratch[at_pixel + GROUP];
+                    let d = centre.xy - vec2<f32>(f32(left + other % TILE), f32(top + other / TILE));
+                    let u = vec2<f32>(xx * d.x + xy * d.y, yy * d.y);
+                    let gxx = g * u.x * u.x;
+                    let gxy = g * u.x * u.y;
+                    let gyy = g * u.y * u.y;
+                    second += vec4<f32>(scratch[at_pixel], g, gxx, gxy);
+                    fourth += vec4<f32>(gyy, gxx * u.x * u.x, gxx * u.x * u.y, gxx * u.y * u.y);
+                    let largest = max(rest.z, scratch[at_pixel + 2u * GROUP]);
+                    rest = vec3<f32>(rest.xy + vec2<f32>(gxy * u.y * u.y, gyy * u.y * u.y), largest);
+                }
+            }
+            workgroupBarrier();
+            if lane == 0u {
+                atomicStore(&shown, 0u);
+            }
+            if own {
+                scratch[lane] = second.x;
+                scratch[GROUP + lane] = second.y;
+                scratch[2u * GROUP + lane] = second.z;
+                scratch[3u * GROUP + lane] = second.w;
+                scratch[4u * GROUP + lane] = fourth.x;
+                scratch[5u * GROUP + lane] = fourth.y;
+                scratch[6u * GROUP + lane] = fourth.z;
+                scratch[7u * GROUP + lane] = fourth.w;
+                scratch[8u * GROUP + lane] = rest.x;
+                scratch[9u * GROUP + lane] = rest.y;
+                scratch[10u * GROUP + lane] = rest.z;
+            }
+            workgroupBarrier();
+            let summed = lane / MOMENTS;
+            if summed < MOMENT_SPLATS && ((shows >> summed) & 1u) == 1u {
+                let which = lane % MOMENTS;
+                var sum = 0.0;
+                for (var p = 0u; p < SHARERS; p++) {
+                    // Lanes begin at different places, which lie in different banks.
+                    let value = scratch[which * GROUP + summed * SHARERS + (p + lane) % SHARERS];
+                    sum = select(sum + value, max(sum, value), which == MOMENT_SUMS);
+                }
+                moments[batch_place[k + summed] * MOMENTS + which] = sum;
+            }
+            workgroupBarrier();
+        }
+    }
+}

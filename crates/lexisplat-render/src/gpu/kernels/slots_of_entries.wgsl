@@ -1,0 +1,18 @@
+// The slots of entries that were sorted by their places in the lists.
+@group(0) @binding(0) var<storage, read> counters: array<u32>;
+@group(0) @binding(1) var<storage, read> entry_places: array<u32>;
+// In the order they were listed in.
+@group(0) @binding(2) var<storage, read> listed_slots: array<u32>;
+@group(0) @binding(3) var<storage, read_write> entry_slots: array<u32>;
+
+@compute @workgroup_size(GROUP)
+fn slots_of_entries(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let i = group_number(group, groups) * GROUP + lane;
+    if i < counters[COUNTER_ENTRIES] {
+        entry_slots[i] = listed_slots[entry_places[i]];
+    }
+}

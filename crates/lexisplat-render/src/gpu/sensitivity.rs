@@ -1,0 +1,126 @@
+//! Sensitivities measured on the GPU. Twin: `cpu::sensitivity`.
+
+use lexisplat::{Geometry, Sensitivity};
+
+use crate::camera::Camera;
+use crate::cpu::{Moments, Projection, RenderOptions, carry};
+use crate::error::{Error, Result};
+
+use super::moments::{MOMENTS_BYTES, MomentKernels, most_entries, most_slots};
+use super::renderer::{GpuRenderer, RoomLimits};
+use super::scene::GpuScene;
+use super::work::WORD;
+
+impl GpuRenderer {
+    /// What [`crate::sensitivity`] measures, measured on the GPU: `scene` is that of `geometry`. The same
+    /// bits each time on the same GPU and driver; within rounding of the processor's, but for what lies
+    /// within rounding of a threshold of the rasteriser. `on_view` is called after each view.
+    ///
+    /// Gives back the memory that pictures took; the next one takes its own again.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; else as [`Self::draw`].
+    pub fn sensitivity(
+        &mut self,
+        scene: &GpuScene,
+        geometry: &Geometry,
+        cameras: &[Camera],
+        on_view: &mut dyn FnMut(),
+    ) -> Result<Sensitivity> {
+        if scene.len() as usize != geometry.len() {
+            let expected = format!("{} Gaussians, as the scene has", scene.len());
+            return Err(Error::parameter("geometry", geometry.len(), expected));
+        }
+        let mut measuring = self.measuring()?;
+        let mut total = Sensitivity::zeros(geometry.len());
+        for camera in cameras {
+            let frame = measuring.draw(scene, camera, &RenderOptions::default())?;
+            let (gaussians, moments) = measuring.read_moments(frame.stats.visible)?;
+            let projection = Projection::new(camera, scene.antialiased());
+            carry(&mut total, &projection, geometry, cameras.len(), &moments, |k| gaussians[k] as usize);
+            on_view();
+        }
+        Ok(total)
+    }
+
+    /// A renderer that also works out moments. This one gives up its buffers: both together may not fit.
+    fn measuring(&mut self) -> Result<Self> {
+        self.plan = None;
+        self.work = None;
+        let mut kernels = self.kernels.clone();
+        kernels.moments = Some(MomentKernels::new(&self.gpu)?);
+        let limits = RoomLimits {
+            slots: self.limits.slots.min(most_slots(&self.gpu)),
+            entries: self.limits.entries.min(most_entries(&self.gpu)),
+            ..self.limits
+        };
+        Ok(Self {
+            gpu: self.gpu.clone(),
+            kernels,
+            work: None,
+            plan: None,
+            timer: None,
+            band_rows: None,
+            limits,
+        })
+    }
+
+    /// The last view's Gaussians, of `slots` slots, and their moments.
+    fn read_moments(&self, slots: u32) -> Result<(Vec<u32>, Vec<Moments>)> {
+        let Some((work, moments)) = self.work.as_ref().and_then(|work| Some((work, work.moments.as_ref()?)))
+        else {
+            return Ok((Vec::new(), Vec::new()));
+        };
+        let sizes = [u64::from(slots) * WORD, u64::from(slots) * MOMENTS_BYTES];
+        let mut encoder =
+            self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let (from, to) = (&work.gaussians.raw, &moments.gaussians_back.raw);
+        encoder.copy_buffer_to_buffer(from, 0, to, 0, sizes[0]);
+        let (from, to) = (&moments.of_slots.raw, &moments.of_slots_back.raw);
+        encoder.copy_buffer_to_buffer(from, 0, to, 0, sizes[1]);
+        self.gpu.queue().submit([encoder.finish()]);
+        let gaussians = self.gpu.read(&moments.gaussians_back, sizes[0])?;
+        Ok((gaussians, self.gpu.read(&moments.of_slots_back, sizes[1])?))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::sample::{SampleOptions, scene};
+
+    use super::super::device::{Gpu, GpuChoice};
+    use super::super::scene::ShPath;
+    use super::*;
+    use crate::scene::Scene;
+    use crate::surround::surround;
+
+    /// Every sum goes on in the next band where it stopped in the one before.
+    #[test]
+    fn bands_change_not_one_bit() {
+        let gpu = match Gpu::open(GpuChoice::Best) {
+            Ok(gpu) => gpu,
+            Err(error) => {
+                assert!(std::env::var_os("LEXISPLAT_REQUIRE_GPU").is_none(), "{error}");
+                eprintln!("skipped: {error}");
+                return;
+            }
+        };
+        let splats = scene(&SampleOptions::new(3000, 3));
+        let cameras = surround(&splats.geometry, 2, [130, 100], [1.0, 4.0]);
+        let on_gpu = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();
+        let measure =
+            |mut renderer: GpuRenderer| renderer.sensitivity(&on_gpu, &splats.geometry, &cameras, &mut || ());
+        let mut whole = GpuRenderer::new(&gpu).unwrap();
+        let limits = whole.limits;
+        // Less than a view has, more than any row of tiles.
+        let few = 4000;
+        let frame = whole.draw(&on_gpu, &cameras[0], &RenderOptions::default()).unwrap();
+        assert!(frame.stats.bands == 1 && frame.stats.entries > few, "{:?}", frame.stats);
+        let banded = |entries| GpuRenderer::new(&gpu).unwrap().with_limits(RoomLimits { entries, ..limits });
+        let whole = measure(whole).unwrap();
+        assert!(whole.colour.iter().any(|&v| v > 0.0));
+        assert!(whole == measure(banded(few.into())).unwrap());
+        let refused = measure(banded(10));
+        assert!(matches!(refused, Err(Error::Limit { .. })), "{:?}", refused.map(|s| s.len()));
+    }
+}
