@@ -23,7 +23,11 @@ struct Bench {
 impl Bench {
     fn new(gpu: &Gpu, slots: u32) -> Self {
         let room = Room { blocks: slots, chunks: 0, slots, entries: slots, tiles: 1, pixels: 1 };
-        Self { gpu: gpu.clone(), kernels: Kernels::new(gpu).unwrap(), work: Work::new(gpu, room).unwrap() }
+        Self {
+            gpu: gpu.clone(),
+            kernels: Kernels::new(gpu).unwrap(),
+            work: Work::new(gpu, room, false).unwrap(),
+        }
     }
 
     fn planner(&self) -> Planner<'_> {
