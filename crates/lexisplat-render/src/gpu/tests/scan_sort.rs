@@ -1,4 +1,4 @@
-//! Prefix sums and sorting by themselves.
+//! Prefix sums, sorting and dispatches in two dimensions by themselves.
 
 #![expect(
     clippy::cast_possible_truncation,
@@ -88,6 +88,36 @@ fn dispatches_cover_all_groups() {
         let (x, y) = dimensions(groups);
         assert!(x <= MAX_GROUPS && y <= MAX_GROUPS && u64::from(x) * u64::from(y) >= groups.into());
     }
+}
+
+#[test]
+fn more_blocks_than_one_dimension_has_get_slots() {
+    let Some(gpu) = gpu() else { return };
+    let blocks = MAX_GROUPS + 300;
+    let bench = Bench::new(&gpu, blocks);
+    let words = GROUP / u32::BITS;
+    // One Gaussian in most blocks, at a place that varies.
+    let marked: Vec<u32> = (0..blocks).filter(|b| b % 7 != 3).map(|b| b * GROUP + b * 31 % GROUP).collect();
+    let mut masks = vec![0_u32; (blocks * words) as usize];
+    let mut starts = vec![0_u32; blocks as usize];
+    for &i in &marked {
+        masks[(i / u32::BITS) as usize] |= 1 << (i % u32::BITS);
+    }
+    for (b, start) in (0..).zip(&mut starts) {
+        *start = marked.partition_point(|&i| i < b * GROUP) as u32;
+    }
+    bench.fill(&bench.work.masks, &masks);
+    bench.fill(&bench.work.starts, &starts);
+    let frame = Frame { blocks, slots: blocks, ..Frame::default() };
+    gpu.write(&bench.work.frame, bytemuck::bytes_of(&frame));
+    let mut planner = bench.planner();
+    let work = &bench.work;
+    let bound =
+        [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
+    planner.step(&bench.kernels.compact, &bound, Size::Groups(blocks)).unwrap();
+    bench.run(&planner.steps);
+    let found: Vec<u32> = gpu.read_back(&work.gaussians);
+    assert!(found[..marked.len()] == marked);
 }
 
 #[test]

@@ -61,9 +61,10 @@ fn check(name: &str, text: &str, most_shared: u32) -> Vec<String> {
 
 #[test]
 fn every_kernel_is_portable() {
-    let names: Vec<String> =
-        TEXTS.iter().flat_map(|(name, parts)| check(name, &parts.concat(), MOST_SHARED)).collect();
-    assert_eq!(names.len(), 14, "{names:?}");
+    for (name, parts) in TEXTS {
+        assert!(!check(name, &parts.concat(), MOST_SHARED).is_empty(), "{name} has no entry point");
+    }
+    assert!(!check("speed", include_str!("../kernels/speed.wgsl"), MOST_SHARED).is_empty());
 }
 
 #[test]
