@@ -25,6 +25,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
         views.width,
         scene_a.geometry(),
     )?;
+    let mut renderer = Renderer::open(views.device)?;
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
         for (i, camera) in cameras.iter().enumerate() {
@@ -39,7 +40,6 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let mut paths = saved.iter();
     let mut failure = None;
     let options = CompareOptions::new(views.background, args.eight_bit);
-    let mut renderer = Renderer::open(views.device)?;
     let comparison =
         compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
             bars.advance(1);

@@ -42,10 +42,10 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     for path in &paths {
         check_output(path, &[], common.overwrite)?;
     }
-    make_folder(&folder)?;
-    let options = RenderOptions { background: views.background, ..RenderOptions::default() };
     let mut renderer = Renderer::open(views.device)?;
     let prepared = renderer.prepare(scene)?;
+    make_folder(&folder)?;
+    let options = RenderOptions { background: views.background, ..RenderOptions::default() };
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();

@@ -71,6 +71,7 @@ pub(super) fn as_json(model: &Model, packed: Option<&Packed>) -> Result<Value> {
         Some(packed) => {
             let streams = packed.stream_bits()?;
             value["promise"] = json!(packed.promise);
+            value["device"] = packed.drawn_on.as_deref().unwrap_or("cpu").into();
             value["order_kept"] = packed.order.is_some().into();
             value["sh_bytes"] = sh_bytes(&streams).into();
             let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, model))));
@@ -102,6 +103,9 @@ pub(super) fn as_text(out: &mut String, model: &Model, packed: Option<&Packed>) 
     }
     if let Some(promise) = packed.and_then(|p| p.promise.as_ref()) {
         writeln!(out, "pictures: {}", promise_line(promise))?;
+    }
+    if let Some(device) = packed.and_then(|p| p.drawn_on.as_ref()) {
+        writeln!(out, "looked at on: {device}")?;
     }
     if model.degree().rest() > 0 {
         writeln!(out, "error: {}", error_line(record))?;
