@@ -103,12 +103,12 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     let told = compress("gpu.lexi", "gpu");
     let name = told["device"].as_str().unwrap().to_owned();
     assert_ne!(name, "cpu");
-    assert_eq!(folder.json(&["info", "gpu.lexi"])["device"], name.as_str());
+    assert_eq!(folder.json(&["info", "gpu.lexi"])["lexi"]["device"], name.as_str());
     assert!(folder.run(&["info", "gpu.lexi"]).contains(&name));
     assert!(told["promise"]["mean_psnr"].as_f64().unwrap() >= 38.0);
     // What the GPU sees is what the processor sees: the files are of a size.
     let reference = compress("cpu.lexi", "cpu");
-    assert_eq!(folder.json(&["info", "cpu.lexi"])["device"], "cpu");
+    assert_eq!(folder.json(&["info", "cpu.lexi"])["lexi"]["device"], "cpu");
     let ratio = told["file_bytes"].as_f64().unwrap() / reference["file_bytes"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
     // The default is the processor, bit for bit.
