@@ -61,7 +61,7 @@ const NO_COLOUR: f32 = -1.0;
 /// What the GPU counts. Places in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
-    /// Gaussians that may be seen.
+    /// Gaussians that may be seen, of the fullest band if bands see for themselves.
     Found,
     /// Those that have slots: all, but for room.
     Slots,

@@ -57,6 +57,8 @@ pub(super) struct Shape {
     pub(super) height: u32,
     /// Rows of tiles drawn at once.
     pub(super) band_rows: u32,
+    /// Whether each band looks for its own Gaussians, because those of all bands do not fit at once.
+    pub(super) bands_see: bool,
     /// Significant bits of depth keys.
     pub(super) depth_bits: u32,
 }
@@ -142,7 +144,27 @@ fn all(buffer: &Buffer) -> Bound<'_> {
 
 impl Planner<'_> {
     fn plan(mut self, scene: &GpuScene, shape: Shape) -> Result<Plan> {
+        let mut by_depth = 0;
+        let mut first = 0;
+        while first < shape.rows {
+            let rows = shape.band_rows.min(shape.rows - first);
+            if shape.bands_see {
+                by_depth = self.see(scene, shape, first, rows)?;
+            } else if first == 0 {
+                by_depth = self.see(scene, shape, 0, shape.rows)?;
+            }
+            self.band(shape, &self.work.slot_values[by_depth], first, rows)?;
+            first += rows;
+        }
+        Ok(Plan { shape, scene: scene.id, passes: self.passes, _uniforms: self.uniforms })
+    }
+
+    /// Projects, shades and orders what may be seen in some rows of tiles; in which of the two buffers the
+    /// slots then are.
+    fn see(&mut self, scene: &GpuScene, shape: Shape, first: u32, rows: u32) -> Result<usize> {
         let (work, kernels) = (self.work, self.kernels);
+        let tiles = rows * shape.columns;
+        let band = self.gpu.uniform("rows in view", &Band { first, rows, tiles, padding: 0 })?;
         for chunk in &scene.chunks {
             let bound = [
                 (0, all(&work.frame)),
@@ -150,6 +172,7 @@ impl Planner<'_> {
                 (2, all(&chunk.bodies)),
                 (3, all(&work.masks)),
                 (4, all(&work.starts)),
+                (5, all(&band)),
             ];
             self.step(&kernels.cull, &bound, Size::Groups(chunk.blocks))?;
         }
@@ -214,13 +237,8 @@ impl Planner<'_> {
         })?;
         self.end(Stage::Sort);
 
-        let mut first = 0;
-        while first < shape.rows {
-            let rows = shape.band_rows.min(shape.rows - first);
-            self.band(shape, &work.slot_values[by_depth], first, rows)?;
-            first += rows;
-        }
-        Ok(Plan { shape, scene: scene.id, passes: self.passes, _uniforms: self.uniforms })
+        self.uniforms.push(band);
+        Ok(by_depth)
     }
 
     /// Lists and draws some rows of tiles.

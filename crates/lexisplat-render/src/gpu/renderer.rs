@@ -49,7 +49,8 @@ pub type StageTimes = Vec<(Stage, f64)>;
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FrameStats {
-    /// Gaussians that passed the coarse test and were projected and shaded.
+    /// Gaussians that passed the coarse test and were projected and shaded; those of the fullest band where
+    /// bands had to look for their own.
     pub visible: u32,
     /// Pairs of a Gaussian and a tile it may touch.
     pub entries: u32,
@@ -72,6 +73,8 @@ pub struct GpuRenderer {
     pub(super) timer: Option<Timer>,
     /// Rows of tiles drawn at once, once lists were found not to fit.
     pub(super) band_rows: Option<u32>,
+    /// Whether bands look for their own Gaussians, once those of the whole view were found not to fit.
+    pub(super) bands_see: bool,
     pub(super) limits: RoomLimits,
 }
 
@@ -140,6 +143,7 @@ impl GpuRenderer {
             plan: None,
             timer: Timer::new(gpu)?,
             band_rows: None,
+            bands_see: false,
             limits,
         })
     }
@@ -218,7 +222,10 @@ impl GpuRenderer {
                 Some(Missing::Room { slots, entries }) => {
                     self.make_room(scene, shape, Some([slots, entries]))?;
                 }
-                Some(Missing::Bands) => self.band_rows = Some((shape.band_rows / 2).max(1)),
+                Some(Missing::Bands { see }) => {
+                    self.band_rows = Some((shape.band_rows / 2).max(1));
+                    self.bands_see |= see;
+                }
             }
             retries += 1;
         }
@@ -235,17 +242,16 @@ impl GpuRenderer {
             let what = "bytes of a row of tiles".to_owned();
             return Err(Error::Limit { what, found: line, limit: self.limits.pixels });
         }
-        // A picture of another size starts from scratch.
-        if self
-            .plan
-            .as_ref()
-            .is_some_and(|p| (p.shape.width, p.shape.height) != (camera.width, camera.height))
-        {
+        // A picture of another size or scene starts from scratch.
+        let now = (scene.id, camera.width, camera.height);
+        if self.plan.as_ref().is_some_and(|p| (p.scene, p.shape.width, p.shape.height) != now) {
             self.band_rows = None;
+            self.bands_see = false;
         }
         let band_rows = self.band_rows.unwrap_or(rows).min(rows).min(fit);
         let depth_bits = depth_bits(scene, camera);
-        Ok(Shape { columns, rows, width: camera.width, height: camera.height, band_rows, depth_bits })
+        let (width, height, bands_see) = (camera.width, camera.height, self.bands_see);
+        Ok(Shape { columns, rows, width, height, band_rows, bands_see, depth_bits })
     }
 
     /// Makes sure that buffers are large enough for the scene and the picture, and for as many slots and
@@ -304,8 +310,6 @@ impl GpuRenderer {
 
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.clear_buffer(&work.counters.raw, 0, None);
-        // The place after the last block's, which no kernel writes.
-        encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
         if let Some(moments) = &work.moments {
             encoder.clear_buffer(&moments.of_slots.raw, 0, None);
         }
@@ -321,6 +325,10 @@ impl GpuRenderer {
             });
             if timestamp_writes.is_some() {
                 timed.push(stage.stage);
+            }
+            if stage.stage == Stage::Cull {
+                // The place after the last block's, which `cull` does not write.
+                encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
             }
             if stage.stage == Stage::Tiles {
                 encoder.clear_buffer(&work.ranges.raw, 0, None);
@@ -393,11 +401,16 @@ impl GpuRenderer {
         };
         let slots = found[Counter::Found as usize];
         if slots > room.slots {
-            if u64::from(slots) > self.limits.slots {
-                let what = "Gaussians in view".to_owned();
+            if u64::from(slots) <= self.limits.slots {
+                return Ok(Some(Missing::Room { slots: spare(slots, self.limits.slots), entries: 0 }));
+            }
+            // Moments are summed over bands in slots, which must stay the same.
+            let one = shape.bands_see && shape.band_rows == 1;
+            if one || self.kernels.moments.is_some() {
+                let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" }.to_owned();
                 return Err(Error::Limit { what, found: slots.into(), limit: self.limits.slots });
             }
-            return Ok(Some(Missing::Room { slots: spare(slots, self.limits.slots), entries: 0 }));
+            return Ok(Some(Missing::Bands { see: true }));
         }
         let entries = found[Counter::EntriesMost as usize];
         if entries > room.entries {
@@ -408,7 +421,7 @@ impl GpuRenderer {
                 let what = "pairs of a Gaussian and a tile in one row of tiles".to_owned();
                 return Err(Error::Limit { what, found: entries.into(), limit: self.limits.entries });
             }
-            return Ok(Some(Missing::Bands));
+            return Ok(Some(Missing::Bands { see: false }));
         }
         Ok(None)
     }
@@ -416,8 +429,14 @@ impl GpuRenderer {
 
 /// What a view lacked.
 enum Missing {
-    Room { slots: u32, entries: u32 },
-    Bands,
+    Room {
+        slots: u32,
+        entries: u32,
+    },
+    /// Bands of half as many rows; whether each must look for its own Gaussians.
+    Bands {
+        see: bool,
+    },
 }
 
 /// Significant bits of depth keys: those of the farthest corner of what can be seen.

@@ -61,6 +61,7 @@ impl GpuRenderer {
             plan: None,
             timer: None,
             band_rows: None,
+            bands_see: false,
             limits,
         })
     }

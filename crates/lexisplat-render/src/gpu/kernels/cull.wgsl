@@ -7,6 +7,8 @@
 @group(0) @binding(3) var<storage, read_write> masks: array<u32>;
 // Gaussians marked in each block.
 @group(0) @binding(4) var<storage, read_write> starts: array<u32>;
+// Rows of tiles that are looked at: all of the picture's, or some where all at once would see too much.
+@group(0) @binding(5) var<uniform> band: Band;
 
 var<workgroup> words: array<atomic<u32>, MASK_WORDS>;
 
@@ -27,7 +29,11 @@ fn may_be_seen(body: vec4<f32>) -> bool {
     let centre = ((ratio / frame.tangents + 1.0) * frame.size - 1.0) * 0.5;
     // Two pixels more than a tile, since the centre is rounded otherwise here.
     let margin = radius + f32(TILE) + 2.0;
-    return all(centre > vec2<f32>(-margin)) && all(centre < frame.size + margin);
+    let top = f32(band.first * TILE);
+    let bottom = f32((band.first + band.rows) * TILE);
+    let low = vec2<f32>(0.0, top) - margin;
+    let high = vec2<f32>(frame.size.x, bottom) + margin;
+    return all(centre > low) && all(centre < high);
 }
 
 @compute @workgroup_size(GROUP)

@@ -24,7 +24,7 @@ fn plan_slots() {
     let found = starts[frame.blocks];
     let n = min(found, frame.slots);
     let blocks = pieces(n, SORT_BLOCK);
-    counters[COUNTER_FOUND] = found;
+    counters[COUNTER_FOUND] = max(counters[COUNTER_FOUND], found);
     counters[COUNTER_SLOTS] = n;
     counters[COUNTER_SLOTS_AND_END] = n + 1u;
     counters[COUNTER_SLOT_BLOCKS] = blocks;

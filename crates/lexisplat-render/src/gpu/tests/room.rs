@@ -21,18 +21,27 @@ fn draw(gpu: &Gpu, limits: RoomLimits, camera: &Camera) -> Result<(Image, FrameS
 }
 
 #[test]
-fn too_many_gaussians_are_an_error() {
+fn bands_look_for_their_own_gaussians_where_all_are_too_many() {
     let Some(gpu) = gpu() else { return };
     let camera = made::camera(1, 100, 120);
-    let (_, stats) = draw(&gpu, PLENTY, &camera).unwrap();
-    let exact = RoomLimits { slots: stats.visible.into(), ..PLENTY };
-    assert!(draw(&gpu, exact, &camera).is_ok());
-    let Err(Error::Limit { what, found, limit }) =
-        draw(&gpu, RoomLimits { slots: exact.slots - 1, ..PLENTY }, &camera)
+    let (whole, stats) = draw(&gpu, PLENTY, &camera).unwrap();
+    let all = u64::from(stats.visible);
+    let exact = RoomLimits { slots: all, ..PLENTY };
+    assert_eq!(draw(&gpu, exact, &camera).unwrap().1.bands, 1);
+    let (cut, cut_stats) = draw(&gpu, RoomLimits { slots: all - 1, ..PLENTY }, &camera).unwrap();
+    assert!(cut_stats.bands > 1 && cut_stats.retries > 0, "{cut_stats:?}");
+    assert!(u64::from(cut_stats.visible) < all);
+    assert_eq!(cut_stats.entries, stats.entries);
+    assert!(bits(&cut) == bits(&whole));
+    // With lists cut as well.
+    let both = RoomLimits { slots: all - 1, entries: u64::from(stats.entries) / 3, ..PLENTY };
+    assert!(bits(&draw(&gpu, both, &camera).unwrap().0) == bits(&whole));
+    let Err(Error::Limit { what, found, limit }) = draw(&gpu, RoomLimits { slots: 10, ..PLENTY }, &camera)
     else {
         panic!("drew more Gaussians than there is room for")
     };
-    assert_eq!((what.as_str(), found, limit), ("Gaussians in view", exact.slots, exact.slots - 1));
+    assert_eq!((what.as_str(), limit), ("Gaussians in one row of tiles", 10));
+    assert!(found > 10 && found < all);
 }
 
 #[test]
