@@ -296,8 +296,8 @@ pub(crate) struct Compare {
 
 /// Open a window on one or two scenes: fly, wipe, difference, live PSNR, compress.
 ///
-/// Drag to orbit, with shift to pan, with ctrl to look around; wheel to come nearer; W A S D Q E to fly; [ and ]
-/// for the cameras; 1 to 5 for first, second, side by side, wipe, difference; P for a screenshot. A file
+/// Drag to orbit, with shift to pan, with ctrl to look around; wheel to come nearer; W A S D Q E to fly; the square
+/// brackets for the cameras; 1 to 5 for first, second, side by side, wipe, difference; P for a screenshot. A file
 /// dropped on the window becomes the second model, or the first if shift is held or none is open.
 #[cfg(feature = "view")]
 #[derive(Debug, Args)]

@@ -21,7 +21,7 @@ const GAUSSIANS_PER_BYTE: u64 = 3;
 /// Writes `packed` to `path`, whole or not at all. Returns the file's size in bytes.
 ///
 /// # Errors
-/// [`Error::Io`] for the file.
+/// [`crate::Error::Io`] for the file.
 pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
     draft(packed).save(path)
 }
@@ -29,7 +29,7 @@ pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
 /// Writes `packed` to `writer`. Returns the number of bytes.
 ///
 /// # Errors
-/// [`Error::Io`], which names no file.
+/// [`crate::Error::Io`], which names no file.
 pub fn write_packed_to(writer: &mut impl Write, packed: &Packed) -> Result<u64> {
     draft(packed).stream(writer)
 }
