@@ -12,17 +12,21 @@
 //!
 //! Kernels ask for no more than WebGPU's defaults: 8 storage buffers, 256 lanes, 16 KiB of workgroup memory
 //! (but [`ShPath::SparseShared`] with a large dictionary). Scenes larger than a binding are cut into chunks,
-//! pictures whose lists are larger into bands.
+//! pictures whose lists are larger into bands, which look for their own Gaussians where those of the whole
+//! view are too many.
 
 mod columns;
 mod constants;
 mod device;
 mod moments;
+mod path;
 mod plan;
+mod radiance;
 mod renderer;
 mod scene;
 mod sensitivity;
 mod shaders;
+mod source;
 mod speed;
 mod table;
 #[cfg(test)]
@@ -33,7 +37,8 @@ mod work;
 pub use wgpu;
 
 pub use device::{AdapterSummary, Gpu, GpuChoice, adapters};
+pub use path::ShPath;
 pub use plan::Stage;
 pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};
-pub use scene::{GpuScene, SceneBytes, ShPath};
+pub use scene::{GpuScene, SceneBytes};
 pub use speed::{Speed, measure_speed};

@@ -10,8 +10,9 @@ use crate::image::Image;
 
 use super::constants::{COUNTERS, Counter, KEY_FIRST};
 use super::device::{Buffer, Gpu};
+use super::path::ShPath;
 use super::plan::{Plan, Shape, Size, Stage, dimensions};
-use super::scene::{GpuScene, ShPath};
+use super::scene::GpuScene;
 use super::shaders::Kernels;
 use super::uniforms::Frame as FrameUniform;
 use super::work::{ENTRY_ELEMENT, PIXEL, Room, SLOT_ELEMENT, Work};

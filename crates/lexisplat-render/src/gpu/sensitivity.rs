@@ -90,7 +90,7 @@ mod tests {
     use lexisplat::sample::{SampleOptions, scene};
 
     use super::super::device::{Gpu, GpuChoice};
-    use super::super::scene::ShPath;
+    use super::super::path::ShPath;
     use super::*;
     use crate::scene::Scene;
     use crate::surround::surround;

@@ -9,10 +9,83 @@ use lexisplat::Dictionary;
 use lexisplat::sh::rest_basis;
 use rayon::prelude::*;
 
+use crate::error::{Error, Result};
+
 use super::constants::TABLE_SIDE;
+use super::device::{Counted, Gpu};
+use super::shaders::Bound;
 
 /// Faces of a cube: +x, -x, +y, -y, +z, -z.
-pub(super) const FACES: u32 = 6;
+const FACES: u32 = 6;
+
+/// The table on the GPU.
+#[derive(Debug)]
+pub(super) struct Table {
+    pub(super) view: wgpu::TextureView,
+    pub(super) sampler: wgpu::Sampler,
+    bytes: Counted,
+}
+
+impl Table {
+    pub(super) fn new(gpu: &Gpu, dictionary: &Dictionary) -> Result<Self> {
+        let side = TABLE_SIDE;
+        let layers = u32::try_from(dictionary.len()).unwrap_or(u32::MAX).max(1);
+        let most = gpu.limits().max_texture_array_layers;
+        if layers > most {
+            let expected = format!("at most {most} atoms for this GPU's texture layers");
+            return Err(Error::parameter("dictionary", format!("{layers} atoms"), expected));
+        }
+        let size = wgpu::Extent3d { width: FACES * side, height: side, depth_or_array_layers: layers };
+        let texel = size_of::<[f16; 4]>();
+        let texture = gpu.checked("table", || {
+            gpu.device().create_texture(&wgpu::TextureDescriptor {
+                label: Some("atom radiance"),
+                size,
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba16Float,
+                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+                view_formats: &[],
+            })
+        })?;
+        let texels: Vec<u16> = texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
+        let per_row = u32::try_from(texel).unwrap_or(0) * size.width;
+        if !dictionary.is_empty() {
+            gpu.queue().write_texture(
+                texture.as_image_copy(),
+                bytemuck::cast_slice(&texels),
+                wgpu::TexelCopyBufferLayout {
+                    offset: 0,
+                    bytes_per_row: Some(per_row),
+                    rows_per_image: Some(side),
+                },
+                size,
+            );
+        }
+        let bytes = gpu.count(u64::from(per_row) * u64::from(side) * u64::from(layers));
+        let view = texture.create_view(&wgpu::TextureViewDescriptor {
+            dimension: Some(wgpu::TextureViewDimension::D2Array),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        let sampler = gpu.device().create_sampler(&wgpu::SamplerDescriptor {
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..wgpu::SamplerDescriptor::default()
+        });
+        Ok(Self { view, sampler, bytes })
+    }
+
+    /// Bytes of the texels.
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes.size()
+    }
+
+    /// What radiance is given after the buffers.
+    pub(super) fn bound(&self) -> [(u32, Bound<'_>); 2] {
+        [(10, Bound::Texture(&self.view)), (11, Bound::Sampler(&self.sampler))]
+    }
+}
 
 /// The direction of the texel at `column`, `row` of face `face`.
 fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
@@ -30,7 +103,7 @@ fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
 }
 
 /// RGBA texels of all layers, one layer an atom, rows of six faces.
-pub(super) fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
+fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
     let degree = dictionary.degree();
     let per_channel = degree.rest_per_channel();
     let width = FACES * TABLE_SIDE;

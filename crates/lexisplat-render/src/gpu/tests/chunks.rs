@@ -3,7 +3,7 @@
 use lexisplat::ShDegree;
 
 use super::super::constants::GROUP;
-use super::super::scene::Source;
+use super::super::source::Source;
 use super::super::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use super::{adapter, bits, gpu, made};
 use crate::cpu::RenderOptions;

@@ -5,8 +5,10 @@ use naga::valid::{Capabilities, FunctionInfo, ModuleInfo, ValidationFlags, Valid
 use naga::{AddressSpace, GlobalVariable, Module};
 
 use super::super::constants::declarations;
-use super::super::scene::{ShPath, Source, radiance_text};
+use super::super::path::ShPath;
+use super::super::radiance::radiance_text;
 use super::super::shaders::TEXTS;
+use super::super::source::Source;
 use super::made;
 use crate::scene::Scene;
 

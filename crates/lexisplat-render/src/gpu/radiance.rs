@@ -1,0 +1,77 @@
+//! The radiance kernel of a scene: its text depends on how SH is held, on the degree and the dictionary.
+
+use crate::error::{Error, Result};
+
+use super::constants::{atom_terms, dense_terms, shared_atom_terms, vectors};
+use super::device::Gpu;
+use super::path::ShPath;
+use super::shaders::{compile, pipeline};
+use super::source::Source;
+
+/// Bytes that the shared path leaves of workgroup memory for the compiler's own use.
+const SHARED_RESERVE: usize = 64;
+
+pub(super) fn radiance_pipeline(
+    gpu: &Gpu,
+    source: &Source<'_>,
+    path: ShPath,
+) -> Result<wgpu::ComputePipeline> {
+    if let (Source::Codes(model), ShPath::SparseShared) = (source, path) {
+        let shared = size_of_val(model.dictionary.as_slice());
+        let most = gpu.limits().max_compute_workgroup_storage_size as usize;
+        if shared + SHARED_RESERVE > most {
+            let expected = format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
+            return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
+        }
+    }
+    pipeline(gpu, &compile(gpu, path.name(), &radiance_text(source, path))?, "radiance")
+}
+
+/// The kernel that colours scenes like `source`.
+pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
+    let common = concat!(include_str!("kernels/frame.wgsl"), include_str!("kernels/radiance.wgsl"));
+    let codes = include_str!("kernels/radiance_sparse.wgsl");
+    match source {
+        Source::Dense { scene, half } => {
+            let per_channel = scene.degree().rest_per_channel();
+            let load = |v: usize| {
+                let at = format!("rows[row + {v}u]");
+                if *half {
+                    format!("vec4<f32>(unpack2x16float({at}.x), unpack2x16float({at}.y))")
+                } else {
+                    at
+                }
+            };
+            let terms = dense_terms(per_channel, load);
+            let row = if *half { "vec2<u32>" } else { "vec4<f32>" };
+            let vectors = vectors(per_channel + 1);
+            let dense = include_str!("kernels/radiance_dense.wgsl")
+                .replace("ROW_TYPE", row)
+                .replace("// DENSE_TERMS", &terms);
+            format!("const ROW_VECTORS: u32 = {vectors}u;\n{common}{dense}")
+        }
+        Source::Codes(model) => {
+            let dictionary = &model.dictionary;
+            let entry = match path {
+                ShPath::SparseOrdered => include_str!("kernels/radiance_ordered.wgsl"),
+                ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
+                ShPath::SparseTable => include_str!("kernels/radiance_table.wgsl"),
+                _ => include_str!("kernels/radiance_codes.wgsl"),
+            };
+            let (index, value) = (model.codes.indices().width(), model.codes.values().width());
+            let per_channel = dictionary.degree().rest_per_channel();
+            let codes = codes.replace("// ATOM_TERMS", &atom_terms(per_channel));
+            let entry = entry.replace("// SHARED_TERMS", &shared_atom_terms(per_channel));
+            format!(
+                "const INDEX_BYTES: u32 = {index}u;\nconst INDEX_MASK: u32 = {}u;\n\
+                 const VALUE_BYTES: u32 = {value}u;\nconst ATOMS: u32 = {}u;\nconst DIM: u32 = {}u;\n\
+                 const ATOM_VECTORS: u32 = {}u;\nconst DICTIONARY: u32 = {}u;\n{common}{codes}{entry}",
+                if index == 1 { 0xff } else { 0xffff },
+                dictionary.len(),
+                dictionary.dim().max(1),
+                vectors(per_channel),
+                dictionary.as_slice().len().max(1),
+            )
+        }
+    }
+}
