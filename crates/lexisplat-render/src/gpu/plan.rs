@@ -1,5 +1,7 @@
 //! Which kernels run on what, in which order.
 
+use std::sync::{Arc, Weak};
+
 use crate::error::Result;
 
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
@@ -67,6 +69,7 @@ pub(super) struct Shape {
 pub(super) struct Plan {
     pub(super) shape: Shape,
     pub(super) scene: u64,
+    scene_lives: Weak<()>,
     pub(super) passes: Vec<StagePass>,
     /// Alive as long as the bindings.
     _uniforms: Vec<Buffer>,
@@ -136,6 +139,11 @@ impl Plan {
             Planner { gpu, kernels, work, uniforms: Vec::new(), steps: Vec::new(), passes: Vec::new() };
         planner.plan(scene, shape)
     }
+
+    /// Whether its scene is still there.
+    pub(super) fn is_of_use(&self) -> bool {
+        self.scene_lives.strong_count() > 0
+    }
 }
 
 fn all(buffer: &Buffer) -> Bound<'_> {
@@ -156,7 +164,8 @@ impl Planner<'_> {
             self.band(shape, &self.work.slot_values[by_depth], first, rows)?;
             first += rows;
         }
-        Ok(Plan { shape, scene: scene.id, passes: self.passes, _uniforms: self.uniforms })
+        let scene_lives = Arc::downgrade(&scene.lives);
+        Ok(Plan { shape, scene: scene.id, scene_lives, passes: self.passes, _uniforms: self.uniforms })
     }
 
     /// Projects, shades and orders what may be seen in some rows of tiles; in which of the two buffers the

@@ -1,5 +1,7 @@
 //! Drawing a scene.
 
+use std::collections::HashMap;
+
 use lexisplat::ShDegree;
 
 use crate::camera::Camera;
@@ -25,6 +27,10 @@ const SPARE: f64 = 1.125;
 const MAX_ENTRIES: u64 = 1 << 26;
 /// Passes timed at most; a view drawn in more bands than that is timed no further.
 const MAX_TIMED: u32 = 1024;
+/// Plans kept: two scenes in turn, from cameras whose depths need a bit more or less.
+const MAX_PLANS: usize = 4;
+/// Cuts remembered before all are forgotten.
+const MAX_CUTS: usize = 64;
 /// Bytes of a time stamp.
 const STAMP: u64 = 8;
 
@@ -70,12 +76,11 @@ pub struct GpuRenderer {
     pub(super) gpu: Gpu,
     pub(super) kernels: Kernels,
     pub(super) work: Option<Work>,
-    pub(super) plan: Option<Plan>,
+    /// Of the last scenes and sizes, the latest last.
+    pub(super) plans: Vec<Plan>,
     pub(super) timer: Option<Timer>,
-    /// Rows of tiles drawn at once, once lists were found not to fit.
-    pub(super) band_rows: Option<u32>,
-    /// Whether bands look for their own Gaussians, once those of the whole view were found not to fit.
-    pub(super) bands_see: bool,
+    /// How scenes' pictures of a size are cut, once they were found not to fit as they are.
+    pub(super) cuts: HashMap<Subject, Cut>,
     pub(super) limits: RoomLimits,
 }
 
@@ -83,6 +88,18 @@ impl std::fmt::Debug for GpuRenderer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("GpuRenderer").field("gpu", self.gpu.summary()).finish_non_exhaustive()
     }
+}
+
+/// A scene, by its number, and a picture's width and height.
+pub(super) type Subject = (u64, u32, u32);
+
+/// How a picture is cut into bands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Cut {
+    /// Rows of tiles drawn at once.
+    rows: u32,
+    /// Whether bands look for their own Gaussians.
+    see: bool,
 }
 
 /// Largest arrays.
@@ -141,10 +158,9 @@ impl GpuRenderer {
             gpu: gpu.clone(),
             kernels: Kernels::new(gpu)?,
             work: None,
-            plan: None,
+            plans: Vec::new(),
             timer: Timer::new(gpu)?,
-            band_rows: None,
-            bands_see: false,
+            cuts: HashMap::new(),
             limits,
         })
     }
@@ -159,7 +175,7 @@ impl GpuRenderer {
     /// The buffers that the last picture was drawn with, and how it was cut.
     #[cfg(test)]
     pub(super) fn inside(&self) -> (&Work, Shape) {
-        (self.work.as_ref().unwrap(), self.plan.as_ref().unwrap().shape)
+        (self.work.as_ref().unwrap(), self.plans.last().unwrap().shape)
     }
 
     /// Draws `scene` as `camera` sees it and brings the picture back.
@@ -224,8 +240,8 @@ impl GpuRenderer {
                     self.make_room(scene, shape, Some([slots, entries]))?;
                 }
                 Some(Missing::Bands { see }) => {
-                    self.band_rows = Some((shape.band_rows / 2).max(1));
-                    self.bands_see |= see;
+                    let cut = Cut { rows: (shape.band_rows / 2).max(1), see: see || shape.bands_see };
+                    self.cuts.insert(subject(scene, camera), cut);
                 }
             }
             retries += 1;
@@ -243,15 +259,14 @@ impl GpuRenderer {
             let what = "bytes of a row of tiles".to_owned();
             return Err(Error::Limit { what, found: line, limit: self.limits.pixels });
         }
-        // A picture of another size or scene starts from scratch.
-        let now = (scene.id, camera.width, camera.height);
-        if self.plan.as_ref().is_some_and(|p| (p.scene, p.shape.width, p.shape.height) != now) {
-            self.band_rows = None;
-            self.bands_see = false;
+        if self.cuts.len() > MAX_CUTS {
+            self.cuts.clear();
         }
-        let band_rows = self.band_rows.unwrap_or(rows).min(rows).min(fit);
+        let whole = Cut { rows, see: false };
+        let cut = self.cuts.get(&subject(scene, camera)).copied().unwrap_or(whole);
+        let (band_rows, bands_see) = (cut.rows.min(rows).min(fit), cut.see);
         let depth_bits = depth_bits(scene, camera);
-        let (width, height, bands_see) = (camera.width, camera.height, self.bands_see);
+        let (width, height) = (camera.width, camera.height);
         Ok(Shape { columns, rows, width, height, band_rows, bands_see, depth_bits })
     }
 
@@ -280,7 +295,7 @@ impl GpuRenderer {
         };
         if self.work.as_ref().is_none_or(|work| work.room != room) {
             // The old buffers go first: both together may not fit.
-            self.plan = None;
+            self.plans.clear();
             self.work = None;
             self.work = Some(Work::new(&self.gpu, room, self.kernels.moments.is_some())?);
         }
@@ -300,10 +315,18 @@ impl GpuRenderer {
         let Some(work) = &self.work else {
             return Err(Error::Gpu { problem: "no buffers".to_owned() });
         };
-        if self.plan.as_ref().is_none_or(|plan| plan.scene != scene.id || plan.shape != shape) {
-            self.plan = Some(Plan::new(gpu, &self.kernels, scene, work, shape)?);
+        // A plan holds on to its scene's buffers.
+        self.plans.retain(Plan::is_of_use);
+        let known = self.plans.iter().position(|plan| plan.scene == scene.id && plan.shape == shape);
+        let plan = match known {
+            Some(place) => self.plans.remove(place),
+            None => Plan::new(gpu, &self.kernels, scene, work, shape)?,
+        };
+        if self.plans.len() >= MAX_PLANS {
+            self.plans.remove(0);
         }
-        let Some(plan) = &self.plan else {
+        self.plans.push(plan);
+        let Some(plan) = self.plans.last() else {
             return Err(Error::Gpu { problem: "no plan".to_owned() });
         };
         let uniform = frame_uniform(scene, camera, options, degree, shape, work.room);
@@ -426,6 +449,10 @@ impl GpuRenderer {
         }
         Ok(None)
     }
+}
+
+fn subject(scene: &GpuScene, camera: &Camera) -> Subject {
+    (scene.id, camera.width, camera.height)
 }
 
 /// What a view lacked.

@@ -1,6 +1,7 @@
 //! A scene on the GPU.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use lexisplat::{Geometry, ShDegree};
@@ -31,6 +32,8 @@ pub struct SceneBytes {
 #[derive(Debug)]
 pub struct GpuScene {
     pub(super) id: u64,
+    /// Gone when the scene is.
+    pub(super) lives: Arc<()>,
     pub(super) chunks: Vec<ChunkBuffers>,
     pub(super) chunk_blocks: Buffer,
     pub(super) radiance: wgpu::ComputePipeline,
@@ -90,6 +93,7 @@ impl GpuScene {
         let radiance = radiance_pipeline(gpu, &source, path)?;
         let mut this = Self {
             id: NEXT_ID.fetch_add(1, Relaxed),
+            lives: Arc::default(),
             chunks: Vec::new(),
             chunk_blocks: gpu.upload::<u32>("chunk blocks", &[0])?,
             radiance,

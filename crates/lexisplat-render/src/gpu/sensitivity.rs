@@ -1,5 +1,7 @@
 //! Sensitivities measured on the GPU. Twin: `cpu::sensitivity`.
 
+use std::collections::HashMap;
+
 use lexisplat::{Geometry, Sensitivity};
 
 use crate::camera::Camera;
@@ -45,7 +47,7 @@ impl GpuRenderer {
 
     /// A renderer that also works out moments. This one gives up its buffers: both together may not fit.
     fn measuring(&mut self) -> Result<Self> {
-        self.plan = None;
+        self.plans.clear();
         self.work = None;
         let mut kernels = self.kernels.clone();
         kernels.moments = Some(MomentKernels::new(&self.gpu)?);
@@ -58,10 +60,9 @@ impl GpuRenderer {
             gpu: self.gpu.clone(),
             kernels,
             work: None,
-            plan: None,
+            plans: Vec::new(),
             timer: None,
-            band_rows: None,
-            bands_see: false,
+            cuts: HashMap::new(),
             limits,
         })
     }

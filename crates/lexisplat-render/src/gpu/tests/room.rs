@@ -111,3 +111,31 @@ fn bytes_are_counted_and_given_back() {
     }
     assert!(gpu.most_bytes() > 0);
 }
+
+#[test]
+fn scenes_in_turn_are_drawn_without_trying_again() {
+    let Some(gpu) = gpu() else { return };
+    let camera = made::camera(1, 100, 120);
+    let options = RenderOptions::default();
+    let (_, stats) = draw(&gpu, PLENTY, &camera).unwrap();
+    let limits = RoomLimits { entries: u64::from(stats.entries) / 3, ..PLENTY };
+    let mut renderer = GpuRenderer::new(&gpu).unwrap().with_limits(limits);
+    let scenes = [8, 9].map(|seed| {
+        let splats = made::scene(seed, 1500, ShDegree::ONE, false);
+        GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap()
+    });
+    let first = scenes.each_ref().map(|scene| renderer.render(scene, &camera, &options).unwrap());
+    assert!(first.iter().all(|(_, stats)| stats.retries > 0 && stats.bands > 1));
+    for (scene, (picture, _)) in scenes.iter().zip(&first) {
+        let (again, stats) = renderer.render(scene, &camera, &options).unwrap();
+        assert_eq!(stats.retries, 0);
+        assert!(bits(&again) == bits(picture));
+    }
+    // What was kept for a scene goes with it.
+    let [one, other] = scenes;
+    assert!(renderer.plans.iter().any(|plan| plan.scene == one.id));
+    let gone = one.id;
+    drop(one);
+    renderer.render(&other, &camera, &options).unwrap();
+    assert!(renderer.plans.iter().all(|plan| plan.scene != gone));
+}
