@@ -116,9 +116,14 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
         return ExitCode::SUCCESS;
     }
     let (code, help) = classify(error);
-    let mut line = format!("{error:#}");
-    line = line.replace('\n', " ");
-    eprintln!("error: {line}");
+    let mut line = error.to_string();
+    for cause in error.chain().skip(1).map(ToString::to_string) {
+        // Most errors already say what their cause said.
+        if !line.contains(&cause) {
+            line = format!("{line}: {cause}");
+        }
+    }
+    eprintln!("error: {}", line.replace('\n', " "));
     if let Some(help) = help {
         eprintln!("help: {help}");
     }

@@ -190,6 +190,7 @@ fn each_blame_has_its_exit_code() {
     folder.fail(&["compress", "scene.ply", "--pursuit", "magic"], 2);
     let error = folder.fail(&["compress", "missing.ply"], 3);
     assert!(error.contains("missing.ply"), "{error}");
+    assert_eq!(error.matches("(os error 2)").count(), 1, "said once: {error}");
     folder.fail(&["compress", "scene.ply", "-o", "no/such/folder/x.lexi"], 3);
     std::fs::write(folder.path("text.ply"), "hello").unwrap();
     folder.fail(&["compress", "text.ply"], 4);

@@ -133,6 +133,9 @@ fn bench_measures_every_path_by_stage() {
         assert!(path["frame"]["median"].as_f64().unwrap() > 0.0, "{path}");
         assert_eq!(path["views"].as_object().unwrap().len(), 2, "{path}");
         assert!(path["visible"].as_f64().unwrap() > 100.0, "{path}");
+        let bytes = |key: &str| path[key].as_f64().unwrap();
+        assert!(bytes("geometry_bytes_per_frame") > 16.0 * folder::GAUSSIANS as f64, "{path}");
+        assert!(bytes("shading_bytes_per_frame") > 32.0 * bytes("visible"), "{path}");
         assert!(told["radiance_model"][name]["predicted"].as_f64().unwrap() > 0.0, "{told}");
     }
     assert_eq!(named("dense-f32")["sh_bytes"], folder::GAUSSIANS * 192);

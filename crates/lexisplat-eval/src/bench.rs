@@ -81,6 +81,10 @@ pub struct PathTimes {
     pub sh_bytes: u64,
     /// Bytes that shading one visible Gaussian moves: slot, position, SH, colour.
     pub shading_bytes: f64,
+    /// Bytes that a frame moves to shade all visible ones.
+    pub shading_bytes_per_frame: f64,
+    /// Bytes of geometry that it reads to look for and project them. 0 on the processor.
+    pub geometry_bytes_per_frame: f64,
 }
 
 impl PathTimes {
@@ -154,6 +158,8 @@ fn run(
         geometry_bytes: 0,
         sh_bytes: 0,
         shading_bytes: 0.0,
+        shading_bytes_per_frame: 0.0,
+        geometry_bytes_per_frame: 0.0,
     })
 }
 
@@ -188,6 +194,8 @@ pub fn bench_gpu(
         geometry_bytes: bytes.geometry,
         sh_bytes: bytes.sh,
         shading_bytes: uploaded.shading_bytes(),
+        shading_bytes_per_frame: times.visible * uploaded.shading_bytes(),
+        geometry_bytes_per_frame: uploaded.looking_bytes(times.visible),
         ..times
     })
 }

@@ -246,6 +246,15 @@ impl Report<'_> {
                 times.visible, times.entries
             )?;
         }
+        for times in self.results.iter().filter(|times| times.shading_bytes_per_frame > 0.0) {
+            writeln!(
+                out,
+                "{:<14} a frame moves {:.2} MB to shade, and reads {:.2} MB of geometry",
+                times.path,
+                times.shading_bytes_per_frame / 1e6,
+                times.geometry_bytes_per_frame / 1e6
+            )?;
+        }
         self.model_text(&mut out)?;
         Ok(out)
     }

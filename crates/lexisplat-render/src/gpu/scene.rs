@@ -222,6 +222,14 @@ impl GpuScene {
         own + (slot + body + colour) as f64
     }
 
+    /// Bytes of geometry read to look for and project `visible` Gaussians: the positions of all, and slot,
+    /// position and shape of those.
+    #[must_use]
+    pub fn looking_bytes(&self, visible: f64) -> f64 {
+        let (slot, body, shape) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 8]>());
+        body as f64 * f64::from(self.len) + visible * (slot + body + shape) as f64
+    }
+
     /// The GPU that holds it.
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
