@@ -4,6 +4,10 @@
 //! the same [`Radiance`] interface, the compressed one straight from its sparse codes. The rules are
 //! those of the 3DGS authors' rasteriser, number by number: see [`conventions`].
 //!
+//! [`render`] draws on the processor, the same bits on every machine. With the feature `gpu` (on by default)
+//! the module `gpu` draws the same pictures through Vulkan, Metal or DX12; [`Renderer`] is one interface to
+//! both.
+//!
 //! ```
 //! use lexisplat::{Geometry, ShDegree, Splats};
 //! use lexisplat_render::{RenderOptions, Scene, orbit, render};
