@@ -170,7 +170,8 @@ def main():
     options = ["--cameras", args.cameras, "--split", args.split, "--width", args.width, "--device", args.device]
     report = json.loads(lexisplat("bench", args.model, *options, "--repeat", args.repeat, "--warmup", WARMUP, "--cpu-repeat", 1, "-q", "--json"))
     for path in report["paths"]:
-        print(f"{path['path']:<14} {path['fps']:8.1f} fps, median {path['frame']['median']:.3f} ms, on {report['device'] or 'cpu'}")
+        device = "the processor" if path["path"].startswith("cpu") else report["device"]
+        print(f"{path['path']:<14} {path['fps']:8.1f} fps, median {path['frame']['median']:.3f} ms, on {device}")
     if found:
         compare_pictures(args, options, cameras, found)
 
