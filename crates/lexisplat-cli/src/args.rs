@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lexisplat::packed::Preset;
-use lexisplat::{Layout, Pursuit};
-use lexisplat_render::Device;
+use lexisplat::{Geometry, Layout, Pursuit};
+use lexisplat_eval::choose_views;
 use lexisplat_render::gpu::ShPath;
+use lexisplat_render::{Camera, Device};
 
 use crate::exit::CODES;
 
@@ -246,6 +247,13 @@ pub(crate) struct Views {
     /// `lexisplat devices`.
     #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu|N")]
     pub(crate) device: Device,
+}
+
+impl Views {
+    /// The cameras that these options mean for a scene.
+    pub(crate) fn choose(&self, geometry: &Geometry) -> lexisplat_eval::Result<Vec<Camera>> {
+        choose_views(self.cameras.as_deref(), self.split.into(), self.orbit, self.width, geometry)
+    }
 }
 
 #[derive(Debug, Clone, Copy, ValueEnum)]

@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::cpu::{RenderOptions, render, sensitivity};
 use crate::error::{Error, Result};
 #[cfg(feature = "gpu")]
-use crate::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath, adapters};
+use crate::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use crate::image::Image;
 use crate::scene::Scene;
 
@@ -24,6 +24,22 @@ pub enum Device {
     Gpu,
     /// The GPU at this place in `gpu::adapters`.
     Index(usize),
+}
+
+#[cfg(feature = "gpu")]
+impl Device {
+    /// The GPU that this means, or `None` if it means the processor.
+    ///
+    /// # Errors
+    /// As [`Renderer::open`].
+    pub fn open_gpu(self) -> Result<Option<Gpu>> {
+        match self {
+            Self::Cpu => Ok(None),
+            Self::Auto => Gpu::find(GpuChoice::Hardware),
+            Self::Gpu => Gpu::open(GpuChoice::Best).map(Some),
+            Self::Index(index) => Gpu::open(GpuChoice::Index(index)).map(Some),
+        }
+    }
 }
 
 impl FromStr for Device {
@@ -78,14 +94,7 @@ impl Renderer {
     /// number out of range.
     #[cfg(feature = "gpu")]
     pub fn open(device: Device) -> Result<Self> {
-        let choice = match device {
-            Device::Cpu => return Ok(Self::cpu()),
-            Device::Auto if adapters().iter().all(|adapter| adapter.software) => return Ok(Self::cpu()),
-            Device::Auto => GpuChoice::Hardware,
-            Device::Gpu => GpuChoice::Best,
-            Device::Index(index) => GpuChoice::Index(index),
-        };
-        Self::on(&Gpu::open(choice)?)
+        device.open_gpu()?.map_or_else(|| Ok(Self::cpu()), |gpu| Self::on(&gpu))
     }
 
     /// Opens `device`, which can only be the processor: the GPU was left out when this was built.

@@ -7,29 +7,19 @@
     reason = "tests: small numbers, and failing is their way to tell"
 )]
 
+mod adapter;
 mod made;
 
+use adapter::gpu;
 use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{Sensitivity, ShDegree, Splats};
-use lexisplat_render::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Error, Scene, sensitivity, surround};
 
 /// Largest difference of a sum, relative to its own size and the mean of all Gaussians'.
 const SUM_TOLERANCE: f32 = 2e-3;
 /// Largest difference of a change of colour, in units of colour.
 const REMOVAL_TOLERANCE: f32 = 1e-3;
-
-/// A GPU, if there is one; there must be if `LEXISPLAT_REQUIRE_GPU` is set.
-fn gpu() -> Option<Gpu> {
-    match Gpu::open(GpuChoice::Best) {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os("LEXISPLAT_REQUIRE_GPU").is_some() => panic!("{error}"),
-        Err(error) => {
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
-}
 
 fn measure(gpu: &Gpu, splats: &Splats, cameras: &[Camera]) -> Sensitivity {
     let scene = GpuScene::new(gpu, &Scene::from(splats), ShPath::DenseF32).unwrap();

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use eframe::{egui, egui_wgpu};
 use lexisplat::Geometry;
 use lexisplat_eval::choose_views;
-use lexisplat_render::gpu::Gpu;
+use lexisplat_render::gpu::{Gpu, rank};
 use lexisplat_render::{Camera, Device};
 
 use crate::Options;
@@ -115,13 +115,7 @@ fn best(
     chosen: Option<usize>,
 ) -> Option<wgpu::Adapter> {
     let mut sorted: Vec<&wgpu::Adapter> = adapters.iter().collect();
-    sorted.sort_by_key(|adapter| match adapter.get_info().device_type {
-        wgpu::DeviceType::DiscreteGpu => 0,
-        wgpu::DeviceType::IntegratedGpu => 1,
-        wgpu::DeviceType::VirtualGpu => 2,
-        wgpu::DeviceType::Other => 3,
-        wgpu::DeviceType::Cpu => 4,
-    });
+    sorted.sort_by_key(|adapter| rank(adapter));
     let fits = |adapter: &&&wgpu::Adapter| surface.is_none_or(|s| adapter.is_surface_supported(s));
     let found = match chosen {
         Some(index) => sorted.get(index).filter(fits),

@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use lexisplat::Progress;
 use lexisplat_eval::{
-    BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, choose_views, text,
+    BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, text,
 };
-use lexisplat_render::gpu::{Gpu, GpuChoice, ShPath, Speed, Stage, adapters, measure_speed};
+use lexisplat_render::gpu::{Gpu, ShPath, Speed, Stage, measure_speed};
 use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
@@ -25,14 +25,11 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = choose_views(
-        views.cameras.as_deref(),
-        views.split.into(),
-        views.orbit,
-        views.width,
-        scene.geometry(),
-    )?;
-    let gpu = open(views.device)?;
+    let cameras = views.choose(scene.geometry())?;
+    let gpu = views.device.open_gpu()?;
+    if gpu.is_none() && views.device == Device::Auto {
+        eprintln!("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
+    }
     let bars = Bars::new(common.quiet);
     let paths = paths(&args.paths, &scene);
     let mut results = Vec::new();
@@ -76,21 +73,6 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
         return print_json(&report.json());
     }
     print(&report.text()?)
-}
-
-/// The GPU to measure, if any.
-fn open(device: Device) -> Result<Option<Gpu>> {
-    let choice = match device {
-        Device::Cpu => return Ok(None),
-        Device::Auto if adapters().iter().all(|adapter| adapter.software) => {
-            eprintln!("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
-            return Ok(None);
-        }
-        Device::Auto => GpuChoice::Hardware,
-        Device::Gpu => GpuChoice::Best,
-        Device::Index(index) => GpuChoice::Index(index),
-    };
-    Ok(Some(Gpu::open(choice)?))
 }
 
 /// The paths asked for, or all that the scene has.

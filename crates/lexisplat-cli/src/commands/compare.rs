@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{CompareOptions, Comparison, SceneFile, choose_views, compare, montage, png, text};
+use lexisplat_eval::{CompareOptions, Comparison, SceneFile, compare, montage, png, text};
 use lexisplat_render::Renderer;
 use serde_json::json;
 
@@ -18,13 +18,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
-    let cameras = choose_views(
-        views.cameras.as_deref(),
-        views.split.into(),
-        views.orbit,
-        views.width,
-        scene_a.geometry(),
-    )?;
+    let cameras = views.choose(scene_a.geometry())?;
     let mut renderer = Renderer::open(views.device)?;
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{choose_views, png};
+use lexisplat_eval::png;
 use lexisplat_render::{RenderOptions, Renderer};
 use serde_json::json;
 
@@ -30,13 +30,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = choose_views(
-        views.cameras.as_deref(),
-        views.split.into(),
-        views.orbit,
-        views.width,
-        scene.geometry(),
-    )?;
+    let cameras = views.choose(scene.geometry())?;
     let paths: Vec<PathBuf> =
         cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
     for path in &paths {

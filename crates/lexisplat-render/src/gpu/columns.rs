@@ -27,18 +27,19 @@ pub(super) fn group_words(codes: &SparseCodes, counts: &[u8]) -> usize {
     (total * codes.indices().width()).div_ceil(4) + (total * codes.values().width()).div_ceil(4)
 }
 
+/// Which of the escapes lie in `range`.
+pub(super) fn escapes_in(codes: &SparseCodes, range: &Range<usize>) -> Range<usize> {
+    let before = |end: usize| codes.escapes().gaussians.partition_point(|&g| (g as usize) < end);
+    before(range.start)..before(range.end)
+}
+
 impl Columns {
     /// The codes of the Gaussians in `range`, which begin at nonzero `first`.
     pub(super) fn new(codes: &SparseCodes, range: Range<usize>, first: usize) -> Self {
-        let all = &codes.escapes().gaussians;
-        let inside = |&g: &u32| range.contains(&(g as usize));
-        let escapes: Vec<u32> = all
-            .iter()
-            .copied()
-            .filter(inside)
-            // Chunks are smaller than 2^32.
-            .map(|g| g - u32::try_from(range.start).unwrap_or(u32::MAX))
-            .collect();
+        // Chunks are smaller than 2^32.
+        let first_gaussian = u32::try_from(range.start).unwrap_or(u32::MAX);
+        let escapes: Vec<u32> =
+            codes.escapes().gaussians[escapes_in(codes, &range)].iter().map(|g| g - first_gaussian).collect();
         let mut out = Self::default();
         let group = COLUMN_GROUP as usize;
         let mut at = first;

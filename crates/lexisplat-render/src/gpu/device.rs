@@ -58,26 +58,35 @@ struct Shared {
     failure: Arc<Mutex<Option<String>>>,
 }
 
+/// Drivers that are looked at. Without OpenGL: it lacks what the kernels need, and its loaders print on
+/// start.
+const BACKENDS: wgpu::Backends =
+    wgpu::Backends::VULKAN.union(wgpu::Backends::METAL).union(wgpu::Backends::DX12);
+
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
-    // Without OpenGL: it lacks what the kernels need, and its loaders print on start.
-    descriptor.backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
+    descriptor.backends = BACKENDS;
     // The arguments of indirect dispatches come from this crate's own kernels, clamped there.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(descriptor)
 }
 
-/// All adapters of the machine, best first: discrete, integrated, virtual, other, software.
-fn sorted_adapters() -> Vec<wgpu::Adapter> {
-    let backends = wgpu::Backends::VULKAN | wgpu::Backends::METAL | wgpu::Backends::DX12;
-    let mut found = pollster::block_on(instance().enumerate_adapters(backends));
-    found.sort_by_key(|adapter| match adapter.get_info().device_type {
+/// How good an adapter is, best first: discrete, integrated, virtual, other, software.
+#[must_use]
+pub fn rank(adapter: &wgpu::Adapter) -> u8 {
+    match adapter.get_info().device_type {
         wgpu::DeviceType::DiscreteGpu => 0,
         wgpu::DeviceType::IntegratedGpu => 1,
         wgpu::DeviceType::VirtualGpu => 2,
         wgpu::DeviceType::Other => 3,
         wgpu::DeviceType::Cpu => 4,
-    });
+    }
+}
+
+/// All adapters of the machine, best first.
+fn sorted_adapters() -> Vec<wgpu::Adapter> {
+    let mut found = pollster::block_on(instance().enumerate_adapters(BACKENDS));
+    found.sort_by_key(rank);
     found
 }
 
@@ -111,6 +120,19 @@ impl Gpu {
 
     /// [`Self::open`], asking the device for what `reduce` leaves of the limits.
     pub(super) fn open_with(choice: GpuChoice, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Self> {
+        Self::find_with(choice, reduce)?.ok_or_else(|| Error::Gpu { problem: NO_ADAPTER.to_owned() })
+    }
+
+    /// [`Self::open`], or `None` if there is no such adapter.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if there is one but it refuses; [`Error::Parameter`] for an index out of range, where
+    /// there are any.
+    pub fn find(choice: GpuChoice) -> Result<Option<Self>> {
+        Self::find_with(choice, |_| {})
+    }
+
+    fn find_with(choice: GpuChoice, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Option<Self>> {
         let found = sorted_adapters();
         let index = match choice {
             GpuChoice::Index(index) if index < found.len() => Some(index),
@@ -124,13 +146,13 @@ impl Gpu {
             }
         };
         let Some((index, adapter)) = index.and_then(|index| Some((index, found.get(index)?))) else {
-            return Err(Error::Gpu { problem: NO_ADAPTER.to_owned() });
+            return Ok(None);
         };
         let mut descriptor = Self::descriptor(adapter);
         reduce(&mut descriptor.required_limits);
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
             .map_err(|error| Error::Gpu { problem: format!("{}: {error}", adapter.get_info().name) })?;
-        Ok(Self::new(summarise(index, adapter), device, queue))
+        Ok(Some(Self::new(summarise(index, adapter), device, queue)))
     }
 
     /// What this renderer asks of a device that is made elsewhere, such as by a window.

@@ -28,6 +28,7 @@ mod sensitivity;
 mod shaders;
 mod source;
 mod speed;
+mod stamps;
 mod table;
 #[cfg(test)]
 mod tests;
@@ -36,7 +37,7 @@ mod work;
 
 pub use wgpu;
 
-pub use device::{AdapterSummary, Gpu, GpuChoice, adapters};
+pub use device::{AdapterSummary, Gpu, GpuChoice, adapters, rank};
 pub use path::ShPath;
 pub use plan::Stage;
 pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};

@@ -94,9 +94,21 @@ pub(super) enum Size {
     Indirect(u64),
 }
 
+/// Bytes of a dispatch's arguments.
+const ARGUMENTS: u64 = 12;
+
 impl Size {
+    /// Lanes for the slots of chunk `k`.
+    fn chunk(k: u64) -> Self {
+        Self::place(Dispatch::Chunks as u64 + k)
+    }
+
+    fn place(dispatch: u64) -> Self {
+        Self::Indirect(dispatch * ARGUMENTS)
+    }
+
     fn of(dispatch: Dispatch) -> Self {
-        Self::Indirect(dispatch as u64 * 12)
+        Self::place(dispatch as u64)
     }
 }
 
@@ -212,7 +224,7 @@ impl Planner<'_> {
                 (8, all(&work.slot_keys[0])),
                 (9, all(&work.rects)),
             ];
-            let size = Size::Indirect((Dispatch::Chunks as u64 + k) * 12);
+            let size = Size::chunk(k);
             self.step(&kernels.project, &bound, size)?;
         }
         self.end(Stage::Project);
@@ -228,7 +240,7 @@ impl Planner<'_> {
             ];
             bound.extend(chunk.sh.iter().zip(6..).map(|(buffer, binding)| (binding, all(buffer))));
             bound.extend(scene.table.iter().flat_map(|table| table.bound()));
-            let size = Size::Indirect((Dispatch::Chunks as u64 + k) * 12);
+            let size = Size::chunk(k);
             self.step(&scene.radiance, &bound, size)?;
         }
         self.end(Stage::Radiance);
@@ -320,30 +332,23 @@ impl Planner<'_> {
         let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
         // A row of tiles is a multiple of 256 bytes, as offsets must be.
         let pixels = || Bound::Part(&work.pixels.raw, top * line, lines * line);
-        let bound = [
-            (0, all(&work.frame)),
-            (1, all(&band)),
-            (2, all(&work.ranges)),
-            (3, all(entry_slots)),
-            (4, all(&work.centres)),
-            (5, all(&work.conics)),
-            (6, all(&work.colours)),
-            (7, pixels()),
-        ];
-        self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
-        if let Some((kernels, moments)) = measuring {
-            let bound = [
+        let tile = || {
+            [
                 (0, all(&work.frame)),
                 (1, all(&band)),
                 (2, all(&work.ranges)),
                 (3, all(entry_slots)),
-                (4, all(&work.entry_values[by_tile])),
-                (5, all(&work.centres)),
-                (6, all(&work.conics)),
-                (7, all(&work.colours)),
-                (8, pixels()),
-                (9, all(&moments.of_entries)),
-            ];
+                (4, all(&work.centres)),
+                (5, all(&work.conics)),
+                (6, all(&work.colours)),
+            ]
+        };
+        let bound: Vec<_> = tile().into_iter().chain([(7, pixels())]).collect();
+        self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
+        if let Some((kernels, moments)) = measuring {
+            let measured =
+                [(7, all(&work.entry_values[by_tile])), (8, pixels()), (9, all(&moments.of_entries))];
+            let bound: Vec<_> = tile().into_iter().chain(measured).collect();
             self.step(&kernels.tile_moments, &bound, Size::Groups(tiles))?;
             let bound = [
                 (0, all(&work.frame)),

@@ -53,10 +53,19 @@ pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
         Source::Codes(model) => {
             let dictionary = &model.dictionary;
             let entry = match path {
-                ShPath::SparseOrdered => include_str!("kernels/radiance_ordered.wgsl"),
+                ShPath::SparseOrdered => concat!(
+                    include_str!("kernels/radiance_cached.wgsl"),
+                    include_str!("kernels/radiance_ordered.wgsl")
+                ),
                 ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
-                ShPath::SparseTable => include_str!("kernels/radiance_table.wgsl"),
-                _ => include_str!("kernels/radiance_codes.wgsl"),
+                ShPath::SparseTable => concat!(
+                    include_str!("kernels/radiance_table.wgsl"),
+                    include_str!("kernels/radiance_codes.wgsl")
+                ),
+                _ => concat!(
+                    include_str!("kernels/radiance_cached.wgsl"),
+                    include_str!("kernels/radiance_codes.wgsl")
+                ),
             };
             let (index, value) = (model.codes.indices().width(), model.codes.values().width());
             let per_channel = dictionary.degree().rest_per_channel();

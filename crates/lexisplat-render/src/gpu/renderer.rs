@@ -11,11 +11,12 @@ use crate::error::{Error, Result};
 use crate::image::Image;
 
 use super::constants::{COUNTERS, Counter, KEY_FIRST};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::path::ShPath;
 use super::plan::{Plan, Shape, Size, Stage, dimensions};
 use super::scene::GpuScene;
 use super::shaders::Kernels;
+use super::stamps::Stamps;
 use super::uniforms::Frame as FrameUniform;
 use super::work::{ENTRY_ELEMENT, PIXEL, Room, SLOT_ELEMENT, Work};
 
@@ -31,8 +32,6 @@ const MAX_TIMED: u32 = 1024;
 const MAX_PLANS: usize = 4;
 /// Cuts remembered before all are forgotten.
 const MAX_CUTS: usize = 64;
-/// Bytes of a time stamp.
-const STAMP: u64 = 8;
 
 /// A drawn picture, still on the GPU.
 #[derive(Debug, Clone)]
@@ -78,7 +77,7 @@ pub struct GpuRenderer {
     pub(super) work: Option<Work>,
     /// Of the last scenes and sizes, the latest last.
     pub(super) plans: Vec<Plan>,
-    pub(super) timer: Option<Timer>,
+    pub(super) stamps: Option<Stamps>,
     /// How scenes' pictures of a size are cut, once they were found not to fit as they are.
     pub(super) cuts: HashMap<Subject, Cut>,
     pub(super) limits: RoomLimits,
@@ -111,37 +110,6 @@ pub(super) struct RoomLimits {
     pub(super) pixels: u64,
 }
 
-pub(super) struct Timer {
-    queries: wgpu::QuerySet,
-    resolved: Buffer,
-    back: Buffer,
-    /// Milliseconds of a tick.
-    tick: f64,
-}
-
-impl Timer {
-    fn new(gpu: &Gpu) -> Result<Option<Self>> {
-        use wgpu::BufferUsages as U;
-        if !gpu.device().features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Ok(None);
-        }
-        let bytes = u64::from(2 * MAX_TIMED) * STAMP;
-        let queries = gpu.checked("time stamps", || {
-            gpu.device().create_query_set(&wgpu::QuerySetDescriptor {
-                label: Some("stages"),
-                ty: wgpu::QueryType::Timestamp,
-                count: 2 * MAX_TIMED,
-            })
-        })?;
-        Ok(Some(Self {
-            queries,
-            resolved: gpu.buffer("time stamps", bytes, U::QUERY_RESOLVE | U::COPY_SRC)?,
-            back: gpu.buffer("time stamps back", bytes, U::MAP_READ | U::COPY_DST)?,
-            tick: f64::from(gpu.queue().get_timestamp_period()) / 1e6,
-        }))
-    }
-}
-
 impl GpuRenderer {
     /// A renderer on `gpu`. Compiles the kernels.
     ///
@@ -159,7 +127,7 @@ impl GpuRenderer {
             kernels: Kernels::new(gpu)?,
             work: None,
             plans: Vec::new(),
-            timer: Timer::new(gpu)?,
+            stamps: Stamps::new(gpu, MAX_TIMED)?,
             cuts: HashMap::new(),
             limits,
         })
@@ -340,13 +308,7 @@ impl GpuRenderer {
         let mut timed = Vec::new();
         for stage in &plan.passes {
             let query = u32::try_from(timed.len()).unwrap_or(u32::MAX);
-            let timestamp_writes = self.timer.as_ref().filter(|_| query < MAX_TIMED).map(|timer| {
-                wgpu::ComputePassTimestampWrites {
-                    query_set: &timer.queries,
-                    beginning_of_pass_write_index: Some(2 * query),
-                    end_of_pass_write_index: Some(2 * query + 1),
-                }
-            });
+            let timestamp_writes = self.stamps.as_ref().and_then(|stamps| stamps.writes(query));
             if timestamp_writes.is_some() {
                 timed.push(stage.stage);
             }
@@ -377,11 +339,8 @@ impl GpuRenderer {
                 }
             }
         }
-        if let Some(timer) = &self.timer {
-            let stamps = u32::try_from(2 * timed.len()).unwrap_or(0);
-            let bytes = u64::from(stamps) * STAMP;
-            encoder.resolve_query_set(&timer.queries, 0..stamps, &timer.resolved.raw, 0);
-            encoder.copy_buffer_to_buffer(&timer.resolved.raw, 0, &timer.back.raw, 0, bytes);
+        if let Some(stamps) = &self.stamps {
+            stamps.resolve(&mut encoder, u32::try_from(timed.len()).unwrap_or(0));
         }
         let bytes = work.counters_back.bytes();
         encoder.copy_buffer_to_buffer(&work.counters.raw, 0, &work.counters_back.raw, 0, bytes);
@@ -404,14 +363,13 @@ impl GpuRenderer {
 
     /// Milliseconds of each stage, bands together, and of everything.
     fn times(&self, timed: &[Stage]) -> Result<(StageTimes, Option<f64>)> {
-        let Some(timer) = &self.timer else { return Ok((Vec::new(), None)) };
-        let stamps: Vec<u64> = self.gpu.read(&timer.back, 2 * timed.len() as u64 * STAMP)?;
-        let between = |from: u64, to: u64| to.saturating_sub(from) as f64 * timer.tick;
+        let Some(stamps) = &self.stamps else { return Ok((Vec::new(), None)) };
+        let passes = stamps.read(&self.gpu, u32::try_from(timed.len()).unwrap_or(0))?;
         let stages = Stage::ALL.map(|stage| {
-            let own = stamps.chunks_exact(2).zip(timed).filter(|(_, s)| **s == stage);
-            (stage, own.map(|(pair, _)| between(pair[0], pair[1])).sum())
+            let own = passes.iter().zip(timed).filter(|(_, s)| **s == stage);
+            (stage, own.map(|([start, end], _)| end - start).sum())
         });
-        let total = stamps.first().zip(stamps.last()).map(|(&first, &last)| between(first, last));
+        let total = passes.last().map(|[_, end]| *end);
         Ok((stages.to_vec(), total))
     }
 

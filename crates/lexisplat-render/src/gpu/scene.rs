@@ -170,8 +170,7 @@ impl GpuScene {
                 blocks,
                 escapes_at: escapes[0],
                 escapes: escapes[1],
-                index: number(self.chunks.len()),
-                padding: 0,
+                padding: [0; 2],
             },
         )?;
         // Of codes, the last buffer is the atoms.

@@ -61,7 +61,7 @@ impl GpuRenderer {
             kernels,
             work: None,
             plans: Vec::new(),
-            timer: None,
+            stamps: None,
             cuts: HashMap::new(),
             limits,
         })
@@ -90,8 +90,8 @@ impl GpuRenderer {
 mod tests {
     use lexisplat::sample::{SampleOptions, scene};
 
-    use super::super::device::{Gpu, GpuChoice};
     use super::super::path::ShPath;
+    use super::super::tests::gpu;
     use super::*;
     use crate::scene::Scene;
     use crate::surround::surround;
@@ -99,14 +99,7 @@ mod tests {
     /// Every sum goes on in the next band where it stopped in the one before.
     #[test]
     fn bands_change_not_one_bit() {
-        let gpu = match Gpu::open(GpuChoice::Best) {
-            Ok(gpu) => gpu,
-            Err(error) => {
-                assert!(std::env::var_os("LEXISPLAT_REQUIRE_GPU").is_none(), "{error}");
-                eprintln!("skipped: {error}");
-                return;
-            }
-        };
+        let Some(gpu) = gpu() else { return };
         let splats = scene(&SampleOptions::new(3000, 3));
         let cameras = surround(&splats.geometry, 2, [130, 100], [1.0, 4.0]);
         let on_gpu = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();

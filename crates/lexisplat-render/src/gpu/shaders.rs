@@ -28,6 +28,7 @@ pub(super) struct Kernels {
 }
 
 const FRAME: &str = include_str!("kernels/frame.wgsl");
+const TILE: &str = include_str!("kernels/tile.wgsl");
 
 /// The texts of all kernels, by name: what a test validates.
 pub(super) const TEXTS: [(&str, &[&str]); 12] = [
@@ -39,9 +40,9 @@ pub(super) const TEXTS: [(&str, &[&str]); 12] = [
     ("sort", &[FRAME, include_str!("kernels/sort.wgsl")]),
     ("tiles", &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")]),
     ("ranges", &[FRAME, include_str!("kernels/ranges.wgsl")]),
-    ("blend", &[FRAME, include_str!("kernels/blend.wgsl")]),
+    ("blend", &[FRAME, TILE, include_str!("kernels/blend.wgsl")]),
     ("slots_of_entries", &[FRAME, include_str!("kernels/slots_of_entries.wgsl")]),
-    ("moments", &[FRAME, include_str!("kernels/moments.wgsl")]),
+    ("moments", &[FRAME, TILE, include_str!("kernels/moments.wgsl")]),
     ("gather_moments", &[FRAME, include_str!("kernels/gather_moments.wgsl")]),
 ];
 

@@ -11,7 +11,7 @@ use crate::conventions::ALPHA_MIN;
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
-use super::columns::group_words;
+use super::columns::{escapes_in, group_words};
 use super::constants::{COLUMN_GROUP, GROUP, vectors};
 use super::device::{Buffer, Gpu};
 
@@ -95,19 +95,13 @@ impl Source<'_> {
                     .chunks(COLUMN_GROUP as usize)
                     .map(|counts| group_words(codes, counts))
                     .sum();
-                let escapes = escapes_in(model, &range).len();
+                let escapes = escapes_in(&model.codes, &range).len();
                 let row = escapes * atom_bytes(model);
                 let columns = range.len() * size_of::<u32>();
                 [shapes, 4 * words as u64, row as u64, columns as u64]
             }
         }
     }
-}
-
-/// Which of the escapes lie in `range`.
-fn escapes_in(model: &Model, range: &Range<usize>) -> Range<usize> {
-    let before = |end: usize| model.codes.escapes().gaussians.partition_point(|&g| (g as usize) < end);
-    before(range.start)..before(range.end)
 }
 
 /// Position and the largest standard deviation, or -1 for what is never drawn.
@@ -177,7 +171,7 @@ fn atom_bytes(model: &Model) -> usize {
 pub(super) fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
     let dictionary = &model.dictionary;
     let (dim, per_channel) = (dictionary.dim(), dictionary.degree().rest_per_channel());
-    let escapes = escapes_in(model, range);
+    let escapes = escapes_in(&model.codes, range);
     let rows = &model.codes.escapes().rows[escapes.start * dim..escapes.end * dim];
     let row_len = 4 * vectors(per_channel);
     let mut out = vec![0.0; (dictionary.len() + escapes.len()) * row_len];

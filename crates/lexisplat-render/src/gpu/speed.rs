@@ -5,9 +5,10 @@ use std::time::Instant;
 use crate::error::Result;
 
 use super::constants::{GROUP, MULTIPLY_ADDS};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::plan::dimensions;
 use super::shaders::{Bound, bind, compile, pipeline};
+use super::stamps::Stamps;
 
 /// Measured rates of a GPU.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,21 +65,12 @@ pub fn measure_speed(gpu: &Gpu) -> Result<Speed> {
 /// Times single dispatches: by time stamps, or else by the clock.
 struct Stopwatch<'a> {
     gpu: &'a Gpu,
-    stamps: Option<(wgpu::QuerySet, Buffer, Buffer)>,
+    stamps: Option<Stamps>,
 }
 
 impl<'a> Stopwatch<'a> {
     fn new(gpu: &'a Gpu) -> Result<Self> {
-        use wgpu::BufferUsages as U;
-        if !gpu.device().features().contains(wgpu::Features::TIMESTAMP_QUERY) {
-            return Ok(Self { gpu, stamps: None });
-        }
-        let descriptor =
-            wgpu::QuerySetDescriptor { label: Some("speed"), ty: wgpu::QueryType::Timestamp, count: 2 };
-        let queries = gpu.checked("time stamps", || gpu.device().create_query_set(&descriptor))?;
-        let resolved = gpu.buffer("time stamps", 16, U::QUERY_RESOLVE | U::COPY_SRC)?;
-        let back = gpu.buffer("time stamps back", 16, U::MAP_READ | U::COPY_DST)?;
-        Ok(Self { gpu, stamps: Some((queries, resolved, back)) })
+        Ok(Self { gpu, stamps: Stamps::new(gpu, 1)? })
     }
 
     /// Least seconds of some runs.
@@ -94,12 +86,7 @@ impl<'a> Stopwatch<'a> {
         let gpu = self.gpu;
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
-            let timestamp_writes =
-                self.stamps.as_ref().map(|(query_set, ..)| wgpu::ComputePassTimestampWrites {
-                    query_set,
-                    beginning_of_pass_write_index: Some(0),
-                    end_of_pass_write_index: Some(1),
-                });
+            let timestamp_writes = self.stamps.as_ref().and_then(|stamps| stamps.writes(0));
             let mut pass =
                 encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
             pass.set_pipeline(pipeline);
@@ -107,16 +94,14 @@ impl<'a> Stopwatch<'a> {
             let (x, y) = dimensions(groups);
             pass.dispatch_workgroups(x, y, 1);
         }
-        if let Some((queries, resolved, back)) = &self.stamps {
-            encoder.resolve_query_set(queries, 0..2, &resolved.raw, 0);
-            encoder.copy_buffer_to_buffer(&resolved.raw, 0, &back.raw, 0, 16);
+        if let Some(stamps) = &self.stamps {
+            stamps.resolve(&mut encoder, 1);
         }
         let clock = Instant::now();
         gpu.queue().submit([encoder.finish()]);
         gpu.wait()?;
-        let Some((_, _, back)) = &self.stamps else { return Ok(clock.elapsed().as_secs_f64()) };
-        let stamps: Vec<u64> = gpu.read(back, 16)?;
-        let ticks = stamps.last().zip(stamps.first()).map_or(0, |(end, start)| end.saturating_sub(*start));
-        Ok(ticks as f64 * f64::from(gpu.queue().get_timestamp_period()) / 1e9)
+        let Some(stamps) = &self.stamps else { return Ok(clock.elapsed().as_secs_f64()) };
+        let milliseconds = stamps.read(gpu, 1)?.first().map_or(0.0, |[start, end]| end - start);
+        Ok(milliseconds / 1e3)
     }
 }

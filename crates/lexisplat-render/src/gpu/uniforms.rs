@@ -37,8 +37,7 @@ pub(super) struct Chunk {
     pub(super) blocks: u32,
     pub(super) escapes_at: u32,
     pub(super) escapes: u32,
-    pub(super) index: u32,
-    pub(super) padding: u32,
+    pub(super) padding: [u32; 2],
 }
 
 /// Rows of tiles drawn at once.

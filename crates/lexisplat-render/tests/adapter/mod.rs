@@ -23,7 +23,7 @@ pub(crate) fn gpu() -> Option<Gpu> {
 pub(crate) fn opened(gpu: lexisplat_render::Result<Gpu>) -> Option<Gpu> {
     match gpu {
         Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os(REQUIRE).is_some_and(|v| !v.is_empty()) => {
+        Err(error) if std::env::var_os(REQUIRE).is_some() => {
             panic!("{REQUIRE} is set, but {error}")
         }
         Err(error) => {

@@ -28,7 +28,6 @@ struct Frame {
     chunks: u32,
     // Room for entries of the tiles' lists.
     entries: u32,
-    // Sequence of the exclusive scan of `starts` is this long.
     padding: u32,
 }
 
@@ -43,9 +42,8 @@ struct Chunk {
     // Where in `columns` the numbers of its escaped Gaussians begin, and how many.
     escapes_at: u32,
     escapes: u32,
-    // Which of the indirect dispatches is its.
-    index: u32,
-    padding: u32,
+    padding_a: u32,
+    padding_b: u32,
 }
 
 // Rows of tiles drawn at once. Twin: `gpu::uniforms::Band`.

@@ -1,14 +1,7 @@
 // How a tile's pixels change with its splats: sums over pixels, for each splat. Each group one tile; lanes
 // are pixels while they draw, and share the pixels of one splat while they sum. Twin: `cpu::moments`.
-@group(0) @binding(0) var<uniform> frame: Frame;
-@group(0) @binding(1) var<uniform> band: Band;
-@group(0) @binding(2) var<storage, read> ranges: array<vec2<u32>>;
-@group(0) @binding(3) var<storage, read> entry_slots: array<u32>;
 // Where each entry's moments belong.
-@group(0) @binding(4) var<storage, read> entry_places: array<u32>;
-@group(0) @binding(5) var<storage, read> centres: array<vec4<f32>>;
-@group(0) @binding(6) var<storage, read> conics: array<vec4<f32>>;
-@group(0) @binding(7) var<storage, read> colours: array<f32>;
+@group(0) @binding(7) var<storage, read> entry_places: array<u32>;
 // The finished picture over black.
 @group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
 // Zeros, where nothing shows.
@@ -31,10 +24,6 @@ var<workgroup> batch_place: array<u32, MOMENT_BATCH>;
 var<workgroup> scratch: array<f32, PARTS * MOMENT_SPLATS * GROUP>;
 // One bit for each of those splats: it shows.
 var<workgroup> shown: atomic<u32>;
-var<workgroup> range: vec2<u32>;
-// Pixels that are not finished.
-var<workgroup> open: atomic<u32>;
-var<workgroup> open_now: u32;
 
 struct Pixel {
     at: vec2<f32>,
@@ -48,15 +37,9 @@ struct Pixel {
 // Draws splat `k` of the batch as `blend` does. The squared derivative by one channel of its colour, g, and
 // the largest change of a channel when it is left out; zeros where it does not show.
 fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
-    let centre = batch_centre[k];
     let conic = batch_conic[k];
-    let d = centre.xy - (*pixel).at;
-    let power = -0.5 * (centre.z * d.x * d.x + conic.x * d.y * d.y) - centre.w * d.x * d.y;
-    if power > 0.0 {
-        return vec3<f32>(0.0);
-    }
-    let alpha = min(conic.y * exp(power), ALPHA_MAX);
-    if alpha < ALPHA_MIN {
+    let alpha = alpha_at(batch_centre[k], conic.x, conic.y, (*pixel).at);
+    if alpha == 0.0 {
         return vec3<f32>(0.0);
     }
     let left = (*pixel).transmittance * (1.0 - alpha);
@@ -88,15 +71,9 @@ fn tile_moments(
     let top = band.first * TILE + row;
     let inside = tile < band.tiles && left + at.x < frame.width && top + at.y < frame.height;
     if lane == 0u {
-        range = vec2<u32>(0u);
-        if tile < band.tiles {
-            range = ranges[tile];
-        }
-        atomicStore(&open, 0u);
         atomicStore(&shown, 0u);
     }
-    workgroupBarrier();
-    let entries = workgroupUniformLoad(&range);
+    let entries = entries_of(tile, lane);
     var pixel: Pixel;
     pixel.at = vec2<f32>(f32(left + at.x), f32(top + at.y));
     pixel.transmittance = 1.0;
@@ -108,25 +85,15 @@ fn tile_moments(
     let splat = lane / SHARERS;
     let sharer = lane % SHARERS;
     for (var first = entries.x; first < entries.y; first += MOMENT_BATCH) {
-        if !pixel.finished {
-            atomicAdd(&open, 1u);
-        }
-        workgroupBarrier();
-        if lane == 0u {
-            open_now = atomicExchange(&open, 0u);
-        }
-        workgroupBarrier();
-        if workgroupUniformLoad(&open_now) == 0u {
+        if !any_open(lane, pixel.finished) {
             break;
         }
         if lane < MOMENT_BATCH && first + lane < entries.y {
-            let slot = entry_slots[first + lane];
-            let conic = conics[slot];
-            let centre = centres[slot];
-            batch_centre[lane] = centre;
-            batch_root[lane] = sqrt(conic.y / centre.z);
-            batch_conic[lane] = vec4<f32>(conic.x, conic.z, colours[3u * slot], colours[3u * slot + 1u]);
-            batch_blue[lane] = colours[3u * slot + 2u];
+            let splat = splat_of(first + lane);
+            batch_centre[lane] = splat.centre;
+            batch_root[lane] = sqrt(splat.conic.y / splat.centre.z);
+            batch_conic[lane] = vec4<f32>(splat.conic.xz, splat.colour.xy);
+            batch_blue[lane] = splat.colour.z;
             batch_place[lane] = entry_places[first + lane];
         }
         workgroupBarrier();

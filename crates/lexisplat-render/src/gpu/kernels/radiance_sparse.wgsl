@@ -88,3 +88,23 @@ fn seen(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     // ATOM_TERMS
     return sum;
 }
+
+// Colours the Gaussian of `slot`, if it is one. The path says what `look` makes of a direction, once for a
+// Gaussian, and what `atom_seen` makes of an atom with that.
+fn colour_slot(slot: u32) {
+    if slot == NO_SLOT {
+        return;
+    }
+    let i = gaussians[slot] - chunk.first;
+    let d = direction_to(i);
+    let looked = look(d);
+    let column = column_of(i);
+    var rest = vec3<f32>(0.0);
+    for (var k = 0u; k < column.count; k++) {
+        rest += value_at(column, k) * atom_seen(atom_number(column, k), looked);
+    }
+    if column.escaped {
+        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, rest_basis(d));
+    }
+    write_colour(slot, base_colour(i), rest);
+}

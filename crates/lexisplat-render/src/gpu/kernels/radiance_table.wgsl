@@ -1,11 +1,11 @@
-// As `radiance_codes`, with each atom's radiance looked up in a table over directions: the six faces of a
-// cube side by side, one layer an atom. Twin: `gpu::table`.
+// Each atom's radiance looked up in a table over directions: the six faces of a cube side by side, one layer
+// an atom. Twin: `gpu::table`.
 @group(0) @binding(10) var table: texture_2d_array<f32>;
 @group(0) @binding(11) var linear: sampler;
 
 // Where the table has direction `d`. Outer texels' centres lie on the edges of a face, so that no sample
 // mixes two faces.
-fn table_place(d: vec3<f32>) -> vec2<f32> {
+fn look(d: vec3<f32>) -> vec2<f32> {
     let size = abs(d);
     var face = 0u;
     var on_face = vec2<f32>(d.y, d.z) / size.x;
@@ -25,27 +25,6 @@ fn table_place(d: vec3<f32>) -> vec2<f32> {
     return vec2<f32>((f32(face) * side + texel.x) / (6.0 * side), texel.y / side);
 }
 
-@compute @workgroup_size(GROUP)
-fn radiance(
-    @builtin(workgroup_id) group: vec3<u32>,
-    @builtin(num_workgroups) groups: vec3<u32>,
-    @builtin(local_invocation_index) lane: u32,
-) {
-    let slot = slot_of(group_number(group, groups), lane);
-    if slot == NO_SLOT {
-        return;
-    }
-    let i = gaussians[slot] - chunk.first;
-    let d = direction_to(i);
-    let place = table_place(d);
-    let column = column_of(i);
-    var rest = vec3<f32>(0.0);
-    for (var k = 0u; k < column.count; k++) {
-        let atom = atom_number(column, k);
-        rest += value_at(column, k) * textureSampleLevel(table, linear, place, atom, 0.0).xyz;
-    }
-    if column.escaped {
-        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, rest_basis(d));
-    }
-    write_colour(slot, base_colour(i), rest);
+fn atom_seen(atom: u32, place: vec2<f32>) -> vec3<f32> {
+    return textureSampleLevel(table, linear, place, atom, 0.0).xyz;
 }

@@ -1,0 +1,68 @@
+// What drawing a tile and measuring it share: each group one tile, each lane one pixel.
+@group(0) @binding(0) var<uniform> frame: Frame;
+@group(0) @binding(1) var<uniform> band: Band;
+@group(0) @binding(2) var<storage, read> ranges: array<vec2<u32>>;
+@group(0) @binding(3) var<storage, read> entry_slots: array<u32>;
+@group(0) @binding(4) var<storage, read> centres: array<vec4<f32>>;
+@group(0) @binding(5) var<storage, read> conics: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read> colours: array<f32>;
+
+var<workgroup> range: vec2<u32>;
+// Pixels that are not finished.
+var<workgroup> open: atomic<u32>;
+var<workgroup> open_now: u32;
+
+// The tile's entries: first and end. All lanes call it, before `any_open`.
+fn entries_of(tile: u32, lane: u32) -> vec2<u32> {
+    if lane == 0u {
+        range = vec2<u32>(0u);
+        if tile < band.tiles {
+            range = ranges[tile];
+        }
+        atomicStore(&open, 0u);
+    }
+    workgroupBarrier();
+    return workgroupUniformLoad(&range);
+}
+
+// Whether any pixel is not finished. All lanes call it.
+fn any_open(lane: u32, finished: bool) -> bool {
+    if !finished {
+        atomicAdd(&open, 1u);
+    }
+    workgroupBarrier();
+    if lane == 0u {
+        open_now = atomicExchange(&open, 0u);
+    }
+    workgroupBarrier();
+    return workgroupUniformLoad(&open_now) > 0u;
+}
+
+struct Splat {
+    // Centre, and the conic's xx and xy.
+    centre: vec4<f32>,
+    // The conic's yy and determinant, and opacity.
+    conic: vec3<f32>,
+    colour: vec3<f32>,
+}
+
+// The splat of an entry; nothing is drawn with one whose colour overflows.
+fn splat_of(entry: u32) -> Splat {
+    let slot = entry_slots[entry];
+    let conic = conics[slot];
+    let colour = vec3<f32>(colours[3u * slot], colours[3u * slot + 1u], colours[3u * slot + 2u]);
+    let opacity = select(conic.z, 0.0, colour.x == NO_COLOUR);
+    return Splat(centres[slot], vec3<f32>(conic.xy, opacity), colour);
+}
+
+// Opacity at the pixel `here` of a splat with this centre and conic (xx and xy beside the centre), 0 where
+// it does not count. Twin: `cpu::blend::alphas`.
+fn alpha_at(centre: vec4<f32>, yy: f32, opacity: f32, here: vec2<f32>) -> f32 {
+    let d = centre.xy - here;
+    let power = -0.5 * (centre.z * d.x * d.x + yy * d.y * d.y) - centre.w * d.x * d.y;
+    if power > 0.0 {
+        return 0.0;
+    }
+    let alpha = min(opacity * exp(power), ALPHA_MAX);
+    return select(alpha, 0.0, alpha < ALPHA_MIN);
+}
