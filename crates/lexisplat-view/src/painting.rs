@@ -91,9 +91,10 @@ pub(crate) enum Told {
 /// The thread's other end.
 #[derive(Debug)]
 pub(crate) struct Painting {
-    asks: Sender<Ask>,
+    /// There until it is dropped.
+    asks: Option<Sender<Ask>>,
     told: Receiver<Told>,
-    thread: JoinHandle<()>,
+    thread: Option<JoinHandle<()>>,
     /// What draws, for the panel.
     pub(crate) name: String,
 }
@@ -131,12 +132,12 @@ impl Painting {
             .name("painting".into())
             .spawn(work)
             .map_err(|e| Error::Window(format!("cannot start a thread: {e}")))?;
-        Ok(Self { asks, told, thread, name })
+        Ok(Self { asks: Some(asks), told, thread: Some(thread), name })
     }
 
     /// Whether the thread still draws. It ends early only by a fault in the program.
     pub(crate) fn is_alive(&self) -> bool {
-        !self.thread.is_finished()
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// Asks for something.
@@ -144,12 +145,24 @@ impl Painting {
     /// # Errors
     /// [`Error::Device`] if the thread is gone.
     pub(crate) fn ask(&self, ask: Ask) -> Result<()> {
-        self.asks.send(ask).map_err(|_| Error::Device("drawing has stopped".to_owned()))
+        let sent = self.asks.as_ref().is_some_and(|asks| asks.send(ask).is_ok());
+        if sent { Ok(()) } else { Err(Error::Device("drawing has stopped".to_owned())) }
     }
 
     /// What was done since the last call.
     pub(crate) fn hear(&self) -> impl Iterator<Item = Told> {
         self.told.try_iter()
+    }
+}
+
+impl Drop for Painting {
+    /// Waits for what is being drawn: a driver that is unloaded under it, when the program ends, crashes.
+    fn drop(&mut self) {
+        self.asks = None;
+        if let Some(thread) = self.thread.take() {
+            // A panic in there was already reported.
+            let _ = thread.join();
+        }
     }
 }
 
