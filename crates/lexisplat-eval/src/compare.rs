@@ -1,10 +1,12 @@
 //! Two scenes drawn from the same cameras, scored view by view. No photos needed.
 
+use std::collections::BTreeMap;
+
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::metrics::{psnr, ssim};
+use crate::metrics::{Metric, psnr, ssim};
 
 /// How to compare.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -25,7 +27,7 @@ impl CompareOptions {
 }
 
 /// The score of one view.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct ViewScore {
     /// The camera's name.
@@ -40,10 +42,25 @@ pub struct ViewScore {
     pub ssim: f64,
     /// Whether the clipped pictures are identical.
     pub identical: bool,
+    /// What else was measured, by name.
+    #[serde(flatten)]
+    pub more: BTreeMap<Metric, f64>,
+}
+
+impl ViewScore {
+    /// A score, if it was measured; an infinite PSNR is not a number.
+    #[must_use]
+    pub fn get(&self, metric: Metric) -> Option<f64> {
+        match metric {
+            Metric::Psnr => self.psnr,
+            Metric::Ssim => Some(self.ssim),
+            _ => self.more.get(&metric).copied(),
+        }
+    }
 }
 
 /// Mean, minimum and maximum over views. All `None` over no views.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Summary {
     /// Arithmetic mean.
     pub mean: Option<f64>,
@@ -67,7 +84,7 @@ impl Summary {
 }
 
 /// The scores of all views.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Comparison {
     /// Whether every view is identical.
@@ -76,6 +93,9 @@ pub struct Comparison {
     pub psnr: Summary,
     /// SSIM over all views.
     pub ssim: Summary,
+    /// What else was measured, over all views.
+    #[serde(flatten)]
+    pub more: BTreeMap<Metric, Summary>,
     /// Each view, in the cameras' order.
     pub views: Vec<ViewScore>,
 }
@@ -88,8 +108,29 @@ impl Comparison {
             identical: views.iter().all(|v| v.identical),
             psnr: Summary::of(views.iter().filter_map(|v| v.psnr)),
             ssim: Summary::of(views.iter().map(|v| v.ssim)),
+            more: Metric::ALL
+                .into_iter()
+                .map(|metric| (metric, views.iter().filter_map(move |v| v.more.get(&metric)).copied()))
+                .map(|(metric, values)| (metric, Summary::of(values)))
+                .filter(|(_, summary)| summary.mean.is_some())
+                .collect(),
             views,
         }
+    }
+
+    /// The summary of what was measured; `None` if it was not.
+    #[must_use]
+    pub fn get(&self, metric: Metric) -> Option<Summary> {
+        match metric {
+            Metric::Psnr => Some(self.psnr),
+            Metric::Ssim => Some(self.ssim),
+            _ => self.more.get(&metric).copied(),
+        }
+    }
+
+    /// What was measured, in the order of tables.
+    pub fn metrics(&self) -> impl Iterator<Item = Metric> {
+        Metric::ALL.into_iter().filter(|&metric| self.get(metric).is_some())
     }
 }
 
@@ -106,6 +147,7 @@ pub fn score(name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
         psnr,
         ssim: if psnr.is_none() { 1.0 } else { ssim(a, b)? },
         identical: psnr.is_none(),
+        more: BTreeMap::new(),
     })
 }
 

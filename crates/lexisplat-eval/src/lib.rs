@@ -38,6 +38,7 @@ mod png;
 mod prune;
 pub mod report;
 mod scene_file;
+pub mod sweep;
 mod target;
 pub mod text;
 mod views;

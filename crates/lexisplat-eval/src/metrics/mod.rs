@@ -1,9 +1,11 @@
 //! How far two pictures are apart. Pixels are clipped to 0..1 first, NaN counts as 0, and nothing is
 //! rounded to 8 bits unless the caller did so.
 
+mod metric;
 mod psnr;
 mod ssim;
 
+pub use metric::Metric;
 pub use psnr::psnr;
 pub use ssim::ssim;
 

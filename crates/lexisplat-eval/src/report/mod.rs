@@ -161,7 +161,15 @@ mod tests {
 
     fn view(name: &str, psnr: Option<f64>) -> ViewScore {
         let identical = psnr.is_none();
-        ViewScore { name: name.to_owned(), width: 8, height: 6, psnr, ssim: 0.99, identical }
+        ViewScore {
+            name: name.to_owned(),
+            width: 8,
+            height: 6,
+            psnr,
+            ssim: 0.99,
+            identical,
+            more: Default::default(),
+        }
     }
 
     /// Every opened element is closed in order: enough of a parser for what the page uses.

@@ -1,0 +1,98 @@
+//! The names of what can be measured.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+/// Something measured between two pictures.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Metric {
+    /// [`super::psnr`], in dB.
+    Psnr,
+    /// [`super::ssim`].
+    Ssim,
+    /// NVIDIA's FLIP: 0 for pictures that look the same, at most 1.
+    Flip,
+    /// LPIPS with VGG16, as the `lpips` package computes it: pictures scaled to -1..1 first.
+    LpipsVgg,
+    /// LPIPS with VGG16, as the 3DGS repository's `metrics.py` computes it: pictures left in 0..1. Not the
+    /// standard value; tables of 3DGS papers print this one.
+    LpipsVggInria,
+    /// LPIPS with AlexNet, as the `lpips` package computes it.
+    LpipsAlex,
+    /// LPIPS with AlexNet of pictures left in 0..1.
+    LpipsAlexInria,
+}
+
+impl Metric {
+    /// All of them, in the order of tables.
+    pub const ALL: [Self; 7] = [
+        Self::Psnr,
+        Self::Ssim,
+        Self::Flip,
+        Self::LpipsVgg,
+        Self::LpipsVggInria,
+        Self::LpipsAlex,
+        Self::LpipsAlexInria,
+    ];
+
+    /// Name in files: `psnr`, `lpips_vgg_inria` and so on.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Psnr => "psnr",
+            Self::Ssim => "ssim",
+            Self::Flip => "flip",
+            Self::LpipsVgg => "lpips_vgg",
+            Self::LpipsVggInria => "lpips_vgg_inria",
+            Self::LpipsAlex => "lpips_alex",
+            Self::LpipsAlexInria => "lpips_alex_inria",
+        }
+    }
+
+    /// Name for people.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Psnr => "PSNR",
+            Self::Ssim => "SSIM",
+            Self::Flip => "FLIP",
+            Self::LpipsVgg => "LPIPS (VGG)",
+            Self::LpipsVggInria => "LPIPS (VGG, as 3DGS)",
+            Self::LpipsAlex => "LPIPS (Alex)",
+            Self::LpipsAlexInria => "LPIPS (Alex, 0..1)",
+        }
+    }
+
+    /// Digits after the point that tables print.
+    #[must_use]
+    pub fn digits(self) -> usize {
+        if self == Self::Psnr { 2 } else { 4 }
+    }
+
+    /// Whether more is better.
+    #[must_use]
+    pub fn more_is_better(self) -> bool {
+        matches!(self, Self::Psnr | Self::Ssim)
+    }
+}
+
+impl fmt::Display for Metric {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.title())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_spell_metrics_by_their_names() {
+        for metric in Metric::ALL {
+            assert_eq!(serde_json::to_string(&metric).unwrap(), format!("\"{}\"", metric.name()));
+        }
+    }
+}
