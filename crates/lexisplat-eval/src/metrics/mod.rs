@@ -1,13 +1,16 @@
 //! How far two pictures are apart. Pixels are clipped to 0..1 first, NaN counts as 0, and nothing is
 //! rounded to 8 bits unless the caller did so.
 
+mod flip;
 mod metric;
 mod psnr;
+mod rows;
 mod ssim;
 
+pub use flip::flip;
 pub use metric::Metric;
 pub use psnr::psnr;
-pub use ssim::ssim;
+pub use ssim::{ssim, ssim_inner};
 
 use lexisplat_render::Image;
 
@@ -47,6 +50,23 @@ fn same_size(a: &Image, b: &Image) -> Result<()> {
 #[cfg(test)]
 pub(crate) mod testing {
     use lexisplat_render::Image;
+
+    /// Two pictures of 64 x 48 that `benches/metrics_beside_references.py --golden` makes too: stripes and
+    /// chequers in 8 bits, and the same shifted in places with noise of at most 12 levels.
+    pub(crate) fn golden() -> [Image; 2] {
+        let plain = |x: i32, y: i32, c: i32| (37 * c + 3 * x + 2 * y + 90 * ((x / 8 + y / 6) % 2)) % 256;
+        let noisy = |x: i32, y: i32, c: i32| {
+            let noise = (31 * x * x + 17 * y * y + 13 * x * y + 101 * c) % 25 - 12;
+            (plain(x + (y / 16) % 2, y, c) + noise).clamp(0, 255)
+        };
+        let picture = |value: &dyn Fn(i32, i32, i32) -> i32| {
+            let pixels: Vec<[u8; 3]> = (0..48 * 64)
+                .map(|i| [0, 1, 2].map(|c| u8::try_from(value(i % 64, i / 64, c)).unwrap()))
+                .collect();
+            Image::from_8bit(64, 48, &pixels).unwrap()
+        };
+        [picture(&plain), picture(&noisy)]
+    }
 
     /// Made-up content with edges, gradients, noise, and values outside 0..1.
     pub(crate) fn picture(width: u32, height: u32, seed: u64) -> Image {

@@ -1,10 +1,10 @@
-//! Structural similarity, as the 3DGS papers compute it.
+//! Structural similarity, as the 3DGS papers compute it and as image libraries do.
 
 use lexisplat_render::Image;
-use rayon::prelude::*;
 
-use super::{clipped, same_size};
-use crate::error::Result;
+use super::rows::{add_across, planes, sum_rows};
+use super::{clip, same_size};
+use crate::error::{Error, Result};
 
 /// Side of the Gaussian window in pixels (INRIA `utils/loss_utils.py`, `window_size`).
 const WINDOW: usize = 11;
@@ -14,70 +14,117 @@ const SIGMA: f64 = 1.5;
 const C1: f64 = 0.01 * 0.01;
 /// Stabiliser of the contrast term, `(0.03 peak)^2`.
 const C2: f64 = 0.03 * 0.03;
-/// Pixels the window reaches to each side. Outside the picture everything is 0.
+/// Pixels the window reaches to each side.
 const REACH: usize = WINDOW / 2;
-/// Blurred quantities: both means, both squares, the product.
-const MAPS: usize = 5;
+/// Blurred quantities: both means, the sum of both squares, the product. No formula needs the squares apart.
+const MAPS: usize = 4;
+
+/// What is done with pixels whose window leaves the picture.
+#[derive(Clone, Copy, PartialEq)]
+enum Border {
+    /// Outside the picture everything is 0.
+    Zero,
+    /// They are not counted.
+    Cut,
+}
 
 /// SSIM, averaged over all pixels and channels: window of 11 x 11, sigma 1.5, zero padding.
 /// At most 1, which it is for identical pictures.
 ///
 /// # Errors
-/// [`crate::Error::Parameter`] if the sizes differ or a picture is empty.
+/// [`Error::Parameter`] if the sizes differ or a picture is empty.
 pub fn ssim(a: &Image, b: &Image) -> Result<f64> {
     same_size(a, b)?;
+    Ok(mean(a, b, Border::Zero))
+}
+
+/// [`ssim`] over the pixels whose window lies within the picture only, as the paper of Wang et al. (2004) and
+/// scikit-image with `gaussian_weights` have it. 3DGS tables print [`ssim`].
+///
+/// # Errors
+/// [`Error::Parameter`] if the sizes differ or a picture is smaller than 11 pixels either way.
+pub fn ssim_inner(a: &Image, b: &Image) -> Result<f64> {
+    same_size(a, b)?;
+    if (a.width.min(a.height) as usize) < WINDOW {
+        let found = format!("{} x {}", a.width, a.height);
+        return Err(Error::parameter("picture", found, format!("at least {WINDOW} x {WINDOW} pixels")));
+    }
+    Ok(mean(a, b, Border::Cut))
+}
+
+fn mean(a: &Image, b: &Image, border: Border) -> f64 {
     let (width, height) = (a.width as usize, a.height as usize);
+    let (a, b) = (planes(a, |p| p.map(clip)), planes(b, |p| p.map(clip)));
     let window = window();
-    // One row of all channels at a time: first across, then down, each in a fixed order.
-    let across: Vec<[f64; MAPS * 3]> = (0..height)
-        .into_par_iter()
-        .flat_map_iter(|y| {
-            let row = |image: &Image| -> Vec<[f64; 3]> {
-                image.pixels[y * width..(y + 1) * width].iter().map(|p| p.map(clipped)).collect()
+    let cut = if border == Border::Cut { REACH } else { 0 };
+    let (rows, columns) = (cut..height - cut, cut..width - cut);
+    let pixels = rows.len() * columns.len();
+    let sum = sum_rows(
+        rows,
+        || Scratch::new(width),
+        |scratch, y| {
+            let channels = a.iter().zip(&b);
+            channels
+                .map(|(a, b)| {
+                    scratch.blur([a, b], &window, y);
+                    columns
+                        .clone()
+                        .map(|x| similarity(scratch.across.each_ref().map(|row| row[x])))
+                        .sum::<f64>()
+                })
+                .sum()
+        },
+    );
+    sum / (pixels * 3) as f64
+}
+
+/// Blurred quantities of one row of one channel.
+struct Scratch {
+    /// Blurred down the columns; [`REACH`] zeros lie to each side.
+    down: [Vec<f64>; MAPS],
+    /// Blurred both ways.
+    across: [Vec<f64>; MAPS],
+}
+
+impl Scratch {
+    fn new(width: usize) -> Self {
+        let rows = |length| [(); MAPS].map(|()| vec![0.0; length]);
+        Self { down: rows(width + 2 * REACH), across: rows(width) }
+    }
+
+    /// Blurs the quantities of row `y` of two planes.
+    fn blur(&mut self, [a, b]: [&[f32]; 2], window: &[f64; WINDOW], y: usize) {
+        let width = self.across[0].len();
+        let inner = REACH..REACH + width;
+        let [mean_a, mean_b, squares, product] = self.down.each_mut().map(|row| &mut row[inner.clone()]);
+        for row in [&mut *mean_a, &mut *mean_b, &mut *squares, &mut *product] {
+            row.fill(0.0);
+        }
+        for (k, &weight) in window.iter().enumerate() {
+            let Some(start) = (y + k).checked_sub(REACH).map(|row| row * width) else { continue };
+            let (Some(a), Some(b)) = (a.get(start..start + width), b.get(start..start + width)) else {
+                break;
             };
-            let (row_a, row_b) = (row(a), row(b));
-            (0..width).map(move |x| {
-                let mut sums = [0.0; MAPS * 3];
-                for (k, weight) in window.iter().enumerate() {
-                    let Some(i) = (x + k).checked_sub(REACH).filter(|&i| i < width) else { continue };
-                    for c in 0..3 {
-                        let (p, q) = (row_a[i][c], row_b[i][c]);
-                        for (sum, value) in sums[c * MAPS..].iter_mut().zip([p, q, p * p, q * q, p * q]) {
-                            *sum += weight * value;
-                        }
-                    }
-                }
-                sums
-            })
-        })
-        .collect();
-    let rows: Vec<f64> = (0..height)
-        .into_par_iter()
-        .map(|y| {
-            let mut total = 0.0;
             for x in 0..width {
-                let mut sums = [0.0; MAPS * 3];
-                for (k, weight) in window.iter().enumerate() {
-                    let Some(i) = (y + k).checked_sub(REACH).filter(|&i| i < height) else { continue };
-                    for (sum, value) in sums.iter_mut().zip(&across[i * width + x]) {
-                        *sum += weight * value;
-                    }
-                }
-                total += sums.chunks_exact(MAPS).map(similarity).sum::<f64>();
+                let (p, q) = (f64::from(a[x]), f64::from(b[x]));
+                mean_a[x] += weight * p;
+                mean_b[x] += weight * q;
+                squares[x] += weight * (p * p + q * q);
+                product[x] += weight * (p * q);
             }
-            total
-        })
-        .collect();
-    Ok(rows.iter().sum::<f64>() / (width * height * 3) as f64)
+        }
+        for (across, down) in self.across.iter_mut().zip(&self.down) {
+            across.fill(0.0);
+            add_across(across, window, down);
+        }
+    }
 }
 
 /// SSIM at one pixel of one channel from its blurred quantities.
-fn similarity(blurred: &[f64]) -> f64 {
-    let (mean_a, mean_b) = (blurred[0], blurred[1]);
-    let (squares, product) = (mean_a * mean_a + mean_b * mean_b, mean_a * mean_b);
-    let variances = blurred[2] + blurred[3] - squares;
-    let covariance = blurred[4] - product;
-    ((2.0 * product + C1) * (2.0 * covariance + C2)) / ((squares + C1) * (variances + C2))
+fn similarity([mean_a, mean_b, squares, product]: [f64; MAPS]) -> f64 {
+    let (means, cross) = (mean_a * mean_a + mean_b * mean_b, mean_a * mean_b);
+    let (variances, covariance) = (squares - means, product - cross);
+    ((2.0 * cross + C1) * (2.0 * covariance + C2)) / ((means + C1) * (variances + C2))
 }
 
 /// The window's weights along one axis; they sum to 1.
@@ -96,19 +143,20 @@ fn window() -> [f64; WINDOW] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::metrics::clipped;
     use crate::metrics::testing::picture;
 
-    /// The definition: a full 2-D window at every pixel.
-    fn naive(a: &Image, b: &Image) -> f64 {
+    /// The definition: a full 2-D window at every pixel at least `cut` from the border.
+    fn naive(a: &Image, b: &Image, cut: i64) -> f64 {
         let (width, height) = (i64::from(a.width), i64::from(a.height));
         let reach = i64::try_from(REACH).unwrap();
         let weight = |d: i64| (-(d * d) as f64 / (2.0 * SIGMA * SIGMA)).exp();
         let norm: f64 = (-reach..=reach).map(weight).sum();
         let mut total = 0.0;
-        for y in 0..height {
-            for x in 0..width {
+        for y in cut..height - cut {
+            for x in cut..width - cut {
                 for c in 0..3 {
-                    let mut sums = [0.0; MAPS];
+                    let mut sums = [0.0; 5];
                     for dy in -reach..=reach {
                         for dx in -reach..=reach {
                             let (u, v) = (x + dx, y + dy);
@@ -123,20 +171,39 @@ mod tests {
                             }
                         }
                     }
-                    total += similarity(&sums);
+                    let [mean_a, mean_b, square_a, square_b, product] = sums;
+                    let (variance_a, variance_b) = (square_a - mean_a * mean_a, square_b - mean_b * mean_b);
+                    let covariance = product - mean_a * mean_b;
+                    total += (2.0 * mean_a * mean_b + C1) * (2.0 * covariance + C2)
+                        / ((mean_a * mean_a + mean_b * mean_b + C1) * (variance_a + variance_b + C2));
                 }
             }
         }
-        total / (width * height * 3) as f64
+        total / ((width - 2 * cut) * (height - 2 * cut) * 3) as f64
     }
 
     #[test]
     fn agrees_with_the_definition() {
         for (width, height) in [(1, 1), (3, 20), (31, 17)] {
             let (a, b) = (picture(width, height, 1), picture(width, height, 2));
-            let (fast, slow) = (ssim(&a, &b).unwrap(), naive(&a, &b));
+            let (fast, slow) = (ssim(&a, &b).unwrap(), naive(&a, &b, 0));
             assert!((fast - slow).abs() < 1e-12, "{width} x {height}: {fast} {slow}");
             assert!(fast < 0.98, "the pictures must differ for this to mean anything: {fast}");
+        }
+    }
+
+    #[test]
+    fn without_its_border_agrees_with_the_definition() {
+        for (width, height) in [(11, 11), (12, 30), (31, 17)] {
+            let (a, b) = (picture(width, height, 1), picture(width, height, 2));
+            let (fast, slow) = (ssim_inner(&a, &b).unwrap(), naive(&a, &b, 5));
+            assert!((fast - slow).abs() < 1e-12, "{width} x {height}: {fast} {slow}");
+            let whole = ssim(&a, &b).unwrap();
+            assert!((fast - whole).abs() > 1e-4, "the border must matter: {fast} {whole}");
+        }
+        for (width, height) in [(10, 30), (30, 10)] {
+            let small = picture(width, height, 1);
+            assert!(ssim_inner(&small, &small).unwrap_err().to_string().contains("at least 11 x 11"));
         }
     }
 
@@ -144,6 +211,7 @@ mod tests {
     fn identical_pictures_score_one() {
         let a = picture(30, 20, 3);
         assert!((ssim(&a, &a).unwrap() - 1.0).abs() < 1e-12);
+        assert!((ssim_inner(&a, &a).unwrap() - 1.0).abs() < 1e-12);
     }
 
     #[test]
@@ -151,7 +219,7 @@ mod tests {
         let (a, b) = (picture(50, 40, 4), picture(50, 40, 5));
         let on = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| ssim(&a, &b)).unwrap().to_bits()
+            pool.install(|| [ssim(&a, &b), ssim_inner(&a, &b)]).map(|score| score.unwrap().to_bits())
         };
         assert_eq!(on(1), on(3));
     }
