@@ -6,7 +6,8 @@ use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, Result};
-use crate::metrics::{Metric, psnr, ssim};
+use crate::metrics::Metric;
+use crate::scorer::Scorer;
 
 /// How to compare.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -134,21 +135,12 @@ impl Comparison {
     }
 }
 
-/// Scores picture `b` against `a`.
+/// Scores picture `b` against `a` by PSNR and SSIM.
 ///
 /// # Errors
 /// [`Error::Parameter`] if their sizes differ.
 pub fn score(name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
-    let psnr = psnr(a, b)?;
-    Ok(ViewScore {
-        name: name.to_owned(),
-        width: a.width,
-        height: a.height,
-        psnr,
-        ssim: if psnr.is_none() { 1.0 } else { ssim(a, b)? },
-        identical: psnr.is_none(),
-        more: BTreeMap::new(),
-    })
+    Scorer::new().score(name, a, b)
 }
 
 /// Draws `a` and `b` with `renderer` from every camera and scores `b` against `a`. `on_view` sees each view

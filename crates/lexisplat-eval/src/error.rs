@@ -7,6 +7,32 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
+    /// The operating system refused a read. Retry or fix permissions.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file, as the caller named it.
+        file: String,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The bytes are not what they claim to be. The file is at fault.
+    #[error("{file}: {problem}")]
+    Format {
+        /// The file, as the caller named it.
+        file: String,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// More than a limit allows.
+    #[error("{what}: {found} is over the limit of {limit}")]
+    Limit {
+        /// What there is too much of.
+        what: String,
+        /// How much there is.
+        found: u64,
+        /// The most allowed.
+        limit: u64,
+    },
     /// An argument is out of range. The caller is at fault.
     #[error("{name} = {value}: {expected}")]
     Parameter {
@@ -26,6 +52,14 @@ pub enum Error {
 }
 
 impl Error {
+    pub(crate) fn io(file: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
+        Self::Io { file: file.as_ref().display().to_string(), source }
+    }
+
+    pub(crate) fn format(file: impl Into<String>, problem: impl Into<String>) -> Self {
+        Self::Format { file: file.into(), problem: problem.into() }
+    }
+
     pub(crate) fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }

@@ -2,12 +2,14 @@
 //! rounded to 8 bits unless the caller did so.
 
 mod flip;
+pub mod lpips;
 mod metric;
 mod psnr;
 mod rows;
 mod ssim;
 
 pub use flip::flip;
+pub use lpips::Lpips;
 pub use metric::Metric;
 pub use psnr::psnr;
 pub use ssim::{ssim, ssim_inner};

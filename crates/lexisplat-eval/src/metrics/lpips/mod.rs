@@ -1,0 +1,270 @@
+//! LPIPS, version 0.1: Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
+//! 2018, as the `lpips` package 0.1.4 computes it. No weights come with this crate; [`Lpips::load`] reads them.
+
+mod conv;
+mod gemm;
+mod map;
+mod network;
+mod weights;
+
+use std::fmt;
+
+use lexisplat_render::Image;
+
+use self::conv::Conv;
+use self::map::Map;
+pub use self::network::Network;
+use self::network::{COLOURS, Pool, STAGES};
+use super::rows::sum_rows;
+use super::{clip, same_size};
+use crate::error::{Error, Result};
+
+/// Added to the length of a pixel's features before dividing by it (`lpips.normalize_tensor`).
+const EPSILON: f64 = 1e-10;
+/// Taken off each colour (`lpips.ScalingLayer`), for pictures in -1..1.
+const SHIFT: [f32; COLOURS] = [-0.030, -0.088, -0.188];
+/// What each colour is then divided by (the same).
+const SCALE: [f32; COLOURS] = [0.458, 0.448, 0.450];
+/// Sums kept apart while adding over features.
+const LANES: usize = 8;
+
+/// How pixel values are mapped before the network sees them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Range {
+    /// 0..1 to -1..1, which the constants are for: what the `lpips` package gives.
+    Standard,
+    /// Left in 0..1: what the 3DGS repository's `metrics.py` gives, and tables of 3DGS papers print (issue 1239
+    /// there).
+    Inria,
+}
+
+/// A network with weights, ready to compare pictures.
+pub struct Lpips {
+    network: Network,
+    stages: Vec<Layers>,
+}
+
+/// One stage: its output is compared.
+struct Layers {
+    pool: Option<Pool>,
+    convs: Vec<Conv>,
+    /// How much each feature counts.
+    linear: Vec<f32>,
+    /// Border of the output, for the next layer to read.
+    padding_after: usize,
+}
+
+/// What a network makes of a picture, kept to compare several others with it. VGG16 keeps 122 floats a pixel:
+/// 52 MB for 400 x 266 pixels, 0.83 GB for 1600 x 1066.
+#[derive(Clone)]
+pub struct Features {
+    network: Network,
+    range: Range,
+    size: (u32, u32),
+    maps: Vec<Map>,
+}
+
+impl Lpips {
+    /// Puts together what `get` has by name and shape.
+    fn build(network: Network, mut get: impl FnMut(&str, &[usize]) -> Result<Vec<f32>>) -> Result<Self> {
+        let shapes = network.stages();
+        let mut stages = Vec::with_capacity(STAGES);
+        for (number, stage) in shapes.iter().enumerate() {
+            let mut convs = Vec::with_capacity(stage.convs.len());
+            let mut channels = 0;
+            for &shape in &stage.convs {
+                let name = format!("features.{}", shape.index);
+                let weights = get(&format!("{name}.weight"), &shape.weight_shape())?;
+                let bias = get(&format!("{name}.bias"), &[shape.outputs])?;
+                convs.push(Conv::new(shape, &weights, bias));
+                channels = shape.outputs;
+            }
+            let linear = get(&format!("lin{number}.model.1.weight"), &[1, channels, 1, 1])?;
+            // A pool reads no border.
+            let next = shapes.get(number + 1).filter(|next| next.pool.is_none());
+            let padding_after = next.and_then(|next| next.convs.first()).map_or(0, |conv| conv.padding);
+            stages.push(Layers { pool: stage.pool, convs, linear, padding_after });
+        }
+        Ok(Self { network, stages })
+    }
+
+    /// Which network this is.
+    #[must_use]
+    pub fn network(&self) -> Network {
+        self.network
+    }
+
+    /// LPIPS of two pictures: 0 if the network sees no difference. Symmetric. In `f32`, so good to five
+    /// digits or so. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x 1066.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the sizes differ, a picture is smaller than [`Network::min_size`], or the weights
+    /// make the features overflow.
+    pub fn distance(&self, a: &Image, b: &Image, range: Range) -> Result<f64> {
+        same_size(a, b)?;
+        let (mut a, mut b) = (self.input(a, range)?, self.input(b, range)?);
+        let mut total = 0.0;
+        for layers in &self.stages {
+            (a, b) = (self.run(layers, a)?, self.run(layers, b)?);
+            total += difference(&a, &b, &layers.linear);
+        }
+        self.finite(total)
+    }
+
+    /// What the network makes of `image`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the picture's pixels do not fill it or it is smaller than
+    /// [`Network::min_size`].
+    pub fn features(&self, image: &Image, range: Range) -> Result<Features> {
+        same_size(image, image)?;
+        let mut map = self.input(image, range)?;
+        let mut maps = Vec::with_capacity(STAGES);
+        for layers in &self.stages {
+            map = self.run(layers, map)?;
+            maps.push(map.clone());
+        }
+        Ok(Features { network: self.network, range, size: (image.width, image.height), maps })
+    }
+
+    /// [`Self::distance`] of `image` to the picture that `reference` was made of, by this network and with
+    /// these weights: the same number for half the work.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] as for [`Self::distance`], and if another network made `reference`.
+    pub fn distance_to(&self, reference: &Features, image: &Image) -> Result<f64> {
+        same_size(image, image)?;
+        if reference.network != self.network {
+            return Err(Error::parameter("features", reference.network, format!("of {}", self.network)));
+        }
+        if (image.width, image.height) != reference.size {
+            let (width, height) = reference.size;
+            let found = format!("{} x {}", image.width, image.height);
+            return Err(Error::parameter(
+                "picture",
+                found,
+                format!("the reference's size, {width} x {height}"),
+            ));
+        }
+        let mut map = self.input(image, reference.range)?;
+        let mut total = 0.0;
+        for (layers, reference) in self.stages.iter().zip(&reference.maps) {
+            map = self.run(layers, map)?;
+            total += difference(reference, &map, &layers.linear);
+        }
+        self.finite(total)
+    }
+
+    /// The picture as the first layer reads it.
+    fn input(&self, image: &Image, range: Range) -> Result<Map> {
+        if image.width.min(image.height) < self.network.min_size() {
+            return Err(self.too_small(image.width, image.height));
+        }
+        let padding = self.stages.first().and_then(|s| s.convs.first()).map_or(0, |c| c.shape.padding);
+        let width = image.width as usize;
+        let mut map = Map::zeros(width, image.height as usize, COLOURS, padding);
+        map.fill_blocks(
+            1,
+            || (),
+            |(), y, row| {
+                let to = row[padding * COLOURS..].chunks_exact_mut(COLOURS);
+                for (to, pixel) in to.zip(&image.pixels[y * width..(y + 1) * width]) {
+                    for (c, (to, &value)) in to.iter_mut().zip(pixel).enumerate() {
+                        let value = clip(value);
+                        let value = if range == Range::Standard { 2.0 * value - 1.0 } else { value };
+                        *to = (value - SHIFT[c]) / SCALE[c];
+                    }
+                }
+            },
+        );
+        Ok(map)
+    }
+
+    /// One stage.
+    fn run(&self, layers: &Layers, mut map: Map) -> Result<Map> {
+        let (width, height) = (map.width, map.height);
+        let small = || self.too_small(width, height);
+        let paddings = layers.convs.iter().map(|c| c.shape.padding).chain([layers.padding_after]);
+        let mut paddings = paddings.collect::<Vec<usize>>().into_iter();
+        let first = paddings.next().unwrap_or(0);
+        if let Some(pool) = layers.pool {
+            map = map.max_pool(pool.side, pool.stride, first).ok_or_else(small)?;
+        }
+        for (conv, padding) in layers.convs.iter().zip(paddings) {
+            map = conv.apply(&map, padding).ok_or_else(small)?;
+        }
+        Ok(map)
+    }
+
+    fn too_small(&self, width: impl fmt::Display, height: impl fmt::Display) -> Error {
+        let (network, least) = (self.network, self.network.min_size());
+        let expected = format!("at least {least} x {least} pixels for LPIPS with {network}");
+        Error::parameter("picture", format!("{width} x {height}"), expected)
+    }
+
+    fn finite(&self, distance: f64) -> Result<f64> {
+        if distance.is_finite() {
+            return Ok(distance);
+        }
+        let expected = format!("weights of {} that do not overflow on pictures", self.network);
+        Err(Error::parameter("lpips", distance, expected))
+    }
+}
+
+impl fmt::Debug for Lpips {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Lpips").field("network", &self.network).finish_non_exhaustive()
+    }
+}
+
+impl fmt::Debug for Features {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { network, range, size, .. } = self;
+        f.debug_struct("Features")
+            .field("network", network)
+            .field("range", range)
+            .field("size", size)
+            .finish_non_exhaustive()
+    }
+}
+
+/// Squared difference of the features of each pixel, each picture's scaled to length 1, weighted by feature;
+/// the mean over pixels.
+fn difference(a: &Map, b: &Map, weights: &[f32]) -> f64 {
+    let channels = weights.len();
+    let row = |y| -> f64 {
+        let pixels = a.row(y).chunks_exact(channels).zip(b.row(y).chunks_exact(channels));
+        pixels
+            .map(|(a, b)| {
+                let (length_a, length_b) = (length(a) + EPSILON, length(b) + EPSILON);
+                sum_lanes(channels, |i| {
+                    let difference = f64::from(a[i]) / length_a - f64::from(b[i]) / length_b;
+                    f64::from(weights[i]) * difference * difference
+                })
+            })
+            .sum()
+    };
+    sum_rows(0..a.height, || (), |(), y| row(y)) / (a.width * a.height) as f64
+}
+
+fn length(features: &[f32]) -> f64 {
+    sum_lanes(features.len(), |i| f64::from(features[i]) * f64::from(features[i])).sqrt()
+}
+
+/// The sum of `term` over `0..count`, in [`LANES`] sums that a processor can do at once.
+#[inline]
+fn sum_lanes(count: usize, term: impl Fn(usize) -> f64) -> f64 {
+    let whole = count - count % LANES;
+    let mut sums = [0.0; LANES];
+    for start in (0..whole).step_by(LANES) {
+        for (lane, sum) in sums.iter_mut().enumerate() {
+            *sum += term(start + lane);
+        }
+    }
+    sums.iter().sum::<f64>() + (whole..count).map(term).sum::<f64>()
+}
+
+#[cfg(test)]
+pub(crate) mod testing;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,132 @@
+//! Which metrics two pictures are scored by.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use lexisplat_render::Image;
+
+use crate::compare::ViewScore;
+use crate::error::Result;
+use crate::metrics::lpips::{Network, Range};
+use crate::metrics::{Lpips, Metric, flip, psnr, ssim};
+
+/// Scores pictures by PSNR and SSIM, and by more if asked to. Cheap to clone: weights are shared.
+#[derive(Debug, Clone, Default)]
+pub struct Scorer {
+    flip: bool,
+    lpips: Vec<Arc<Lpips>>,
+}
+
+impl Scorer {
+    /// PSNR and SSIM.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// FLIP too.
+    #[must_use]
+    pub fn with_flip(mut self) -> Self {
+        self.flip = true;
+        self
+    }
+
+    /// LPIPS by this network too, with pictures in both ranges. Takes the place of one with the same network.
+    #[must_use]
+    pub fn with_lpips(mut self, lpips: Lpips) -> Self {
+        self.lpips.retain(|other| other.network() != lpips.network());
+        self.lpips.push(Arc::new(lpips));
+        self
+    }
+
+    /// What is measured, in the order of tables.
+    #[must_use]
+    pub fn metrics(&self) -> Vec<Metric> {
+        let mut metrics = vec![Metric::Psnr, Metric::Ssim];
+        metrics.extend(self.flip.then_some(Metric::Flip));
+        metrics.extend(
+            self.lpips.iter().flat_map(|lpips| lpips_metrics(lpips.network())).map(|(metric, _)| metric),
+        );
+        metrics.sort_unstable();
+        metrics
+    }
+
+    /// Scores picture `b` against `a`; the score goes by `name`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] if their sizes differ, or are too small for a network.
+    pub fn score(&self, name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
+        let psnr = psnr(a, b)?;
+        let identical = psnr.is_none();
+        let mut more = BTreeMap::new();
+        if self.flip {
+            more.insert(Metric::Flip, if identical { 0.0 } else { flip(a, b)? });
+        }
+        for lpips in &self.lpips {
+            for (metric, range) in lpips_metrics(lpips.network()) {
+                more.insert(metric, if identical { 0.0 } else { lpips.distance(a, b, range)? });
+            }
+        }
+        Ok(ViewScore {
+            name: name.to_owned(),
+            width: a.width,
+            height: a.height,
+            psnr,
+            ssim: if identical { 1.0 } else { ssim(a, b)? },
+            identical,
+            more,
+        })
+    }
+}
+
+/// What a network measures.
+fn lpips_metrics(network: Network) -> [(Metric, Range); 2] {
+    match network {
+        Network::Vgg => [(Metric::LpipsVgg, Range::Standard), (Metric::LpipsVggInria, Range::Inria)],
+        Network::Alex => [(Metric::LpipsAlex, Range::Standard), (Metric::LpipsAlexInria, Range::Inria)],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compare::score;
+    use crate::metrics::lpips::testing::random;
+    use crate::metrics::testing::picture;
+
+    #[test]
+    fn a_score_has_what_was_asked_for() {
+        let (a, b) = (picture(40, 32, 1), picture(40, 32, 2));
+        let basic = Scorer::new();
+        assert_eq!(basic.metrics(), [Metric::Psnr, Metric::Ssim]);
+        assert_eq!(basic.score("view", &a, &b).unwrap(), score("view", &a, &b).unwrap());
+        assert!(score("view", &a, &b).unwrap().more.is_empty());
+
+        let lpips = random(Network::Alex, 1);
+        let expected = [Range::Standard, Range::Inria].map(|range| lpips.distance(&a, &b, range).unwrap());
+        let scorer = Scorer::new().with_lpips(random(Network::Alex, 2)).with_lpips(lpips).with_flip();
+        let metrics = [Metric::Psnr, Metric::Ssim, Metric::Flip, Metric::LpipsAlex, Metric::LpipsAlexInria];
+        assert_eq!(scorer.metrics(), metrics);
+        let found = scorer.score("view", &a, &b).unwrap();
+        assert!(metrics.iter().all(|&metric| found.get(metric).is_some()));
+        assert_eq!(found.more.len(), 3);
+        assert_eq!(found.get(Metric::Flip), Some(flip(&a, &b).unwrap()));
+        assert_eq!(found.get(Metric::LpipsAlex), Some(expected[0]));
+        assert_eq!(found.get(Metric::LpipsAlexInria), Some(expected[1]));
+        assert!(expected[0] != expected[1] && expected[0] > 0.0);
+    }
+
+    #[test]
+    fn identical_pictures_need_no_network() {
+        // Too small for the network, so computing would fail.
+        let a = picture(12, 12, 1);
+        let scorer = Scorer::new().with_flip().with_lpips(random(Network::Alex, 1));
+        let found = scorer.score("same", &a, &a).unwrap();
+        assert!(found.identical && found.psnr.is_none());
+        assert_eq!(found.get(Metric::Ssim), Some(1.0));
+        for metric in [Metric::Flip, Metric::LpipsAlex, Metric::LpipsAlexInria] {
+            assert_eq!(found.get(metric), Some(0.0));
+        }
+        assert!(scorer.score("other", &a, &picture(12, 12, 2)).is_err());
+    }
+}
