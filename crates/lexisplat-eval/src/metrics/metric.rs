@@ -20,9 +20,9 @@ pub enum Metric {
     /// LPIPS with VGG16, as the 3DGS repository's `metrics.py` computes it: pictures left in 0..1. Not the
     /// standard value; tables of 3DGS papers print this one.
     LpipsVggInria,
-    /// LPIPS with AlexNet, as the `lpips` package computes it.
+    /// LPIPS with `AlexNet`, as the `lpips` package computes it.
     LpipsAlex,
-    /// LPIPS with AlexNet of pictures left in 0..1.
+    /// LPIPS with `AlexNet` of pictures left in 0..1.
     LpipsAlexInria,
 }
 
