@@ -4,10 +4,10 @@
 //! scripts it still shows everything but the dictionary; it follows the reader's light or dark theme.
 
 mod atoms;
-mod base64;
+pub(crate) mod base64;
 mod charts;
 mod sections;
-mod text;
+pub(crate) mod text;
 
 use std::fmt::Write;
 
@@ -88,12 +88,39 @@ pub fn html(report: &Report<'_>) -> String {
 }
 
 #[cfg(test)]
+pub(crate) mod testing {
+    /// Every opened element is closed in order: enough of a parser for what the page uses.
+    pub(crate) fn check_nesting(page: &str) {
+        let void = ["meta", "img", "input", "br", "rect", "line"];
+        let mut open: Vec<&str> = Vec::new();
+        let mut rest = page;
+        while let Some(start) = rest.find('<') {
+            rest = &rest[start + 1..];
+            let end = rest.find('>').expect("every tag ends");
+            let (tag, after) = rest.split_at(end);
+            let name = tag.trim_start_matches('/').split([' ', '\n']).next().unwrap().trim_end_matches('/');
+            if tag.starts_with('/') {
+                assert_eq!(open.pop(), Some(name), "closing {tag}");
+            } else if !tag.starts_with('!') && !tag.ends_with('/') && !void.contains(&name) {
+                open.push(name);
+            }
+            rest = after;
+            if name == "script" || name == "style" {
+                rest = &rest[rest.find("</").unwrap_or(0)..];
+            }
+        }
+        assert!(open.is_empty(), "{open:?}");
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use lexisplat::{
         Dictionary, Escapes, Geometry, Indices, Layout, Pursuit, Record, SceneMeta, ShDegree, SparseCodes,
         Values,
     };
 
+    use super::testing::check_nesting;
     use super::*;
     use crate::compare::ViewScore;
 
@@ -170,29 +197,6 @@ mod tests {
             identical,
             more: Default::default(),
         }
-    }
-
-    /// Every opened element is closed in order: enough of a parser for what the page uses.
-    fn check_nesting(page: &str) {
-        let void = ["meta", "img", "input", "br", "rect", "line"];
-        let mut open: Vec<&str> = Vec::new();
-        let mut rest = page;
-        while let Some(start) = rest.find('<') {
-            rest = &rest[start + 1..];
-            let end = rest.find('>').expect("every tag ends");
-            let (tag, after) = rest.split_at(end);
-            let name = tag.trim_start_matches('/').split([' ', '\n']).next().unwrap().trim_end_matches('/');
-            if tag.starts_with('/') {
-                assert_eq!(open.pop(), Some(name), "closing {tag}");
-            } else if !tag.starts_with('!') && !void.contains(&name) {
-                open.push(name);
-            }
-            rest = after;
-            if name == "script" || name == "style" {
-                rest = &rest[rest.find("</").unwrap_or(0)..];
-            }
-        }
-        assert!(open.is_empty(), "{open:?}");
     }
 
     #[test]

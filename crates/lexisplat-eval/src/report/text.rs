@@ -1,7 +1,7 @@
 //! Text and numbers for people, safe inside HTML.
 
 /// `text` with everything HTML gives a meaning replaced.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {
@@ -17,7 +17,7 @@ pub(super) fn escape(text: &str) -> String {
 }
 
 /// 1234567 as `1,234,567`.
-pub(super) fn count(value: u64) -> String {
+pub(crate) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut out = String::new();
     for (i, c) in digits.chars().enumerate() {
@@ -30,7 +30,7 @@ pub(super) fn count(value: u64) -> String {
 }
 
 /// Bytes in the unit that gives few digits; a megabyte is 10^6 bytes.
-pub(super) fn bytes(value: u64) -> String {
+pub(crate) fn bytes(value: u64) -> String {
     let v = value as f64;
     match value {
         0..1_000 => format!("{value}\u{a0}B"),
@@ -42,12 +42,12 @@ pub(super) fn bytes(value: u64) -> String {
 }
 
 /// `value` with `digits` decimals, or a dash if there is none.
-pub(super) fn number(value: Option<f64>, digits: usize) -> String {
+pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     value.filter(|v| v.is_finite()).map_or_else(|| "\u{2013}".to_owned(), |v| format!("{v:.digits$}"))
 }
 
 /// `a / b` as `2.7x`, or a dash if `b` is 0.
-pub(super) fn ratio(a: f64, b: f64) -> String {
+pub(crate) fn ratio(a: f64, b: f64) -> String {
     if b > 0.0 { format!("{:.2}\u{d7}", a / b) } else { "\u{2013}".to_owned() }
 }
 
