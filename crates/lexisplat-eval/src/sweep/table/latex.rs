@@ -17,6 +17,11 @@ fn escape(text: &str) -> String {
             '|' => out.push_str("\\textbar{}"),
             '"' => out.push_str("\\char34{}"),
             '\u{2013}' => out.push_str("--"),
+            '\u{2212}' => out.push_str("$-$"),
+            '\u{d7}' => out.push_str("$\\times$"),
+            '\u{201c}' => out.push_str("``"),
+            '\u{201d}' => out.push_str("''"),
+            '\u{a0}' => out.push('~'),
             '&' | '%' | '$' | '#' | '_' | '{' | '}' => {
                 out.push('\\');
                 out.push(c);
@@ -115,6 +120,18 @@ mod tests {
             assert_eq!(line.replace("\\&", "").matches('&').count(), 2, "{line}");
         }
         assert_eq!(latex.matches('{').count(), latex.matches('}').count());
+    }
+
+    /// What this crate itself writes beyond ASCII must not need another engine.
+    #[test]
+    fn typography_is_spelled_in_ascii() {
+        assert_eq!(
+            escape("1\u{2013}2 \u{2212}3 4\u{d7}5 \u{201c}a\u{201d} b\u{a0}c"),
+            "1--2 $-$3 4$\\times$5 ``a'' b~c"
+        );
+        for table in crate::sweep::tables::all(&crate::sweep::testing::results()) {
+            assert!(table.to_latex().is_ascii(), "{}", table.name);
+        }
     }
 
     #[test]

@@ -4,6 +4,8 @@ mod html;
 mod latex;
 mod markdown;
 
+pub(super) use markdown::escape as escape_markdown;
+
 use super::csv;
 use crate::text;
 

@@ -10,6 +10,7 @@ pub use beside::{nonzeros, psnr};
 pub use bytes::bytes;
 pub use fidelity::{main, settings, views};
 pub use scenes::{models, skipped, summary};
+pub(super) use truth::change;
 pub use truth::{drops, truth};
 
 use super::grid::Grid;

@@ -4,16 +4,19 @@ use super::{header, heading, paper_row, printed, row, ruled};
 use crate::sweep::grid::{Grid, mean, score};
 use crate::sweep::paper::{self, Quantity};
 use crate::sweep::table::{Cell, Row, Style, Table};
-use crate::sweep::{Method, Results, Setting};
+use crate::sweep::{Method, Point, Results, SceneResult, Setting};
 
 /// Digits of PSNR differences, as the paper prints them.
 const DIGITS: usize = 2;
 
 /// Compressed minus base PSNR against photos of one scene, in dB: negative where compressing lost something.
-fn change(grid: &Grid<'_>, method: Method, column: usize, setting: Setting) -> Option<f64> {
-    let base = grid.scene(method, column)?.to_photos.as_ref()?.psnr.mean?;
-    let compressed = grid.point(method, column, setting)?.to_photos.as_ref()?.psnr.mean?;
-    Some(compressed - base)
+pub(in crate::sweep) fn change(scene: &SceneResult, point: &Point) -> Option<f64> {
+    Some(point.to_photos.as_ref()?.psnr.mean? - scene.to_photos.as_ref()?.psnr.mean?)
+}
+
+/// The same of a column.
+fn change_at(grid: &Grid<'_>, method: Method, column: usize, setting: Setting) -> Option<f64> {
+    change(grid.scene(method, column)?, grid.point(method, column, setting)?)
 }
 
 /// The paper's table against photos: models as trained and compressed at the tolerance nearest to 0.1.
@@ -53,7 +56,7 @@ pub fn truth(results: &Results) -> Table {
             }
             if let Some(setting) = setting {
                 let cells = grid
-                    .across(DIGITS, |column| Cell::change(change(&grid, method, column, setting), DIGITS));
+                    .across(DIGITS, |column| Cell::change(change_at(&grid, method, column, setting), DIGITS));
                 if cells.iter().any(|cell| *cell != Cell::Missing) {
                     let names = [name, "Comp. \u{2212} Base.", "PSNR, dB"].map(str::to_owned);
                     of_kind.push(Row { style: Style::Total, ..row(names, cells) });
@@ -97,7 +100,7 @@ pub fn drops(results: &Results) -> Table {
         let mut of_method = Vec::new();
         for &setting in &grid.settings {
             let changes: Vec<Cell> = (0..grid.columns.len())
-                .map(|column| Cell::change(change(&grid, method, column, setting), DIGITS))
+                .map(|column| Cell::change(change_at(&grid, method, column, setting), DIGITS))
                 .collect();
             let worst = (0..changes.len())
                 .filter_map(|column| Some((changes[column].value()?, column)))
