@@ -48,7 +48,7 @@ pub const NOTES: [Note; 8] = [
     },
     Note {
         title: "FPS are of another device",
-        text: "The paper's FPS were measured on an NVIDIA RTX 4090 at full resolution. Ours are of the device \
+        text: "The paper's FPS were measured on an NVIDIA RTX 4090, at a resolution that it does not name. Ours are of the device \
                named beside them, at the picture size named in the list of models. Only the change from dense to \
                sparse can be compared, and on a CPU not even that.",
     },
