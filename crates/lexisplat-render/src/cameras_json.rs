@@ -17,7 +17,7 @@ pub const MAX_CAMERAS_BYTES: u64 = 16 << 20;
 /// Most cameras in a file.
 pub const MAX_CAMERAS: usize = 100_000;
 /// Longest name of a camera, in bytes.
-const MAX_NAME: usize = 1024;
+pub(crate) const MAX_NAME: usize = 1024;
 
 /// Reads the cameras of `path`, in the file's order.
 ///
@@ -149,7 +149,7 @@ impl<'de> Visitor<'de> for CameraAt {
 }
 
 /// `value` as a whole number, if it is one; some writers print `400.0`.
-fn whole(value: f64) -> Option<u32> {
+pub(crate) fn whole(value: f64) -> Option<u32> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "compared with the original")]
     let integer = value as u32;
     (f64::from(integer) == value).then_some(integer)

@@ -5,6 +5,9 @@ use std::path::Path;
 /// Result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
+/// A value, or what is wrong with it where the file is not known.
+pub(crate) type Checked<T> = std::result::Result<T, String>;
+
 /// Any failure of this crate. The variant tells whose fault it is.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

@@ -38,6 +38,7 @@ extern crate self as lexisplat_render;
 
 mod camera;
 mod cameras_json;
+mod colmap;
 pub mod conventions;
 mod cpu;
 mod error;
@@ -49,9 +50,12 @@ mod radiance;
 mod renderer;
 mod scene;
 mod surround;
+mod transforms;
+mod view_set;
 
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
+pub use colmap::{MAX_COLMAP_BYTES, read_colmap, read_colmap_binary, read_colmap_text};
 pub use cpu::{Drawn, RenderOptions, render, render_measured, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
@@ -60,3 +64,5 @@ pub use radiance::Radiance;
 pub use renderer::{Device, Prepared, Renderer};
 pub use scene::Scene;
 pub use surround::surround;
+pub use transforms::{read_nerf, read_transforms, read_transforms_bytes};
+pub use view_set::{SizeOf, ViewSet, read_views};

@@ -1,0 +1,123 @@
+//! Lines of a text file, of which long ones are never held.
+
+use std::fmt::Display;
+use std::io::BufRead;
+
+use crate::error::{Error, Result};
+
+/// Longest line that is kept, in bytes: a name at its limit and ten numbers.
+const MAX_LINE: usize = 4096;
+
+/// Lines of a reader.
+pub(super) struct Lines<'a, R> {
+    file: &'a str,
+    reader: R,
+    /// Number of the line read last, from 1.
+    number: u64,
+    bytes: Vec<u8>,
+}
+
+impl<'a, R: BufRead> Lines<'a, R> {
+    pub(super) fn new(file: &'a str, reader: R) -> Self {
+        Self { file, reader, number: 0, bytes: Vec::new() }
+    }
+
+    /// An error about the line read last.
+    pub(super) fn wrong(&self, problem: impl Display) -> Error {
+        Error::format(self.file, format!("line {}: {problem}", self.number))
+    }
+
+    /// An [`Error::Limit`] on the number of `what`.
+    pub(super) fn too_many(&self, what: &str, limit: usize) -> Error {
+        Error::Limit { what: format!("{}: {what}", self.file), found: limit as u64 + 1, limit: limit as u64 }
+    }
+
+    /// The next line without white space at its ends; `None` after the last.
+    pub(super) fn line(&mut self) -> Result<Option<String>> {
+        self.bytes.clear();
+        let mut long = false;
+        let bytes = &mut self.bytes;
+        let any = each_piece(&mut self.reader, |piece| {
+            let room = MAX_LINE.saturating_sub(bytes.len());
+            long |= piece.len() > room;
+            bytes.extend_from_slice(&piece[..piece.len().min(room)]);
+        });
+        if !any.map_err(|e| Error::io(self.file, e))? {
+            return Ok(None);
+        }
+        self.number += 1;
+        if long {
+            return Err(self.wrong(format!("over the limit of {MAX_LINE} bytes")));
+        }
+        match std::str::from_utf8(&self.bytes) {
+            Ok(text) => Ok(Some(text.trim().to_owned())),
+            Err(_) => Err(self.wrong("not UTF-8")),
+        }
+    }
+
+    /// Passes over the next line, however long, and counts its words.
+    pub(super) fn words_of_next(&mut self) -> Result<u64> {
+        let (mut words, mut inside) = (0_u64, false);
+        let any = each_piece(&mut self.reader, |piece| {
+            for byte in piece {
+                let word = !byte.is_ascii_whitespace();
+                words += u64::from(word && !inside);
+                inside = word;
+            }
+        });
+        self.number += u64::from(any.map_err(|e| Error::io(self.file, e))?);
+        Ok(words)
+    }
+}
+
+/// Calls `f` with the pieces of the next line, without its end; whether there was one.
+fn each_piece(reader: &mut impl BufRead, mut f: impl FnMut(&[u8])) -> std::io::Result<bool> {
+    let mut any = false;
+    loop {
+        let buffer = match reader.fill_buf() {
+            Ok(buffer) => buffer,
+            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
+            Err(e) => return Err(e),
+        };
+        if buffer.is_empty() {
+            return Ok(any);
+        }
+        any = true;
+        let end = buffer.iter().position(|byte| *byte == b'\n');
+        f(&buffer[..end.unwrap_or(buffer.len())]);
+        let used = end.map_or(buffer.len(), |end| end + 1);
+        reader.consume(used);
+        if end.is_some() {
+            return Ok(true);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::BufReader;
+
+    #[test]
+    fn lines_come_apart_whatever_the_buffer() {
+        let text = format!(" one \r\n\n{}\n 1 2  3\t4 \nlast", "long ".repeat(3000));
+        for size in [1, 3, 7, 1 << 16] {
+            let mut lines = Lines::new("a.txt", BufReader::with_capacity(size, text.as_bytes()));
+            assert_eq!(lines.line().unwrap().as_deref(), Some("one"));
+            assert_eq!(lines.line().unwrap().as_deref(), Some(""));
+            assert_eq!(lines.words_of_next().unwrap(), 3000);
+            assert_eq!(lines.words_of_next().unwrap(), 4);
+            assert_eq!(lines.line().unwrap().as_deref(), Some("last"));
+            assert_eq!(lines.line().unwrap(), None);
+            assert_eq!(lines.words_of_next().unwrap(), 0);
+            assert_eq!(lines.wrong("x").to_string(), "a.txt: line 5: x");
+        }
+        let mut lines = Lines::new("a.txt", text.as_bytes());
+        lines.line().unwrap();
+        lines.line().unwrap();
+        let long = lines.line().unwrap_err().to_string();
+        assert!(long.starts_with("a.txt: line 3: over the limit"), "{long}");
+        assert_eq!(lines.words_of_next().unwrap(), 4);
+        assert!(Lines::new("a.txt", &[b'a', 0xFF][..]).line().is_err());
+    }
+}

@@ -1,0 +1,50 @@
+//! COLMAP's poses as cameras.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::intrinsics::Intrinsics;
+use crate::camera::Camera;
+use crate::error::Checked;
+use crate::orbit::single;
+
+/// An image: its name, its camera's number, and where it was taken.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Posed {
+    pub(super) name: String,
+    pub(super) camera: u32,
+    /// World-to-camera rotation as a quaternion (w, x, y, z), of any length above 0 as in COLMAP.
+    pub(super) quaternion: [f64; 4],
+    /// World-to-camera translation, applied after the rotation, in world units.
+    pub(super) translation: [f64; 3],
+}
+
+impl Posed {
+    /// The image as a camera with `intrinsics`.
+    pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Checked<Camera> {
+        let [w, x, y, z] = self.quaternion;
+        let quaternion = DQuat::from_xyzw(x, y, z, w);
+        let squares = quaternion.length_squared();
+        if !(squares.is_normal() && DVec3::from_array(self.translation).is_finite()) {
+            return Err(format!(
+                "its pose is no pose: quaternion {:?}, translation {:?}",
+                self.quaternion, self.translation
+            ));
+        }
+        let to_camera = DMat3::from_quat(quaternion.normalize());
+        let position = -(to_camera.transpose() * DVec3::from_array(self.translation));
+        let [fx, fy] = intrinsics.focal;
+        let camera = Camera {
+            name: self.name.clone(),
+            width: intrinsics.width,
+            height: intrinsics.height,
+            fx: single(fx),
+            fy: single(fy),
+            position: position.to_array().map(single),
+            // Columns of the rotation to the camera are rows of the one to the world.
+            rotation: to_camera.to_cols_array_2d().map(|row| row.map(single)),
+            split: None,
+        };
+        camera.validate().map_err(|e| e.to_string())?;
+        Ok(camera)
+    }
+}

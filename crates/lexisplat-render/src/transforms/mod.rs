@@ -1,0 +1,207 @@
+//! Reads `transforms.json`, as nerfstudio, instant-ngp and the `NeRF` synthetic scenes write it.
+//!
+//! `transform_matrix` is camera to world with the camera's y up and z back (OpenGL), in the frame of
+//! the file. That is the frame of models trained by tools that read the file as it is, the 3DGS authors'
+//! loader among them (`gaussian-splatting/scene/dataset_readers.py`, `readCamerasFromTransforms`).
+//! **nerfstudio does not**: it centres and scales the scene, and `ns-export` leaves the model in that
+//! frame, recorded in `dataparser_transforms.json`, which is not read here. Such a model and its
+//! `transforms.json` do not fit together. `applied_transform` is not undone either.
+//!
+//! Formats: nerfstudio's documentation, "Data conventions"; `nerfstudio_dataparser.py`.
+
+mod file;
+#[cfg(test)]
+mod tests;
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use crate::camera::{Camera, Split};
+use crate::cameras_json::{MAX_NAME, whole};
+use crate::error::{Checked, Error, Result};
+use crate::orbit::single;
+use crate::view_set::{PrincipalPoints, SizeOf, ViewSet, read_limited};
+use file::{Frame, Lens, Transforms};
+
+/// Files of a `NeRF` synthetic folder and the split that each is; `transforms_val.json` is not used, as in
+/// the 3DGS authors' loader.
+const NERF_FILES: [(&str, Split); 2] =
+    [("transforms_train.json", Split::Train), ("transforms_test.json", Split::Test)];
+/// How far the last row of a matrix may be from (0, 0, 0, 1).
+const LAST_ROW_TOLERANCE: f64 = 1e-6;
+
+/// What to do about a lens that the rasteriser cannot draw through.
+const UNDISTORT: &str = "only pinhole cameras can be drawn from; undistort the photos (`colmap image_undistorter`) and use the cameras of that";
+
+/// Whether `folder` is a `NeRF` synthetic one.
+pub(crate) fn is_nerf(folder: &Path) -> bool {
+    folder.join(NERF_FILES[0].0).is_file()
+}
+
+/// Reads a `transforms.json`. See [`read_transforms_bytes`].
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read, else as [`read_transforms_bytes`].
+pub fn read_transforms(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let path = path.as_ref();
+    read_transforms_bytes(&path.display().to_string(), &read_limited(path)?, size_of)
+}
+
+/// Reads `transforms_train.json` and, if it is there, `transforms_test.json` of a `NeRF` synthetic folder;
+/// every camera is marked with its split. These files name no size, so `size_of` has to know.
+///
+/// # Errors
+/// As [`read_transforms`].
+pub fn read_nerf(folder: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let mut all = ViewSet::default();
+    for (index, (name, split)) in NERF_FILES.into_iter().enumerate() {
+        let path = folder.as_ref().join(name);
+        if index > 0 && !path.is_file() {
+            continue;
+        }
+        let set = read_transforms(&path, size_of)?;
+        all.cameras.extend(set.cameras.into_iter().map(|camera| Camera { split: Some(split), ..camera }));
+        all.warnings.extend(set.warnings.into_iter().map(|warning| format!("{name}: {warning}")));
+    }
+    Ok(all)
+}
+
+/// The cameras in `bytes`, in order, named by their `file_path` as written; `file` stands for them in
+/// errors.
+///
+/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`, of the
+/// frame before those of the file; one for both axes if only x has any. Where `w` and `h` are missing,
+/// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`].
+/// `train_filenames` and `test_filenames` set the split; `val_filenames` count as test if there are no
+/// `test_filenames`, as in nerfstudio's own evaluation.
+///
+/// # Errors
+/// [`Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
+/// range, a size is not known, the lens is not a pinhole's, or it is over [`crate::MAX_CAMERAS_BYTES`] or
+/// [`crate::MAX_CAMERAS`].
+pub fn read_transforms_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let transforms = Transforms::parse(bytes).map_err(|problem| Error::format(file, problem))?;
+    let splits = Splits::new(&transforms).map_err(|problem| Error::format(file, problem))?;
+    let mut points = PrincipalPoints::default();
+    let mut cameras = Vec::with_capacity(transforms.frames.len());
+    for (index, frame) in transforms.frames.iter().enumerate() {
+        let split = splits.of(&frame.path);
+        let camera = camera(frame, &transforms.lens, split, size_of, &mut points);
+        let about = |problem| Error::format(file, format!("frame {index} ('{}'): {problem}", frame.path));
+        cameras.push(camera.map_err(about)?);
+    }
+    let mut warnings = splits.warnings(&transforms.frames);
+    warnings.extend(points.warning());
+    Ok(ViewSet { cameras, warnings })
+}
+
+fn camera(
+    frame: &Frame,
+    global: &Lens,
+    split: Option<Split>,
+    size_of: SizeOf<'_>,
+    points: &mut PrincipalPoints,
+) -> Checked<Camera> {
+    if frame.path.len() > MAX_NAME {
+        return Err(format!("field 'file_path' is over the limit of {MAX_NAME} bytes"));
+    }
+    for lens in [&frame.lens, global] {
+        if let Some(problem) = lens.distortion() {
+            return Err(format!("{problem}; {UNDISTORT}"));
+        }
+    }
+    let side = |name: &str, own: Option<f64>, all: Option<f64>| match own.or(all) {
+        None => Ok(None),
+        Some(value) => match whole(value) {
+            Some(side) => Ok(Some(side)),
+            None => Err(format!("field '{name}' is {value}, not a whole number of pixels")),
+        },
+    };
+    let stated = (side("w", frame.lens.w, global.w)?, side("h", frame.lens.h, global.h)?);
+    let (width, height) = match stated {
+        (Some(width), Some(height)) => (width, height),
+        _ => size_of(&frame.path).ok_or(
+            "the file has no 'w' and 'h', and the photo that would tell the size is not known; name the folder of the photos",
+        )?,
+    };
+    let (along_x, along_y) = (frame.lens.focal_x(width)?, frame.lens.focal_y(height)?);
+    let (all_x, all_y) = (global.focal_x(width)?, global.focal_y(height)?);
+    let fx = along_x
+        .or(all_x)
+        .ok_or("neither 'fl_x' nor 'camera_angle_x' is there, so its focal length is not known")?;
+    // A frame's own focal length is not mixed with the file's for the other axis.
+    let fy = along_y.or(if along_x.is_some() { None } else { all_y }).unwrap_or(fx);
+    let [right, up, back, position] = frame.columns()?;
+    let rotation = std::array::from_fn(|row| [right[row], -up[row], -back[row]].map(single));
+    let camera = Camera {
+        name: frame.path.clone(),
+        width,
+        height,
+        fx: single(fx),
+        fy: single(fy),
+        position: position.map(single),
+        rotation,
+        split,
+    };
+    camera.validate().map_err(|e| e.to_string())?;
+    let centre = [(frame.lens.cx.or(global.cx), width), (frame.lens.cy.or(global.cy), height)];
+    points.see(centre.map(|(at, side)| at.unwrap_or(f64::from(side) / 2.0)), width, height);
+    Ok(camera)
+}
+
+impl Frame {
+    /// The matrix's columns: right, up, back and position.
+    fn columns(&self) -> Checked<[[f64; 3]; 4]> {
+        if let [_, _, _, last] = self.matrix.as_slice() {
+            let off = last.iter().zip([0.0, 0.0, 0.0, 1.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            if off > LAST_ROW_TOLERANCE {
+                return Err(format!("field 'transform_matrix' ends in {last:?}, expected [0, 0, 0, 1]"));
+            }
+        }
+        let [x, y, z, ..] = self.matrix.as_slice() else {
+            let rows = self.matrix.len();
+            return Err(format!("field 'transform_matrix' has {rows} rows, expected 4"));
+        };
+        Ok(std::array::from_fn(|column| [x[column], y[column], z[column]]))
+    }
+}
+
+/// Names of the frames of each split, where the file has such lists.
+struct Splits<'a> {
+    train: HashSet<&'a str>,
+    test: HashSet<&'a str>,
+}
+
+impl<'a> Splits<'a> {
+    fn new(transforms: &'a Transforms) -> Checked<Self> {
+        let set = |names: &'a [String]| names.iter().map(|name| plain(name)).collect::<HashSet<_>>();
+        let held = transforms.test.as_ref().or(transforms.val.as_ref());
+        let train = set(transforms.train.as_deref().unwrap_or_default());
+        let test = set(held.map_or(&[], Vec::as_slice));
+        match train.intersection(&test).min() {
+            Some(both) => Err(format!("'{both}' is listed for training and for testing")),
+            None => Ok(Self { train, test }),
+        }
+    }
+
+    fn of(&self, path: &str) -> Option<Split> {
+        let path = plain(path);
+        let train = self.train.contains(path).then_some(Split::Train);
+        train.or_else(|| self.test.contains(path).then_some(Split::Test))
+    }
+
+    fn warnings(&self, frames: &[Frame]) -> Vec<String> {
+        let frames: HashSet<&str> = frames.iter().map(|frame| plain(&frame.path)).collect();
+        let lost = |names: &HashSet<&'a str>| names.iter().filter(|name| !frames.contains(*name)).count();
+        [("train", lost(&self.train)), ("test", lost(&self.test))]
+            .into_iter()
+            .filter(|(_, lost)| *lost > 0)
+            .map(|(split, lost)| format!("{lost} of the names listed for the {split} split are of no frame"))
+            .collect()
+    }
+}
+
+/// A path without the `./` that some writers put before it.
+fn plain(path: &str) -> &str {
+    path.strip_prefix("./").unwrap_or(path)
+}
