@@ -45,10 +45,13 @@ mod error;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod image;
+mod object;
 mod orbit;
 mod radiance;
 mod renderer;
+mod room;
 mod scene;
+mod sight;
 mod surround;
 mod transforms;
 mod view_set;
@@ -59,9 +62,11 @@ pub use colmap::{MAX_COLMAP_BYTES, read_colmap, read_colmap_binary, read_colmap_
 pub use cpu::{Drawn, RenderOptions, render, render_measured, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
+pub use object::{object, subject};
 pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
 pub use renderer::{Device, Prepared, Renderer};
+pub use room::{is_room, room};
 pub use scene::Scene;
 pub use surround::surround;
 pub use transforms::{read_nerf, read_transforms, read_transforms_bytes};

@@ -7,7 +7,7 @@ use crate::camera::Camera;
 
 /// Share of the opacity, on each side and axis, that is left out when the bulk is measured: floaters
 /// and far backgrounds are many but thin.
-const TRIM: f64 = 0.2;
+pub(crate) const TRIM: f64 = 0.2;
 /// Field of view along the picture's shorter side, in degrees.
 const FIELD_OF_VIEW: f64 = 50.0;
 /// Height of the ring above the centre and how far it sways, in degrees of elevation.
@@ -23,7 +23,7 @@ const MIN_RADIUS: f64 = 1e-3;
 /// Nearest distance to the centre, in world units: well beyond [`crate::conventions::NEAR_Z`].
 const MIN_DISTANCE: f64 = 0.5;
 /// Up in the world: scenes trained from COLMAP's cameras are about upright with y down.
-const UP: DVec3 = DVec3::NEG_Y;
+pub(crate) const UP: DVec3 = DVec3::NEG_Y;
 
 /// `count` cameras on a swaying ring around the bulk of `geometry`, all looking at its centre, named
 /// `orbit_000`, `orbit_001` and so on; the same for the same input.
@@ -32,8 +32,12 @@ const UP: DVec3 = DVec3::NEG_Y;
 /// view. World y is taken to point down, as in scenes trained from COLMAP's cameras.
 #[must_use]
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+    ring(bulk(geometry), count, width, height)
+}
+
+/// [`orbit`] around a centre, at a distance from which a ball of a radius fits the field of view.
+pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, height: u32) -> Vec<Camera> {
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
-    let (centre, radius) = bulk(geometry);
     let centre = DVec3::from_array(centre);
     let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
     let focal = f64::from(width.min(height)) / 2.0 / half_view.tan();
@@ -65,9 +69,13 @@ pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<
 /// Centre and radius of where most of the opacity is, in world units; the radius is above 0.
 #[must_use]
 pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
-    let weights: Vec<f64> = geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect();
-    let (centre, half) = middle(geometry, &weights, TRIM);
+    let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     (centre.to_array(), (half.length() * AIR).max(MIN_RADIUS))
+}
+
+/// Opacities after the sigmoid.
+pub(crate) fn opacity_weights(geometry: &Geometry) -> Vec<f64> {
+    geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect()
 }
 
 /// Weighted median of the positions, and half the extent along each axis of what is left without the

@@ -1,0 +1,88 @@
+//! Views of what there is to look at in a scene that comes without cameras.
+
+use lexisplat::Geometry;
+
+use crate::camera::Camera;
+use crate::orbit::{bulk, ring};
+use crate::surround::detail;
+
+/// The detail is the subject of a scene whose bulk is this many times as large: an object before a
+/// background. Bonsai (11) and flowers (7) are such scenes; where the object is all there is, it is 1 to 2.
+const BACKGROUND: f64 = 4.0;
+/// Radius of what is looked at, in units of the half diagonal of the detail's box. Photos of a centrepiece
+/// are taken from 3 to 6 half diagonals; this makes it 4.
+const AIR: f64 = 1.8;
+
+/// `count` cameras on a swaying ring around the [`subject`] of `geometry`, as [`crate::orbit`] has them
+/// around the bulk, and named as those.
+#[must_use]
+pub fn object(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+    ring(subject(geometry), count, width, height)
+}
+
+/// Centre and radius, in world units, of what there is to look at: where most of the small opaque
+/// Gaussians are, if that is a small part of the scene, else the [`bulk`].
+#[must_use]
+pub fn subject(geometry: &Geometry) -> ([f64; 3], f64) {
+    let (centre, radius) = bulk(geometry);
+    let (finest, half) = detail(geometry);
+    let fine = half.length();
+    // A detail without extent is one Gaussian or none.
+    if fine > 0.0 && radius > BACKGROUND * fine { (finest.to_array(), fine * AIR) } else { (centre, radius) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A ball of 500 small Gaussians of radius 1 around (5, -2, 7), and as many large ones `far` away from it.
+    fn before(far: f64) -> Geometry {
+        let mut g = Geometry::default();
+        for i in 0..1000_u16 {
+            let t = f64::from(i);
+            let y = 1.0 - (2.0 * t + 1.0) / 1000.0;
+            let around = (1.0 - y * y).sqrt();
+            let (radius, scale) = if i % 2 == 0 { (1.0, -4.0) } else { (far, 0.0) };
+            let p = glam::DVec3::new(around * (t * 2.4).cos(), y, around * (t * 2.4).sin()) * radius;
+            g.positions.push((p + glam::DVec3::new(5.0, -2.0, 7.0)).to_array().map(crate::orbit::single));
+            g.scales.push([scale; 3]);
+            g.opacities.push(2.0);
+            g.rotations.push([1.0, 0.0, 0.0, 0.0]);
+        }
+        g
+    }
+
+    #[test]
+    fn an_object_before_a_background_is_the_subject() {
+        let near = |centre: [f64; 3]| {
+            centre.iter().zip([5.0, -2.0, 7.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max) < 0.2
+        };
+        let (centre, radius) = subject(&before(60.0));
+        assert!(near(centre) && radius > 1.0 && radius < 2.5, "{centre:?} {radius}");
+        for camera in object(&before(60.0), 6, 90, 60) {
+            camera.validate().unwrap();
+            let [x, y, z] = camera.to_view([5.0, -2.0, 7.0]);
+            assert!(z > 2.0 && z < 6.0 && x.abs() < 0.3 && y.abs() < 0.3, "{x} {y} {z}");
+        }
+        // Where all of it is the object.
+        let alone = before(1.5);
+        assert_eq!(subject(&alone), bulk(&alone));
+        assert_eq!(object(&alone, 4, 90, 60), crate::orbit(&alone, 4, 90, 60));
+    }
+
+    #[test]
+    fn degenerate_scenes_still_give_cameras() {
+        let all_equal = Geometry { positions: vec![[1.0; 3]; 40], ..before(1.0) };
+        let one = Geometry {
+            positions: vec![[1.0, f32::NAN, 3.0]],
+            opacities: vec![f32::NAN],
+            scales: vec![[f32::INFINITY; 3]],
+            ..Geometry::default()
+        };
+        for geometry in [Geometry::default(), one, all_equal] {
+            for camera in object(&geometry, 3, 0, 10) {
+                camera.validate().unwrap();
+            }
+        }
+    }
+}

@@ -1,0 +1,293 @@
+//! Views from inside a scene that comes without cameras, and whether it wants them.
+
+use glam::DVec3;
+use lexisplat::Geometry;
+
+use crate::camera::Camera;
+use crate::conventions::NEAR_Z;
+use crate::object::{object, subject};
+use crate::orbit::{TRIM, UP, bulk, middle, opacity_weights, single};
+use crate::sight::{Ray, transmittances};
+use crate::surround::{PLASTIC, detail};
+
+/// Views of the orbit that are tried.
+const TRIED_VIEWS: usize = 8;
+/// Gaussians that each of them should see.
+const TARGETS: usize = 24;
+/// A line of sight ends so far before its target, in radii of what is looked at: the target's neighbours on
+/// the same surface are not in the way.
+const SHORT: f64 = 0.1;
+/// A target is seen if this share of the light arrives.
+const SEEN: f64 = 0.5;
+/// In a room fewer than this share of the lines are free. Of real objects, with and without a background
+/// (bonsai, snowmiku, flowers, leica, fruit), 0.34 to 0.66 are; of a made-up room none.
+const FEW: f64 = 0.15;
+
+/// Places tried to stand at.
+const PLACES: u32 = 32;
+/// How far from the centre they are to either side, in half extents of the bulk.
+const ASIDE: f64 = 0.7;
+/// How far above the centre they are at most, in half extents of the bulk: below it are floors, and under
+/// those nothing that is free because nobody saw it.
+const ABOVE: f64 = 0.5;
+/// Directions in which a place should be free.
+const DIRECTIONS: u32 = 8;
+/// How far it should be free there, in radii of the bulk.
+const FREE: f64 = 0.5;
+/// What has to be free before a view: its middle, and points this far to the right and down, in tangents of
+/// the angle from it.
+const BUNDLE: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [-0.4, 0.3], [0.4, -0.3], [-0.4, -0.3]];
+/// Places that views are spread over.
+const STANDS: usize = 3;
+/// A place with less than this share of the free ways of the best is not stood at.
+const GOOD: f64 = 0.8;
+/// A view with less than this share of the light left on its free way is taken from elsewhere.
+const CLEAR: f64 = 0.8;
+/// Field of view along the picture's shorter side, in degrees.
+const FIELD_OF_VIEW: f64 = 60.0;
+/// How far views look up or down in turn, in degrees.
+const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
+
+/// Whether `geometry` is a scene to look at from inside: [`object`]'s cameras see next to none of its detail,
+/// as walls are in the way.
+#[must_use]
+pub fn is_room(geometry: &Geometry) -> bool {
+    seen(geometry).is_some_and(|share| share < FEW)
+}
+
+/// Share of the lines from an orbit's cameras to Gaussians of the detail that are free; `None` if there are
+/// no such Gaussians.
+fn seen(geometry: &Geometry) -> Option<f64> {
+    let (_, radius) = subject(geometry);
+    let targets = targets(geometry);
+    let mut lines = Vec::new();
+    for camera in object(geometry, TRIED_VIEWS, 1, 1) {
+        let origin = DVec3::from_array(camera.position.map(f64::from));
+        lines.extend(targets.iter().map(|target| {
+            let way = target - origin;
+            let to = way.length() - SHORT * radius;
+            Ray { origin, direction: way.normalize_or_zero(), from: f64::from(NEAR_Z), to }
+        }));
+    }
+    let free = transmittances(geometry, &lines).iter().filter(|light| **light >= SEEN).count();
+    (!lines.is_empty()).then(|| free as f64 / lines.len() as f64)
+}
+
+/// Centres of up to [`TARGETS`] opaque Gaussians of the detail, evenly spread over the file.
+fn targets(geometry: &Geometry) -> Vec<DVec3> {
+    let (centre, half) = detail(geometry);
+    let all: Vec<DVec3> = geometry
+        .positions
+        .iter()
+        .zip(&geometry.opacities)
+        .filter(|(_, opacity)| **opacity > 0.0)
+        .map(|(position, _)| DVec3::from_array(position.map(f64::from)))
+        .filter(|position| (position - centre).abs().cmple(half).all())
+        .collect();
+    let step = all.len().div_ceil(TARGETS).max(1);
+    all.into_iter().step_by(step).collect()
+}
+
+/// `count` cameras inside `geometry` that look outwards all around, upright, from a few places near the
+/// middle of its bulk that have little before them, named `room_000` and so on; the same for the same
+/// input. World y is taken to point down, as for [`crate::orbit`].
+#[must_use]
+pub fn room(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
+    let focal = single(f64::from(width.min(height)) / 2.0 / (FIELD_OF_VIEW / 2.0).to_radians().tan());
+    let steps = u32::try_from(count).unwrap_or(u32::MAX);
+    let (_, radius) = bulk(geometry);
+    let stands = stands(geometry, radius);
+    let looks: Vec<[DVec3; 3]> = (0..steps).map(|i| axes(look(i, steps))).collect();
+    let light = free_ways(geometry, &stands, &looks, radius);
+    let light = |stand: usize, look: usize| light[stand * looks.len() + look];
+    (0..steps)
+        .zip(&looks)
+        .enumerate()
+        .map(|(at, (i, columns))| {
+            // In turn, unless something is in the way there.
+            let own = at % stands.len();
+            let best = (0..stands.len()).fold(own, |a, b| if light(b, at) > light(a, at) { b } else { a });
+            let stand = if light(own, at) >= CLEAR { own } else { best };
+            Camera {
+                name: format!("room_{i:03}"),
+                width,
+                height,
+                fx: focal,
+                fy: focal,
+                position: stands[stand].to_array().map(single),
+                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
+                split: None,
+            }
+        })
+        .collect()
+}
+
+/// The direction of look `i` of `count`: around once, up and down in turn.
+fn look(i: u32, count: u32) -> DVec3 {
+    let (sine, cosine) = libm::sincos(f64::from(i) / f64::from(count) * std::f64::consts::TAU);
+    let (up, level) = libm::sincos(PITCH[i as usize % PITCH.len()].to_radians());
+    DVec3::new(sine, 0.0, -cosine) * level + UP * up
+}
+
+/// Right, down and forward of a camera that looks along `forward`, which is not upright.
+fn axes(forward: DVec3) -> [DVec3; 3] {
+    let right = forward.cross(UP).normalize();
+    [right, forward.cross(right), forward]
+}
+
+/// Mean light left before every look from every place, place by place.
+fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius: f64) -> Vec<f64> {
+    let from = f64::from(NEAR_Z);
+    let mut rays = Vec::with_capacity(places.len() * looks.len() * BUNDLE.len());
+    for &origin in places {
+        for [right, down, forward] in looks {
+            rays.extend(BUNDLE.map(|[x, y]| {
+                let direction = (forward + right * x + down * y).normalize();
+                Ray { origin, direction, from, to: from + FREE * radius }
+            }));
+        }
+    }
+    let light = transmittances(geometry, &rays);
+    light.chunks_exact(BUNDLE.len()).map(|bundle| bundle.iter().sum::<f64>() / BUNDLE.len() as f64).collect()
+}
+
+/// One to [`STANDS`] places: the freest, then those that are about as free and farthest from the others.
+fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
+    let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
+    let places: Vec<DVec3> = (0..PLACES)
+        .map(|i| {
+            // The first is above the centre.
+            let share = |k: usize| (0.5 + f64::from(i) * PLASTIC[k]).fract();
+            let aside = |k: usize| ASIDE * (2.0 * share(k) - 1.0);
+            centre + half * (DVec3::new(aside(0), 0.0, aside(2)) + UP * ABOVE * share(1))
+        })
+        .collect();
+    let looks: Vec<[DVec3; 3]> = (0..DIRECTIONS).map(|i| axes(look(i, DIRECTIONS))).collect();
+    let light = free_ways(geometry, &places, &looks, radius);
+    let scores: Vec<f64> = light.chunks_exact(looks.len()).map(|ways| ways.iter().sum()).collect();
+    let best = (0..places.len()).fold(0, |a, b| if scores[b] > scores[a] { b } else { a });
+    let mut chosen = vec![places[best]];
+    while chosen.len() < STANDS {
+        let apart = |i: usize| chosen.iter().map(|c| c.distance(places[i])).fold(f64::INFINITY, f64::min);
+        let good = (0..places.len()).filter(|&i| scores[i] >= GOOD * scores[best] && apart(i) > 0.0);
+        let Some(next) = good.max_by(|&a, &b| apart(a).total_cmp(&apart(b))) else { break };
+        chosen.push(places[next]);
+    }
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn put(g: &mut Geometry, at: [f64; 3], scale: f64, opacity: f32) {
+        g.positions.push(at.map(single));
+        g.scales.push([single(scale.ln()); 3]);
+        g.opacities.push(opacity);
+        g.rotations.push([1.0, 0.0, 0.0, 0.0]);
+    }
+
+    /// Share `i` of a sequence that covers an interval evenly.
+    fn share(i: u16, k: usize) -> f64 {
+        (f64::from(i) * PLASTIC[k]).fract()
+    }
+
+    /// A vase on a table, and a background that is far and thin.
+    fn still_life() -> Geometry {
+        let mut g = Geometry::default();
+        for i in 0..1500 {
+            let (turn, high) = (std::f64::consts::TAU * share(i, 0), share(i, 1));
+            put(&mut g, [0.5 * turn.cos(), -high, 0.5 * turn.sin()], 0.03, 4.0);
+            put(&mut g, [4.0 * share(i, 0) - 2.0, 0.0, 4.0 * share(i, 1) - 2.0], 0.08, 4.0);
+        }
+        for i in 0..300 {
+            let (turn, y) = (std::f64::consts::TAU * share(i, 0), 1.6 * share(i, 1) - 0.8);
+            let level = (1.0 - y * y).sqrt() * 30.0;
+            put(&mut g, [level * turn.cos(), 30.0 * y, level * turn.sin()], 1.0, -3.0);
+        }
+        g
+    }
+
+    /// Half the room's size, in world units.
+    const HALF: [f64; 3] = [5.0, 1.5, 4.0];
+
+    /// Walls, floor and ceiling, all opaque, and furniture along two of the walls.
+    fn hollow_box() -> Geometry {
+        let mut g = Geometry::default();
+        for i in 0..4000 {
+            let [a, b] = [0, 1].map(|k| 2.0 * share(i, k) - 1.0);
+            let side = f64::from(i % 2) * 2.0 - 1.0;
+            let on = [[side, a, b], [a, side, b], [a, b, side]][usize::from(i / 2 % 3)];
+            put(&mut g, std::array::from_fn(|axis| on[axis] * HALF[axis]), 0.25, 6.0);
+        }
+        for i in 0..3000 {
+            let side = f64::from(i % 2) * 2.0 - 1.0;
+            let (x, y, z) = (9.0 * share(i, 0) - 4.5, 1.5 - share(i, 1), side * (3.0 + share(i, 2)));
+            put(&mut g, [x, y, z], 0.05, 3.0);
+        }
+        g
+    }
+
+    #[test]
+    fn rooms_are_told_from_objects() {
+        assert!(!is_room(&still_life()));
+        assert!(is_room(&hollow_box()));
+        // Without walls and ceiling in the way, furniture is looked at from outside.
+        let mut open = hollow_box();
+        open.opacities[..4000].fill(-4.0);
+        assert!(!is_room(&open));
+    }
+
+    #[test]
+    fn views_of_a_room_are_inside_upright_and_all_around() {
+        let g = hollow_box();
+        let cameras = room(&g, 12, 320, 200);
+        assert_eq!(cameras.len(), 12);
+        assert_eq!(cameras[7].name, "room_007");
+        let mut sum = DVec3::ZERO;
+        for camera in &cameras {
+            camera.validate().unwrap();
+            let position = camera.position.map(f64::from);
+            assert!(position.iter().zip(HALF).all(|(p, half)| p.abs() < 0.9 * half), "{position:?}");
+            let r = &camera.rotation;
+            assert!(r[1][0].abs() < 1e-6 && r[1][1] > 0.9, "level, and not upside down");
+            sum += DVec3::from_array(r.map(|row| f64::from(row[2])));
+            // What is before it is as far as a room's width allows.
+            let near = g.positions.iter().filter(|p| {
+                let [x, y, z] = camera.to_view(**p);
+                z > NEAR_Z && z < 0.7 && x.abs() < 0.3 * z && y.abs() < 0.3 * z
+            });
+            assert_eq!(near.count(), 0);
+        }
+        sum.y = 0.0;
+        assert!(sum.length() < 0.5, "all around: {sum}");
+        let mut places: Vec<[f32; 3]> = cameras.iter().map(|camera| camera.position).collect();
+        places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        places.dedup();
+        assert!(places.len() > 1, "from more than one place");
+        assert_eq!(cameras, room(&g, 12, 320, 200));
+        assert!(room(&g, 0, 10, 10).is_empty());
+    }
+
+    #[test]
+    fn degenerate_scenes_still_give_cameras() {
+        let mut one = Geometry::default();
+        put(&mut one, [1.0, 2.0, 3.0], 0.5, 9.0);
+        let mut broken = one.clone();
+        broken.positions[0][1] = f32::NAN;
+        broken.scales[0] = [f32::INFINITY; 3];
+        broken.opacities[0] = f32::NAN;
+        let mut equal = Geometry::default();
+        (0..50).for_each(|_| put(&mut equal, [1.0, 2.0, 3.0], 1e-30, 3.0));
+        let mut huge = one.clone();
+        put(&mut huge, [-3e38; 3], 1e30, 9.0);
+        put(&mut huge, [3e38; 3], 1e-30, 9.0);
+        for geometry in [Geometry::default(), one, broken, equal, huge] {
+            let _ = is_room(&geometry);
+            for camera in room(&geometry, 3, 0, 10) {
+                camera.validate().unwrap();
+            }
+        }
+    }
+}
