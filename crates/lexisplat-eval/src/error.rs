@@ -56,8 +56,8 @@ impl Error {
         Self::Io { file: file.as_ref().display().to_string(), source }
     }
 
-    pub(crate) fn format(file: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::Format { file: file.into(), problem: problem.into() }
+    pub(crate) fn format(file: impl AsRef<std::path::Path>, problem: impl Into<String>) -> Self {
+        Self::Format { file: file.as_ref().display().to_string(), problem: problem.into() }
     }
 
     pub(crate) fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {

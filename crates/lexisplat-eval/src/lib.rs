@@ -52,4 +52,7 @@ pub use prune::{Pruned, prune};
 pub use scene_file::{Loaded, SceneFile};
 pub use scorer::Scorer;
 pub use target::{Goal, Judge, Views, pack_to};
-pub use views::{DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SplitFilter, choose_views};
+pub use views::{
+    ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SceneKind, SplitFilter, View,
+    ViewOptions, choose_views, find_views, photo,
+};

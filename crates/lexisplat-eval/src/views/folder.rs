@@ -1,0 +1,250 @@
+//! A folder of photos, and which of them a camera's name means.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lexisplat_render::Camera;
+
+use crate::error::{Error, Result};
+
+/// Endings of photos, in lower case.
+const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Sub-folders within each other that are looked into; links could go round for ever.
+const MAX_DEPTH: usize = 8;
+/// Most files and folders looked at.
+const MAX_ENTRIES: usize = 1_000_000;
+/// Folder of full-size photos in a data set's folder.
+const IMAGES: &str = "images";
+
+/// Photos of a folder and its sub-folders.
+#[derive(Debug)]
+pub(super) struct PhotoFolder {
+    folder: PathBuf,
+    /// What the photos' size is still to be divided by.
+    pub(super) divisor: u32,
+    /// In order of paths.
+    photos: Vec<PathBuf>,
+    /// By path in the folder without ending.
+    by_path: HashMap<String, Vec<usize>>,
+    /// By name without ending.
+    by_stem: HashMap<String, Vec<usize>>,
+}
+
+/// The photos that a name may mean.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Found<'a> {
+    One(&'a Path),
+    Several(&'a Path, &'a Path),
+    None,
+}
+
+impl<'a> Found<'a> {
+    pub(super) fn one(self) -> Option<&'a Path> {
+        match self {
+            Self::One(path) => Some(path),
+            Self::Several(..) | Self::None => None,
+        }
+    }
+}
+
+impl PhotoFolder {
+    /// Photos of `images`, or of its folder `images` if it has one. For a divisor above 1 those of the folder
+    /// of smaller photos beside or in it, if there is one.
+    pub(super) fn open(images: &Path, divisor: u32) -> Result<Self> {
+        let inner = images.join(IMAGES);
+        let base = if inner.is_dir() { inner } else { images.to_path_buf() };
+        let smaller = smaller(images, &base, divisor);
+        let (folder, divisor) = smaller.map_or((base, divisor), |folder| (folder, 1));
+        let mut photos = Vec::new();
+        collect(&folder, 0, &mut 0, &mut photos)?;
+        photos.sort();
+        let mut by_path: HashMap<String, Vec<usize>> = HashMap::new();
+        let mut by_stem: HashMap<String, Vec<usize>> = HashMap::new();
+        for (index, path) in photos.iter().enumerate() {
+            let within = path.strip_prefix(&folder).unwrap_or(path).with_extension("");
+            let within = plain(&within.to_string_lossy());
+            let stem = within.rsplit('/').next().unwrap_or_default().to_owned();
+            by_stem.entry(stem).or_default().push(index);
+            by_path.entry(within).or_default().push(index);
+        }
+        if photos.is_empty() {
+            let value = folder.display();
+            return Err(Error::parameter("images", value, "a folder with photos (png, jpg or jpeg)"));
+        }
+        Ok(Self { folder, divisor, photos, by_path, by_stem })
+    }
+
+    /// The photo of a camera of this name: by its path without ending, then by ever shorter ends of that path,
+    /// then by its bare name wherever it is. Several are told apart by their ending if that is given.
+    pub(super) fn find(&self, name: &str) -> Found<'_> {
+        let name = plain(name);
+        let (stem, ending) = without_ending(&name);
+        let mut tails = [name.as_str(), stem];
+        loop {
+            for tail in tails {
+                if let Some(found) = self.by_path.get(tail) {
+                    return self.choose(found, ending);
+                }
+            }
+            match tails.map(|tail| tail.split_once('/').map(|(_, rest)| rest)) {
+                [Some(a), Some(b)] => tails = [a, b],
+                _ => break,
+            }
+        }
+        let found = tails.into_iter().find_map(|tail| self.by_stem.get(tail));
+        found.map_or(Found::None, |found| self.choose(found, ending))
+    }
+
+    fn choose(&self, found: &[usize], ending: Option<&str>) -> Found<'_> {
+        let path = |index: &usize| self.photos.get(*index).map(PathBuf::as_path);
+        let alike =
+            |path: &&Path| ending.zip(path.extension()).is_some_and(|(a, b)| b.eq_ignore_ascii_case(a));
+        let all: Vec<&Path> = found.iter().filter_map(path).collect();
+        let same: Vec<&Path> = all.iter().copied().filter(alike).collect();
+        match (all.as_slice(), same.as_slice()) {
+            ([one], _) | (_, [one]) => Found::One(one),
+            ([a, b, ..], _) => Found::Several(a, b),
+            _ => Found::None,
+        }
+    }
+
+    /// The cameras that have a photo of their own, with it; at least one. What is left out is told.
+    pub(super) fn matched(
+        &self,
+        cameras: Vec<Camera>,
+        warnings: &mut Vec<String>,
+    ) -> Result<Vec<(Camera, PathBuf)>> {
+        let count = cameras.len();
+        let first = cameras.first().map(|camera| camera.name.clone()).unwrap_or_default();
+        let (mut lost, mut several, mut shared) = (Left::default(), Left::default(), Left::default());
+        let mut pairs: Vec<(Camera, PathBuf)> = Vec::new();
+        for camera in cameras {
+            match self.find(&camera.name) {
+                Found::One(path) => pairs.push((camera, path.to_path_buf())),
+                Found::None => lost.add(|| format!("'{}'", camera.name)),
+                Found::Several(a, b) => {
+                    several.add(|| format!("'{}': {} and {}", camera.name, a.display(), b.display()));
+                }
+            }
+        }
+        let mut owners: HashMap<PathBuf, String> = HashMap::new();
+        let mut contested: HashMap<PathBuf, String> = HashMap::new();
+        for (camera, path) in &pairs {
+            let owner = owners.entry(path.clone()).or_insert_with(|| camera.name.clone());
+            if *owner != camera.name {
+                contested.entry(path.clone()).or_insert_with(|| format!("'{owner}' and '{}'", camera.name));
+            }
+        }
+        pairs.retain(|(_, path)| {
+            let Some(both) = contested.get(path) else { return true };
+            shared.add(|| format!("{both}: {}", path.display()));
+            false
+        });
+        let folder = self.folder.display();
+        warnings.extend(lost.tell(count, &format!("have no photo in {folder}")));
+        warnings.extend(several.tell(count, &format!("match several photos in {folder}")));
+        warnings.extend(shared.tell(count, "match a photo that another camera matches too"));
+        if pairs.is_empty() {
+            let photo = self.photos.first().and_then(|path| path.strip_prefix(&self.folder).ok());
+            let photo = photo.unwrap_or(&self.folder).display();
+            let why = warnings.last().map_or("", String::as_str);
+            let expected =
+                format!("photos named as the cameras are; a camera is '{first}', a photo '{photo}' ({why})");
+            return Err(Error::parameter("images", folder, expected));
+        }
+        Ok(pairs)
+    }
+}
+
+/// How many cameras were left out for a reason, and the first.
+#[derive(Default)]
+struct Left {
+    count: usize,
+    example: String,
+}
+
+impl Left {
+    fn add(&mut self, example: impl FnOnce() -> String) {
+        if self.count == 0 {
+            self.example = example();
+        }
+        self.count += 1;
+    }
+
+    fn tell(&self, of: usize, why: &str) -> Option<String> {
+        let Self { count, example } = self;
+        (*count > 0).then(|| format!("{count} of {of} cameras {why} and are left out, such as {example}"))
+    }
+}
+
+/// The photo that a cameras file means by `name`: beside it, with an ending if the name has none.
+pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
+    let folder = if source.is_dir() { source } else { source.parent()? };
+    let path = folder.join(name);
+    if path.is_file() {
+        return Some(path);
+    }
+    let ended = |ending: &str| PathBuf::from(format!("{}.{ending}", path.display()));
+    ENDINGS.iter().flat_map(|ending| [ended(ending), ended(&ending.to_uppercase())]).find(|p| p.is_file())
+}
+
+/// The folder of photos smaller by `divisor`: `images_4` in the folder given, or beside the one with the
+/// photos.
+fn smaller(given: &Path, base: &Path, divisor: u32) -> Option<PathBuf> {
+    if divisor == 1 {
+        return None;
+    }
+    let name = base.file_name()?.to_string_lossy();
+    let beside = base.with_file_name(format!("{name}_{divisor}"));
+    [beside, given.join(format!("{IMAGES}_{divisor}"))].into_iter().find(|folder| folder.is_dir())
+}
+
+/// Adds the photos of a folder and its sub-folders.
+fn collect(folder: &Path, depth: usize, seen: &mut usize, photos: &mut Vec<PathBuf>) -> Result<()> {
+    let io = |e| Error::io(folder, e);
+    for entry in fs::read_dir(folder).map_err(io)? {
+        let entry = entry.map_err(io)?;
+        *seen += 1;
+        if *seen > MAX_ENTRIES {
+            let problem =
+                format!("over the limit of {MAX_ENTRIES} files and folders; name the photos' folder");
+            return Err(Error::format(folder, problem));
+        }
+        // Dot files are the system's, such as the twins that macOS leaves of photos.
+        if entry.file_name().to_string_lossy().starts_with('.') {
+            continue;
+        }
+        let path = entry.path();
+        // Follows links; those that lead nowhere are no photos.
+        let Ok(metadata) = fs::metadata(&path) else { continue };
+        if metadata.is_dir() && depth < MAX_DEPTH {
+            collect(&path, depth + 1, seen, photos)?;
+        } else if metadata.is_file() && is_photo(&path) {
+            photos.push(path);
+        }
+    }
+    Ok(())
+}
+
+fn is_photo(path: &Path) -> bool {
+    path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+/// A path with slashes only and without `./` or a slash before it.
+fn plain(path: &str) -> String {
+    let path = path.replace('\\', "/");
+    let mut rest = path.as_str();
+    while let Some(after) = rest.strip_prefix("./").or_else(|| rest.strip_prefix('/')) {
+        rest = after;
+    }
+    rest.to_owned()
+}
+
+/// A path without its ending, and the ending.
+fn without_ending(path: &str) -> (&str, Option<&str>) {
+    match path.rsplit_once('.') {
+        Some((stem, ending)) if !ending.contains('/') => (stem, Some(ending)),
+        _ => (path, None),
+    }
+}

@@ -1,0 +1,192 @@
+//! Which views to draw, and the photos that belong to them.
+
+mod fit;
+mod folder;
+mod photo;
+mod split;
+#[cfg(test)]
+mod tests;
+
+use std::path::{Path, PathBuf};
+
+use lexisplat::Geometry;
+use lexisplat_render::{Camera, ViewSet, is_room, object, orbit, read_views, room};
+
+use crate::error::{Error, Result};
+use folder::PhotoFolder;
+pub use photo::photo;
+pub use split::{DEFAULT_HOLD, SplitFilter};
+
+/// Widest picture drawn unless asked otherwise, as the field does (INRIA `utils/camera_utils.py`).
+pub const DEFAULT_MAX_WIDTH: u32 = 1600;
+/// Views of an automatic orbit.
+pub const DEFAULT_ORBIT: u16 = 8;
+/// Size of an orbit's pictures before the width cap, in pixels.
+pub const ORBIT_SIZE: (u32, u32) = (960, 640);
+/// Divisors of photos that data sets come in, as folders `images_2` and so on.
+const DIVISORS: [u32; 4] = [1, 2, 4, 8];
+
+/// Where generated views are taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SceneKind {
+    /// What [`is_room`] says.
+    #[default]
+    Auto,
+    /// From around what there is to look at ([`object`]).
+    Object,
+    /// From inside, outwards ([`room`]).
+    Room,
+}
+
+/// What [`find_views`] goes by.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ViewOptions {
+    /// Cameras of any kind that [`read_views`] reads; generated ones without.
+    pub cameras: Option<PathBuf>,
+    /// Which of the cameras. Generated ones have no split.
+    pub split: SplitFilter,
+    /// Where no camera is marked with a split, every so many-th is a test view, the first included; above 0.
+    pub hold: usize,
+    /// Where generated views are taken from.
+    pub kind: SceneKind,
+    /// How many views to generate.
+    pub count: u16,
+    /// Widest picture in pixels; wider cameras are scaled down.
+    pub max_width: u32,
+    /// Folder of photos. Cameras without one are left out.
+    pub images: Option<PathBuf>,
+    /// What to divide the photos' size by: 1, 2, 4 or 8. Photos are taken from the folder's sibling of this
+    /// divisor (`images_4`) if there is one, else scaled on reading. Without photos the cameras are scaled.
+    pub resolution: Option<u32>,
+}
+
+impl Default for ViewOptions {
+    fn default() -> Self {
+        Self {
+            cameras: None,
+            split: SplitFilter::All,
+            hold: DEFAULT_HOLD,
+            kind: SceneKind::Auto,
+            count: DEFAULT_ORBIT,
+            max_width: DEFAULT_MAX_WIDTH,
+            images: None,
+            resolution: None,
+        }
+    }
+}
+
+/// A camera and its photo.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// The camera, of the size to draw and to read the photo at.
+    pub camera: Camera,
+    /// The photo's file.
+    pub photo: Option<PathBuf>,
+}
+
+/// Views to draw.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChosenViews {
+    /// The views, in the source's order; at least one.
+    pub views: Vec<View>,
+    /// Where they come from: the file or folder as given, `orbit` or `room`.
+    pub from: String,
+    /// What was ignored or looks wrong, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// The views that `options` mean for a scene of `geometry`.
+///
+/// # Errors
+/// [`Error::Parameter`] if the resolution is no divisor, the split leaves no camera or the folder has no
+/// photo of any; [`Error::Io`] if the folder or a photo cannot be read; [`Error::Format`] if a photo is none
+/// or has another shape than its camera; what [`read_views`] says.
+pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenViews> {
+    let divisor = options.resolution.unwrap_or(1);
+    if !DIVISORS.contains(&divisor) {
+        return Err(Error::parameter("resolution", divisor, "expected 1, 2, 4 or 8"));
+    }
+    let Some(source) = &options.cameras else {
+        return generated(options, divisor, geometry);
+    };
+    let photos = options.images.as_deref().map(|images| PhotoFolder::open(images, divisor)).transpose()?;
+    let ViewSet { cameras, mut warnings } = read(source, photos.as_ref())?;
+    let cameras = split::filter(cameras, options.split, options.hold)?;
+    let views = match &photos {
+        Some(photos) => {
+            let mut views = Vec::new();
+            for (camera, path) in photos.matched(cameras, &mut warnings)? {
+                let camera = fit::to_photo(&camera, photo::size(&path)?, &path)?;
+                let camera = fit::divided(&camera, photos.divisor);
+                views.push(View { camera, photo: Some(path) });
+            }
+            views
+        }
+        None => {
+            let alone = cameras.iter().map(|camera| fit::divided(camera, divisor));
+            alone.map(|camera| View { camera, photo: None }).collect()
+        }
+    };
+    Ok(ChosenViews { views: capped(views, options.max_width), from: source.display().to_string(), warnings })
+}
+
+/// The cameras of `source`; sizes that it does not state are those of the photos, in the folder or where
+/// the source itself says they are.
+fn read(source: &Path, photos: Option<&PhotoFolder>) -> Result<ViewSet> {
+    let mut failed = None;
+    let set = read_views(source, &mut |name| {
+        let path = match photos {
+            Some(photos) => photos.find(name).one()?.to_path_buf(),
+            None => folder::beside(source, name)?,
+        };
+        photo::size(&path).map_err(|e| failed.get_or_insert(e)).ok()
+    });
+    match (set, failed) {
+        (Err(_), Some(error)) => Err(error),
+        (set, _) => Ok(set?),
+    }
+}
+
+fn generated(options: &ViewOptions, divisor: u32, geometry: &Geometry) -> Result<ChosenViews> {
+    if options.images.is_some() {
+        return Err(Error::parameter("images", "a folder", "photos need the cameras they were taken with"));
+    }
+    let inside = match options.kind {
+        SceneKind::Auto => is_room(geometry),
+        SceneKind::Object => false,
+        SceneKind::Room => true,
+    };
+    let (count, (width, height)) = (usize::from(options.count), ORBIT_SIZE);
+    let (cameras, from) = if inside {
+        (room(geometry, count, width, height), "room")
+    } else {
+        (object(geometry, count, width, height), "orbit")
+    };
+    let cameras = split::unmarked(cameras, options.split)?;
+    let views = cameras.iter().map(|c| View { camera: fit::divided(c, divisor), photo: None }).collect();
+    Ok(ChosenViews { views: capped(views, options.max_width), from: from.into(), warnings: Vec::new() })
+}
+
+fn capped(views: Vec<View>, max_width: u32) -> Vec<View> {
+    let cap = |view: View| View { camera: view.camera.with_max_width(max_width), ..view };
+    views.into_iter().map(cap).collect()
+}
+
+/// Cameras of any kind that [`read_views`] reads, or an [`orbit`] of `orbit_views` around all of `geometry`.
+/// Where no camera is marked with a split, every [`DEFAULT_HOLD`]th is a test view.
+///
+/// # Errors
+/// What [`read_views`] says; [`Error::Parameter`] if the filter leaves no camera.
+pub fn choose_views(
+    cameras: Option<&Path>,
+    filter: SplitFilter,
+    orbit_views: u16,
+    max_width: u32,
+    geometry: &Geometry,
+) -> Result<Vec<Camera>> {
+    let found = match cameras {
+        Some(source) => split::filter(read(source, None)?.cameras, filter, DEFAULT_HOLD)?,
+        None => split::unmarked(orbit(geometry, orbit_views.into(), ORBIT_SIZE.0, ORBIT_SIZE.1), filter)?,
+    };
+    Ok(found.iter().map(|camera| camera.with_max_width(max_width)).collect())
+}

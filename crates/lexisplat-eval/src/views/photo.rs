@@ -1,0 +1,129 @@
+//! Photos as pictures.
+
+use std::fs::File;
+use std::io::{Cursor, Read};
+use std::path::Path;
+
+use image::imageops::{self, FilterType};
+use image::{DynamicImage, ImageError, ImageReader, Limits, RgbImage};
+use lexisplat_render::{Image, MAX_SIDE};
+
+use super::View;
+use crate::error::{Error, Result};
+
+/// Largest file read, in bytes: ten times what the largest camera writes.
+const MAX_PHOTO_BYTES: u64 = 512 << 20;
+/// Most memory that decoding may take, in bytes: a picture of [`MAX_SIDE`] squared with alpha.
+const MAX_DECODED: u64 = 4 * (MAX_SIDE as u64).pow(2);
+/// Bytes in which a size nearly always is: behind a preview and a colour profile.
+const HEADER: u64 = 256 << 10;
+/// Markers of a JPEG: its start, the start of a scan, its end (ITU-T T.81, table B.1).
+const JPEG_START: [u8; 2] = [0xFF, 0xD8];
+const JPEG_SCAN: [u8; 2] = [0xFF, 0xDA];
+const JPEG_END: [u8; 2] = [0xFF, 0xD9];
+
+fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.max_image_width = Some(MAX_SIDE);
+    limits.max_image_height = Some(MAX_SIDE);
+    limits.max_alloc = Some(MAX_DECODED);
+    limits
+}
+
+/// Up to `limit` bytes of the file from its start.
+fn start(path: &Path, limit: u64) -> Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(path)
+        .and_then(|file| file.take(limit).read_to_end(&mut bytes))
+        .map_err(|e| Error::io(path, e))?;
+    Ok(bytes)
+}
+
+fn reader(path: &Path, bytes: Vec<u8>) -> Result<ImageReader<Cursor<Vec<u8>>>> {
+    let mut reader =
+        ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| Error::io(path, e))?;
+    reader.limits(limits());
+    Ok(reader)
+}
+
+fn refused(path: &Path, error: &ImageError) -> Error {
+    let problem = match error {
+        ImageError::Limits(_) => {
+            format!("over the limit of {MAX_SIDE} pixels a side or {} MiB decoded", MAX_DECODED >> 20)
+        }
+        ImageError::Unsupported(_) => "neither a PNG nor a JPEG that can be read".into(),
+        other => format!("damaged: {other}"),
+    };
+    Error::format(path, problem)
+}
+
+/// Width and height of a photo in pixels, from its header. A turn that EXIF asks for is not made.
+pub(super) fn size(path: &Path) -> Result<(u32, u32)> {
+    let head = start(path, HEADER)?;
+    let whole = (head.len() as u64) < HEADER;
+    match reader(path, head)?.into_dimensions() {
+        Ok(size) => Ok(size),
+        Err(error) if whole => Err(refused(path, &error)),
+        // A long header.
+        Err(_) => reader(path, all(path)?)?.into_dimensions().map_err(|e| refused(path, &e)),
+    }
+}
+
+fn all(path: &Path) -> Result<Vec<u8>> {
+    let bytes = start(path, MAX_PHOTO_BYTES + 1)?;
+    if bytes.len() as u64 > MAX_PHOTO_BYTES {
+        return Err(Error::format(path, format!("over the limit of {} MiB", MAX_PHOTO_BYTES >> 20)));
+    }
+    Ok(bytes)
+}
+
+/// The photo of `view`, of its camera's size, in 8 bits a channel divided by 255.
+///
+/// Where it is transparent `background` (0 to 1 a channel) shows. It is resized after that if it has
+/// another size, by the cubic convolution that the 3DGS authors' loader uses (a = -0.5, widened where
+/// it shrinks: `PIL`'s bicubic). A turn that EXIF asks for is not made, as in that loader.
+///
+/// # Errors
+/// [`Error::Parameter`] if the view has no photo; [`Error::Io`] if it cannot be read; [`Error::Format`] if
+/// it is damaged, neither PNG nor JPEG, or over 16,384 pixels a side.
+pub fn photo(view: &View, background: [f32; 3]) -> Result<Image> {
+    let Some(path) = &view.photo else {
+        return Err(Error::parameter("view", &view.camera.name, "a view with a photo"));
+    };
+    let bytes = all(path)?;
+    if is_cut_jpeg(&bytes) {
+        return Err(Error::format(path, "damaged: it ends before the picture does"));
+    }
+    let decoded = reader(path, bytes)?.decode().map_err(|e| refused(path, &e))?;
+    let (width, height) = (view.camera.width, view.camera.height);
+    let mut picture = opaque(decoded, background);
+    if picture.dimensions() != (width, height) {
+        picture = imageops::resize(&picture, width, height, FilterType::CatmullRom);
+    }
+    let pixels: Vec<[u8; 3]> = picture.pixels().map(|pixel| pixel.0).collect();
+    Ok(Image::from_8bit(width, height, &pixels)?)
+}
+
+/// Whether these are the bytes of a JPEG without an end after its last scan, which the decoder would fill up
+/// with grey. Neither marker occurs within a scan.
+fn is_cut_jpeg(bytes: &[u8]) -> bool {
+    let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
+    bytes.starts_with(&JPEG_START) && last(JPEG_END) <= last(JPEG_SCAN)
+}
+
+/// The picture before a background.
+fn opaque(picture: DynamicImage, background: [f32; 3]) -> RgbImage {
+    if !picture.color().has_alpha() {
+        return picture.into_rgb8();
+    }
+    let rgba = picture.into_rgba8();
+    let behind = background.map(|v| v.clamp(0.0, 1.0) * 255.0);
+    RgbImage::from_fn(rgba.width(), rgba.height(), |x, y| {
+        let [r, g, b, a] = rgba.get_pixel(x, y).0.map(f32::from);
+        let alpha = a / 255.0;
+        let over = |front: f32, behind: f32| front * alpha + behind * (1.0 - alpha) + 0.5;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0.5 to 255.5")]
+        let byte = |v: f32| v as u8;
+        image::Rgb([over(r, behind[0]), over(g, behind[1]), over(b, behind[2])].map(byte))
+    })
+}

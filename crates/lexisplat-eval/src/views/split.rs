@@ -1,0 +1,126 @@
+//! Training and test views.
+
+use lexisplat_render::{Camera, Split};
+
+use crate::error::{Error, Result};
+
+/// Every so many-th camera, in order of names, is a test view, the first included: the field's convention
+/// for sources without a split (INRIA `scene/dataset_readers.py`, `llffhold`).
+pub const DEFAULT_HOLD: usize = 8;
+
+/// Which views of a cameras file to use.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SplitFilter {
+    /// All of them.
+    #[default]
+    All,
+    /// Those marked `train`; if none is marked with a split, those that are not held out.
+    Train,
+    /// Those marked `test`; if none is marked with a split, those that are held out.
+    Test,
+}
+
+impl SplitFilter {
+    fn wanted(self) -> Option<Split> {
+        match self {
+            Self::All => None,
+            Self::Train => Some(Split::Train),
+            Self::Test => Some(Split::Test),
+        }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Train => "train",
+            Self::Test => "test",
+        }
+    }
+
+    fn none_left(self, of: usize) -> Error {
+        let expected = match self {
+            Self::All => "cameras, of which there are none".to_owned(),
+            _ => format!("a split that some of the {of} cameras belong to"),
+        };
+        Error::parameter("split", self.name(), expected)
+    }
+}
+
+/// The cameras that `filter` lets through, in their order; at least one. If no camera is marked, every
+/// `hold`-th in order of names counts as marked for testing and the others for training.
+pub(super) fn filter(mut cameras: Vec<Camera>, filter: SplitFilter, hold: usize) -> Result<Vec<Camera>> {
+    if hold == 0 {
+        return Err(Error::parameter("hold", hold, "1 or more"));
+    }
+    let count = cameras.len();
+    if let Some(wanted) = filter.wanted() {
+        if cameras.iter().all(|camera| camera.split.is_none()) {
+            mark(&mut cameras, hold);
+        }
+        cameras.retain(|camera| camera.split == Some(wanted));
+    }
+    if cameras.is_empty() { Err(filter.none_left(count)) } else { Ok(cameras) }
+}
+
+/// [`filter`] for generated cameras, which have no split.
+pub(super) fn unmarked(cameras: Vec<Camera>, filter: SplitFilter) -> Result<Vec<Camera>> {
+    if cameras.is_empty() || filter != SplitFilter::All {
+        return Err(filter.none_left(cameras.len()));
+    }
+    Ok(cameras)
+}
+
+fn mark(cameras: &mut [Camera], hold: usize) {
+    let mut sorted: Vec<&mut Camera> = cameras.iter_mut().collect();
+    sorted.sort_by(|a, b| a.name.cmp(&b.name));
+    for (index, camera) in sorted.into_iter().enumerate() {
+        camera.split = Some(if index % hold == 0 { Split::Test } else { Split::Train });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cameras(names: &[&str]) -> Vec<Camera> {
+        let camera = |name: &&str| Camera {
+            name: (*name).into(),
+            width: 8,
+            height: 8,
+            fx: 8.0,
+            fy: 8.0,
+            position: [0.0; 3],
+            rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            split: None,
+        };
+        names.iter().map(camera).collect()
+    }
+
+    fn names(cameras: Vec<Camera>) -> Vec<String> {
+        cameras.into_iter().map(|camera| camera.name).collect()
+    }
+
+    #[test]
+    fn unmarked_cameras_are_held_out_by_name() {
+        let all = cameras(&["d", "c", "b", "a", "e"]);
+        assert_eq!(names(filter(all.clone(), SplitFilter::Test, 3).unwrap()), ["d", "a"]);
+        assert_eq!(names(filter(all.clone(), SplitFilter::Train, 3).unwrap()), ["c", "b", "e"]);
+        assert_eq!(filter(all.clone(), SplitFilter::All, 3).unwrap(), all);
+        assert_eq!(names(filter(all.clone(), SplitFilter::Test, DEFAULT_HOLD).unwrap()), ["a"]);
+        assert!(filter(all.clone(), SplitFilter::Train, 1).is_err());
+        assert!(filter(all, SplitFilter::All, 0).is_err());
+    }
+
+    #[test]
+    fn marks_win() {
+        let mut all = cameras(&["a", "b", "c"]);
+        all[1].split = Some(Split::Test);
+        assert_eq!(names(filter(all.clone(), SplitFilter::Test, 8).unwrap()), ["b"]);
+        let message = filter(all.clone(), SplitFilter::Train, 8).unwrap_err().to_string();
+        assert_eq!(message, "split = train: a split that some of the 3 cameras belong to");
+        assert_eq!(filter(all, SplitFilter::All, 8).unwrap().len(), 3);
+        assert!(filter(Vec::new(), SplitFilter::All, 8).is_err());
+        assert!(unmarked(cameras(&["a"]), SplitFilter::Test).is_err());
+        assert!(unmarked(cameras(&["a"]), SplitFilter::All).is_ok());
+    }
+}
