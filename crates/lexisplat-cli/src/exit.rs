@@ -79,6 +79,9 @@ fn eval(error: &lexisplat_eval::Error) -> (u8, Option<&'static str>) {
     match error {
         lexisplat_eval::Error::Codec(e) => codec(e),
         lexisplat_eval::Error::Render(e) => render(e),
+        lexisplat_eval::Error::Io { .. } => (3, None),
+        lexisplat_eval::Error::Format { .. } => (4, None),
+        lexisplat_eval::Error::Limit { .. } => (6, None),
         _ => (5, None),
     }
 }

@@ -42,6 +42,23 @@ impl Bars {
         self.set(Some(Bar { bar, start: Instant::now(), shown: false }));
     }
 
+    /// Says what is being done now, in front of the bar.
+    pub(crate) fn say(&self, what: &str) {
+        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if let Some(bar) = current.as_ref() {
+            bar.bar.set_message(what.to_owned());
+        }
+    }
+
+    /// Prints a line to standard error, above the bar if it is shown.
+    pub(crate) fn aside(&self, line: &str) {
+        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        match current.as_ref() {
+            Some(bar) if bar.shown => bar.bar.suspend(|| eprintln!("{line}")),
+            _ => eprintln!("{line}"),
+        }
+    }
+
     fn set(&self, new: Option<Bar>) {
         // A thread that panicked while holding the lock leaves at worst a bar on the screen.
         let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);

@@ -1,4 +1,4 @@
-//! Metrics, view sets and comparison of 3D Gaussian Splatting scenes, without photos.
+//! Metrics, view sets and comparison of 3D Gaussian Splatting scenes, without photos or with them.
 //!
 //! ```
 //! use lexisplat::{CompressOptions, Silent, compress};
@@ -31,6 +31,7 @@
 
 mod bench;
 mod compare;
+mod drawing;
 mod error;
 pub mod metrics;
 pub mod montage;
@@ -42,10 +43,11 @@ mod scorer;
 pub mod sweep;
 mod target;
 pub mod text;
-mod views;
+pub mod views;
 
 pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};
 pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
+pub use drawing::{DrawOptions, draw_views, score_views};
 pub use error::{Error, Result};
 pub use png::png;
 pub use prune::{Pruned, prune};

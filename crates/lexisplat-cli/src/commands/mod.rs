@@ -7,9 +7,11 @@ mod compress;
 mod decompress;
 mod demo;
 mod devices;
+mod eval;
 mod info;
 mod pack;
 mod render;
+mod sweep;
 #[cfg(feature = "view")]
 mod view;
 
@@ -30,6 +32,8 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Info(args) => info::run(&args, &common),
         Command::Render(args) => render::run(&args, &common),
         Command::Compare(args) => compare::run(&args, &common),
+        Command::Eval(args) => eval::run(&args, &common),
+        Command::Sweep(args) => sweep::run(&args, &common),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args, &common),
         Command::Bench(args) => bench::run(&args, &common),

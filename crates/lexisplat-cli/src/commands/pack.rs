@@ -8,12 +8,12 @@ use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::PlyRead;
 use lexisplat::{Error, Progress, Splats, lexi};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
-use lexisplat_render::{Renderer, read_cameras};
+use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
 
 use super::compress::error_line;
 use crate::args::{Common, Compress};
-use crate::files::{tell, write_output};
+use crate::files::{tell, warn, write_output};
 use crate::progress::Bars;
 
 /// Levels of an 8-bit channel above 0.
@@ -39,7 +39,11 @@ pub(crate) fn run(
 
     let clock = Instant::now();
     let views = match &args.cameras {
-        Some(path) => Views::given(&read_cameras(path)?)?,
+        Some(path) => {
+            let set = read_views(path, &mut |_| None)?;
+            warn("cameras", &set.warnings);
+            Views::given(&set.cameras)?
+        }
         None => Views::generated(&splats),
     };
     let mut renderer = Renderer::open(args.device)?;

@@ -40,22 +40,23 @@ fn steps(curve: &[At], value: impl Fn(&At) -> Option<f64>) -> Vec<Step> {
 /// What the curve does, by its first and last slope.
 fn verdict(first: f64, last: f64) -> &'static str {
     if last >= 0.0 || last.abs() <= FLAT * first.abs() {
-        "so the curve flattens"
+        "the curve flattens"
     } else if last.abs() >= STEEP * first.abs() {
-        "so the curve gets steeper and does not level off"
+        "the curve gets steeper and does not level off"
     } else {
-        "so it keeps falling at about the same rate and does not level off"
+        "it keeps falling and does not level off"
     }
 }
 
-/// `PSNR falls by 5.0 dB` or `PSNR rises by ...`.
-fn falls(slope: f64) -> String {
-    let word = if slope <= 0.0 { "falls" } else { "rises" };
-    format!("{word} by {:.1}\u{a0}dB", slope.abs())
+/// `costs 5.0 dB`, or `gains` where the slope is upwards.
+fn cost(slope: f64) -> String {
+    let word = if slope <= 0.0 { "costs" } else { "gains" };
+    format!("{word} {:.1}\u{a0}dB", slope.abs())
 }
 
-/// One paragraph a method: slopes of PSNR over tolerances, where every Gaussian has at most one nonzero, what
-/// is left without SH, and what speed does meanwhile. Plain text; methods with too few settings are left out.
+/// One paragraph a method: what a doubling of the ratio costs in PSNR along tolerances and along capped
+/// nonzeros, where PSNR is with at most one nonzero in every Gaussian and without SH, and what speed does
+/// meanwhile. Plain text; methods with too few settings are left out.
 #[must_use]
 pub fn level_off(results: &Results) -> Vec<String> {
     let grid = Grid::new(results);
@@ -66,15 +67,15 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
     let tolerances = curve(grid, method, Kind::Tolerances, None);
     let caps = curve(grid, method, Kind::Caps, None);
     let mut sentences = Vec::new();
-    for (points, what) in [(&tolerances, "tolerances"), (&caps, "capped nonzeros")] {
+    for (points, what) in [(&tolerances, "Along tolerances"), (&caps, "With capped nonzeros")] {
         let steps = steps(points, |at| at.psnr.mean);
         if let [first, .., last] = steps.as_slice() {
             sentences.push(format!(
-                "Along {what} PSNR {} for each doubling of the coefficient ratio from {} to {}, and {} from {} to {}: {}.",
-                falls(first.slope),
+                "{what} each doubling of the coefficient ratio {} at first ({} to {}) and {} at last ({} to {}): {}.",
+                cost(first.slope),
                 first.from.label(),
                 first.to.label(),
-                falls(last.slope),
+                cost(last.slope),
                 last.from.label(),
                 last.to.label(),
                 verdict(first.slope, last.slope)
@@ -86,11 +87,11 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
         && let (Some(psnr), Some(ratio)) = (at.psnr.mean, at.ratio)
     {
         sentences.push(format!(
-            "With at most one nonzero in every Gaussian (ratio {ratio:.1}) it is at {psnr:.2}\u{a0}dB."
+            "With at most one nonzero in every Gaussian (ratio {ratio:.1}) PSNR is {psnr:.2}\u{a0}dB."
         ));
     }
     if let Some(psnr) = at_cap(0).and_then(|at| at.psnr.mean) {
-        sentences.push(format!("With SH dropped altogether it is at {psnr:.2}\u{a0}dB, the floor."));
+        sentences.push(format!("With SH dropped altogether it is {psnr:.2}\u{a0}dB, the floor."));
     }
     if sentences.is_empty() {
         return None;
@@ -108,18 +109,18 @@ fn speed(grid: &Grid<'_>, points: &[At]) -> Option<String> {
         return None;
     }
     let steps = steps(points, |at| at.fps);
-    let change = |slope: f64| format!("{:+.1}\u{a0}% of {}'s", slope / from * 100.0, first.setting.label());
+    let share = |slope: f64| format!("{:+.1}\u{a0}%", slope / from * 100.0);
     let slopes = match steps.as_slice() {
         [first, .., last] => format!(
-            "; each doubling of the ratio changed them by {} in the first step, by {} in the last",
-            change(first.slope),
-            change(last.slope)
+            "; a doubling of the ratio brings {} at first and {} at last",
+            share(first.slope),
+            share(last.slope)
         ),
         _ => String::new(),
     };
-    let dense = first.fps_dense.map_or_else(String::new, |dense| format!(" (dense SH: {dense:.1})"));
+    let dense = first.fps_dense.map_or_else(String::new, |dense| format!(", {dense:.1} from dense SH"));
     Some(format!(
-        "FPS on {} went from {from:.1} at {} to {to:.1} at {}{dense}{slopes}.",
+        "FPS on {} are {from:.1} at {} and {to:.1} at {}{dense}{slopes}.",
         grid.device(),
         first.setting.label(),
         last.setting.label()
@@ -140,7 +141,7 @@ mod tests {
             let power = f64::from(u8::try_from(k).unwrap());
             scene.points.push(Point {
                 fps: Some(Fps { dense: 10.0, sparse: 20.0 + power * power }),
-                ..point(Setting::Tolerance(0.1 * (power + 1.0)), 16.0 / power.exp2(), Some(psnr))
+                ..point(Setting::Tolerance(0.5 * (power + 1.0)), 16.0 / power.exp2(), Some(psnr))
             });
         }
         results.scenes.push(scene);
@@ -152,22 +153,21 @@ mod tests {
         let text = level_off(&falling([50.0, 44.0, 40.0, 38.0])).join("");
         assert_eq!(
             text.replace('\u{a0}', " "),
-            "3DGS. Along tolerances PSNR falls by 6.0 dB for each doubling of the coefficient ratio from tol 0.1 to tol \
-             0.2, and falls by 2.0 dB from tol 0.30000000000000004 to tol 0.4: so the curve flattens. FPS on CPU went from \
-             20.0 at tol 0.1 to 29.0 at tol 0.4 (dense SH: 10.0); each doubling of the ratio changed them by +5.0 % of tol \
-             0.1's in the first step, by +25.0 % of tol 0.1's in the last."
+            "3DGS. Along tolerances each doubling of the coefficient ratio costs 6.0 dB at first (tol 0.5 to tol 1) and costs \
+             2.0 dB at last (tol 1.5 to tol 2): the curve flattens. FPS on CPU are 20.0 at tol 0.5 and 29.0 at tol \
+             2, 10.0 from dense SH; a doubling of the ratio brings +5.0 % at first and +25.0 % at last."
         );
-        assert!(level_off(&falling([50.0, 44.0, 40.0, 35.0]))[0].contains("at about the same rate"));
+        assert!(level_off(&falling([50.0, 44.0, 40.0, 35.0]))[0].contains("keeps falling"));
         assert!(level_off(&falling([50.0, 44.0, 40.0, 20.0]))[0].contains("steeper"));
-        assert!(level_off(&falling([50.0, 44.0, 40.0, 41.0]))[0].contains("rises by 1.0"));
+        assert!(level_off(&falling([50.0, 44.0, 40.0, 41.0]))[0].contains("gains 1.0"));
     }
 
     #[test]
     fn caps_and_the_floor_are_told() {
         let text = level_off(&results());
         assert_eq!(text.len(), 1, "MCMC has one step only");
-        assert!(text[0].contains("at most one nonzero in every Gaussian (ratio 50.0) it is at 29.00"));
-        assert!(text[0].contains("dropped altogether it is at 25.00"));
+        assert!(text[0].contains("at most one nonzero in every Gaussian (ratio 50.0) PSNR is 29.00"));
+        assert!(text[0].contains("dropped altogether it is 25.00"));
         assert!(level_off(&Results::default()).is_empty());
     }
 

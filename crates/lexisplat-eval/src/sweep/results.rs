@@ -204,6 +204,8 @@ pub struct SceneResult {
     pub on_gpu: bool,
     /// The model itself against photos.
     pub to_photos: Option<Comparison>,
+    /// Frames in a second of the model itself, if measured.
+    pub fps: Option<f64>,
     /// Each way it was compressed.
     pub points: Vec<Point>,
 }

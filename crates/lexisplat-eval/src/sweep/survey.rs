@@ -8,6 +8,8 @@ use crate::metrics::Metric;
 
 /// The survey's header.
 const HEADER: [&str; 6] = ["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"];
+/// Letters of a name that a path keeps: file systems take 255 bytes, and something may be added.
+const LONGEST_NAME: usize = 60;
 /// Folder of scenes without a data set.
 const NO_DATASET: &str = "other";
 
@@ -49,7 +51,7 @@ pub fn survey(results: &Results) -> Vec<(String, String)> {
 /// `name` as one part of a path, on every system.
 pub(super) fn safe(name: &str) -> String {
     let kept = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' };
-    let name: String = name.trim().chars().map(kept).collect();
+    let name: String = name.trim().chars().take(LONGEST_NAME).map(kept).collect();
     if name.chars().all(|c| c == '.') { "_".to_owned() } else { name }
 }
 
@@ -133,6 +135,7 @@ mod tests {
             ]
         );
         assert!(survey(&results)[0].1.contains("3dgs,inf,1,0,"));
+        assert_eq!(safe(&"\u{1d4a}".repeat(300)).chars().count(), LONGEST_NAME);
     }
 
     #[test]

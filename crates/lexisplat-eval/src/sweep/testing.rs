@@ -60,6 +60,7 @@ pub(super) fn scene(dataset: &str, name: &str, method: Method) -> SceneResult {
         device: "cpu".to_owned(),
         on_gpu: false,
         to_photos: None,
+        fps: None,
         points: Vec::new(),
     }
 }

@@ -230,14 +230,21 @@ fn parse_property<'a>(
 
 /// Refuses what is no PLY, naming the splat formats people mix up with it.
 fn check_magic(file: &str, bytes: &[u8]) -> Result<()> {
-    let unsupported = |kind: &str| FormatError::Unsupported {
+    let because = |kind: &str, advice: &str| FormatError::Unsupported {
         kind: kind.to_owned(),
-        advice: "convert it to PLY first, for example with splat-transform".to_owned(),
+        advice: advice.to_owned(),
     };
+    let unsupported = |kind| because(kind, "convert it to PLY first, for example with splat-transform");
     let problem = match bytes {
         [b'p', b'l', b'y', b'\n' | b'\r' | b' ' | b'\t', ..] => return Ok(()),
         [0x1f, 0x8b, ..] => unsupported("a gzip file (SPZ?)"),
         [b'P', b'K', 3, 4, ..] => unsupported("a zip archive (SOG?)"),
+        [b'N', b'G', b'S', b'P', ..] => unsupported("SPZ, version 4"),
+        // Python's pickle, protocols 2 to 5.
+        [0x80, 2..=5, ..] => because(
+            "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)",
+            "it is never read here: load it where it was made and write a PLY, for EAGLES with load_compressed_pkl and save_ply",
+        ),
         [] => FormatError::Malformed("the file is empty".to_owned()),
         _ => FormatError::Malformed("not a PLY file: it does not start with a line 'ply'".to_owned()),
     };
@@ -353,10 +360,17 @@ mod tests {
     }
 
     #[test]
+    fn pickles_are_never_read() {
+        let error = Header::parse("a.pkl", &[0x80, 4, 0x95, 0], &Limits::default()).unwrap_err().to_string();
+        assert!(error.contains("a.pkl") && error.contains("pickle") && error.contains("save_ply"), "{error}");
+    }
+
+    #[test]
     fn bad_headers_are_named() {
         let cases = [
             ("", "the file is empty"),
             ("plx\n", "not a PLY file"),
+            ("NGSP", "SPZ, version 4"),
             ("ply\nformat ascii 1.0\n", "no 'end_header'"),
             ("ply\nend_header\n", "no 'format'"),
             ("ply\nformat ascii 2.0\nend_header\n", "version 1.0"),

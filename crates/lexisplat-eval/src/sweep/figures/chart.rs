@@ -30,6 +30,8 @@ const BAND_OPACITY: f64 = 0.14;
 const STEPS: f64 = 7.0;
 /// Range of values where they do not differ.
 const LEAST_RANGE: f64 = 1.0;
+/// Numbers beyond this, and below its inverse along x, are no measurements.
+const LARGEST: f64 = 1e9;
 /// Colours of everything but data; the page's style sheet swaps them in its dark theme.
 const INK: &str = "#1d1e22";
 const SOFT: &str = "#5c5f68";
@@ -42,7 +44,7 @@ pub(super) const COLOURS: [&str; 4] = [INK, SOFT, GRID, PAPER];
 
 /// A dash pattern, in SVG pixels: drawn, not drawn.
 pub(super) const SOLID: &str = "";
-pub(super) const DASHED: &str = "8 5";
+pub(super) const DASHED: &str = "6 5";
 pub(super) const DOTTED: &str = "2 5";
 
 /// What is drawn at points.
@@ -118,10 +120,11 @@ impl Chart {
     pub(super) fn draw(mut self) -> Result<Option<Figure>> {
         for series in &mut self.series {
             // A logarithm has no place for others.
-            let good = |&(x, y): &(f64, f64)| x > 0.0 && x.is_finite() && y.is_finite();
+            let good = |&(x, y): &(f64, f64)| x >= LARGEST.recip() && x <= LARGEST && y.abs() <= LARGEST;
             if series.band.len() == series.points.len() {
                 let both = series.points.iter().zip(&series.band).filter(|(point, _)| good(point));
-                (series.points, series.band) = both.map(|(point, band)| (*point, *band)).unzip();
+                (series.points, series.band) =
+                    both.map(|(point, band)| (*point, (band.0.max(-LARGEST), band.1.min(LARGEST)))).unzip();
             } else {
                 series.band.clear();
                 series.points.retain(good);

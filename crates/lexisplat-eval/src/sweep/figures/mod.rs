@@ -451,6 +451,23 @@ mod tests {
     }
 
     #[test]
+    fn numbers_that_are_no_measurements_are_left_out() {
+        let mut results = results();
+        for (k, scene) in results.scenes.iter_mut().enumerate() {
+            for point in &mut scene.points {
+                let odd = [f64::MAX, f64::NAN, f64::INFINITY, 0.0, -1.0, f64::MIN_POSITIVE][k];
+                point.coefficient_ratio = Some(odd);
+                point.to_original.psnr.mean = Some(odd);
+                point.to_original.psnr.max = Some(odd);
+                point.fps = Some(super::super::Fps { dense: odd, sparse: odd });
+            }
+        }
+        for figure in figures(&results).unwrap() {
+            assert!(!figure.svg.contains("NaN") && !figure.svg.contains("inf\""), "{}", figure.name);
+        }
+    }
+
+    #[test]
     fn one_point_and_names_alike_are_drawn() {
         let mut results = results();
         results.scenes.truncate(1);

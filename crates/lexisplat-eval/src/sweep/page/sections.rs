@@ -30,15 +30,20 @@ pub(super) fn header(page: &mut String, facts: &Facts<'_>, date: Option<&str>) {
         page.push_str("<h1>Nothing was evaluated</h1>\n</header>\n");
         return;
     }
-    let methods = facts.grid.methods.iter().filter(|method| !method.is_competitor()).count();
+    let of_all = facts.grid.settings.is_empty();
+    let methods = facts.grid.methods.iter().filter(|method| of_all || !method.is_competitor()).count();
+    let ways = if of_all {
+        "as trained".to_owned()
+    } else {
+        format!("compressed in <em>{}</em>", plural(facts.grid.settings.len(), "way"))
+    };
     let _ = write!(
         page,
-        "<h1>{} by {}, compressed in <em>{}</em></h1>\n\
+        "<h1>{} by {}, {ways}</h1>\n\
          <p class=\"lede\">Each trained model was compressed, drawn straight from its codes, and compared with the \
          original\u{2019}s pictures from the same cameras{}. {}</p>\n<dl class=\"cards\">",
         plural(facts.grid.columns.len(), "scene"),
         plural(methods, "method"),
-        plural(facts.grid.settings.len(), "way"),
         if facts.grid.metrics_to_photos().is_empty() { "" } else { ", and with photos" },
         text::escape(&date.map_or_else(String::new, |date| format!("Made {date}."))),
     );
@@ -111,8 +116,10 @@ pub(super) fn pictures(page: &mut String, facts: &Facts<'_>, pictures: &[SweepPi
     }
     page.push_str(
         "<section aria-labelledby=\"see\"><h2 id=\"see\">Can you tell?</h2>\n\
-         <p>Left of the line is the original, right of it the compressed scene, drawn straight from its codes.\
-         <span class=\"scripted\"> Drag the line.</span></p>\n<div class=\"panel\">\
+         <p class=\"scripted\">Left of the line is the original, right of it the compressed scene, drawn straight from its \
+         codes. Drag the line.</p>\n\
+         <p class=\"unscripted\">From the left: the original, the photo if there is one, the compressed scene drawn \
+         straight from its codes, and their amplified difference.</p>\n<div class=\"panel\">\
          <div class=\"controls pick\"><label>Scene <select id=\"scene\"></select></label>\
          <label>Setting <select id=\"setting\"></select></label>\
          <label>View <select id=\"view\"></select></label></div>\n",

@@ -1,6 +1,23 @@
 "use strict";
 document.documentElement.classList.add("js");
 
+// Tables: keep all columns that name a row in sight where they leave room for the others.
+const pin = grid => {
+  const names = [...grid.querySelectorAll("thead tr:last-child .name")];
+  grid.classList.remove("pinned");
+  if (!grid.clientWidth || names.length < 2) return;
+  let left = 0;
+  names.forEach((name, i) => {
+    grid.style.setProperty("--name-" + (i + 1), left + "px");
+    left += name.offsetWidth;
+  });
+  grid.classList.toggle("pinned", left < grid.clientWidth / 2);
+};
+const pinAll = () => document.querySelectorAll(".grid").forEach(pin);
+document.querySelectorAll("details").forEach(details => details.addEventListener("toggle", pinAll));
+addEventListener("resize", pinAll);
+pinAll();
+
 // Pictures: one at a time, original left of the line and compressed right of it.
 const views = [...document.querySelectorAll(".view")];
 if (views.length) {

@@ -1,15 +1,19 @@
 //! The command line, as typed.
 
+mod eval;
+
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lexisplat::packed::Preset;
 use lexisplat::{Geometry, Layout, Pursuit};
-use lexisplat_eval::choose_views;
+use lexisplat_eval::SplitFilter;
+use lexisplat_eval::views::{ChosenViews, ViewOptions, find_views};
 use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Device};
 
+pub(crate) use self::eval::{Eval, Measures, Photos, Sweep};
 use crate::exit::CODES;
 
 /// Make trained 3D Gaussian Splatting scenes small, with a promised error, and draw and compare them.
@@ -46,6 +50,8 @@ pub(crate) enum Command {
     Info(Info),
     Render(Render),
     Compare(Compare),
+    Eval(Eval),
+    Sweep(Box<Sweep>),
     #[cfg(feature = "view")]
     View(View),
     Devices(Devices),
@@ -77,7 +83,7 @@ pub(crate) struct Compress {
     /// The best file this many times smaller than the PLY.
     #[arg(long, group = "goal", value_name = "R")]
     pub(crate) ratio: Option<f64>,
-    /// Cameras from an INRIA cameras.json to judge by [default: views generated around the scene].
+    /// Cameras to judge by: as for `render` [default: views generated around the scene].
     #[arg(long, value_name = "FILE")]
     pub(crate) cameras: Option<PathBuf>,
     /// Keep each Gaussian's index in the source, for 4 bytes each: packed files are in another order.
@@ -228,13 +234,22 @@ pub(crate) struct Info {
 /// Which cameras to draw from, and on what.
 #[derive(Debug, Args)]
 pub(crate) struct Views {
-    /// Cameras from an INRIA cameras.json [default: an orbit fitted to the scene].
-    #[arg(long, value_name = "FILE", conflicts_with = "orbit")]
+    /// Cameras: INRIA's cameras.json, a transforms.json of nerfstudio, or a COLMAP folder such as
+    /// sparse/0 [default: views that fit the scene].
+    #[arg(long, visible_alias = "sparse", value_name = "PATH", conflicts_with_all = ["orbit", "scene"])]
     pub(crate) cameras: Option<PathBuf>,
-    /// Use only the cameras marked with this split.
-    #[arg(long, value_enum, default_value_t = Split::All, requires = "cameras")]
-    pub(crate) split: Split,
-    /// Views of the automatic orbit.
+    /// Which of the cameras: those marked so, or, if none is marked, every 8th by name as test [default: all,
+    /// and test with photos].
+    #[arg(long, value_enum, requires = "cameras")]
+    pub(crate) split: Option<Split>,
+    /// Every how manyeth camera by name is a test one, where cameras are not marked.
+    #[arg(long, default_value_t = lexisplat_eval::views::DEFAULT_HOLD, value_name = "N", requires = "cameras")]
+    pub(crate) hold: usize,
+    /// What kind of scene generated views are for: an `object` seen from around, a `room` seen from inside, or
+    /// `auto` to judge by the scene.
+    #[arg(long, value_enum, default_value_t = SceneKind::Auto)]
+    pub(crate) scene: SceneKind,
+    /// Number of generated views.
     #[arg(long, default_value_t = lexisplat_eval::DEFAULT_ORBIT, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub(crate) orbit: u16,
     /// Widest picture; wider cameras are scaled down.
@@ -250,9 +265,54 @@ pub(crate) struct Views {
 }
 
 impl Views {
-    /// The cameras that these options mean for a scene.
+    /// The views that these options mean for a scene.
+    pub(crate) fn find(
+        &self,
+        geometry: &Geometry,
+        photos: Option<&Photos>,
+    ) -> lexisplat_eval::Result<ChosenViews> {
+        let mut options = ViewOptions::default();
+        options.cameras.clone_from(&self.cameras);
+        options.hold = self.hold;
+        options.kind = self.scene.into();
+        options.count = self.orbit;
+        options.max_width = self.width;
+        if let Some(photos) = photos {
+            options.images.clone_from(&photos.images);
+            options.resolution = photos.resolution;
+        }
+        let with_photos = options.images.is_some();
+        options.split = match self.split {
+            Some(split) => split.into(),
+            None if with_photos => SplitFilter::Test,
+            None => SplitFilter::All,
+        };
+        find_views(&options, geometry)
+    }
+
+    /// The cameras that these options mean for a scene; warnings about them are printed.
     pub(crate) fn choose(&self, geometry: &Geometry) -> lexisplat_eval::Result<Vec<Camera>> {
-        choose_views(self.cameras.as_deref(), self.split.into(), self.orbit, self.width, geometry)
+        let found = self.find(geometry, None)?;
+        crate::files::warn("views", &found.warnings);
+        Ok(found.views.into_iter().map(|view| view.camera).collect())
+    }
+}
+
+/// What kind of scene views are generated for.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum SceneKind {
+    Auto,
+    Object,
+    Room,
+}
+
+impl From<SceneKind> for lexisplat_eval::views::SceneKind {
+    fn from(kind: SceneKind) -> Self {
+        match kind {
+            SceneKind::Auto => Self::Auto,
+            SceneKind::Object => Self::Object,
+            SceneKind::Room => Self::Room,
+        }
     }
 }
 
@@ -263,7 +323,7 @@ pub(crate) enum Split {
     Test,
 }
 
-impl From<Split> for lexisplat_eval::SplitFilter {
+impl From<Split> for SplitFilter {
     fn from(split: Split) -> Self {
         match split {
             Split::All => Self::All,

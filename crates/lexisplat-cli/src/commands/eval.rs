@@ -1,0 +1,257 @@
+//! `lexisplat eval`.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use anyhow::Result;
+use lexisplat::Progress;
+use lexisplat_eval::metrics::Metric;
+use lexisplat_eval::views::{ChosenViews, View, photo};
+use lexisplat_eval::{
+    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, montage, png, score_views, text,
+};
+use lexisplat_render::{Camera, Image, Renderer};
+use serde_json::{Value, json};
+
+use crate::args::{Common, Eval, Measures};
+use crate::files::{
+    check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
+};
+use crate::progress::Bars;
+
+/// What was found out about a model.
+struct Scored {
+    file: String,
+    bytes: u64,
+    gaussians: usize,
+    to_photos: Option<Comparison>,
+    to_original: Option<Comparison>,
+}
+
+impl Scored {
+    /// The comparisons there are, with names.
+    fn comparisons(&self) -> impl Iterator<Item = (&'static str, &Comparison)> {
+        [("photos", &self.to_photos), ("original", &self.to_original)]
+            .into_iter()
+            .filter_map(|(name, comparison)| Some((name, comparison.as_ref()?)))
+    }
+}
+
+pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
+    if args.original.is_none() && args.photos.images.is_none() {
+        let expected = "--images, --original, or both: something to score against";
+        return Err(lexisplat::Error::parameter("eval", "neither photos nor an original", expected).into());
+    }
+    if let Some(path) = &args.csv {
+        check_output(path, &[], common.overwrite)?;
+    }
+    let scorer = scorer(&args.measures)?;
+    let mut renderer = Renderer::open(args.views.device)?;
+    let drawing = DrawOptions { background: args.views.background, eight_bit: args.measures.eight_bit };
+    // Views that are generated fit the original; all models are seen from the same.
+    let original = args.original.as_deref().map(|path| load(path, false)).transpose()?;
+    let first = match &original {
+        Some(_) => None,
+        None => Some(load(&args.models[0], false)?),
+    };
+    let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
+    let found = args.views.find(reference.scene().geometry(), Some(&args.photos))?;
+    warn("views", &found.warnings);
+    let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
+    let photos = photos(&found, args.views.background)?;
+    let bars = Bars::new(common.quiet);
+    let pictures = args.models.len() + usize::from(original.is_some());
+    bars.start("drawing", "views", (pictures * cameras.len()) as u64);
+    let originals = match &original {
+        Some(original) => {
+            warn_of(original);
+            draw_views(&mut renderer, &original.scene(), &cameras, &drawing, &mut || bars.advance(1))?
+        }
+        None => Vec::new(),
+    };
+    let mut scored = Vec::new();
+    let mut first = first;
+    for path in &args.models {
+        let model = match first.take() {
+            Some(model) => model,
+            None => load(path, false)?,
+        };
+        warn_of(&model);
+        let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &mut || bars.advance(1))?;
+        let against = |references: &[Image]| {
+            let given = !references.is_empty();
+            given.then(|| score_views(&scorer, &cameras, references, &drawn)).transpose()
+        };
+        let (to_photos, to_original) = (against(&photos)?, against(&originals)?);
+        if let Some(folder) = &args.save_views {
+            let references = if photos.is_empty() { &originals } else { &photos };
+            save(&folder.join(path.file_name().unwrap_or_default()), &cameras, references, &drawn, common)?;
+        }
+        let SceneFile { name, bytes, .. } = &model;
+        let gaussians = model.scene().len();
+        scored.push(Scored { file: name.clone(), bytes: *bytes, gaussians, to_photos, to_original });
+    }
+    bars.end();
+    if let Some(path) = &args.csv {
+        write_bytes(path, csv(&scored)?.as_bytes())?;
+    }
+    if common.json {
+        return print_json(&report(args, &scored, &found, renderer.name()));
+    }
+    if common.quiet {
+        return Ok(());
+    }
+    print(&table(args, &scored, &found, renderer.name())?)
+}
+
+/// What measures as the options say.
+pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
+    let mut scorer = Scorer::new();
+    if !measures.no_flip {
+        scorer = scorer.with_flip();
+    }
+    for path in &measures.lpips {
+        scorer = scorer.with_lpips(lexisplat_eval::metrics::Lpips::load(path)?);
+    }
+    Ok(scorer)
+}
+
+/// The photos of views, in order; none if they have none.
+fn photos(found: &ChosenViews, background: [f32; 3]) -> Result<Vec<Image>> {
+    let with_photos = found.views.iter().filter(|view| view.photo.is_some());
+    Ok(with_photos.map(|view: &View| photo(view, background)).collect::<Result<_, _>>()?)
+}
+
+fn save(
+    folder: &Path,
+    cameras: &[Camera],
+    references: &[Image],
+    drawn: &[Image],
+    common: &Common,
+) -> Result<()> {
+    make_folder(folder)?;
+    for (i, (camera, (a, b))) in cameras.iter().zip(references.iter().zip(drawn)).enumerate() {
+        let path = folder.join(view_name(i, cameras.len(), &camera.name));
+        check_output(&path, &[], common.overwrite)?;
+        let (width, height, pixels) = montage::montage(a, b);
+        write_bytes(&path, &png(width, height, &pixels)?)?;
+    }
+    Ok(())
+}
+
+fn csv(scored: &[Scored]) -> Result<String> {
+    let mut out = String::from("model,against,view,width,height,metric,value\n");
+    for model in scored {
+        for (against, comparison) in model.comparisons() {
+            for view in &comparison.views {
+                for metric in comparison.metrics() {
+                    let value = view.get(metric).map(|v| v.to_string()).unwrap_or_default();
+                    let (file, name) = (quoted(&model.file), quoted(&view.name));
+                    let (width, height) = (view.width, view.height);
+                    writeln!(out, "{file},{against},{name},{width},{height},{},{value}", metric.name())?;
+                }
+            }
+        }
+    }
+    Ok(out)
+}
+
+/// A field of a CSV file (RFC 4180).
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n', '\r']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+fn report(args: &Eval, scored: &[Scored], found: &ChosenViews, device: &str) -> Value {
+    let models: Vec<Value> = scored
+        .iter()
+        .map(|model| {
+            json!({
+                "file": model.file,
+                "bytes": model.bytes,
+                "gaussians": model.gaussians,
+                "to_photos": model.to_photos,
+                "to_original": model.to_original,
+            })
+        })
+        .collect();
+    json!({
+        "original": args.original.as_ref().map(|path| path.display().to_string()),
+        "images": args.photos.images.as_ref().map(|path| path.display().to_string()),
+        "views_from": found.from,
+        "views": found.views.len(),
+        "device": device,
+        "eight_bit": args.measures.eight_bit,
+        "models": models,
+        "warnings": found.warnings,
+    })
+}
+
+fn table(args: &Eval, scored: &[Scored], found: &ChosenViews, device: &str) -> Result<String> {
+    let mut out = String::new();
+    for model in scored {
+        for (against, comparison) in model.comparisons() {
+            writeln!(out, "{} against {against}", model.file)?;
+            one(&mut out, comparison)?;
+            writeln!(out)?;
+        }
+        writeln!(
+            out,
+            "{:>10}  {}: {} Gaussians",
+            text::bytes(model.bytes),
+            model.file,
+            text::count(model.gaussians as u64)
+        )?;
+    }
+    writeln!(out, "{:>10}  {}", found.views.len(), views_line(found, args))?;
+    writeln!(out, "{:>10}  {device}", "drawn on")?;
+    let rounded = if args.measures.eight_bit { "rounded to 8 bits" } else { "not rounded" };
+    writeln!(out, "{:>10}  {rounded} before scoring", "pictures")?;
+    Ok(out)
+}
+
+fn views_line(found: &ChosenViews, args: &Eval) -> String {
+    let photos = if args.photos.images.is_some() { ", each with a photo" } else { "" };
+    format!("views from {}{photos}", found.from)
+}
+
+/// A line for every view, and mean, minimum and maximum.
+fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
+    let metrics: Vec<Metric> = comparison.metrics().collect();
+    let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
+    let columns: Vec<usize> = metrics.iter().map(|m| m.title().chars().count().max(9)).collect();
+    write!(out, "{:<width$}  {:>11}", "view", "size")?;
+    for (metric, column) in metrics.iter().zip(&columns) {
+        write!(out, "  {:>column$}", metric.title())?;
+    }
+    writeln!(out)?;
+    for view in &comparison.views {
+        let size = format!("{}x{}", view.width, view.height);
+        write!(out, "{:<width$}  {size:>11}", view.name)?;
+        for (&metric, column) in metrics.iter().zip(&columns) {
+            write!(out, "  {:>column$}", number(metric, view.get(metric)))?;
+        }
+        writeln!(out)?;
+    }
+    for label in ["mean", "minimum", "maximum"] {
+        let pick = |summary: &Summary| match label {
+            "mean" => summary.mean,
+            "minimum" => summary.min,
+            _ => summary.max,
+        };
+        write!(out, "{label:<width$}  {:>11}", "")?;
+        for (&metric, column) in metrics.iter().zip(&columns) {
+            let value = comparison.get(metric).as_ref().and_then(pick);
+            write!(out, "  {:>column$}", number(metric, value))?;
+        }
+        writeln!(out)?;
+    }
+    Ok(())
+}
+
+fn number(metric: Metric, value: Option<f64>) -> String {
+    value.map_or_else(|| "identical".to_owned(), |v| format!("{v:.*}", metric.digits()))
+}
