@@ -137,7 +137,7 @@ impl Runner<'_> {
         let mut saved = Vec::new();
         for &setting in settings(entry, self.options) {
             self.watch.part(&format!("{} {} {}", entry.name, entry.method, setting.label()));
-            points.push(self.point(&mut subject, setting, base.fps)?);
+            points.push(self.point(&mut subject, setting)?);
             saved.extend(subject.shown.iter().map(|&view| self.saved(&subject, place, view, setting)));
         }
         let shipped_bytes =
@@ -226,7 +226,7 @@ impl Runner<'_> {
         Ok(base)
     }
 
-    fn point(&mut self, subject: &mut Subject, setting: Setting, dense: Option<f64>) -> Part<Point> {
+    fn point(&mut self, subject: &mut Subject, setting: Setting) -> Part<Point> {
         let label = setting.label();
         let name = format!("{}-{}", subject.name, file_name(&label));
         let key = format!("{}; {label}", subject.key);
@@ -250,6 +250,8 @@ impl Runner<'_> {
             let apart = difference(&originals[view], &drawn[view]);
             self.save(&self.picture(subject, view, &format!("{label} difference")), &apart)?;
         }
+        // Side by side, so that whatever else the machine does slows both.
+        let dense = self.fps(&Scene::from(&subject.splats), &subject.cameras)?;
         let fps = match (dense, self.fps(&scene, &subject.cameras)?) {
             (Some(dense), Some(sparse)) => Some(Fps { dense, sparse }),
             _ => None,
