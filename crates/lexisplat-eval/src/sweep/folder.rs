@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 
 /// The page holds pictures of at most so many bytes in all; browsers grow slow with more. All stay in their
 /// folder.
-const PICTURE_BYTES: u64 = 96 << 20;
+const PICTURE_BYTES: u64 = 24 << 20;
 /// The tolerance whose pictures go into the page before others: the paper's main one.
 const SHOWN_FIRST: f64 = 0.1;
 
