@@ -66,8 +66,8 @@ pub(crate) struct Sweep {
     /// Models, PLY files.
     #[arg(value_name = "MODEL", required_unless_present = "manifest")]
     pub(crate) models: Vec<PathBuf>,
-    /// Models with their methods, cameras and photos: a TOML file with a table `scene` for each (docs/EVALUATION.md). Those that
-    /// are not there are skipped and listed.
+    /// Models with their methods, cameras and photos: a TOML file with a table `scene` for each
+    /// (docs/EVALUATION.md). Those that are not there are skipped and listed.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["models", "cameras", "images", "method"])]
     pub(crate) manifest: Option<PathBuf>,
     /// Where relative paths in the manifest start [default: its folder].

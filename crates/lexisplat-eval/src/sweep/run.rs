@@ -17,7 +17,7 @@ use crate::scorer::Scorer;
 pub struct Saved {
     /// Place of the scene in [`Results::scenes`].
     pub scene: usize,
-    /// [`Setting::label`].
+    /// The label of its [`super::Setting`].
     pub setting: String,
     /// The view's name.
     pub view: String,
