@@ -28,6 +28,8 @@ const MARK: f64 = 4.2;
 const BAND_OPACITY: f64 = 0.14;
 /// Steps along y that values are spread over, at most.
 const STEPS: f64 = 7.0;
+/// Most steps between marked powers of two: their texts are up to eight letters long.
+const MOST_POWERS: f64 = 8.0;
 /// Range of values where they do not differ.
 const LEAST_RANGE: f64 = 1.0;
 /// Numbers beyond this, and below its inverse along x, are no measurements.
@@ -115,6 +117,15 @@ fn step(spread: f64) -> f64 {
     rounds.filter(|round| *round >= least).reduce(f64::min).unwrap_or(10.0 * power)
 }
 
+/// First and last power of two on an axis that shows `logarithms`, and how many powers lie between two marked
+/// numbers: few enough that their texts do not touch.
+fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
+    let first = logarithms.0.floor();
+    let spread = (logarithms.1 - first).ceil().max(1.0);
+    let step = (spread / MOST_POWERS).ceil();
+    (first, first + (spread / step).ceil() * step, step)
+}
+
 impl Chart {
     /// The chart; `None` if it has no points.
     pub(super) fn draw(mut self) -> Result<Option<Figure>> {
@@ -196,7 +207,7 @@ impl Chart {
         let low = (low / step).floor() * step;
         let high = ((y.1 / step).ceil() * step).max(low + step);
         // Whole powers of two at both ends, so that there are two marked numbers at least.
-        let (first, last) = (x.0.floor(), x.1.ceil().max(x.0.floor() + 1.0));
+        let (first, last, powers) = powers(x);
         let mut layout = Layout::new((first, last), (low, high))
             .with_width(WIDTH)
             .with_height(HEIGHT)
@@ -211,7 +222,7 @@ impl Chart {
             .with_y_label(literal(&self.y))
             .with_x_axis_min(first)
             .with_x_axis_max(last)
-            .with_x_tick_step(1.0)
+            .with_x_tick_step(powers)
             .with_y_axis_min(low)
             .with_y_axis_max(high)
             .with_y_tick_step(step)
@@ -233,6 +244,19 @@ impl Chart {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn powers_of_two_leave_room_for_their_texts() {
+        for (logarithms, expected) in [
+            ((1.2, 3.5), (1.0, 4.0, 1.0)),
+            ((2.0, 2.0), (2.0, 3.0, 1.0)),
+            ((0.0, 8.0), (0.0, 8.0, 1.0)),
+            ((1.0, 16.7), (1.0, 17.0, 2.0)),
+            ((1.0, 18.0), (1.0, 19.0, 3.0)),
+        ] {
+            assert_eq!(powers(logarithms), expected, "{logarithms:?}");
+        }
+    }
 
     #[test]
     fn steps_are_round() {
