@@ -23,6 +23,10 @@ const SEEN: f64 = 0.5;
 /// (bonsai, snowmiku, flowers, leica, fruit), 0.34 to 0.66 are; of a made-up room none.
 const FEW: f64 = 0.15;
 
+/// And from inside, at least this share. Of the sample scene, whose objects hide each other when they are made
+/// of few Gaussians, at most 0.5 are; of a made-up room all.
+const MANY: f64 = 0.7;
+
 /// Places tried to stand at.
 const PLACES: u32 = 32;
 /// How far from the centre they are to either side, in half extents of the bulk.
@@ -49,20 +53,26 @@ const FIELD_OF_VIEW: f64 = 60.0;
 const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
 
 /// Whether `geometry` is a scene to look at from inside: [`object`]'s cameras see next to none of its detail,
-/// as walls are in the way.
+/// as walls are in the way, and [`room`]'s places most of it.
 #[must_use]
 pub fn is_room(geometry: &Geometry) -> bool {
-    seen(geometry).is_some_and(|share| share < FEW)
+    let targets = targets(geometry);
+    let around: Vec<DVec3> = object(geometry, TRIED_VIEWS, 1, 1)
+        .iter()
+        .map(|camera| DVec3::from_array(camera.position.map(f64::from)))
+        .collect();
+    if seen(geometry, &around, &targets).is_none_or(|share| share >= FEW) {
+        return false;
+    }
+    let (_, radius) = bulk(geometry);
+    seen(geometry, &stands(geometry, radius), &targets).is_some_and(|share| share >= MANY)
 }
 
-/// Share of the lines from an orbit's cameras to Gaussians of the detail that are free; `None` if there are
-/// no such Gaussians.
-fn seen(geometry: &Geometry) -> Option<f64> {
+/// Share of the lines from `places` to `targets` that are free; `None` if there are none.
+fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3]) -> Option<f64> {
     let (_, radius) = subject(geometry);
-    let targets = targets(geometry);
-    let mut lines = Vec::new();
-    for camera in object(geometry, TRIED_VIEWS, 1, 1) {
-        let origin = DVec3::from_array(camera.position.map(f64::from));
+    let mut lines = Vec::with_capacity(places.len() * targets.len());
+    for &origin in places {
         lines.extend(targets.iter().map(|target| {
             let way = target - origin;
             let to = way.length() - SHORT * radius;
@@ -233,6 +243,11 @@ mod tests {
     fn rooms_are_told_from_objects() {
         assert!(!is_room(&still_life()));
         assert!(is_room(&hollow_box()));
+        // Coarse models of objects hide themselves, from within as well.
+        for gaussians in [100, 300, 1500, 6000] {
+            let splats = lexisplat::sample::scene(&lexisplat::sample::SampleOptions::new(gaussians, 0));
+            assert!(!is_room(&splats.geometry), "{gaussians}");
+        }
         // Without walls and ceiling in the way, furniture is looked at from outside.
         let mut open = hollow_box();
         open.opacities[..4000].fill(-4.0);
