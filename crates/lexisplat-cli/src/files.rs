@@ -5,7 +5,7 @@ use std::io::{BufWriter, Read, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
-use lexisplat::Error;
+use lexisplat::{Error, Input};
 use lexisplat_eval::SceneFile;
 
 use crate::args::Common;
@@ -29,10 +29,18 @@ pub(crate) fn is_pipe(path: &Path) -> bool {
 }
 
 /// All of standard input.
-pub(crate) fn standard_input() -> Result<Vec<u8>> {
+fn standard_input() -> Result<Vec<u8>> {
     let mut bytes = Vec::new();
     std::io::stdin().lock().read_to_end(&mut bytes).context("standard input")?;
     Ok(bytes)
+}
+
+/// The bytes of a file, mapped where possible, or of standard input; and what messages call it.
+pub(crate) fn input(path: &Path) -> Result<(String, Input)> {
+    if is_pipe(path) {
+        return Ok(("standard input".to_owned(), Input::from(standard_input()?)));
+    }
+    Ok((path.display().to_string(), Input::open(path)?))
 }
 
 /// Reads a PLY or a .lexi, whichever the bytes say it is.

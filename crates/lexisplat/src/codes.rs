@@ -183,6 +183,19 @@ impl SparseCodes {
         values: Values,
         escapes: Escapes,
     ) -> Result<Self> {
+        Self::part(dictionary, 0, counts, indices, values, escapes)
+    }
+
+    /// [`Self::new`] of a part of a scene, whose first Gaussian errors call number `first`. Escapes are
+    /// numbered from the part's start.
+    pub(crate) fn part(
+        dictionary: &Dictionary,
+        first: usize,
+        counts: Vec<u8>,
+        indices: Indices,
+        values: Values,
+        escapes: Escapes,
+    ) -> Result<Self> {
         let (dim, atoms) = (dictionary.dim(), dictionary.len());
         let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
         let lengths = [("codes.indices", indices.len()), ("codes.values", values.len())];
@@ -203,19 +216,23 @@ impl SparseCodes {
             let empty = counts.get(g as usize) == Some(&0);
             if !ascending || !empty {
                 let expected = "strictly ascending Gaussians without nonzeros";
-                return Err(Error::parameter("escapes.gaussians", g, expected));
+                return Err(Error::parameter("escapes.gaussians", first + g as usize, expected));
             }
         }
         let mut start = 0;
         for (i, &count) in counts.iter().enumerate() {
             let end = start + usize::from(count);
             if usize::from(count) > dim {
-                return Err(Error::parameter("codes.counts", count, format!("at most {dim} (Gaussian {i})")));
+                return Err(Error::parameter(
+                    "codes.counts",
+                    count,
+                    format!("at most {dim} (Gaussian {})", first + i),
+                ));
             }
             for k in start..end {
                 let index = indices.get(k);
                 if index >= atoms || (k > start && indices.get(k - 1) >= index) {
-                    let expected = format!("ascending atoms below {atoms} (Gaussian {i})");
+                    let expected = format!("ascending atoms below {atoms} (Gaussian {})", first + i);
                     return Err(Error::parameter("codes.indices", index, expected));
                 }
             }

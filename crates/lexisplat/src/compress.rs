@@ -1,23 +1,26 @@
 //! The whole encoder: a dense scene in, a [`Model`] and a report out.
 
+use std::ops::Range;
+
 use half::f16;
 
 use crate::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
-use crate::learn::{DEFAULT_SAMPLE, LearnOptions, Learned, learn};
+use crate::learn::{DEFAULT_SAMPLE, Fetch, LearnOptions, Learned, learn_from};
 use crate::limits::Limits;
 use crate::model::{Layout, Model, Pursuit, Record};
 use crate::parallel::{CHUNK, map_chunks};
 use crate::progress::{Progress, Stage};
 use crate::pursuit::{Coder, Encoded, Stop, ValueType};
+use crate::sh::ShDegree;
 use crate::splats::Splats;
 use crate::stopwatch::Stopwatch;
 
 /// The paper's main tolerance.
 pub const DEFAULT_TOLERANCE: f64 = 0.1;
-/// Chunks coded before their results are appended: bounds what is held twice.
-const CHUNKS_AT_ONCE: usize = 32;
+/// Gaussians coded before their results are appended: bounds what is held twice.
+pub(crate) const AT_ONCE: usize = 32 * CHUNK;
 
 /// How to compress.
 #[derive(Debug, Clone, PartialEq)]
@@ -94,130 +97,181 @@ pub fn compress(
     progress: &dyn Progress,
 ) -> Result<(Model, CompressReport)> {
     splats.validate()?;
-    Limits::check("Gaussians", splats.len() as u64, Limits::default().gaussians)?;
-    let stop = Stop::new(options.tolerance, options.max_nonzeros)?;
+    let (n, dim) = (splats.len(), splats.degree.rest());
+    Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
     let clock = Stopwatch::start();
-    let (dictionary, learned) = match &options.dictionary {
-        Some(given) if given.degree() != splats.degree => {
-            let expected = format!("a dictionary of the scene's SH degree {}", splats.degree);
-            return Err(Error::parameter("dictionary", format!("degree {}", given.degree()), expected));
-        }
-        Some(given) => (given.clone(), None),
-        None => {
-            let learn_options = LearnOptions {
-                atoms: options.atoms,
-                pursuit: options.pursuit,
-                stop,
-                seed: options.seed,
-                sample: options.sample,
-                ..LearnOptions::new(stop)
-            };
-            let learned = learn(splats.degree, &splats.sh_rest, &learn_options, progress)?;
-            (learned.dictionary.clone(), Some(learned))
-        }
+    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| {
+        numbers.iter().for_each(|&i| out.extend_from_slice(splats.rest(i)));
+        Ok(())
     };
+    let (encoder, learned) = Encoder::new(splats.degree, n, &mut fetch, options, progress)?;
     let learn_seconds = clock.seconds();
     let clock = Stopwatch::start();
-    let values = if options.layout == Layout::F16 { ValueType::F16 } else { ValueType::F32 };
-    let coder = Coder::new(&dictionary, options.pursuit, stop, values);
-    let coded = Coded::scene(&coder, &splats, &dictionary, values, stop.tolerance(), progress)?;
-    let code_seconds = clock.seconds();
-
-    let count = splats.len().max(1) as f64;
-    let escapes = coded.escapes.gaussians.len() as u64;
-    let dim = dictionary.dim();
-    let nonzeros = coded.indices.len() as u64 + escapes * dim as u64;
-    let mut nonzero_histogram = vec![0_u64; dim + 1];
-    for &n in &coded.counts {
-        nonzero_histogram[usize::from(n)] += 1;
+    let mut coded = encoder.nothing();
+    if dim > 0 && splats.sh_rest.iter().any(|v| !v.is_finite()) {
+        return Err(Error::parameter("sh_rest", "NaN or infinity", "finite values"));
     }
-    nonzero_histogram[0] -= escapes;
-    let record = Record {
-        tolerance: options.tolerance,
-        max_nonzeros: options.max_nonzeros,
-        pursuit: options.pursuit,
-        seed: options.seed,
-        layout: options.layout,
-        max_residual: coded.max_error,
-        rms_residual: (coded.squared_error / count).sqrt(),
-        over_tolerance: coded.over_tolerance,
-    };
+    progress.begin(Stage::Code, n as u64);
+    for start in (0..n).step_by(AT_ONCE) {
+        let end = n.min(start + AT_ONCE);
+        encoder.code(&splats.sh_rest[start * dim..end * dim], start..end, &mut coded, progress);
+    }
+    progress.end();
+    let (record, report) = coded.tally.told(options, n, learned, [learn_seconds, clock.seconds()]);
+    let Encoder { dictionary, .. } = encoder;
     let codes = SparseCodes::new(&dictionary, coded.counts, coded.indices, coded.values, coded.escapes)?;
-    let report = CompressReport {
-        learned,
-        mean_nonzeros: nonzeros as f64 / count,
-        nonzero_histogram,
-        escapes,
-        learn_seconds,
-        code_seconds,
-    };
     let Splats { geometry, meta, .. } = splats;
     Ok((Model { geometry, meta, dictionary, codes, record }, report))
 }
 
-/// The codes of a run of Gaussians, as they grow.
-struct Coded {
-    counts: Vec<u8>,
-    indices: Indices,
-    values: Values,
-    escapes: Escapes,
+/// A dictionary, and how to code with it.
+pub(crate) struct Encoder {
+    pub(crate) dictionary: Dictionary,
+    coder: Option<Coder>,
+    tolerance: Option<f64>,
+    values: ValueType,
+}
+
+impl Encoder {
+    /// Checks `options` and learns the dictionary from `vectors` rows of SH-rest, unless one is given.
+    pub(crate) fn new(
+        degree: ShDegree,
+        vectors: usize,
+        fetch: &mut Fetch<'_>,
+        options: &CompressOptions,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Option<Learned>)> {
+        let stop = Stop::new(options.tolerance, options.max_nonzeros)?;
+        let (dictionary, learned) = match &options.dictionary {
+            Some(given) if given.degree() != degree => {
+                let expected = format!("a dictionary of the scene's SH degree {degree}");
+                return Err(Error::parameter("dictionary", format!("degree {}", given.degree()), expected));
+            }
+            Some(given) => (given.clone(), None),
+            None => {
+                let learn_options = LearnOptions {
+                    atoms: options.atoms,
+                    pursuit: options.pursuit,
+                    stop,
+                    seed: options.seed,
+                    sample: options.sample,
+                    ..LearnOptions::new(stop)
+                };
+                let learned = learn_from(degree, vectors, fetch, &learn_options, progress)?;
+                (learned.dictionary.clone(), Some(learned))
+            }
+        };
+        let values = if options.layout == Layout::F16 { ValueType::F16 } else { ValueType::F32 };
+        let coder = (degree.rest() > 0).then(|| Coder::new(&dictionary, options.pursuit, stop, values));
+        Ok((Self { dictionary, coder, tolerance: stop.tolerance(), values }, learned))
+    }
+
+    /// Codes of no Gaussians.
+    pub(crate) fn nothing(&self) -> Coded {
+        Coded::empty(&self.dictionary, self.values)
+    }
+
+    /// Codes `rest`, the SH-rest of Gaussians `range`, and appends to `coded`. The same bits come out of one
+    /// call and of several, if all but the last are for a multiple of [`CHUNK`] Gaussians.
+    pub(crate) fn code(&self, rest: &[f32], range: Range<usize>, coded: &mut Coded, progress: &dyn Progress) {
+        let dim = self.dictionary.dim();
+        let Some(coder) = &self.coder else {
+            coded.counts.resize(coded.counts.len() + range.len(), 0);
+            coded.tally.histogram[0] += range.len() as u64;
+            progress.advance(range.len() as u64);
+            return;
+        };
+        let parts = map_chunks(range.len(), CHUNK, |piece| {
+            let mut part = self.nothing();
+            let start = range.start + piece.start;
+            coder.encode(&rest[piece.start * dim..piece.end * dim], |visit| {
+                part.push(start, visit.signal, visit.code, visit.outcome, self.tolerance);
+            });
+            progress.advance(piece.len() as u64);
+            part
+        });
+        for part in parts {
+            coded.append(part);
+        }
+    }
+}
+
+/// What is counted while coding.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Tally {
+    pub(crate) nonzeros: u64,
+    pub(crate) escapes: u64,
+    /// Gaussians by number of nonzeros; escapes not among them.
+    histogram: Vec<u64>,
     max_error: f64,
     squared_error: f64,
     over_tolerance: u64,
 }
 
+impl Tally {
+    fn add(&mut self, part: &Self) {
+        self.nonzeros += part.nonzeros;
+        self.escapes += part.escapes;
+        self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
+        self.max_error = self.max_error.max(part.max_error);
+        self.squared_error += part.squared_error;
+        self.over_tolerance += part.over_tolerance;
+    }
+
+    /// What is recorded and reported of `gaussians` Gaussians; `seconds` are those of learning and coding.
+    pub(crate) fn told(
+        &self,
+        options: &CompressOptions,
+        gaussians: usize,
+        learned: Option<Learned>,
+        seconds: [f64; 2],
+    ) -> (Record, CompressReport) {
+        let count = gaussians.max(1) as f64;
+        let dim = self.histogram.len() as u64 - 1;
+        let record = Record {
+            tolerance: options.tolerance,
+            max_nonzeros: options.max_nonzeros,
+            pursuit: options.pursuit,
+            seed: options.seed,
+            layout: options.layout,
+            max_residual: self.max_error,
+            rms_residual: (self.squared_error / count).sqrt(),
+            over_tolerance: self.over_tolerance,
+        };
+        let report = CompressReport {
+            learned,
+            mean_nonzeros: (self.nonzeros + self.escapes * dim) as f64 / count,
+            nonzero_histogram: self.histogram.clone(),
+            escapes: self.escapes,
+            learn_seconds: seconds[0],
+            code_seconds: seconds[1],
+        };
+        (record, report)
+    }
+}
+
+/// The codes of a run of Gaussians, as they grow.
+#[derive(Debug)]
+pub(crate) struct Coded {
+    pub(crate) counts: Vec<u8>,
+    pub(crate) indices: Indices,
+    pub(crate) values: Values,
+    pub(crate) escapes: Escapes,
+    pub(crate) tally: Tally,
+}
+
 impl Coded {
-    fn empty(atoms: usize, values: ValueType) -> Self {
+    fn empty(dictionary: &Dictionary, values: ValueType) -> Self {
         Self {
             counts: Vec::new(),
-            indices: Indices::for_atoms(atoms),
+            indices: Indices::for_atoms(dictionary.len()),
             values: match values {
                 ValueType::F32 => Values::F32(Vec::new()),
                 ValueType::F16 => Values::F16(Vec::new()),
             },
             escapes: Escapes::default(),
-            max_error: 0.0,
-            squared_error: 0.0,
-            over_tolerance: 0,
+            tally: Tally { histogram: vec![0; dictionary.dim() + 1], ..Tally::default() },
         }
-    }
-
-    /// Codes a whole scene, chunk by chunk.
-    fn scene(
-        coder: &Coder,
-        splats: &Splats,
-        dictionary: &Dictionary,
-        values: ValueType,
-        tolerance: Option<f64>,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let (n, dim) = (splats.len(), splats.degree.rest());
-        let mut all = Self::empty(dictionary.len(), values);
-        if dim == 0 {
-            all.counts = vec![0; n];
-            return Ok(all);
-        }
-        if splats.sh_rest.iter().any(|v| !v.is_finite()) {
-            return Err(Error::parameter("sh_rest", "NaN or infinity", "finite values"));
-        }
-        progress.begin(Stage::Code, n as u64);
-        for batch in (0..n).step_by(CHUNK * CHUNKS_AT_ONCE) {
-            let len = (n - batch).min(CHUNK * CHUNKS_AT_ONCE);
-            let parts = map_chunks(len, CHUNK, |range| {
-                let mut part = Self::empty(dictionary.len(), values);
-                let (start, end) = (batch + range.start, batch + range.end);
-                coder.encode(&splats.sh_rest[start * dim..end * dim], |visit| {
-                    part.push(start, visit.signal, visit.code, visit.outcome, tolerance);
-                });
-                progress.advance((end - start) as u64);
-                part
-            });
-            for part in parts {
-                all.append(part);
-            }
-        }
-        progress.end();
-        Ok(all)
     }
 
     fn push(
@@ -234,6 +288,7 @@ impl Coded {
             self.escapes.gaussians.push((start + self.counts.len()) as u32);
             self.escapes.rows.extend_from_slice(signal);
             self.counts.push(0);
+            self.tally.escapes += 1;
             return;
         };
         #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
@@ -247,9 +302,26 @@ impl Coded {
             Values::F32(values) => values.extend(code.iter().map(|p| p.1)),
             Values::F16(values) => values.extend(code.iter().map(|p| f16::from_f32(p.1))),
         }
-        self.max_error = self.max_error.max(error);
-        self.squared_error += error * error;
-        self.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
+        self.tally.nonzeros += code.len() as u64;
+        self.tally.histogram[code.len()] += 1;
+        self.tally.max_error = self.tally.max_error.max(error);
+        self.tally.squared_error += error * error;
+        self.tally.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
+    }
+
+    /// Forgets the codes, but not what was counted.
+    pub(crate) fn clear(&mut self) {
+        self.counts.clear();
+        match &mut self.indices {
+            Indices::U8(v) => v.clear(),
+            Indices::U16(v) => v.clear(),
+        }
+        match &mut self.values {
+            Values::F32(v) => v.clear(),
+            Values::F16(v) => v.clear(),
+        }
+        self.escapes.gaussians.clear();
+        self.escapes.rows.clear();
     }
 
     fn append(&mut self, part: Self) {
@@ -266,8 +338,6 @@ impl Coded {
         }
         self.escapes.gaussians.extend_from_slice(&part.escapes.gaussians);
         self.escapes.rows.extend_from_slice(&part.escapes.rows);
-        self.max_error = self.max_error.max(part.max_error);
-        self.squared_error += part.squared_error;
-        self.over_tolerance += part.over_tolerance;
+        self.tally.add(&part.tally);
     }
 }

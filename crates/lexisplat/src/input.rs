@@ -13,9 +13,12 @@ use std::path::Path;
 
 use crate::error::{Error, Result};
 
-/// The bytes of a file.
+/// The bytes of a file, as a slice: its own pages where it can be mapped, else a copy.
 #[derive(Debug)]
-pub(crate) enum Input {
+pub struct Input(Bytes);
+
+#[derive(Debug)]
+enum Bytes {
     /// Pages of the file itself; they do not count as anonymous memory.
     #[cfg(feature = "mmap")]
     Mapped(memmap2::Mmap),
@@ -25,17 +28,28 @@ pub(crate) enum Input {
 
 impl Input {
     /// Maps the regular file `path`, or reads anything else to its end.
-    pub(crate) fn open(path: &Path) -> Result<Self> {
+    ///
+    /// # Errors
+    /// [`Error::Io`] naming `path`.
+    pub fn open(path: &Path) -> Result<Self> {
         #[cfg(feature = "mmap")]
         {
             let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
             let kind = file.metadata().map_err(|e| Error::io(path, e))?;
             // An empty mapping is an error on some systems.
             if kind.is_file() && kind.len() > 0 {
-                return map(&file).map(Self::Mapped).map_err(|e| Error::io(path, e));
+                let map = map(&file).map_err(|e| Error::io(path, e))?;
+                return Ok(Self(Bytes::Mapped(map)));
             }
         }
-        std::fs::read(path).map(Self::Owned).map_err(|e| Error::io(path, e))
+        let bytes = std::fs::read(path).map_err(|e| Error::io(path, e))?;
+        Ok(Self::from(bytes))
+    }
+}
+
+impl From<Vec<u8>> for Input {
+    fn from(bytes: Vec<u8>) -> Self {
+        Self(Bytes::Owned(bytes))
     }
 }
 
@@ -53,10 +67,10 @@ impl Deref for Input {
     type Target = [u8];
 
     fn deref(&self) -> &[u8] {
-        match self {
+        match &self.0 {
             #[cfg(feature = "mmap")]
-            Self::Mapped(map) => map,
-            Self::Owned(bytes) => bytes,
+            Bytes::Mapped(map) => map,
+            Bytes::Owned(bytes) => bytes,
         }
     }
 }

@@ -70,14 +70,17 @@ mod rng;
 pub mod sample;
 mod sensitivity;
 pub mod sh;
+mod spill;
 mod splats;
 pub mod stats;
 mod stopwatch;
+pub mod stream;
 
 pub use codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
 pub use compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
 pub use dictionary::Dictionary;
 pub use error::{Error, FormatError, Result};
+pub use input::Input;
 pub use limits::{Limits, MAX_ATOMS};
 pub use model::{Layout, Model, Pursuit, Record};
 pub use progress::{Progress, Silent, Stage};

@@ -85,10 +85,14 @@ impl Sensitivity {
     /// what, so files made with it are larger for the same quality than with a measured one.
     #[must_use]
     pub fn guess(geometry: &Geometry) -> Self {
+        Self::guess_part(geometry, guessed_total(0.0, geometry))
+    }
+
+    /// [`Self::guess`] of a part of a scene whose [`guessed_total`] is `total`.
+    pub(crate) fn guess_part(geometry: &Geometry, total: f64) -> Self {
         let n = geometry.len();
         let mut out = Self::zeros(n);
         out.removal.fill(f32::INFINITY);
-        let total: f64 = (0..n).map(|i| f64::from(guessed_weight(geometry, i))).sum();
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let unit = (1.0 / (3.0 * total.max(LEAST_TOTAL))) as f32;
         for i in 0..n {
@@ -162,6 +166,11 @@ impl Sensitivity {
             rows.for_each(|v| *v *= factor);
         }
     }
+}
+
+/// Adds to `sum`, one after the other, what the weights of all Gaussians are expected to be proportional to.
+pub(crate) fn guessed_total(sum: f64, geometry: &Geometry) -> f64 {
+    (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(guessed_weight(geometry, i)))
 }
 
 /// What a Gaussian's weight is expected to be proportional to.

@@ -71,26 +71,63 @@ pub struct Lint {
 /// # Errors
 /// [`crate::Error::Parameter`] if the scene's arrays differ in length.
 pub fn lint(splats: &Splats) -> crate::Result<Lint> {
-    splats.validate()?;
-    let mut counts = Counts::default();
-    for part in map_chunks(splats.len(), CHUNK, |range| Counts::of(splats, range)) {
-        counts.add(&part);
+    let mut linter = Linter::default();
+    linter.add(splats)?;
+    Ok(linter.finish())
+}
+
+/// [`lint`] of a scene that comes part after part.
+#[derive(Debug, Default)]
+pub struct Linter {
+    gaussians: u64,
+    view_dependent: bool,
+    counts: Counts,
+    columns: Vec<Column>,
+}
+
+impl Linter {
+    /// Looks the next Gaussians over. Parts are of one scene: the same properties in all of them. The same
+    /// bits come out of one part and of several, if all but the last are a multiple of 2048 Gaussians.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] if the part's arrays differ in length.
+    pub fn add(&mut self, splats: &Splats) -> crate::Result<()> {
+        splats.validate()?;
+        for part in map_chunks(splats.len(), CHUNK, |range| Counts::of(splats, range)) {
+            self.counts.add(&part);
+        }
+        self.gaussians += splats.len() as u64;
+        self.view_dependent = splats.degree.get() > 0;
+        let columns = columns(splats);
+        // An empty part may lack what the others have.
+        if self.columns.iter().all(|c| c.whole.count == 0) && self.columns.len() <= columns.len() {
+            self.columns = columns;
+        } else {
+            self.columns.iter_mut().zip(columns).for_each(|(all, part)| all.parts.extend(part.parts));
+        }
+        self.columns.iter_mut().for_each(Column::join);
+        Ok(())
     }
-    let n = splats.len() as u64;
-    let mut lint = Lint {
-        gaussians: n,
-        attributes: attributes(splats),
-        rest_norms: counts.rest_norms,
-        mean_rest_norm: if n == 0 { 0.0 } else { counts.norm_sum / n as f64 },
-        zero_rest: counts.zero_rest,
-        zero_quaternions: counts.zero_quaternions,
-        non_unit_quaternions: counts.non_unit_quaternions,
-        huge_scales: counts.huge_scales,
-        never_drawn: counts.never_drawn,
-        warnings: Vec::new(),
-    };
-    lint.warnings = warnings(&lint, splats.degree.get() > 0);
-    Ok(lint)
+
+    /// What all parts together look like.
+    #[must_use]
+    pub fn finish(self) -> Lint {
+        let (n, counts) = (self.gaussians, self.counts);
+        let mut lint = Lint {
+            gaussians: n,
+            attributes: self.columns.into_iter().map(Column::told).collect(),
+            rest_norms: counts.rest_norms,
+            mean_rest_norm: if n == 0 { 0.0 } else { counts.norm_sum / n as f64 },
+            zero_rest: counts.zero_rest,
+            zero_quaternions: counts.zero_quaternions,
+            non_unit_quaternions: counts.non_unit_quaternions,
+            huge_scales: counts.huge_scales,
+            never_drawn: counts.never_drawn,
+            warnings: Vec::new(),
+        };
+        lint.warnings = warnings(&lint, self.view_dependent);
+        lint
+    }
 }
 
 fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
@@ -117,7 +154,7 @@ fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
 }
 
 /// Counts and sums over some Gaussians.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Counts {
     rest_norms: [u64; NORM_BINS.len()],
     norm_sum: f64,
@@ -163,12 +200,57 @@ impl Counts {
     }
 }
 
-fn attributes(splats: &Splats) -> Vec<AttributeStats> {
+/// Range and sum of one property.
+#[derive(Debug)]
+struct Column {
+    name: String,
+    whole: Span,
+    /// Those of chunks not yet added to the whole, in order.
+    parts: Vec<Span>,
+}
+
+/// Range, sum and number of values.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    min: f64,
+    max: f64,
+    sum: f64,
+    count: u64,
+}
+
+impl Span {
+    const EMPTY: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0 };
+}
+
+impl Column {
+    fn join(&mut self) {
+        for part in self.parts.drain(..) {
+            let whole = &mut self.whole;
+            *whole = Span {
+                min: whole.min.min(part.min),
+                max: whole.max.max(part.max),
+                sum: whole.sum + part.sum,
+                count: whole.count + part.count,
+            };
+        }
+    }
+
+    fn told(self) -> AttributeStats {
+        let Span { min, max, sum, count } = self.whole;
+        match count {
+            0 => AttributeStats { name: self.name, min: 0.0, max: 0.0, mean: 0.0 },
+            _ => AttributeStats { name: self.name, min, max, mean: sum / count as f64 },
+        }
+    }
+}
+
+/// All properties of some Gaussians.
+fn columns(splats: &Splats) -> Vec<Column> {
     let geometry = &splats.geometry;
     let mut out = Vec::new();
     let mut columns = |names: &[&str], values: &[f32]| {
         for (column, name) in names.iter().enumerate() {
-            out.push(column_stats(name, values, column, names.len()));
+            out.push(spans(name, values, column, names.len()));
         }
     };
     columns(&["x", "y", "z"], geometry.positions.as_flattened());
@@ -183,37 +265,29 @@ fn attributes(splats: &Splats) -> Vec<AttributeStats> {
     columns(&["scale_0", "scale_1", "scale_2"], geometry.scales.as_flattened());
     columns(&["rot_0", "rot_1", "rot_2", "rot_3"], geometry.rotations.as_flattened());
     for extra in &geometry.extras {
-        for_extra!(&extra.values, v => out.push(column_stats(&extra.name, v, 0, 1)));
+        for_extra!(&extra.values, v => out.push(spans(&extra.name, v, 0, 1)));
     }
     out
 }
 
-/// Statistics of every `width`-th value from `column` on.
-fn column_stats<T: Copy + Into<f64> + Sync>(
-    name: &str,
-    values: &[T],
-    column: usize,
-    width: usize,
-) -> AttributeStats {
+/// Every `width`-th value from `column` on.
+fn spans<T: Copy + Into<f64> + Sync>(name: &str, values: &[T], column: usize, width: usize) -> Column {
     let parts = map_chunks(values.len() / width, CHUNK, |rows| {
-        let mut part = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0_u64);
+        let mut part = Span::EMPTY;
         for row in rows {
             let value: f64 = values[row * width + column].into();
             if !value.is_nan() {
-                part = (part.0.min(value), part.1.max(value), part.2 + value, part.3 + 1);
+                part = Span {
+                    min: part.min.min(value),
+                    max: part.max.max(value),
+                    sum: part.sum + value,
+                    count: part.count + 1,
+                };
             }
         }
         part
     });
-    let mut whole = (f64::INFINITY, f64::NEG_INFINITY, 0.0, 0_u64);
-    for (min, max, sum, count) in parts {
-        whole = (whole.0.min(min), whole.1.max(max), whole.2 + sum, whole.3 + count);
-    }
-    let (min, max, sum, count) = whole;
-    match count {
-        0 => AttributeStats { name: name.to_owned(), min: 0.0, max: 0.0, mean: 0.0 },
-        _ => AttributeStats { name: name.to_owned(), min, max, mean: sum / count as f64 },
-    }
+    Column { name: name.to_owned(), whole: Span::EMPTY, parts }
 }
 
 #[cfg(test)]

@@ -127,6 +127,11 @@ pub(crate) struct Compress {
     /// Leave out Gaussians with NaN or infinite values instead of refusing the file.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
+    /// Memory that packing may take, about. A scene that needs more is packed part by part: what shows is then
+    /// guessed, not looked at, so of the qualities only --preset can be had. Files of the other layouts are
+    /// the same whatever the memory.
+    #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
+    pub(crate) memory: u64,
     /// What looks at the scene and judges pictures: `cpu`, so that the same input gives the same file
     /// everywhere; or faster, and recorded in the file, `gpu`, `auto` or a number from `lexisplat devices`.
     #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
@@ -157,6 +162,19 @@ impl Compress {
             ("--keep-order", self.keep_order),
             ("--prune", self.prune.is_some()),
         ]
+    }
+
+    /// Options that need the whole scene in memory, as given.
+    pub(crate) fn whole_only(&self) -> Option<&'static str> {
+        let options = [
+            ("--psnr", self.psnr.is_some()),
+            ("--min-psnr", self.min_psnr.is_some()),
+            ("--size", self.size.is_some()),
+            ("--ratio", self.ratio.is_some()),
+            ("--cameras", self.cameras.is_some()),
+            ("--prune", self.prune.is_some()),
+        ];
+        options.iter().find(|o| o.1).map(|o| o.0)
     }
 
     /// The layout asked for, or the one the other options ask for.

@@ -4,16 +4,15 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::ply::{PlyRead, ReadOptions};
-use lexisplat::{
-    CompressOptions, CompressReport, DEFAULT_TOLERANCE, Error, Layout, Limits, Model, compress, lexi, ply,
-};
+use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::stream::Compressed;
+use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, lexi, ply, stream};
 use serde_json::json;
 
 use lexisplat_eval::text;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, is_pipe, output_path, standard_input, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 
 /// Bytes of SH-rest a coefficient takes in a PLY.
@@ -48,69 +47,67 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         options.dictionary = Some(lexi::read_dictionary(path, &Limits::default())?);
     }
 
-    let (name, read) = read(args)?;
-    warn(&name, &read.warnings);
+    let (name, bytes) = input(&args.input)?;
+    let read = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
+    if layout == Layout::Packed && super::pack::is_large(args, bytes.len())? {
+        let bars = Bars::new(common.quiet);
+        let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
+        warn(&name, chunks.warnings());
+        return super::pack::run_in_parts(args, common, &output, &chunks, &bars, start);
+    }
     if layout == Layout::Packed {
+        let read = ply::read_bytes(&name, &bytes, &read)?;
+        warn(&name, &read.warnings);
         return super::pack::run(args, common, &output, read, start);
     }
-    let PlyRead { splats, warnings, source } = read;
-    let read_seconds = start.elapsed().as_secs_f64();
     let bars = Bars::new(common.quiet);
-    let (model, report) = compress(splats, &options, &bars)?;
-
-    let clock = Instant::now();
-    let file_bytes =
-        write_output(&output, |path| lexi::write(path, &model), |out| lexi::write_to(out, &model))?;
+    let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
+    warn(&name, chunks.warnings());
+    let read_seconds = start.elapsed().as_secs_f64();
+    let mut done = None;
+    write_output(
+        &output,
+        |path| {
+            Ok::<_, Error>(done.insert(stream::compress_file(&chunks, &options, path, &bars)?).file_bytes())
+        },
+        |out| Ok(done.insert(stream::compress_to(&chunks, &options, out, &bars)?).file_bytes()),
+    )?;
+    let Some(done) = done else { return Ok(()) };
     if let Some(path) = &args.save_dictionary {
-        lexi::write_dictionary(path, &model.dictionary)?;
+        lexi::write_dictionary(path, &done.dictionary)?;
     }
-    let write_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
         output: &output,
-        model: &model,
-        report: &report,
-        ply_bytes: source.file_bytes,
-        file_bytes,
-        seconds: [read_seconds, write_seconds, start.elapsed().as_secs_f64()],
+        done: &done,
+        ply_bytes: chunks.summary().file_bytes,
+        seconds: [read_seconds, start.elapsed().as_secs_f64()],
     };
-    tell(common, &output, || outcome.json(&warnings), || outcome.text())
-}
-
-fn read(args: &Compress) -> Result<(String, PlyRead)> {
-    let options = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
-    if is_pipe(&args.input) {
-        let name = "standard input".to_owned();
-        let read = ply::read_bytes(&name, &standard_input()?, &options)?;
-        return Ok((name, read));
-    }
-    Ok((args.input.display().to_string(), ply::read(&args.input, &options)?))
+    tell(common, &output, || Ok(outcome.json(chunks.warnings())), || outcome.text())
 }
 
 /// What was done, to be told in text or JSON.
 struct Outcome<'a> {
     output: &'a Path,
-    model: &'a Model,
-    report: &'a CompressReport,
+    done: &'a Compressed,
     ply_bytes: u64,
-    file_bytes: u64,
-    /// Reading, writing, everything.
-    seconds: [f64; 3],
+    /// Reading, everything.
+    seconds: [f64; 2],
 }
 
 impl Outcome<'_> {
     fn dense_sh_bytes(&self) -> u64 {
-        (self.model.len() * self.model.degree().rest()) as u64 * COEFFICIENT_BYTES
+        (self.done.gaussians * self.done.dictionary.dim()) as u64 * COEFFICIENT_BYTES
     }
 
-    fn json(&self, warnings: &[String]) -> Result<serde_json::Value> {
-        let (model, report, record) = (self.model, self.report, &self.model.record);
+    fn json(&self, warnings: &[String]) -> serde_json::Value {
+        let (done, report, record) = (self.done, &self.done.report, &self.done.record);
         let attributes: serde_json::Map<String, serde_json::Value> =
-            lexi::attribute_bytes(model)?.into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
-        Ok(json!({
+            done.attribute_bytes.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect();
+        json!({
             "output": self.output.display().to_string(),
-            "gaussians": model.len(),
-            "sh_degree": model.degree().get(),
-            "atoms": model.dictionary.len(),
+            "gaussians": done.gaussians,
+            "sh_degree": done.dictionary.degree().get(),
+            "atoms": done.dictionary.len(),
             "pursuit": record.pursuit.name(),
             "layout": record.layout.name(),
             "tol": record.tolerance,
@@ -124,8 +121,8 @@ impl Outcome<'_> {
             "max_residual": record.max_residual,
             "rms_residual": record.rms_residual,
             "ply_bytes": self.ply_bytes,
-            "file_bytes": self.file_bytes,
-            "sh_bytes": lexi::sh_bytes(model)?,
+            "file_bytes": done.file_bytes(),
+            "sh_bytes": done.sh_bytes(),
             "dense_sh_bytes": self.dense_sh_bytes(),
             "attribute_bytes": attributes,
             "learn_rounds": report.learned.as_ref().map(|l| l.rounds),
@@ -134,27 +131,31 @@ impl Outcome<'_> {
             "read_seconds": self.seconds[0],
             "learn_seconds": report.learn_seconds,
             "code_seconds": report.code_seconds,
-            "write_seconds": self.seconds[1],
-            "total_seconds": self.seconds[2],
+            "write_seconds": done.write_seconds,
+            "total_seconds": self.seconds[1],
             "warnings": warnings,
-        }))
+        })
     }
 
     fn text(&self) -> Result<String> {
         use std::fmt::Write as _;
-        let (model, report, record) = (self.model, self.report, &self.model.record);
-        let dim = model.degree().rest();
+        let (done, report, record) = (self.done, &self.done.report, &self.done.record);
+        let dim = done.dictionary.dim();
         let mut out = String::new();
         let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-        let gaussians = text::count(model.len() as u64);
+        let gaussians = text::count(done.gaussians as u64);
         line(
             "wrote",
-            format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), model.degree()),
+            format!(
+                "{}: {gaussians} Gaussians, SH degree {}",
+                self.output.display(),
+                done.dictionary.degree()
+            ),
         )?;
         match &report.learned {
             Some(l) if dim > 0 => {
                 let sample = text::count(l.sample as u64);
-                let atoms = model.dictionary.len();
+                let atoms = done.dictionary.len();
                 line(
                     "dictionary",
                     format!(
@@ -164,10 +165,10 @@ impl Outcome<'_> {
                 )?;
             }
             Some(_) => line("dictionary", "none: no view-dependent colour".to_owned())?,
-            None => line("dictionary", format!("{} atoms, given", model.dictionary.len()))?,
+            None => line("dictionary", format!("{} atoms, given", done.dictionary.len()))?,
         }
         if let Some(ratio) = report.coefficient_ratio() {
-            let rate = model.len() as f64 / report.code_seconds.max(1e-9);
+            let rate = done.gaussians as f64 / report.code_seconds.max(1e-9);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rate to look at")]
             let rate = text::count(rate as u64);
             line(
@@ -182,7 +183,7 @@ impl Outcome<'_> {
         if report.escapes > 0 {
             line("escapes", format!("{} Gaussians stored exactly", text::count(report.escapes)))?;
         }
-        let sh = lexi::sh_bytes(model)?;
+        let sh = done.sh_bytes();
         if dim > 0 {
             let dense = self.dense_sh_bytes();
             line(
@@ -199,12 +200,13 @@ impl Outcome<'_> {
             "file bytes",
             format!(
                 "{} of {}: {} smaller (whole file against the PLY)",
-                text::bytes(self.file_bytes),
+                text::bytes(done.file_bytes()),
                 text::bytes(self.ply_bytes),
-                text::ratio(self.ply_bytes, self.file_bytes)
+                text::ratio(self.ply_bytes, done.file_bytes())
             ),
         )?;
-        let parts: Vec<String> = lexi::attribute_bytes(model)?
+        let parts: Vec<String> = done
+            .attribute_bytes
             .iter()
             .map(|(name, bytes)| format!("{name} {}", text::bytes(*bytes)))
             .collect();

@@ -2,14 +2,16 @@
 
 use std::time::Instant;
 
-use anyhow::{Context, Result};
-use lexisplat::{Error, Limits, lexi, ply};
+use anyhow::Result;
+use lexisplat::lexi::LexiChunks;
+use lexisplat::{Error, Limits, stream};
 use serde_json::json;
 
 use lexisplat_eval::text;
 
 use crate::args::{Common, Decompress};
-use crate::files::{check_output, is_pipe, output_path, print, print_json, standard_input, write_output};
+use crate::files::{check_output, input, is_pipe, output_path, print, print_json, write_output};
+use crate::progress::Bars;
 
 pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let start = Instant::now();
@@ -19,35 +21,31 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
         return Err(Error::parameter("output", "-", expected).into());
     }
     check_output(&output, &[&args.input], common.overwrite)?;
-    let limits = Limits::default();
-    let model = if is_pipe(&args.input) {
-        lexi::read_bytes("standard input", &standard_input()?, &limits)?
-    } else {
-        lexi::read(&args.input, &limits)?
-    };
-    let splats = model.into_splats();
+    let (name, bytes) = input(&args.input)?;
+    let lexi = LexiChunks::open(&name, &bytes, &Limits::default())?;
+    let bars = Bars::new(common.quiet);
     let bytes = write_output(
         &output,
-        |path| Ok(ply::write(path, &splats)?),
-        |out| ply::write_to(out, &splats).context("standard output"),
+        |path| stream::decompress_file(&lexi, path, &bars),
+        |out| stream::decompress_to(&lexi, out, &bars),
     )?;
     let seconds = start.elapsed().as_secs_f64();
     let name = output.display();
     if common.json {
         print_json(&json!({
             "output": name.to_string(),
-            "gaussians": splats.len(),
-            "sh_degree": splats.degree.get(),
+            "gaussians": lexi.len(),
+            "sh_degree": lexi.degree().get(),
             "ply_bytes": bytes,
             "total_seconds": seconds,
         }))
     } else if common.quiet || is_pipe(&output) {
         Ok(())
     } else {
-        let count = text::count(splats.len() as u64);
+        let count = text::count(lexi.len() as u64);
         print(&format!(
             "wrote {name}: {count} Gaussians, SH degree {}, {}, {seconds:.1} s\n",
-            splats.degree,
+            lexi.degree(),
             text::bytes(bytes)
         ))
     }

@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
-use lexisplat::ply::PlyRead;
-use lexisplat::{Error, Progress, Splats, lexi};
+use lexisplat::ply::{PlyChunks, PlyRead};
+use lexisplat::{Error, Progress, lexi, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
@@ -19,6 +19,9 @@ use crate::progress::Bars;
 /// Levels of an 8-bit channel above 0.
 const LEVELS: f32 = 255.0;
 
+/// Memory that packing a whole scene takes, for each byte of its PLY: 1.85 was measured.
+const MEMORY_PER_BYTE: u64 = 2;
+
 /// Packs `read` and writes it to `output`. `start` is when the command began.
 pub(crate) fn run(
     args: &Compress,
@@ -29,11 +32,7 @@ pub(crate) fn run(
 ) -> Result<()> {
     let read_seconds = start.elapsed().as_secs_f64();
     let mut splats = read.splats;
-    let mut options = PackOptions::default();
-    options.tolerance = args.tol;
-    options.atoms = args.atoms;
-    options.keep_order = args.keep_order;
-    options.seed = args.seed;
+    let options = options(args);
     let goal = goal(args, read.source.file_bytes)?;
     let bars = Bars::new(common.quiet);
 
@@ -78,15 +77,83 @@ pub(crate) fn run(
     let write_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
         output,
-        splats: &splats,
         packed: &packed,
+        streams: if common.quiet && !common.json { Vec::new() } else { packed.stream_bits()? },
+        tensors: lexi::packed_tensor_bytes(&packed),
         report: &report,
         pruned,
+        looked: true,
         ply_bytes: read.source.file_bytes,
         file_bytes,
         seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
     };
-    tell(common, output, || outcome.json(&read.warnings), || outcome.text())
+    tell(common, output, || Ok(outcome.json(&read.warnings)), || outcome.text())
+}
+
+fn options(args: &Compress) -> PackOptions {
+    let mut options = PackOptions::default();
+    options.tolerance = args.tol;
+    options.atoms = args.atoms;
+    options.keep_order = args.keep_order;
+    options.seed = args.seed;
+    options
+}
+
+/// Whether a PLY of `bytes` bytes takes more memory to pack than there may be.
+///
+/// # Errors
+/// It does, and an option needs all of it.
+pub(crate) fn is_large(args: &Compress, bytes: usize) -> Result<bool> {
+    let needed = (bytes as u64).saturating_mul(MEMORY_PER_BYTE);
+    if needed <= args.memory {
+        return Ok(false);
+    }
+    match args.whole_only() {
+        None => Ok(true),
+        Some(option) => {
+            let expected =
+                format!("at least {needed} bytes, for {option} needs the whole scene; or --preset");
+            Err(Error::parameter("memory", args.memory, expected).into())
+        }
+    }
+}
+
+/// Packs `ply` part by part and writes it to `output`. `start` is when the command began.
+pub(crate) fn run_in_parts(
+    args: &Compress,
+    common: &Common,
+    output: &Path,
+    ply: &PlyChunks<'_>,
+    bars: &Bars,
+    start: Instant,
+) -> Result<()> {
+    let read_seconds = start.elapsed().as_secs_f64();
+    let options = options(args);
+    let decibels = args.preset.unwrap_or_default().decibels();
+    let clock = Instant::now();
+    let mut done = None;
+    let file_bytes = write_output(
+        output,
+        |path| {
+            Ok::<_, Error>(done.insert(stream::pack_file(ply, &options, decibels, path, bars)?).file_bytes())
+        },
+        |out| Ok(done.insert(stream::pack_to(ply, &options, decibels, out, bars)?).file_bytes()),
+    )?;
+    let Some(done) = done else { return Ok(()) };
+    let pack_seconds = clock.elapsed().as_secs_f64();
+    let outcome = Outcome {
+        output,
+        packed: &done.head,
+        streams: done.stream_bits,
+        tensors: done.tensor_bytes,
+        report: &done.report,
+        pruned: None,
+        looked: false,
+        ply_bytes: ply.summary().file_bytes,
+        file_bytes,
+        seconds: [read_seconds, 0.0, pack_seconds, 0.0, start.elapsed().as_secs_f64()],
+    };
+    tell(common, output, || Ok(outcome.json(ply.warnings())), || outcome.text())
 }
 
 fn goal(args: &Compress, ply_bytes: u64) -> Result<Option<Goal>> {
@@ -102,7 +169,7 @@ fn goal(args: &Compress, ply_bytes: u64) -> Result<Option<Goal>> {
 
 /// Bytes of each attribute, of tables, of the header, and of what is lost by rounding streams to whole
 /// words; they sum to the file's size.
-pub(crate) fn attribute_bytes(packed: &Packed, streams: &[StreamBits]) -> Vec<(String, f64)> {
+pub(crate) fn attribute_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(String, f64)> {
     let mut out: Vec<(String, f64)> = Vec::new();
     for stream in streams {
         match out.iter_mut().find(|a| a.0 == stream.attribute) {
@@ -111,11 +178,12 @@ pub(crate) fn attribute_bytes(packed: &Packed, streams: &[StreamBits]) -> Vec<(S
         }
     }
     let coded: f64 = out.iter().map(|a| a.1).sum();
-    for (name, bytes) in lexi::packed_tensor_bytes(packed) {
+    for (name, bytes) in tensors {
+        let bytes = *bytes as f64;
         match name.strip_prefix("packed.") {
-            Some("data") => out.push(("rounding".to_owned(), bytes as f64 - coded)),
-            Some(name) => out.push((name.to_owned(), bytes as f64)),
-            None => out.push((name, bytes as f64)),
+            Some("data") => out.push(("rounding".to_owned(), bytes - coded)),
+            Some(name) => out.push((name.to_owned(), bytes)),
+            None => out.push((name.clone(), bytes)),
         }
     }
     out
@@ -130,10 +198,13 @@ pub(crate) fn sh_bytes(streams: &[StreamBits]) -> f64 {
 /// What was done, to be told in text or JSON.
 struct Outcome<'a> {
     output: &'a Path,
-    splats: &'a Splats,
     packed: &'a Packed,
+    streams: Vec<StreamBits>,
+    tensors: Vec<(String, u64)>,
     report: &'a PackReport,
     pruned: Option<Pruned>,
+    /// Whether views said what shows, or a guess.
+    looked: bool,
     ply_bytes: u64,
     file_bytes: u64,
     /// Reading, looking, packing, writing, everything.
@@ -141,17 +212,17 @@ struct Outcome<'a> {
 }
 
 impl Outcome<'_> {
-    fn json(&self, warnings: &[String]) -> Result<Value> {
+    fn json(&self, warnings: &[String]) -> Value {
         let (packed, report, record) = (self.packed, self.report, &self.packed.record);
-        let streams = packed.stream_bits()?;
+        let streams = &self.streams;
         let whole = |bytes: f64| (bytes * 8.0).round() / 8.0;
-        let attributes: serde_json::Map<String, Value> = attribute_bytes(packed, &streams)
+        let attributes: serde_json::Map<String, Value> = attribute_bytes(&self.tensors, streams)
             .into_iter()
             .map(|(name, bytes)| (name, json!(whole(bytes))))
             .collect();
-        let dim = self.splats.degree.rest();
+        let dim = packed.degree.rest();
         let nonzeros = report.mean_nonzeros;
-        Ok(json!({
+        json!({
             "output": self.output.display().to_string(),
             "gaussians": packed.gaussians,
             "sh_degree": packed.degree.get(),
@@ -168,10 +239,11 @@ impl Outcome<'_> {
             "rms_residual": record.rms_residual,
             "ply_bytes": self.ply_bytes,
             "file_bytes": self.file_bytes,
-            "sh_bytes": whole(sh_bytes(&streams)),
+            "sh_bytes": whole(sh_bytes(streams)),
             "dense_sh_bytes": packed.gaussians * dim * 4,
             "attribute_bytes": attributes,
             "promise": packed.promise,
+            "importance": if self.looked { "views" } else { "guess" },
             "device": self.packed.drawn_on.as_deref().unwrap_or("cpu"),
             "pruned": self.pruned.map(|p| json!({
                 "gaussians": p.removed,
@@ -186,7 +258,7 @@ impl Outcome<'_> {
             "write_seconds": self.seconds[3],
             "total_seconds": self.seconds[4],
             "warnings": warnings,
-        }))
+        })
     }
 
     fn text(&self) -> Result<String> {
@@ -238,8 +310,13 @@ impl Outcome<'_> {
         let bits = |(name, bytes): &(String, f64)| {
             format!("{name} {:.1}", 8.0 * bytes / packed.gaussians.max(1) as f64)
         };
-        let parts: Vec<String> = attribute_bytes(packed, &packed.stream_bits()?).iter().map(bits).collect();
+        let attributes = attribute_bytes(&self.tensors, &self.streams);
+        let parts: Vec<String> = attributes.iter().map(bits).collect();
         line("bits each", parts.join(", "))?;
+        if !self.looked {
+            let why = "larger than --memory, so packed part by part; what shows was guessed";
+            line("scene", why.to_owned())?;
+        }
         let [read, look, pack, write, all] = self.seconds;
         line(
             "seconds",

@@ -20,6 +20,7 @@ use crate::progress::{Progress, Stage};
 use crate::pursuit::{Coder, Stop, ValueType};
 use crate::sh::ShDegree;
 pub(crate) use axes::principal_axes;
+pub(crate) use sample::Fetch;
 use sample::Sample;
 use training::Training;
 
@@ -104,6 +105,26 @@ pub fn learn(
     progress: &dyn Progress,
 ) -> Result<Learned> {
     let dim = degree.rest();
+    if dim > 0 && !signals.len().is_multiple_of(dim) {
+        return Err(Error::parameter("signals", signals.len(), format!("a multiple of {dim} values")));
+    }
+    let vectors = signals.len().checked_div(dim).unwrap_or(0);
+    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| {
+        numbers.iter().for_each(|&i| out.extend_from_slice(&signals[i * dim..(i + 1) * dim]));
+        Ok(())
+    };
+    learn_from(degree, vectors, &mut fetch, options, progress)
+}
+
+/// [`learn`] from `vectors` vectors, of which `fetch` gives those asked for.
+pub(crate) fn learn_from(
+    degree: ShDegree,
+    vectors: usize,
+    fetch: &mut Fetch<'_>,
+    options: &LearnOptions,
+    progress: &dyn Progress,
+) -> Result<Learned> {
+    let dim = degree.rest();
     let atoms = options.atoms.unwrap_or(2 * dim);
     if dim == 0 {
         return Ok(Learned { dictionary: Dictionary::empty(), rounds: 0, sample: 0, held_out_nonzeros: 0.0 });
@@ -114,10 +135,7 @@ pub fn learn(
     if !(0.0..1.0).contains(&options.momentum) {
         return Err(Error::parameter("momentum", options.momentum, "from 0 to below 1"));
     }
-    if !signals.len().is_multiple_of(dim) {
-        return Err(Error::parameter("signals", signals.len(), format!("a multiple of {dim} values")));
-    }
-    let sample = Sample::draw(dim, signals, options);
+    let sample = Sample::draw(dim, vectors, fetch, options)?;
     if sample.learn.iter().chain(&sample.held_out).any(|v| !v.is_finite()) {
         return Err(Error::parameter("signals", "NaN or infinity", "finite values"));
     }

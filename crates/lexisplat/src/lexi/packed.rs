@@ -8,11 +8,13 @@ use safetensors::Dtype;
 
 use super::read::{degree, extras, meta, record};
 use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, PACKED_VERSION, key, tensor};
+use super::spilled::{Extras, write_tensors};
 use super::tensors::{Checked, Draft, Tensor, preamble};
 use super::write::{extra_tensors, put_record};
 use crate::error::Result;
 use crate::limits::Limits;
-use crate::packed::{CHUNK, Packed, Promise, inverse};
+use crate::packed::{CHUNK, Packed, Promise};
+use crate::spill::Spilled;
 
 /// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
 /// header is refused before anything is allocated.
@@ -49,6 +51,30 @@ pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
 
 /// The packed scene of a file whose checksums hold.
 pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
+    let head = head(checked, file_bytes, limits)?;
+    let n = head.gaussians;
+    let order = if checked.has(tensor::ORDER) {
+        Some(checked.values(tensor::ORDER, Dtype::U32, &[n])?)
+    } else {
+        None
+    };
+    Ok(Packed { extras: extras(checked, n, &(0..n))?, order, data: data(checked)?.to_vec(), ..head })
+}
+
+/// The data of a packed file.
+pub(super) fn data<'a>(checked: &Checked<'a>) -> Result<&'a [u8]> {
+    checked.data(tensor::DATA, Dtype::U8, &length(checked, tensor::DATA, Dtype::U8)?)
+}
+
+fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]> {
+    match checked.view(name)?.shape() {
+        [len] => Ok([*len]),
+        shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
+    }
+}
+
+/// Everything of a packed scene that is not as long as the scene; all is looked at.
+pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
     Limits::check("Gaussians in a packed file", gaussians, limits.gaussians)?;
     Limits::check(
@@ -57,24 +83,14 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
         file_bytes.saturating_mul(GAUSSIANS_PER_BYTE),
     )?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    let length = |name: &str, dtype: Dtype| -> Result<[usize; 1]> {
-        match checked.view(name)?.shape() {
-            [len] => Ok([*len]),
-            shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
-        }
-    };
     let mut known =
         vec![tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::HEADER_CHECKSUM];
-    let order = if checked.has(tensor::ORDER) {
+    if checked.has(tensor::ORDER) {
         known.push(tensor::ORDER);
-        let order: Vec<u32> = checked.values(tensor::ORDER, Dtype::U32, &[gaussians])?;
-        if inverse(&order, gaussians).is_none() {
+        if !is_permutation(checked, gaussians)? {
             return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
         }
-        Some(order)
-    } else {
-        None
-    };
+    }
     let ignored = |name: &str| name.starts_with(EXTRA_PREFIX) || name.starts_with(IGNORED_PREFIX);
     if let Some(name) = checked.names().iter().find(|name| !known.contains(name) && !ignored(name)) {
         return Err(checked.malformed(format!("tensor '{name}' is not known for layout 'packed'")));
@@ -87,6 +103,8 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
                 .map_err(|e| checked.malformed(format!("metadata 'promise': {e}")))?,
         ),
     };
+    extras(checked, gaussians, &(0..0))?;
+    data(checked)?;
     Ok(Packed {
         degree: degree(checked)?,
         gaussians,
@@ -94,19 +112,63 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
         atom_bits: checked.number(key::ATOM_BITS)?,
         record: record(checked)?,
         meta: meta(checked)?,
-        extras: extras(checked, gaussians)?,
-        order,
+        extras: Vec::new(),
+        order: None,
         promise,
         drawn_on: checked.optional(key::DRAWN_ON)?,
         parameters: checked.values(
             tensor::PARAMETERS,
             Dtype::F32,
-            &length(tensor::PARAMETERS, Dtype::F32)?,
+            &length(checked, tensor::PARAMETERS, Dtype::F32)?,
         )?,
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
-        tables: checked.values(tensor::TABLES, Dtype::U8, &length(tensor::TABLES, Dtype::U8)?)?,
-        data: checked.values(tensor::DATA, Dtype::U8, &length(tensor::DATA, Dtype::U8)?)?,
+        tables: checked.values(tensor::TABLES, Dtype::U8, &length(checked, tensor::TABLES, Dtype::U8)?)?,
+        data: Vec::new(),
     })
+}
+
+/// Whether the order names each of `n` Gaussians once.
+fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
+    let data = checked.data(tensor::ORDER, Dtype::U32, &[n])?;
+    let mut seen = vec![0_u64; n.div_ceil(64)];
+    for place in data.as_chunks::<4>().0 {
+        let place = u32::from_le_bytes(*place) as usize;
+        let Some(word) = seen.get_mut(place / 64).filter(|_| place < n) else { return Ok(false) };
+        let bit = 1 << (place % 64);
+        if *word & bit != 0 {
+            return Ok(false);
+        }
+        *word |= bit;
+    }
+    Ok(true)
+}
+
+/// What of a packed scene is as long as the scene, set aside.
+#[derive(Debug)]
+pub(crate) struct SpilledPacked {
+    pub(crate) data: Spilled,
+    pub(crate) order: Option<Spilled>,
+    pub(crate) extras: Extras,
+}
+
+/// Writes the file of `head`, which lacks what is in `spilled`, with `write`, which is given what to do with
+/// a writer. Returns what [`packed_tensor_bytes`] does of the whole.
+pub(crate) fn write_spilled_packed(
+    head: &Packed,
+    spilled: SpilledPacked,
+    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
+) -> Result<Vec<(String, u64)>> {
+    let (metadata, mut tensors) = contents(head);
+    let n = head.gaussians;
+    let bytes = head.lengths.iter().map(|&l| l as usize).sum();
+    let data = Tensor::spilled(tensor::DATA, Dtype::U8, &[bytes], spilled.data);
+    tensors.retain(|t| t.name != tensor::DATA);
+    tensors.push(data);
+    if let Some(order) = spilled.order {
+        tensors.push(Tensor::spilled(tensor::ORDER, Dtype::U32, &[n], order));
+    }
+    tensors.extend(spilled.extras.tensors(n)?);
+    write_tensors(metadata, tensors, write)
 }
 
 fn draft(packed: &Packed) -> Draft<'_> {

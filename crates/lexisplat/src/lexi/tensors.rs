@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
+use std::ops::Range;
 use std::path::Path;
 
 use safetensors::tensor::{SafeTensorError, TensorView};
@@ -12,6 +13,7 @@ use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
 use crate::output::write_whole;
 use crate::parallel::map_chunks;
+use crate::spill::Spilled;
 
 #[cfg(target_endian = "big")]
 compile_error!("tensors are little-endian and written as they lie in memory");
@@ -31,6 +33,8 @@ pub(super) struct Tensor<'a> {
 pub(super) enum Source<'a> {
     /// As they lie in memory.
     Bytes(&'a [u8]),
+    /// Set aside in a temporary file.
+    Spilled(Spilled),
     /// Made entry by entry.
     I32(Box<dyn Iterator<Item = i32> + 'a>, Box<dyn Iterator<Item = i32> + 'a>),
 }
@@ -52,6 +56,11 @@ impl Tensor<'_> {
     ) -> Tensor<'a> {
         let source = Source::Bytes(bytemuck::cast_slice(values));
         Tensor { name: name.to_owned(), dtype, shape: shape.to_vec(), source }
+    }
+
+    /// A tensor whose bytes were set aside.
+    pub(super) fn spilled(name: &str, dtype: Dtype, shape: &[usize], spilled: Spilled) -> Self {
+        Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source: Source::Spilled(spilled) }
     }
 
     pub(super) fn bytes(&self) -> usize {
@@ -91,6 +100,7 @@ impl<'a> Draft<'a> {
             let mut crc = crc32fast::Hasher::new();
             match &mut tensor.source {
                 Source::Bytes(bytes) => crc.update(bytes),
+                Source::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
                 Source::I32(entries, _) => {
                     // Hashing cannot fail.
                     let _ = each_block(entries, |block| {
@@ -156,12 +166,12 @@ impl<'a> Draft<'a> {
     }
 
     /// Bytes of the length, the JSON and the header's checksum.
-    fn header_bytes(&self) -> u64 {
+    pub(super) fn header_bytes(&self) -> u64 {
         (self.header.len() + self.header_checksum.len()) as u64
     }
 
     /// Writes the whole file; returns its size.
-    fn write_to(self, writer: &mut dyn Write) -> std::io::Result<u64> {
+    pub(super) fn write_to(self, writer: &mut dyn Write) -> std::io::Result<u64> {
         let mut written = self.header_bytes();
         writer.write_all(&self.header)?;
         let mut checksum = Some(self.header_checksum);
@@ -174,6 +184,7 @@ impl<'a> Draft<'a> {
             written += tensor.bytes() as u64;
             match tensor.source {
                 Source::Bytes(bytes) => writer.write_all(bytes)?,
+                Source::Spilled(spilled) => spilled.copy_to(writer)?,
                 Source::I32(_, mut entries) => each_block(&mut *entries, |block| writer.write_all(block))?,
             }
         }
@@ -190,8 +201,10 @@ fn json<T: serde::Serialize + ?Sized>(value: &T) -> String {
 }
 
 /// A file read: its header parsed and all checksums verified.
+#[derive(Debug)]
 pub(super) struct Checked<'a> {
-    file: &'a str,
+    /// The file, as the caller named it.
+    pub(super) file: &'a str,
     tensors: SafeTensors<'a>,
     metadata: BTreeMap<String, String>,
 }
@@ -309,13 +322,8 @@ impl<'a> Checked<'a> {
         self.tensors.tensor(name).map_err(|_| self.malformed(format!("tensor '{name}' is missing")))
     }
 
-    /// A copy of the tensor `name`, which must have this type and shape.
-    pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
-        &self,
-        name: &str,
-        dtype: Dtype,
-        shape: &[usize],
-    ) -> Result<Vec<T>> {
+    /// The bytes of the tensor `name`, which must have this type and shape.
+    pub(super) fn data(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&'a [u8]> {
         let view = self.view(name)?;
         if view.dtype() != dtype || view.shape() != shape {
             let text = format!(
@@ -325,7 +333,31 @@ impl<'a> Checked<'a> {
             );
             return Err(self.malformed(text));
         }
-        Ok(bytemuck::allocation::pod_collect_to_vec(view.data()))
+        Ok(view.data())
+    }
+
+    /// A copy of the tensor `name`, which must have this type and shape.
+    pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        shape: &[usize],
+    ) -> Result<Vec<T>> {
+        Ok(bytemuck::allocation::pod_collect_to_vec(self.data(name, dtype, shape)?))
+    }
+
+    /// A copy of rows `range` of the tensor `name`, which must have this type and shape.
+    pub(super) fn part<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        shape: &[usize],
+        range: &Range<usize>,
+    ) -> Result<Vec<T>> {
+        let row = shape.iter().skip(1).product::<usize>() * (dtype.bitsize() / 8);
+        let data = self.data(name, dtype, shape)?.get(range.start * row..range.end * row);
+        let data = data.ok_or_else(|| self.malformed(format!("tensor '{name}' is too short")))?;
+        Ok(bytemuck::allocation::pod_collect_to_vec(data))
     }
 }
 

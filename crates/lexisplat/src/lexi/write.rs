@@ -10,7 +10,6 @@ use super::schema::{EXTRA_PREFIX, FORMAT, VERSION, key, tensor};
 use super::tensors::{Draft, Source, Tensor, preamble};
 use crate::codes::{Indices, Values};
 use crate::error::{Error, Result};
-use crate::limits::Limits;
 use crate::model::{Layout, Model, Record};
 use crate::sh::ShDegree;
 use crate::splats::{Extra, ExtraValues, SceneMeta};
@@ -55,9 +54,12 @@ pub fn file_bytes(model: &Model) -> Result<u64> {
 /// # Errors
 /// As [`write()`], without the I/O.
 pub fn sh_bytes(model: &Model) -> Result<u64> {
-    let is_sh =
-        |name: &str| name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.");
     Ok(tensors(model)?.iter().filter(|t| is_sh(&t.name)).map(|t| t.bytes() as u64).sum())
+}
+
+/// Whether a tensor stands for SH-rest.
+pub(crate) fn is_sh(name: &str) -> bool {
+    name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.")
 }
 
 fn draft(model: &Model) -> Result<Draft<'_>> {
@@ -175,8 +177,7 @@ fn push_codes<'a>(out: &mut Vec<Tensor<'a>>, model: &'a Model) -> Result<()> {
         out.push(Tensor::plain(tensor::COUNTS, Dtype::U8, &[counts.len()], counts));
         return Ok(());
     }
-    let largest = i32::MAX.unsigned_abs().into();
-    Limits::check("nonzeros in layout 'paper', whose pointers are i32", nonzeros as u64, largest)?;
+    super::spilled::check_pointers(nonzeros as u64)?;
     let pointers = Source::i32(|| {
         let ends = counts.iter().scan(0_i32, |end, &count| {
             *end += i32::from(count);
@@ -200,7 +201,7 @@ fn push_codes<'a>(out: &mut Vec<Tensor<'a>>, model: &'a Model) -> Result<()> {
 }
 
 /// The bits of half floats, which `bytemuck` knows as integers.
-fn as_bits(values: &[half::f16]) -> &[u16] {
+pub(super) fn as_bits(values: &[half::f16]) -> &[u16] {
     use half::slice::HalfFloatSliceExt;
     values.reinterpret_cast()
 }

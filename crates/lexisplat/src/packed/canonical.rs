@@ -32,10 +32,10 @@ pub(super) struct Canonical {
 
 /// A Gaussian's place in a packed scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Placed {
-    pub(super) cell: u64,
+pub(crate) struct Placed {
+    pub(crate) cell: u64,
     /// Its index in the scene.
-    pub(super) source: u32,
+    pub(crate) source: u32,
 }
 
 impl Placed {
@@ -44,9 +44,35 @@ impl Placed {
     }
 }
 
+/// Least and largest coordinates; 0 if there are none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Bounds {
+    least: Vec3,
+    most: Vec3,
+}
+
+impl Bounds {
+    pub(crate) fn of(positions: &[Vec3]) -> Self {
+        let mut positions = positions.iter();
+        let Some(&first) = positions.next() else { return Self { least: [0.0; 3], most: [0.0; 3] } };
+        let mut bounds = Self { least: first, most: first };
+        positions.for_each(|&p| bounds.add(Self { least: p, most: p }));
+        bounds
+    }
+
+    /// Makes them those of both.
+    pub(crate) fn add(&mut self, other: Self) {
+        for k in 0..3 {
+            // The order of `sort_by(total_cmp)`, by which a grid's corner was always found.
+            self.least[k] = std::cmp::min_by(self.least[k], other.least[k], f32::total_cmp);
+            self.most[k] = std::cmp::max_by(self.most[k], other.most[k], f32::total_cmp);
+        }
+    }
+}
+
 /// The grid of cells.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     pub(super) origin: Vec3,
     pub(super) cell: f32,
 }
@@ -54,19 +80,21 @@ pub(super) struct Grid {
 impl Grid {
     /// A grid over all positions whose cells hold about one Gaussian where most are.
     pub(super) fn fit(positions: &[Vec3]) -> Self {
-        let n = positions.len();
-        let mut origin = [0.0; 3];
+        Self::fit_sample(positions, Bounds::of(positions), positions.len())
+    }
+
+    /// [`Self::fit`] for `total` positions within `bounds`, of which `sample` are some.
+    pub(crate) fn fit_sample(sample: &[Vec3], bounds: Bounds, total: usize) -> Self {
         let mut bulk = 0.0_f64;
-        let mut whole = 0.0_f64;
         for k in 0..3 {
-            let mut values: Vec<f32> = positions.iter().map(|p| p[k]).collect();
+            let mut values: Vec<f32> = sample.iter().map(|p| p[k]).collect();
             values.sort_by(f32::total_cmp);
-            let at = |share| at_share(&values, share);
-            origin[k] = at(0.0);
-            bulk = bulk.max(f64::from(at(1.0 - TRIM)) - f64::from(at(TRIM)));
-            whole = whole.max(f64::from(at(1.0)) - f64::from(at(0.0)));
+            let at = |share| f64::from(at_share(&values, share));
+            bulk = bulk.max(at(1.0 - TRIM) - at(TRIM));
         }
-        let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * n.max(1) as f64);
+        let Bounds { least: origin, most } = bounds;
+        let whole = (0..3).map(|k| f64::from(most[k]) - f64::from(origin[k])).fold(0.0, f64::max);
+        let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * total.max(1) as f64);
         // All coordinates must fit, and cells must be something.
         let least = whole / f64::from((1_u32 << morton::BITS) - 2);
         let cell = wanted.max(least).max(whole * 1e-6).max(1e-9);
@@ -75,7 +103,8 @@ impl Grid {
         Self { origin, cell }
     }
 
-    fn cell(&self, position: Vec3) -> u64 {
+    /// Number of the cell of `position` on the Morton curve.
+    pub(crate) fn cell(&self, position: Vec3) -> u64 {
         let most = f64::from((1_u32 << morton::BITS) - 1);
         morton::encode(std::array::from_fn(|k| {
             let at = (f64::from(position[k]) - f64::from(self.origin[k])) / f64::from(self.cell);

@@ -55,6 +55,12 @@ impl Histogram {
         self.counts.is_empty()
     }
 
+    /// Bits that `table` codes all its symbols in.
+    pub(super) fn bits(&self, table: &Table) -> f64 {
+        let used = (0_u16..).zip(&self.counts).filter(|(_, count)| **count > 0);
+        used.map(|(symbol, &count)| f64::from(count) * table.bits(symbol)).sum()
+    }
+
     /// Bits of all its symbols under its own probabilities, and of its table.
     fn cost(&self) -> f64 {
         let total: u64 = self.counts.iter().map(|&c| u64::from(c)).sum();

@@ -38,16 +38,18 @@ pub(super) struct Fit {
     pub(super) parameters: Parameters,
     /// Colour and shape class of each Gaussian.
     pub(super) classes: Vec<[u8; 2]>,
-    /// Step of class 0 when the overall step is 1: colour, shape.
-    units: [f64; 2],
+    /// Those of the colour and of the shape.
+    kinds: [Classes; 2],
 }
 
 impl Fit {
     /// `scene` is the order of the Gaussians of `geometry`.
     pub(super) fn new(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[Placed], grid: &Grid) -> Self {
-        let (colour, colour_unit) = classes(scene.iter().map(|g| sensitivity.colour[g.index()]));
-        let (shape, shape_unit) = classes(scene.iter().map(|g| sensitivity.opacity[g.index()]));
-        let classes: Vec<[u8; 2]> = colour.into_iter().zip(shape).map(|(c, s)| [c, s]).collect();
+        let kinds = [
+            Classes::fit(scene.iter().map(|g| sensitivity.colour[g.index()])),
+            Classes::fit(scene.iter().map(|g| sensitivity.opacity[g.index()])),
+        ];
+        let classes: Vec<[u8; 2]> = scene.iter().map(|g| of(kinds, sensitivity, g.index())).collect();
         let (dc_mean, dc_axes) = colour_axes(geometry, scene);
         let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
         let mut parameters = Parameters {
@@ -72,15 +74,25 @@ impl Fit {
             predictors: [[0.0; FEATURES]; TARGETS],
         };
         predictors(geometry, scene, &classes, &mut parameters);
-        Self { parameters, classes, units: [colour_unit, shape_unit] }
+        Self { parameters, classes, kinds }
+    }
+
+    /// Colour and shape class of each Gaussian of another part of the scene, in the order of `sensitivity`.
+    pub(super) fn classes_of(&self, sensitivity: &Sensitivity) -> Vec<[u8; 2]> {
+        (0..sensitivity.len()).map(|i| of(self.kinds, sensitivity, i)).collect()
     }
 
     /// The parameters for an overall step: about the square root of the mean squared error of pictures
     /// that one value of one Gaussian may make.
     pub(super) fn with_step(&self, step: f64) -> Parameters {
         let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
-        Parameters { base: self.units.map(base), ..self.parameters.clone() }
+        Parameters { base: self.kinds.map(|k| base(k.unit())), ..self.parameters.clone() }
     }
+}
+
+/// Colour and shape class of Gaussian `i`.
+fn of(kinds: [Classes; 2], sensitivity: &Sensitivity, i: usize) -> [u8; 2] {
+    [kinds[0].of(sensitivity.colour[i]), kinds[1].of(sensitivity.opacity[i])]
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]
@@ -94,19 +106,36 @@ fn quantile(values: &[f64], share: f64) -> f64 {
     at_share(&sorted, share)
 }
 
-/// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight). Returns also the
-/// step of class 0 for an overall step of 1.
-fn classes(weights: impl Iterator<Item = f32>) -> (Vec<u8>, f64) {
-    let weights: Vec<f64> = weights.map(f64::from).collect();
-    let floor = (quantile(&weights, FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
-    let logs: Vec<f64> = weights.iter().map(|w| 0.5 * libm::log2(w + floor)).collect();
-    let top = quantile(&logs, TOP_QUANTILE).round();
-    let class = |log: &f64| {
+/// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight).
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Classes {
+    /// Added to every weight.
+    floor: f64,
+    /// Half the binary logarithm of the weight of class 0.
+    top: f64,
+}
+
+impl Classes {
+    /// The classes for a scene whose weights are like these.
+    fn fit(weights: impl Iterator<Item = f32>) -> Self {
+        let weights: Vec<f64> = weights.map(f64::from).collect();
+        let floor = (quantile(&weights, FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
+        let logs: Vec<f64> = weights.iter().map(|w| 0.5 * libm::log2(w + floor)).collect();
+        Self { floor, top: quantile(&logs, TOP_QUANTILE).round() }
+    }
+
+    /// The class of a weight.
+    fn of(self, weight: f32) -> u8 {
+        let log = 0.5 * libm::log2(f64::from(weight) + self.floor);
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let class = (top - log).round().clamp(0.0, f64::from(LAST_CLASS)) as u8;
+        let class = (self.top - log).round().clamp(0.0, f64::from(LAST_CLASS)) as u8;
         class
-    };
-    (logs.iter().map(class).collect(), libm::exp2(-top))
+    }
+
+    /// The step of class 0 for an overall step of 1.
+    fn unit(self) -> f64 {
+        libm::exp2(-self.top)
+    }
 }
 
 /// Mean base colour and its principal axes, strongest first.

@@ -9,19 +9,23 @@
 mod bits;
 mod canonical;
 mod codebook;
+mod coder;
 mod entropy;
 mod fit;
 mod morton;
 mod neighbours;
 mod pack;
 mod parameters;
+mod parts;
 mod preset;
 mod restore;
 mod stream;
 mod unpack;
 mod walk;
 
-pub(crate) use restore::inverse;
+pub(crate) use canonical::{Bounds, Grid, Placed};
+pub(crate) use parts::{PartPacker, Whole};
+pub(crate) use unpack::Decoder;
 
 pub use pack::{PackOptions, PackReport, Packer};
 pub use preset::Preset;

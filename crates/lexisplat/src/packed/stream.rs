@@ -134,6 +134,23 @@ impl Recorder {
         }
     }
 
+    /// Raw bits each stream has so far.
+    pub(super) fn raw_bits(&self) -> [u64; Stream::ALL.len()] {
+        self.raw_bits
+    }
+
+    /// All that [`Self::finish_later`] needs: symbols with their contexts, and raw bits.
+    pub(super) fn set_aside(self) -> (Vec<u16>, Vec<u8>) {
+        (self.symbols.iter().flat_map(|&(context, symbol)| [context, symbol]).collect(), self.raw.finish())
+    }
+
+    /// The two parts of a chunk that was set aside.
+    pub(super) fn finish_later(symbols: &[u16], raw: Vec<u8>, tables: &Tables) -> [Vec<u8>; 2] {
+        let symbols = symbols.as_chunks::<2>().0.iter().map(|&[context, symbol]| (context, symbol)).collect();
+        let [coded, _] = Self { symbols, ..Self::default() }.finish(tables);
+        [coded, raw]
+    }
+
     /// The chunk's two parts: modelled symbols and raw bits.
     pub(super) fn finish(self, tables: &Tables) -> [Vec<u8>; 2] {
         let table = |context: u16| {

@@ -118,7 +118,7 @@ struct Piece {
     values: Vec<f16>,
     escaped: Vec<u32>,
     rows: Vec<f32>,
-    spent: Option<[f64; Stream::ALL.len()]>,
+    spent: Spent,
 }
 
 impl Packed {
@@ -140,13 +140,7 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        let spent = self.decode(true)?.1;
-        let stream = |(stream, bits): (Stream, f64)| StreamBits {
-            name: format!("{stream:?}"),
-            attribute: stream.attribute(),
-            bits,
-        };
-        Ok(Stream::ALL.into_iter().zip(spent).map(stream).collect())
+        Ok(self.decode(true)?.1.named())
     }
 
     /// The dictionary alone.
@@ -154,126 +148,186 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
-        let tables = self.tables()?;
-        let parts = self.parts()?;
-        let (dictionary, _) =
-            self.dictionary(&tables, parts[0], parts[1], false).ok_or_else(|| bad("dictionary"))?;
-        Ok(dictionary)
+        Ok(Decoder::new(self, &self.data)?.dictionary)
     }
 
-    fn tables(&self) -> Result<Tables> {
-        Tables::read(&self.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))
-    }
-
-    /// The pieces of `data`: two for the dictionary and two for each chunk.
-    fn parts(&self) -> Result<Vec<&[u8]>> {
-        let chunks = self.gaussians.div_ceil(CHUNK);
-        let total: u64 = self.lengths.iter().map(|&l| u64::from(l)).sum();
-        if self.lengths.len() != 2 * (chunks + 1) || total != self.data.len() as u64 {
-            return Err(bad("lengths"));
-        }
-        let mut parts = Vec::with_capacity(self.lengths.len());
-        let mut rest = self.data.as_slice();
-        for &length in &self.lengths {
-            let (part, tail) = rest.split_at_checked(length as usize).ok_or_else(|| bad("lengths"))?;
-            parts.push(part);
-            rest = tail;
-        }
-        Ok(parts)
-    }
-
-    fn decode(&self, count_bits: bool) -> Result<(Model, [f64; Stream::ALL.len()])> {
-        let parameters = Parameters::from_list(&self.parameters).ok_or_else(|| bad("parameters"))?;
-        let tables = self.tables()?;
-        let parts = self.parts()?;
-        let chunks = self.gaussians.div_ceil(CHUNK);
-        let mut spent = [0.0; Stream::ALL.len()];
-        let mut add = |more: &Option<[f64; Stream::ALL.len()]>| {
-            for (a, b) in spent.iter_mut().zip(more.iter().flatten()) {
-                *a += b;
-            }
-        };
-        let (dictionary, bits) =
-            self.dictionary(&tables, parts[0], parts[1], count_bits).ok_or_else(|| bad("dictionary"))?;
-        add(&bits);
+    fn decode(&self, count_bits: bool) -> Result<(Model, Spent)> {
+        let decoder = Decoder::new(self, &self.data)?;
+        let mut spent = decoder.dictionary_bits();
         let n = self.gaussians;
-        let mut g = Geometry {
-            positions: vec![[0.0; 3]; n],
-            normals: Vec::new(),
-            dc: vec![[0.0; 3]; n],
-            opacities: vec![0.0; n],
-            scales: vec![[0.0; 3]; n],
-            rotations: vec![[0.0; 4]; n],
-            extras: self.extras.clone(),
-        };
+        let mut g = Geometry { extras: self.extras.clone(), ..zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
-        let places = g
-            .positions
-            .chunks_mut(CHUNK)
-            .zip(g.dc.chunks_mut(CHUNK))
-            .zip(g.opacities.chunks_mut(CHUNK))
-            .zip(g.scales.chunks_mut(CHUNK))
-            .zip(g.rotations.chunks_mut(CHUNK))
-            .zip(counts.chunks_mut(CHUNK))
-            .map(|(((((positions, dc), opacities), scales), rotations), counts)| Place {
-                positions,
-                dc,
-                opacities,
-                scales,
-                rotations,
-                counts,
-            });
-        let work: Vec<(usize, &[u8], &[u8], Place<'_>)> =
-            (0..chunks).zip(places).map(|(c, p)| (c, parts[2 * c + 2], parts[2 * c + 3], p)).collect();
-        let pieces = map_vec(work, |(c, symbols, raw, place)| {
-            let mut player = Player::new(&tables, symbols, raw)?;
-            player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-            piece(&parameters, &dictionary, player, c * CHUNK, place)
-        });
+        let work = places(&mut g, &mut counts).enumerate().collect();
+        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, count_bits));
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
-        for (c, piece) in pieces.into_iter().enumerate() {
-            let piece = piece.ok_or_else(|| bad(&format!("chunk {c}")))?;
-            add(&piece.spent);
+        for piece in pieces {
+            let piece = piece?;
+            spent.add(&piece.spent);
             atoms.extend(piece.atoms);
             values.extend(piece.values);
             escapes.gaussians.extend(piece.escaped);
             escapes.rows.extend(piece.rows);
         }
-        let indices = if dictionary.len() <= 256 {
-            Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
-        } else {
-            Indices::U16(atoms)
-        };
+        let dictionary = decoder.dictionary;
+        let indices = indices(&dictionary, atoms);
         let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)?;
         let record = Record { layout: Layout::Packed, ..self.record.clone() };
         Ok((Model { geometry: g, meta: self.meta.clone(), dictionary, codes, record }, spent))
     }
+}
 
-    fn dictionary(
-        &self,
-        tables: &Tables,
-        symbols: &[u8],
-        raw: &[u8],
-        count_bits: bool,
-    ) -> Option<(Dictionary, Option<[f64; Stream::ALL.len()]>)> {
-        let dim = self.degree.rest();
-        if dim == 0 {
-            return (self.atoms == 0 && symbols.is_empty() && raw.is_empty())
-                .then(|| (Dictionary::empty(), None));
-        }
-        if !(1..=MAX_ATOMS).contains(&self.atoms) || self.atom_bits > MAX_ATOM_BITS {
-            return None;
-        }
-        let mut player = Player::new(tables, symbols, raw)?;
-        player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-        let rows = dictionary_walk(&mut player, self.degree, self.atoms, self.atom_bits, None);
-        if !player.exhausted() {
-            return None;
-        }
-        Some((Dictionary::new(self.degree, rows).ok()?, player.spent))
+/// The Geometry of `n` Gaussians, to be filled.
+fn zeros(n: usize) -> Geometry {
+    Geometry {
+        positions: vec![[0.0; 3]; n],
+        normals: Vec::new(),
+        dc: vec![[0.0; 3]; n],
+        opacities: vec![0.0; n],
+        scales: vec![[0.0; 3]; n],
+        rotations: vec![[0.0; 4]; n],
+        extras: Vec::new(),
     }
+}
+
+/// The places of all chunks.
+fn places<'a>(g: &'a mut Geometry, counts: &'a mut [u8]) -> impl Iterator<Item = Place<'a>> {
+    g.positions
+        .chunks_mut(CHUNK)
+        .zip(g.dc.chunks_mut(CHUNK))
+        .zip(g.opacities.chunks_mut(CHUNK))
+        .zip(g.scales.chunks_mut(CHUNK))
+        .zip(g.rotations.chunks_mut(CHUNK))
+        .zip(counts.chunks_mut(CHUNK))
+        .map(|(((((positions, dc), opacities), scales), rotations), counts)| Place {
+            positions,
+            dc,
+            opacities,
+            scales,
+            rotations,
+            counts,
+        })
+}
+
+fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {
+    if dictionary.len() <= 256 {
+        Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
+    } else {
+        Indices::U16(atoms)
+    }
+}
+
+/// Bits each stream took.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Spent(pub(super) [f64; Stream::ALL.len()]);
+
+impl Spent {
+    pub(crate) fn add(&mut self, more: &Self) {
+        for (a, b) in self.0.iter_mut().zip(more.0) {
+            *a += b;
+        }
+    }
+
+    /// With the streams' names.
+    pub(crate) fn named(&self) -> Vec<StreamBits> {
+        let stream = |(stream, bits): (Stream, f64)| StreamBits {
+            name: format!("{stream:?}"),
+            attribute: stream.attribute(),
+            bits,
+        };
+        Stream::ALL.into_iter().zip(self.0).map(stream).collect()
+    }
+}
+
+/// What all chunks of a packed scene are decoded with, and where they are.
+#[derive(Debug)]
+pub(crate) struct Decoder<'a> {
+    pub(crate) dictionary: Dictionary,
+    dictionary_bits: Spent,
+    parameters: Parameters,
+    tables: Tables,
+    /// The pieces of the data: two for the dictionary and two for each chunk.
+    parts: Vec<&'a [u8]>,
+    gaussians: usize,
+}
+
+impl<'a> Decoder<'a> {
+    /// Of `packed`, whose own data may be left out, and its `data`.
+    pub(crate) fn new(packed: &Packed, data: &'a [u8]) -> Result<Self> {
+        let parameters = Parameters::from_list(&packed.parameters).ok_or_else(|| bad("parameters"))?;
+        let tables = Tables::read(&packed.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
+        let gaussians = packed.gaussians;
+        let parts = parts(gaussians, &packed.lengths, data)?;
+        let (dictionary, dictionary_bits) =
+            dictionary(packed, &tables, parts[0], parts[1]).ok_or_else(|| bad("dictionary"))?;
+        Ok(Self { dictionary, dictionary_bits, parameters, tables, parts, gaussians })
+    }
+
+    /// Bits the dictionary took.
+    pub(crate) fn dictionary_bits(&self) -> Spent {
+        self.dictionary_bits
+    }
+
+    /// Chunk `c` alone, without extras, its escapes numbered from its start; and if
+    /// `count_bits` what it took.
+    pub(crate) fn chunk(&self, c: usize, count_bits: bool) -> Result<(Geometry, SparseCodes, Spent)> {
+        let first = c * CHUNK;
+        let n = self.gaussians.saturating_sub(first).min(CHUNK);
+        let (mut g, mut counts) = (zeros(n), vec![0; n]);
+        let place = places(&mut g, &mut counts).next().ok_or_else(|| bad(&format!("chunk {c}")))?;
+        let piece = self.piece(c, 0, place, count_bits)?;
+        let escapes = Escapes { gaussians: piece.escaped, rows: piece.rows };
+        let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
+        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)?;
+        Ok((g, codes, piece.spent))
+    }
+
+    /// Decodes chunk `c` to `place`; its first Gaussian is called number `first`.
+    fn piece(&self, c: usize, first: usize, place: Place<'_>, count_bits: bool) -> Result<Piece> {
+        let parts = (self.parts.get(2 * c + 2).copied()).zip(self.parts.get(2 * c + 3).copied());
+        let decoded = parts.and_then(|(symbols, raw)| {
+            let mut player = Player::new(&self.tables, symbols, raw)?;
+            player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
+            piece(&self.parameters, &self.dictionary, player, first, place)
+        });
+        decoded.ok_or_else(|| bad(&format!("chunk {c}")))
+    }
+}
+
+/// The pieces of `data`: two for the dictionary and two for each chunk.
+fn parts<'a>(gaussians: usize, lengths: &[u32], data: &'a [u8]) -> Result<Vec<&'a [u8]>> {
+    let chunks = gaussians.div_ceil(CHUNK);
+    let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
+    if lengths.len() != 2 * (chunks + 1) || total != data.len() as u64 {
+        return Err(bad("lengths"));
+    }
+    let mut parts = Vec::with_capacity(lengths.len());
+    let mut rest = data;
+    for &length in lengths {
+        let (part, tail) = rest.split_at_checked(length as usize).ok_or_else(|| bad("lengths"))?;
+        parts.push(part);
+        rest = tail;
+    }
+    Ok(parts)
+}
+
+fn dictionary(packed: &Packed, tables: &Tables, symbols: &[u8], raw: &[u8]) -> Option<(Dictionary, Spent)> {
+    let dim = packed.degree.rest();
+    if dim == 0 {
+        return (packed.atoms == 0 && symbols.is_empty() && raw.is_empty())
+            .then(|| (Dictionary::empty(), Spent::default()));
+    }
+    if !(1..=MAX_ATOMS).contains(&packed.atoms) || packed.atom_bits > MAX_ATOM_BITS {
+        return None;
+    }
+    let mut player = Player::new(tables, symbols, raw)?;
+    player.spent = Some([0.0; Stream::ALL.len()]);
+    let rows = dictionary_walk(&mut player, packed.degree, packed.atoms, packed.atom_bits, None);
+    if !player.exhausted() {
+        return None;
+    }
+    Some((Dictionary::new(packed.degree, rows).ok()?, Spent(player.spent.unwrap_or_default())))
 }
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
@@ -321,8 +375,8 @@ fn piece(
     first: usize,
     place: Place<'_>,
 ) -> Option<Piece> {
-    let mut piece =
-        Piece { atoms: Vec::new(), values: Vec::new(), escaped: Vec::new(), rows: Vec::new(), spent: None };
+    let (atoms, values) = (Vec::new(), Vec::new());
+    let mut piece = Piece { atoms, values, escaped: Vec::new(), rows: Vec::new(), spent: Spent::default() };
     let mut walk = Walk::new(parameters, dictionary.dim());
     let mut code = Vec::with_capacity(dictionary.dim());
     for i in 0..place.counts.len() {
@@ -353,7 +407,7 @@ fn piece(
     if !player.exhausted() {
         return None;
     }
-    piece.spent = player.spent;
+    piece.spent = Spent(player.spent.unwrap_or_default());
     Some(piece)
 }
 

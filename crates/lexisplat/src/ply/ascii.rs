@@ -69,11 +69,12 @@ impl<'a> AsciiRows<'a> {
         Ok(Self { file, data, starts, types, row_bytes })
     }
 
-    /// Rows `range`, which starts at a chunk border and has at most one chunk.
+    /// Rows `range`; quickest from a chunk border on.
     pub(super) fn pack(&self, range: Range<usize>) -> Result<Vec<u8>> {
         let mut packed = Vec::with_capacity(range.len() * self.row_bytes);
         let start = self.starts.get(range.start / CHUNK_ROWS).copied().unwrap_or(self.data.len());
-        for (row, (_, line)) in range.zip(lines(self.data, start)) {
+        let before = range.start % CHUNK_ROWS;
+        for (row, (_, line)) in range.zip(lines(self.data, start).skip(before)) {
             let bad = |why: String| Error::malformed(self.file, format!("vertex {row}: {why}"));
             let line = std::str::from_utf8(line).map_err(|_| bad("not text".to_owned()))?;
             let mut words = line.split_ascii_whitespace();

@@ -52,8 +52,8 @@ impl<'a> Rows<'a> {
         Ok(Self::Binary(Packed { bytes: &data[start..end], row_bytes, big }))
     }
 
-    /// Rows `range` packed. The range has at most [`CHUNK_ROWS`] rows and starts at a multiple of it.
-    pub(super) fn chunk(&self, range: Range<usize>) -> Result<(Cow<'_, [u8]>, bool)> {
+    /// Rows `range` packed. Of an ASCII file quickest from a multiple of [`CHUNK_ROWS`] on.
+    pub(super) fn packed(&self, range: Range<usize>) -> Result<(Cow<'_, [u8]>, bool)> {
         match self {
             Self::Binary(rows) => {
                 let bytes = &rows.bytes[range.start * rows.row_bytes..range.end * rows.row_bytes];

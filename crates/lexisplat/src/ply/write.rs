@@ -48,19 +48,50 @@ pub fn write_to(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
 }
 
 fn write_checked(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
-    let header = header(splats);
-    writer.write_all(header.as_bytes())?;
-    let layout = RowLayout::new(splats);
-    let count = splats.len();
-    let mut block = vec![0; layout.row_bytes * BLOCK_ROWS.min(count)];
-    for start in (0..count).step_by(BLOCK_ROWS) {
-        let rows = &mut block[..layout.row_bytes * BLOCK_ROWS.min(count - start)];
-        for_each_chunk_mut(rows, layout.row_bytes * CHUNK_ROWS, |chunk, rows| {
-            layout.pack(splats, start + chunk * CHUNK_ROWS, rows);
-        });
-        writer.write_all(rows)?;
+    let mut writer = PlyWriter::begin(writer, splats, splats.len())?;
+    writer.write(splats)?;
+    Ok(writer.bytes)
+}
+
+/// Writes a scene part after part.
+pub(crate) struct PlyWriter<W> {
+    writer: W,
+    layout: RowLayout,
+    block: Vec<u8>,
+    /// Bytes written so far.
+    pub(crate) bytes: u64,
+}
+
+impl<W: Write> PlyWriter<W> {
+    /// Writes the header of a scene of `count` Gaussians that is like `splats`, whose own number is of no
+    /// matter; it was [`check`]ed.
+    pub(crate) fn begin(mut writer: W, splats: &Splats, count: usize) -> io::Result<Self> {
+        let header = header(splats, count);
+        writer.write_all(header.as_bytes())?;
+        let layout = RowLayout::new(splats);
+        let block = vec![0; layout.row_bytes * BLOCK_ROWS.min(count)];
+        Ok(Self { writer, layout, block, bytes: header.len() as u64 })
     }
-    Ok(header.len() as u64 + layout.row_bytes as u64 * count as u64)
+
+    /// Bytes of a Gaussian.
+    pub(crate) fn row_bytes(&self) -> u64 {
+        self.layout.row_bytes as u64
+    }
+
+    /// Writes the next Gaussians.
+    pub(crate) fn write(&mut self, splats: &Splats) -> io::Result<()> {
+        let (count, row_bytes) = (splats.len(), self.layout.row_bytes);
+        for start in (0..count).step_by(BLOCK_ROWS) {
+            let rows = &mut self.block[..row_bytes * BLOCK_ROWS.min(count - start)];
+            let layout = &self.layout;
+            for_each_chunk_mut(rows, row_bytes * CHUNK_ROWS, |chunk, rows| {
+                layout.pack(splats, start + chunk * CHUNK_ROWS, rows);
+            });
+            self.writer.write_all(rows)?;
+        }
+        self.bytes += row_bytes as u64 * count as u64;
+        Ok(())
+    }
 }
 
 /// Names of the properties every file has, in order.
@@ -75,7 +106,8 @@ fn names(rest: usize) -> impl Iterator<Item = String> {
         .chain(fixed(&ROTATION))
 }
 
-fn check(splats: &Splats) -> Result<()> {
+/// Refuses what no PLY can hold.
+pub(crate) fn check(splats: &Splats) -> Result<()> {
     splats.validate()?;
     let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
     for extra in &splats.geometry.extras {
@@ -95,13 +127,14 @@ fn check(splats: &Splats) -> Result<()> {
     Ok(())
 }
 
-fn header(splats: &Splats) -> String {
+/// The header of a scene of `count` Gaussians that is like `splats`.
+pub(super) fn header(splats: &Splats, count: usize) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments(&splats.meta) {
         text.push_str(format!("comment {comment}").trim_end());
         text.push('\n');
     }
-    text.push_str(&format!("element vertex {}\n", splats.len()));
+    text.push_str(&format!("element vertex {count}\n"));
     for name in names(splats.degree.rest()) {
         text.push_str(&format!("property float {name}\n"));
     }
@@ -138,7 +171,7 @@ fn extra_type(values: &ExtraValues) -> ScalarType {
 }
 
 /// Byte offsets of the groups in a row.
-struct RowLayout {
+pub(super) struct RowLayout {
     normal: usize,
     dc: usize,
     rest: usize,
@@ -146,11 +179,11 @@ struct RowLayout {
     scale: usize,
     rotation: usize,
     extras: Vec<usize>,
-    row_bytes: usize,
+    pub(super) row_bytes: usize,
 }
 
 impl RowLayout {
-    fn new(splats: &Splats) -> Self {
+    pub(super) fn new(splats: &Splats) -> Self {
         let mut at = 0;
         let mut place = |bytes: usize| {
             let start = at;
@@ -170,7 +203,7 @@ impl RowLayout {
     }
 
     /// Formats the Gaussians from `start` on into `rows`.
-    fn pack(&self, splats: &Splats, start: usize, rows: &mut [u8]) {
+    pub(super) fn pack(&self, splats: &Splats, start: usize, rows: &mut [u8]) {
         let count = rows.len() / self.row_bytes;
         let range = start..start + count;
         let geometry = &splats.geometry;

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::packed::{Packed, StreamBits};
-use lexisplat::{Model, lexi};
+use lexisplat::Layout;
+use lexisplat::lexi::{self, LexiChunks};
+use lexisplat::packed::StreamBits;
+use lexisplat::stream::Survey;
 use serde_json::{Map, Value, json};
 
 use super::bars;
@@ -18,150 +20,131 @@ const DENSE_SH_BYTES: usize = 192;
 /// Atoms listed as the most used.
 const TOP_ATOMS: usize = 8;
 
-/// Gaussians by number of nonzeros, escapes apart.
-fn nonzero_histogram(model: &Model) -> Vec<u64> {
-    let mut histogram = vec![0; model.degree().rest() + 1];
-    for &count in model.codes.counts() {
-        histogram[usize::from(count)] += 1;
-    }
-    let escapes = model.codes.escapes().gaussians.len() as u64;
-    histogram[0] -= escapes;
-    histogram
+fn each(bytes: f64, lexi: &LexiChunks<'_>) -> f64 {
+    bytes / lexi.len().max(1) as f64
 }
 
-/// Gaussians that use each atom.
-fn atom_usage(model: &Model) -> Vec<u64> {
-    let mut usage = vec![0; model.dictionary.len()];
-    for k in 0..model.codes.nonzeros() {
-        usage[model.codes.indices().get(k)] += 1;
-    }
-    usage
+fn is_packed(lexi: &LexiChunks<'_>) -> bool {
+    lexi.record().layout == Layout::Packed
 }
 
-fn each(bytes: f64, model: &Model) -> f64 {
-    bytes / model.len().max(1) as f64
-}
-
-pub(super) fn as_json(model: &Model, packed: Option<&Packed>) -> Result<Value> {
-    let record = &model.record;
+pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
+    let record = lexi.record();
+    let packed = is_packed(lexi);
     let mut value = json!({
-        "version": if packed.is_some() { lexi::PACKED_VERSION } else { lexi::VERSION },
+        "version": if packed { lexi::PACKED_VERSION } else { lexi::VERSION },
         "layout": record.layout.name(),
         "tol": record.tolerance,
         "seed": record.seed,
         "max_residual": record.max_residual,
         "rms_residual": record.rms_residual,
         "over_tolerance": record.over_tolerance,
-        "atoms": model.dictionary.len(),
-        "nonzeros": model.codes.nonzeros(),
-        "escapes": model.codes.escapes().gaussians.len(),
-        "nonzero_histogram": nonzero_histogram(model),
-        "atom_usage": atom_usage(model),
-        "resident_sh_bytes": model.resident_sh_bytes(),
-        "resident_sh_bytes_per_gaussian": each(model.resident_sh_bytes() as f64, model),
+        "atoms": lexi.dictionary().len(),
+        "nonzeros": survey.nonzeros,
+        "escapes": survey.escapes,
+        "nonzero_histogram": survey.nonzero_histogram,
+        "atom_usage": survey.atom_usage,
+        "resident_sh_bytes": survey.resident_sh_bytes,
+        "resident_sh_bytes_per_gaussian": each(survey.resident_sh_bytes as f64, lexi),
         "checksums": "ok",
     });
-    let bytes: Map<String, Value> = match packed {
-        None => {
-            value["pursuit"] = record.pursuit.name().into();
-            value["max_nnz"] = record.max_nonzeros.into();
-            value["sh_bytes"] = lexi::sh_bytes(model)?.into();
-            lexi::attribute_bytes(model)?.into_iter().map(|(name, bytes)| (name, bytes.into())).collect()
-        }
-        Some(packed) => {
-            let streams = packed.stream_bits()?;
-            value["promise"] = json!(packed.promise);
-            value["device"] = packed.drawn_on.as_deref().unwrap_or("cpu").into();
-            value["order_kept"] = packed.order.is_some().into();
-            value["sh_bytes"] = sh_bytes(&streams).into();
-            let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, model))));
-            value["stream_bits_per_gaussian"] = Value::Object(bits.collect());
-            attribute_bytes(packed, &streams).into_iter().map(|(name, bytes)| (name, bytes.into())).collect()
-        }
+    let tensors = lexi.attribute_bytes();
+    let bytes: Map<String, Value> = if packed {
+        let streams = &survey.stream_bits;
+        value["promise"] = json!(lexi.promise());
+        value["device"] = lexi.drawn_on().unwrap_or("cpu").into();
+        value["order_kept"] = lexi.order_kept().into();
+        value["sh_bytes"] = sh_bytes(streams).into();
+        let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, lexi))));
+        value["stream_bits_per_gaussian"] = Value::Object(bits.collect());
+        attribute_bytes(tensors, streams).into_iter().map(|(name, bytes)| (name, bytes.into())).collect()
+    } else {
+        value["pursuit"] = record.pursuit.name().into();
+        value["max_nnz"] = record.max_nonzeros.into();
+        value["sh_bytes"] = lexi.sh_bytes().into();
+        tensors.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect()
     };
     value["attribute_bytes"] = Value::Object(bytes);
-    Ok(value)
+    value
 }
 
-pub(super) fn as_text(out: &mut String, model: &Model, packed: Option<&Packed>) -> Result<()> {
-    let record = &model.record;
-    let atoms = model.dictionary.len();
-    match packed {
-        None => writeln!(
+pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) -> Result<()> {
+    let record = lexi.record();
+    let atoms = lexi.dictionary().len();
+    let packed = is_packed(lexi);
+    if packed {
+        writeln!(
+            out,
+            ".lexi version {}, layout packed, {atoms} atoms, {}, all checksums right",
+            lexi::PACKED_VERSION,
+            if lexi.order_kept() { "order of the source kept" } else { "in an order of its own" },
+        )?;
+    } else {
+        writeln!(
             out,
             ".lexi version {}, layout {}, pursuit {}, {atoms} atoms, all checksums right",
             lexi::VERSION,
             record.layout,
             record.pursuit,
-        )?,
-        Some(packed) => writeln!(
-            out,
-            ".lexi version {}, layout packed, {atoms} atoms, {}, all checksums right",
-            lexi::PACKED_VERSION,
-            if packed.order.is_some() { "order of the source kept" } else { "in an order of its own" },
-        )?,
+        )?;
     }
-    if let Some(promise) = packed.and_then(|p| p.promise.as_ref()) {
+    if let Some(promise) = lexi.promise() {
         writeln!(out, "pictures: {}", promise_line(promise))?;
     }
-    if let Some(device) = packed.and_then(|p| p.drawn_on.as_ref()) {
+    if let Some(device) = lexi.drawn_on() {
         writeln!(out, "looked at on: {device}")?;
     }
-    if model.degree().rest() > 0 {
+    if atoms > 0 {
         writeln!(out, "error: {}", error_line(record))?;
-        let escapes = model.codes.escapes().gaussians.len();
-        let mean = model.codes.nonzeros() as f64 / model.len().max(1) as f64;
-        writeln!(out, "codes: {mean:.2} nonzeros a Gaussian, {escapes} stored exactly")?;
+        let mean = survey.nonzeros as f64 / lexi.len().max(1) as f64;
+        writeln!(out, "codes: {mean:.2} nonzeros a Gaussian, {} stored exactly", survey.escapes)?;
     }
     writeln!(
         out,
         "in memory: {:.1} bytes of SH a Gaussian (codes, base colour, dictionary), beside {DENSE_SH_BYTES} dense",
-        each(model.resident_sh_bytes() as f64, model)
+        each(survey.resident_sh_bytes as f64, lexi)
     )?;
-    match packed {
-        None => {
-            writeln!(out, "\nbytes")?;
-            for (name, bytes) in lexi::attribute_bytes(model)? {
-                let one = each(bytes as f64, model);
-                writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", text::bytes(bytes))?;
-            }
+    if packed {
+        packed_bytes(out, lexi, &survey.stream_bits)?;
+    } else {
+        writeln!(out, "\nbytes")?;
+        for (name, bytes) in lexi.attribute_bytes() {
+            let one = each(*bytes as f64, lexi);
+            writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", text::bytes(*bytes))?;
         }
-        Some(packed) => packed_bytes(out, model, packed)?,
     }
-    if model.degree().rest() > 0 {
+    if atoms > 0 {
         writeln!(out, "\nGaussians by nonzeros")?;
-        let histogram = nonzero_histogram(model);
+        let histogram = &survey.nonzero_histogram;
         let last = histogram.iter().rposition(|&n| n > 0).unwrap_or(0);
         let labels: Vec<String> = (0..=last).map(|n| n.to_string()).collect();
         bars(out, &labels, &histogram[..=last])?;
-        usage_text(out, model)?;
+        usage_text(out, &survey.atom_usage)?;
     }
     Ok(())
 }
 
 /// Each attribute with the streams it is made of.
-fn packed_bytes(out: &mut String, model: &Model, packed: &Packed) -> Result<()> {
-    let streams = packed.stream_bits()?;
+fn packed_bytes(out: &mut String, lexi: &LexiChunks<'_>, streams: &[StreamBits]) -> Result<()> {
     writeln!(out, "\n{:<14} {:>10} {:>16}   streams", "attribute", "bytes", "bits a Gaussian")?;
-    for (name, bytes) in attribute_bytes(packed, &streams) {
+    for (name, bytes) in attribute_bytes(lexi.attribute_bytes(), streams) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]
         let size = text::bytes(bytes.round() as u64);
         let parts: Vec<&StreamBits> = streams.iter().filter(|s| s.attribute == name).collect();
         let parts = match parts.as_slice() {
             [] | [_] => String::new(),
             parts => {
-                let part = |s: &&StreamBits| format!("{} {:.2}", s.name, each(s.bits, model));
+                let part = |s: &&StreamBits| format!("{} {:.2}", s.name, each(s.bits, lexi));
                 parts.iter().map(part).collect::<Vec<_>>().join(", ")
             }
         };
-        let line = format!("{name:<14} {size:>10} {:>16.2}   {parts}", each(8.0 * bytes, model));
+        let line = format!("{name:<14} {size:>10} {:>16.2}   {parts}", each(8.0 * bytes, lexi));
         writeln!(out, "{}", line.trim_end())?;
     }
     Ok(())
 }
 
-fn usage_text(out: &mut String, model: &Model) -> Result<()> {
-    let usage = atom_usage(model);
+fn usage_text(out: &mut String, usage: &[u64]) -> Result<()> {
     let total = usage.iter().sum::<u64>().max(1);
     let mut order: Vec<usize> = (0..usage.len()).collect();
     order.sort_by_key(|&j| (std::cmp::Reverse(usage[j]), j));

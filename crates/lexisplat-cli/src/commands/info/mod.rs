@@ -5,84 +5,116 @@ mod codes;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Splats;
-use lexisplat::stats::{Lint, NORM_BINS, lint};
-use lexisplat_eval::{Loaded, SceneFile, text};
+use lexisplat::lexi::LexiChunks;
+use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::stats::{Lint, NORM_BINS};
+use lexisplat::stream::Survey;
+use lexisplat::{Limits, Splats, lexi, stream};
+use lexisplat_eval::text;
 use serde_json::json;
 
 use crate::args::{Common, Info};
-use crate::files::{load, print, print_json, warn, warn_of};
+use crate::files::{input, print, print_json, warn};
+use crate::progress::Bars;
 
 /// Width of the longest bar of a histogram, in characters.
 const BAR: usize = 40;
 
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
-    let input = load(&args.file, args.drop_invalid)?;
-    warn_of(&input);
-    let dense;
-    let splats: &Splats = match &input.loaded {
-        Loaded::Ply(read) => &read.splats,
-        Loaded::Lexi(model, _) => {
-            dense = model.to_splats();
-            &dense
-        }
+    let (name, bytes) = input(&args.file)?;
+    let bars = Bars::new(common.quiet || common.json);
+    let (scene, lint) = if lexi::is_lexi(&bytes) {
+        let lexi = LexiChunks::open(&name, &bytes, &Limits::default())?;
+        let survey = stream::survey(&lexi, &std::env::temp_dir())?;
+        let lint = survey.lint.clone();
+        (Scene::Lexi(lexi, survey), lint)
+    } else {
+        let read = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
+        let ply = PlyChunks::open(&name, &bytes, &read, &bars)?;
+        warn(&name, ply.warnings());
+        let lint = stream::lint_ply(&ply, &bars)?;
+        (Scene::Ply(ply), lint)
     };
-    let lint = lint(splats)?;
+    let file = File { name: &name, bytes: bytes.len() as u64, scene };
     if common.json {
-        return print_json(&as_json(&input, splats, &lint)?);
+        return print_json(&as_json(&file, &lint)?);
     }
-    warn(&input.name, &lint.warnings);
+    warn(&name, &lint.warnings);
     if common.quiet {
         return Ok(());
     }
-    print(&as_text(&input, splats, &lint)?)
+    print(&as_text(&file, &lint)?)
 }
 
-fn as_json(input: &SceneFile, splats: &Splats, lint: &Lint) -> Result<serde_json::Value> {
+/// A file to be told of.
+struct File<'a> {
+    name: &'a str,
+    bytes: u64,
+    scene: Scene<'a>,
+}
+
+enum Scene<'a> {
+    Ply(PlyChunks<'a>),
+    Lexi(LexiChunks<'a>, Survey),
+}
+
+impl Scene<'_> {
+    /// A scene like it without Gaussians.
+    fn empty(&self) -> Splats {
+        match self {
+            Self::Ply(ply) => ply.empty(),
+            Self::Lexi(lexi, _) => lexi.empty(),
+        }
+    }
+}
+
+fn as_json(file: &File<'_>, lint: &Lint) -> Result<serde_json::Value> {
+    let like = file.scene.empty();
     let mut value = json!({
-        "file": input.name,
-        "file_bytes": input.bytes,
-        "gaussians": splats.len(),
-        "sh_degree": splats.degree.get(),
-        "antialiased": splats.meta.antialiased,
-        "comments": splats.meta.comments,
-        "extras": splats.geometry.extras.iter().map(|e| &e.name).collect::<Vec<_>>(),
+        "file": file.name,
+        "file_bytes": file.bytes,
+        "gaussians": lint.gaussians,
+        "sh_degree": like.degree.get(),
+        "antialiased": like.meta.antialiased,
+        "comments": like.meta.comments,
+        "extras": like.geometry.extras.iter().map(|e| &e.name).collect::<Vec<_>>(),
         "statistics": lint,
         "norm_bins": NORM_BINS,
     });
-    match &input.loaded {
-        Loaded::Ply(read) => {
+    match &file.scene {
+        Scene::Ply(ply) => {
             value["kind"] = "ply".into();
-            value["ply"] = serde_json::to_value(&read.source)?;
-            value["warnings"] = json!(read.warnings);
+            value["ply"] = serde_json::to_value(ply.summary())?;
+            value["warnings"] = json!(ply.warnings());
         }
-        Loaded::Lexi(model, packed) => {
+        Scene::Lexi(lexi, survey) => {
             value["kind"] = "lexi".into();
-            value["lexi"] = codes::as_json(model, packed.as_deref())?;
+            value["lexi"] = codes::as_json(lexi, survey);
         }
     }
     Ok(value)
 }
 
-fn as_text(input: &SceneFile, splats: &Splats, lint: &Lint) -> Result<String> {
+fn as_text(file: &File<'_>, lint: &Lint) -> Result<String> {
     let mut out = String::new();
-    let count = text::count(splats.len() as u64);
+    let like = file.scene.empty();
+    let count = text::count(lint.gaussians);
     writeln!(
         out,
         "{}: {}, {count} Gaussians, SH degree {}",
-        input.name,
-        text::bytes(input.bytes),
-        splats.degree
+        file.name,
+        text::bytes(file.bytes),
+        like.degree
     )?;
-    if splats.meta.antialiased {
+    if like.meta.antialiased {
         writeln!(out, "trained with the anti-aliased dilation, and drawn so")?;
     }
-    for comment in &splats.meta.comments {
+    for comment in &like.meta.comments {
         writeln!(out, "comment: {comment}")?;
     }
-    match &input.loaded {
-        Loaded::Ply(read) => {
-            let source = &read.source;
+    match &file.scene {
+        Scene::Ply(ply) => {
+            let source = ply.summary();
             let kind = serde_json::to_value(source.dialect)?;
             let format = serde_json::to_value(source.format)?;
             writeln!(
@@ -94,13 +126,13 @@ fn as_text(input: &SceneFile, splats: &Splats, lint: &Lint) -> Result<String> {
                 source.row_bytes
             )?;
         }
-        Loaded::Lexi(model, packed) => codes::as_text(&mut out, model, packed.as_deref())?,
+        Scene::Lexi(lexi, survey) => codes::as_text(&mut out, lexi, survey)?,
     }
     writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
     for a in &lint.attributes {
         writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", a.name, a.min, a.mean, a.max)?;
     }
-    if splats.degree.rest() > 0 {
+    if like.degree.rest() > 0 {
         writeln!(out, "\nnorm of a Gaussian's SH without DC, mean {:.4}", lint.mean_rest_norm)?;
         let labels = NORM_BINS.iter().map(|from| format!("{from} and up")).collect::<Vec<_>>();
         bars(&mut out, &labels, &lint.rest_norms)?;

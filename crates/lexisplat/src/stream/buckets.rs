@@ -1,0 +1,117 @@
+//! Records put in order by way of temporary files: dealt into buckets first, each of which fits in memory.
+
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+use crate::spill::temporary;
+
+/// Bytes a bucket collects before they are written.
+const BLOCK: usize = 1 << 16;
+/// Temporary files at most: buckets share them, and each is given back when its last bucket was taken.
+const FILES: usize = 64;
+
+/// Records of one length in buckets, in each in the order they came in.
+#[derive(Debug)]
+pub(super) struct Buckets {
+    folder: PathBuf,
+    files: Vec<Option<File>>,
+    /// Buckets that share a file.
+    shared: usize,
+    buckets: Vec<Bucket>,
+}
+
+#[derive(Debug, Default, Clone)]
+struct Bucket {
+    /// Not yet written.
+    pending: Vec<u8>,
+    /// Where in the file what was written is.
+    written: Vec<(u64, usize)>,
+}
+
+impl Buckets {
+    /// `count` empty buckets; temporary files are in `folder`.
+    pub(super) fn new(folder: &Path, count: usize) -> Result<Self> {
+        let shared = count.div_ceil(FILES).max(1);
+        let files = (0..count.div_ceil(shared)).map(|_| temporary(folder).map(Some));
+        Ok(Self {
+            folder: folder.to_owned(),
+            files: files.collect::<Result<_>>()?,
+            shared,
+            buckets: vec![Bucket::default(); count],
+        })
+    }
+
+    /// Number of buckets.
+    pub(super) fn len(&self) -> usize {
+        self.buckets.len()
+    }
+
+    /// Appends a record, given in parts, to bucket `bucket`.
+    pub(super) fn push(&mut self, bucket: usize, record: &[&[u8]]) -> Result<()> {
+        let pending = &mut self.buckets[bucket].pending;
+        record.iter().for_each(|part| pending.extend_from_slice(part));
+        if pending.len() >= BLOCK { self.flush(bucket) } else { Ok(()) }
+    }
+
+    fn flush(&mut self, bucket: usize) -> Result<()> {
+        let Bucket { pending, written } = &mut self.buckets[bucket];
+        let Some(file) = &mut self.files[bucket / self.shared] else { return Ok(()) };
+        let mut append = || {
+            let at = file.seek(SeekFrom::End(0))?;
+            file.write_all(pending)?;
+            Ok(at)
+        };
+        let at = append().map_err(|e| Error::io(&self.folder, e))?;
+        written.push((at, pending.len()));
+        pending.clear();
+        Ok(())
+    }
+
+    /// All records of bucket `bucket`. Buckets are taken in order, once.
+    pub(super) fn take(&mut self, bucket: usize) -> Result<Vec<u8>> {
+        let Bucket { pending, written } = std::mem::take(&mut self.buckets[bucket]);
+        let mut out = vec![0; written.iter().map(|w| w.1).sum()];
+        if let Some(file) = &mut self.files[bucket / self.shared] {
+            let mut rest = out.as_mut_slice();
+            for (at, len) in written {
+                let (block, tail) = std::mem::take(&mut rest).split_at_mut(len);
+                file.seek(SeekFrom::Start(at))
+                    .and_then(|_| file.read_exact(block))
+                    .map_err(|e| Error::io(&self.folder, e))?;
+                rest = tail;
+            }
+        }
+        if (bucket + 1).is_multiple_of(self.shared) {
+            self.files[bucket / self.shared] = None;
+        }
+        out.extend_from_slice(&pending);
+        Ok(out)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn records_come_back_bucket_by_bucket_in_order() {
+        let folder = tempfile::tempdir().unwrap();
+        // More buckets than files, some of them larger than a block and some empty.
+        let count = 3 * FILES - 1;
+        let mut buckets = Buckets::new(folder.path(), count).unwrap();
+        assert_eq!(buckets.len(), count);
+        let mut expected = vec![Vec::new(); count];
+        for i in 0..120_000_u32 {
+            let bucket = if i % 3 == 0 { 5 } else { (i as usize * 7919) % (count - 1) };
+            let record = [i.to_le_bytes(), (!i).to_le_bytes()];
+            buckets.push(bucket, &[&record[0], &record[1]]).unwrap();
+            expected[bucket].extend(record.concat());
+        }
+        for (bucket, expected) in expected.into_iter().enumerate() {
+            assert!(buckets.take(bucket).unwrap() == expected, "{bucket}");
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,55 @@
+//! From a .lexi file to a PLY, a part at a time.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::source_order::in_source_order;
+use crate::error::{Error, Result};
+use crate::lexi::LexiChunks;
+use crate::output::{folder_of, write_whole};
+use crate::ply::{PlyWriter, check};
+use crate::progress::{Progress, Stage};
+
+/// Writes the dense scene of `lexi` to the PLY `output`, whole or not at all: the bytes that
+/// [`lexi::read`](crate::lexi::read) and [`ply::write`](crate::ply::write()) would make. Returns their
+/// number.
+///
+/// # Errors
+/// As those two; [`Error::Io`] also for temporary files beside `output`, which a packed file with its
+/// source's order needs.
+pub fn decompress_file(lexi: &LexiChunks<'_>, output: &Path, progress: &dyn Progress) -> Result<u64> {
+    let mut bytes = 0;
+    write_whole(output, |writer| {
+        bytes = run(lexi, writer, folder_of(output), &|e| Error::io(output, e), progress)?;
+        Ok(())
+    })?;
+    Ok(bytes)
+}
+
+/// [`decompress_file`] to a writer; temporary files are where the system wants them.
+///
+/// # Errors
+/// As [`decompress_file`]; an [`Error::Io`] of the writer names no file.
+pub fn decompress_to(lexi: &LexiChunks<'_>, writer: &mut impl Write, progress: &dyn Progress) -> Result<u64> {
+    run(lexi, writer, &std::env::temp_dir(), &|e| Error::io("output", e), progress)
+}
+
+fn run(
+    lexi: &LexiChunks<'_>,
+    writer: &mut impl Write,
+    folder: &Path,
+    io: &dyn Fn(std::io::Error) -> Error,
+    progress: &dyn Progress,
+) -> Result<u64> {
+    let like = lexi.empty();
+    check(&like)?;
+    let mut ply = PlyWriter::begin(writer, &like, lexi.len()).map_err(io)?;
+    progress.begin(Stage::Write, ply.row_bytes() * lexi.len() as u64);
+    in_source_order(lexi, folder, &mut |splats| {
+        ply.write(&splats).map_err(io)?;
+        progress.advance(ply.row_bytes() * splats.len() as u64);
+        Ok(())
+    })?;
+    progress.end();
+    Ok(ply.bytes)
+}

@@ -1,0 +1,168 @@
+//! Gaussians put in the order of a packed file by way of temporary files.
+
+use std::path::Path;
+
+use super::buckets::Buckets;
+use crate::error::Result;
+use crate::packed::{Bounds, Grid, Placed};
+use crate::ply::{PlyChunks, RowBytes};
+use crate::progress::{Progress, Stage};
+use crate::rng::SplitMix64;
+use crate::sensitivity::guessed_total;
+use crate::splats::Splats;
+
+/// How much is held at a time. The first two do not show in the file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sizes {
+    /// Gaussians read together.
+    pub(super) at_once: usize,
+    /// Gaussians of a bucket, about.
+    pub(super) bucket: usize,
+    /// Gaussians whose cells are looked at to know where buckets end.
+    pub(super) looked_at: usize,
+    /// Gaussians to fit steps and predictors to, about.
+    pub(super) sample: usize,
+    /// Gaussians of a run of the sample, neighbours in the order of the file, about.
+    pub(super) run: usize,
+}
+
+/// Bytes of a record before the values: cell and index in the source.
+const KEY_BYTES: usize = 12;
+/// Mixed into the seed of what is looked at.
+const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
+
+/// A scene dealt into buckets in the order of a packed file.
+pub(super) struct Ordered {
+    pub(super) grid: Grid,
+    /// Sum over all Gaussians of what their weights are guessed from.
+    pub(super) guessed_total: f64,
+    /// Some of the Gaussians, in order.
+    pub(super) sample: Splats,
+    rows: RowBytes,
+    buckets: Buckets,
+}
+
+impl Ordered {
+    /// Reads all of `ply`, twice.
+    pub(super) fn new(
+        ply: &PlyChunks<'_>,
+        sizes: Sizes,
+        seed: u64,
+        folder: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let n = ply.len();
+        let row_bytes = ply.summary().row_bytes;
+        progress.begin(Stage::Read, 2 * n as u64 * row_bytes);
+        let mut splats = ply.empty();
+        let (mut bounds, mut total) = (None::<Bounds>, 0.0);
+        let mut looked = Vec::with_capacity(sizes.looked_at.min(n));
+        let mut look = stratified(n, sizes.looked_at, seed).peekable();
+        let each_chunk = |splats: &mut Splats, f: &mut dyn FnMut(usize, &Splats) -> Result<()>| {
+            for start in (0..n).step_by(sizes.at_once) {
+                let range = start..n.min(start + sizes.at_once);
+                ply.read(range.clone(), splats)?;
+                splats.geometry.normals = Vec::new();
+                f(start, splats)?;
+                progress.advance(range.len() as u64 * row_bytes);
+            }
+            Ok::<(), crate::Error>(())
+        };
+        each_chunk(&mut splats, &mut |start, splats| {
+            let geometry = &splats.geometry;
+            let part = Bounds::of(&geometry.positions);
+            bounds.get_or_insert(part).add(part);
+            total = guessed_total(total, geometry);
+            while let Some(i) = look.next_if(|&i| i < start + splats.len()) {
+                looked.push((geometry.positions[i - start], i));
+            }
+            Ok(())
+        })?;
+        let positions: Vec<[f32; 3]> = looked.iter().map(|l| l.0).collect();
+        let bounds = bounds.unwrap_or_else(|| Bounds::of(&[]));
+        let grid = Grid::fit_sample(&positions, bounds, n);
+        let mut keys: Vec<Placed> = looked.iter().map(|&(p, i)| placed(&grid, p, i)).collect();
+        drop((looked, positions));
+        keys.sort_unstable();
+        let ends = |parts: usize| -> Vec<Placed> {
+            (1..parts).filter_map(|k| keys.get(k * keys.len() / parts)).copied().collect()
+        };
+        let (bucket_ends, run_ends) = (ends(n.div_ceil(sizes.bucket)), ends(n.div_ceil(sizes.run)));
+        drop(keys);
+        // One run in so many is of the sample.
+        let every = n.div_ceil(sizes.sample).max(1);
+
+        let rows = RowBytes::new(&ply.empty());
+        let mut buckets = Buckets::new(folder, bucket_ends.len() + 1)?;
+        let (mut bytes, mut sampled) = (Vec::new(), Vec::new());
+        each_chunk(&mut splats, &mut |start, splats| {
+            rows.pack(splats, &mut bytes);
+            for (i, row) in bytes.chunks_exact(rows.bytes()).enumerate() {
+                let key = placed(&grid, splats.geometry.positions[i], start + i);
+                let record = [&key.cell.to_le_bytes()[..], &key.source.to_le_bytes(), row];
+                if run_ends.partition_point(|end| *end <= key).is_multiple_of(every) {
+                    record.iter().for_each(|part| sampled.extend_from_slice(part));
+                }
+                buckets.push(bucket_ends.partition_point(|end| *end <= key), &record)?;
+            }
+            Ok(())
+        })?;
+        progress.end();
+        let mut sample = Vec::new();
+        in_order(&sampled, &rows, &mut sample, &mut Vec::new());
+        drop(sampled);
+        let sample = rows.unpack(&sample)?;
+        Ok(Self { grid, guessed_total: total, sample, rows, buckets })
+    }
+
+    /// Hands all Gaussians to `take` in order, with their places: a multiple of `chunk` of them each time
+    /// but the last.
+    pub(super) fn each(
+        mut self,
+        chunk: usize,
+        take: &mut dyn FnMut(&Splats, &[Placed]) -> Result<()>,
+    ) -> Result<()> {
+        let (mut bytes, mut places) = (Vec::new(), Vec::new());
+        let count = self.buckets.len();
+        for bucket in 0..count {
+            in_order(&self.buckets.take(bucket)?, &self.rows, &mut bytes, &mut places);
+            let last = bucket + 1 == count;
+            let whole = if last { places.len() } else { places.len() / chunk * chunk };
+            if whole > 0 {
+                let splats = self.rows.unpack(&bytes[..whole * self.rows.bytes()])?;
+                take(&splats, &places[..whole])?;
+                bytes.drain(..whole * self.rows.bytes());
+                places.drain(..whole);
+            }
+        }
+        Ok(())
+    }
+}
+
+fn placed(grid: &Grid, position: [f32; 3], source: usize) -> Placed {
+    // Scenes have at most 2^32 - 2 Gaussians.
+    Placed { cell: grid.cell(position), source: u32::try_from(source).unwrap_or(u32::MAX) }
+}
+
+/// Appends the rows of `records` in order to `bytes`, and their places to `places`.
+fn in_order(records: &[u8], rows: &RowBytes, bytes: &mut Vec<u8>, places: &mut Vec<Placed>) {
+    let records: Vec<&[u8]> = records.chunks_exact(KEY_BYTES + rows.bytes()).collect();
+    let key = |record: &[u8]| Placed {
+        cell: record.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),
+        source: record[8..].first_chunk().map_or(0, |s| u32::from_le_bytes(*s)),
+    };
+    let mut order: Vec<(Placed, &[u8])> = records.into_iter().map(|r| (key(r), r)).collect();
+    order.sort_unstable_by_key(|o| o.0);
+    bytes.reserve(order.len() * rows.bytes());
+    for (place, record) in order {
+        places.push(place);
+        bytes.extend_from_slice(&record[KEY_BYTES..]);
+    }
+}
+
+/// One random number of each of about `count` equal parts of the numbers below `n`, ascending.
+fn stratified(n: usize, count: usize, seed: u64) -> impl Iterator<Item = usize> {
+    let stride = n.div_ceil(count).max(1);
+    let mut random = SplitMix64::new(seed ^ LOOK_STREAM);
+    (0..n).step_by(stride).map(move |start| start + random.below(stride.min(n - start)))
+}

@@ -1,0 +1,203 @@
+//! Layout packed: put in order first, then code chunk by chunk, then write.
+
+use std::io::Write;
+use std::path::Path;
+
+use super::counted::Counted;
+use super::order::{Ordered, Sizes};
+use crate::compress::AT_ONCE;
+use crate::error::{Error, Result};
+use crate::lexi::write_spilled_packed;
+use crate::limits::Limits;
+use crate::output::{folder_of, write_whole};
+use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
+use crate::ply::PlyChunks;
+use crate::progress::{Progress, Stage};
+use crate::sensitivity::Sensitivity;
+
+/// Peak of anonymous memory is below 1.5 GiB with these, at SH degree 3.
+const SIZES: Sizes =
+    Sizes { at_once: AT_ONCE, bucket: 8 * CHUNK, looked_at: 1 << 20, sample: 1 << 19, run: 2048 };
+
+/// What [`pack_file`] did.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct PackedFile {
+    /// The packed scene without what is as long as the scene: extras, order and data.
+    pub head: Packed,
+    /// How it went.
+    pub report: PackReport,
+    /// What the streams take.
+    pub stream_bits: Vec<StreamBits>,
+    /// Bytes of each tensor and of the header, as
+    /// [`lexi::packed_tensor_bytes`](crate::lexi::packed_tensor_bytes).
+    pub tensor_bytes: Vec<(String, u64)>,
+}
+
+impl PackedFile {
+    /// Size of the file.
+    #[must_use]
+    pub fn file_bytes(&self) -> u64 {
+        self.tensor_bytes.iter().map(|t| t.1).sum()
+    }
+}
+
+/// Packs `ply` to the file `output`, whole or not at all, so that pictures are about `decibels` good.
+///
+/// What shows is guessed ([`Sensitivity::guess`]); steps, predictors and dictionary are found from some half
+/// a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but the same on any
+/// number of threads.
+///
+/// # Errors
+/// [`Error::Parameter`] for options out of range and values so large that sums of them leave f32;
+/// [`Error::Io`] for `output` and for temporary files beside it.
+pub fn pack_file(
+    ply: &PlyChunks<'_>,
+    options: &PackOptions,
+    decibels: f64,
+    output: &Path,
+    progress: &dyn Progress,
+) -> Result<PackedFile> {
+    run(ply, options, decibels, folder_of(output), SIZES, progress, |fill| {
+        write_whole(output, |writer| fill(writer).map_err(|e| Error::io(output, e)))
+    })
+}
+
+/// [`pack_file`] to a writer; temporary files are where the system wants them.
+///
+/// # Errors
+/// As [`pack_file`]; an [`Error::Io`] of the writer names no file.
+pub fn pack_to(
+    ply: &PlyChunks<'_>,
+    options: &PackOptions,
+    decibels: f64,
+    writer: &mut impl Write,
+    progress: &dyn Progress,
+) -> Result<PackedFile> {
+    run(ply, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill| {
+        fill(writer).map_err(|e| Error::io("output", e))
+    })
+}
+
+fn run(
+    ply: &PlyChunks<'_>,
+    options: &PackOptions,
+    decibels: f64,
+    folder: &Path,
+    sizes: Sizes,
+    progress: &dyn Progress,
+    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<()>,
+) -> Result<PackedFile> {
+    let n = ply.len();
+    Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
+    let mut ordered = Ordered::new(ply, sizes, options.seed, folder, progress)?;
+    let total = ordered.guessed_total;
+    let sample = std::mem::replace(&mut ordered.sample, ply.empty());
+    let sensitivity = Sensitivity::guess_part(&sample.geometry, total);
+    let whole = Whole { gaussians: n, grid: ordered.grid, decibels };
+    let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, folder, progress)?;
+    drop((sample, sensitivity));
+    progress.begin(Stage::Code, n as u64);
+    ordered.each(CHUNK, &mut |splats, places| {
+        let sensitivity = Sensitivity::guess_part(&splats.geometry, total);
+        packer.push(splats, &sensitivity, places)?;
+        progress.advance(splats.len() as u64);
+        Ok(())
+    })?;
+    progress.end();
+    let (head, spilled, report, stream_bits) = packer.finish(folder)?;
+    let tensor_bytes = write_spilled_packed(&head, spilled, |fill, bytes| {
+        progress.begin(Stage::Write, bytes);
+        write(&mut |writer| fill(&mut Counted { writer, progress }))?;
+        progress.end();
+        Ok(())
+    })?;
+    Ok(PackedFile { head, report, stream_bits, tensor_bytes })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::Packer;
+    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply, sample};
+
+    fn scene(count: usize) -> Splats {
+        let mut splats = sample::scene(&sample::SampleOptions::new(count, 4));
+        splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
+        let values = ExtraValues::U32((0..u32::try_from(count).unwrap()).collect());
+        splats.geometry.extras = vec![Extra { name: "number".into(), values }];
+        splats
+    }
+
+    fn options() -> PackOptions {
+        PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
+    }
+
+    fn streamed(splats: &Splats, sizes: Sizes) -> (Vec<u8>, PackedFile) {
+        let mut bytes = Vec::new();
+        ply::write_to(&mut bytes, splats).unwrap();
+        let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let mut out = Vec::new();
+        let done = run(&chunks, &options(), 38.0, folder.path(), sizes, &Silent, |fill| {
+            fill(&mut out).map_err(|e| Error::io("out", e))
+        })
+        .unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        (out, done)
+    }
+
+    /// Everything fits in one bucket and is of the sample: then nothing is left to differ.
+    #[test]
+    fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
+        for count in [CHUNK + 500, 700, 0] {
+            let splats = scene(count);
+            let all = Sizes { sample: count.max(1), looked_at: count.max(1), ..SIZES };
+            let (found, done) = streamed(&splats, all);
+            let sensitivity = Sensitivity::guess(&splats.geometry);
+            let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
+            let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
+            let mut expected = Vec::new();
+            lexi::write_packed_to(&mut expected, &packed).unwrap();
+            assert!(found == expected, "{count}");
+            assert_eq!(done.tensor_bytes, lexi::packed_tensor_bytes(&packed));
+            let bits = packed.stream_bits().unwrap();
+            for (a, b) in done.stream_bits.iter().zip(&bits) {
+                assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn many_small_buckets_and_a_small_sample_make_a_file_that_is_as_good() {
+        let splats = scene(2 * CHUNK + 2000);
+        let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
+        let (found, done) = streamed(&splats, small);
+        let (whole, _) = streamed(&splats, SIZES);
+        let ratio = found.len() as f64 / whole.len() as f64;
+        assert!((0.97..1.03).contains(&ratio), "{ratio}");
+        let other = Sizes { at_once: 10_000, bucket: 20_000, ..small };
+        assert!(streamed(&splats, other).0 == found, "what is held at a time shows");
+        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+        // The order was kept, so each Gaussian is where it was.
+        assert_eq!(model.geometry.extras, splats.geometry.extras);
+        let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
+        let moved = model.geometry.positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
+        assert_eq!(moved.count(), 0);
+        assert_eq!(done.head.gaussians, splats.len());
+        assert_eq!(
+            done.report.nonzero_histogram.iter().sum::<u64>() + done.report.escapes,
+            splats.len() as u64
+        );
+    }
+
+    #[test]
+    fn gaussians_in_one_place_do_not_make_one_bucket_of_all() {
+        let mut splats = scene(5000);
+        splats.geometry.positions.fill([1.0; 3]);
+        let small = Sizes { at_once: 1000, bucket: 700, looked_at: 1000, sample: 2000, run: 100 };
+        let (found, _) = streamed(&splats, small);
+        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+        assert_eq!(model.geometry.extras, splats.geometry.extras);
+    }
+}

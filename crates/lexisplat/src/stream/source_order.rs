@@ -1,0 +1,144 @@
+//! The Gaussians of a .lexi file as they were in their source, a part at a time.
+
+use std::path::Path;
+
+use super::buckets::Buckets;
+use crate::error::Result;
+use crate::lexi::LexiChunks;
+use crate::model::Model;
+use crate::packed::StreamBits;
+use crate::ply::RowBytes;
+use crate::splats::Splats;
+
+/// Gaussians of a bucket when a packed file's order is undone: a multiple of a chunk.
+const BUCKET: usize = 4 * crate::packed::CHUNK;
+/// Bytes of a Gaussian's place, before its values.
+const PLACE_BYTES: usize = 4;
+
+/// Hands the dense scene of `lexi` to `take`, part after part: in the order of its source if the file knows
+/// it, else in that of the file. Temporary files, if any are needed, are in `folder`.
+///
+/// # Errors
+/// [`crate::Error::Format`] as [`lexi::read`](crate::lexi::read) for what is only found while decoding,
+/// [`crate::Error::Io`] for temporary files, and what `take` says.
+pub fn in_source_order(
+    lexi: &LexiChunks<'_>,
+    folder: &Path,
+    take: &mut dyn FnMut(Splats) -> Result<()>,
+) -> Result<()> {
+    parts_and_source_order(lexi, folder, false, &mut |_| (), take)?;
+    Ok(())
+}
+
+/// [`in_source_order`] that first shows every part to `see` as it is in the file. Returns what the streams
+/// of a packed file take if `count_bits`.
+pub(super) fn parts_and_source_order(
+    lexi: &LexiChunks<'_>,
+    folder: &Path,
+    count_bits: bool,
+    see: &mut dyn FnMut(&Model),
+    take: &mut dyn FnMut(Splats) -> Result<()>,
+) -> Result<Vec<StreamBits>> {
+    if !lexi.order_kept() {
+        return lexi.parts(count_bits, &mut |_, model| {
+            see(&model);
+            take(model.into_splats())
+        });
+    }
+    by_buckets(lexi, folder, BUCKET, count_bits, see, take)
+}
+
+fn by_buckets(
+    lexi: &LexiChunks<'_>,
+    folder: &Path,
+    bucket_len: usize,
+    count_bits: bool,
+    see: &mut dyn FnMut(&Model),
+    take: &mut dyn FnMut(Splats) -> Result<()>,
+) -> Result<Vec<StreamBits>> {
+    let n = lexi.len();
+    let rows = RowBytes::new(&lexi.empty());
+    let mut buckets = Buckets::new(folder, n.div_ceil(bucket_len))?;
+    let mut bytes = Vec::new();
+    let bits = lexi.parts(count_bits, &mut |first, model| {
+        see(&model);
+        let splats = model.into_splats();
+        rows.pack(&splats, &mut bytes);
+        let places = lexi.order(first..first + splats.len())?;
+        for (row, place) in bytes.chunks_exact(rows.bytes()).zip(places) {
+            buckets.push(place as usize / bucket_len, &[&place.to_le_bytes(), row])?;
+        }
+        Ok(())
+    })?;
+    for bucket in 0..buckets.len() {
+        let start = bucket * bucket_len;
+        let count = bucket_len.min(n - start);
+        bytes.clear();
+        bytes.resize(count * rows.bytes(), 0);
+        for record in buckets.take(bucket)?.chunks_exact(PLACE_BYTES + rows.bytes()) {
+            let (place, row) = record.split_at(PLACE_BYTES);
+            let place = place.first_chunk().map_or(0, |p| u32::from_le_bytes(*p)) as usize - start;
+            bytes[place * rows.bytes()..][..row.len()].copy_from_slice(row);
+        }
+        take(rows.unpack(&bytes)?)?;
+    }
+    Ok(bits)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::{CHUNK, PackOptions, Packer};
+    use crate::{Extra, ExtraValues, Limits, Sensitivity, Silent, lexi, ply, sample};
+
+    #[test]
+    fn small_buckets_undo_the_order_of_a_packed_file() {
+        let n = CHUNK + 1000;
+        let mut splats = sample::scene(&sample::SampleOptions::new(n, 2));
+        splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
+        // A name that no PLY can hold.
+        let values = ExtraValues::U32((0..u32::try_from(n).unwrap()).collect());
+        splats.geometry.extras = vec![Extra { name: "a name".into(), values }];
+        let options = PackOptions { keep_order: true, atoms: Some(8), ..PackOptions::default() };
+        let sensitivity = Sensitivity::guess(&splats.geometry);
+        let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
+        let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
+        let mut bytes = Vec::new();
+        lexi::write_packed_to(&mut bytes, &packed).unwrap();
+        let whole = lexi::read_bytes("t", &bytes, &Limits::default()).unwrap().into_splats();
+        let chunks = LexiChunks::open("t", &bytes, &Limits::default()).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        for bucket in [4099, n, BUCKET] {
+            let mut start = 0;
+            let mut seen = 0;
+            let bits = by_buckets(
+                &chunks,
+                folder.path(),
+                bucket,
+                true,
+                &mut |model| seen += model.len(),
+                &mut |part| {
+                    let range = start..start + part.len();
+                    assert_eq!(part.geometry.positions, whole.geometry.positions[range.clone()]);
+                    assert_eq!(part.geometry.rotations, whole.geometry.rotations[range.clone()]);
+                    assert_eq!(part.sh_rest, whole.sh_rest[9 * range.start..9 * range.end]);
+                    let expected =
+                        ExtraValues::U32(range.clone().map(|i| u32::try_from(i).unwrap()).collect());
+                    assert_eq!(part.geometry.extras, [Extra { name: "a name".into(), values: expected }]);
+                    assert_eq!(part.meta, whole.meta);
+                    start = range.end;
+                    Ok(())
+                },
+            )
+            .unwrap();
+            assert_eq!((start, seen), (n, n));
+            assert_eq!(bits, packed.stream_bits().unwrap());
+        }
+        // No PLY can be made of it, and none is left half made.
+        let output = folder.path().join("out.ply");
+        let error = super::super::decompress_file(&chunks, &output, &Silent).unwrap_err().to_string();
+        assert!(error.contains("a name"), "{error}");
+        assert_eq!(ply::write(&output, &whole).unwrap_err().to_string(), error);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+}

@@ -1,0 +1,92 @@
+//! What `lexisplat info` says of a file, a part at a time.
+
+use std::path::Path;
+
+use super::source_order::parts_and_source_order;
+use crate::error::Result;
+use crate::lexi::LexiChunks;
+use crate::packed::StreamBits;
+use crate::parallel::CHUNK;
+use crate::ply::PlyChunks;
+use crate::progress::{Progress, Stage};
+use crate::stats::{Lint, Linter};
+
+/// Gaussians looked over together.
+const AT_ONCE: usize = 32 * CHUNK;
+
+/// What a .lexi file's Gaussians and codes are like.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct Survey {
+    /// What the dense scene looks like.
+    pub lint: Lint,
+    /// Nonzeros in all.
+    pub nonzeros: u64,
+    /// Gaussians stored exactly.
+    pub escapes: u64,
+    /// Gaussians by number of nonzeros, from 0 to the dimension; escapes not among them.
+    pub nonzero_histogram: Vec<u64>,
+    /// Gaussians that use each atom.
+    pub atom_usage: Vec<u64>,
+    /// As [`Model::resident_sh_bytes`](crate::Model::resident_sh_bytes).
+    pub resident_sh_bytes: u64,
+    /// What the streams of a packed file take; empty for other layouts.
+    pub stream_bits: Vec<StreamBits>,
+}
+
+/// [`lint`](crate::stats::lint()) of a PLY.
+///
+/// # Errors
+/// As [`PlyChunks::read`].
+pub fn lint_ply(ply: &PlyChunks<'_>, progress: &dyn Progress) -> Result<Lint> {
+    let mut linter = Linter::default();
+    let mut splats = ply.empty();
+    linter.add(&splats)?;
+    let n = ply.len();
+    progress.begin(Stage::Read, n as u64 * ply.summary().row_bytes);
+    for start in (0..n).step_by(AT_ONCE) {
+        let range = start..n.min(start + AT_ONCE);
+        progress.advance(range.len() as u64 * ply.summary().row_bytes);
+        ply.read(range, &mut splats)?;
+        linter.add(&splats)?;
+    }
+    progress.end();
+    Ok(linter.finish())
+}
+
+/// Looks a .lexi file over. Temporary files, if any are needed, are in `folder`.
+///
+/// # Errors
+/// As [`in_source_order`](super::in_source_order).
+pub fn survey(lexi: &LexiChunks<'_>, folder: &Path) -> Result<Survey> {
+    let mut linter = Linter::default();
+    linter.add(&lexi.empty())?;
+    let dictionary = lexi.dictionary();
+    let mut out = Survey {
+        lint: Linter::default().finish(),
+        nonzeros: 0,
+        escapes: 0,
+        nonzero_histogram: vec![0; dictionary.dim() + 1],
+        atom_usage: vec![0; dictionary.len()],
+        resident_sh_bytes: (dictionary.len() * dictionary.dim() * size_of::<f32>()) as u64,
+        stream_bits: Vec::new(),
+    };
+    let stream_bits = parts_and_source_order(
+        lexi,
+        folder,
+        true,
+        &mut |model| {
+            let codes = &model.codes;
+            let escapes = codes.escapes().gaussians.len() as u64;
+            out.escapes += escapes;
+            out.nonzeros += codes.nonzeros() as u64;
+            codes.counts().iter().for_each(|&count| out.nonzero_histogram[usize::from(count)] += 1);
+            out.nonzero_histogram[0] -= escapes;
+            (0..codes.nonzeros()).for_each(|k| out.atom_usage[codes.indices().get(k)] += 1);
+            let base = size_of_val(model.geometry.dc.as_slice());
+            out.resident_sh_bytes += (codes.resident_bytes() + base) as u64;
+        },
+        &mut |splats| linter.add(&splats),
+    )?;
+    Ok(Survey { lint: linter.finish(), stream_bits, ..out })
+}
