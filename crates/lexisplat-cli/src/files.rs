@@ -94,19 +94,19 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
     })?)
 }
 
-/// Writes an output: to its file by `save`, or by `stream` to standard output. Returns its size in bytes.
-pub(crate) fn write_output<E: Into<anyhow::Error>>(
+/// Writes an output: to its file by `save`, or by `stream` to standard output. Returns what they do.
+pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
-    save: impl FnOnce(&Path) -> Result<u64, E>,
-    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<u64, E>,
-) -> Result<u64> {
+    save: impl FnOnce(&Path) -> Result<T, E>,
+    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
+) -> Result<T> {
     if !is_pipe(output) {
         return save(output).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let bytes = stream(&mut out).map_err(Into::into)?;
+    let done = stream(&mut out).map_err(Into::into)?;
     out.flush().context("standard output")?;
-    Ok(bytes)
+    Ok(done)
 }
 
 /// Tells what was done: as JSON or text on standard output, as text on standard error if that carries

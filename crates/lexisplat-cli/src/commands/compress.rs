@@ -64,15 +64,11 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
     warn(&name, chunks.warnings());
     let read_seconds = start.elapsed().as_secs_f64();
-    let mut done = None;
-    write_output(
+    let done = write_output(
         &output,
-        |path| {
-            Ok::<_, Error>(done.insert(stream::compress_file(&chunks, &options, path, &bars)?).file_bytes())
-        },
-        |out| Ok(done.insert(stream::compress_to(&chunks, &options, out, &bars)?).file_bytes()),
+        |path| stream::compress_file(&chunks, &options, path, &bars),
+        |out| stream::compress_to(&chunks, &options, out, &bars),
     )?;
-    let Some(done) = done else { return Ok(()) };
     if let Some(path) = &args.save_dictionary {
         lexi::write_dictionary(path, &done.dictionary)?;
     }

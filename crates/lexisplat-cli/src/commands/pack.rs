@@ -131,15 +131,12 @@ pub(crate) fn run_in_parts(
     let options = options(args);
     let decibels = args.preset.unwrap_or_default().decibels();
     let clock = Instant::now();
-    let mut done = None;
-    let file_bytes = write_output(
+    let done = write_output(
         output,
-        |path| {
-            Ok::<_, Error>(done.insert(stream::pack_file(ply, &options, decibels, path, bars)?).file_bytes())
-        },
-        |out| Ok(done.insert(stream::pack_to(ply, &options, decibels, out, bars)?).file_bytes()),
+        |path| stream::pack_file(ply, &options, decibels, path, bars),
+        |out| stream::pack_to(ply, &options, decibels, out, bars),
     )?;
-    let Some(done) = done else { return Ok(()) };
+    let file_bytes = done.file_bytes();
     let pack_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
         output,

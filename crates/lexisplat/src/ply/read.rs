@@ -33,7 +33,7 @@ pub struct PlyRead {
 /// Reads the PLY at `path`, mapped with the feature `mmap`.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read, else as [`read_bytes`].
+/// [`crate::Error::Io`] if it cannot be read, else as [`read_bytes`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
     let input = Input::open(path)?;
     read_bytes(&path.display().to_string(), &input, options)
@@ -45,9 +45,9 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 /// the result, at most a few times `bytes`, and next to nothing else.
 ///
 /// # Errors
-/// [`Error::Format`] naming what is wrong: no PLY, a relative of 3DGS that is not supported, a missing
+/// [`crate::Error::Format`] naming what is wrong: no PLY, a relative of 3DGS that is not supported, a missing
 /// or repeated property, a count that does not match, NaN or infinite values unless
-/// [`ReadOptions::drop_invalid`]. [`Error::Limit`] if the file asks for more than its limits allow.
+/// [`ReadOptions::drop_invalid`]. [`crate::Error::Limit`] if the file asks for more than its limits allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     let mut source = Source::open(name, bytes, options)?;
     let mut splats = empty(&source.layout);

@@ -27,13 +27,13 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         let lexi = LexiChunks::open(&name, &bytes, &Limits::default())?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let lint = survey.lint.clone();
-        (Scene::Lexi(lexi, survey), lint)
+        (Scene::Lexi(Box::new(lexi), Box::new(survey)), lint)
     } else {
         let read = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
         let ply = PlyChunks::open(&name, &bytes, &read, &bars)?;
         warn(&name, ply.warnings());
         let lint = stream::lint_ply(&ply, &bars)?;
-        (Scene::Ply(ply), lint)
+        (Scene::Ply(Box::new(ply)), lint)
     };
     let file = File { name: &name, bytes: bytes.len() as u64, scene };
     if common.json {
@@ -54,8 +54,8 @@ struct File<'a> {
 }
 
 enum Scene<'a> {
-    Ply(PlyChunks<'a>),
-    Lexi(LexiChunks<'a>, Survey),
+    Ply(Box<PlyChunks<'a>>),
+    Lexi(Box<LexiChunks<'a>>, Box<Survey>),
 }
 
 impl Scene<'_> {
