@@ -16,6 +16,11 @@ use crate::limits::Limits;
 use crate::parallel::map_vec;
 use crate::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats, for_extra};
 
+/// What an infinite opacity, before the sigmoid, is taken as, with its sign: in f32 the sigmoid of this is 1 and
+/// that of its negative 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply) write such values
+/// for 255 and 0.
+const SURE_OPACITY: f32 = 100.0;
+
 /// How to read.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct ReadOptions {
@@ -47,12 +52,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 
 /// Reads the PLY in `bytes`; messages call it `name`.
 ///
-/// Floats keep their bits; other types become the nearest f32 (with a warning). Memory: the arrays of
+/// Floats keep their bits; other types become the nearest f32 (with a warning). Infinite opacities become 100
+/// and -100, which look the same (with a warning). Memory: the arrays of
 /// the result, at most a few times `bytes`, and next to nothing else.
 ///
 /// # Errors
 /// [`Error::Format`] naming what is wrong: no PLY, a relative of 3DGS that is not supported, a missing
-/// or repeated property, a count that does not match, NaN or infinite values unless
+/// or repeated property, a count that does not match, NaN or (but for opacities) infinite values unless
 /// [`ReadOptions::drop_invalid`]. [`Error::Limit`] if the file asks for more than its limits allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     let header = Header::parse(name, bytes, &options.limits)?;
@@ -74,7 +80,12 @@ pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Ply
 
     let mut splats = allocate(name, &layout, count)?;
     splats.meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased };
-    let bad = fill(&rows, &layout, &mut splats)?;
+    let Filled { bad, sure } = fill(&rows, &layout, &mut splats)?;
+    if sure > 0 {
+        warnings.push(format!(
+            "{sure} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)"
+        ));
+    }
     if let Some(first) = bad.first() {
         let dropped: usize = bad.iter().map(|b| b.rows.len()).sum();
         let (row, property) = (first.rows.first().copied().unwrap_or(0), first.property.clone());
@@ -166,16 +177,27 @@ struct Piece<'a> {
 struct Found {
     bad: Option<Bad>,
     normals: bool,
+    /// Opacities that were infinite.
+    sure: usize,
 }
 
-/// Fills the arrays from `rows`; the chunks with bad values, in order.
-fn fill(rows: &Rows<'_>, layout: &Layout, splats: &mut Splats) -> Result<Vec<Bad>> {
+/// What filling all pieces found.
+struct Filled {
+    /// The chunks with bad values, in order.
+    bad: Vec<Bad>,
+    /// Opacities that were infinite.
+    sure: usize,
+}
+
+/// Fills the arrays from `rows`.
+fn fill(rows: &Rows<'_>, layout: &Layout, splats: &mut Splats) -> Result<Filled> {
     let count = splats.len();
-    let (mut bad, mut normals) = (Vec::new(), false);
+    let (mut bad, mut normals, mut sure) = (Vec::new(), false, 0);
     for found in map_vec(pieces(splats, layout), |piece| fill_piece(rows, layout, piece)) {
         let found = found?;
         bad.extend(found.bad);
         normals |= found.normals;
+        sure += found.sure;
     }
     if let (true, Some(group)) = (normals, &layout.normal) {
         // Rare enough for a second pass, which spares everyone else the array.
@@ -188,7 +210,7 @@ fn fill(rows: &Rows<'_>, layout: &Layout, splats: &mut Splats) -> Result<Vec<Bad
         });
         done.into_iter().collect::<Result<()>>()?;
     }
-    Ok(bad)
+    Ok(Filled { bad, sure })
 }
 
 /// The arrays of `splats` cut into chunks of rows.
@@ -239,6 +261,11 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
     layout.dc.read(packed, piece.dc);
     layout.rest.read(packed, piece.rest);
     layout.opacity.read(packed, piece.opacities);
+    let mut sure = 0;
+    for opacity in piece.opacities.iter_mut().filter(|v| v.is_infinite()) {
+        *opacity = SURE_OPACITY.copysign(*opacity);
+        sure += 1;
+    }
     layout.scale.read(packed, piece.scales);
     layout.rotation.read(packed, piece.rotations);
     piece.extras.iter_mut().for_each(|fill| fill(packed));
@@ -249,7 +276,7 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
     }
     // A negative zero is worth keeping too: what comes out must have the bits that went in.
     let any_normal = normals.iter().fold(0, |any, v| any | v.to_bits()) != 0;
-    Ok(Found { bad: bad_rows(&piece, &normals), normals: any_normal })
+    Ok(Found { bad: bad_rows(&piece, &normals), normals: any_normal, sure })
 }
 
 /// The piece's Gaussians with NaN or infinite values, if any.
