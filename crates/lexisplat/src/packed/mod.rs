@@ -11,6 +11,9 @@ mod canonical;
 mod codebook;
 mod entropy;
 mod fit;
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub mod fuzzing;
 mod morton;
 mod neighbours;
 mod pack;
