@@ -12,10 +12,7 @@ const PER_BYTE: usize = 128;
 const BASE: usize = 16 << 20;
 
 fuzz_target!(init: one_thread(), |data: &[u8]| {
-    let drop_invalid = data.len() % 2 == 1;
-    let mut options = ReadOptions::default();
-    options.drop_invalid = drop_invalid;
-    options.limits = limits();
+    let options = ReadOptions { drop_invalid: data.len() % 2 == 1, limits: limits() };
     let Ok(read) = bounded(data, PER_BYTE, BASE, || read_bytes("fuzz.ply", data, &options)) else { return };
     invariants::splats(&read.splats);
     let mut bytes = Vec::new();

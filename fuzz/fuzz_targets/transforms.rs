@@ -11,7 +11,7 @@ const PER_BYTE: usize = 64;
 const BASE: usize = 64 << 10;
 
 fuzz_target!(|data: &[u8]| {
-    let mut size_of = |path: &str| (path.len() % 2 == 0).then_some((64, 48));
+    let mut size_of = |path: &str| path.len().is_multiple_of(2).then_some((64, 48));
     let read = bounded(data, PER_BYTE, BASE, || read_transforms_bytes("transforms.json", data, &mut size_of));
     for camera in read.map(|set| set.cameras).unwrap_or_default() {
         camera.validate().expect("cameras that were read are in range");
