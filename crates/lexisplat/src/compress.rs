@@ -90,13 +90,15 @@ impl CompressReport {
 ///
 /// # Errors
 /// [`Error::Parameter`] for options out of range, a dictionary of another degree, or a scene whose arrays
-/// differ in length or whose SH-rest is not finite.
+/// differ in length or whose values are not finite.
 pub fn compress(
     splats: Splats,
     options: &CompressOptions,
     progress: &dyn Progress,
 ) -> Result<(Model, CompressReport)> {
     splats.validate()?;
+    // What a reader would refuse is not written.
+    splats.geometry.validate_values()?;
     let (n, dim) = (splats.len(), splats.degree.rest());
     Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
     let clock = Stopwatch::start();

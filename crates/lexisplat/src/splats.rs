@@ -150,6 +150,27 @@ impl Geometry {
         Ok(())
     }
 
+    /// Checks that every value is finite but those of extras, which may be anything.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the array and the first value that is not.
+    pub(crate) fn validate_values(&self) -> Result<()> {
+        let arrays: [(&'static str, &[f32]); 6] = [
+            ("positions", self.positions.as_flattened()),
+            ("normals", self.normals.as_flattened()),
+            ("dc", self.dc.as_flattened()),
+            ("opacities", &self.opacities),
+            ("scales", self.scales.as_flattened()),
+            ("rotations", self.rotations.as_flattened()),
+        ];
+        for (name, values) in arrays {
+            if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+                return Err(Error::parameter(name, value, "finite values"));
+            }
+        }
+        Ok(())
+    }
+
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
         filter(&mut self.positions, keep);

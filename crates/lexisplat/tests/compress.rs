@@ -219,3 +219,28 @@ fn wrong_options_are_named() {
     broken.sh_rest[100] = f32::NAN;
     assert!(compress(broken, &CompressOptions::default(), &Silent).is_err());
 }
+
+/// A file of such a scene could be written, but no reader would take it.
+#[test]
+fn values_that_are_not_finite_are_named() {
+    type Change = fn(&mut Splats, f32);
+    let changes: [(&str, Change); 7] = [
+        ("positions", |s, v| s.geometry.positions[7][1] = v),
+        ("normals", |s, v| s.geometry.normals = vec![[0.0, v, 0.0]; 20]),
+        ("dc", |s, v| s.geometry.dc[7][2] = v),
+        ("opacities", |s, v| s.geometry.opacities[7] = v),
+        ("scales", |s, v| s.geometry.scales[7][0] = v),
+        ("rotations", |s, v| s.geometry.rotations[7][3] = v),
+        ("sh_rest", |s, v| s.sh_rest[100] = v),
+    ];
+    for (name, change) in changes {
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut splats = scene(20, 3, 15);
+            change(&mut splats, value);
+            let error = compress(splats, &CompressOptions::default(), &Silent).unwrap_err();
+            let Error::Parameter { name: found, .. } = error else { panic!("{error}") };
+            // Learning, which may see the rows first, calls them signals.
+            assert!(found == name || (name, found) == ("sh_rest", "signals"), "{name}: {found}");
+        }
+    }
+}

@@ -9,6 +9,9 @@ use crate::splats::Geometry;
 const MAX_THINNESS: f32 = 9.0;
 /// Largest logarithm of a standard deviation, either sign: beyond it exp leaves f32.
 const MAX_LOG_SCALE: f32 = 40.0;
+/// Half the logarithm of the largest f32: of a larger scale the variance leaves f32, and no rasteriser draws the
+/// Gaussian. Limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
+const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
 /// Smallest logarithm of an opacity: of less nothing is left in f32.
 const MIN_LOG_OPACITY: f32 = -100.0;
 /// Cells along the longest side of the bulk, for each Gaussian in it.
@@ -134,13 +137,15 @@ pub(super) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     let [first, second, third] = order.map(|k| given[k]);
     // Turning an axis around leaves the ellipsoid as it is.
     let third = if dot(cross(first, second), third) < 0.0 { third.map(|v| -v) } else { third };
+    let drawn = scales[order[0]] <= MAX_DRAWN_LOG_SCALE;
+    let log_opacity = if drawn { log_sigmoid(geometry.opacities[i]) } else { MIN_LOG_OPACITY };
     let longest = scales[order[0]].clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE);
     Canonical {
         scales: order.map(|k| scales[k].clamp(longest - MAX_THINNESS, longest)),
         order,
         axes: [first, second, third],
         position: geometry.positions[i],
-        log_opacity: log_sigmoid(geometry.opacities[i]).max(MIN_LOG_OPACITY),
+        log_opacity: log_opacity.max(MIN_LOG_OPACITY),
         dc: geometry.dc[i],
     }
 }

@@ -12,6 +12,9 @@ mod codebook;
 mod coder;
 mod entropy;
 mod fit;
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub mod fuzzing;
 mod morton;
 mod neighbours;
 mod pack;

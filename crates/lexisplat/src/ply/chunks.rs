@@ -40,7 +40,7 @@ impl<'a> PlyChunks<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let mut source = Source::open(name, bytes, options)?;
-        let (mut bad, mut normals) = (Vec::<Bad>::new(), false);
+        let (mut bad, mut normals, mut sure) = (Vec::<Bad>::new(), false, 0);
         let mut scratch = empty(&source.layout);
         progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
         for start in (0..source.count).step_by(SCAN_ROWS) {
@@ -49,9 +49,10 @@ impl<'a> PlyChunks<'a> {
             let found = fill(&source.rows, &source.layout, name, range, &mut scratch)?;
             bad.extend(found.bad);
             normals |= found.normals;
+            sure += found.sure;
         }
         progress.end();
-        source.leave_out(&bad, options)?;
+        source.judge(&bad, sure, options)?;
         let dropped = bad.into_iter().flat_map(|b| b.rows).collect();
         Ok(Self { source, dropped, normals })
     }

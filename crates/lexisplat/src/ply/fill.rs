@@ -11,6 +11,11 @@ use crate::error::{Error, Result};
 use crate::parallel::map_vec;
 use crate::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats, for_extra};
 
+/// What an infinite opacity, before the sigmoid, is taken as, with its sign: in f32 the sigmoid of this is 1 and
+/// that of its negative 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply) write such values
+/// for 255 and 0.
+pub(super) const SURE_OPACITY: f32 = 100.0;
+
 /// A scene of this layout without Gaussians.
 pub(super) fn empty(layout: &Layout) -> Splats {
     let extras = layout.extras.iter().map(|(name, field)| {
@@ -100,6 +105,8 @@ struct Piece<'a> {
 struct Found {
     bad: Option<Bad>,
     normals: bool,
+    /// Opacities that were infinite.
+    sure: usize,
 }
 
 /// What filling found.
@@ -109,6 +116,8 @@ pub(super) struct Filled {
     pub(super) bad: Vec<Bad>,
     /// Whether a Gaussian without bad values has a normal.
     pub(super) normals: bool,
+    /// Opacities that were infinite.
+    pub(super) sure: usize,
 }
 
 /// Fills the arrays of `splats`, which was [`empty`] or filled before, with rows `range`; normals left out.
@@ -125,6 +134,7 @@ pub(super) fn fill(
         let found = found?;
         filled.bad.extend(found.bad);
         filled.normals |= found.normals;
+        filled.sure += found.sure;
     }
     Ok(filled)
 }
@@ -196,6 +206,11 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
     layout.dc.read(packed, piece.dc);
     layout.rest.read(packed, piece.rest);
     layout.opacity.read(packed, piece.opacities);
+    let mut sure = 0;
+    for opacity in piece.opacities.iter_mut().filter(|v| v.is_infinite()) {
+        *opacity = SURE_OPACITY.copysign(*opacity);
+        sure += 1;
+    }
     layout.scale.read(packed, piece.scales);
     layout.rotation.read(packed, piece.rotations);
     piece.extras.iter_mut().for_each(|fill| fill(packed));
@@ -214,7 +229,7 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
             .zip(piece.rows.clone())
             .any(|(normal, row)| any_bits(normal) && bad.rows.binary_search(&row).is_err()),
     };
-    Ok(Found { bad, normals: any_normal })
+    Ok(Found { bad, normals: any_normal, sure })
 }
 
 /// The piece's Gaussians with NaN or infinite values, if any.

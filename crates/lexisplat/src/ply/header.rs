@@ -223,6 +223,8 @@ fn parse_property<'a>(
         word => Kind::Scalar(ty(word)?),
     };
     match (words.next(), words.next()) {
+        // No writer could repeat it.
+        (Some(name), None) if name.chars().any(char::is_control) => Err("control characters in the name"),
         (Some(name), None) => Ok(Property { name: name.to_owned(), kind }),
         _ => Err("expected one name after the type"),
     }
@@ -381,6 +383,10 @@ mod tests {
             ("ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n", "unknown type"),
             ("ply\nformat ascii 1.0\nelement v 1\nproperty list float int x\nend_header\n", "integer type"),
             ("ply\nformat ascii 1.0\nelement v 1\nproperty float\nend_header\n", "one name"),
+            (
+                "ply\nformat ascii 1.0\nelement v 1\nproperty uchar la\x05bel\nend_header\n",
+                "'property uchar la\\u{5}bel': control characters",
+            ),
             ("ply\nformat ascii 1.0\nzebra\nend_header\n", "not a PLY keyword"),
             ("ply\nformat ascii 1.0\n\x1b[31m\nend_header\n", "'\\u{1b}[31m'"),
         ];

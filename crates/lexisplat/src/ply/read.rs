@@ -41,18 +41,19 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 
 /// Reads the PLY in `bytes`; messages call it `name`.
 ///
-/// Floats keep their bits; other types become the nearest f32 (with a warning). Memory: the arrays of
+/// Floats keep their bits; other types become the nearest f32 (with a warning). Infinite opacities become 100
+/// and -100, which look the same (with a warning). Memory: the arrays of
 /// the result, at most a few times `bytes`, and next to nothing else.
 ///
 /// # Errors
 /// [`crate::Error::Format`] naming what is wrong: no PLY, a relative of 3DGS that is not supported, a missing
-/// or repeated property, a count that does not match, NaN or infinite values unless
+/// or repeated property, a count that does not match, NaN or (but for opacities) infinite values unless
 /// [`ReadOptions::drop_invalid`]. [`crate::Error::Limit`] if the file asks for more than its limits allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     let mut source = Source::open(name, bytes, options)?;
     let mut splats = empty(&source.layout);
     let found = fill(&source.rows, &source.layout, name, 0..source.count, &mut splats)?;
-    source.leave_out(&found.bad, options)?;
+    source.judge(&found.bad, found.sure, options)?;
     if found.normals {
         fill_normals(&source.rows, &source.layout, 0..source.count, &mut splats)?;
     }

@@ -1,6 +1,6 @@
 //! What is known of a PLY before its values are looked at.
 
-use super::fill::Bad;
+use super::fill::{Bad, SURE_OPACITY};
 use super::header::Header;
 use super::layout::Layout;
 use super::marks::marks;
@@ -49,8 +49,13 @@ impl<'a> Source<'a> {
         Ok(Self { name, rows, layout, count, meta, warnings, summary })
     }
 
-    /// Refuses the rows that are `bad`, or notes that they are left out.
-    pub(super) fn leave_out(&mut self, bad: &[Bad], options: &ReadOptions) -> Result<()> {
+    /// Refuses the rows that are `bad`, or notes that they are left out, and notes `sure` infinite opacities.
+    pub(super) fn judge(&mut self, bad: &[Bad], sure: usize, options: &ReadOptions) -> Result<()> {
+        if sure > 0 {
+            self.warnings.push(format!(
+                "{sure} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)"
+            ));
+        }
         let Some(first) = bad.first() else { return Ok(()) };
         let dropped: usize = bad.iter().map(|b| b.rows.len()).sum();
         let (row, property) = (first.rows.first().copied().unwrap_or(0), first.property.clone());

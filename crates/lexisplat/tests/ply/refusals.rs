@@ -143,7 +143,8 @@ fn bad_values_are_counted_or_dropped() {
     let splats = scene(1, rows, 2);
     for (bad, property) in [
         (f64::NAN, "y"),
-        (f64::INFINITY, "opacity"),
+        (f64::NAN, "opacity"),
+        (f64::INFINITY, "scale_1"),
         (f64::NEG_INFINITY, "f_rest_7"),
         (1e300, "rot_2"),
         (f64::NAN, "nz"),
@@ -189,6 +190,33 @@ fn bad_values_are_counted_or_dropped() {
     }
 }
 
+/// Decoders of 8-bit opacities write the logit of 1 and 0 as it is.
+#[test]
+fn infinite_opacities_are_sure_ones() {
+    let rows = 3000;
+    let splats = scene(1, rows, 2);
+    for ty in [ScalarType::F32, ScalarType::F64] {
+        let mut file = File::new(columns(&splats));
+        file.column("opacity").ty = ty;
+        let values = &mut file.column("opacity").values;
+        (values[0], values[1501], values[2999]) = (f64::INFINITY, f64::NEG_INFINITY, f64::INFINITY);
+        for (format, drop_invalid) in
+            [(Format::BinaryLittleEndian, false), (Format::BinaryBigEndian, true), (Format::Ascii, false)]
+        {
+            file.format = format;
+            let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
+            let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
+            let warning = "3 opacities are infinite, taken as 100 (opaque) or -100 (invisible)";
+            assert!(found.warnings.iter().any(|w| w == warning), "{:?}", found.warnings);
+            assert_eq!(found.source.dropped, 0);
+            let mut expected = splats.clone();
+            let opacities = &mut expected.geometry.opacities;
+            (opacities[0], opacities[1501], opacities[2999]) = (100.0, -100.0, 100.0);
+            assert_same(&found.splats, &expected, "infinite opacities");
+        }
+    }
+}
+
 #[test]
 fn part_of_a_normal_is_dropped_by_name() {
     let found = ply::read_bytes("t.ply", &good().without(&["ny"]).bytes(), &ReadOptions::default()).unwrap();
@@ -207,6 +235,18 @@ fn the_writer_refuses_what_it_could_not_read_back() {
     let mut splats = scene(1, 2, 0);
     splats.sh_rest.pop();
     assert!(ply::write_to(&mut Vec::new(), &splats).is_err());
+}
+
+/// Found by fuzzing: a name that was read but that the writer refused.
+#[test]
+fn names_that_cannot_be_written_are_not_read() {
+    for name in ["la\u{5}bel", "\u{1b}[31mred", "a\0"] {
+        let mut file = good();
+        file.columns.push(Column { name: name.to_owned(), ty: ScalarType::U8, values: vec![0.0; 4] });
+        let said = refuse(&file.bytes());
+        assert!(said.contains("control characters in the name"), "{said}");
+        assert!(!said.contains(char::is_control), "{said:?}");
+    }
 }
 
 #[test]

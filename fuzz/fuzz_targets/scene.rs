@@ -1,0 +1,106 @@
+//! Scenes of any finite values: compressed in every layout, packed, drawn from every kind of view and described,
+//! each with a result that keeps what it promises.
+#![no_main]
+
+use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::{
+    CompressOptions, Error, Layout, Pursuit, Sensitivity, Silent, Splats, compress, lexi, stats,
+};
+use lexisplat_fuzz::made::{Bytes, scene};
+use lexisplat_fuzz::{invariants, limits, one_thread};
+use lexisplat_render::{RenderOptions, Scene, object, orbit, render, room, surround};
+use libfuzzer_sys::fuzz_target;
+
+/// Pixels of the pictures drawn: a few tiles, one of them cut.
+const SIDES: (u32, u32) = (40, 24);
+/// Sums in another order differ by some units in the last place of f64.
+const SUM_SLACK: f64 = 1e-12;
+
+fuzz_target!(init: one_thread(), |data: &[u8]| {
+    let mut bytes = Bytes(data);
+    let (what, how) = (bytes.byte(), bytes.byte());
+    let splats = scene(&mut bytes);
+    match what % 4 {
+        0 => exact(splats, how),
+        1 => packed(&splats, how),
+        2 => drawn(&splats, how),
+        _ => {
+            let lint = stats::lint(&splats).expect("arrays fit");
+            assert!(!format!("{lint:?}").is_empty());
+        }
+    }
+});
+
+fn exact(splats: Splats, how: u8) {
+    let mut options = CompressOptions::default();
+    options.layout = [Layout::F32, Layout::F16, Layout::Paper][usize::from(how % 3)];
+    options.pursuit = if how & 4 == 0 { Pursuit::Ols } else { Pursuit::Omp };
+    options.max_nonzeros = (how & 8 != 0).then_some(2);
+    options.atoms = Some(usize::from(how >> 4) + 1);
+    let original = splats.clone();
+    let model = match compress(splats, &options, &Silent) {
+        Ok((model, _)) => model,
+        Err(Error::Parameter { .. }) => return,
+        Err(error) => panic!("{error}"),
+    };
+    invariants::model(&model);
+    invariants::exact_round_trip(&model);
+    assert_eq!(model.geometry, original.geometry);
+    let tolerance = options.tolerance.unwrap_or(f64::INFINITY);
+    assert!(options.max_nonzeros.is_some() || model.record.max_residual <= tolerance);
+    let dense = model.dense_rest();
+    let dim = original.degree.rest().max(1);
+    for (a, b) in original.sh_rest.chunks(dim).zip(dense.chunks(dim)) {
+        let error = a.iter().zip(b).map(|(x, y)| (f64::from(*x) - f64::from(*y)).powi(2)).sum::<f64>().sqrt();
+        let most = model.record.max_residual * (1.0 + SUM_SLACK);
+        assert!(error <= most, "{error} is over {most}");
+    }
+}
+
+fn packed(splats: &Splats, how: u8) {
+    let mut options = PackOptions::default();
+    options.keep_order = how & 1 == 1;
+    options.tolerance = (how & 2 != 0).then_some(0.1);
+    let sensitivity = if how & 4 == 0 {
+        Sensitivity::guess(&splats.geometry)
+    } else {
+        let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
+        lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &mut || ())
+    };
+    let packer = match Packer::new(splats, &sensitivity, &options) {
+        Ok(packer) => packer,
+        Err(Error::Parameter { .. }) => return,
+        Err(error) => panic!("{error}"),
+    };
+    let step = packer.step_for(f64::from(how >> 3) * 3.0);
+    let packed = match packer.pack(step, &Silent) {
+        Ok((packed, _)) => packed,
+        // Sums that f32 cannot hold.
+        Err(Error::Parameter { name: "values", .. }) => return,
+        Err(error) => panic!("{error}"),
+    };
+    let mut bytes = Vec::new();
+    lexi::write_packed_to(&mut bytes, &packed).expect("written");
+    let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
+    assert_eq!(model.len(), splats.len());
+    invariants::model(&model);
+}
+
+fn drawn(splats: &Splats, how: u8) {
+    let geometry = &splats.geometry;
+    let (width, height) = SIDES;
+    let cameras = match how % 4 {
+        0 => orbit(geometry, 2, width, height),
+        1 => surround(geometry, 2, [width, height], [1.0, 2.0]),
+        2 => room(geometry, 2, width, height),
+        _ => object(geometry, 2, width, height),
+    };
+    for camera in cameras {
+        // A scene as wide as f32 has no view that shows it.
+        if camera.validate().is_err() {
+            continue;
+        }
+        let image = render(&Scene::from(splats), &camera, &RenderOptions::default());
+        assert!(image.pixels.iter().flatten().all(|v| v.is_finite()), "pixels not finite");
+    }
+}

@@ -1,0 +1,282 @@
+//! Writes the first inputs of every fuzz target, made of the procedural sample scene: every dialect, layout and
+//! degree, small.
+//!
+//! `seeds corpus` writes to `corpus/TARGET/seed-NAME`. Built by `cargo fuzz build` with the targets, so that there
+//! is one build.
+
+use std::error::Error;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use lexisplat::packed::fuzzing::parts;
+use lexisplat::packed::{PackOptions, Packer, Promise};
+use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::{
+    CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
+};
+use lexisplat_render::{Camera, orbit};
+// What the build with coverage calls.
+use libfuzzer_sys as _;
+
+type Done = Result<(), Box<dyn Error>>;
+
+/// Gaussians of most seeds: a fuzzer is as quick as its inputs are small.
+const FEW: usize = 6;
+/// Atoms of seeds, so that dictionaries are small.
+const ATOMS: usize = 4;
+
+fn main() -> Done {
+    let root = PathBuf::from(std::env::args_os().nth(1).ok_or("name the folder to write to")?);
+    plys(&root)?;
+    exact(&root)?;
+    packed(&root)?;
+    cameras(&root)?;
+    made(&root)
+}
+
+fn save(root: &Path, target: &str, name: &str, bytes: &[u8]) -> Done {
+    let folder = root.join(target);
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join(format!("seed-{name}")), bytes)?;
+    Ok(())
+}
+
+/// A sample of any degree; beyond 3 the highest coefficients repeat lower ones.
+fn sample(gaussians: usize, degree: ShDegree) -> Splats {
+    let splats = scene(&SampleOptions::new(gaussians, 7));
+    if degree <= splats.degree {
+        return splats.with_degree_cut(degree);
+    }
+    let (from, to) = (splats.degree.rest_per_channel(), degree.rest_per_channel());
+    let longer = |channel: &[f32]| channel.iter().copied().cycle().take(to).collect::<Vec<f32>>();
+    let sh_rest = splats.sh_rest.chunks_exact(from).flat_map(longer).collect();
+    Splats { sh_rest, degree, ..splats }
+}
+
+fn with_extras(mut splats: Splats) -> Splats {
+    let n = u8::try_from(splats.len()).unwrap_or(0);
+    let extra = |name: &str, values| Extra { name: name.to_owned(), values };
+    splats.geometry.extras = vec![
+        extra("label", ExtraValues::U8((0..n).collect())),
+        extra("time", ExtraValues::F64((0..n).map(f64::from).collect())),
+    ];
+    splats.geometry.normals = vec![[0.0, 1.0, 0.0]; splats.len()];
+    splats.meta.comments = vec!["SplatRenderMode: mip".to_owned(), "made for a test".to_owned()];
+    splats
+}
+
+fn degrees() -> impl Iterator<Item = ShDegree> {
+    (0..=4).filter_map(|degree| ShDegree::new(degree).ok())
+}
+
+fn plys(root: &Path) -> Done {
+    for degree in degrees() {
+        let mut bytes = Vec::new();
+        ply::write_to(&mut bytes, &with_extras(sample(3, degree)))?;
+        save(root, "ply", &format!("binary-{degree}"), &bytes)?;
+    }
+    // The same Gaussians as other trainers write them.
+    let degree = ShDegree::ONE;
+    let splats = sample(2, degree);
+    let mut names: Vec<String> = ["x", "y", "z", "f_dc_0", "f_dc_1", "f_dc_2"].map(str::to_owned).to_vec();
+    names.extend((0..degree.rest()).map(|k| format!("f_rest_{k}")));
+    names.extend(
+        ["opacity", "scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"].map(str::to_owned),
+    );
+    let g = &splats.geometry;
+    let row = |i: usize| -> Vec<f32> {
+        let groups: [&[f32]; 6] =
+            [&g.positions[i], &g.dc[i], splats.rest(i), &g.opacities[i..=i], &g.scales[i], &g.rotations[i]];
+        groups.concat()
+    };
+    for (name, format, ty, end) in [
+        ("ascii", "ascii", "float", "\n"),
+        ("ascii-crlf", "ascii", "double", "\r\n"),
+        ("big-endian", "binary_big_endian", "float", "\n"),
+        ("doubles", "binary_little_endian", "float64", "\n"),
+    ] {
+        let mut header = format!("ply{end}format {format} 1.0{end}comment antialiased 1{end}");
+        write!(header, "element vertex {}{end}", splats.len())?;
+        for property in names.iter().rev() {
+            write!(header, "property {ty} {property}{end}")?;
+        }
+        write!(header, "element face 1{end}property list uchar int vertex_indices{end}end_header{end}")?;
+        let mut bytes = header.into_bytes();
+        for i in 0..splats.len() {
+            let row: Vec<f32> = row(i).into_iter().rev().collect();
+            match (format, ty) {
+                ("ascii", _) => {
+                    let words: Vec<String> = row.iter().map(f32::to_string).collect();
+                    bytes.extend_from_slice(format!("{}{end}", words.join(" ")).as_bytes());
+                }
+                ("binary_big_endian", _) => row.iter().for_each(|v| bytes.extend(v.to_be_bytes())),
+                _ => row.iter().for_each(|v| bytes.extend(f64::from(*v).to_le_bytes())),
+            }
+        }
+        let face: &[u8] = if format == "ascii" { b"3 0 1 2\n" } else { &[1, 0, 0, 0, 0] };
+        bytes.extend_from_slice(face);
+        save(root, "ply", name, &bytes)?;
+    }
+    Ok(())
+}
+
+fn exact(root: &Path) -> Done {
+    for layout in [Layout::F32, Layout::F16, Layout::Paper] {
+        for degree in degrees() {
+            let mut splats = with_extras(sample(FEW, degree));
+            // One row that no few atoms come near: an escape.
+            if degree != ShDegree::ZERO {
+                splats.sh_rest[..degree.rest()].fill(1e6);
+            }
+            let mut options = CompressOptions::default();
+            options.layout = layout;
+            options.atoms = Some(if layout == Layout::F32 && degree == ShDegree::ONE { 300 } else { ATOMS });
+            let (model, _) = compress(splats, &options, &Silent)?;
+            let mut bytes = Vec::new();
+            lexi::write_to(&mut bytes, &model)?;
+            let name = format!("{layout}-{degree}");
+            save(root, "lexi", &name, &bytes)?;
+            save(root, "dictionary", &name, &bytes)?;
+            if degree != ShDegree::ZERO {
+                let path = root.join("dictionary").join(format!("seed-alone-{name}"));
+                lexi::write_dictionary(&path, &model.dictionary)?;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn packed(root: &Path) -> Done {
+    for degree in degrees() {
+        for (gaussians, rich) in [(1, false), (2, false), (40, false), (40, true)] {
+            let mut splats = sample(gaussians, degree);
+            let mut options = PackOptions::default();
+            options.atoms = (degree != ShDegree::ZERO).then_some(ATOMS);
+            if rich {
+                splats = with_extras(splats);
+                options.keep_order = true;
+                options.tolerance = Some(0.05);
+                if degree != ShDegree::ZERO {
+                    splats.sh_rest[..degree.rest()].fill(1e6);
+                }
+            }
+            let sensitivity = Sensitivity::guess(&splats.geometry);
+            let packer = Packer::new(&splats, &sensitivity, &options)?;
+            let (mut packed, _) = packer.pack(1e-3, &Silent)?;
+            packed.promise = rich.then(|| Promise::new("size", 3000.0, [31.5, 25.0], 18, false));
+            let mut bytes = Vec::new();
+            lexi::write_packed_to(&mut bytes, &packed)?;
+            let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });
+            save(root, "packed", &name, &bytes)?;
+            if gaussians == 2 {
+                save(root, "dictionary", &format!("packed-{name}"), &bytes)?;
+            }
+            // Tables and data without the container.
+            let mut entropy = vec![0];
+            let [tables, symbols, raw] = parts(&packed);
+            for part in [tables, symbols, raw] {
+                entropy.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
+            }
+            [tables, symbols, raw].iter().for_each(|part| entropy.extend_from_slice(part));
+            entropy.extend((0..64).flat_map(|k| [k, k / 3]));
+            save(root, "entropy", &format!("decode-{name}"), &entropy)?;
+        }
+    }
+    let script: Vec<u8> = (0..60).flat_map(|k: u8| [k, k % 24, k % 3, k, k]).collect();
+    save(root, "entropy", "round-trip", &[&[1][..], &script].concat())
+}
+
+fn cameras(root: &Path) -> Done {
+    let splats = sample(40, ShDegree::ZERO);
+    let views = orbit(&splats.geometry, 3, 64, 48);
+    let json = |camera: &Camera| {
+        serde_json::json!({
+            "id": 0, "img_name": camera.name, "width": camera.width, "height": camera.height,
+            "position": camera.position, "rotation": camera.rotation, "fx": camera.fx, "fy": camera.fy,
+        })
+    };
+    let list: Vec<_> = views.iter().map(json).collect();
+    save(root, "cameras_json", "orbit", serde_json::to_string(&list)?.as_bytes())?;
+    let mut one = list[0].clone();
+    one["split"] = "test".into();
+    save(root, "cameras_json", "split", serde_json::to_string_pretty(&[one])?.as_bytes())?;
+
+    let matrix = |camera: &Camera| -> Vec<[f32; 4]> {
+        let r = &camera.rotation;
+        let row = |i: usize| [r[i][0], -r[i][1], -r[i][2], camera.position[i]];
+        vec![row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+    };
+    let frames: Vec<_> = views
+        .iter()
+        .map(|c| serde_json::json!({"file_path": format!("./images/{}.png", c.name), "transform_matrix": matrix(c)}))
+        .collect();
+    let nerf = serde_json::json!({"camera_angle_x": 0.69, "frames": frames});
+    save(root, "transforms", "nerf", nerf.to_string().as_bytes())?;
+    let nerfstudio = serde_json::json!({
+        "camera_model": "OPENCV", "fl_x": 51.5, "fl_y": 51.0, "cx": 32, "cy": 24.5, "w": 64, "h": 48, "k1": 0,
+        "distortion_params": [0, 0], "is_fisheye": false, "frames": frames,
+        "train_filenames": ["images/orbit_000.png"], "test_filenames": ["./images/orbit_001.png"],
+        "val_filenames": [],
+    });
+    save(root, "transforms", "nerfstudio", serde_json::to_string_pretty(&nerfstudio)?.as_bytes())?;
+    let mut frame = frames[0].clone();
+    for (key, value) in [("fl_x", 51.5), ("w", 64.0), ("h", 48.0), ("camera_angle_y", 0.5)] {
+        frame[key] = value.into();
+    }
+    save(root, "transforms", "frame", serde_json::json!({"frames": [frame]}).to_string().as_bytes())?;
+    colmap(root)
+}
+
+/// Two cameras, two images of each.
+fn colmap(root: &Path) -> Done {
+    let mut files = [2_u64.to_le_bytes().to_vec(), 4_u64.to_le_bytes().to_vec()];
+    for (number, model, parameters) in
+        [(1_u32, 0_u32, &[50.0, 32.0, 24.0][..]), (2, 1, &[50.0, 51.0, 32.0, 24.0])]
+    {
+        files[0].extend(number.to_le_bytes());
+        files[0].extend(model.to_le_bytes());
+        files[0].extend(64_u64.to_le_bytes());
+        files[0].extend(48_u64.to_le_bytes());
+        parameters.iter().for_each(|p: &f64| files[0].extend(p.to_le_bytes()));
+    }
+    for image in 1..=4_u32 {
+        files[1].extend(image.to_le_bytes());
+        [1.0, 0.1, 0.0, 0.2, 0.5, -1.0, f64::from(image)]
+            .iter()
+            .for_each(|v| files[1].extend(v.to_le_bytes()));
+        files[1].extend((1 + image % 2).to_le_bytes());
+        files[1].extend(format!("images/{image}.jpg\0").as_bytes());
+        files[1].extend(1_u64.to_le_bytes());
+        files[1].extend([0; 24]);
+    }
+    save(root, "colmap", "binary", &joined(0, &files[0], &files[1])?)?;
+    let cameras = "# Camera list\n1 SIMPLE_PINHOLE 64 48 50 32 24\n2 PINHOLE 64 48 50 51 32 24\n";
+    let mut images = "# Image list\n# Number of images: 4, mean observations per image: 1\n".to_owned();
+    for image in 1..=4 {
+        let camera = 1 + image % 2;
+        write!(images, "{image} 1 0.1 0 0.2 0.5 -1 {image} {camera} images/{image}.jpg\n1.5 2.5 -1\n")?;
+    }
+    save(root, "colmap", "text", &joined(1, cameras.as_bytes(), images.as_bytes())?)
+}
+
+fn joined(kind: u8, cameras: &[u8], images: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let length = u16::try_from(cameras.len())?.to_le_bytes();
+    Ok([&[kind], &length[..], cameras, images].concat())
+}
+
+/// Scenes as bytes: what to do, how, degree, count, whether copies, then values.
+fn made(root: &Path) -> Done {
+    for what in 0..4_u8 {
+        for degree in 0..5_u8 {
+            for how in [0, 5, 0x1b, 0xf6] {
+                let mut bytes = vec![what, how, degree, 1 + degree * 2, u8::from(how == 5)];
+                bytes.extend(
+                    (0..1200_u32).map(|k| u8::try_from((k * 37 + u32::from(how)) % 0xc0).unwrap_or(0)),
+                );
+                save(root, "scene", &format!("{what}-{degree}-{how}"), &bytes)?;
+            }
+        }
+    }
+    save(root, "scene", "empty", &[0, 0, 3, 0])
+}

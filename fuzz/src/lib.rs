@@ -1,0 +1,25 @@
+//! What the fuzz targets share: a memory bound, limits as a product sets them, mutations of .lexi files
+//! whose checksums fit, and what must hold of anything that was read.
+
+pub mod allocator;
+pub mod container;
+pub mod invariants;
+pub mod made;
+
+use lexisplat::Limits;
+
+/// What a careful product would let a file of unknown origin ask for.
+#[must_use]
+pub fn limits() -> Limits {
+    let mut limits = Limits::default();
+    limits.gaussians = 1 << 20;
+    limits.header_bytes = 1 << 20;
+    limits.properties = 512;
+    limits
+}
+
+/// Makes the calling thread the only worker: no hand-over for every small loop, and results that repeat.
+pub fn one_thread() {
+    // An error says that there is a pool already, which is then this one.
+    let _ = rayon::ThreadPoolBuilder::new().num_threads(1).use_current_thread().build_global();
+}
