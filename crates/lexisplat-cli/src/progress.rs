@@ -73,6 +73,7 @@ impl Progress for Bars {
     fn begin(&self, stage: Stage, total: u64) {
         let (label, unit) = match stage {
             Stage::Learn => ("learning", "rounds"),
+            Stage::Look => ("looking", "Gaussians"),
             Stage::Code => ("coding", "Gaussians"),
             Stage::Read => ("reading", "bytes"),
             Stage::Write => ("writing", "bytes"),

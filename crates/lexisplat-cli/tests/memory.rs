@@ -12,7 +12,7 @@ const LITTLE: [&str; 2] = ["--memory", "100kB"];
 fn a_scene_larger_than_memory_is_packed_in_parts() {
     let folder = Folder::new();
     let report = folder.json(&[&["compress", "scene.ply", "--keep-order"], &LITTLE[..]].concat());
-    assert_eq!((&report["importance"], &report["layout"]), (&"guess".into(), &"packed".into()));
+    assert_eq!((&report["importance"], &report["layout"]), (&"views".into(), &"packed".into()));
     let bytes = std::fs::read(folder.path("scene.lexi")).unwrap();
     assert_eq!(report["file_bytes"], bytes.len());
     let listed = report["attribute_bytes"].as_object().unwrap().values().map(|v| v.as_f64().unwrap());
@@ -30,8 +30,24 @@ fn a_scene_larger_than_memory_is_packed_in_parts() {
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     assert!(!before.geometry.positions.iter().zip(&after.geometry.positions).any(far), "out of order");
     let text = folder.run(&[&["compress", "scene.ply", "--overwrite"], &LITTLE[..]].concat());
-    assert!(text.contains("guessed"), "{text}");
+    assert!(text.contains("part by part"), "{text}");
     assert_eq!(folder.names(), ["back.ply", "scene.lexi", "scene.ply"]);
+}
+
+#[test]
+fn what_shows_can_be_guessed_whatever_the_memory() {
+    let folder = Folder::new();
+    let report = folder.json(&["compress", "scene.ply", "--guess", "-o", "much.lexi"]);
+    assert_eq!((&report["importance"], &report["look_seconds"]), (&"guess".into(), &0.0.into()));
+    let text =
+        folder.run(&[&["compress", "scene.ply", "--guess", "-o", "little.lexi"], &LITTLE[..]].concat());
+    assert!(text.contains("guessed"), "{text}");
+    folder.run(&[&["compress", "scene.ply", "-o", "looked.lexi"], &LITTLE[..]].concat());
+    let file = |name: &str| std::fs::read(folder.path(name)).unwrap();
+    assert!(file("much.lexi") == file("little.lexi"));
+    assert!(file("looked.lexi") != file("little.lexi"));
+    let error = folder.fail(&["compress", "scene.ply", "--guess", "--psnr", "40"], 2);
+    assert!(error.contains("--guess") && error.contains("--psnr"), "{error}");
 }
 
 #[test]

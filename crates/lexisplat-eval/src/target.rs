@@ -72,6 +72,14 @@ impl Views {
         }
     }
 
+    /// Views from all around a part of a scene, only to see what shows in it: none of them judges. As many as
+    /// for a large scene.
+    #[must_use]
+    pub fn of_part(part: &Splats) -> Self {
+        let measure = surround(&part.geometry, *GENERATED_VIEWS.start(), GENERATED_SIZE, GENERATED_DISTANCES);
+        Self { measure, judge: Vec::new(), given: false }
+    }
+
     /// The given cameras; those marked as training ones where there are marks.
     ///
     /// # Errors

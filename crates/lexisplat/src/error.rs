@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// Result with this crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Any failure of the codec. The variant tells whose fault it is.
 #[derive(Debug, thiserror::Error)]

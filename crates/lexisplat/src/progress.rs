@@ -22,6 +22,8 @@ pub enum Stage {
     Read,
     /// Learning the dictionary, in rounds.
     Learn,
+    /// Drawing parts of the scene to see what shows, in Gaussians.
+    Look,
     /// Coding, in Gaussians.
     Code,
     /// Writing a file, in bytes.

@@ -81,6 +81,24 @@ impl Sensitivity {
         filter(&mut self.removal, keep);
     }
 
+    /// Appends that of further Gaussians.
+    pub(crate) fn append(&mut self, mut other: Self) {
+        self.colour.append(&mut other.colour);
+        self.opacity.append(&mut other.opacity);
+        self.position.append(&mut other.position);
+        self.scale.append(&mut other.scale);
+        self.rotation.append(&mut other.rotation);
+        self.removal.append(&mut other.removal);
+    }
+
+    /// What it is if the pictures are only `share` of all there are, and the others do not show these
+    /// Gaussians.
+    pub(crate) fn share(&mut self, share: f32) {
+        let shapes = self.position.as_flattened_mut().iter_mut();
+        let shapes = shapes.chain(self.scale.as_flattened_mut()).chain(self.rotation.as_flattened_mut());
+        self.colour.iter_mut().chain(&mut self.opacity).chain(shapes).for_each(|v| *v *= share);
+    }
+
     /// An estimate from the Gaussians alone: what is opaque and large shows. Knows nothing of what hides
     /// what, so files made with it are larger for the same quality than with a measured one.
     #[must_use]

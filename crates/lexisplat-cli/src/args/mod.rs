@@ -127,9 +127,13 @@ pub(crate) struct Compress {
     /// Leave out Gaussians with NaN or infinite values instead of refusing the file.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
-    /// Memory that packing may take, about. A scene that needs more is packed part by part: what shows is then
-    /// guessed, not looked at, so of the qualities only --preset can be had. Files of the other layouts are
-    /// the same whatever the memory.
+    /// Guess what shows from each Gaussian alone instead of looking at the scene: several times faster, and
+    /// larger files of the same quality. Of the qualities only --preset can be had.
+    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "prune"])]
+    pub(crate) guess: bool,
+    /// Memory that packing may take, about. A scene that needs more is packed part by part: each part is looked
+    /// at alone, and of the qualities only --preset can be had. Files of the other layouts are the same
+    /// whatever the memory.
     #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// What looks at the scene and judges pictures: `cpu`, so that the same input gives the same file
@@ -151,8 +155,9 @@ impl Compress {
     }
 
     /// Options that only packed files have, as given.
-    fn packed_only(&self) -> [(&'static str, bool); 8] {
+    fn packed_only(&self) -> [(&'static str, bool); 9] {
         [
+            ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
             ("--psnr", self.psnr.is_some()),
             ("--min-psnr", self.min_psnr.is_some()),

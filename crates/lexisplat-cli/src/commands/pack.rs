@@ -1,12 +1,14 @@
 //! `lexisplat compress` in the packed layout.
 
+use std::cell::Cell;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::{PlyChunks, PlyRead};
-use lexisplat::{Error, Progress, lexi, stream};
+use lexisplat::stream::Importance;
+use lexisplat::{Error, Progress, Splats, lexi, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
@@ -83,6 +85,7 @@ pub(crate) fn run(
         report: &report,
         pruned,
         looked: true,
+        in_parts: false,
         ply_bytes: read.source.file_bytes,
         file_bytes,
         seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
@@ -99,11 +102,16 @@ fn options(args: &Compress) -> PackOptions {
     options
 }
 
-/// Whether a PLY of `bytes` bytes takes more memory to pack than there may be.
+/// Whether to pack a PLY of `bytes` bytes part by part: it takes more memory than there may be, or nothing
+/// looks at it.
 ///
 /// # Errors
 /// It does, and an option needs all of it.
 pub(crate) fn is_large(args: &Compress, bytes: usize) -> Result<bool> {
+    if args.guess {
+        // What looking needs memory for is not done.
+        return Ok(true);
+    }
     let needed = (bytes as u64).saturating_mul(MEMORY_PER_BYTE);
     if needed <= args.memory {
         return Ok(false);
@@ -131,13 +139,27 @@ pub(crate) fn run_in_parts(
     let options = options(args);
     let decibels = args.preset.unwrap_or_default().decibels();
     let clock = Instant::now();
+    let mut renderer = if args.guess { Renderer::cpu() } else { Renderer::open(args.device)? };
+    let device = renderer.is_gpu().then(|| renderer.name().to_owned());
+    let mut look_seconds = 0.0;
+    let mut judge = |part: &Splats| {
+        let clock = Instant::now();
+        let seen = Views::of_part(part).sensitivity(&mut renderer, part, &mut || ());
+        look_seconds += clock.elapsed().as_secs_f64();
+        seen
+    };
+    let importance =
+        if args.guess { Importance::Guess } else { Importance::Judge { judge: &mut judge, device } };
+    // Either one or the other writes.
+    let importance = Cell::new(Some(importance));
+    let once = || importance.take().unwrap_or(Importance::Guess);
     let done = write_output(
         output,
-        |path| stream::pack_file(ply, &options, decibels, path, bars),
-        |out| stream::pack_to(ply, &options, decibels, out, bars),
+        |path| stream::pack_file(ply, once(), &options, decibels, path, bars),
+        |out| stream::pack_to(ply, once(), &options, decibels, out, bars),
     )?;
     let file_bytes = done.file_bytes();
-    let pack_seconds = clock.elapsed().as_secs_f64();
+    let pack_seconds = clock.elapsed().as_secs_f64() - look_seconds;
     let outcome = Outcome {
         output,
         packed: &done.head,
@@ -145,10 +167,11 @@ pub(crate) fn run_in_parts(
         tensors: done.tensor_bytes,
         report: &done.report,
         pruned: None,
-        looked: false,
+        looked: !args.guess,
+        in_parts: true,
         ply_bytes: ply.summary().file_bytes,
         file_bytes,
-        seconds: [read_seconds, 0.0, pack_seconds, 0.0, start.elapsed().as_secs_f64()],
+        seconds: [read_seconds, look_seconds, pack_seconds, 0.0, start.elapsed().as_secs_f64()],
     };
     tell(common, output, || Ok(outcome.json(ply.warnings())), || outcome.text())
 }
@@ -202,6 +225,8 @@ struct Outcome<'a> {
     pruned: Option<Pruned>,
     /// Whether views said what shows, or a guess.
     looked: bool,
+    /// Whether the scene was never whole in memory.
+    in_parts: bool,
     ply_bytes: u64,
     file_bytes: u64,
     /// Reading, looking, packing, writing, everything.
@@ -310,9 +335,12 @@ impl Outcome<'_> {
         let attributes = attribute_bytes(&self.tensors, &self.streams);
         let parts: Vec<String> = attributes.iter().map(bits).collect();
         line("bits each", parts.join(", "))?;
-        if !self.looked {
-            let why = "larger than --memory, so packed part by part; what shows was guessed";
-            line("scene", why.to_owned())?;
+        match (self.looked, self.in_parts) {
+            (false, _) => line("scene", "what shows was guessed".to_owned())?,
+            (true, true) => {
+                line("scene", "larger than --memory, so looked at and packed part by part".to_owned())?;
+            }
+            (true, false) => {}
         }
         let [read, look, pack, write, all] = self.seconds;
         line(

@@ -49,7 +49,8 @@ impl Fit {
             Classes::fit(scene.iter().map(|g| sensitivity.colour[g.index()])),
             Classes::fit(scene.iter().map(|g| sensitivity.opacity[g.index()])),
         ];
-        let classes: Vec<[u8; 2]> = scene.iter().map(|g| of(kinds, sensitivity, g.index())).collect();
+        let weights = |g: &Placed| [sensitivity.colour[g.index()], sensitivity.opacity[g.index()]];
+        let classes: Vec<[u8; 2]> = scene.iter().map(|g| of(kinds, weights(g))).collect();
         let (dc_mean, dc_axes) = colour_axes(geometry, scene);
         let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
         let mut parameters = Parameters {
@@ -77,9 +78,10 @@ impl Fit {
         Self { parameters, classes, kinds }
     }
 
-    /// Colour and shape class of each Gaussian of another part of the scene, in the order of `sensitivity`.
-    pub(super) fn classes_of(&self, sensitivity: &Sensitivity) -> Vec<[u8; 2]> {
-        (0..sensitivity.len()).map(|i| of(self.kinds, sensitivity, i)).collect()
+    /// Colour and shape class of each Gaussian of another part of the scene, of which `weights` are its
+    /// sensitivities to colour and opacity.
+    pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
+        weights.iter().map(|&weights| of(self.kinds, weights)).collect()
     }
 
     /// The parameters for an overall step: about the square root of the mean squared error of pictures
@@ -90,9 +92,9 @@ impl Fit {
     }
 }
 
-/// Colour and shape class of Gaussian `i`.
-fn of(kinds: [Classes; 2], sensitivity: &Sensitivity, i: usize) -> [u8; 2] {
-    [kinds[0].of(sensitivity.colour[i]), kinds[1].of(sensitivity.opacity[i])]
+/// Colour and shape class of a Gaussian of these sensitivities to colour and opacity.
+fn of(kinds: [Classes; 2], [colour, opacity]: [f32; 2]) -> [u8; 2] {
+    [kinds[0].of(colour), kinds[1].of(opacity)]
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]

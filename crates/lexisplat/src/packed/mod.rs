@@ -27,6 +27,7 @@ mod unpack;
 mod walk;
 
 pub(crate) use canonical::{Bounds, Grid, Placed};
+pub(crate) use pack::check;
 pub(crate) use parts::{PartPacker, Whole};
 pub(crate) use unpack::Decoder;
 

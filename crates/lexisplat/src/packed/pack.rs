@@ -41,7 +41,7 @@ pub struct PackOptions {
 
 impl PackOptions {
     /// Refuses what is out of range.
-    pub(super) fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         if let Some(atoms) = self.atoms
             && !(1..=MAX_ATOMS).contains(&atoms)
         {
@@ -206,7 +206,7 @@ pub(super) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
 }
 
 /// Refuses scenes and sensitivities that do not go together or are not finite.
-pub(super) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
+pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
     splats.validate()?;
     Limits::check("Gaussians", splats.len() as u64, Limits::default().gaussians)?;
     let weights = [

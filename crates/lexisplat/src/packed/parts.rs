@@ -96,17 +96,11 @@ impl PartPacker {
         })
     }
 
-    /// Codes the next Gaussians, whole chunks unless they are the last; `places` says of each its cell and
-    /// its index in the source.
-    pub(crate) fn push(
-        &mut self,
-        splats: &Splats,
-        sensitivity: &Sensitivity,
-        places: &[Placed],
-    ) -> Result<()> {
-        check(splats, sensitivity)?;
+    /// Codes the next Gaussians, whole chunks unless they are the last. `weights` are the sensitivities of
+    /// each to colour and opacity, and `places` its cell and its index in the source; all was checked.
+    pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[Placed]) -> Result<()> {
         self.gaussians += splats.len();
-        let classes = self.fit.classes_of(sensitivity);
+        let classes = self.fit.classes_of(weights);
         let scene: Vec<Placed> = (0..).zip(places).map(|(source, p)| Placed { source, ..*p }).collect();
         let view = View { splats, scene: &scene, classes: &classes };
         let coder = &self.coder;
@@ -129,9 +123,11 @@ impl PartPacker {
     }
 
     /// The packed scene, what is as long as the scene set aside; the report; and what the streams take.
+    /// `drawn_on` is the GPU that looked, if one did.
     pub(crate) fn finish(
         self,
         folder: &Path,
+        drawn_on: Option<&str>,
     ) -> Result<(Packed, SpilledPacked, PackReport, Vec<StreamBits>)> {
         let tables = tables(&self.histograms)?;
         let spent = spent(&self.histograms, &self.raw_bits, &tables);
@@ -166,7 +162,7 @@ impl PartPacker {
             extras: Vec::new(),
             order: None,
             promise: None,
-            drawn_on: None,
+            drawn_on: drawn_on.map(str::to_owned),
             parameters: self.coder.parameters.to_list(),
             tables: tables.write(),
             lengths,

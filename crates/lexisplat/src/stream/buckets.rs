@@ -69,13 +69,23 @@ impl Buckets {
         Ok(())
     }
 
-    /// All records of bucket `bucket`. Buckets are taken in order, once.
+    /// All records of bucket `bucket`, which is empty after. Buckets are taken in order.
     pub(super) fn take(&mut self, bucket: usize) -> Result<Vec<u8>> {
-        let Bucket { pending, written } = std::mem::take(&mut self.buckets[bucket]);
+        let out = self.read(bucket)?;
+        self.buckets[bucket] = Bucket::default();
+        if (bucket + 1).is_multiple_of(self.shared) {
+            self.files[bucket / self.shared] = None;
+        }
+        Ok(out)
+    }
+
+    /// All records of bucket `bucket`.
+    pub(super) fn read(&mut self, bucket: usize) -> Result<Vec<u8>> {
+        let Bucket { pending, written } = &self.buckets[bucket];
         let mut out = vec![0; written.iter().map(|w| w.1).sum()];
         if let Some(file) = &mut self.files[bucket / self.shared] {
             let mut rest = out.as_mut_slice();
-            for (at, len) in written {
+            for &(at, len) in written {
                 let (block, tail) = std::mem::take(&mut rest).split_at_mut(len);
                 file.seek(SeekFrom::Start(at))
                     .and_then(|_| file.read_exact(block))
@@ -83,10 +93,7 @@ impl Buckets {
                 rest = tail;
             }
         }
-        if (bucket + 1).is_multiple_of(self.shared) {
-            self.files[bucket / self.shared] = None;
-        }
-        out.extend_from_slice(&pending);
+        out.extend_from_slice(pending);
         Ok(out)
     }
 }
@@ -110,6 +117,7 @@ mod tests {
             expected[bucket].extend(record.concat());
         }
         for (bucket, expected) in expected.into_iter().enumerate() {
+            assert!(buckets.read(bucket).unwrap() == expected, "{bucket}");
             assert!(buckets.take(bucket).unwrap() == expected, "{bucket}");
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

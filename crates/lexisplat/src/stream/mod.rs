@@ -28,6 +28,7 @@ mod buckets;
 mod compress;
 mod counted;
 mod decompress;
+mod importance;
 mod order;
 mod pack;
 mod source_order;
@@ -35,6 +36,7 @@ mod survey;
 
 pub use compress::{Compressed, compress_file, compress_to};
 pub use decompress::{decompress_file, decompress_to};
+pub use importance::Importance;
 pub use pack::{PackedFile, pack_file, pack_to};
 pub use source_order::in_source_order;
 pub use survey::{Survey, lint_ply, survey};

@@ -3,15 +3,17 @@
 use std::path::Path;
 
 use super::buckets::Buckets;
-use crate::error::Result;
-use crate::packed::{Bounds, Grid, Placed};
+use super::importance::Importance;
+use crate::error::{Error, Result};
+use crate::packed::{Bounds, Grid, Placed, check};
 use crate::ply::{PlyChunks, RowBytes};
 use crate::progress::{Progress, Stage};
 use crate::rng::SplitMix64;
-use crate::sensitivity::guessed_total;
+use crate::sensitivity::{Sensitivity, guessed_total};
+use crate::spill::{Spill, Spilled};
 use crate::splats::Splats;
 
-/// How much is held at a time. The first two do not show in the file.
+/// How much is held at a time. The first does not show in the file, the second only if parts are judged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     /// Gaussians read together.
@@ -36,10 +38,21 @@ pub(super) struct Ordered {
     pub(super) grid: Grid,
     /// Sum over all Gaussians of what their weights are guessed from.
     pub(super) guessed_total: f64,
-    /// Some of the Gaussians, in order.
-    pub(super) sample: Splats,
     rows: RowBytes,
     buckets: Buckets,
+    gaussians: usize,
+    /// Where runs end, and one run in how many is of the sample.
+    runs: (Vec<Placed>, usize),
+}
+
+/// What is known when all Gaussians were judged.
+pub(super) struct Judged {
+    /// Some of the Gaussians, in order.
+    pub(super) sample: Splats,
+    /// Theirs.
+    pub(super) sensitivity: Sensitivity,
+    /// Sensitivities to colour and opacity of all Gaussians, in order, as pairs of f32.
+    pub(super) weights: Spilled,
 }
 
 impl Ordered {
@@ -66,7 +79,7 @@ impl Ordered {
                 f(start, splats)?;
                 progress.advance(range.len() as u64 * row_bytes);
             }
-            Ok::<(), crate::Error>(())
+            Ok::<(), Error>(())
         };
         each_chunk(&mut splats, &mut |start, splats| {
             let geometry = &splats.geometry;
@@ -94,33 +107,61 @@ impl Ordered {
 
         let rows = RowBytes::new(&ply.empty());
         let mut buckets = Buckets::new(folder, bucket_ends.len() + 1)?;
-        let (mut bytes, mut sampled) = (Vec::new(), Vec::new());
+        let mut bytes = Vec::new();
         each_chunk(&mut splats, &mut |start, splats| {
             rows.pack(splats, &mut bytes);
             for (i, row) in bytes.chunks_exact(rows.bytes()).enumerate() {
                 let key = placed(&grid, splats.geometry.positions[i], start + i);
                 let record = [&key.cell.to_le_bytes()[..], &key.source.to_le_bytes(), row];
-                if run_ends.partition_point(|end| *end <= key).is_multiple_of(every) {
-                    record.iter().for_each(|part| sampled.extend_from_slice(part));
-                }
                 buckets.push(bucket_ends.partition_point(|end| *end <= key), &record)?;
             }
             Ok(())
         })?;
         progress.end();
-        let mut sample = Vec::new();
-        in_order(&sampled, &rows, &mut sample, &mut Vec::new());
-        drop(sampled);
-        let sample = rows.unpack(&sample)?;
-        Ok(Self { grid, guessed_total: total, sample, rows, buckets })
+        Ok(Self { grid, guessed_total: total, rows, buckets, gaussians: n, runs: (run_ends, every) })
     }
 
-    /// Hands all Gaussians to `take` in order, with their places: a multiple of `chunk` of them each time
-    /// but the last.
+    /// Has all Gaussians judged, bucket by bucket.
+    pub(super) fn judge<E: From<Error>>(
+        &mut self,
+        importance: &mut Importance<'_, E>,
+        folder: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Judged, E> {
+        let (mut sample, mut sensitivity) = (Vec::new(), Sensitivity::default());
+        let mut weights = Spill::new(folder)?;
+        progress.begin(Stage::Look, self.gaussians as u64);
+        for bucket in 0..self.buckets.len() {
+            let (mut bytes, mut places) = (Vec::new(), Vec::new());
+            in_order(&self.buckets.read(bucket)?, &self.rows, &mut bytes, &mut places);
+            let splats = self.rows.unpack(&bytes)?;
+            let mut found = importance.of(&splats, self.gaussians, self.guessed_total)?;
+            check(&splats, &found)?;
+            let pairs: Vec<[f32; 2]> =
+                found.colour.iter().zip(&found.opacity).map(|(&c, &o)| [c, o]).collect();
+            weights.push(&pairs)?;
+            let (ends, every) = &self.runs;
+            let sampled = |key: &Placed| ends.partition_point(|end| end <= key).is_multiple_of(*every);
+            let keep: Vec<bool> = places.iter().map(sampled).collect();
+            for (row, _) in bytes.chunks_exact(self.rows.bytes()).zip(&keep).filter(|(_, keep)| **keep) {
+                sample.extend_from_slice(row);
+            }
+            found.retain(&keep);
+            sensitivity.append(found);
+            progress.advance(splats.len() as u64);
+        }
+        progress.end();
+        let sample = self.rows.unpack(&sample)?;
+        Ok(Judged { sample, sensitivity, weights: weights.finish()? })
+    }
+
+    /// Hands all Gaussians to `take` in order, with their `weights` and their places: a multiple
+    /// of `chunk` of them each time but the last.
     pub(super) fn each(
         mut self,
+        mut weights: Spilled,
         chunk: usize,
-        take: &mut dyn FnMut(&Splats, &[Placed]) -> Result<()>,
+        take: &mut dyn FnMut(&Splats, &[[f32; 2]], &[Placed]) -> Result<()>,
     ) -> Result<()> {
         let (mut bytes, mut places) = (Vec::new(), Vec::new());
         let count = self.buckets.len();
@@ -130,7 +171,7 @@ impl Ordered {
             let whole = if last { places.len() } else { places.len() / chunk * chunk };
             if whole > 0 {
                 let splats = self.rows.unpack(&bytes[..whole * self.rows.bytes()])?;
-                take(&splats, &places[..whole])?;
+                take(&splats, &weights.take(whole)?, &places[..whole])?;
                 bytes.drain(..whole * self.rows.bytes());
                 places.drain(..whole);
             }

@@ -4,7 +4,8 @@ use std::io::Write;
 use std::path::Path;
 
 use super::counted::Counted;
-use super::order::{Ordered, Sizes};
+use super::importance::Importance;
+use super::order::{Judged, Ordered, Sizes};
 use crate::compress::AT_ONCE;
 use crate::error::{Error, Result};
 use crate::lexi::write_spilled_packed;
@@ -13,16 +14,10 @@ use crate::output::{folder_of, write_whole};
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
 use crate::ply::PlyChunks;
 use crate::progress::{Progress, Stage};
-use crate::sensitivity::Sensitivity;
 
 /// Peak of anonymous memory is below 1.5 GiB with these, at SH degree 3.
 const SIZES: Sizes =
     Sizes { at_once: AT_ONCE, bucket: 8 * CHUNK, looked_at: 1 << 20, sample: 1 << 19, run: 2048 };
-
-/// What views measure of the squared weights that a guess sums to 1: where several Gaussians share a pixel,
-/// or none is, squares sum to less. Without it files came out 7 to 9 dB better than asked (leica-brush,
-/// fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
-const SHOWN: f64 = 0.1;
 
 /// What [`pack_file`] did.
 #[derive(Debug, Clone)]
@@ -49,21 +44,23 @@ impl PackedFile {
 
 /// Packs `ply` to the file `output`, whole or not at all, so that pictures are about `decibels` good.
 ///
-/// What shows is guessed ([`Sensitivity::guess`]); steps, predictors and dictionary are found from some half
-/// a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but the same on any
-/// number of threads.
+/// What shows is judged part by part (`importance`); steps, predictors and dictionary are found from some
+/// half a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but the same on
+/// any number of threads.
 ///
 /// # Errors
-/// [`Error::Parameter`] for options out of range and values so large that sums of them leave f32;
-/// [`Error::Io`] for `output` and for temporary files beside it.
-pub fn pack_file(
+/// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
+/// importances that do not fit their part or are not finite; [`Error::Io`] for `output` and for temporary
+/// files beside it; what `importance` returns.
+pub fn pack_file<E: From<Error>>(
     ply: &PlyChunks<'_>,
+    importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
     output: &Path,
     progress: &dyn Progress,
-) -> Result<PackedFile> {
-    run(ply, options, decibels, folder_of(output), SIZES, progress, |fill| {
+) -> Result<PackedFile, E> {
+    run(ply, importance, options, decibels, folder_of(output), SIZES, progress, |fill| {
         write_whole(output, |writer| fill(writer).map_err(|e| Error::io(output, e)))
     })
 }
@@ -72,45 +69,46 @@ pub fn pack_file(
 ///
 /// # Errors
 /// As [`pack_file`]; an [`Error::Io`] of the writer names no file.
-pub fn pack_to(
+pub fn pack_to<E: From<Error>>(
     ply: &PlyChunks<'_>,
+    importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
     writer: &mut impl Write,
     progress: &dyn Progress,
-) -> Result<PackedFile> {
-    run(ply, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill| {
+) -> Result<PackedFile, E> {
+    run(ply, importance, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill| {
         fill(writer).map_err(|e| Error::io("output", e))
     })
 }
 
-fn run(
+#[expect(clippy::too_many_arguments, reason = "those of the two above, and what differs between them")]
+fn run<E: From<Error>>(
     ply: &PlyChunks<'_>,
+    mut importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
     folder: &Path,
     sizes: Sizes,
     progress: &dyn Progress,
     write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<()>,
-) -> Result<PackedFile> {
+) -> Result<PackedFile, E> {
     let n = ply.len();
     Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
+    options.check()?;
     let mut ordered = Ordered::new(ply, sizes, options.seed, folder, progress)?;
-    let total = ordered.guessed_total / SHOWN;
-    let sample = std::mem::replace(&mut ordered.sample, ply.empty());
-    let sensitivity = Sensitivity::guess_part(&sample.geometry, total);
+    let Judged { sample, sensitivity, weights } = ordered.judge(&mut importance, folder, progress)?;
     let whole = Whole { gaussians: n, grid: ordered.grid, decibels };
     let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, folder, progress)?;
     drop((sample, sensitivity));
     progress.begin(Stage::Code, n as u64);
-    ordered.each(CHUNK, &mut |splats, places| {
-        let sensitivity = Sensitivity::guess_part(&splats.geometry, total);
-        packer.push(splats, &sensitivity, places)?;
+    ordered.each(weights, CHUNK, &mut |splats, weights, places| {
+        packer.push(splats, weights, places)?;
         progress.advance(splats.len() as u64);
         Ok(())
     })?;
     progress.end();
-    let (head, spilled, report, stream_bits) = packer.finish(folder)?;
+    let (head, spilled, report, stream_bits) = packer.finish(folder, importance.device())?;
     let tensor_bytes = write_spilled_packed(&head, spilled, |fill, bytes| {
         progress.begin(Stage::Write, bytes);
         write(&mut |writer| fill(&mut Counted { writer, progress }))?;
@@ -124,6 +122,8 @@ fn run(
 mod tests {
     use super::*;
     use crate::packed::Packer;
+    use crate::sensitivity::{Sensitivity, guessed_total};
+    use crate::stream::importance::SHOWN;
     use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply, sample};
 
     fn scene(count: usize) -> Splats {
@@ -138,18 +138,18 @@ mod tests {
         PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
     }
 
-    fn streamed(splats: &Splats, sizes: Sizes) -> (Vec<u8>, PackedFile) {
+    fn streamed(splats: &Splats, importance: Importance<'_>, sizes: Sizes) -> Result<(Vec<u8>, PackedFile)> {
         let mut bytes = Vec::new();
         ply::write_to(&mut bytes, splats).unwrap();
         let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut out = Vec::new();
-        let done = run(&chunks, &options(), 38.0, folder.path(), sizes, &Silent, |fill| {
+        let write = |fill: &mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>| {
             fill(&mut out).map_err(|e| Error::io("out", e))
-        })
-        .unwrap();
+        };
+        let done = run(&chunks, importance, &options(), 38.0, folder.path(), sizes, &Silent, write);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        (out, done)
+        done.map(|done| (out, done))
     }
 
     /// Everything fits in one bucket and is of the sample: then nothing is left to differ.
@@ -158,9 +158,19 @@ mod tests {
         for count in [CHUNK + 500, 700, 0] {
             let splats = scene(count);
             let all = Sizes { sample: count.max(1), looked_at: count.max(1), ..SIZES };
-            let (found, done) = streamed(&splats, all);
-            let total = crate::sensitivity::guessed_total(0.0, &splats.geometry) / SHOWN;
+            let total = guessed_total(0.0, &splats.geometry) / SHOWN;
             let sensitivity = Sensitivity::guess_part(&splats.geometry, total);
+            let (found, done) = streamed(&splats, Importance::Guess, all).unwrap();
+            // A judge that says of each Gaussian what the guess says.
+            let mut judge = |part: &Splats| {
+                assert_eq!(part.len(), splats.len());
+                Ok(Sensitivity::guess_part(&part.geometry, total))
+            };
+            assert!(
+                streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, all).unwrap().0
+                    == found,
+                "{count}"
+            );
             let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
             let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
             let mut expected = Vec::new();
@@ -178,12 +188,15 @@ mod tests {
     fn many_small_buckets_and_a_small_sample_make_a_file_that_is_as_good() {
         let splats = scene(2 * CHUNK + 2000);
         let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
-        let (found, done) = streamed(&splats, small);
-        let (whole, _) = streamed(&splats, SIZES);
+        let (found, done) = streamed(&splats, Importance::Guess, small).unwrap();
+        let (whole, _) = streamed(&splats, Importance::Guess, SIZES).unwrap();
         let ratio = found.len() as f64 / whole.len() as f64;
         assert!((0.97..1.03).contains(&ratio), "{ratio}");
         let other = Sizes { at_once: 10_000, bucket: 20_000, ..small };
-        assert!(streamed(&splats, other).0 == found, "what is held at a time shows");
+        assert!(
+            streamed(&splats, Importance::Guess, other).unwrap().0 == found,
+            "what is held at a time shows"
+        );
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
         // The order was kept, so each Gaussian is where it was.
         assert_eq!(model.geometry.extras, splats.geometry.extras);
@@ -198,11 +211,46 @@ mod tests {
     }
 
     #[test]
+    fn every_gaussian_is_judged_once_beside_its_neighbours() {
+        let splats = scene(12_000);
+        let small = Sizes { at_once: 4096, bucket: 3000, looked_at: 3000, sample: 6000, run: 500 };
+        let mut seen = Vec::new();
+        let mut parts = 0;
+        let mut judge = |part: &Splats| {
+            let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
+            seen.extend_from_slice(numbers);
+            parts += 1;
+            Ok(Sensitivity::guess(&part.geometry))
+        };
+        let (found, _) =
+            streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, small).unwrap();
+        assert_eq!(parts, 4);
+        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+        assert_eq!(model.geometry.extras, splats.geometry.extras);
+        seen.sort_unstable();
+        assert!(seen.into_iter().eq(0..12_000));
+    }
+
+    #[test]
+    fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
+        let splats = scene(700);
+        let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
+            streamed(&splats, Importance::Judge { judge, device: None }, SIZES).unwrap_err().to_string()
+        };
+        let error = refused(&mut |part| Ok(Sensitivity::zeros(part.len() - 1)));
+        assert!(error.contains("699") && error.contains("700"), "{error}");
+        let mut broken = Sensitivity::zeros(700);
+        broken.opacity[3] = f32::NAN;
+        assert!(refused(&mut |_| Ok(broken.clone())).contains("NaN"));
+        assert_eq!(refused(&mut |_| Err(Error::parameter("view", 7, "none"))), "view = 7: expected none");
+    }
+
+    #[test]
     fn gaussians_in_one_place_do_not_make_one_bucket_of_all() {
         let mut splats = scene(5000);
         splats.geometry.positions.fill([1.0; 3]);
         let small = Sizes { at_once: 1000, bucket: 700, looked_at: 1000, sample: 2000, run: 100 };
-        let (found, _) = streamed(&splats, small);
+        let (found, _) = streamed(&splats, Importance::Guess, small).unwrap();
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
         assert_eq!(model.geometry.extras, splats.geometry.extras);
     }
