@@ -242,7 +242,7 @@ mod tests {
         let mut broken = Sensitivity::zeros(700);
         broken.opacity[3] = f32::NAN;
         assert!(refused(&mut |_| Ok(broken.clone())).contains("NaN"));
-        assert_eq!(refused(&mut |_| Err(Error::parameter("view", 7, "none"))), "view = 7: expected none");
+        assert_eq!(refused(&mut |_| Err(Error::parameter("view", 7, "none"))), "view = 7: none");
     }
 
     #[test]
