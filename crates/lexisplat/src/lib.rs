@@ -67,6 +67,7 @@ pub mod ply;
 mod progress;
 pub mod pursuit;
 mod rng;
+mod room;
 pub mod sample;
 mod sensitivity;
 pub mod sh;
