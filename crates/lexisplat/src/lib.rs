@@ -71,6 +71,7 @@ mod room;
 pub mod sample;
 mod sensitivity;
 pub mod sh;
+pub mod simd;
 mod spill;
 mod splats;
 pub mod stats;
