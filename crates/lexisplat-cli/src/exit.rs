@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 /// Shown at the end of `--help`.
-pub(crate) const CODES: &str = "Exit codes:
+pub(crate) const AFTER_HELP: &str = "Exit codes:
   0  done
   1  unexpected failure
   2  wrong usage
@@ -12,7 +12,11 @@ pub(crate) const CODES: &str = "Exit codes:
   5  an option or argument is out of range
   6  a size is over a limit
   7  an output exists and --overwrite was not given
-  8  no GPU, or it failed; or no display to open a window on";
+  8  no GPU, or it failed; or no display to open a window on
+
+Environment:
+  LEXISPLAT_SIMD  vector instructions: `plain`, `avx2` or `avx512` [default: the widest that the
+                  CPU has]; results do not depend on it";
 
 /// What to do about an output that is already there.
 const OVERWRITE: &str = "give --overwrite to replace it, or another name";

@@ -1,10 +1,11 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
 use std::ffi::OsStr;
-use std::io::{BufWriter, Read, StdoutLock, Write};
+use std::io::{BufWriter, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
+use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input};
 use lexisplat_eval::SceneFile;
 
@@ -28,27 +29,28 @@ pub(crate) fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == OsStr::new("-")
 }
 
-/// All of standard input.
-fn standard_input() -> Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    std::io::stdin().lock().read_to_end(&mut bytes).context("standard input")?;
-    Ok(bytes)
-}
+/// What messages call standard input.
+const STANDARD_INPUT: &str = "standard input";
 
 /// The bytes of a file, mapped where possible, or of standard input; and what messages call it.
-pub(crate) fn input(path: &Path) -> Result<(String, Input)> {
+pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
+    let limits = common.limits()?;
     if is_pipe(path) {
-        return Ok(("standard input".to_owned(), Input::from(standard_input()?)));
+        let bytes = Input::read(STANDARD_INPUT, std::io::stdin().lock(), &limits)?;
+        return Ok((STANDARD_INPUT.to_owned(), bytes));
     }
-    Ok((path.display().to_string(), Input::open(path)?))
+    Ok((path.display().to_string(), Input::open_within(path, &limits)?))
 }
 
 /// Reads a PLY or a .lexi, whichever the bytes say it is.
-pub(crate) fn load(path: &Path, drop_invalid: bool) -> Result<SceneFile> {
+pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
+    let limits = common.limits()?;
+    let options = ReadOptions { limits, ..ReadOptions::default() };
     if is_pipe(path) {
-        return Ok(SceneFile::read_bytes("standard input", &standard_input()?, drop_invalid)?);
+        let bytes = Input::read(STANDARD_INPUT, std::io::stdin().lock(), &limits)?;
+        return Ok(SceneFile::read_bytes(STANDARD_INPUT, &bytes, &options)?);
     }
-    Ok(SceneFile::read(path, drop_invalid)?)
+    Ok(SceneFile::read(path, &options)?)
 }
 
 /// The output: what was asked for, or the input with another extension.

@@ -52,7 +52,8 @@ pub fn prune(
     let nothing = Pruned { removed: 0, largest_change: 0.0, views: cameras.len() };
     let mut last = usize::MAX;
     for power in 0..TRIES {
-        let limit = bound * STRICTER.powi(power);
+        // Not `powi`, whose last bit may differ between machines.
+        let limit = bound * (0..power).fold(1.0, |share, _| share * STRICTER);
         let keep: Vec<bool> = seen.removal.iter().map(|&change| change > limit).collect();
         let removed = keep.iter().filter(|&&k| !k).count();
         if removed == 0 {

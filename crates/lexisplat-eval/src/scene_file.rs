@@ -6,7 +6,7 @@ use std::path::Path;
 use lexisplat::lexi::{self, Contents};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{Error, Limits, Model, Result};
+use lexisplat::{Error, Model, Result};
 use lexisplat_render::Scene;
 
 /// Bytes that tell a PLY from a .lexi.
@@ -44,12 +44,11 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
-    /// Reads a PLY or a .lexi, whichever the bytes say it is. Gaussians of a PLY with values that are not
-    /// finite are left out with `drop_invalid`.
+    /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
     ///
     /// # Errors
     /// What [`ply::read`] and [`lexi::open`] say.
-    pub fn read(path: &Path, drop_invalid: bool) -> Result<Self> {
+    pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         let name = path.display().to_string();
         let io = |e| Error::io(path, e);
         let mut start = Vec::with_capacity(PEEK);
@@ -57,9 +56,9 @@ impl SceneFile {
         let bytes = file.metadata().map_err(io)?.len();
         file.take(PEEK as u64).read_to_end(&mut start).map_err(io)?;
         let loaded = if lexi::is_lexi(&start) {
-            Loaded::lexi(lexi::open(path, &Limits::default())?, &name)?
+            Loaded::lexi(lexi::open(path, &options.limits)?, &name)?
         } else {
-            Loaded::Ply(Box::new(ply::read(path, &options(drop_invalid))?))
+            Loaded::Ply(Box::new(ply::read(path, options)?))
         };
         Ok(Self { loaded, name, bytes })
     }
@@ -68,11 +67,11 @@ impl SceneFile {
     ///
     /// # Errors
     /// As [`Self::read`].
-    pub fn read_bytes(name: &str, bytes: &[u8], drop_invalid: bool) -> Result<Self> {
+    pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
         let loaded = if lexi::is_lexi(bytes) {
-            Loaded::lexi(lexi::open_bytes(name, bytes, &Limits::default())?, name)?
+            Loaded::lexi(lexi::open_bytes(name, bytes, &options.limits)?, name)?
         } else {
-            Loaded::Ply(Box::new(ply::read_bytes(name, bytes, &options(drop_invalid))?))
+            Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))
         };
         Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
     }
@@ -94,8 +93,4 @@ impl SceneFile {
             Loaded::Lexi(..) => &[],
         }
     }
-}
-
-fn options(drop_invalid: bool) -> ReadOptions {
-    ReadOptions { drop_invalid, ..ReadOptions::default() }
 }

@@ -40,14 +40,15 @@ pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, 
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
     let centre = DVec3::from_array(centre);
     let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
-    let focal = f64::from(width.min(height)) / 2.0 / half_view.tan();
-    let distance = (radius / half_view.sin()).max(MIN_DISTANCE);
+    let focal = f64::from(width.min(height)) / 2.0 / libm::tan(half_view);
+    let distance = (radius / libm::sin(half_view)).max(MIN_DISTANCE);
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     (0..steps)
         .map(|i| {
             let turn = f64::from(i) / f64::from(steps) * std::f64::consts::TAU;
-            let elevation = (ELEVATION + ELEVATION_SWAY * (SWAYS * turn).sin()).to_radians();
-            let out = DVec3::new(turn.sin(), 0.0, -turn.cos()) * elevation.cos() + UP * elevation.sin();
+            let elevation = (ELEVATION + ELEVATION_SWAY * libm::sin(SWAYS * turn)).to_radians();
+            let around = DVec3::new(libm::sin(turn), 0.0, -libm::cos(turn));
+            let out = around * libm::cos(elevation) + UP * libm::sin(elevation);
             let forward = -out;
             let right = forward.cross(UP).normalize();
             let down = forward.cross(right);
@@ -75,7 +76,7 @@ pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
 
 /// Opacities after the sigmoid.
 pub(crate) fn opacity_weights(geometry: &Geometry) -> Vec<f64> {
-    geometry.opacities.iter().map(|&o| 1.0 / (1.0 + f64::from(-o).exp())).collect()
+    geometry.opacities.iter().map(|&o| 1.0 / (1.0 + libm::exp(f64::from(-o)))).collect()
 }
 
 /// Weighted median of the positions, and half the extent along each axis of what is left without the

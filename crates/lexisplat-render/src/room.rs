@@ -104,7 +104,7 @@ fn targets(geometry: &Geometry) -> Vec<DVec3> {
 #[must_use]
 pub fn room(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
-    let focal = single(f64::from(width.min(height)) / 2.0 / (FIELD_OF_VIEW / 2.0).to_radians().tan());
+    let focal = single(f64::from(width.min(height)) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians()));
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     let (_, radius) = bulk(geometry);
     let stands = stands(geometry, radius);

@@ -49,7 +49,7 @@ impl App {
 
     fn open(&mut self, path: PathBuf, which: Which) {
         let id = self.next_id();
-        let work = models::open(id, which, path, self.orbit_size(), self.bell.clone());
+        let work = models::open(id, which, path, self.options.limits, self.orbit_size(), self.bell.clone());
         self.works[which.index()] = Some(work);
     }
 

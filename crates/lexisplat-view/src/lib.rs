@@ -34,6 +34,7 @@ mod window;
 
 use std::path::PathBuf;
 
+use lexisplat::Limits;
 use lexisplat_eval::SplitFilter;
 use lexisplat_render::Device;
 
@@ -62,6 +63,8 @@ pub struct Options {
     pub device: Device,
     /// Whether a screenshot asked for by name may replace a file.
     pub overwrite: bool,
+    /// What files may ask for, those dropped on the window too.
+    pub limits: Limits,
     /// What to do without being asked: see [`SCRIPT_WORDS`]. Empty for nothing.
     pub script: String,
 }

@@ -5,8 +5,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lexisplat::packed::{PackOptions, Packed, Packer};
-use lexisplat::ply::Dialect;
-use lexisplat::{CompressOptions, Layout, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
+use lexisplat::ply::{Dialect, ReadOptions};
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
 use lexisplat_eval::{Loaded, SceneFile, SplitFilter, Views, choose_views};
 use lexisplat_render::{Camera, Renderer, bulk};
 
@@ -200,13 +200,20 @@ pub(crate) struct Bell {
     pub(crate) wake: Arc<dyn Fn() + Send + Sync>,
 }
 
-/// Starts reading `path` as `which`.
-pub(crate) fn open(id: u64, which: Which, path: PathBuf, size: OrbitSize, bell: Bell) -> Work {
+/// Starts reading `path`, which may ask for `limits`, as `which`.
+pub(crate) fn open(
+    id: u64,
+    which: Which,
+    path: PathBuf,
+    limits: Limits,
+    size: OrbitSize,
+    bell: Bell,
+) -> Work {
     let gauge = Arc::new(Gauge::default());
     gauge.start("reading", 0);
     let name = path.display().to_string();
     spawn(id, which, bell, move || {
-        let scene = SceneFile::read(&path, false)?;
+        let scene = SceneFile::read(&path, &ReadOptions { limits, ..ReadOptions::default() })?;
         Open::new(id, scene, Some(path), size)
     });
     Work { id, name, gauge }

@@ -8,7 +8,7 @@ use crate::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::learn::{DEFAULT_SAMPLE, Fetch, LearnOptions, Learned, learn_from};
-use crate::limits::Limits;
+use crate::limits::{Limits, MAX_GAUSSIANS};
 use crate::model::{Layout, Model, Pursuit, Record};
 use crate::parallel::{CHUNK, map_chunks};
 use crate::progress::{Progress, Stage};
@@ -100,7 +100,7 @@ pub fn compress(
     // What a reader would refuse is not written.
     splats.geometry.validate_values()?;
     let (n, dim) = (splats.len(), splats.degree.rest());
-    Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
+    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     let clock = Stopwatch::start();
     let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| {
         numbers.iter().for_each(|&i| out.extend_from_slice(splats.rest(i)));

@@ -36,15 +36,22 @@ pub enum Error {
         expected: String,
     },
     /// The input may be well formed but asks for more than [`crate::Limits`] allows.
-    #[error("{what}: {found} is over the limit of {limit}")]
+    #[error("{what}: {found} is over the limit of {limit}{}", advice(*.name))]
     Limit {
-        /// What was counted.
+        /// What was counted, and the file.
         what: String,
         /// How many were asked for.
         found: u64,
         /// How many are allowed.
         limit: u64,
+        /// Which of [`crate::Limits`] it is; `None` if it cannot be raised.
+        name: Option<&'static str>,
     },
+}
+
+/// How to raise the limit `name`, starting with punctuation.
+fn advice(name: Option<&'static str>) -> String {
+    name.map(|name| format!("; if you trust the file, raise it with --limit {name}=N")).unwrap_or_default()
 }
 
 /// What is wrong with a file's bytes.
@@ -130,6 +137,16 @@ impl Error {
     /// An [`Error::Format`] about `file` with a free text.
     pub fn malformed(file: impl Into<String>, text: impl Into<String>) -> Self {
         Self::format(file, FormatError::Malformed(text.into()))
+    }
+
+    /// An [`Error::Limit`].
+    pub(crate) fn limit(what: impl Into<String>, found: u64, limit: u64, name: Option<&'static str>) -> Self {
+        Self::Limit { what: what.into(), found, limit, name }
+    }
+
+    /// This error about what was read from `file`: a limit stays one, anything else is the file's fault.
+    pub(crate) fn of_file(self, file: &str) -> Self {
+        if matches!(self, Self::Limit { .. }) { self } else { Self::malformed(file, self.to_string()) }
     }
 
     /// An [`Error::Parameter`].

@@ -84,6 +84,15 @@ impl ExtraValues {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Bytes of one value.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        fn width<T>(_: &[T]) -> usize {
+            size_of::<T>()
+        }
+        for_extra!(self, v => width(v))
+    }
 }
 
 /// What a scene's file says about it beside its Gaussians; travels from PLY to .lexi and back.

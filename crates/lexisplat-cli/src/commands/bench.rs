@@ -21,7 +21,7 @@ const LANES: usize = 32;
 const ORDER_BLOCK: usize = 1024;
 
 pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
-    let input = load(&args.file, false)?;
+    let input = load(&args.file, common)?;
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;

@@ -13,7 +13,7 @@ use crate::files::{check_output, load, make_folder, print, print_json, view_name
 use crate::progress::Bars;
 
 pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
-    let (a, b) = (load(&args.a, false)?, load(&args.b, false)?);
+    let (a, b) = (load(&args.a, common)?, load(&args.b, common)?);
     warn_of(&a);
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());

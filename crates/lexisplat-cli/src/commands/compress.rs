@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::stream::Compressed;
-use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, lexi, ply, stream};
+use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
 use serde_json::json;
 
 use lexisplat_eval::text;
@@ -32,6 +32,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         check_output(path, &inputs, common.overwrite)?;
     }
     let layout = args.chosen_layout()?;
+    let limits = common.limits()?;
     let mut options = CompressOptions::default();
     options.tolerance = match (args.tol, args.max_nnz) {
         (None, Some(_)) => None,
@@ -44,11 +45,11 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
     if let Some(path) = &args.dictionary {
-        options.dictionary = Some(lexi::read_dictionary(path, &Limits::default())?);
+        options.dictionary = Some(lexi::read_dictionary(path, &limits)?);
     }
 
-    let (name, bytes) = input(&args.input)?;
-    let read = ReadOptions { drop_invalid: args.drop_invalid, ..ReadOptions::default() };
+    let (name, bytes) = input(&args.input, common)?;
+    let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
     if layout == Layout::Packed && super::pack::is_large(args, bytes.len())? {
         let bars = Bars::new(common.quiet);
         let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;

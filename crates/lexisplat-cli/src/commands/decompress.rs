@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::lexi::LexiChunks;
-use lexisplat::{Error, Limits, stream};
+use lexisplat::{Error, stream};
 use serde_json::json;
 
 use lexisplat_eval::text;
@@ -21,8 +21,8 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
         return Err(Error::parameter("output", "-", expected).into());
     }
     check_output(&output, &[&args.input], common.overwrite)?;
-    let (name, bytes) = input(&args.input)?;
-    let lexi = LexiChunks::open(&name, &bytes, &Limits::default())?;
+    let (name, bytes) = input(&args.input, common)?;
+    let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
     let bars = Bars::new(common.quiet);
     let bytes = write_output(
         &output,

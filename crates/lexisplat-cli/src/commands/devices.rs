@@ -1,6 +1,7 @@
 //! `lexisplat devices`.
 
 use anyhow::Result;
+use lexisplat::simd::Simd;
 use lexisplat_eval::text;
 use lexisplat_render::gpu::{AdapterSummary, adapters};
 use serde_json::json;
@@ -25,17 +26,20 @@ pub(crate) fn run(common: &Common) -> Result<()> {
                 })
             })
             .collect();
-        return print_json(&json!({ "devices": list }));
+        let available: Vec<_> = Simd::available().into_iter().map(Simd::name).collect();
+        let processor = json!({ "simd": Simd::detect().name(), "available": available });
+        return print_json(&json!({ "devices": list, "processor": processor }));
     }
+    let simd = Simd::detect().name();
     if found.is_empty() {
-        return print(
-            "no GPU was found: everything is drawn on the processor (cpu)\n\
+        return print(&format!(
+            "no GPU was found: everything is drawn on the processor (cpu, {simd})\n\
              A Vulkan, Metal or DX12 driver is needed; on Debian and Ubuntu, mesa-vulkan-drivers and libvulkan1\n\
-             bring one for many GPUs, and a software one.\n",
-        );
+             bring one for many GPUs, and a software one.\n"
+        ));
     }
     let lines: String = found.iter().map(line).collect();
-    print(&format!("{lines}cpu  the processor; the same pictures bit for bit on every machine\n"))
+    print(&format!("{lines}cpu  the processor ({simd}); the same pictures bit for bit on every machine\n"))
 }
 
 fn line(a: &AdapterSummary) -> String {

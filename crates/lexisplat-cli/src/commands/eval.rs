@@ -49,10 +49,10 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     let mut renderer = Renderer::open(args.views.device)?;
     let drawing = DrawOptions { background: args.views.background, eight_bit: args.measures.eight_bit };
     // Views that are generated fit the original; all models are seen from the same.
-    let original = args.original.as_deref().map(|path| load(path, false)).transpose()?;
+    let original = args.original.as_deref().map(|path| load(path, common)).transpose()?;
     let first = match &original {
         Some(_) => None,
-        None => Some(load(&args.models[0], false)?),
+        None => Some(load(&args.models[0], common)?),
     };
     let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
     let found = args.views.find(reference.scene().geometry(), Some(&args.photos))?;
@@ -74,7 +74,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     for path in &args.models {
         let model = match first.take() {
             Some(model) => model,
-            None => load(path, false)?,
+            None => load(path, common)?,
         };
         warn_of(&model);
         let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &mut || bars.advance(1))?;

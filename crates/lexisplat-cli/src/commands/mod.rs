@@ -17,11 +17,14 @@ mod view;
 
 use anyhow::{Context, Result};
 
+use lexisplat::simd::Simd;
+
 use crate::args::{Cli, Command};
 
 /// Sets up threads and runs the command.
 pub(crate) fn run(cli: Cli) -> Result<()> {
     let Cli { common, command } = cli;
+    Simd::chosen()?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(common.threads)
         .build_global()

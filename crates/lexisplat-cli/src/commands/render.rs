@@ -26,7 +26,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         name.push("-views");
         args.file.with_file_name(name)
     });
-    let input = load(&args.file, false)?;
+    let input = load(&args.file, common)?;
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;

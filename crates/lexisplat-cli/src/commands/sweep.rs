@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     check_folder(folder, common.overwrite)?;
     let entries = entries(args)?;
     let scorer = scorer(&args.measures)?;
-    let options = options(args)?;
+    let options = options(args, common)?;
     make_folder(folder)?;
     let watch = Watcher { bars: Bars::new(common.quiet), reused: Cell::new(0), made: Cell::new(0) };
     let outcome = sweep(&entries, &options, &scorer, folder, &watch);
@@ -75,8 +75,9 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
     Ok(entries)
 }
 
-fn options(args: &Sweep) -> Result<SweepOptions> {
+fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     let mut options = SweepOptions::default();
+    options.limits = common.limits()?;
     let given = [args.max_nnz.is_empty(), args.presets.is_empty()];
     let tolerances: &[f64] =
         if args.tol.is_empty() && given == [true, true] { &TOLERANCES } else { &args.tol };

@@ -16,6 +16,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
         background: views.background,
         device: views.device,
         overwrite: common.overwrite,
+        limits: common.limits()?,
         script: args.actions.clone(),
     };
     Ok(lexisplat_view::run(options)?)

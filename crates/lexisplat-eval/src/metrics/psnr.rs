@@ -23,7 +23,7 @@ pub fn psnr(a: &Image, b: &Image) -> Result<Option<f64>> {
         })
         .sum();
     let mean = squares / (a.pixels.len() * 3) as f64;
-    Ok((mean > 0.0).then(|| -10.0 * mean.log10()))
+    Ok((mean > 0.0).then(|| -10.0 * libm::log10(mean)))
 }
 
 #[cfg(test)]

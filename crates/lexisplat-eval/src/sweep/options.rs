@@ -1,6 +1,6 @@
 //! How to sweep, and who is told how it goes.
 
-use lexisplat::{Layout, Pursuit};
+use lexisplat::{Layout, Limits, Pursuit};
 use lexisplat_render::Device;
 
 use super::results::Setting;
@@ -35,6 +35,8 @@ pub struct SweepOptions {
     pub generated: u16,
     /// What to draw on.
     pub device: Device,
+    /// What models may ask for.
+    pub limits: Limits,
     /// Views of each model whose pictures are saved.
     pub pictures: usize,
     /// Whether finished parts that are already in the folder count.
@@ -58,6 +60,7 @@ impl Default for SweepOptions {
             kind: SceneKind::Auto,
             generated: DEFAULT_ORBIT,
             device: Device::Auto,
+            limits: Limits::default(),
             pictures: 1,
             resume: true,
             fingerprint: String::new(),

@@ -105,7 +105,8 @@ impl Runner<'_> {
             return Err(Stop::Scene(format!("{} is not there", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
-        let read = ply::read(&entry.model, &ReadOptions::default())?;
+        let options = ReadOptions { limits: self.options.limits, ..ReadOptions::default() };
+        let read = ply::read(&entry.model, &options)?;
         for warning in &read.warnings {
             self.watch.warn(&entry.name, warning);
         }

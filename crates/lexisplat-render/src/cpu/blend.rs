@@ -1,5 +1,7 @@
 //! Drawing one tile: its splats from front to back, a row of 16 pixels at a time.
 
+use lexisplat::simd::Simd;
+
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
 use super::math::exp_in_range;
@@ -45,7 +47,7 @@ pub(super) fn tile(
     at: [usize; 2],
     background: [f32; 3],
 ) -> TilePixels {
-    pulp::Arch::new().dispatch(
+    Simd::detect().dispatch(
         #[inline(always)]
         || draw(splats, list, at, background),
     )
@@ -151,7 +153,7 @@ pub(super) fn alphas(splat: &Splat, x: &Lanes, y: f32) -> Option<Lanes> {
 mod tests {
     use super::*;
 
-    /// The vector instructions that `pulp` picks for this machine round as the plain ones do.
+    /// The vector instructions that this machine has round as the plain ones do.
     #[test]
     fn the_instruction_set_makes_no_difference() {
         let mut state = 7_u32;
@@ -171,11 +173,19 @@ mod tests {
             .map(|splat| Visible { splat, ..Visible::default() })
             .collect();
         let (at, background) = ([1, 3], [0.1, 0.5, 0.9]);
-        let chosen = tile(&splats, 0..300, at, background);
         let plain = draw(&splats, 0..300, at, background);
-        for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
-            assert_eq!(chosen.pixel(x, y).map(f32::to_bits), plain.pixel(x, y).map(f32::to_bits));
-            assert_ne!(chosen.pixel(x, y), background);
+        for simd in Simd::available() {
+            let wide = simd.dispatch(
+                #[inline(always)]
+                || draw(&splats, 0..300, at, background),
+            );
+            let chosen = tile(&splats, 0..300, at, background);
+            for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
+                let bits = plain.pixel(x, y).map(f32::to_bits);
+                assert_eq!(wide.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");
+                assert_eq!(chosen.pixel(x, y).map(f32::to_bits), bits);
+                assert_ne!(chosen.pixel(x, y), background);
+            }
         }
     }
 }

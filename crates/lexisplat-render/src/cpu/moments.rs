@@ -1,5 +1,7 @@
 //! How a tile's pixels change with its splats: sums over pixels of products of derivatives.
 
+use lexisplat::simd::Simd;
+
 use crate::conventions::{TILE, TRANSMITTANCE_MIN};
 
 use super::blend::{Lanes, TilePixels, alphas};
@@ -45,7 +47,7 @@ pub(super) fn tile(
     size: [usize; 2],
     picture: &TilePixels,
 ) -> Vec<(u32, Moments)> {
-    pulp::Arch::new().dispatch(
+    Simd::detect().dispatch(
         #[inline(always)]
         || walk(splats, roots, list, at, size, picture),
     )

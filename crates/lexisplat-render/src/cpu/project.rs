@@ -105,7 +105,7 @@ impl Projection {
         if !finite || opacity < ALPHA_MIN {
             return None;
         }
-        let cutoff = (ALPHA_MIN / opacity).ln() - POWER_SLACK;
+        let cutoff = libm::logf(ALPHA_MIN / opacity) - POWER_SLACK;
         let rect = self.grid.rect(centre, radius)?;
         let (cutoff, extent) = match self.tighten {
             true => (cutoff, self.extent(centre, conic, cutoff)),

@@ -14,6 +14,7 @@ use crate::limits::Limits;
 use crate::model::{Layout, Model, Record};
 use crate::packed::{CHUNK, Decoder, Packed, Promise, StreamBits};
 use crate::parallel::map_chunks;
+use crate::room::{COUNT_BYTES, GEOMETRY_BYTES, Room};
 use crate::sh::ShDegree;
 use crate::splats::{Extra, Geometry, SceneMeta, Splats};
 
@@ -40,6 +41,7 @@ enum Kind<'a> {
 #[derive(Debug)]
 struct PackedParts<'a> {
     file: &'a str,
+    file_bytes: u64,
     checked: Checked<'a>,
     /// Without extras, order and data.
     head: Packed,
@@ -51,22 +53,23 @@ impl<'a> LexiChunks<'a> {
     /// Looks over the .lexi file in `bytes`, which errors call `file`.
     ///
     /// # Errors
-    /// As [`read_bytes`](super::read_bytes), but what is wrong with the codes themselves is only found by
-    /// [`Self::each`].
+    /// As [`read_bytes`](super::read_bytes), but what is wrong with the codes themselves, and what is over
+    /// [`Limits::bytes`] and [`Limits::expansion`], is only found by [`Self::each`].
     pub fn open(file: &'a str, bytes: &'a [u8], limits: &Limits) -> Result<Self> {
         let (checked, layout) = checked(file, bytes, limits)?;
         let attribute_bytes = sizes(&checked, bytes)?;
         if layout != Layout::Packed {
-            let exact = Exact::open(checked, limits)?;
+            let exact = Exact::open(checked, bytes.len() as u64, limits)?;
             let extras = exact.extras()?;
             return Ok(Self { kind: Kind::Exact(Box::new(exact)), extras, attribute_bytes });
         }
         let head = super::packed::head(&checked, bytes.len() as u64, limits)?;
         let data = super::packed::data(&checked)?;
-        let decoder = Decoder::new(&head, data).map_err(|e| checked.malformed(e.to_string()))?;
+        let decoder = Decoder::new(&head, file, data).map_err(|e| e.of_file(file))?;
         let extras = extras(&checked, head.gaussians, &(0..0))?;
         let order_kept = checked.has(tensor::ORDER);
-        let parts = PackedParts { file, checked, head, decoder, order_kept };
+        let file_bytes = bytes.len() as u64;
+        let parts = PackedParts { file, file_bytes, checked, head, decoder, order_kept };
         Ok(Self { kind: Kind::Packed(Box::new(parts)), extras, attribute_bytes })
     }
 
@@ -213,13 +216,16 @@ impl PackedParts<'_> {
     ) -> Result<Vec<StreamBits>> {
         let n = self.head.gaussians;
         let chunks = n.div_ceil(CHUNK);
+        let extra_bytes = extras(&self.checked, n, &(0..0))?.iter().map(|e| e.values.width()).sum::<usize>();
         let mut spent = self.decoder.dictionary_bits();
         for first in (0..chunks).step_by(CHUNKS_AT_ONCE) {
             let count = CHUNKS_AT_ONCE.min(chunks - first);
-            let parts = map_chunks(count, 1, |c| self.decoder.chunk(first + c.start, count_bits));
+            let held = n.min((first + count) * CHUNK) - first * CHUNK;
+            let room = Room::new(&self.head.limits, self.file, self.file_bytes);
+            room.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
+            let parts = map_chunks(count, 1, |c| self.decoder.chunk(first + c.start, &room, count_bits));
             for (c, part) in (first..).zip(parts) {
-                let (mut geometry, codes, bits) =
-                    part.map_err(|e| crate::Error::malformed(self.file, e.to_string()))?;
+                let (mut geometry, codes, bits) = part.map_err(|e| e.of_file(self.file))?;
                 spent.add(&bits);
                 let range = c * CHUNK..n.min((c + 1) * CHUNK);
                 let start = range.start;

@@ -4,14 +4,16 @@ use std::path::Path;
 
 use safetensors::Dtype;
 
+use super::exact::refuse_unknown;
 use super::read;
-use super::schema::{DICTIONARY_FORMAT, FORMAT, VERSION, key, tensor};
+use super::schema::{DICTIONARY_FORMAT, FORMAT, IGNORED_PREFIX, VERSION, key, tensor};
 use super::tensors::{Checked, Draft, Tensor, preamble};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::limits::Limits;
 use crate::model::Layout;
+use crate::packed::Decoder;
 use crate::sh::ShDegree;
 
 /// Reads the dictionary of a dictionary file or of a .lexi scene.
@@ -19,7 +21,7 @@ use crate::sh::ShDegree;
 /// # Errors
 /// As [`super::read()`]; a scene of degree 0 has none.
 pub fn read_dictionary(path: &Path, limits: &Limits) -> Result<Dictionary> {
-    let bytes = Input::open(path)?;
+    let bytes = Input::open_within(path, limits)?;
     read_dictionary_bytes(&path.display().to_string(), &bytes, limits)
 }
 
@@ -34,11 +36,23 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
     if degree == ShDegree::ZERO {
         return Err(checked.malformed("a scene of SH degree 0 has no dictionary"));
     }
-    if checked.text(key::FORMAT)? == FORMAT && read::record(&checked)?.layout == Layout::Packed {
-        let packed = super::packed::from_checked(&checked, bytes.len() as u64, limits)?;
-        return packed.unpack_dictionary().map_err(|e| checked.malformed(e.to_string()));
+    if checked.text(key::FORMAT)? == FORMAT {
+        let layout = read::layout(&checked)?;
+        if layout == Layout::Packed {
+            let head = super::packed::head(&checked, bytes.len() as u64, limits)?;
+            let decoder = Decoder::new(&head, file, super::packed::data(&checked)?);
+            return Ok(decoder.map_err(|e| e.of_file(file))?.dictionary);
+        }
+        refuse_unknown(&checked, layout, degree)?;
+    } else {
+        let known = |name: &str| {
+            [tensor::DICTIONARY, tensor::HEADER_CHECKSUM].contains(&name) || name.starts_with(IGNORED_PREFIX)
+        };
+        if let Some(name) = checked.names().iter().find(|name| !known(name)) {
+            return Err(checked.malformed(format!("tensor '{name}' is not known in a dictionary")));
+        }
     }
-    read::dictionary(&checked, degree)
+    read::dictionary(&checked, degree, limits)
 }
 
 /// Writes `dictionary` to `path`, whole or not at all. Returns the file's size in bytes.

@@ -13,6 +13,7 @@ use crate::dictionary::Dictionary;
 use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
 use crate::model::{Layout, Record};
+use crate::room::{COUNT_BYTES, GEOMETRY_BYTES, Room};
 use crate::sh::ShDegree;
 use crate::splats::{Geometry, SceneMeta};
 
@@ -32,21 +33,25 @@ pub(super) struct Exact<'a> {
     pub(super) escapes: usize,
     /// Nonzeros before each [`BLOCK`] of Gaussians.
     offsets: Vec<usize>,
+    file_bytes: u64,
+    limits: Limits,
 }
 
 impl<'a> Exact<'a> {
-    pub(super) fn open(checked: Checked<'a>, limits: &Limits) -> Result<Self> {
+    /// `checked` is a file of `file_bytes`.
+    pub(super) fn open(checked: Checked<'a>, file_bytes: u64, limits: &Limits) -> Result<Self> {
         let n = match checked.view(tensor::POSITION)?.shape() {
             [n, 3] => *n,
             shape => {
                 return Err(checked.malformed(format!("tensor 'position' has shape {shape:?}, not [N, 3]")));
             }
         };
-        Limits::check(&format!("Gaussians in {}", checked.file), n as u64, limits.gaussians)?;
+        limits.check_gaussians(checked.file, n as u64)?;
+        let (degree, record) = (degree(&checked)?, record(&checked)?);
+        refuse_unknown(&checked, record.layout, degree)?;
         let normals = checked.has(tensor::NORMAL);
         all_finite(&checked, n, normals)?;
         extras(&checked, n, &(0..0))?;
-        let (degree, record) = (degree(&checked)?, record(&checked)?);
         let mut exact = Self {
             dictionary: Dictionary::empty(),
             gaussians: n,
@@ -55,28 +60,22 @@ impl<'a> Exact<'a> {
             nonzeros: 0,
             escapes: 0,
             offsets: Vec::new(),
+            file_bytes,
+            limits: *limits,
             record,
             checked,
         };
-        let codes: &[&str] = if degree == ShDegree::ZERO { &[] } else { exact.look_at_codes(degree)? };
-        let checked = &exact.checked;
-        let known =
-            GEOMETRY.iter().map(|g| g.0).chain([tensor::HEADER_CHECKSUM]).chain(codes.iter().copied());
-        let known: Vec<&str> = known.collect();
-        let ignored = |name: &str| name.starts_with(EXTRA_PREFIX) || name.starts_with(IGNORED_PREFIX);
-        if let Some(name) = checked.names().iter().find(|name| !known.contains(name) && !ignored(name)) {
-            let layout = exact.record.layout;
-            let text = format!("tensor '{name}' is not known for layout '{layout}' and degree {degree}");
-            return Err(checked.malformed(text));
+        if degree != ShDegree::ZERO {
+            exact.look_at_codes(degree)?;
         }
         Ok(exact)
     }
 
-    /// Reads the dictionary and whatever says where codes are. Returns the names of their tensors.
-    fn look_at_codes(&mut self, degree: ShDegree) -> Result<&'static [&'static str]> {
+    /// Reads the dictionary and whatever says where codes are.
+    fn look_at_codes(&mut self, degree: ShDegree) -> Result<()> {
         let n = self.gaussians;
         let checked = &self.checked;
-        self.dictionary = dictionary(checked, degree)?;
+        self.dictionary = dictionary(checked, degree, &self.limits)?;
         self.nonzeros = match checked.view(tensor::VALUES)?.shape() {
             [nonzeros] => *nonzeros,
             shape => return Err(checked.malformed(format!("tensor 'codes.values' has shape {shape:?}"))),
@@ -90,6 +89,9 @@ impl<'a> Exact<'a> {
         for start in (0..n).step_by(BLOCK) {
             offsets.push(total);
             let counts = self.counts(start..n.min(start + BLOCK))?;
+            if let Some(k) = counts.iter().position(|&c| u64::from(c) > self.limits.nonzeros) {
+                self.limits.check_nonzeros(checked.file, start + k, counts[k].into())?;
+            }
             total = counts.iter().fold(total, |sum, &c| sum.saturating_add(usize::from(c)));
         }
         self.offsets = offsets;
@@ -102,7 +104,7 @@ impl<'a> Exact<'a> {
             return Err(checked.malformed(error.to_string()));
         }
         if !checked.has(tensor::ESCAPED) {
-            return Ok(if paper { &PAPER_CODES } else { &CODES });
+            return Ok(());
         }
         self.escapes = match checked.view(tensor::ESCAPED)?.shape() {
             [count] => *count,
@@ -120,7 +122,7 @@ impl<'a> Exact<'a> {
                 last = Some(gaussian);
             }
         }
-        Ok(if paper { &PAPER_CODES_ESCAPES } else { &CODES_ESCAPES })
+        Ok(())
     }
 
     /// Number of Gaussians.
@@ -141,6 +143,7 @@ impl<'a> Exact<'a> {
     /// Geometry and codes of Gaussians `range`; escapes are numbered from its start.
     pub(super) fn part(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
         let (checked, n) = (&self.checked, self.gaussians);
+        let room = self.room_for_geometry(range.len())?;
         let geometry = Geometry {
             positions: checked.part(tensor::POSITION, Dtype::F32, &[n, 3], &range)?,
             normals: match self.normals {
@@ -167,11 +170,29 @@ impl<'a> Exact<'a> {
         let counts = self.counts(range.clone())?;
         let sum = |counts: &[u8]| counts.iter().map(|&c| usize::from(c)).sum::<usize>();
         let start = self.offsets.get(block).copied().unwrap_or(self.nonzeros) + sum(&before);
+        let escaped = self.escaped_of(&range)?;
+        let width = Indices::for_atoms(self.dictionary.len()).width() + self.value_width();
+        room.take(sum(&counts), width)?;
+        room.take(escaped.len(), size_of::<u32>() + self.dictionary.dim() * size_of::<f32>())?;
         let (indices, values) = self.read_codes(start..start + sum(&counts))?;
-        let escapes = self.escapes_of(&range)?;
+        let escapes = self.escapes(&range, &escaped)?;
         let codes = SparseCodes::part(&self.dictionary, range.start, counts, indices, values, escapes)
             .map_err(|e| checked.malformed(e.to_string()))?;
         Ok((geometry, codes))
+    }
+
+    /// What is left once there is room for all of `count` Gaussians but their codes.
+    fn room_for_geometry(&self, count: usize) -> Result<Room<'_>> {
+        let normals = if self.normals { 3 * size_of::<f32>() } else { 0 };
+        let extras = self.extras()?.iter().map(|e| e.values.width()).sum::<usize>();
+        let room = Room::new(&self.limits, self.checked.file, self.file_bytes);
+        room.take(count, GEOMETRY_BYTES + COUNT_BYTES + normals + extras)?;
+        Ok(room)
+    }
+
+    /// Bytes of a value in memory.
+    fn value_width(&self) -> usize {
+        if self.record.layout == Layout::F16 { size_of::<f16>() } else { size_of::<f32>() }
     }
 
     /// Nonzeros of Gaussians `range`.
@@ -220,10 +241,10 @@ impl<'a> Exact<'a> {
         self.checked.part(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
     }
 
-    /// The escapes among Gaussians `range`.
-    fn escapes_of(&self, range: &Range<usize>) -> Result<Escapes> {
+    /// Which of all escapes are of Gaussians `range`.
+    fn escaped_of(&self, range: &Range<usize>) -> Result<Range<usize>> {
         if self.escapes == 0 {
-            return Ok(Escapes::default());
+            return Ok(0..0);
         }
         let (mut low, mut high) = (0, self.escapes);
         while low < high {
@@ -233,16 +254,20 @@ impl<'a> Exact<'a> {
                 _ => high = middle,
             }
         }
-        let mut gaussians = self.escaped(low..self.escapes.min(low + range.len()))?;
-        gaussians.truncate(gaussians.partition_point(|&g| (g as usize) < range.end));
-        let rows = low..low + gaussians.len();
-        let start = u32::try_from(range.start).unwrap_or(u32::MAX);
-        gaussians.iter_mut().for_each(|g| *g -= start);
-        if rows.is_empty() {
+        let gaussians = self.escaped(low..self.escapes.min(low + range.len()))?;
+        Ok(low..low + gaussians.partition_point(|&g| (g as usize) < range.end))
+    }
+
+    /// The escapes `escaped`, which are of Gaussians `range`.
+    fn escapes(&self, range: &Range<usize>, escaped: &Range<usize>) -> Result<Escapes> {
+        if escaped.is_empty() {
             return Ok(Escapes::default());
         }
+        let mut gaussians = self.escaped(escaped.clone())?;
+        let start = u32::try_from(range.start).unwrap_or(u32::MAX);
+        gaussians.iter_mut().for_each(|g| *g -= start);
         let shape = [self.escapes, self.dictionary.dim()];
-        Ok(Escapes { gaussians, rows: self.checked.part(tensor::ESCAPE_ROWS, Dtype::F32, &shape, &rows)? })
+        Ok(Escapes { gaussians, rows: self.checked.part(tensor::ESCAPE_ROWS, Dtype::F32, &shape, escaped)? })
     }
 }
 
@@ -255,24 +280,29 @@ const GEOMETRY: [(&str, usize); 6] = [
     (tensor::SCALE, 3),
     (tensor::ROTATION, 4),
 ];
-const CODES: [&str; 4] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES, tensor::COUNTS];
-const PAPER_CODES: [&str; 4] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES, tensor::POINTERS];
-const CODES_ESCAPES: [&str; 6] = [
-    tensor::DICTIONARY,
-    tensor::INDICES,
-    tensor::VALUES,
-    tensor::COUNTS,
-    tensor::ESCAPED,
-    tensor::ESCAPE_ROWS,
-];
-const PAPER_CODES_ESCAPES: [&str; 6] = [
-    tensor::DICTIONARY,
-    tensor::INDICES,
-    tensor::VALUES,
-    tensor::POINTERS,
-    tensor::ESCAPED,
-    tensor::ESCAPE_ROWS,
-];
+const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
+const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
+
+/// Refuses tensors that are not of this layout and may change what is drawn.
+pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDegree) -> Result<()> {
+    let counts = if layout == Layout::Paper { tensor::POINTERS } else { tensor::COUNTS };
+    let coded = degree != ShDegree::ZERO;
+    let known = |name: &str| {
+        GEOMETRY.iter().any(|g| g.0 == name)
+            || name == tensor::HEADER_CHECKSUM
+            || (coded && (name == counts || CODES.contains(&name)))
+            || (coded && checked.has(tensor::ESCAPED) && ESCAPES.contains(&name))
+            || name.starts_with(EXTRA_PREFIX)
+            || name.starts_with(IGNORED_PREFIX)
+    };
+    match checked.names().iter().find(|name| !known(name)) {
+        None => Ok(()),
+        Some(name) => {
+            let text = format!("tensor '{name}' is not known for layout '{layout}' and degree {degree}");
+            Err(checked.malformed(text))
+        }
+    }
+}
 
 /// Refuses NaN and infinity in what is drawn. Extras may hold anything.
 fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {

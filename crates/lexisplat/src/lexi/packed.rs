@@ -14,6 +14,7 @@ use super::write::{extra_tensors, put_record};
 use crate::error::Result;
 use crate::limits::Limits;
 use crate::packed::{CHUNK, Packed, Promise};
+use crate::room::Room;
 use crate::spill::Spilled;
 
 /// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
@@ -53,7 +54,16 @@ pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
 pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
     let head = head(checked, file_bytes, limits)?;
     let n = head.gaussians;
+    let room = Room::new(limits, checked.file, file_bytes);
+    let lists = (head.parameters.len() + head.lengths.len(), size_of::<u32>());
+    for (count, each) in [lists, (head.tables.len(), 1), (data(checked)?.len(), 1)] {
+        room.take(count, each)?;
+    }
+    for extra in extras(checked, n, &(0..0))? {
+        room.take(n, extra.values.width())?;
+    }
     let order = if checked.has(tensor::ORDER) {
+        room.take(n, size_of::<u32>())?;
         Some(checked.values(tensor::ORDER, Dtype::U32, &[n])?)
     } else {
         None
@@ -76,12 +86,11 @@ fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]>
 /// Everything of a packed scene that is not as long as the scene; all is looked at.
 pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
-    Limits::check("Gaussians in a packed file", gaussians, limits.gaussians)?;
-    Limits::check(
-        "Gaussians in a packed file of this size",
-        gaussians,
-        file_bytes.saturating_mul(GAUSSIANS_PER_BYTE),
-    )?;
+    limits.check_gaussians(checked.file, gaussians)?;
+    let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
+    Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
+    let atoms = checked.number(key::ATOMS)?;
+    limits.check_atoms(checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
     let mut known =
         vec![tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::HEADER_CHECKSUM];
@@ -108,7 +117,7 @@ pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> R
     Ok(Packed {
         degree: degree(checked)?,
         gaussians,
-        atoms: checked.number(key::ATOMS)?,
+        atoms: usize::try_from(atoms).map_err(|_| checked.malformed("too many atoms"))?,
         atom_bits: checked.number(key::ATOM_BITS)?,
         record: record(checked)?,
         meta: meta(checked)?,
@@ -124,6 +133,7 @@ pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> R
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
         tables: checked.values(tensor::TABLES, Dtype::U8, &length(checked, tensor::TABLES, Dtype::U8)?)?,
         data: Vec::new(),
+        limits: *limits,
     })
 }
 

@@ -9,7 +9,7 @@ use super::exact::Exact;
 use super::schema::{EXTRA_PREFIX, FORMAT, LENGTH_BYTES, PACKED_VERSION, key, tensor};
 use super::tensors::Checked;
 use crate::dictionary::Dictionary;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::input::Input;
 use crate::limits::{Limits, MAX_ATOMS};
 use crate::model::{Layout, Model, Record};
@@ -20,10 +20,10 @@ use crate::splats::{Extra, ExtraValues, SceneMeta};
 /// Reads a .lexi file.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be opened, [`Error::Format`] if any byte of it is not as it should be,
-/// [`Error::Limit`] if it asks for more than `limits` allow.
+/// [`crate::Error::Io`] if it cannot be opened, [`crate::Error::Format`] if any byte of it is not as it should be,
+/// [`crate::Error::Limit`] if it asks for more than `limits` allow.
 pub fn read(path: &Path, limits: &Limits) -> Result<Model> {
-    let bytes = Input::open(path)?;
+    let bytes = Input::open_within(path, limits)?;
     read_bytes(&path.display().to_string(), &bytes, limits)
 }
 
@@ -55,7 +55,7 @@ impl Contents {
     /// The scene, unpacked if need be. `file` is its name in errors.
     ///
     /// # Errors
-    /// [`Error::Format`] if a packed scene's streams are not what an encoder writes.
+    /// As [`unpack`].
     pub fn into_model(self, file: &str) -> Result<Model> {
         match self {
             Self::Model(model) => Ok(model),
@@ -67,9 +67,10 @@ impl Contents {
 /// Decodes a packed scene. `file` is its name in errors.
 ///
 /// # Errors
-/// [`Error::Format`] if its streams are not what an encoder writes.
+/// [`crate::Error::Format`] if its streams are not what an encoder writes, [`crate::Error::Limit`] if it becomes more than
+/// [`Packed::limits`] allow.
 pub fn unpack(file: &str, packed: &Packed) -> Result<Model> {
-    packed.unpack().map_err(|e| Error::malformed(file, e.to_string()))
+    packed.unpack_from(file).map_err(|e| e.of_file(file))
 }
 
 /// Reads a .lexi file; packed scenes stay packed.
@@ -77,7 +78,7 @@ pub fn unpack(file: &str, packed: &Packed) -> Result<Model> {
 /// # Errors
 /// As [`read`].
 pub fn open(path: &Path, limits: &Limits) -> Result<Contents> {
-    let bytes = Input::open(path)?;
+    let bytes = Input::open_within(path, limits)?;
     open_bytes(&path.display().to_string(), &bytes, limits)
 }
 
@@ -90,7 +91,7 @@ pub fn open_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents>
     if layout == Layout::Packed {
         return Ok(Contents::Packed(super::packed::from_checked(&checked, bytes.len() as u64, limits)?));
     }
-    let exact = Exact::open(checked, limits)?;
+    let exact = Exact::open(checked, bytes.len() as u64, limits)?;
     let (n, meta) = (exact.len(), exact.meta.clone());
     let (geometry, codes) = exact.part(0..n)?;
     Ok(Contents::Model(Model { geometry, meta, dictionary: exact.dictionary, codes, record: exact.record }))
@@ -99,13 +100,19 @@ pub fn open_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Contents>
 /// A file whose checksums hold, and its layout, which goes with its version.
 pub(super) fn checked<'a>(file: &'a str, bytes: &'a [u8], limits: &Limits) -> Result<(Checked<'a>, Layout)> {
     let checked = Checked::open(file, bytes, &[FORMAT], limits)?;
-    let layout = record(&checked)?.layout;
+    let layout = layout(&checked)?;
+    Ok((checked, layout))
+}
+
+/// The layout of a scene, which goes with its version.
+pub(super) fn layout(checked: &Checked<'_>) -> Result<Layout> {
+    let layout = record(checked)?.layout;
     let version: u64 = checked.number(key::VERSION)?;
     if (layout == Layout::Packed) != (version == PACKED_VERSION) {
         let text = format!("metadata 'version' is {version}, which has no layout '{layout}'");
         return Err(checked.malformed(text));
     }
-    Ok((checked, layout))
+    Ok(layout)
 }
 
 pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
@@ -120,7 +127,7 @@ pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
 }
 
 /// The dictionary tensor of a scene or a dictionary file.
-pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree) -> Result<Dictionary> {
+pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limits) -> Result<Dictionary> {
     let dim = degree.rest();
     let atoms = match checked.view(tensor::DICTIONARY)?.shape() {
         [atoms, width] if *width == dim && (1..=MAX_ATOMS).contains(atoms) => *atoms,
@@ -129,6 +136,7 @@ pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree) -> Result<Dict
             return Err(checked.malformed(text));
         }
     };
+    limits.check_atoms(checked.file, atoms as u64)?;
     let values = checked.values(tensor::DICTIONARY, Dtype::F32, &[atoms, dim])?;
     Dictionary::new(degree, values).map_err(|e| checked.malformed(format!("tensor 'dictionary': {e}")))
 }

@@ -221,7 +221,7 @@ impl<'a> Checked<'a> {
             return Err(format(problem));
         };
         let length = u64::from_le_bytes(*length);
-        Limits::check(&format!("bytes in the header of {file}"), length, limits.header_bytes)?;
+        limits.check_header(file, length)?;
         let end = length + LENGTH_BYTES as u64;
         let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end)).ok_or_else(|| {
             let found = bytes.len() as u64;

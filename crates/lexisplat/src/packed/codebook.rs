@@ -4,7 +4,7 @@
 //! minimises `|y - D v|^2 + PRICE * bits(v)` over integer values v, greedily.
 
 use crate::parallel::map_chunks;
-use crate::pursuit::path::Path;
+use crate::simd::Simd;
 
 /// Squared error, in steps, that a bit may cost. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit; dead zones and short codes make more of it pay.
@@ -193,10 +193,10 @@ impl Codebook {
 
     /// Codes of all rows; `classes` has one entry a row.
     pub(super) fn encode(&self, rows: &[f32], classes: &[u8], until: Until) -> Codes {
-        let path = Path::detect();
+        let simd = Simd::detect();
         let parts = map_chunks(classes.len(), CHUNK, |range| {
             let mut codes = Codes::default();
-            path.dispatch(Job {
+            simd.run(Job {
                 book: self,
                 rows: &rows[range.start * self.dim..range.end * self.dim],
                 classes: &classes[range],

@@ -8,7 +8,7 @@ use super::fit::Fit;
 use super::restore::gather;
 use super::unpack::Packed;
 use crate::error::{Error, Result};
-use crate::limits::{Limits, MAX_ATOMS};
+use crate::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
 use crate::parallel::map_chunks;
 use crate::progress::{Progress, Stage};
 use crate::sensitivity::Sensitivity;
@@ -183,6 +183,7 @@ impl<'a> Packer<'a> {
             tables: tables.write(),
             lengths,
             data,
+            limits: Limits::default(),
         };
         Ok((packed, report))
     }
@@ -208,7 +209,7 @@ pub(super) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
 /// Refuses scenes and sensitivities that do not go together or are not finite.
 pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
     splats.validate()?;
-    Limits::check("Gaussians", splats.len() as u64, Limits::default().gaussians)?;
+    Limits::check("Gaussians", splats.len() as u64, MAX_GAUSSIANS)?;
     let weights = [
         (sensitivity.colour.len(), sensitivity.colour.as_slice()),
         (sensitivity.opacity.len(), &sensitivity.opacity),

@@ -12,6 +12,7 @@ use super::stream::{Recorder, Stream};
 use super::unpack::{Packed, Spent, StreamBits};
 use crate::error::Result;
 use crate::lexi::{Extras, SpilledPacked};
+use crate::limits::Limits;
 use crate::parallel::{map_chunks, map_vec};
 use crate::progress::Progress;
 use crate::sensitivity::Sensitivity;
@@ -167,6 +168,7 @@ impl PartPacker {
             tables: tables.write(),
             lengths,
             data: Vec::new(),
+            limits: Limits::default(),
         };
         let order = match self.order {
             Some(order) => Some(order.finish()?),

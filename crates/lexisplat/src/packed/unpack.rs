@@ -12,15 +12,21 @@ use super::walk::Walk;
 use crate::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
-use crate::limits::MAX_ATOMS;
+use crate::limits::{Limits, MAX_ATOMS};
 use crate::maths::Vec3;
 use crate::model::{Layout, Model, Record};
 use crate::parallel::map_vec;
+use crate::room::{COUNT_BYTES, GEOMETRY_BYTES, Room};
 use crate::sh::ShDegree;
 use crate::splats::{Extra, Geometry, SceneMeta};
 
 /// Steps of atoms' coefficients are 2^-k for k up to this.
 pub(super) const MAX_ATOM_BITS: u32 = 14;
+
+/// Gaussians of a chunk after which is asked whether there are bits and room left.
+const LOOK_AFTER: usize = 256;
+/// A packed scene whose file is not known, in errors.
+const UNNAMED: &str = "the packed scene";
 
 /// A packed scene as it lies in a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +61,8 @@ pub struct Packed {
     pub lengths: Vec<u32>,
     /// All parts.
     pub data: Vec<u8>,
+    /// What may be made of it: the limits of whoever read it; the default ones of a scene that was packed here.
+    pub limits: Limits,
 }
 
 /// What a search for a quality or a size aimed at and reached.
@@ -113,6 +121,7 @@ struct Place<'a> {
 }
 
 /// The rest of a chunk: what is not of one length for every Gaussian.
+#[derive(Default)]
 struct Piece {
     atoms: Vec<u16>,
     values: Vec<f16>,
@@ -121,13 +130,35 @@ struct Piece {
     spent: Spent,
 }
 
+/// Why a chunk is not decoded.
+enum Refusal {
+    /// No encoder writes it so.
+    Damage,
+    /// Its codes do not fit in what may be held.
+    Room,
+    /// A Gaussian of it, counted from its start, has this many nonzeros.
+    Nonzeros(usize, u64),
+}
+
+impl From<std::num::TryFromIntError> for Refusal {
+    fn from(_: std::num::TryFromIntError) -> Self {
+        Self::Damage
+    }
+}
+
 impl Packed {
     /// The scene, its SH as sparse codes; in the order of its source if that was kept.
     ///
     /// # Errors
-    /// [`Error::Parameter`] naming the part that is not as it should be.
+    /// [`Error::Parameter`] naming the part that is not as it should be, [`Error::Limit`] if there is more than
+    /// [`Self::limits`] allow.
     pub fn unpack(&self) -> Result<Model> {
-        let model = self.decode(false)?.0;
+        self.unpack_from(UNNAMED)
+    }
+
+    /// [`Self::unpack`]; errors about limits call it `file`.
+    pub(crate) fn unpack_from(&self, file: &str) -> Result<Model> {
+        let model = self.decode(file, false)?.0;
         model.geometry.validate()?;
         match &self.order {
             Some(order) => super::restore::restored(model, order),
@@ -140,7 +171,7 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        Ok(self.decode(true)?.1.named())
+        Ok(self.decode(UNNAMED, true)?.1.named())
     }
 
     /// The dictionary alone.
@@ -148,18 +179,34 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
-        Ok(Decoder::new(self, &self.data)?.dictionary)
+        Ok(Decoder::new(self, UNNAMED, &self.data)?.dictionary)
     }
 
-    fn decode(&self, count_bits: bool) -> Result<(Model, Spent)> {
-        let decoder = Decoder::new(self, &self.data)?;
+    /// Room for the scene beside `self`, of which its geometry is taken.
+    fn room<'a>(&self, file: &'a str) -> Result<Room<'a>> {
+        let words = self.parameters.len() + self.lengths.len() + self.order.as_ref().map_or(0, Vec::len);
+        let extras = self.extras.iter().map(|e| e.values.width()).sum::<usize>();
+        let n = self.gaussians;
+        let sizes = [(words, size_of::<u32>()), (self.tables.len(), 1), (self.data.len(), 1), (n, extras)];
+        let own = sizes.iter().map(|&(count, each)| (count as u64).saturating_mul(each as u64));
+        let room = Room::new(&self.limits, file, own.fold(0, u64::saturating_add));
+        for (count, each) in sizes {
+            room.take(count, each)?;
+        }
+        room.take(n, GEOMETRY_BYTES + COUNT_BYTES + extras)?;
+        Ok(room)
+    }
+
+    fn decode(&self, file: &str, count_bits: bool) -> Result<(Model, Spent)> {
+        let decoder = Decoder::new(self, file, &self.data)?;
         let mut spent = decoder.dictionary_bits();
         let n = self.gaussians;
+        let room = self.room(file)?;
         let mut g = Geometry { extras: self.extras.clone(), ..zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let work = places(&mut g, &mut counts).enumerate().collect();
-        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, count_bits));
+        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, &room, count_bits));
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
         for piece in pieces {
@@ -243,6 +290,9 @@ impl Spent {
 /// What all chunks of a packed scene are decoded with, and where they are.
 #[derive(Debug)]
 pub(crate) struct Decoder<'a> {
+    /// Its name in errors about limits.
+    file: &'a str,
+    limits: Limits,
     pub(crate) dictionary: Dictionary,
     dictionary_bits: Spent,
     parameters: Parameters,
@@ -253,15 +303,18 @@ pub(crate) struct Decoder<'a> {
 }
 
 impl<'a> Decoder<'a> {
-    /// Of `packed`, whose own data may be left out, and its `data`.
-    pub(crate) fn new(packed: &Packed, data: &'a [u8]) -> Result<Self> {
+    /// Of `packed`, whose own data may be left out, and its `data`; errors about limits call it `file`.
+    pub(crate) fn new(packed: &Packed, file: &'a str, data: &'a [u8]) -> Result<Self> {
+        let limits = packed.limits;
+        limits.check_gaussians(file, packed.gaussians as u64)?;
+        limits.check_atoms(file, packed.atoms as u64)?;
         let parameters = Parameters::from_list(&packed.parameters).ok_or_else(|| bad("parameters"))?;
         let tables = Tables::read(&packed.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
         let gaussians = packed.gaussians;
         let parts = parts(gaussians, &packed.lengths, data)?;
         let (dictionary, dictionary_bits) =
             dictionary(packed, &tables, parts[0], parts[1]).ok_or_else(|| bad("dictionary"))?;
-        Ok(Self { dictionary, dictionary_bits, parameters, tables, parts, gaussians })
+        Ok(Self { file, limits, dictionary, dictionary_bits, parameters, tables, parts, gaussians })
     }
 
     /// Bits the dictionary took.
@@ -270,13 +323,18 @@ impl<'a> Decoder<'a> {
     }
 
     /// Chunk `c` alone, without extras, its escapes numbered from its start; and if
-    /// `count_bits` what it took.
-    pub(crate) fn chunk(&self, c: usize, count_bits: bool) -> Result<(Geometry, SparseCodes, Spent)> {
+    /// `count_bits` what it took. In `room` there is room for all but its codes.
+    pub(crate) fn chunk(
+        &self,
+        c: usize,
+        room: &Room<'_>,
+        count_bits: bool,
+    ) -> Result<(Geometry, SparseCodes, Spent)> {
         let first = c * CHUNK;
         let n = self.gaussians.saturating_sub(first).min(CHUNK);
         let (mut g, mut counts) = (zeros(n), vec![0; n]);
         let place = places(&mut g, &mut counts).next().ok_or_else(|| bad(&format!("chunk {c}")))?;
-        let piece = self.piece(c, 0, place, count_bits)?;
+        let piece = self.piece(c, 0, place, room, count_bits)?;
         let escapes = Escapes { gaussians: piece.escaped, rows: piece.rows };
         let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
         let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)?;
@@ -284,14 +342,84 @@ impl<'a> Decoder<'a> {
     }
 
     /// Decodes chunk `c` to `place`; its first Gaussian is called number `first`.
-    fn piece(&self, c: usize, first: usize, place: Place<'_>, count_bits: bool) -> Result<Piece> {
+    fn piece(
+        &self,
+        c: usize,
+        first: usize,
+        place: Place<'_>,
+        room: &Room<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
         let parts = (self.parts.get(2 * c + 2).copied()).zip(self.parts.get(2 * c + 3).copied());
-        let decoded = parts.and_then(|(symbols, raw)| {
-            let mut player = Player::new(&self.tables, symbols, raw)?;
-            player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-            piece(&self.parameters, &self.dictionary, player, first, place)
-        });
-        decoded.ok_or_else(|| bad(&format!("chunk {c}")))
+        let player = parts.and_then(|(symbols, raw)| Player::new(&self.tables, symbols, raw));
+        let mut player = player.ok_or_else(|| bad(&format!("chunk {c}")))?;
+        player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
+        self.play(player, first, place, room).map_err(|refusal| match refusal {
+            Refusal::Damage => bad(&format!("chunk {c}")),
+            Refusal::Room => room.full(),
+            Refusal::Nonzeros(i, found) => {
+                let over = self.limits.check_nonzeros(self.file, c * CHUNK + i, found);
+                over.err().unwrap_or_else(|| bad(&format!("chunk {c}")))
+            }
+        })
+    }
+
+    /// Decodes the chunk of `player`, whose first Gaussian is number `first`.
+    fn play(
+        &self,
+        mut player: Player<'_>,
+        first: usize,
+        place: Place<'_>,
+        room: &Room<'_>,
+    ) -> std::result::Result<Piece, Refusal> {
+        let (parameters, dictionary) = (&self.parameters, &self.dictionary);
+        let mut piece = Piece::default();
+        let mut walk = Walk::new(parameters, dictionary.dim());
+        let mut code = Vec::with_capacity(dictionary.dim());
+        let width = indices(dictionary, Vec::new()).width() + size_of::<f16>();
+        let row = size_of::<u32>() + dictionary.dim() * size_of::<f32>();
+        let (mut nonzeros, mut rows) = (0, 0);
+        for i in 0..place.counts.len() {
+            let decoded = walk.step(&mut player, None).ok_or(Refusal::Damage)?;
+            place.positions[i] = decoded.position;
+            place.dc[i] = decoded.dc;
+            place.opacities[i] = decoded.opacity;
+            place.scales[i] = decoded.scales;
+            place.rotations[i] = decoded.rotation;
+            if !walk.exact.is_empty() {
+                rows += 1;
+                piece.escaped.push(u32::try_from(first + i)?);
+                piece.rows.extend_from_slice(&walk.exact);
+            }
+            resident(&walk.code, parameters.value_step(decoded.colour_class), &mut code);
+            place.counts[i] = u8::try_from(code.len())?;
+            if code.len() as u64 > self.limits.nonzeros {
+                return Err(Refusal::Nonzeros(i, code.len() as u64));
+            }
+            nonzeros += code.len();
+            for &(atom, value) in &code {
+                if usize::from(atom) >= dictionary.len() || !value.is_finite() {
+                    return Err(Refusal::Damage);
+                }
+                piece.atoms.push(atom);
+                piece.values.push(value);
+            }
+            // A damaged file could ask for more than it holds, or than may be held.
+            if i % LOOK_AFTER == LOOK_AFTER - 1 || i + 1 == place.counts.len() {
+                if player.overrun() {
+                    return Err(Refusal::Damage);
+                }
+                if !(room.grow(nonzeros, width) && room.grow(rows, row)) {
+                    return Err(Refusal::Room);
+                }
+                (nonzeros, rows) = (0, 0);
+            }
+        }
+        if !player.exhausted() {
+            return Err(Refusal::Damage);
+        }
+        piece.spent = Spent(player.spent.unwrap_or_default());
+        Ok(piece)
     }
 }
 
@@ -365,50 +493,6 @@ pub(super) fn dictionary_walk<S: Symbols>(
         rows.extend(row.iter().map(|x| (x / norm) as f32));
     }
     rows
-}
-
-/// Decodes the chunk whose first Gaussian is number `first`.
-fn piece(
-    parameters: &Parameters,
-    dictionary: &Dictionary,
-    mut player: Player<'_>,
-    first: usize,
-    place: Place<'_>,
-) -> Option<Piece> {
-    let (atoms, values) = (Vec::new(), Vec::new());
-    let mut piece = Piece { atoms, values, escaped: Vec::new(), rows: Vec::new(), spent: Spent::default() };
-    let mut walk = Walk::new(parameters, dictionary.dim());
-    let mut code = Vec::with_capacity(dictionary.dim());
-    for i in 0..place.counts.len() {
-        let decoded = walk.step(&mut player, None)?;
-        place.positions[i] = decoded.position;
-        place.dc[i] = decoded.dc;
-        place.opacities[i] = decoded.opacity;
-        place.scales[i] = decoded.scales;
-        place.rotations[i] = decoded.rotation;
-        if !walk.exact.is_empty() {
-            piece.escaped.push(u32::try_from(first + i).ok()?);
-            piece.rows.extend_from_slice(&walk.exact);
-        }
-        resident(&walk.code, parameters.value_step(decoded.colour_class), &mut code);
-        place.counts[i] = u8::try_from(code.len()).ok()?;
-        for &(atom, value) in &code {
-            if usize::from(atom) >= dictionary.len() || !value.is_finite() {
-                return None;
-            }
-            piece.atoms.push(atom);
-            piece.values.push(value);
-        }
-        // A damaged file could ask for more than it holds.
-        if i % 256 == 255 && player.overrun() {
-            return None;
-        }
-    }
-    if !player.exhausted() {
-        return None;
-    }
-    piece.spent = Spent(player.spent.unwrap_or_default());
-    Some(piece)
 }
 
 /// A code as it is kept in memory: by ascending atom, values in f16.

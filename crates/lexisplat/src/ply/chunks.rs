@@ -41,6 +41,7 @@ impl<'a> PlyChunks<'a> {
     ) -> Result<Self> {
         let mut source = Source::open(name, bytes, options)?;
         let (mut bad, mut normals, mut sure) = (Vec::<Bad>::new(), false, 0);
+        source.check_room(source.count.min(SCAN_ROWS), false)?;
         let mut scratch = empty(&source.layout);
         progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
         for start in (0..source.count).step_by(SCAN_ROWS) {
@@ -109,7 +110,8 @@ impl<'a> PlyChunks<'a> {
     /// before.
     ///
     /// # Errors
-    /// [`crate::Error::Format`] if an ASCII row is not what the header promises.
+    /// [`crate::Error::Format`] if an ASCII row is not what the header promises; [`crate::Error::Limit`] if the
+    /// range is longer than limits allow to hold.
     ///
     /// # Panics
     /// If the range ends after [`Self::len`].
@@ -119,6 +121,7 @@ impl<'a> PlyChunks<'a> {
             Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
             _ => 0..0,
         };
+        self.source.check_room(rows.len(), self.normals)?;
         fill(&self.source.rows, &self.source.layout, self.source.name, rows.clone(), splats)?;
         if self.normals {
             fill_normals(&self.source.rows, &self.source.layout, rows.clone(), splats)?;

@@ -137,7 +137,7 @@ impl Header {
     /// Parses the header at the start of `bytes`, which came from the file called `file`.
     pub(super) fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
         check_magic(file, bytes)?;
-        let mut lines = Lines::new(bytes, limits.header_bytes);
+        let mut lines = Lines::new(file, bytes, *limits);
         let (mut format, mut comments, mut elements) = (None, Vec::new(), Vec::<Element>::new());
         loop {
             let Some(line) = lines.next()? else {
@@ -165,7 +165,8 @@ impl Header {
                     }
                 }
                 Some("element") => {
-                    Limits::check("elements in the PLY header", elements.len() as u64 + 1, MAX_ELEMENTS)?;
+                    let what = format!("elements in the header of {file}");
+                    Limits::check(&what, elements.len() as u64 + 1, MAX_ELEMENTS)?;
                     elements.push(parse_element(words).map_err(bad)?);
                 }
                 Some("property") => {
@@ -173,7 +174,7 @@ impl Header {
                         return Err(bad("a property before any element"));
                     };
                     let found = element.properties.len() as u64 + 1;
-                    Limits::check("properties of one PLY element", found, limits.properties)?;
+                    limits.check_properties(file, found)?;
                     element.properties.push(parse_property(words).map_err(bad)?);
                 }
                 Some(_) => return Err(bad("not a PLY keyword")),
@@ -255,8 +256,9 @@ fn check_magic(file: &str, bytes: &[u8]) -> Result<()> {
 
 /// Header lines, ended by `\n`, `\r\n` or, throughout a file whose first line is, `\r`.
 struct Lines<'a> {
+    file: &'a str,
     bytes: &'a [u8],
-    limit: u64,
+    limits: Limits,
     /// Start of the next line.
     at: usize,
     /// Lines returned so far.
@@ -265,18 +267,19 @@ struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    fn new(bytes: &'a [u8], limit: u64) -> Self {
+    fn new(file: &'a str, bytes: &'a [u8], limits: Limits) -> Self {
         let mac = bytes
             .windows(2)
             .find(|w| matches!(w[0], b'\n' | b'\r'))
             .is_some_and(|w| w[0] == b'\r' && w[1] != b'\n');
-        Self { bytes, limit, at: 0, number: 0, end: if mac { b'\r' } else { b'\n' } }
+        Self { file, bytes, limits, at: 0, number: 0, end: if mac { b'\r' } else { b'\n' } }
     }
 
     /// The next line without its end, or `None` at the end of the bytes.
     fn next(&mut self) -> Result<Option<&'a [u8]>> {
         let rest = &self.bytes[self.at..];
-        let room = usize::try_from(self.limit.saturating_sub(self.at as u64)).unwrap_or(usize::MAX);
+        let room =
+            usize::try_from(self.limits.header_bytes.saturating_sub(self.at as u64)).unwrap_or(usize::MAX);
         let window = &rest[..rest.len().min(room)];
         let line = match window.iter().position(|&b| b == self.end) {
             Some(length) => {
@@ -284,7 +287,7 @@ impl<'a> Lines<'a> {
                 &window[..length]
             }
             None if window.len() < rest.len() => {
-                Limits::check("bytes of the PLY header", self.limit.saturating_add(1), self.limit)?;
+                self.limits.check_header(self.file, self.limits.header_bytes.saturating_add(1))?;
                 return Ok(None);
             }
             None if rest.is_empty() => return Ok(None),

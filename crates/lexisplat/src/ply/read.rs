@@ -35,7 +35,7 @@ pub struct PlyRead {
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be read, else as [`read_bytes`].
 pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
-    let input = Input::open(path)?;
+    let input = Input::open_within(path, &options.limits)?;
     read_bytes(&path.display().to_string(), &input, options)
 }
 
@@ -48,13 +48,16 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 /// # Errors
 /// [`crate::Error::Format`] naming what is wrong: no PLY, a relative of 3DGS that is not supported, a missing
 /// or repeated property, a count that does not match, NaN or (but for opacities) infinite values unless
-/// [`ReadOptions::drop_invalid`]. [`crate::Error::Limit`] if the file asks for more than its limits allow.
+/// [`ReadOptions::drop_invalid`]. [`crate::Error::Limit`] if the file asks for more than [`ReadOptions::limits`]
+/// allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     let mut source = Source::open(name, bytes, options)?;
+    source.check_room(source.count, false)?;
     let mut splats = empty(&source.layout);
     let found = fill(&source.rows, &source.layout, name, 0..source.count, &mut splats)?;
     source.judge(&found.bad, found.sure, options)?;
     if found.normals {
+        source.check_room(source.count, true)?;
         fill_normals(&source.rows, &source.layout, 0..source.count, &mut splats)?;
     }
     if !found.bad.is_empty() {

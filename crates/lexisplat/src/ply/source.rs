@@ -4,11 +4,13 @@ use super::fill::{Bad, SURE_OPACITY};
 use super::header::Header;
 use super::layout::Layout;
 use super::marks::marks;
+use super::names::NORMAL;
 use super::read::ReadOptions;
 use super::rows::Rows;
 use super::summary::PlySummary;
 use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
+use crate::room::{GEOMETRY_BYTES, Room};
 use crate::splats::SceneMeta;
 
 /// A PLY whose header is understood and whose rows are all there.
@@ -23,6 +25,7 @@ pub(super) struct Source<'a> {
     pub(super) meta: SceneMeta,
     pub(super) warnings: Vec<String>,
     pub(super) summary: PlySummary,
+    limits: Limits,
 }
 
 impl<'a> Source<'a> {
@@ -31,7 +34,7 @@ impl<'a> Source<'a> {
         let header = Header::parse(name, bytes, &options.limits)?;
         let layout = Layout::new(name, &header)?;
         let summary = PlySummary::new(&header, bytes.len() as u64, layout.row_bytes as u64);
-        Limits::check("Gaussians", summary.vertices, options.limits.gaussians)?;
+        options.limits.check_gaussians(name, summary.vertices)?;
         let marks = marks(&header.comments);
         let mut warnings = layout.warnings.clone();
         if marks.contradict {
@@ -46,7 +49,15 @@ impl<'a> Source<'a> {
             warnings.push("the scene holds no Gaussians".to_owned());
         }
         let meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased };
-        Ok(Self { name, rows, layout, count, meta, warnings, summary })
+        Ok(Self { name, rows, layout, count, meta, warnings, summary, limits: options.limits })
+    }
+
+    /// Refuses to hold `rows` rows, with normals or without, if they are more than limits allow.
+    pub(super) fn check_room(&self, rows: usize, normals: bool) -> Result<()> {
+        let extras = self.layout.extras.iter().map(|(_, field)| field.ty.bytes()).sum::<usize>();
+        let floats = self.layout.degree.rest() + if normals { NORMAL.len() } else { 0 };
+        let room = Room::new(&self.limits, self.name, self.summary.file_bytes);
+        room.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
     }
 
     /// Refuses the rows that are `bad`, or notes that they are left out, and notes `sure` infinite opacities.

@@ -3,10 +3,10 @@
 use half::f16;
 
 use super::greedy::{Plan, Scratch};
-use super::path::Path;
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::model::Pursuit;
+use crate::simd::Simd;
 
 /// Relative distance kept from the tolerance, so that another order of summing f64 squares agrees.
 const PROMISE_MARGIN: f64 = 1e-12;
@@ -129,25 +129,25 @@ pub struct Coder {
     pursuit: Pursuit,
     stop: Stop,
     values: ValueType,
-    path: Path,
+    simd: Simd,
 }
 
 impl Coder {
     /// A coder over `dictionary`.
     #[must_use]
     pub fn new(dictionary: &Dictionary, pursuit: Pursuit, stop: Stop, values: ValueType) -> Self {
-        Self::with_path(dictionary, pursuit, stop, values, Path::detect())
+        Self::with_simd(dictionary, pursuit, stop, values, Simd::detect())
     }
 
     /// A coder that uses the given instructions.
-    pub(super) fn with_path(
+    pub(super) fn with_simd(
         dictionary: &Dictionary,
         pursuit: Pursuit,
         stop: Stop,
         values: ValueType,
-        path: Path,
+        simd: Simd,
     ) -> Self {
-        Self { plan: Plan::new(dictionary), pursuit, stop, values, path }
+        Self { plan: Plan::new(dictionary), pursuit, stop, values, simd }
     }
 
     /// Codes the vectors in `signals`, each as long as an atom, and hands each result to `sink`, in order.
@@ -158,13 +158,7 @@ impl Coder {
         let mut scratch = self.plan.scratch();
         let mut code = Vec::with_capacity(self.plan.dim());
         // Compiles the loop once per vector width; the arithmetic is the same in each.
-        self.path.dispatch(Job {
-            coder: self,
-            signals,
-            scratch: &mut scratch,
-            code: &mut code,
-            sink: &mut sink,
-        });
+        self.simd.run(Job { coder: self, signals, scratch: &mut scratch, code: &mut code, sink: &mut sink });
     }
 
     #[inline(always)]

@@ -15,6 +15,5 @@ mod engine;
 mod greedy;
 #[cfg(test)]
 mod oracle;
-pub(crate) mod path;
 
 pub use engine::{Coder, Encoded, Stop, ValueType, Visit};

@@ -62,10 +62,10 @@ mod tests {
     use crate::codes::reconstruct;
     use crate::dictionary::Dictionary;
     use crate::pursuit::greedy::Plan;
-    use crate::pursuit::path::Path;
     use crate::pursuit::{Coder, Encoded, Stop, ValueType};
     use crate::rng::SplitMix64;
     use crate::sh::ShDegree;
+    use crate::simd::Simd;
 
     /// Share of the best wish that two atoms may differ by and still be one to f32.
     const CLOSE: f64 = 1e-3;
@@ -223,11 +223,11 @@ mod tests {
             let signals = random_signals(degree, 200, 0.2, &mut rng);
             for pursuit in [Pursuit::Omp, Pursuit::Ols] {
                 let stop = Stop::new(Some(0.05), None).unwrap();
-                let coder = |path| Coder::with_path(&dictionary, pursuit, stop, ValueType::F16, path);
-                let plain = bits(&coder(Path::Plain), &signals);
+                let coder = |simd| Coder::with_simd(&dictionary, pursuit, stop, ValueType::F16, simd);
+                let plain = bits(&coder(Simd::PLAIN), &signals);
                 assert!(plain.iter().any(|(code, _)| code.len() > 2));
-                for path in Path::available() {
-                    assert_eq!(bits(&coder(path), &signals), plain, "{path:?} {pursuit} {atoms} atoms");
+                for simd in Simd::available() {
+                    assert_eq!(bits(&coder(simd), &signals), plain, "{simd:?} {pursuit} {atoms} atoms");
                 }
             }
         }

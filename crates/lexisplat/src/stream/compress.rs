@@ -8,7 +8,7 @@ use crate::compress::{AT_ONCE, CompressOptions, CompressReport, Encoder};
 use crate::dictionary::Dictionary;
 use crate::error::{Error, Result};
 use crate::lexi::SpilledModel;
-use crate::limits::Limits;
+use crate::limits::{Limits, MAX_GAUSSIANS};
 use crate::model::{Layout, Record};
 use crate::output::{folder_of, write_whole};
 use crate::parallel::CHUNK;
@@ -93,7 +93,7 @@ fn run(
 ) -> Result<Compressed> {
     debug_assert!(at_once.is_multiple_of(CHUNK), "sums would be added in another order");
     let n = ply.len();
-    Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
+    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     if options.layout == Layout::Packed {
         let expected = "f32, f16 or paper: layout packed is what `pack_file` writes";
         return Err(Error::parameter("layout", options.layout, expected));

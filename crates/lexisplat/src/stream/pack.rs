@@ -9,7 +9,7 @@ use super::order::{Judged, Ordered, Sizes};
 use crate::compress::AT_ONCE;
 use crate::error::{Error, Result};
 use crate::lexi::write_spilled_packed;
-use crate::limits::Limits;
+use crate::limits::{Limits, MAX_GAUSSIANS};
 use crate::output::{folder_of, write_whole};
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
 use crate::ply::PlyChunks;
@@ -94,7 +94,7 @@ fn run<E: From<Error>>(
     write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<()>,
 ) -> Result<PackedFile, E> {
     let n = ply.len();
-    Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
+    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     options.check()?;
     let mut ordered = Ordered::new(ply, sizes, options.seed, folder, progress)?;
     let Judged { sample, sensitivity, weights } = ordered.judge(&mut importance, folder, progress)?;

@@ -1,5 +1,5 @@
 //! Products of matrices in `f32`: the one place that hands pointers to `matrixmultiply`.
-#![allow(unsafe_code, reason = "matrixmultiply::sgemm takes pointers; bounds are asserted before the call")]
+#![expect(unsafe_code, reason = "matrixmultiply::sgemm takes pointers; bounds are asserted before the call")]
 
 /// Sizes of a product: a matrix of `rows` x `depth` times one of `depth` x `columns`.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,107 @@
+//! The same input, options and seed give the same bytes on any number of threads and with every set of vector
+//! instructions that this CPU has, by everything that a user runs: exact and packed files, pictures that judge
+//! quality, scenes packed part by part, decompressed scenes, drawn ones.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+mod folder;
+
+use std::collections::BTreeMap;
+
+use assert_cmd::Command;
+use folder::{Folder, lexisplat};
+use lexisplat::ply;
+use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::simd::{Simd, VARIABLE};
+
+/// Numbers of threads.
+const THREADS: [&str; 3] = ["1", "2", "7"];
+/// Gaussians of the larger scene: three units of work of the exact layouts, so that threads share them.
+const MANY: usize = 5000;
+/// Gaussians of the scene whose pictures are drawn again and again.
+const FEW: usize = 700;
+
+/// What is run, in this order, in a folder with `many.ply` and `few.ply`.
+const COMMANDS: [&str; 13] = [
+    "compress many.ply -o f16.lexi --tol 0.08 --save-dictionary dictionary.lexi",
+    "compress many.ply -o f32.lexi --layout f32 --tol 0.1 --pursuit omp",
+    "compress many.ply -o paper.lexi --layout paper --max-nnz 6",
+    "compress many.ply -o given.lexi --dictionary dictionary.lexi",
+    "compress few.ply -o preset.lexi --preset high --keep-order",
+    "compress few.ply -o aimed.lexi --psnr 33 --prune=1",
+    "compress few.ply -o sized.lexi --size 14kB",
+    "compress few.ply -o promised.lexi --layout packed --tol 0.1",
+    "compress many.ply -o parts.lexi --preset balanced --memory 1MB",
+    "decompress f16.lexi -o f16.ply",
+    "decompress preset.lexi -o preset.ply",
+    "render few.ply -o dense --orbit 2 --width 96 --device cpu",
+    "render preset.lexi -o sparse --orbit 2 --width 96 --device cpu",
+];
+
+/// Every file that the commands make, by its name.
+fn made(simd: &str, threads: &str) -> BTreeMap<String, Vec<u8>> {
+    let folder = Folder(tempfile::tempdir().unwrap());
+    ply::write(&folder.path("many.ply"), &scene(&SampleOptions::new(MANY, 1))).unwrap();
+    ply::write(&folder.path("few.ply"), &scene(&SampleOptions::new(FEW, 2))).unwrap();
+    for command in COMMANDS {
+        let mut run: Command = lexisplat();
+        run.current_dir(folder.0.path()).env(VARIABLE, simd).args(command.split(' '));
+        let output = run.args(["--threads", threads, "--quiet"]).output().unwrap();
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(output.status.success(), "{simd}, {threads} threads, {command}: {error}");
+    }
+    let mut found = BTreeMap::new();
+    for pattern in ["", "dense", "sparse"] {
+        for entry in std::fs::read_dir(folder.path(pattern)).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_file() {
+                let name = path.strip_prefix(folder.0.path()).unwrap().display().to_string();
+                found.insert(name, std::fs::read(&path).unwrap());
+            }
+        }
+    }
+    found
+}
+
+#[test]
+fn threads_and_vector_instructions_do_not_show_in_any_file() {
+    let sets: Vec<&str> = Simd::available().into_iter().map(Simd::name).collect();
+    eprintln!("this CPU has: {}", sets.join(", "));
+    assert_eq!(sets[0], "plain");
+    #[cfg(target_arch = "x86_64")]
+    for (name, has) in [
+        ("avx2", std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma")),
+        ("avx512", std::is_x86_feature_detected!("avx512f") && std::is_x86_feature_detected!("avx512vl")),
+    ] {
+        assert!(!has || sets.contains(&name), "this CPU has {name}, which cannot be chosen");
+    }
+    let first = made(sets[0], THREADS[0]);
+    // 9 compressed scenes, 2 decompressed, a dictionary, 2 given scenes, 4 pictures.
+    assert_eq!(first.len(), 9 + 2 + 1 + 2 + 4, "{:?}", first.keys());
+    for simd in &sets {
+        for threads in THREADS {
+            let again = made(simd, threads);
+            assert!(again.keys().eq(first.keys()), "{simd}, {threads} threads");
+            for (name, bytes) in &first {
+                assert!(again[name] == *bytes, "{name} is another with {simd} and {threads} threads");
+            }
+        }
+    }
+}
+
+/// A choice that is not kept is worse than none.
+#[test]
+fn the_choice_of_instructions_is_kept_or_refused() {
+    let folder = Folder::new();
+    for simd in Simd::available() {
+        let mut run = lexisplat();
+        let output = run.current_dir(folder.0.path()).env(VARIABLE, simd.name()).args(["devices", "--json"]);
+        let value: serde_json::Value = serde_json::from_slice(&output.output().unwrap().stdout).unwrap();
+        assert_eq!(value["processor"]["simd"], simd.name());
+    }
+    let mut run = lexisplat();
+    let output = run.current_dir(folder.0.path()).env(VARIABLE, "mmx").args(["info", "scene.ply"]);
+    let output = output.output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    assert!(said.contains("LEXISPLAT_SIMD = mmx: plain"), "{said}");
+}

@@ -1,0 +1,305 @@
+//! What docs/FORMAT.md says of versions and of names that a reader does not know, of every layout and every
+//! reader.
+
+#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
+
+mod common;
+
+use std::path::PathBuf;
+
+use common::reseal;
+use lexisplat::lexi::{self, LexiChunks};
+use lexisplat::{Error, FormatError, Limits, Model, Result, Splats};
+use serde_json::{Map, Value, json};
+
+/// Golden files: scenes of version 1 in each of its layouts, then of version 2.
+const SCENES: [&str; 9] = [
+    "f32",
+    "f16",
+    "paper",
+    "degree0",
+    "degree4",
+    "degree1_u16_escapes",
+    "packed",
+    "packed_degree0",
+    "packed_escapes",
+];
+
+fn golden(name: &str) -> Vec<u8> {
+    let path: PathBuf =
+        [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect();
+    std::fs::read(path).unwrap()
+}
+
+/// A file as its parts, which can be changed and put together again.
+#[derive(Clone)]
+struct Parts {
+    metadata: Map<String, Value>,
+    /// Name, type, shape and bytes of each tensor.
+    tensors: Vec<(String, Value, Value, Vec<u8>)>,
+}
+
+impl Parts {
+    fn of(bytes: &[u8]) -> Self {
+        let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk().unwrap())).unwrap();
+        let header: Value = serde_json::from_slice(&bytes[8..8 + length]).unwrap();
+        let data = &bytes[8 + length..];
+        let mut entries = header.as_object().unwrap().clone();
+        let metadata = entries.remove("__metadata__").unwrap().as_object().unwrap().clone();
+        let tensor = |(name, entry): (String, Value)| {
+            let at = |i: usize| usize::try_from(entry["data_offsets"][i].as_u64().unwrap()).unwrap();
+            (name, entry["dtype"].clone(), entry["shape"].clone(), data[at(0)..at(1)].to_vec())
+        };
+        Self { metadata, tensors: entries.into_iter().map(tensor).collect() }
+    }
+
+    /// With an entry of the metadata replaced or added.
+    fn with(&self, key: &str, value: &str) -> Self {
+        let mut new = self.clone();
+        new.metadata.insert(key.to_owned(), Value::from(value));
+        new
+    }
+
+    /// With another tensor.
+    fn and(&self, name: &str, dtype: &str, shape: &[usize], bytes: &[u8]) -> Self {
+        let mut new = self.clone();
+        new.tensors.push((name.to_owned(), Value::from(dtype), json!(shape), bytes.to_vec()));
+        new
+    }
+
+    /// The file, with offsets and checksums that fit.
+    fn sealed(&self) -> Vec<u8> {
+        let mut header = Map::new();
+        let mut data = Vec::new();
+        for (name, dtype, shape, bytes) in &self.tensors {
+            let start = data.len();
+            data.extend_from_slice(bytes);
+            let entry = json!({"dtype": dtype, "shape": shape, "data_offsets": [start, data.len()]});
+            header.insert(name.clone(), entry);
+        }
+        header.insert("__metadata__".to_owned(), Value::Object(self.metadata.clone()));
+        reseal(&mut Value::Object(header), &mut data)
+    }
+}
+
+/// The dense scene of a file, as each of the readers sees it.
+fn read(bytes: &[u8]) -> [Result<Splats>; 2] {
+    let whole = lexi::read_bytes("file.lexi", bytes, &Limits::default()).map(Model::into_splats);
+    let in_parts = || {
+        let chunks = LexiChunks::open("file.lexi", bytes, &Limits::default())?;
+        let mut all = Vec::new();
+        lexisplat::stream::in_source_order(&chunks, &std::env::temp_dir(), &mut |part| {
+            all.push(part);
+            Ok(())
+        })?;
+        assert_eq!(all.len(), 1, "these files are shorter than a part");
+        Ok(all.remove(0))
+    };
+    [whole, in_parts()]
+}
+
+/// What each of the readers, that of dictionaries too where there is one, says against a file.
+fn refusals(bytes: &[u8], degree: &str) -> Vec<Error> {
+    let mut errors: Vec<Error> = read(bytes).into_iter().map(|r| r.expect_err("taken")).collect();
+    if degree != "0" {
+        errors.push(lexi::read_dictionary_bytes("file.lexi", bytes, &Limits::default()).expect_err("taken"));
+    }
+    errors
+}
+
+fn scene_refusals(bytes: &[u8]) -> Vec<String> {
+    read(bytes).into_iter().map(|r| r.unwrap_err().to_string()).collect()
+}
+
+fn assert_refused(parts: &Parts, words: &[&str]) {
+    for error in refusals(&parts.sealed(), parts.metadata["degree"].as_str().unwrap()) {
+        let said = error.to_string();
+        assert!(words.iter().all(|word| said.contains(word)), "{said}, without {words:?}");
+        assert!(said.starts_with("file.lexi: "), "{said}");
+    }
+}
+
+fn assert_same(name: &str, parts: &Parts, original: &Parts) {
+    for (a, b) in read(&parts.sealed()).into_iter().zip(read(&original.sealed())) {
+        assert_eq!(a.unwrap(), b.unwrap(), "{name}");
+    }
+}
+
+/// A dictionary alone, of the golden scene `f32`.
+fn dictionary_alone() -> Vec<u8> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("d.lexi");
+    let scene = lexi::read_bytes("f32.lexi", &golden("f32"), &Limits::default()).unwrap();
+    lexi::write_dictionary(&path, &scene.dictionary).unwrap();
+    std::fs::read(path).unwrap()
+}
+
+#[test]
+fn golden_files_of_every_version_are_read_alike_whole_and_in_parts() {
+    for name in SCENES {
+        let bytes = golden(name);
+        let [whole, in_parts] = read(&bytes).map(Result::unwrap);
+        assert_eq!(whole, in_parts, "{name}");
+        let version = if name.starts_with("packed") { "2" } else { "1" };
+        assert_eq!(Parts::of(&bytes).metadata["version"], version, "{name}");
+        // Changing nothing changes nothing.
+        assert_same(name, &Parts::of(&bytes), &Parts::of(&bytes));
+    }
+    assert_eq!(Parts::of(&dictionary_alone()).metadata["version"], "1");
+}
+
+#[test]
+fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        // A newer file may hold anything else that is not known.
+        let layout = parts.with("layout", "holographic").and("codes.more", "F64", &[1], &[0; 8]);
+        for newer in [parts.with("version", "3"), layout.with("version", "4000000000000")] {
+            let found: u64 = newer.metadata["version"].as_str().unwrap().parse().unwrap();
+            let mut damaged = newer.sealed();
+            let last = damaged.len() - 1;
+            damaged[last] ^= 1;
+            for bytes in [newer.sealed(), damaged] {
+                for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
+                    let said = error.to_string();
+                    let Error::Format { problem: FormatError::Version { found: f, supported: 2 }, .. } =
+                        error
+                    else {
+                        panic!("{name}: {said}")
+                    };
+                    assert_eq!(f, found, "{name}");
+                    assert!(said.contains("version") && said.contains(&found.to_string()), "{said}");
+                    assert!(said.ends_with("update lexisplat"), "{said}");
+                }
+            }
+        }
+    }
+    let newer = Parts::of(&dictionary_alone()).with("version", "3").sealed();
+    let error = lexi::read_dictionary_bytes("d.lexi", &newer, &Limits::default()).unwrap_err().to_string();
+    assert!(error.starts_with("d.lexi: format version 3 ") && error.ends_with("update lexisplat"), "{error}");
+}
+
+#[test]
+fn versions_that_never_were_are_damage() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        for version in ["0", "", "-1", "1.0", "two", "99999999999999999999"] {
+            assert_refused(&parts.with("version", version), &["metadata 'version' is "]);
+        }
+        // Each layout belongs to one version.
+        let other = if name.starts_with("packed") { "1" } else { "2" };
+        assert_refused(&parts.with("version", other), &["metadata 'version'", "has no layout"]);
+        assert_refused(&parts.with("layout", "holographic"), &["holographic"]);
+        assert_refused(&parts.with("format", "lexi-video"), &["metadata 'format' is 'lexi-video'"]);
+        for key in ["version", "format", "layout"] {
+            let mut missing = parts.clone();
+            missing.metadata.remove(key);
+            assert_refused(&missing, &[key, "is missing"]);
+        }
+    }
+}
+
+#[test]
+fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        let more = parts.and("x-thumbnail", "U8", &[2, 3], &[7; 6]).and("x-", "F64", &[0, 4], &[]);
+        assert_same(name, &more, &parts);
+        // Wherever they lie, and in whatever order the others are.
+        let mut turned = more.clone();
+        turned.tensors.reverse();
+        assert_same(name, &turned, &parts);
+        let mut bytes = more.sealed();
+        let at = bytes.windows(6).position(|w| w == [7; 6]).unwrap();
+        bytes[at] ^= 1;
+        for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
+            let problem = matches!(&error, Error::Format { problem: FormatError::Checksum { part }, .. }
+                if part == "x-thumbnail");
+            assert!(problem, "{name}: {error}");
+        }
+    }
+}
+
+#[test]
+fn any_other_unknown_tensor_is_refused_by_name() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        // Those of other layouts are not known in this one.
+        let mut unknown = vec!["X-thumbnail", "thumbnail", "codes.more", "sh.order", "packed.more", ""];
+        if name.starts_with("packed") {
+            unknown.extend(["position", "dictionary", "codes.counts", "escapes.rows"]);
+        } else {
+            let pointers = if name == "paper" { "codes.counts" } else { "codes.pointers" };
+            unknown.extend(["packed.data", "packed.order", pointers]);
+        }
+        if name == "f32" {
+            unknown.push("escapes.rows");
+        }
+        if name == "degree0" {
+            unknown.extend(["dictionary", "codes.counts", "escapes.gaussians"]);
+        }
+        for tensor in unknown {
+            let more = parts.and(tensor, "F32", &[1], &[0; 4]);
+            assert_refused(&more, &[&format!("tensor '{tensor}' is not known for layout '")]);
+        }
+        // A property that is known, of a type that is not.
+        for said in scene_refusals(&parts.and("extra.flag", "BOOL", &[1], &[0]).sealed()) {
+            assert!(said.contains("extra.flag"), "{said}");
+        }
+    }
+}
+
+#[test]
+fn unknown_metadata_is_ignored() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        let more = parts.with("licence", "none").with("x", "").with("generator", "another program 7");
+        assert_same(name, &more, &parts);
+    }
+    // Of a promise too.
+    let parts = Parts::of(&golden("packed"));
+    let mut promise: Value = serde_json::from_str(parts.metadata["promise"].as_str().unwrap()).unwrap();
+    promise["judge"] = Value::from("someone");
+    assert_same("packed", &parts.with("promise", &promise.to_string()), &parts);
+}
+
+#[test]
+fn values_beyond_those_of_this_version_are_refused_by_name() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        assert_refused(&parts.with("degree", "5"), &["degree"]);
+        assert_refused(&parts.with("pursuit", "lasso"), &["lasso"]);
+        if name.starts_with("packed") {
+            assert_refused(&parts.with("atoms", "1025"), &["dictionary"]);
+            if name != "packed_degree0" {
+                assert_refused(&parts.with("atom_bits", "15"), &["dictionary"]);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_dictionary_alone_keeps_the_same_rules() {
+    let parts = Parts::of(&dictionary_alone());
+    let read = |parts: &Parts| lexi::read_dictionary_bytes("d.lexi", &parts.sealed(), &Limits::default());
+    let original = read(&parts).unwrap();
+    let more = parts.and("x-name", "U8", &[2], b"no").with("licence", "none");
+    assert_eq!(read(&more).unwrap(), original);
+    for name in ["name", "position", "extra.label", "codes.values"] {
+        let said = read(&parts.and(name, "F32", &[1], &[0; 4])).unwrap_err().to_string();
+        assert_eq!(said, format!("d.lexi: tensor '{name}' is not known in a dictionary"));
+    }
+    for version in ["0", "one"] {
+        let said = read(&parts.with("version", version)).unwrap_err().to_string();
+        assert!(said.contains("metadata 'version' is "), "{said}");
+    }
+    let mut bytes = more.sealed();
+    let at = bytes.windows(2).rposition(|w| w == b"no").unwrap();
+    bytes[at] ^= 1;
+    let said = lexi::read_dictionary_bytes("d.lexi", &bytes, &Limits::default()).unwrap_err().to_string();
+    assert!(said.contains("checksum of 'x-name'"), "{said}");
+    // It is no scene.
+    for said in scene_refusals(&parts.sealed()) {
+        assert!(said.contains("metadata 'format' is 'lexi-dictionary'"), "{said}");
+    }
+}
