@@ -71,6 +71,7 @@ pub(crate) fn run(
     let clock = Instant::now();
     let file_bytes = write_output(
         output,
+        common.overwrite,
         |path| lexi::write_packed(path, &packed),
         |out| lexi::write_packed_to(out, &packed),
     )?;
@@ -133,6 +134,7 @@ pub(crate) fn run_in_parts(
     let clock = Instant::now();
     let done = write_output(
         output,
+        common.overwrite,
         |path| stream::pack_file(ply, &options, decibels, path, bars),
         |out| stream::pack_to(ply, &options, decibels, out, bars),
     )?;

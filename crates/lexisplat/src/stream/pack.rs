@@ -9,7 +9,7 @@ use crate::compress::AT_ONCE;
 use crate::error::{Error, Result};
 use crate::lexi::write_spilled_packed;
 use crate::limits::Limits;
-use crate::output::{folder_of, write_whole};
+use crate::output::{Output, write_whole};
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
 use crate::ply::PlyChunks;
 use crate::progress::{Progress, Stage};
@@ -56,15 +56,16 @@ impl PackedFile {
 /// # Errors
 /// [`Error::Parameter`] for options out of range and values so large that sums of them leave f32;
 /// [`Error::Io`] for `output` and for temporary files beside it.
-pub fn pack_file(
+pub fn pack_file<'a>(
     ply: &PlyChunks<'_>,
     options: &PackOptions,
     decibels: f64,
-    output: &Path,
+    output: impl Into<Output<'a>>,
     progress: &dyn Progress,
 ) -> Result<PackedFile> {
-    run(ply, options, decibels, folder_of(output), SIZES, progress, |fill| {
-        write_whole(output, |writer| fill(writer).map_err(|e| Error::io(output, e)))
+    let output = output.into();
+    run(ply, options, decibels, &output.spill_folder()?, SIZES, progress, |fill, bytes| {
+        write_whole(output.of_bytes(bytes), |writer| fill(writer).map_err(|e| Error::io(output.path(), e)))
     })
 }
 
@@ -79,7 +80,7 @@ pub fn pack_to(
     writer: &mut impl Write,
     progress: &dyn Progress,
 ) -> Result<PackedFile> {
-    run(ply, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill| {
+    run(ply, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill, _| {
         fill(writer).map_err(|e| Error::io("output", e))
     })
 }
@@ -91,7 +92,7 @@ fn run(
     folder: &Path,
     sizes: Sizes,
     progress: &dyn Progress,
-    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<()>,
+    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
 ) -> Result<PackedFile> {
     let n = ply.len();
     Limits::check("Gaussians", n as u64, Limits::default().gaussians)?;
@@ -113,7 +114,7 @@ fn run(
     let (head, spilled, report, stream_bits) = packer.finish(folder)?;
     let tensor_bytes = write_spilled_packed(&head, spilled, |fill, bytes| {
         progress.begin(Stage::Write, bytes);
-        write(&mut |writer| fill(&mut Counted { writer, progress }))?;
+        write(&mut |writer| fill(&mut Counted { writer, progress }), bytes)?;
         progress.end();
         Ok(())
     })?;
@@ -144,7 +145,7 @@ mod tests {
         let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut out = Vec::new();
-        let done = run(&chunks, &options(), 38.0, folder.path(), sizes, &Silent, |fill| {
+        let done = run(&chunks, &options(), 38.0, folder.path(), sizes, &Silent, |fill, _| {
             fill(&mut out).map_err(|e| Error::io("out", e))
         })
         .unwrap();
