@@ -94,8 +94,7 @@ impl<'a> Output<'a> {
             |e: &io::Error| matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
         match (error, self.bytes) {
             (Error::Io { file, source }, Some(bytes)) if full(&source) && Path::new(&file) == self.path => {
-                let text =
-                    format!("{source}; the file takes {bytes} bytes: free space, or write to another disk");
+                let text = format!("{source}; the file takes {bytes} bytes");
                 Error::Io { file, source: io::Error::new(source.kind(), text) }
             }
             (error, _) => error,

@@ -18,7 +18,7 @@ pub(super) struct All {
     pub(super) finished: usize,
 }
 
-static ALL: Mutex<All> = Mutex::new(All { stopped: false, names: Vec::new(), finished: 0 });
+static ALL: Mutex<All> = Mutex::new(All::NONE);
 
 fn all() -> MutexGuard<'static, All> {
     // The list is right after every step of a panicked thread.
@@ -27,11 +27,7 @@ fn all() -> MutexGuard<'static, All> {
 
 /// Does `work`, which [`stop`] waits for, unless all was stopped before. It should be short.
 pub(super) fn unless_stopped<T>(work: impl FnOnce(&mut All) -> io::Result<T>) -> io::Result<T> {
-    let mut all = all();
-    if all.stopped {
-        return Err(io::Error::other("the program was stopped"));
-    }
-    work(&mut all)
+    all().unless_stopped(work)
 }
 
 /// Counts an output that has no temporary file.
@@ -62,14 +58,58 @@ pub fn is_stopped() -> bool {
 /// Not for a signal handler itself, since it takes a lock, but for a thread that waits for signals.
 #[must_use]
 pub fn stop(expected: usize) -> Option<usize> {
-    let mut all = all();
-    if all.finished >= expected {
-        return None;
+    all().stop(expected)
+}
+
+impl All {
+    const NONE: Self = Self { stopped: false, names: Vec::new(), finished: 0 };
+
+    fn stop(&mut self, expected: usize) -> Option<usize> {
+        if self.finished >= expected {
+            return None;
+        }
+        self.stopped = true;
+        for name in self.names.drain(..) {
+            // What cannot be removed can be no reason to stay.
+            let _ = std::fs::remove_file(name);
+        }
+        Some(self.finished)
     }
-    all.stopped = true;
-    for name in all.names.drain(..) {
-        // What cannot be removed is one that was not made.
-        let _ = std::fs::remove_file(name);
+
+    fn unless_stopped<T>(&mut self, work: impl FnOnce(&mut Self) -> io::Result<T>) -> io::Result<T> {
+        if self.stopped {
+            return Err(io::Error::other("the program was stopped"));
+        }
+        work(self)
     }
-    Some(all.finished)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn stopping_removes_what_is_unfinished_and_lets_nothing_be_finished() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut all = All::NONE;
+        for name in ["a", "b"] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, "half").unwrap();
+            all.names.push(path);
+        }
+        all.names.push(folder.path().join("gone"));
+        all.finished = 2;
+        assert!(all.unless_stopped(|_| Ok(())).is_ok());
+        assert_eq!(all.stop(3), Some(2));
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+        assert!(all.unless_stopped(|_| -> io::Result<()> { panic!("not to be done") }).is_err());
+    }
+
+    #[test]
+    fn what_is_all_finished_cannot_be_stopped() {
+        let mut all = All::NONE;
+        all.finished = 2;
+        assert_eq!(all.stop(2), None);
+        assert!(all.unless_stopped(|_| Ok(())).is_ok());
+    }
 }
