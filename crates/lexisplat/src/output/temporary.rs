@@ -1,12 +1,12 @@
 //! A file that is being written: without a name where that is possible, else with one that is remembered.
 
 use std::fs::File;
-use std::io::{self, Seek};
+use std::io;
 use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::{Existing, folder_of, unfinished};
+use super::{Existing, unfinished};
 
 /// The name of a file that is being written.
 #[derive(Debug)]
@@ -49,10 +49,7 @@ impl Temporary {
     /// Gives `file`, which is whole, the name `target`.
     pub(super) fn name(mut self, file: File, target: &Path, existing: Existing) -> io::Result<()> {
         match self.0.take() {
-            Some(path) => {
-                drop(file);
-                rename(path, target, existing)
-            }
+            Some(path) => rename(path, target, existing),
             None => self.name_unnamed(file, target, existing),
         }
     }
@@ -64,6 +61,7 @@ impl Temporary {
 
     #[cfg(target_os = "linux")]
     fn name_unnamed(self, mut file: File, target: &Path, existing: Existing) -> io::Result<()> {
+        use super::folder_of;
         use super::unnamed::link;
         let linked = unfinished::unless_stopped(|all| {
             match link(&file, target) {
@@ -90,8 +88,8 @@ impl Temporary {
 /// without a name but cannot name them.
 #[cfg(target_os = "linux")]
 fn copy(file: &mut File, target: &Path, existing: Existing) -> io::Result<()> {
-    let (mut named, temporary) = Temporary::create_named(folder_of(target))?;
-    file.rewind()?;
+    let (mut named, temporary) = Temporary::create_named(super::folder_of(target))?;
+    io::Seek::rewind(file)?;
     io::copy(file, &mut named)?;
     named.sync_all()?;
     temporary.name(named, target, existing)
