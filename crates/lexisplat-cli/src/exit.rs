@@ -1,6 +1,9 @@
 //! How the program ends: one line of error, one of help, and a code that says whose fault it was.
 
+use std::io::ErrorKind;
 use std::process::ExitCode;
+
+use crate::files::note;
 
 /// Shown at the end of `--help`.
 pub(crate) const AFTER_HELP: &str = "Exit codes:
@@ -13,6 +16,12 @@ pub(crate) const AFTER_HELP: &str = "Exit codes:
   6  a size is over a limit
   7  an output exists and --overwrite was not given
   8  no GPU, or it failed; or no display to open a window on
+
+Stopped by a signal, as a shell counts (the program ends by the signal itself, as its caller can tell):
+  129  SIGHUP, when its terminal is closed
+  130  SIGINT, which is Ctrl-C
+  143  SIGTERM, what `kill` sends
+With any code but 0 an output is whole or not there, and one that was to be replaced is as it was.
 
 Environment:
   LEXISPLAT_SIMD  vector instructions: `plain`, `avx2` or `avx512` [default: the widest that the
@@ -83,16 +92,36 @@ fn eval(error: &lexisplat_eval::Error) -> (u8, Option<&'static str>) {
     match error {
         lexisplat_eval::Error::Codec(e) => codec(e),
         lexisplat_eval::Error::Render(e) => render(e),
-        lexisplat_eval::Error::Io { .. } => (3, None),
+        lexisplat_eval::Error::Io { file, source } => (3, io(file, source)),
         lexisplat_eval::Error::Format { .. } => (4, None),
         lexisplat_eval::Error::Limit { .. } => (6, None),
         _ => (5, None),
     }
 }
 
+/// What to do where the system did not write.
+fn io(file: &str, source: &std::io::Error) -> Option<&'static str> {
+    match source.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded if file.ends_with("(temporary file)") => Some(
+            "free space in that folder: temporary files lie beside the output, or in $TMPDIR if that is standard output",
+        ),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
+            Some("free space there, or name an output on another disk with -o")
+        }
+        ErrorKind::FileTooLarge => Some(
+            "the file system or a limit (`ulimit -f`) allows no file so large; name an output elsewhere with -o",
+        ),
+        _ => None,
+    }
+}
+
 fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
     match error {
-        lexisplat::Error::Io { .. } => (3, None),
+        // Outputs that came into being after they were looked for.
+        lexisplat::Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
+            (7, Some(OVERWRITE))
+        }
+        lexisplat::Error::Io { file, source } => (3, io(file, source)),
         lexisplat::Error::Format { .. } => (4, Some("`lexisplat info FILE` says more about a file")),
         lexisplat::Error::Parameter { .. } => (5, None),
         lexisplat::Error::Limit { .. } => (6, None),
@@ -102,7 +131,7 @@ fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
 
 fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
     match error {
-        lexisplat_render::Error::Io { .. } => (3, None),
+        lexisplat_render::Error::Io { file, source } => (3, io(file, source)),
         lexisplat_render::Error::Format { .. } => (4, None),
         lexisplat_render::Error::Parameter { name: "device", .. } => {
             (5, Some("`lexisplat devices` lists what there is"))
@@ -118,7 +147,7 @@ fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
 pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
     // A reader that closed the pipe has seen enough.
     if error.chain().any(|cause| {
-        cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == std::io::ErrorKind::BrokenPipe)
+        cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
     }) {
         return ExitCode::SUCCESS;
     }
@@ -130,9 +159,9 @@ pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
             line = format!("{line}: {cause}");
         }
     }
-    eprintln!("error: {}", line.replace('\n', " "));
+    note(&format!("error: {}", line.replace('\n', " ")));
     if let Some(help) = help {
-        eprintln!("help: {help}");
+        note(&format!("help: {help}"));
     }
     ExitCode::from(code)
 }

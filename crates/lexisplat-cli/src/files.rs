@@ -1,10 +1,11 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
 use std::ffi::OsStr;
-use std::io::{BufWriter, StdoutLock, Write};
+use std::io::{BufWriter, ErrorKind, StdoutLock, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::Result;
+use lexisplat::output::{Existing, Output};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input};
 use lexisplat_eval::SceneFile;
@@ -12,10 +13,18 @@ use lexisplat_eval::SceneFile;
 use crate::args::Common;
 use crate::exit::OutputExists;
 
+/// What messages call it.
+const STANDARD_OUTPUT: &str = "standard output";
+
+/// Writes a line to standard error. A program whose standard error is full goes on.
+pub(crate) fn note(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{line}");
+}
+
 /// Prints warnings about `name`.
 pub(crate) fn warn(name: &str, warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {name}: {warning}");
+        note(&format!("warning: {name}: {warning}"));
     }
 }
 
@@ -62,17 +71,37 @@ pub(crate) fn output_path(input: &Path, output: Option<&Path>, extension: &str) 
     }
 }
 
-/// Refuses outputs that are in the way, before any work is done.
-pub(crate) fn check_output(path: &Path, inputs: &[&Path], overwrite: bool) -> Result<()> {
-    if is_pipe(path) {
+/// What becomes of outputs that are already there.
+pub(crate) fn existing(overwrite: bool) -> Existing {
+    if overwrite { Existing::Replace } else { Existing::Refuse }
+}
+
+/// The file that `path` means, however it is written, whether it is there or not.
+fn meant(path: &Path) -> Option<PathBuf> {
+    let beside = || {
+        let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
+        Some(folder.join(path.file_name()?))
+    };
+    path.canonicalize().ok().or_else(beside)
+}
+
+/// Refuses outputs that are in the way, or where no file can be made, before any work is done.
+/// `others` are the other files of the command.
+pub(crate) fn check_output(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
+    check_free(path, others, overwrite)?;
+    if is_pipe(path) { Ok(()) } else { Ok(Output::new(path, existing(overwrite)).check()?) }
+}
+
+/// Refuses outputs that are in the way; their folder need not be there yet.
+pub(crate) fn check_free(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
+    let is_special = |found: std::fs::Metadata| !found.is_file() && !found.is_dir();
+    if is_pipe(path) || path.metadata().is_ok_and(is_special) {
         return Ok(());
     }
-    let same = |input: &Path| match (path.canonicalize(), input.canonicalize()) {
-        (Ok(a), Ok(b)) => a == b,
-        _ => false,
-    };
-    if inputs.iter().any(|input| same(input)) {
-        let expected = "another file than the input; name one with -o";
+    let this = meant(path);
+    if this.is_some() && others.iter().any(|other| meant(other) == this) {
+        let expected = "another file than the input and other outputs; name one with -o";
         return Err(Error::parameter("output", path.display(), expected).into());
     }
     if path.is_dir() {
@@ -86,28 +115,37 @@ pub(crate) fn check_output(path: &Path, inputs: &[&Path], overwrite: bool) -> Re
 
 /// Makes the folder `path` if need be.
 pub(crate) fn make_folder(path: &Path) -> Result<()> {
-    Ok(std::fs::create_dir_all(path).map_err(|e| Error::io(path, e))?)
+    Ok(std::fs::create_dir_all(path).map_err(|e| match e.kind() {
+        // A file has the name: that is not for --overwrite.
+        ErrorKind::AlreadyExists => Error::io(path, ErrorKind::NotADirectory.into()),
+        _ => Error::io(path, e),
+    })?)
 }
 
 /// Writes `bytes` to `path`, whole or not at all.
-pub(crate) fn write_bytes(path: &Path, bytes: &[u8]) -> Result<()> {
-    Ok(lexisplat::output::write_whole(path, |writer| {
+pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
+    Ok(lexisplat::output::write_whole(Output::new(path, existing(overwrite)), |writer| {
         writer.write_all(bytes).map_err(|e| Error::io(path, e))
     })?)
 }
 
 /// Writes an output: to its file by `save`, or by `stream` to standard output. Returns what they do.
-pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
+pub(crate) fn write_output<T>(
     output: &Path,
-    save: impl FnOnce(&Path) -> Result<T, E>,
-    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
+    overwrite: bool,
+    save: impl FnOnce(Output<'_>) -> lexisplat::Result<T>,
+    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> lexisplat::Result<T>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return save(output).map_err(Into::into);
+        return Ok(save(Output::new(output, existing(overwrite)))?);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let done = stream(&mut out).map_err(Into::into)?;
-    out.flush().context("standard output")?;
+    let done = stream(&mut out).map_err(|error| match error {
+        // What the library calls a writer that has no name.
+        Error::Io { file, source } if file == "output" => Error::io(STANDARD_OUTPUT, source),
+        other => other,
+    })?;
+    out.flush().map_err(|e| Error::io(STANDARD_OUTPUT, e))?;
     Ok(done)
 }
 
@@ -124,7 +162,7 @@ pub(crate) fn tell(
     } else if common.quiet {
         Ok(())
     } else if is_pipe(output) {
-        eprint!("{}", text()?);
+        note(text()?.trim_end());
         Ok(())
     } else {
         print(&text()?)
@@ -134,7 +172,9 @@ pub(crate) fn tell(
 /// Writes text to standard output, where a closed pipe is no reason to panic.
 pub(crate) fn print(text: &str) -> Result<()> {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).context("standard output")
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|e| Error::io(STANDARD_OUTPUT, e).into())
 }
 
 /// Prints one JSON object.

@@ -5,6 +5,7 @@ mod commands;
 mod exit;
 mod files;
 mod progress;
+mod stop;
 
 use std::process::ExitCode;
 
@@ -12,7 +13,10 @@ use clap::Parser;
 
 fn main() -> ExitCode {
     let cli = args::Cli::parse();
-    match commands::run(cli) {
+    stop::listen();
+    let done = commands::run(cli);
+    stop::wait_if_stopped();
+    match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => exit::report(&error),
     }

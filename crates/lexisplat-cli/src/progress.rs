@@ -1,13 +1,25 @@
 //! Progress bars: on a terminal, for work over a second, unless asked to be quiet.
 
-use std::sync::Mutex;
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lexisplat::{Progress, Stage};
 
+use crate::files::note;
+
 /// Work shorter than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
+
+/// The bar on the screen.
+static SHOWN: Mutex<Option<ProgressBar>> = Mutex::new(None);
+
+/// Takes the bar off the screen, for a program that is about to end.
+pub(crate) fn clear() {
+    if let Some(bar) = SHOWN.lock().unwrap_or_else(PoisonError::into_inner).take() {
+        bar.finish_and_clear();
+    }
+}
 
 /// A bar that appears when the work turns out to be long.
 #[derive(Debug, Default)]
@@ -44,7 +56,7 @@ impl Bars {
 
     /// Says what is being done now, in front of the bar.
     pub(crate) fn say(&self, what: &str) {
-        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(bar) = current.as_ref() {
             bar.bar.set_message(what.to_owned());
         }
@@ -52,17 +64,18 @@ impl Bars {
 
     /// Prints a line to standard error, above the bar if it is shown.
     pub(crate) fn aside(&self, line: &str) {
-        let current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         match current.as_ref() {
-            Some(bar) if bar.shown => bar.bar.suspend(|| eprintln!("{line}")),
-            _ => eprintln!("{line}"),
+            Some(bar) if bar.shown => bar.bar.suspend(|| note(line)),
+            _ => note(line),
         }
     }
 
     fn set(&self, new: Option<Bar>) {
         // A thread that panicked while holding the lock leaves at worst a bar on the screen.
-        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(old) = current.take() {
+            clear();
             old.bar.finish_and_clear();
         }
         *current = new;
@@ -83,13 +96,14 @@ impl Progress for Bars {
     }
 
     fn advance(&self, units: u64) {
-        let mut current = self.current.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        let mut current = self.current.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(bar) = current.as_mut() {
             bar.bar.inc(units);
             if !bar.shown && bar.start.elapsed() > PATIENCE {
                 // Indicatif itself stays silent when standard error is no terminal.
                 bar.bar.set_draw_target(ProgressDrawTarget::stderr());
                 bar.shown = true;
+                *SHOWN.lock().unwrap_or_else(PoisonError::into_inner) = Some(bar.bar.clone());
             }
         }
     }

@@ -17,7 +17,7 @@ pub(crate) fn temporary(folder: &Path) -> Result<File> {
 }
 
 /// What errors call a temporary file in `folder`.
-fn named(folder: &Path) -> PathBuf {
+pub(crate) fn named(folder: &Path) -> PathBuf {
     folder.join("(temporary file)")
 }
 

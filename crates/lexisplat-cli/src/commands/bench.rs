@@ -12,7 +12,7 @@ use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
 use crate::args::{Bench, Common};
-use crate::files::{load, print, print_json, warn_of};
+use crate::files::{load, note, print, print_json, warn_of};
 use crate::progress::Bars;
 
 /// Lanes that run in step on most GPUs.
@@ -28,7 +28,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     let cameras = views.choose(scene.geometry())?;
     let gpu = views.device.open_gpu()?;
     if gpu.is_none() && views.device == Device::Auto {
-        eprintln!("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
+        note("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
     }
     let bars = Bars::new(common.quiet);
     let paths = paths(&args.paths, &scene);
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
                 Err(lexisplat_eval::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
                     if args.paths.is_empty() =>
                 {
-                    eprintln!("warning: {}: {error}", path.name());
+                    note(&format!("warning: {}: {error}", path.name()));
                 }
                 Err(error) => return Err(error.into()),
             }

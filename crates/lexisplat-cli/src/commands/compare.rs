@@ -9,8 +9,9 @@ use lexisplat_render::Renderer;
 use serde_json::json;
 
 use crate::args::{Common, Compare};
-use crate::files::{check_output, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
+use crate::files::{check_free, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let (a, b) = (load(&args.a, common)?, load(&args.b, common)?);
@@ -24,9 +25,11 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     if let Some(folder) = &args.save_views {
         for (i, camera) in cameras.iter().enumerate() {
             let path = folder.join(view_name(i, cameras.len(), &camera.name));
-            check_output(&path, &[], common.overwrite)?;
+            check_free(&path, &[], common.overwrite)?;
             saved.push(path);
         }
+        // Numbers follow the pictures.
+        stop::while_writing(Work::Files(usize::MAX));
         make_folder(folder)?;
     }
     let bars = Bars::new(common.quiet);
@@ -41,7 +44,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
                 let (width, height, pixels) = montage::montage(image_a, image_b);
                 let written = png(width, height, &pixels)
                     .map_err(Into::into)
-                    .and_then(|bytes| write_bytes(path, &bytes));
+                    .and_then(|bytes| write_bytes(path, &bytes, common.overwrite));
                 failure = failure.take().or(written.err());
             }
         })?;

@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
+use lexisplat::output::Output;
 use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::stream::Compressed;
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
@@ -12,8 +13,9 @@ use serde_json::json;
 use lexisplat_eval::text;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, input, is_pipe, output_path, tell, warn, write_output};
+use crate::files::{check_output, existing, input, is_pipe, output_path, tell, warn, write_output};
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 /// Bytes of SH-rest a coefficient takes in a PLY.
 const COEFFICIENT_BYTES: u64 = 4;
@@ -29,8 +31,14 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     inputs.extend(args.dictionary.as_deref());
     check_output(&output, &inputs, common.overwrite)?;
     if let Some(path) = &args.save_dictionary {
+        inputs.push(&output);
         check_output(path, &inputs, common.overwrite)?;
     }
+    stop::while_writing(match &args.save_dictionary {
+        _ if is_pipe(&output) => Work::Stream,
+        None => Work::Files(1),
+        Some(_) => Work::Files(2),
+    });
     let layout = args.chosen_layout()?;
     let limits = common.limits()?;
     let mut options = CompressOptions::default();
@@ -67,11 +75,12 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let read_seconds = start.elapsed().as_secs_f64();
     let done = write_output(
         &output,
+        common.overwrite,
         |path| stream::compress_file(&chunks, &options, path, &bars),
         |out| stream::compress_to(&chunks, &options, out, &bars),
     )?;
     if let Some(path) = &args.save_dictionary {
-        lexi::write_dictionary(path, &done.dictionary)?;
+        lexi::write_dictionary(Output::new(path, existing(common.overwrite)), &done.dictionary)?;
     }
     let outcome = Outcome {
         output: &output,

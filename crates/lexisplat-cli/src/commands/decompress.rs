@@ -12,6 +12,7 @@ use lexisplat_eval::text;
 use crate::args::{Common, Decompress};
 use crate::files::{check_output, input, is_pipe, output_path, print, print_json, write_output};
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let start = Instant::now();
@@ -21,11 +22,13 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
         return Err(Error::parameter("output", "-", expected).into());
     }
     check_output(&output, &[&args.input], common.overwrite)?;
+    stop::while_writing(if is_pipe(&output) { Work::Stream } else { Work::Files(1) });
     let (name, bytes) = input(&args.input, common)?;
     let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
     let bars = Bars::new(common.quiet);
     let bytes = write_output(
         &output,
+        common.overwrite,
         |path| stream::decompress_file(&lexi, path, &bars),
         |out| stream::decompress_to(&lexi, out, &bars),
     )?;

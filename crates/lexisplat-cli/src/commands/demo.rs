@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
+use lexisplat::output::Output;
 use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
 use lexisplat_eval::report::{Picture, Report, html};
@@ -13,8 +14,9 @@ use serde_json::json;
 
 use super::compress::error_line;
 use crate::args::{Common, Demo};
-use crate::files::{check_output, make_folder, print, print_json, view_name, write_bytes};
+use crate::files::{check_free, existing, make_folder, note, print, print_json, view_name, write_bytes};
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 /// Views drawn and compared.
 const VIEWS: usize = 6;
@@ -49,27 +51,28 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let start = Instant::now();
     let folder = &args.output;
     for name in FILES {
-        check_output(&folder.join(name), &[], common.overwrite)?;
+        check_free(&folder.join(name), &[], common.overwrite)?;
     }
+    stop::while_writing(Work::Files(FILES.len() + 3 * VIEWS));
     let views_folder = folder.join("views");
     make_folder(&views_folder)?;
     let say = |text: &str| {
         if !common.quiet && !common.json {
-            eprintln!("{text}");
+            note(text);
         }
     };
     let [ply_path, lexi_path, report_path] = FILES.map(|name| folder.join(name));
 
     say("1. making a scene: a still life of glossy and matte things, as a trainer would leave it");
     let splats = scene(&SampleOptions::new(args.gaussians, args.seed));
-    let ply_bytes = ply::write(&ply_path, &splats)?;
+    let ply_bytes = ply::write(Output::new(&ply_path, existing(common.overwrite)), &splats)?;
 
     say("2. compressing it: learning a dictionary, coding every Gaussian, checking every error");
     let bars = Bars::new(common.quiet);
     let mut options = CompressOptions::default();
     options.seed = args.seed;
     let (model, report) = compress(splats.clone(), &options, &bars)?;
-    let file_bytes = lexi::write(&lexi_path, &model)?;
+    let file_bytes = lexi::write(Output::new(&lexi_path, existing(common.overwrite)), &model)?;
 
     say("3. drawing both, the compressed one straight from its codes, and comparing");
     let cameras = orbit(&splats.geometry, VIEWS, ORBIT_SIZE.0, ORBIT_SIZE.1);
@@ -120,7 +123,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         pictures: &pictures,
         amplification: montage::AMPLIFICATION,
     });
-    write_bytes(&report_path, page.as_bytes())?;
+    write_bytes(&report_path, page.as_bytes(), common.overwrite)?;
 
     let seconds = start.elapsed().as_secs_f64();
     if common.json {
@@ -162,7 +165,8 @@ fn save(folder: &Path, drawn: &[Drawn]) -> Result<()> {
     for (i, view) in drawn.iter().enumerate() {
         for (part, bytes) in view.parts() {
             let name = view_name(i, drawn.len(), &format!("{}_{part}", view.name));
-            write_bytes(&folder.join(name), bytes)?;
+            // Names of pictures follow from those of the files, which were free or may be replaced.
+            write_bytes(&folder.join(name), bytes, true)?;
         }
     }
     Ok(())

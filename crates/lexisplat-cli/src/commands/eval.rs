@@ -15,9 +15,10 @@ use serde_json::{Value, json};
 
 use crate::args::{Common, Eval, Measures};
 use crate::files::{
-    check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
+    check_free, check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
 };
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 /// What was found out about a model.
 struct Scored {
@@ -44,6 +45,9 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     }
     if let Some(path) = &args.csv {
         check_output(path, &[], common.overwrite)?;
+    }
+    if args.csv.is_some() || args.save_views.is_some() {
+        stop::while_writing(Work::Files(usize::MAX));
     }
     let scorer = scorer(&args.measures)?;
     let mut renderer = Renderer::open(args.views.device)?;
@@ -93,7 +97,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     }
     bars.end();
     if let Some(path) = &args.csv {
-        write_bytes(path, csv(&scored)?.as_bytes())?;
+        write_bytes(path, csv(&scored)?.as_bytes(), common.overwrite)?;
     }
     if common.json {
         return print_json(&report(args, &scored, &found, renderer.name()));
@@ -132,9 +136,9 @@ fn save(
     make_folder(folder)?;
     for (i, (camera, (a, b))) in cameras.iter().zip(references.iter().zip(drawn)).enumerate() {
         let path = folder.join(view_name(i, cameras.len(), &camera.name));
-        check_output(&path, &[], common.overwrite)?;
+        check_free(&path, &[], common.overwrite)?;
         let (width, height, pixels) = montage::montage(a, b);
-        write_bytes(&path, &png(width, height, &pixels)?)?;
+        write_bytes(&path, &png(width, height, &pixels)?, common.overwrite)?;
     }
     Ok(())
 }

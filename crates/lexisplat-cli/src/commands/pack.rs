@@ -73,6 +73,7 @@ pub(crate) fn run(
     let clock = Instant::now();
     let file_bytes = write_output(
         output,
+        common.overwrite,
         |path| lexi::write_packed(path, &packed),
         |out| lexi::write_packed_to(out, &packed),
     )?;
@@ -155,6 +156,7 @@ pub(crate) fn run_in_parts(
     let once = || importance.take().unwrap_or(Importance::Guess);
     let done = write_output(
         output,
+        common.overwrite,
         |path| stream::pack_file(ply, once(), &options, decibels, path, bars),
         |out| stream::pack_to(ply, once(), &options, decibels, out, bars),
     )?;

@@ -11,9 +11,10 @@ use serde_json::json;
 
 use crate::args::{Common, Render};
 use crate::files::{
-    check_output, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
+    check_free, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
 };
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let folder = args.output.clone().unwrap_or_else(|| {
@@ -34,10 +35,11 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let paths: Vec<PathBuf> =
         cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
     for path in &paths {
-        check_output(path, &[], common.overwrite)?;
+        check_free(path, &[], common.overwrite)?;
     }
     let mut renderer = Renderer::open(views.device)?;
     let prepared = renderer.prepare(scene)?;
+    stop::while_writing(Work::Files(paths.len()));
     make_folder(&folder)?;
     let options = RenderOptions { background: views.background, ..RenderOptions::default() };
     let bars = Bars::new(common.quiet);
@@ -49,7 +51,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         let picture = renderer.render(&prepared, camera, &options)?;
         let seconds = clock.elapsed().as_secs_f64();
         drawing += seconds;
-        write_bytes(path, &png(picture.width, picture.height, &picture.to_8bit())?)?;
+        write_bytes(path, &png(picture.width, picture.height, &picture.to_8bit())?, common.overwrite)?;
         bars.advance(1);
         done.push(json!({
             "camera": camera.name,

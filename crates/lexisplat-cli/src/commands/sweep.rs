@@ -17,6 +17,7 @@ use crate::args::{Common, Sweep};
 use crate::exit::OutputExists;
 use crate::files::{make_folder, print, print_json};
 use crate::progress::Bars;
+use crate::stop::{self, Work};
 
 /// The paper's tolerances.
 const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
@@ -29,6 +30,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let entries = entries(args)?;
     let scorer = scorer(&args.measures)?;
     let options = options(args, common)?;
+    stop::while_writing(Work::Resumable);
     make_folder(folder)?;
     let watch = Watcher { bars: Bars::new(common.quiet), reused: Cell::new(0), made: Cell::new(0) };
     let outcome = sweep(&entries, &options, &scorer, folder, &watch);

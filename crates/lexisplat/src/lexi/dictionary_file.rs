@@ -13,6 +13,7 @@ use crate::error::{Error, Result};
 use crate::input::Input;
 use crate::limits::Limits;
 use crate::model::Layout;
+use crate::output::Output;
 use crate::packed::Decoder;
 use crate::sh::ShDegree;
 
@@ -55,11 +56,11 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
     read::dictionary(&checked, degree, limits)
 }
 
-/// Writes `dictionary` to `path`, whole or not at all. Returns the file's size in bytes.
+/// Writes `dictionary` to `output`, whole or not at all. Returns the file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Parameter`] for the empty dictionary of degree 0, [`Error::Io`] for the file.
-pub fn write_dictionary(path: &Path, dictionary: &Dictionary) -> Result<u64> {
+pub fn write_dictionary<'a>(output: impl Into<Output<'a>>, dictionary: &Dictionary) -> Result<u64> {
     if dictionary.is_empty() {
         return Err(Error::parameter("dictionary", "empty", "a scene with view-dependent colour"));
     }
@@ -67,5 +68,5 @@ pub fn write_dictionary(path: &Path, dictionary: &Dictionary) -> Result<u64> {
     metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
     let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());
-    Draft::new(metadata, vec![tensor]).save(path)
+    Draft::new(metadata, vec![tensor]).save(output.into())
 }

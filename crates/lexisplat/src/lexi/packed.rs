@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
 
 use safetensors::Dtype;
 
@@ -13,6 +12,7 @@ use super::tensors::{Checked, Draft, Tensor, preamble};
 use super::write::{extra_tensors, put_record};
 use crate::error::Result;
 use crate::limits::Limits;
+use crate::output::Output;
 use crate::packed::{CHUNK, Packed, Promise};
 use crate::room::Room;
 use crate::spill::Spilled;
@@ -21,12 +21,12 @@ use crate::spill::Spilled;
 /// header is refused before anything is allocated.
 const GAUSSIANS_PER_BYTE: u64 = 3;
 
-/// Writes `packed` to `path`, whole or not at all. Returns the file's size in bytes.
+/// Writes `packed` to `output`, whole or not at all. Returns the file's size in bytes.
 ///
 /// # Errors
 /// [`crate::Error::Io`] for the file.
-pub fn write_packed(path: &Path, packed: &Packed) -> Result<u64> {
-    draft(packed).save(path)
+pub fn write_packed<'a>(output: impl Into<Output<'a>>, packed: &Packed) -> Result<u64> {
+    draft(packed).save(output.into())
 }
 
 /// Writes `packed` to `writer`. Returns the number of bytes.

@@ -3,7 +3,6 @@
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::ops::Range;
-use std::path::Path;
 
 use safetensors::tensor::{SafeTensorError, TensorView};
 use safetensors::{Dtype, SafeTensors};
@@ -11,7 +10,7 @@ use safetensors::{Dtype, SafeTensors};
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::error::{Error, FormatError, Result};
 use crate::limits::Limits;
-use crate::output::write_whole;
+use crate::output::{Output, write_whole};
 use crate::parallel::map_chunks;
 use crate::spill::Spilled;
 
@@ -150,11 +149,12 @@ impl<'a> Draft<'a> {
         out
     }
 
-    /// Writes the file to `path`, whole or not at all. Returns its size in bytes.
-    pub(super) fn save(self, path: &Path) -> Result<u64> {
+    /// Writes the file to `output`, whole or not at all. Returns its size in bytes.
+    pub(super) fn save(self, output: Output<'_>) -> Result<u64> {
         let mut bytes = 0;
-        write_whole(path, |writer| {
-            bytes = self.write_to(writer).map_err(|e| Error::io(path, e))?;
+        let all = self.header_bytes() + self.tensors.iter().map(|t| t.bytes() as u64).sum::<u64>();
+        write_whole(output.of_bytes(all), |writer| {
+            bytes = self.write_to(writer).map_err(|e| Error::io(output.path(), e))?;
             Ok(())
         })?;
         Ok(bytes)

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::Path;
 
 use safetensors::Dtype;
 
@@ -11,16 +10,17 @@ use super::tensors::{Draft, Source, Tensor, preamble};
 use crate::codes::{Indices, Values};
 use crate::error::{Error, Result};
 use crate::model::{Layout, Model, Record};
+use crate::output::Output;
 use crate::sh::ShDegree;
 use crate::splats::{Extra, ExtraValues, SceneMeta};
 
-/// Writes `model` to `path`, whole or not at all. Returns the file's size in bytes.
+/// Writes `model` to `output`, whole or not at all. Returns the file's size in bytes.
 ///
 /// # Errors
 /// [`Error::Io`] for the file; [`Error::Parameter`] if the values' type is not the layout's;
 /// [`Error::Limit`] if the paper's 32-bit pointers cannot count the nonzeros.
-pub fn write(path: &Path, model: &Model) -> Result<u64> {
-    draft(model)?.save(path)
+pub fn write<'a>(output: impl Into<Output<'a>>, model: &Model) -> Result<u64> {
+    draft(model)?.save(output.into())
 }
 
 /// Writes `model` to `writer`. Returns the number of bytes.

@@ -1,24 +1,22 @@
 //! Writes a [`Splats`] in the INRIA layout, which every viewer reads.
 
-use std::collections::HashSet;
-use std::io::{self, Write};
-use std::path::Path;
-
 use super::header::ScalarType;
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
 use crate::error::{Error, Result};
-use crate::output::write_whole;
+use crate::output::{Output, write_whole};
 use crate::parallel::for_each_chunk_mut;
 use crate::splats::{ExtraValues, SceneMeta, Splats, for_extra};
+use std::collections::HashSet;
+use std::io::{self, Write};
 
 /// Rows one thread formats at a time.
 const CHUNK_ROWS: usize = 1024;
 /// Rows formatted before they are written: at 248 bytes a row, 8 MiB.
 const BLOCK_ROWS: usize = 32 * CHUNK_ROWS;
 
-/// Writes `splats` to `path`, whole or not at all; the number of bytes.
+/// Writes `splats` to `output`, whole or not at all; the number of bytes.
 ///
 /// Little-endian, in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
 /// own types. Normals are zeros if the scene has none. Comments go back in; the anti-aliasing mark is
@@ -27,11 +25,12 @@ const BLOCK_ROWS: usize = 32 * CHUNK_ROWS;
 /// # Errors
 /// [`Error::Io`] if the file cannot be written, [`Error::Parameter`] if the arrays differ in length or
 /// an extra's name cannot stand in a header.
-pub fn write(path: &Path, splats: &Splats) -> Result<u64> {
+pub fn write<'a>(output: impl Into<Output<'a>>, splats: &Splats) -> Result<u64> {
     check(splats)?;
+    let output = output.into();
     let mut bytes = 0;
-    write_whole(path, |file| {
-        bytes = write_checked(file, splats).map_err(|e| Error::io(path, e))?;
+    write_whole(output, |file| {
+        bytes = write_checked(file, splats).map_err(|e| Error::io(output.path(), e))?;
         Ok(())
     })?;
     Ok(bytes)

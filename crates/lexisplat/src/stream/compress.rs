@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 use crate::lexi::SpilledModel;
 use crate::limits::{Limits, MAX_GAUSSIANS};
 use crate::model::{Layout, Record};
-use crate::output::{folder_of, write_whole};
+use crate::output::{Output, write_whole};
 use crate::parallel::CHUNK;
 use crate::ply::PlyChunks;
 use crate::progress::{Progress, Stage};
@@ -53,14 +53,15 @@ impl Compressed {
 ///
 /// # Errors
 /// As those two, [`Error::Io`] also for temporary files beside `output`.
-pub fn compress_file(
+pub fn compress_file<'a>(
     ply: &PlyChunks<'_>,
     options: &CompressOptions,
-    output: &Path,
+    output: impl Into<Output<'a>>,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    run(ply, options, folder_of(output), AT_ONCE, progress, |fill| {
-        write_whole(output, |writer| fill(writer).map_err(|e| Error::io(output, e)))
+    let output = output.into();
+    run(ply, options, &output.spill_folder()?, AT_ONCE, progress, |fill, bytes| {
+        write_whole(output.of_bytes(bytes), |writer| fill(writer).map_err(|e| Error::io(output.path(), e)))
     })
 }
 
@@ -74,12 +75,12 @@ pub fn compress_to(
     writer: &mut impl Write,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    run(ply, options, &std::env::temp_dir(), AT_ONCE, progress, |fill| {
+    run(ply, options, &std::env::temp_dir(), AT_ONCE, progress, |fill, _| {
         fill(writer).map_err(|e| Error::io("output", e))
     })
 }
 
-/// Writes a file to a writer.
+/// Writes a file, whose size is told too, to a writer.
 type Fill<'a> = dyn FnMut(&mut dyn Write) -> std::io::Result<()> + 'a;
 
 /// `at_once` Gaussians, a multiple of [`CHUNK`], are in memory at a time.
@@ -89,7 +90,7 @@ fn run(
     folder: &Path,
     at_once: usize,
     progress: &dyn Progress,
-    write: impl FnOnce(&mut Fill<'_>) -> Result<()>,
+    write: impl FnOnce(&mut Fill<'_>, u64) -> Result<()>,
 ) -> Result<Compressed> {
     debug_assert!(at_once.is_multiple_of(CHUNK), "sums would be added in another order");
     let n = ply.len();
@@ -119,7 +120,7 @@ fn run(
     let clock = Stopwatch::start();
     let attribute_bytes = set_aside.finish(&encoder.dictionary, &record, ply.meta(), |fill, bytes| {
         progress.begin(Stage::Write, bytes);
-        write(&mut |writer| fill(&mut Counted { writer, progress }))?;
+        write(&mut |writer| fill(&mut Counted { writer, progress }), bytes)?;
         progress.end();
         Ok(())
     })?;
@@ -155,7 +156,7 @@ mod tests {
         let chunks = PlyChunks::open("t.ply", bytes, &read, &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut out = Vec::new();
-        let done = run(&chunks, options, folder.path(), at_once, &Silent, |fill| {
+        let done = run(&chunks, options, folder.path(), at_once, &Silent, |fill, _| {
             fill(&mut out).map_err(|e| Error::io("out", e))
         })
         .unwrap();

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::source_order::in_source_order;
 use crate::error::{Error, Result};
 use crate::lexi::LexiChunks;
-use crate::output::{folder_of, write_whole};
+use crate::output::{Output, write_whole};
 use crate::ply::{PlyWriter, check};
 use crate::progress::{Progress, Stage};
 
@@ -17,10 +17,16 @@ use crate::progress::{Progress, Stage};
 /// # Errors
 /// As those two; [`Error::Io`] also for temporary files beside `output`, which a packed file with its
 /// source's order needs.
-pub fn decompress_file(lexi: &LexiChunks<'_>, output: &Path, progress: &dyn Progress) -> Result<u64> {
+pub fn decompress_file<'a>(
+    lexi: &LexiChunks<'_>,
+    output: impl Into<Output<'a>>,
+    progress: &dyn Progress,
+) -> Result<u64> {
+    let output = output.into();
+    let folder = output.spill_folder()?;
     let mut bytes = 0;
-    write_whole(output, |writer| {
-        bytes = run(lexi, writer, folder_of(output), &|e| Error::io(output, e), progress)?;
+    write_whole(output.of_bytes(size(lexi)?), |writer| {
+        bytes = run(lexi, writer, &folder, &|e| Error::io(output.path(), e), progress)?;
         Ok(())
     })?;
     Ok(bytes)
@@ -32,6 +38,14 @@ pub fn decompress_file(lexi: &LexiChunks<'_>, output: &Path, progress: &dyn Prog
 /// As [`decompress_file`]; an [`Error::Io`] of the writer names no file.
 pub fn decompress_to(lexi: &LexiChunks<'_>, writer: &mut impl Write, progress: &dyn Progress) -> Result<u64> {
     run(lexi, writer, &std::env::temp_dir(), &|e| Error::io("output", e), progress)
+}
+
+/// Bytes of the PLY that `lexi` becomes.
+fn size(lexi: &LexiChunks<'_>) -> Result<u64> {
+    let like = lexi.empty();
+    check(&like)?;
+    let ply = PlyWriter::begin(Vec::new(), &like, lexi.len()).map_err(|e| Error::io("output", e))?;
+    Ok(ply.bytes + ply.row_bytes() * lexi.len() as u64)
 }
 
 fn run(

@@ -2,7 +2,8 @@
 //!
 //! What comes out is byte for byte what the functions that hold the whole scene make of it, but for
 //! [`pack_file`]. Anonymous memory is bounded whatever the number of Gaussians; temporary files as large as
-//! the output, when packing also as the input, lie beside the output and have no name.
+//! the output, when packing also as the input, lie beside the output, or in the system's folder for
+//! them if that is no plain file, and have no name.
 //!
 //! ```
 //! use lexisplat::sample::{SampleOptions, scene};

@@ -10,7 +10,7 @@ use crate::compress::AT_ONCE;
 use crate::error::{Error, Result};
 use crate::lexi::write_spilled_packed;
 use crate::limits::{Limits, MAX_GAUSSIANS};
-use crate::output::{folder_of, write_whole};
+use crate::output::{Output, write_whole};
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
 use crate::ply::PlyChunks;
 use crate::progress::{Progress, Stage};
@@ -52,16 +52,17 @@ impl PackedFile {
 /// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
 /// importances that do not fit their part or are not finite; [`Error::Io`] for `output` and for temporary
 /// files beside it; what `importance` returns.
-pub fn pack_file<E: From<Error>>(
+pub fn pack_file<'a, E: From<Error>>(
     ply: &PlyChunks<'_>,
     importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
-    output: &Path,
+    output: impl Into<Output<'a>>,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    run(ply, importance, options, decibels, folder_of(output), SIZES, progress, |fill| {
-        write_whole(output, |writer| fill(writer).map_err(|e| Error::io(output, e)))
+    let output = output.into();
+    run(ply, importance, options, decibels, &output.spill_folder()?, SIZES, progress, |fill, bytes| {
+        write_whole(output.of_bytes(bytes), |writer| fill(writer).map_err(|e| Error::io(output.path(), e)))
     })
 }
 
@@ -77,7 +78,7 @@ pub fn pack_to<E: From<Error>>(
     writer: &mut impl Write,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    run(ply, importance, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill| {
+    run(ply, importance, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill, _| {
         fill(writer).map_err(|e| Error::io("output", e))
     })
 }
@@ -91,7 +92,7 @@ fn run<E: From<Error>>(
     folder: &Path,
     sizes: Sizes,
     progress: &dyn Progress,
-    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>) -> Result<()>,
+    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
 ) -> Result<PackedFile, E> {
     let n = ply.len();
     Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
@@ -111,7 +112,7 @@ fn run<E: From<Error>>(
     let (head, spilled, report, stream_bits) = packer.finish(folder, importance.device())?;
     let tensor_bytes = write_spilled_packed(&head, spilled, |fill, bytes| {
         progress.begin(Stage::Write, bytes);
-        write(&mut |writer| fill(&mut Counted { writer, progress }))?;
+        write(&mut |writer| fill(&mut Counted { writer, progress }), bytes)?;
         progress.end();
         Ok(())
     })?;
@@ -144,7 +145,7 @@ mod tests {
         let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let mut out = Vec::new();
-        let write = |fill: &mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>| {
+        let write = |fill: &mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, _: u64| {
             fill(&mut out).map_err(|e| Error::io("out", e))
         };
         let done = run(&chunks, importance, &options(), 38.0, folder.path(), sizes, &Silent, write);

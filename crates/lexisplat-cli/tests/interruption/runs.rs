@@ -1,0 +1,107 @@
+//! Runs of the program that are ended from outside.
+
+use std::os::unix::process::ExitStatusExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::time::{Duration, Instant};
+
+use crate::folder::Folder;
+
+/// What the scene is coded or decoded to.
+pub(crate) const OUTPUT: &str = "made";
+/// What was there before.
+pub(crate) const OLD: &[u8] = b"what was there before";
+/// A program that does not come so far hangs.
+pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
+/// Every way to write a scene: exact, packed, packed in parts, and back.
+pub(crate) const JOBS: [&[&str]; 4] = [
+    &["compress", "scene.ply", "--layout", "f16", "-o", OUTPUT],
+    &["compress", "scene.ply", "-o", OUTPUT],
+    &["compress", "scene.ply", "--memory", "100kB", "-o", OUTPUT],
+    &["decompress", "kept.lexi", "-o", OUTPUT],
+];
+
+pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_lexisplat");
+
+/// The program in `folder`.
+pub(crate) fn program(folder: &Folder, arguments: &[&str]) -> Command {
+    let mut command = Command::new(PROGRAM);
+    command.current_dir(folder.0.path()).args(arguments);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command
+}
+
+/// A folder with all that the jobs read.
+pub(crate) fn ready() -> Folder {
+    let folder = Folder::new();
+    folder.run(&["compress", "scene.ply", "-o", "kept.lexi", "--quiet"]);
+    folder
+}
+
+/// What a job makes if nobody disturbs it, and how long that takes.
+pub(crate) fn undisturbed(folder: &Folder, job: &[&str]) -> (Vec<u8>, Duration) {
+    let clock = Instant::now();
+    folder.run(job);
+    let seconds = clock.elapsed();
+    let path = folder.path(OUTPUT);
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    (bytes, seconds)
+}
+
+/// Sends a signal, named as `kill` names it.
+pub(crate) fn send(child: &Child, signal: &str) {
+    let sent =
+        Command::new("kill").args(["-s", signal, &child.id().to_string()]).stderr(Stdio::null()).status();
+    // One that has ended cannot be sent any.
+    sent.unwrap();
+}
+
+/// Waits until the program watches for signals.
+pub(crate) fn wait_until_watching(child: &Child, signal: i32) {
+    let clock = Instant::now();
+    let caught = || {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
+        let mask =
+            status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap_or("0").trim().to_owned();
+        u64::from_str_radix(&mask, 16).unwrap() >> (signal - 1) & 1 == 1
+    };
+    while !caught() {
+        assert!(clock.elapsed() < PATIENCE, "signal {signal} is never watched for");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+/// What a shell calls the end of a program.
+pub(crate) fn code(status: ExitStatus) -> i32 {
+    status.code().or_else(|| status.signal().map(|signal| 128 + signal)).unwrap()
+}
+
+/// Asserts that the output is as before or `whole`, and that there is nothing else than `before` and it.
+/// Whether it is whole.
+pub(crate) fn assert_old_or_new(
+    folder: &Folder,
+    before: &[String],
+    old: Option<&[u8]>,
+    whole: &[u8],
+) -> bool {
+    let found = std::fs::read(folder.path(OUTPUT)).ok();
+    let is_new = found.as_deref() == Some(whole);
+    assert!(is_new || found.as_deref() == old, "a half output of {:?} bytes", found.map(|f| f.len()));
+    let mut names = folder.names();
+    names.retain(|name| name != OUTPUT);
+    assert_eq!(names, before);
+    is_new
+}
+
+/// SplitMix64 (Vigna), from 0 to 1.
+pub(crate) struct Random(pub(crate) u64);
+
+impl Random {
+    pub(crate) fn next(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z ^ (z >> 31)) as f64 / u64::MAX as f64
+    }
+}
