@@ -18,18 +18,18 @@ const THREADS: [&str; 3] = ["1", "2", "7"];
 /// Gaussians of the larger scene: three units of work of the exact layouts, so that threads share them.
 const MANY: usize = 5000;
 /// Gaussians of the scene whose pictures are drawn again and again.
-const FEW: usize = 700;
+const FEW: usize = 300;
 
-/// What is run, in this order, in a folder with `many.ply` and `few.ply`.
+/// What is run, in this order, in a folder with `many.ply`, `few.ply` and a few small cameras.
 const COMMANDS: [&str; 13] = [
     "compress many.ply -o f16.lexi --tol 0.08 --save-dictionary dictionary.lexi",
     "compress many.ply -o f32.lexi --layout f32 --tol 0.1 --pursuit omp",
     "compress many.ply -o paper.lexi --layout paper --max-nnz 6",
     "compress many.ply -o given.lexi --dictionary dictionary.lexi",
     "compress few.ply -o preset.lexi --preset high --keep-order",
-    "compress few.ply -o aimed.lexi --psnr 33 --prune=1",
-    "compress few.ply -o sized.lexi --size 14kB",
-    "compress few.ply -o promised.lexi --layout packed --tol 0.1",
+    "compress few.ply -o aimed.lexi --psnr 33 --prune=1 --cameras cameras.json",
+    "compress few.ply -o sized.lexi --size 9kB --cameras cameras.json",
+    "compress few.ply -o promised.lexi --layout packed --tol 0.1 --cameras cameras.json",
     "compress many.ply -o parts.lexi --preset balanced --memory 1MB",
     "decompress f16.lexi -o f16.ply",
     "decompress preset.lexi -o preset.ply",
@@ -41,7 +41,16 @@ const COMMANDS: [&str; 13] = [
 fn made(simd: &str, threads: &str) -> BTreeMap<String, Vec<u8>> {
     let folder = Folder(tempfile::tempdir().unwrap());
     ply::write(&folder.path("many.ply"), &scene(&SampleOptions::new(MANY, 1))).unwrap();
-    ply::write(&folder.path("few.ply"), &scene(&SampleOptions::new(FEW, 2))).unwrap();
+    let few = scene(&SampleOptions::new(FEW, 2));
+    ply::write(&folder.path("few.ply"), &few).unwrap();
+    let cameras = lexisplat_render::orbit(&few.geometry, 4, 160, 120).into_iter().map(|camera| {
+        serde_json::json!({
+            "img_name": camera.name, "width": camera.width, "height": camera.height,
+            "fx": camera.fx, "fy": camera.fy, "position": camera.position, "rotation": camera.rotation,
+        })
+    });
+    let cameras = serde_json::Value::from(cameras.collect::<Vec<_>>());
+    std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
     for command in COMMANDS {
         let mut run: Command = lexisplat();
         run.current_dir(folder.0.path()).env(VARIABLE, simd).args(command.split(' '));
@@ -75,10 +84,13 @@ fn threads_and_vector_instructions_do_not_show_in_any_file() {
         assert!(!has || sets.contains(&name), "this CPU has {name}, which cannot be chosen");
     }
     let first = made(sets[0], THREADS[0]);
-    // 9 compressed scenes, 2 decompressed, a dictionary, 2 given scenes, 4 pictures.
-    assert_eq!(first.len(), 9 + 2 + 1 + 2 + 4, "{:?}", first.keys());
+    // 9 compressed scenes, 2 decompressed, a dictionary, 2 given scenes with cameras, 4 pictures.
+    assert_eq!(first.len(), 9 + 2 + 1 + 3 + 4, "{:?}", first.keys());
     for simd in &sets {
         for threads in THREADS {
+            if (*simd, threads) == (sets[0], THREADS[0]) {
+                continue;
+            }
             let again = made(simd, threads);
             assert!(again.keys().eq(first.keys()), "{simd}, {threads} threads");
             for (name, bytes) in &first {

@@ -1,13 +1,14 @@
 //! The command line, as typed.
 
 mod eval;
+mod limits;
 
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lexisplat::packed::Preset;
-use lexisplat::{Geometry, Layout, Limits, Pursuit};
+use lexisplat::{Geometry, Layout, Pursuit};
 use lexisplat_eval::SplitFilter;
 use lexisplat_eval::views::{ChosenViews, ViewOptions, find_views};
 use lexisplat_render::gpu::ShPath;
@@ -45,26 +46,8 @@ pub(crate) struct Common {
     /// [default: 4294967294], `atoms` [1024], `nonzeros` of a Gaussian [72], `bytes` held at once, or read from a
     /// pipe [no limit], such as 2GiB, `expansion`, that is the same for each byte of the file [256],
     /// `header_bytes` [4MiB] or `properties` of an element of a PLY [4096]. Exit code 6 if a file asks for more.
-    #[arg(long = "limit", global = true, value_name = "NAME=N", value_parser = limit)]
+    #[arg(long = "limit", global = true, value_name = "NAME=N", value_parser = limits::limit)]
     limits: Vec<(String, u64)>,
-}
-
-impl Common {
-    /// What files may ask for.
-    ///
-    /// # Errors
-    /// A name that is none, which the command line has refused already.
-    pub(crate) fn limits(&self) -> Result<Limits, lexisplat::Error> {
-        self.limits.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
-    }
-}
-
-/// A limit as `NAME=N`, N as [`size`].
-fn limit(text: &str) -> Result<(String, u64), String> {
-    let (name, value) = text.split_once('=').ok_or("NAME=N, such as gaussians=1000000")?;
-    let value = if value == "0" { 0 } else { size(value)? };
-    Limits::default().with(name, value).map_err(|e| e.to_string())?;
-    Ok((name.to_owned(), value))
 }
 
 #[derive(Debug, Subcommand)]
@@ -508,32 +491,6 @@ mod tests {
         assert_eq!(size("77"), Ok(77));
         for bad in ["", "MB", "-3kB", "10 furlongs", "1e30GB"] {
             assert!(size(bad).is_err(), "{bad}");
-        }
-    }
-
-    #[test]
-    fn limits_have_names_and_numbers() {
-        assert_eq!(limit("gaussians=5"), Ok(("gaussians".to_owned(), 5)));
-        assert_eq!(limit("bytes=2GiB"), Ok(("bytes".to_owned(), 2 << 30)));
-        assert_eq!(limit("expansion=0"), Ok(("expansion".to_owned(), 0)));
-        for bad in ["gaussians", "gaussian=5", "bytes=", "bytes=-1", "=5"] {
-            assert!(limit(bad).is_err(), "{bad}");
-        }
-        // The help names the defaults.
-        use clap::CommandFactory;
-        let help = Cli::command().render_long_help().to_string();
-        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
-        let Limits { gaussians, atoms, nonzeros, expansion, header_bytes, properties, .. } =
-            Limits::default();
-        assert_eq!((Limits::default().bytes, header_bytes), (u64::MAX, 4 << 20));
-        for part in [
-            format!(
-                "`gaussians` [default: {gaussians}], `atoms` [{atoms}], `nonzeros` of a Gaussian [{nonzeros}]"
-            ),
-            format!("each byte of the file [{expansion}], `header_bytes` [4MiB]"),
-            format!("element of a PLY [{properties}]"),
-        ] {
-            assert!(help.contains(&part), "{part}: {help}");
         }
     }
 

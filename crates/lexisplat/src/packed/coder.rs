@@ -3,13 +3,13 @@
 use half::f16;
 
 use super::canonical::{Placed, canonical};
+use super::chunks::{MAX_ATOM_BITS, dictionary_walk, resident};
 use super::codebook::{Codebook, Codes, Costs, Until, learn};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::pack::{PackOptions, PackReport};
 use super::parameters::Parameters;
 use super::stream::{Recorder, Stream};
-use super::unpack::{MAX_ATOM_BITS, dictionary_walk, resident};
 use super::walk::{Code, Target, Walk};
 use crate::codes::reconstruct;
 use crate::dictionary::Dictionary;

@@ -8,6 +8,7 @@
 
 mod bits;
 mod canonical;
+mod chunks;
 mod codebook;
 mod coder;
 mod entropy;
@@ -27,9 +28,9 @@ mod unpack;
 mod walk;
 
 pub(crate) use canonical::{Bounds, Grid, Placed};
+pub(crate) use chunks::Decoder;
 pub(crate) use pack::check;
 pub(crate) use parts::{PartPacker, Whole};
-pub(crate) use unpack::Decoder;
 
 pub use pack::{PackOptions, PackReport, Packer};
 pub use preset::Preset;

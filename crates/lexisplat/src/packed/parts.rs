@@ -4,12 +4,13 @@ use std::path::Path;
 
 use super::CHUNK;
 use super::canonical::{Grid, Placed};
+use super::chunks::Spent;
 use super::coder::{ChunkCoder, Tally, View, length, no_symbols, tables};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::pack::{PackOptions, PackReport, check, expected_step};
 use super::stream::{Recorder, Stream};
-use super::unpack::{Packed, Spent, StreamBits};
+use super::unpack::{Packed, StreamBits};
 use crate::error::Result;
 use crate::lexi::{Extras, SpilledPacked};
 use crate::limits::Limits;

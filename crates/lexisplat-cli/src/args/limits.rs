@@ -1,0 +1,56 @@
+//! `--limit`: what files may ask for.
+
+use lexisplat::Limits;
+
+use super::{Common, size};
+
+impl Common {
+    /// What files may ask for.
+    ///
+    /// # Errors
+    /// A name that is none, which the command line has refused already.
+    pub(crate) fn limits(&self) -> Result<Limits, lexisplat::Error> {
+        self.limits.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
+    }
+}
+
+/// A limit as `NAME=N`, N as [`size`].
+pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
+    let (name, value) = text.split_once('=').ok_or("NAME=N, such as gaussians=1000000")?;
+    let value = if value == "0" { 0 } else { size(value)? };
+    Limits::default().with(name, value).map_err(|e| e.to_string())?;
+    Ok((name.to_owned(), value))
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+    use crate::args::Cli;
+
+    #[test]
+    fn limits_have_names_and_numbers() {
+        assert_eq!(limit("gaussians=5"), Ok(("gaussians".to_owned(), 5)));
+        assert_eq!(limit("bytes=2GiB"), Ok(("bytes".to_owned(), 2 << 30)));
+        assert_eq!(limit("expansion=0"), Ok(("expansion".to_owned(), 0)));
+        for bad in ["gaussians", "gaussian=5", "bytes=", "bytes=-1", "=5"] {
+            assert!(limit(bad).is_err(), "{bad}");
+        }
+        // The help names the defaults.
+        let help = Cli::command().render_long_help().to_string();
+        let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
+        let Limits { gaussians, atoms, nonzeros, expansion, header_bytes, properties, .. } =
+            Limits::default();
+        assert_eq!((Limits::default().bytes, header_bytes), (u64::MAX, 4 << 20));
+        for part in [
+            format!(
+                "`gaussians` [default: {gaussians}], `atoms` [{atoms}], `nonzeros` of a Gaussian [{nonzeros}]"
+            ),
+            format!("each byte of the file [{expansion}], `header_bytes` [4MiB]"),
+            format!("element of a PLY [{properties}]"),
+        ] {
+            assert!(help.contains(&part), "{part}: {help}");
+        }
+    }
+}
