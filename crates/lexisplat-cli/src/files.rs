@@ -130,20 +130,21 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<
 }
 
 /// Writes an output: to its file by `save`, or by `stream` to standard output. Returns what they do.
-pub(crate) fn write_output<T>(
+pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
     overwrite: bool,
-    save: impl FnOnce(Output<'_>) -> lexisplat::Result<T>,
-    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> lexisplat::Result<T>,
+    save: impl FnOnce(Output<'_>) -> Result<T, E>,
+    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return Ok(save(Output::new(output, existing(overwrite)))?);
+        return save(Output::new(output, existing(overwrite))).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let done = stream(&mut out).map_err(|error| match error {
+    let done = stream(&mut out).map_err(|error| match error.into().downcast() {
         // What the library calls a writer that has no name.
-        Error::Io { file, source } if file == "output" => Error::io(STANDARD_OUTPUT, source),
-        other => other,
+        Ok(Error::Io { file, source }) if file == "output" => Error::io(STANDARD_OUTPUT, source).into(),
+        Ok(other) => anyhow::Error::from(other),
+        Err(other) => other,
     })?;
     out.flush().map_err(|e| Error::io(STANDARD_OUTPUT, e))?;
     Ok(done)

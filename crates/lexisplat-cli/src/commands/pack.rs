@@ -8,7 +8,7 @@ use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::{PlyChunks, PlyRead};
 use lexisplat::stream::Importance;
-use lexisplat::{Error, Progress, Splats, lexi, stream};
+use lexisplat::{Error, Progress, Sensitivity, Splats, lexi, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
@@ -143,11 +143,11 @@ pub(crate) fn run_in_parts(
     let mut renderer = if args.guess { Renderer::cpu() } else { Renderer::open(args.device)? };
     let device = renderer.is_gpu().then(|| renderer.name().to_owned());
     let mut look_seconds = 0.0;
-    let mut judge = |part: &Splats| {
+    let mut judge = |part: &Splats| -> Result<Sensitivity> {
         let clock = Instant::now();
         let seen = Views::of_part(part).sensitivity(&mut renderer, part, &mut || ());
         look_seconds += clock.elapsed().as_secs_f64();
-        seen
+        Ok(seen?)
     };
     let importance =
         if args.guess { Importance::Guess } else { Importance::Judge { judge: &mut judge, device } };

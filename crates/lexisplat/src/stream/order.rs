@@ -33,6 +33,9 @@ const KEY_BYTES: usize = 12;
 /// Mixed into the seed of what is looked at.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
+/// Takes Gaussians, their sensitivities to colour and opacity, and their places.
+type Take<'a> = dyn FnMut(&Splats, &[[f32; 2]], &[Placed]) -> Result<()> + 'a;
+
 /// A scene dealt into buckets in the order of a packed file.
 pub(super) struct Ordered {
     pub(super) grid: Grid,
@@ -157,12 +160,7 @@ impl Ordered {
 
     /// Hands all Gaussians to `take` in order, with their `weights` and their places: a multiple
     /// of `chunk` of them each time but the last.
-    pub(super) fn each(
-        mut self,
-        mut weights: Spilled,
-        chunk: usize,
-        take: &mut dyn FnMut(&Splats, &[[f32; 2]], &[Placed]) -> Result<()>,
-    ) -> Result<()> {
+    pub(super) fn each(mut self, mut weights: Spilled, chunk: usize, take: &mut Take<'_>) -> Result<()> {
         let (mut bytes, mut places) = (Vec::new(), Vec::new());
         let count = self.buckets.len();
         for bucket in 0..count {
