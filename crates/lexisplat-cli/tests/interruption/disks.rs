@@ -107,7 +107,7 @@ fn standard_output_that_is_full_is_an_error() {
     let folder = ready();
     let full = || Stdio::from(std::fs::File::options().write(true).open("/dev/full").unwrap());
     for arguments in [
-        &["compress", "scene.ply", "-o", "-"][..],
+        &["compress", "scene.ply", "--cameras", "cameras.json", "-o", "-"][..],
         &["compress", "scene.ply", "--layout", "f16", "-o", "-"],
         &["compress", "scene.ply", "--memory", "100kB", "-o", "-"],
         &["decompress", "kept.lexi", "-o", "-"],
@@ -124,7 +124,7 @@ fn standard_output_that_is_full_is_an_error() {
             "{error}"
         );
     }
-    assert_eq!(folder.names(), ["kept.lexi", "scene.ply"]);
+    assert_eq!(folder.names(), ["cameras.json", "kept.lexi", "scene.ply"]);
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn standard_error_that_is_full_is_no_error() {
         let mut command = Command::new(PROGRAM);
         command.current_dir(folder.0.path()).args(arguments).stderr(full()).output().unwrap().status.code()
     };
-    assert_eq!(run(&["compress", "scene.ply", "-o", "-"]), Some(0));
+    assert_eq!(run(&["compress", "scene.ply", "--memory", "100kB", "-o", "-"]), Some(0));
     assert_eq!(run(&["compress", "gone.ply"]), Some(3));
 }
 
@@ -152,6 +152,6 @@ fn a_file_over_the_limit_of_its_size_is_an_error() {
         let error = String::from_utf8(ended.stderr).unwrap();
         assert_eq!(ended.status.code(), Some(3), "{job:?}: {error}");
         assert!(error.contains("File too large") && error.contains("ulimit -f"), "{error}");
-        assert_eq!(folder.names(), ["kept.lexi", "scene.ply"]);
+        assert_eq!(folder.names(), ["cameras.json", "kept.lexi", "scene.ply"]);
     }
 }

@@ -88,7 +88,18 @@ fn what_is_said_fits_what_was_written() {
 fn a_hang_up_that_nohup_ignores_stays_ignored() {
     let folder = Folder::new();
     let mut child = Command::new("sh")
-        .args(["-c", "trap '' HUP; exec \"$0\" \"$@\"", PROGRAM, "compress", "-", "-o", OUTPUT, "--quiet"])
+        .args([
+            "-c",
+            "trap '' HUP; exec \"$0\" \"$@\"",
+            PROGRAM,
+            "compress",
+            "-",
+            "-o",
+            OUTPUT,
+            "--quiet",
+            "--memory",
+            "100kB",
+        ])
         .current_dir(folder.0.path())
         .stdin(Stdio::piped())
         .spawn()
