@@ -15,9 +15,9 @@ build() {
 
 # fuzz PROGRAMS TARGET SECONDS LOG: one run; its exit status is libFuzzer's.
 fuzz() {
-  # One allocation and all memory, the sanitizer's included, in MiB. The time for one input is that of a clock on the
-  # wall, and long because machines are busy; those over 10 s are reported.
-  local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout=60 -report_slow_units=10)
+  # One allocation and all memory, the sanitizer's included, in MiB. The time for one input, in seconds, is that of a
+  # clock on the wall, and long because machines are busy; those over 10 s are kept.
+  local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=10)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
     lexi | packed | dictionary) options+=(-max_len=16384) ;;
