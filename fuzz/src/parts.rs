@@ -48,12 +48,12 @@ pub fn ply(
     });
 }
 
-/// Sizes of parts: some of 0 to 255 Gaussians, others of nearly all.
+/// Sizes of parts: some of 0 to 4 Gaussians, then some of a quarter or more.
 fn sizes(data: &[u8], gaussians: usize) -> impl Iterator<Item = usize> {
-    let byte = move |k: usize| usize::from(data.get(k % data.len().max(1)).copied().unwrap_or(0));
-    // Prime, so that places differ from file to file and round to round.
-    (0..).map(move |k| match byte(k * 251 + data.len() / 2) {
-        small @ 0..=0xdf if k < 8 => small,
+    // A stride that is prime, so that files of any length give sizes of all kinds.
+    let byte = move |k: usize| usize::from(data.get(k * 251 % data.len().max(1)).copied().unwrap_or(0));
+    (1..).map(move |k| match byte(k) {
+        small @ 0..=0xdf if k < 16 => small % 5,
         large => 1 + gaussians / (1 + large % 4),
     })
 }
