@@ -1,9 +1,10 @@
-//! The PLY reader: any bytes are refused or give a scene that can be written and read again, within memory.
+//! The PLY reader: any bytes are refused or give a scene that can be written and read again, within memory; whole
+//! and a part at a time.
 #![no_main]
 
 use lexisplat::ply::{ReadOptions, read_bytes, write_to};
 use lexisplat_fuzz::allocator::bounded;
-use lexisplat_fuzz::{invariants, limits, one_thread};
+use lexisplat_fuzz::{invariants, limits, one_thread, parts};
 use libfuzzer_sys::fuzz_target;
 
 /// A byte of an ASCII file is at most half a value; a text header names things of some 100 bytes.
@@ -13,7 +14,9 @@ const BASE: usize = 16 << 20;
 
 fuzz_target!(init: one_thread(), |data: &[u8]| {
     let options = ReadOptions { drop_invalid: data.len() % 2 == 1, limits: limits() };
-    let Ok(read) = bounded(data, PER_BYTE, BASE, || read_bytes("fuzz.ply", data, &options)) else { return };
+    let read = bounded(data, PER_BYTE, BASE, || read_bytes("fuzz.ply", data, &options));
+    parts::ply(data, &options, read.as_ref(), [PER_BYTE, BASE]);
+    let Ok(read) = read else { return };
     invariants::splats(&read.splats);
     let mut bytes = Vec::new();
     if let Err(error) = write_to(&mut bytes, &read.splats) {

@@ -1,10 +1,11 @@
-//! Scenes of any finite values: compressed in every layout, packed, drawn from every kind of view and described,
-//! each with a result that keeps what it promises.
+//! Scenes of any finite values: compressed in every layout and packed, whole and a part at a time, drawn from every
+//! kind of view and described, each with a result that keeps what it promises.
 #![no_main]
 
 use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::{
-    CompressOptions, Error, Layout, Pursuit, Sensitivity, Silent, Splats, compress, lexi, stats,
+    CompressOptions, Error, Layout, Pursuit, Sensitivity, Silent, Splats, compress, lexi, ply, stats, stream,
 };
 use lexisplat_fuzz::made::{Bytes, scene};
 use lexisplat_fuzz::{invariants, limits, one_thread};
@@ -38,11 +39,19 @@ fn exact(splats: Splats, how: u8) {
     options.max_nonzeros = (how & 8 != 0).then_some(2);
     options.atoms = Some(usize::from(how >> 4) + 1);
     let original = splats.clone();
-    let model = match compress(splats, &options, &Silent) {
+    let file = as_ply(&splats);
+    let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
+    let mut streamed = Vec::new();
+    let done = stream::compress_to(&parts, &options, &mut streamed, &Silent);
+    let model = match compress(Splats { meta: parts.meta().clone(), ..splats }, &options, &Silent) {
         Ok((model, _)) => model,
-        Err(Error::Parameter { .. }) => return,
+        Err(Error::Parameter { .. }) => return assert!(done.is_err(), "refused when held whole only"),
         Err(error) => panic!("{error}"),
     };
+    done.expect("not refused when held whole");
+    let mut whole = Vec::new();
+    lexi::write_to(&mut whole, &model).expect("written");
+    assert!(whole == streamed, "compressed in parts differs");
     invariants::model(&model);
     invariants::exact_round_trip(&model);
     assert_eq!(model.geometry, original.geometry);
@@ -67,6 +76,7 @@ fn packed(splats: &Splats, how: u8) {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
         lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &mut || ())
     };
+    packed_in_parts(splats, &options, f64::from(how >> 3) * 3.0);
     let packer = match Packer::new(splats, &sensitivity, &options) {
         Ok(packer) => packer,
         Err(Error::Parameter { .. }) => return,
@@ -82,6 +92,26 @@ fn packed(splats: &Splats, how: u8) {
     let mut bytes = Vec::new();
     lexi::write_packed_to(&mut bytes, &packed).expect("written");
     let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
+    assert_eq!(model.len(), splats.len());
+    invariants::model(&model);
+}
+
+fn as_ply(splats: &Splats) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    ply::write_to(&mut bytes, splats).expect("written");
+    bytes
+}
+
+fn packed_in_parts(splats: &Splats, options: &PackOptions, decibels: f64) {
+    let file = as_ply(splats);
+    let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
+    let mut bytes = Vec::new();
+    match stream::pack_to(&parts, options, decibels, &mut bytes, &Silent) {
+        Ok(done) => assert_eq!(done.file_bytes(), bytes.len() as u64),
+        Err(Error::Parameter { .. }) => return,
+        Err(error) => panic!("{error}"),
+    }
+    let model = lexi::read_bytes("parts.lexi", &bytes, &limits()).expect("what was packed can be read");
     assert_eq!(model.len(), splats.len());
     invariants::model(&model);
 }

@@ -5,6 +5,7 @@ pub mod allocator;
 pub mod container;
 pub mod invariants;
 pub mod made;
+pub mod parts;
 
 use lexisplat::Limits;
 

@@ -1,6 +1,8 @@
-//! Ten thousand damaged PLY files: no panic, and no memory beyond a multiple of the file.
+//! Ten thousand damaged PLY files, read whole and a part at a time: no panic, no memory beyond a multiple of the
+//! file, and one answer.
 
-use lexisplat::ply::{self, Format, ReadOptions};
+use lexisplat::Silent;
+use lexisplat::ply::{self, Format, PlyChunks, ReadOptions};
 
 #[path = "common/allocator.rs"]
 mod allocator;
@@ -105,13 +107,25 @@ fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
     let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
     let (result, used) = counted(|| ply::read_bytes("t.ply", bytes, &options));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input", bytes.len());
+    let (opened, used) = counted(|| PlyChunks::open("t.ply", bytes, &options, &Silent));
+    assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input, in parts", bytes.len());
     match result {
         Ok(read) => {
             assert!(read.splats.validate().is_ok());
+            let chunks = opened.unwrap_or_else(|error| panic!("refused in parts only: {error}"));
+            assert_eq!(chunks.warnings(), read.warnings);
+            let (mut part, half) = (chunks.empty(), chunks.len() / 2);
+            let mut parts = Vec::new();
+            for range in [0..half, half..chunks.len()] {
+                assert!(chunks.read(range, &mut part).is_ok());
+                parts.extend_from_slice(&part.geometry.positions);
+            }
+            assert_eq!(parts, read.splats.geometry.positions);
             true
         }
         Err(error) => {
             let said = error.to_string();
+            assert_eq!(opened.err().map(|e| e.to_string()), Some(said.clone()));
             assert!(!said.contains('\n') && said.len() < 600, "{said:?}");
             false
         }

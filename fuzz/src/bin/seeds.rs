@@ -23,6 +23,8 @@ type Done = Result<(), Box<dyn Error>>;
 
 /// Gaussians of most seeds: a fuzzer is as quick as its inputs are small.
 const FEW: usize = 6;
+/// Rows that a PLY reader takes at once.
+const CHUNK_ROWS: usize = 1024;
 /// Atoms of seeds, so that dictionaries are small.
 const ATOMS: usize = 4;
 
@@ -118,16 +120,30 @@ fn plys(root: &Path) -> Done {
         bytes.extend_from_slice(face);
         save(root, "ply", name, &bytes)?;
     }
-    Ok(())
+    long_ply(root)
+}
+
+/// Rows of one byte a property, more than a reader takes at once.
+fn long_ply(root: &Path) -> Done {
+    let rows = CHUNK_ROWS + 40;
+    let names = "x y z f_dc_0 f_dc_1 f_dc_2 opacity scale_0 scale_1 scale_2 rot_0 rot_1 rot_2 rot_3";
+    let mut header = format!("ply\nformat binary_little_endian 1.0\nelement vertex {rows}\n");
+    for name in names.split(' ') {
+        writeln!(header, "property char {name}")?;
+    }
+    header.push_str("end_header\n");
+    let values = (0..rows * names.split(' ').count()).map(|k| (k * 7 % 251).to_le_bytes()[0]);
+    save(root, "ply", "long", &header.into_bytes().into_iter().chain(values).collect::<Vec<u8>>())
 }
 
 fn exact(root: &Path) -> Done {
     for layout in [Layout::F32, Layout::F16, Layout::Paper] {
         for degree in degrees() {
             let mut splats = with_extras(sample(FEW, degree));
-            // One row that no few atoms come near: an escape.
+            // Rows that no few atoms come near: escapes.
             if degree != ShDegree::ZERO {
                 splats.sh_rest[..degree.rest()].fill(1e6);
+                splats.sh_rest[4 * degree.rest()..][..degree.rest()].fill(-1e6);
             }
             let mut options = CompressOptions::default();
             options.layout = layout;

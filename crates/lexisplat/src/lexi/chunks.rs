@@ -188,6 +188,16 @@ impl<'a> LexiChunks<'a> {
         Ok(())
     }
 
+    /// [`Self::each`] with parts of `at_once` Gaussians where the layout is exact, for the fuzz targets.
+    #[cfg(feature = "fuzzing")]
+    #[doc(hidden)]
+    pub fn each_of(&self, at_once: usize, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
+        match &self.kind {
+            Kind::Exact(exact) => exact_parts(exact, at_once.max(1), take),
+            Kind::Packed(_) => self.each(take),
+        }
+    }
+
     /// [`Self::each`]; returns what the streams of a packed file take if `count_bits`.
     pub(crate) fn parts(
         &self,
@@ -196,16 +206,25 @@ impl<'a> LexiChunks<'a> {
     ) -> Result<Vec<StreamBits>> {
         match &self.kind {
             Kind::Exact(exact) => {
-                for start in (0..exact.len()).step_by(PART) {
-                    let (geometry, codes) = exact.part(start..exact.len().min(start + PART))?;
-                    let (meta, dictionary) = (exact.meta.clone(), exact.dictionary.clone());
-                    take(start, Model { geometry, meta, dictionary, codes, record: exact.record.clone() })?;
-                }
+                exact_parts(exact, PART, take)?;
                 Ok(Vec::new())
             }
             Kind::Packed(packed) => packed.parts(count_bits, take),
         }
     }
+}
+
+fn exact_parts(
+    exact: &Exact<'_>,
+    at_once: usize,
+    take: &mut dyn FnMut(usize, Model) -> Result<()>,
+) -> Result<()> {
+    for start in (0..exact.len()).step_by(at_once) {
+        let (geometry, codes) = exact.part(start..exact.len().min(start + at_once))?;
+        let (meta, dictionary) = (exact.meta.clone(), exact.dictionary.clone());
+        take(start, Model { geometry, meta, dictionary, codes, record: exact.record.clone() })?;
+    }
+    Ok(())
 }
 
 impl PackedParts<'_> {

@@ -1,4 +1,5 @@
-//! Damaged and hostile packed files: refused or decoded to finite numbers, without panic, within memory.
+//! Damaged and hostile packed files, read whole and a part at a time: refused or decoded to finite numbers, without
+//! panic, within memory.
 
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
@@ -13,8 +14,9 @@ use std::time::{Duration, Instant};
 
 use allocator::counted;
 use files::{copies, files};
+use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::CHUNK;
-use lexisplat::{Limits, Splats, lexi};
+use lexisplat::{Limits, Model, Result, Splats, lexi};
 use mutations::{Parts, Random, change_metadata, change_parameters, change_tensor, make_up};
 use serde_json::Value;
 
@@ -40,6 +42,9 @@ fn accepted(bytes: &[u8]) -> bool {
     assert!(clock.elapsed() < PATIENCE, "{:?} for {} bytes", clock.elapsed(), bytes.len());
     let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_TABLES + ALLOWED_BASE;
     assert!(used <= allowed, "{used} bytes allocated for a file of {}, {allowed} allowed", bytes.len());
+    let (in_parts, used) = counted(|| read_in_parts(bytes));
+    assert!(used <= allowed, "{used} bytes allocated in parts for {}, {allowed} allowed", bytes.len());
+    assert_eq!(in_parts.ok(), result.as_ref().ok().map(Model::len), "in parts and whole");
     match result {
         Ok(model) => {
             let Splats { geometry: g, sh_rest, .. } = model.into_splats();
@@ -59,6 +64,16 @@ fn accepted(bytes: &[u8]) -> bool {
             false
         }
     }
+}
+
+/// How many Gaussians there are.
+fn read_in_parts(bytes: &[u8]) -> Result<usize> {
+    let mut gaussians = 0;
+    LexiChunks::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
+        gaussians += part.len();
+        Ok(())
+    })?;
+    Ok(gaussians)
 }
 
 /// One test, since the allocator counts for the whole process.
