@@ -4,6 +4,7 @@
 
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::stream::Importance;
 use lexisplat::{
     CompressOptions, Error, Layout, Pursuit, Sensitivity, Silent, Splats, compress, lexi, ply, stats, stream,
 };
@@ -106,7 +107,7 @@ fn packed_in_parts(splats: &Splats, options: &PackOptions, decibels: f64) {
     let file = as_ply(splats);
     let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let mut bytes = Vec::new();
-    match stream::pack_to(&parts, options, decibels, &mut bytes, &Silent) {
+    match stream::pack_to(&parts, Importance::<Error>::Guess, options, decibels, &mut bytes, &Silent) {
         Ok(done) => assert_eq!(done.file_bytes(), bytes.len() as u64),
         Err(Error::Parameter { .. }) => return,
         Err(error) => panic!("{error}"),

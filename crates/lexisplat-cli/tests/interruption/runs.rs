@@ -22,9 +22,22 @@ pub(crate) const JOBS: [&[&str]; 4] = [
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_lexisplat");
 
+/// Whether whoever started the tests has hang-ups ignored, as `nohup` does, which the program would keep to.
+fn hang_ups_are_ignored() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0").trim();
+    u64::from_str_radix(mask, 16).unwrap() & 1 == 1
+}
+
 /// The program in `folder`.
 pub(crate) fn program(folder: &Folder, arguments: &[&str]) -> Command {
-    let mut command = Command::new(PROGRAM);
+    let mut command = if hang_ups_are_ignored() {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=HUP", PROGRAM]);
+        command
+    } else {
+        Command::new(PROGRAM)
+    };
     command.current_dir(folder.0.path()).args(arguments);
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     command
