@@ -75,9 +75,12 @@ fn what_is_said_fits_what_was_written() {
     ] {
         let mut child = waiting(&folder, arguments);
         // Standard input is read after the command has said what it writes.
-        child.stdin.as_mut().unwrap().write_all(&vec![0; 1 << 20]).unwrap();
+        let mut stdin = child.stdin.take().unwrap();
+        stdin.write_all(&vec![0; 1 << 20]).unwrap();
         send(&child, "TERM");
         let ended = child.wait_with_output().unwrap();
+        // Until here, or the command would find the input's end, and an error of its own.
+        drop(stdin);
         assert_eq!(code(ended.status), 143);
         assert_eq!(String::from_utf8(ended.stderr).unwrap(), expected);
     }
