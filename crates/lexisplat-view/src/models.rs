@@ -326,14 +326,14 @@ mod tests {
         std::fs::write(&bad, "nonsense").unwrap();
         let (sender, finished) = std::sync::mpsc::channel();
         let bell = Bell { sender, wake: Arc::new(|| ()) };
-        open(7, Which::Second, good, SIZE, bell.clone());
+        open(7, Which::Second, good, Limits::default(), SIZE, bell.clone());
         let told = finished.recv().unwrap();
         let model = told.result.unwrap();
         assert_eq!((told.id, told.which, model.gaussians()), (7, Which::Second, 20));
         assert_eq!(model.short_name(), "good.ply");
         assert!(model.ratio(None).is_none());
         assert_eq!((model.orbit.len(), model.orbit[0].width), (3, 100));
-        open(8, Which::First, bad, SIZE, bell.clone());
+        open(8, Which::First, bad, Limits::default(), SIZE, bell.clone());
         assert!(finished.recv().unwrap().result.is_err());
         let original = Arc::new(model);
         compress_to(9, original, Quality::Tolerance(-1.0), None, SIZE, bell);
