@@ -75,7 +75,10 @@ fn wrong_headers_are_named() {
         (edited("element vertex", "element vertices"), "no element 'vertex'; elements found: vertices"),
         (edited("end_header", "element vertex 1\nend_header"), "'vertex' is declared more than once"),
         (edited("property float x", "property half x"), "header line 4, 'property half x': unknown type"),
-        (edited("vertex 4", "vertex 4294967296"), "Gaussians: 4294967296 is over the limit of 4294967294"),
+        (
+            edited("vertex 4", "vertex 4294967296"),
+            "Gaussians in t.ply: 4294967296 is over the limit of 4294967294",
+        ),
     ];
     for (bytes, part) in cases {
         let said = refuse(&bytes);
