@@ -283,7 +283,7 @@ fn joined(kind: u8, cameras: &[u8], images: &[u8]) -> Result<Vec<u8>, Box<dyn Er
 
 /// Scenes as bytes: what to do, how, degree, count, whether copies, then values.
 fn made(root: &Path) -> Done {
-    for what in 0..4_u8 {
+    for what in 0..6_u8 {
         for degree in 0..5_u8 {
             for how in [0, 5, 0x1b, 0xf6] {
                 let mut bytes = vec![what, how, degree, 1 + degree * 2, u8::from(how == 5)];
