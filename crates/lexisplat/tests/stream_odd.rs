@@ -167,7 +167,15 @@ fn packing_keeps_every_gaussian_and_comes_out_as_if_read_whole() {
             options.keep_order = keep_order;
             options.atoms = (chunks.degree() != ShDegree::ZERO).then_some(6);
             let mut packed = Vec::new();
-            let done = stream::pack_to(&chunks, stream::Importance::<lexisplat::Error>::Guess, &options, 36.0, &mut packed, &Silent).unwrap();
+            let done = stream::pack_to(
+                &chunks,
+                stream::Importance::<lexisplat::Error>::Guess,
+                &options,
+                36.0,
+                &mut packed,
+                &Silent,
+            )
+            .unwrap();
             assert_eq!(done.file_bytes(), packed.len() as u64, "{name}");
             let dense = unpacked(&packed);
             assert_eq!((dense.len(), dense.degree), (whole.len(), whole.degree), "{name}");
