@@ -16,8 +16,8 @@ build() {
 # fuzz PROGRAMS TARGET SECONDS LOG: one run; its exit status is libFuzzer's.
 fuzz() {
   # One allocation and all memory, the sanitizer's included, in MiB. The time for one input, in seconds, is that of a
-  # clock on the wall, and long because machines are busy; those over 10 s are kept.
-  local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=10)
+  # clock on the wall, and long because machines are busy; the slowest ones over a second are kept.
+  local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=1)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
     lexi | packed | dictionary) options+=(-max_len=16384) ;;
