@@ -45,10 +45,10 @@ mod tests {
         assert_eq!((Limits::default().bytes, header_bytes), (u64::MAX, 4 << 20));
         for part in [
             format!(
-                "`gaussians` [default: {gaussians}], `atoms` [{atoms}], `nonzeros` of a Gaussian [{nonzeros}]"
+                "`gaussians` (by default {gaussians}), `atoms` ({atoms}), `nonzeros` of a Gaussian ({nonzeros})"
             ),
-            format!("each byte of the file [{expansion}], `header_bytes` [4MiB]"),
-            format!("element of a PLY [{properties}]"),
+            format!("each byte of the file ({expansion}), `header_bytes` (4MiB)"),
+            format!("element of a PLY ({properties})"),
         ] {
             assert!(help.contains(&part), "{part}: {help}");
         }

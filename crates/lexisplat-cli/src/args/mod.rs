@@ -43,9 +43,9 @@ pub(crate) struct Common {
     #[arg(long, global = true)]
     pub(crate) overwrite: bool,
     /// Most that a model or a dictionary may ask for; may be given again for another NAME. It is `gaussians`
-    /// [default: 4294967294], `atoms` [1024], `nonzeros` of a Gaussian [72], `bytes` held at once, or read from a
-    /// pipe [no limit], such as 2GiB, `expansion`, that is the same for each byte of the file [256],
-    /// `header_bytes` [4MiB] or `properties` of an element of a PLY [4096]. Exit code 6 if a file asks for more.
+    /// (by default 4294967294), `atoms` (1024), `nonzeros` of a Gaussian (72), `bytes` held at once, or read from
+    /// a pipe (no limit), such as 2GiB, `expansion`, that is the same for each byte of the file (256),
+    /// `header_bytes` (4MiB) or `properties` of an element of a PLY (4096). Exit code 6 if a file asks for more.
     #[arg(long = "limit", global = true, value_name = "NAME=N", value_parser = limits::limit)]
     limits: Vec<(String, u64)>,
 }
