@@ -2,8 +2,8 @@
 """Kills compress at random moments and damages whole outputs, and counts what that leaves, as Markdown.
 
     cargo build --release -p lexisplat-cli --no-default-features
-    cargo run --release -p lexisplat --example huge_ply -- MODEL.ply 150000 scene.ply
-    python3 benches/interruptions.py scene.ply FOLDER [--signal KILL|TERM|INT|HUP] [--runs 200]
+    target/release/lexisplat demo --gaussians 3000 --output demo
+    python3 benches/interruptions.py demo/scene.ply FOLDER [--signal KILL|TERM|INT|HUP] [--runs 200]
         [--ways f16,packed,parts]
 
 FOLDER must be empty and takes the outputs, which are deleted again. Every way to compress is run undisturbed
@@ -14,18 +14,34 @@ and `decompress` must refuse each. Linux and macOS.
 """
 
 import argparse
+import json
 import os
 import random
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 
 BINARY = os.path.abspath(os.environ.get("LEXISPLAT", "target/release/lexisplat"))
+# Where a scene is looked at from two small views, which takes no time.
+CAMERAS = [
+    {
+        "id": i,
+        "img_name": str(i),
+        "width": 64,
+        "height": 48,
+        "fx": 60,
+        "fy": 60,
+        "position": [0.5 * i, 0, -3],
+        "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    }
+    for i in range(2)
+]
 # The last has less memory than any scene takes, so that it is packed in parts.
 WAYS = {
     "f16": ["--layout", "f16"],
-    "packed": ["--layout", "packed"],
+    "packed": ["--layout", "packed", "--cameras", "CAMERAS"],
     "parts": ["--layout", "packed", "--memory", "100kB"],
 }
 OLD = b"what was there before"
@@ -135,8 +151,11 @@ def main():
     )
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     bad = 0
+    cameras = tempfile.NamedTemporaryFile("w", suffix=".json")
+    json.dump(CAMERAS, cameras)
+    cameras.flush()
     for name in args.ways.split(","):
-        options = WAYS[name]
+        options = [cameras.name if option == "CAMERAS" else option for option in WAYS[name]]
         counts, whole, seconds = kills(args.scene, folder, options, number, args.runs, rng)
         tried = max(1, args.runs // 5)
         accepted = damages(folder, whole, tried, rng)
