@@ -6,8 +6,8 @@
     python3 benches/out_of_core.py huge.ply FOLDER [LAYOUT ...]
 
 FOLDER takes the outputs, which are deleted again. Memory is RssAnon of /proc, looked at 20 times a second:
-pages of mapped files are not in it, since the system takes them back when it likes. Layouts are f16 and
-packed unless named. The scene must be too large for --memory, or packing holds it. Packing needs as much
+pages of mapped files are not in it, since the system takes them back when it likes. Layouts are f16,
+packed, and guess, which is packed with --guess, unless named. The scene must be too large for --memory, or packing holds it. Packing needs as much
 disk as the scene beside it. Linux only.
 """
 
@@ -51,7 +51,7 @@ def measure(arguments):
 
 def main():
     scene, folder = sys.argv[1], sys.argv[2]
-    layouts = sys.argv[3:] or ["f16", "packed"]
+    layouts = sys.argv[3:] or ["f16", "packed", "guess"]
     print("| command | layout | Gaussians | seconds | million a second | peak RssAnon, MiB | output bytes | load |")
     print("|---|---|---|---|---|---|---|---|")
 
@@ -70,9 +70,8 @@ def main():
     for layout in layouts:
         small = os.path.join(folder, f"out_of_core.{layout}.lexi")
         back = os.path.join(folder, f"out_of_core.{layout}.ply")
-        if layout == "packed":
-            row("compress --guess", layout, ["compress", scene, "-o", small, "--guess"], small)
-        row("compress", layout, ["compress", scene, "-o", small, "--layout", layout], small)
+        how = ["--guess"] if layout == "guess" else ["--layout", layout]
+        row("compress", layout, ["compress", scene, "-o", small, *how], small)
         row("info", layout, ["info", small], None)
         row("decompress", layout, ["decompress", small, "-o", back], back)
         os.remove(back)
