@@ -1,52 +1,14 @@
-//! The system's allocator, counting: what a reader may allocate is part of what is tested.
+//! A bound on what a reader may allocate, by the allocator that the tests count with.
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
-
-struct Counting;
-
-static LIVE: AtomicUsize = AtomicUsize::new(0);
-static PEAK: AtomicUsize = AtomicUsize::new(0);
-
-#[expect(unsafe_code, reason = "a global allocator is an unsafe trait; every call goes to the system's")]
-// SAFETY: all requests are passed on unchanged to `System`; counting does not touch the memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        count(layout.size());
-        // SAFETY: the caller keeps the contract, which is the same.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        count(layout.size());
-        // SAFETY: as above.
-        unsafe { System.alloc_zeroed(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        LIVE.fetch_sub(layout.size(), Relaxed);
-        // SAFETY: as above.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
-fn count(bytes: usize) {
-    let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
-    PEAK.fetch_max(live, Relaxed);
-}
-
-#[global_allocator]
-static ALLOCATOR: Counting = Counting;
+#[path = "../../crates/lexisplat/tests/common/allocator.rs"]
+mod counting;
 
 /// What `work` returns.
 ///
 /// # Panics
 /// If it held more than `per_byte` bytes for each of `input`, and `base`, at any time.
 pub fn bounded<T>(input: &[u8], per_byte: usize, base: usize, work: impl FnOnce() -> T) -> T {
-    let before = LIVE.load(Relaxed);
-    PEAK.store(before, Relaxed);
-    let result = work();
-    let used = PEAK.load(Relaxed).saturating_sub(before);
+    let (result, used) = counting::counted(work);
     let allowed = input.len() * per_byte + base;
     assert!(used <= allowed, "{used} bytes allocated for an input of {}, {allowed} allowed", input.len());
     result

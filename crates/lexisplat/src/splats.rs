@@ -118,6 +118,16 @@ pub struct Splats {
     pub meta: SceneMeta,
 }
 
+/// Refuses the first value of named arrays that is not finite, as [`Error::Parameter`].
+pub(crate) fn all_finite<'a>(arrays: impl IntoIterator<Item = (&'static str, &'a [f32])>) -> Result<()> {
+    for (name, values) in arrays {
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(Error::parameter(name, value, "finite values"));
+        }
+    }
+    Ok(())
+}
+
 impl Geometry {
     /// Number of Gaussians.
     #[must_use]
@@ -172,12 +182,7 @@ impl Geometry {
             ("scales", self.scales.as_flattened()),
             ("rotations", self.rotations.as_flattened()),
         ];
-        for (name, values) in arrays {
-            if let Some(value) = values.iter().find(|v| !v.is_finite()) {
-                return Err(Error::parameter(name, value, "finite values"));
-            }
-        }
-        Ok(())
+        all_finite(arrays)
     }
 
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.

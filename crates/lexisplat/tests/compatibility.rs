@@ -4,13 +4,15 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
 
 mod common;
+#[path = "common/parts.rs"]
+mod parts;
 
 use std::path::PathBuf;
 
-use common::reseal;
 use lexisplat::lexi::{self, LexiChunks};
 use lexisplat::{Error, FormatError, Limits, Model, Result, Splats};
-use serde_json::{Map, Value, json};
+use parts::Parts;
+use serde_json::Value;
 
 /// Golden files: scenes of version 1 in each of its layouts, then of version 2.
 const SCENES: [&str; 9] = [
@@ -29,57 +31,6 @@ fn golden(name: &str) -> Vec<u8> {
     let path: PathBuf =
         [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect();
     std::fs::read(path).unwrap()
-}
-
-/// A file as its parts, which can be changed and put together again.
-#[derive(Clone)]
-struct Parts {
-    metadata: Map<String, Value>,
-    /// Name, type, shape and bytes of each tensor.
-    tensors: Vec<(String, Value, Value, Vec<u8>)>,
-}
-
-impl Parts {
-    fn of(bytes: &[u8]) -> Self {
-        let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk().unwrap())).unwrap();
-        let header: Value = serde_json::from_slice(&bytes[8..8 + length]).unwrap();
-        let data = &bytes[8 + length..];
-        let mut entries = header.as_object().unwrap().clone();
-        let metadata = entries.remove("__metadata__").unwrap().as_object().unwrap().clone();
-        let tensor = |(name, entry): (String, Value)| {
-            let at = |i: usize| usize::try_from(entry["data_offsets"][i].as_u64().unwrap()).unwrap();
-            (name, entry["dtype"].clone(), entry["shape"].clone(), data[at(0)..at(1)].to_vec())
-        };
-        Self { metadata, tensors: entries.into_iter().map(tensor).collect() }
-    }
-
-    /// With an entry of the metadata replaced or added.
-    fn with(&self, key: &str, value: &str) -> Self {
-        let mut new = self.clone();
-        new.metadata.insert(key.to_owned(), Value::from(value));
-        new
-    }
-
-    /// With another tensor.
-    fn and(&self, name: &str, dtype: &str, shape: &[usize], bytes: &[u8]) -> Self {
-        let mut new = self.clone();
-        new.tensors.push((name.to_owned(), Value::from(dtype), json!(shape), bytes.to_vec()));
-        new
-    }
-
-    /// The file, with offsets and checksums that fit.
-    fn sealed(&self) -> Vec<u8> {
-        let mut header = Map::new();
-        let mut data = Vec::new();
-        for (name, dtype, shape, bytes) in &self.tensors {
-            let start = data.len();
-            data.extend_from_slice(bytes);
-            let entry = json!({"dtype": dtype, "shape": shape, "data_offsets": [start, data.len()]});
-            header.insert(name.clone(), entry);
-        }
-        header.insert("__metadata__".to_owned(), Value::Object(self.metadata.clone()));
-        reseal(&mut Value::Object(header), &mut data)
-    }
 }
 
 /// The dense scene of a file, as each of the readers sees it.

@@ -7,9 +7,8 @@ mod allocator;
 mod common;
 
 use allocator::counted;
-use common::{models, reseal, written};
-use lexisplat::lexi::LexiChunks;
-use lexisplat::{Limits, Model, Result, lexi};
+use common::{count_in_parts, models, reseal, written};
+use lexisplat::{Limits, Model, lexi};
 use serde_json::Value;
 
 /// A reader may hold this many bytes per byte of input, plus [`ALLOWED_BASE`]: the tensors once, and the
@@ -25,7 +24,7 @@ fn accepted(bytes: &[u8]) -> bool {
     let (result, used) = counted(|| lexi::read_bytes("mutated.lexi", bytes, &Limits::default()));
     let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_BASE;
     assert!(used <= allowed, "{used} bytes allocated for a file of {}, {allowed} allowed", bytes.len());
-    let (in_parts, used) = counted(|| read_in_parts(bytes));
+    let (in_parts, used) = counted(|| count_in_parts(bytes));
     assert!(used <= allowed, "{used} bytes allocated in parts for {}, {allowed} allowed", bytes.len());
     assert_eq!(in_parts.ok(), result.as_ref().ok().map(Model::len), "in parts and whole");
     match result {
@@ -39,16 +38,6 @@ fn accepted(bytes: &[u8]) -> bool {
             false
         }
     }
-}
-
-/// How many Gaussians there are.
-fn read_in_parts(bytes: &[u8]) -> Result<usize> {
-    let mut gaussians = 0;
-    LexiChunks::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
-        gaussians += part.len();
-        Ok(())
-    })?;
-    Ok(gaussians)
 }
 
 struct Random(u64);

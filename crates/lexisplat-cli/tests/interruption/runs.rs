@@ -24,9 +24,14 @@ pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_lexisplat");
 
 /// Whether whoever started the tests has hang-ups ignored, as `nohup` does, which the program would keep to.
 fn hang_ups_are_ignored() -> bool {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:")).unwrap_or("0").trim();
-    u64::from_str_radix(mask, 16).unwrap() & 1 == 1
+    has_signal("self", "SigIgn:", 1)
+}
+
+/// Whether a process, as `/proc` calls it, has the signal in this of its masks.
+fn has_signal(process: &str, mask: &str, signal: i32) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let bits = status.lines().find_map(|line| line.strip_prefix(mask)).unwrap_or("0").trim();
+    u64::from_str_radix(bits, 16).unwrap() >> (signal - 1) & 1 == 1
 }
 
 /// The program in `folder`.
@@ -81,13 +86,8 @@ pub(crate) fn send(child: &Child, signal: &str) {
 /// Waits until the program watches for signals.
 pub(crate) fn wait_until_watching(child: &Child, signal: i32) {
     let clock = Instant::now();
-    let caught = || {
-        let status = std::fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
-        let mask =
-            status.lines().find_map(|line| line.strip_prefix("SigCgt:")).unwrap_or("0").trim().to_owned();
-        u64::from_str_radix(&mask, 16).unwrap() >> (signal - 1) & 1 == 1
-    };
-    while !caught() {
+    let process = child.id().to_string();
+    while !has_signal(&process, "SigCgt:", signal) {
         assert!(clock.elapsed() < PATIENCE, "signal {signal} is never watched for");
         std::thread::sleep(Duration::from_millis(2));
     }

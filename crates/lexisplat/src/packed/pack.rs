@@ -12,7 +12,7 @@ use crate::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
 use crate::parallel::map_chunks;
 use crate::progress::{Progress, Stage};
 use crate::sensitivity::Sensitivity;
-use crate::splats::{Splats, for_extra};
+use crate::splats::{Splats, all_finite, for_extra};
 use crate::stopwatch::Stopwatch;
 
 /// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians, how it
@@ -222,23 +222,15 @@ pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
             let expected = format!("{} entries, one a Gaussian", splats.len());
             return Err(Error::parameter("sensitivity", len, expected));
         }
-        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
-            return Err(Error::parameter("sensitivity", value, "finite values"));
-        }
+        all_finite([("sensitivity", values)])?;
     }
     let g = &splats.geometry;
-    let arrays: [(&str, &[f32]); 6] = [
+    all_finite([
         ("positions", g.positions.as_flattened()),
         ("dc", g.dc.as_flattened()),
         ("opacities", &g.opacities),
         ("scales", g.scales.as_flattened()),
         ("rotations", g.rotations.as_flattened()),
-        ("sh_rest", &splats.sh_rest),
-    ];
-    for (name, values) in arrays {
-        if let Some(k) = values.iter().position(|v| !v.is_finite()) {
-            return Err(Error::parameter(name, values[k], "finite values"));
-        }
-    }
-    Ok(())
+        ("sh_rest", splats.sh_rest.as_slice()),
+    ])
 }

@@ -8,7 +8,7 @@ use super::chunks::Spent;
 use super::coder::{ChunkCoder, Tally, View, length, no_symbols, tables};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
-use super::pack::{PackOptions, PackReport, check, expected_step};
+use super::pack::{PackOptions, PackReport, expected_step};
 use super::stream::{Recorder, Stream};
 use super::unpack::{Packed, StreamBits};
 use crate::error::Result;
@@ -58,7 +58,8 @@ pub(crate) struct PartPacker {
 
 impl PartPacker {
     /// Fits steps and predictors and learns the dictionary from `sample`, some of the Gaussians of `scene` in
-    /// the order of the file, best in runs. Temporary files are in `folder`.
+    /// the order of the file, best in runs. These and the options were checked. Temporary files are in
+    /// `folder`.
     pub(crate) fn new(
         scene: Whole,
         sample: &Splats,
@@ -67,8 +68,6 @@ impl PartPacker {
         folder: &Path,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        check(sample, sensitivity)?;
-        options.check()?;
         let clock = Stopwatch::start();
         let Whole { gaussians: total, grid, decibels } = scene;
         let placed = |(source, &position): (u32, &[f32; 3])| Placed { cell: grid.cell(position), source };

@@ -7,9 +7,11 @@
 )]
 
 use half::f16;
+use lexisplat::lexi::LexiChunks;
+use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{
-    Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Pursuit, Record, SceneMeta,
-    ShDegree, SparseCodes, Values,
+    Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Limits, Model, Pursuit, Record,
+    Result, SceneMeta, ShDegree, SparseCodes, Splats, Values,
 };
 use serde_json::Value;
 
@@ -144,4 +146,28 @@ pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
     }
     out.extend_from_slice(data);
     out
+}
+
+/// How many Gaussians a file read part by part has.
+pub fn count_in_parts(bytes: &[u8]) -> Result<usize> {
+    let mut gaussians = 0;
+    LexiChunks::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
+        gaussians += part.len();
+        Ok(())
+    })?;
+    Ok(gaussians)
+}
+
+/// One Gaussian again and again, with nothing but geometry.
+pub fn copies(count: usize) -> Splats {
+    let one = scene(&SampleOptions::new(1, 1)).geometry;
+    let geometry = Geometry {
+        positions: one.positions.repeat(count),
+        dc: one.dc.repeat(count),
+        opacities: one.opacities.repeat(count),
+        scales: one.scales.repeat(count),
+        rotations: one.rotations.repeat(count),
+        ..Geometry::default()
+    };
+    Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() }
 }

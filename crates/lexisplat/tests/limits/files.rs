@@ -70,21 +70,6 @@ pub(crate) fn two_chunks() -> Vec<u8> {
     packed(&rich(CHUNK + 300, LARGE), 1e-6, true)
 }
 
-/// One Gaussian again and again, with nothing but geometry.
-pub(crate) fn copies(count: usize) -> Splats {
-    let one = scene(&SampleOptions::new(1, 1)).geometry;
-    let geometry = Geometry {
-        positions: one.positions.repeat(count),
-        dc: one.dc.repeat(count),
-        opacities: one.opacities.repeat(count),
-        scales: one.scales.repeat(count),
-        rotations: one.rotations.repeat(count),
-        ..Geometry::default()
-    };
-    let meta = lexisplat::SceneMeta::default();
-    Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta }
-}
-
 /// Bytes of geometry with normals and extras.
 fn geometry_bytes(g: &Geometry) -> usize {
     let arrays = [&g.positions, &g.normals, &g.dc, &g.scales];

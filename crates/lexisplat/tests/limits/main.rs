@@ -5,14 +5,16 @@
 
 #[path = "../common/allocator.rs"]
 mod allocator;
+#[path = "../common/mod.rs"]
+mod common;
 mod files;
 
 use std::cell::Cell;
 
 use allocator::counted;
+use common::copies;
 use files::{
-    HUGE, LARGE, as_ascii, as_ply, copies, exact, model_bytes, packed, packed_bytes, rich, splats_bytes,
-    two_chunks,
+    HUGE, LARGE, as_ascii, as_ply, exact, model_bytes, packed, packed_bytes, rich, splats_bytes, two_chunks,
 };
 use lexisplat::lexi::{self, Contents, LexiChunks};
 use lexisplat::ply::{self, PlyChunks, ReadOptions};

@@ -2,7 +2,9 @@
 
 use lexisplat::packed::{PackOptions, Packer, Promise};
 use lexisplat::sample::{SampleOptions, scene};
-use lexisplat::{Extra, ExtraValues, Geometry, SceneMeta, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat::{Extra, ExtraValues, Sensitivity, ShDegree, Silent, Splats, lexi};
+
+use crate::common;
 
 fn packed(splats: &Splats, step: f64, change: fn(&mut PackOptions), promise: Option<Promise>) -> Vec<u8> {
     let mut options = PackOptions::default();
@@ -42,15 +44,5 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
 
 /// One Gaussian again and again.
 pub(crate) fn copies(count: usize) -> Vec<u8> {
-    let one = scene(&SampleOptions::new(1, 1)).geometry;
-    let geometry = Geometry {
-        positions: one.positions.repeat(count),
-        dc: one.dc.repeat(count),
-        opacities: one.opacities.repeat(count),
-        scales: one.scales.repeat(count),
-        rotations: one.rotations.repeat(count),
-        ..Geometry::default()
-    };
-    let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() };
-    packed(&splats, 1e300, |_| (), None)
+    packed(&common::copies(count), 1e300, |_| (), None)
 }

@@ -9,15 +9,18 @@ mod allocator;
 mod common;
 mod files;
 mod mutations;
+#[path = "../common/parts.rs"]
+mod parts;
 
 use std::time::{Duration, Instant};
 
 use allocator::counted;
+use common::count_in_parts;
 use files::{copies, files};
-use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::CHUNK;
-use lexisplat::{Limits, Model, Result, Splats, lexi};
-use mutations::{Parts, Random, change_metadata, change_parameters, change_tensor, make_up};
+use lexisplat::{Limits, Model, Splats, lexi};
+use mutations::{Random, change_metadata, change_parameters, change_tensor, make_up};
+use parts::Parts;
 use serde_json::Value;
 
 /// A reader may hold this many bytes per byte of input. A byte is at most 3 Gaussians, each 57 bytes as it is
@@ -42,7 +45,7 @@ fn accepted(bytes: &[u8]) -> bool {
     assert!(clock.elapsed() < PATIENCE, "{:?} for {} bytes", clock.elapsed(), bytes.len());
     let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_TABLES + ALLOWED_BASE;
     assert!(used <= allowed, "{used} bytes allocated for a file of {}, {allowed} allowed", bytes.len());
-    let (in_parts, used) = counted(|| read_in_parts(bytes));
+    let (in_parts, used) = counted(|| count_in_parts(bytes));
     assert!(used <= allowed, "{used} bytes allocated in parts for {}, {allowed} allowed", bytes.len());
     assert_eq!(in_parts.ok(), result.as_ref().ok().map(Model::len), "in parts and whole");
     match result {
@@ -64,16 +67,6 @@ fn accepted(bytes: &[u8]) -> bool {
             false
         }
     }
-}
-
-/// How many Gaussians there are.
-fn read_in_parts(bytes: &[u8]) -> Result<usize> {
-    let mut gaussians = 0;
-    LexiChunks::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
-        gaussians += part.len();
-        Ok(())
-    })?;
-    Ok(gaussians)
 }
 
 /// One test, since the allocator counts for the whole process.
