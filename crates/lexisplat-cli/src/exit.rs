@@ -137,7 +137,8 @@ fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
             (5, Some("`lexisplat devices` lists what there is"))
         }
         lexisplat_render::Error::Parameter { .. } => (5, None),
-        lexisplat_render::Error::Limit { .. } => (6, Some("--device cpu draws without a GPU's limits")),
+        lexisplat_render::Error::Limit { .. } => (6, None),
+        lexisplat_render::Error::GpuLimit { .. } => (6, Some("--device cpu draws without a GPU's limits")),
         lexisplat_render::Error::Gpu { .. } => (8, Some("--device cpu draws without a GPU")),
         _ => (1, None),
     }

@@ -65,3 +65,18 @@ fn a_pipe_is_read_no_further_than_its_limit() {
         assert!(said.contains("bytes of standard input: 1048577 is over the limit of 1048576"), "{said}");
     }
 }
+
+/// A file of cameras is no matter of a GPU.
+#[test]
+fn cameras_over_their_limit_are_said_without_a_word_on_gpus() {
+    let folder = Folder::new();
+    std::fs::create_dir(folder.path("model")).unwrap();
+    for name in ["cameras.bin", "images.bin"] {
+        // Without a byte on the disk.
+        let file = std::fs::File::create(folder.path("model").join(name)).unwrap();
+        file.set_len(lexisplat_render::MAX_COLMAP_BYTES + 1).unwrap();
+    }
+    let over =
+        folder.fail(&["render", "scene.ply", "--cameras", "model", "-o", "out", "--device", "cpu"], LIMIT);
+    assert!(over.contains("cameras.bin: bytes: ") && !over.contains("GPU"), "{over}");
+}

@@ -1,16 +1,12 @@
 //! Scenes of either kind from files, told apart by content.
 
-use std::io::Read;
 use std::path::Path;
 
 use lexisplat::lexi::{self, Contents};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{Error, Model, Result};
+use lexisplat::{Input, Model, Result};
 use lexisplat_render::Scene;
-
-/// Bytes that tell a PLY from a .lexi.
-const PEEK: usize = 16;
 
 /// A scene of either kind.
 #[derive(Debug)]
@@ -47,20 +43,11 @@ impl SceneFile {
     /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
     ///
     /// # Errors
-    /// What [`ply::read`] and [`lexi::open`] say.
+    /// What [`Input::open_within`], [`ply::read_bytes`] and [`lexi::open_bytes`] say.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
-        let name = path.display().to_string();
-        let io = |e| Error::io(path, e);
-        let mut start = Vec::with_capacity(PEEK);
-        let file = std::fs::File::open(path).map_err(io)?;
-        let bytes = file.metadata().map_err(io)?.len();
-        file.take(PEEK as u64).read_to_end(&mut start).map_err(io)?;
-        let loaded = if lexi::is_lexi(&start) {
-            Loaded::lexi(lexi::open(path, &options.limits)?, &name)?
-        } else {
-            Loaded::Ply(Box::new(ply::read(path, options)?))
-        };
-        Ok(Self { loaded, name, bytes })
+        // Once, for a pipe gives its bytes once.
+        let bytes = Input::open_within(path, &options.limits)?;
+        Self::read_bytes(&path.display().to_string(), &bytes, options)
     }
 
     /// [`Self::read`] of a file in memory, called `name` in errors.

@@ -39,7 +39,7 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// More than a limit allows. The text names what, how much, and the limit.
+    /// A file has more than a limit allows. The text names what, how much, and the limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
         /// What there is too much of.
@@ -47,6 +47,16 @@ pub enum Error {
         /// How much there is.
         found: u64,
         /// The most allowed.
+        limit: u64,
+    },
+    /// More than this GPU holds. The CPU renderer has no such limit.
+    #[error("{what}: {found} is over the limit of {limit}")]
+    GpuLimit {
+        /// What there is too much of.
+        what: String,
+        /// How much there is.
+        found: u64,
+        /// The most that the GPU takes.
         limit: u64,
     },
     /// The GPU or its driver refused, or there is none. The CPU renderer needs neither.

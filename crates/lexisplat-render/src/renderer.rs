@@ -139,7 +139,7 @@ impl Renderer {
     /// Makes `scene` ready: uploads it, as it is stored, to the GPU.
     ///
     /// # Errors
-    /// [`Error::Limit`] or [`Error::Gpu`] if it does not fit on the GPU.
+    /// [`Error::GpuLimit`] or [`Error::Gpu`] if it does not fit on the GPU.
     pub fn prepare<'a>(&self, scene: Scene<'a>) -> Result<Prepared<'a>> {
         Ok(Prepared {
             #[cfg(feature = "gpu")]
@@ -154,7 +154,7 @@ impl Renderer {
     /// Draws a scene that this renderer prepared, as `camera` sees it.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the camera cannot be drawn with; on a GPU also [`Error::Limit`] if the view
+    /// [`Error::Parameter`] if the camera cannot be drawn with; on a GPU also [`Error::GpuLimit`] if the view
     /// needs more than it has, and [`Error::Gpu`] if it fails.
     pub fn render(
         &mut self,

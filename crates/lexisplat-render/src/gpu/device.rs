@@ -252,7 +252,7 @@ impl Gpu {
         let size = size.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT).max(MIN_BUFFER);
         let limit = self.shared.limits.max_buffer_size;
         if size > limit {
-            return Err(Error::Limit { what: format!("bytes of GPU buffer {label}"), found: size, limit });
+            return Err(Error::GpuLimit { what: format!("bytes of GPU buffer {label}"), found: size, limit });
         }
         let raw = self.checked(label, || {
             let descriptor =

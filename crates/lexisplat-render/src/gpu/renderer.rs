@@ -182,7 +182,7 @@ impl GpuRenderer {
     ///
     /// # Errors
     /// [`Error::Parameter`] if the scene is on another GPU or the camera cannot be drawn with, or for a
-    /// lower degree than the scene's where radiance comes from a table; [`Error::Limit`] if the view needs
+    /// lower degree than the scene's where radiance comes from a table; [`Error::GpuLimit`] if the view needs
     /// larger buffers than this GPU has; [`Error::Gpu`] if the device fails.
     pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
         camera.validate()?;
@@ -225,7 +225,7 @@ impl GpuRenderer {
         let fit = u32::try_from(self.limits.pixels / line).unwrap_or(u32::MAX);
         if fit == 0 {
             let what = "bytes of a row of tiles".to_owned();
-            return Err(Error::Limit { what, found: line, limit: self.limits.pixels });
+            return Err(Error::GpuLimit { what, found: line, limit: self.limits.pixels });
         }
         if self.cuts.len() > MAX_CUTS {
             self.cuts.clear();
@@ -390,7 +390,7 @@ impl GpuRenderer {
             let one = shape.bands_see && shape.band_rows == 1;
             if one || self.kernels.moments.is_some() {
                 let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" }.to_owned();
-                return Err(Error::Limit { what, found: slots.into(), limit: self.limits.slots });
+                return Err(Error::GpuLimit { what, found: slots.into(), limit: self.limits.slots });
             }
             return Ok(Some(Missing::Bands { see: true }));
         }
@@ -401,7 +401,7 @@ impl GpuRenderer {
             }
             if shape.band_rows == 1 {
                 let what = "pairs of a Gaussian and a tile in one row of tiles".to_owned();
-                return Err(Error::Limit { what, found: entries.into(), limit: self.limits.entries });
+                return Err(Error::GpuLimit { what, found: entries.into(), limit: self.limits.entries });
             }
             return Ok(Some(Missing::Bands { see: false }));
         }

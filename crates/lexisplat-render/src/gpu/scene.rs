@@ -68,13 +68,14 @@ impl GpuScene {
     ///
     /// # Errors
     /// [`Error::Parameter`] for a sparse path of a dense scene, or a dictionary too large for the path;
-    /// [`Error::Limit`] for more Gaussians than 2^32 - 2; [`Error::Gpu`] if memory runs out.
+    /// [`Error::GpuLimit`] for more Gaussians than 2^32 - 2; [`Error::Gpu`] if memory runs out.
     pub fn new(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
-        let len = u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| Error::Limit {
-            what: "Gaussians of a scene on the GPU".to_owned(),
-            found: scene.len() as u64,
-            limit: u64::from(u32::MAX) - 1,
-        })?;
+        let len =
+            u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| Error::GpuLimit {
+                what: "Gaussians of a scene on the GPU".to_owned(),
+                found: scene.len() as u64,
+                limit: u64::from(u32::MAX) - 1,
+            })?;
         let model = match scene {
             Scene::Sparse(model) => Some(*model),
             Scene::Dense(_) => None,

@@ -116,6 +116,6 @@ mod tests {
         assert!(whole.colour.iter().any(|&v| v > 0.0));
         assert!(whole == measure(banded(few.into())).unwrap());
         let refused = measure(banded(10));
-        assert!(matches!(refused, Err(Error::Limit { .. })), "{:?}", refused.map(|s| s.len()));
+        assert!(matches!(refused, Err(Error::GpuLimit { .. })), "{:?}", refused.map(|s| s.len()));
     }
 }

@@ -63,7 +63,7 @@ impl Source<'_> {
             if !fits(used) {
                 let found = used.into_iter().max().unwrap_or(0);
                 let what = "bytes of 256 Gaussians on the GPU".to_owned();
-                return Err(Error::Limit { what, found, limit });
+                return Err(Error::GpuLimit { what, found, limit });
             }
         }
         if start < len {

@@ -56,7 +56,9 @@ fn chunks_are_whole_blocks_within_the_limit() {
         source.chunks(scene.len(), 2 * row).unwrap(),
         [0..2 * block, 2 * block..4 * block, 4 * block..scene.len()]
     );
-    assert!(matches!(source.chunks(scene.len(), row - 1), Err(Error::Limit { found, .. }) if found == row));
+    assert!(
+        matches!(source.chunks(scene.len(), row - 1), Err(Error::GpuLimit { found, .. }) if found == row)
+    );
     assert!(source.chunks(0, row).unwrap().is_empty());
 }
 
@@ -77,5 +79,5 @@ fn a_later_block_that_fits_nowhere_is_refused() {
     let source = Source::Codes(&model);
     let escaped = (block + 20) as u64 * ROW;
     assert_eq!(source.chunks(2 * block, escaped).unwrap().len(), 1);
-    assert!(matches!(source.chunks(2 * block, escaped - 1), Err(Error::Limit { .. })));
+    assert!(matches!(source.chunks(2 * block, escaped - 1), Err(Error::GpuLimit { .. })));
 }

@@ -36,7 +36,7 @@ fn bands_look_for_their_own_gaussians_where_all_are_too_many() {
     // With lists cut as well.
     let both = RoomLimits { slots: all - 1, entries: u64::from(stats.entries) / 3, ..PLENTY };
     assert!(bits(&draw(&gpu, both, &camera).unwrap().0) == bits(&whole));
-    let Err(Error::Limit { what, found, limit }) = draw(&gpu, RoomLimits { slots: 10, ..PLENTY }, &camera)
+    let Err(Error::GpuLimit { what, found, limit }) = draw(&gpu, RoomLimits { slots: 10, ..PLENTY }, &camera)
     else {
         panic!("drew more Gaussians than there is room for")
     };
@@ -57,7 +57,9 @@ fn bands_draw_the_same_picture() {
     assert!(bits(&cut) == bits(&whole));
     // Eight rows of tiles cannot be cut finer.
     let refused = draw(&gpu, RoomLimits { entries: all / 20, ..PLENTY }, &camera);
-    assert!(matches!(refused, Err(Error::Limit { limit, found, .. }) if limit == all / 20 && found > limit));
+    assert!(
+        matches!(refused, Err(Error::GpuLimit { limit, found, .. }) if limit == all / 20 && found > limit)
+    );
 }
 
 #[test]
@@ -70,7 +72,7 @@ fn pictures_larger_than_a_binding_are_cut() {
     assert_eq!((stats.bands, stats.retries), (3, 0));
     assert!(bits(&cut) == bits(&whole));
     let refused = draw(&gpu, RoomLimits { pixels: row - 1, ..PLENTY }, &camera);
-    assert!(matches!(refused, Err(Error::Limit { found, limit, .. }) if (found, limit) == (row, row - 1)));
+    assert!(matches!(refused, Err(Error::GpuLimit { found, limit, .. }) if (found, limit) == (row, row - 1)));
 }
 
 #[test]
