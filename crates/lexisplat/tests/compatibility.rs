@@ -99,6 +99,47 @@ fn golden_files_of_every_version_are_read_alike_whole_and_in_parts() {
     assert_eq!(Parts::of(&dictionary_alone()).metadata["version"], "1");
 }
 
+/// Where there is nothing to read, shapes and types must still be looked at, by both readers.
+#[test]
+fn tensors_of_no_gaussians_are_of_their_shape_and_type() {
+    let taken = |parts: &Parts| {
+        let bytes = parts.sealed();
+        let whole = lexi::read_bytes("file.lexi", &bytes, &Limits::default()).map(|model| model.len());
+        [whole, common::count_in_parts(&bytes)]
+    };
+    for name in SCENES.iter().filter(|name| !name.starts_with("packed")) {
+        let mut none = Parts::of(&golden(name));
+        let of_gaussians = |name: &str| !["dictionary", "checksum.header"].contains(&name);
+        for (name, _, shape, bytes) in none.tensors.iter_mut().filter(|t| of_gaussians(&t.0)) {
+            let pointers = usize::from(name == "codes.pointers");
+            shape[0] = pointers.into();
+            *bytes = vec![0; 4 * pointers];
+        }
+        assert!(taken(&none).into_iter().all(|n| n.unwrap() == 0), "{name}");
+        for (at, tensor) in none.tensors.iter().enumerate().filter(|(_, t)| of_gaussians(&t.0)) {
+            let row: u64 = tensor.2.as_array().unwrap()[1..].iter().map(|n| n.as_u64().unwrap()).product();
+            let mut longer = none.clone();
+            let (_, dtype, shape, bytes) = &mut longer.tensors[at];
+            let width = match dtype.as_str().unwrap() {
+                "U8" => 1,
+                "U16" | "F16" => 2,
+                "F64" => 8,
+                _ => 4,
+            };
+            shape[0] = (shape[0].as_u64().unwrap() + 1).into();
+            bytes.extend(vec![0; width * usize::try_from(row).unwrap()]);
+            let mut other = none.clone();
+            other.tensors[at].1 = "I64".into();
+            other.tensors[at].3 = other.tensors[at].3.repeat(2);
+            for wrong in [longer, other] {
+                for found in taken(&wrong) {
+                    assert!(found.is_err(), "{name}: {} {:?}", tensor.0, wrong.tensors[at]);
+                }
+            }
+        }
+    }
+}
+
 #[test]
 fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
     for name in SCENES {

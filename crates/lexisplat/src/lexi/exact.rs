@@ -84,6 +84,8 @@ impl<'a> Exact<'a> {
         if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
         }
+        // Looked at even where there are no Gaussians to count for.
+        self.counts(0..0)?;
         let mut total = 0_usize;
         let mut offsets = Vec::with_capacity(n.div_ceil(BLOCK));
         for start in (0..n).step_by(BLOCK) {
@@ -110,6 +112,7 @@ impl<'a> Exact<'a> {
             [count] => *count,
             shape => return Err(checked.malformed(format!("tensor 'escapes.gaussians' has shape {shape:?}"))),
         };
+        self.escaped(0..0)?;
         checked.data(tensor::ESCAPE_ROWS, Dtype::F32, &[self.escapes, self.dictionary.dim()])?;
         let mut last = None;
         for start in (0..self.escapes).step_by(BLOCK) {
