@@ -21,7 +21,8 @@ impl Bytes<'_> {
         match kind {
             0..=0xbf => (f32::from(kind) - 96.0) / 16.0,
             0xc0..=0xcf => {
-                f32::from_bits(u32::from(self.byte()) << 23 | u32::from(kind & 1) << 31).min(f32::MAX)
+                let power = f32::from_bits(u32::from(self.byte()) << 23 | u32::from(kind & 1) << 31);
+                power.clamp(f32::MIN, f32::MAX)
             }
             0xd0 => f32::MAX,
             0xd1 => f32::MIN,
