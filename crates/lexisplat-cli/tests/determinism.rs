@@ -57,17 +57,7 @@ fn made(simd: &str, threads: &str) -> BTreeMap<String, Vec<u8>> {
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(output.status.success(), "{simd}, {threads} threads, {command}: {error}");
     }
-    let mut found = BTreeMap::new();
-    for pattern in ["", "dense", "sparse"] {
-        for entry in std::fs::read_dir(folder.path(pattern)).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_file() {
-                let name = path.strip_prefix(folder.0.path()).unwrap().display().to_string();
-                found.insert(name, std::fs::read(&path).unwrap());
-            }
-        }
-    }
-    found
+    folder.files()
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! Outputs that are in the way, or no plain files.
 
-use std::collections::BTreeMap;
-use std::ffi::OsString;
 use std::os::unix::fs::{FileTypeExt, symlink};
-use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::folder::Folder;
@@ -118,38 +115,26 @@ fn devices_and_pipes_are_written_to_as_they_are() {
     assert_eq!(folder.names(), ["cameras.json", "kept.lexi", "plain", "scene.ply"]);
 }
 
-/// The bytes of a file, or of all files of a folder; gone with that.
-fn take(path: &Path) -> BTreeMap<OsString, Vec<u8>> {
-    let entries: Vec<_> = match std::fs::read_dir(path) {
-        Ok(entries) => entries.map(|e| e.unwrap().path()).collect(),
-        Err(_) => vec![path.to_owned()],
-    };
-    let bytes = |path: &PathBuf| (path.file_name().unwrap().to_owned(), std::fs::read(path).unwrap());
-    let found = entries.iter().map(bytes).collect();
-    std::fs::remove_dir_all(path).or_else(|_| std::fs::remove_file(path)).unwrap();
-    found
-}
-
 /// A pipe gives its bytes once: nothing may look at its beginning and then open it again.
 #[test]
 fn scenes_may_come_from_pipes() {
     let folder = ready();
     let pipe = folder.path("pipe");
     assert!(Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let render = &["--cameras", "cameras.json", "--device", "cpu"][..];
+    let render = &["-o", "seen", "--cameras", "cameras.json", "--device", "cpu"][..];
     for (command, scene, options) in [
-        ("compress", "scene.ply", &["--layout", "f16"][..]),
-        ("compress", "scene.ply", &["--memory", "100kB"]),
-        ("decompress", "kept.lexi", &[]),
+        ("compress", "scene.ply", &["-o", OUTPUT, "--layout", "f16"][..]),
+        ("compress", "scene.ply", &["-o", OUTPUT, "--memory", "100kB"]),
+        ("decompress", "kept.lexi", &["-o", OUTPUT]),
         ("render", "scene.ply", render),
         ("render", "kept.lexi", render),
     ] {
-        let arguments = |from| [&[command, from, "-o", OUTPUT], options].concat();
+        let arguments = |from| [&[command, from, "--overwrite"], options].concat();
         let mut child = program(&folder, &arguments("pipe")).spawn().unwrap();
         std::fs::copy(folder.path(scene), &pipe).unwrap();
         assert!(child.wait().unwrap().success(), "{command} {scene}");
-        let piped = take(&folder.path(OUTPUT));
+        let piped = folder.files();
         folder.run(&arguments(scene));
-        assert!(piped == take(&folder.path(OUTPUT)), "{command} {scene}");
+        assert!(piped == folder.files(), "{command} {scene}");
     }
 }

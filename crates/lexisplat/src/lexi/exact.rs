@@ -84,8 +84,6 @@ impl<'a> Exact<'a> {
         if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
         }
-        // Looked at even where there are no Gaussians to count for.
-        self.counts(0..0)?;
         let mut total = 0_usize;
         let mut offsets = Vec::with_capacity(n.div_ceil(BLOCK));
         for start in (0..n).step_by(BLOCK) {
@@ -97,7 +95,8 @@ impl<'a> Exact<'a> {
             total = counts.iter().fold(total, |sum, &c| sum.saturating_add(usize::from(c)));
         }
         self.offsets = offsets;
-        // Types and shapes too are as they should be.
+        // Types and shapes too are as they should be, also where there is nothing to read.
+        self.counts(0..0)?;
         self.read_codes(0..0)?;
         let checked = &self.checked;
         if total != self.nonzeros {
