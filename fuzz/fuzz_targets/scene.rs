@@ -79,7 +79,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         return packed_in_parts(splats, &options, decibels);
     }
     let sensitivity = if how & 4 == 0 {
-        Sensitivity::guess(&splats.geometry)
+        Sensitivity::heuristic(&splats.geometry)
     } else {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
         lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &mut || ())
@@ -127,7 +127,7 @@ fn packed_in_parts(splats: &Splats, options: &PackOptions, decibels: f64) {
     let file = as_ply(splats);
     let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let mut bytes = Vec::new();
-    match stream::pack_to(&parts, Importance::<Error>::Guess, options, decibels, &mut bytes, &Silent) {
+    match stream::pack_to(&parts, Importance::<Error>::Heuristic, options, decibels, &mut bytes, &Silent) {
         Ok(done) => assert_eq!(done.file_bytes(), bytes.len() as u64),
         Err(Error::Parameter { .. }) => return,
         Err(error) => panic!("{error}"),

@@ -5,7 +5,7 @@ mod folder;
 
 use folder::{Folder, GAUSSIANS, lexisplat, read};
 use lexisplat::ply;
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
 
 #[test]

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 use assert_cmd::Command;
 use folder::{Folder, lexisplat};
 use lexisplat::ply;
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::simd::{Simd, VARIABLE};
+use lexisplat_sample::{SampleOptions, scene};
 
 /// Numbers of threads.
 const THREADS: [&str; 3] = ["1", "2", "7"];

@@ -290,9 +290,9 @@ pub fn busy_lanes(model: &Model, lanes: usize, block: usize) -> [f64; 2] {
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::sample::{SampleOptions, scene};
     use lexisplat::{CompressOptions, Silent, compress};
     use lexisplat_render::orbit;
+    use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
 

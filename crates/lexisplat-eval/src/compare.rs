@@ -49,6 +49,20 @@ pub struct ViewScore {
 }
 
 impl ViewScore {
+    /// The score of a view of `size` (width and height in pixels). Without a `psnr`, in dB, the pictures are
+    /// identical.
+    #[must_use]
+    pub fn new(
+        name: &str,
+        size: [u32; 2],
+        psnr: Option<f64>,
+        ssim: f64,
+        more: BTreeMap<Metric, f64>,
+    ) -> Self {
+        let ([width, height], identical) = (size, psnr.is_none());
+        Self { name: name.to_owned(), width, height, psnr, ssim, identical, more }
+    }
+
     /// A score, if it was measured; an infinite PSNR is not a number.
     #[must_use]
     pub fn get(&self, metric: Metric) -> Option<f64> {

@@ -52,15 +52,18 @@ pub enum Error {
 }
 
 impl Error {
-    pub(crate) fn io(file: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
+    /// An [`Error::Io`] about `file`.
+    pub fn io(file: impl AsRef<std::path::Path>, source: std::io::Error) -> Self {
         Self::Io { file: file.as_ref().display().to_string(), source }
     }
 
-    pub(crate) fn format(file: impl AsRef<std::path::Path>, problem: impl Into<String>) -> Self {
+    /// An [`Error::Format`] about `file`.
+    pub fn format(file: impl AsRef<std::path::Path>, problem: impl Into<String>) -> Self {
         Self::Format { file: file.as_ref().display().to_string(), problem: problem.into() }
     }
 
-    pub(crate) fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
+    /// An [`Error::Parameter`].
+    pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }
     }
 }

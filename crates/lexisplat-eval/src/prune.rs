@@ -100,7 +100,7 @@ fn largest_change(
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::sample::{SampleOptions, scene};
+    use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
 
@@ -132,7 +132,7 @@ mod tests {
         let mut splats = scene(&SampleOptions::new(60, 3));
         let original = splats.clone();
         let views = Views::generated(&splats);
-        let mut seen = Sensitivity::guess(&splats.geometry);
+        let mut seen = Sensitivity::heuristic(&splats.geometry);
         let pruned = prune(&mut Renderer::cpu(), &mut splats, &mut seen, &views, 0.1).unwrap();
         assert_eq!(pruned.removed, 0);
         assert_eq!(splats, original);

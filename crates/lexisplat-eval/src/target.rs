@@ -1,6 +1,6 @@
 //! Packing to a target: the smallest file of a quality, or the best quality of a size. No photos needed.
 
-use lexisplat::packed::{PackReport, Packed, Packer, Promise};
+use lexisplat::packed::{PackReport, Packed, Packer, TargetRecord};
 use lexisplat::{Model, Progress, Sensitivity, Splats, lexi};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, Split, surround};
 
@@ -28,7 +28,7 @@ const MAX_VIEWS: usize = 150;
 /// One given camera in so many judges. All say what shows: that flatters those that judge by less than
 /// 0.1 dB (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
-/// Say of the guess that knows no views in [`Sensitivity::temper`]: measured on held-out views
+/// Say of the guess that knows no views in [`Sensitivity::blend_with_prior`]: measured on held-out views
 /// (docs/METHOD.md).
 const GUESS_SHARE: f32 = 0.3;
 /// Identical pictures count as this many decibels, so that means stay numbers.
@@ -146,7 +146,7 @@ impl Views {
         on_view: &mut dyn FnMut(),
     ) -> Result<Sensitivity> {
         let mut seen = renderer.sensitivity(&Scene::from(splats), &self.measure, on_view)?;
-        seen.temper(&splats.geometry, GUESS_SHARE);
+        seen.blend_with_prior(&splats.geometry, GUESS_SHARE);
         Ok(seen)
     }
 }
@@ -323,7 +323,8 @@ pub fn pack_to(
         reached = judge.score(&packed.unpack()?)?;
     }
     let views = u32::try_from(judge.views.len()).unwrap_or(u32::MAX);
-    packed.promise = Some(Promise::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.given));
+    packed.target =
+        Some(TargetRecord::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.given));
     Ok((packed, report))
 }
 

@@ -245,7 +245,7 @@ mod tests {
         assert!(is_room(&hollow_box()));
         // Coarse models of objects hide themselves, from within as well.
         for gaussians in [100, 300, 1500, 6000] {
-            let splats = lexisplat::sample::scene(&lexisplat::sample::SampleOptions::new(gaussians, 0));
+            let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(gaussians, 0));
             assert!(!is_room(&splats.geometry), "{gaussians}");
         }
         // Without walls and ceiling in the way, furniture is looked at from outside.

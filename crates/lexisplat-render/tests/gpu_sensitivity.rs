@@ -11,10 +11,10 @@ mod adapter;
 mod made;
 
 use adapter::{gpu, opened};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{Sensitivity, ShDegree, Splats};
 use lexisplat_render::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Error, Scene, sensitivity, surround};
+use lexisplat_sample::{SampleOptions, scene};
 
 /// Largest difference of a sum, relative to its own size and the mean of all Gaussians'.
 const SUM_TOLERANCE: f32 = 2e-3;

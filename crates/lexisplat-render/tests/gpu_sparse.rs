@@ -15,10 +15,10 @@ mod twins;
 
 use adapter::gpu;
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{CompressOptions, Layout, Model, Sensitivity, ShDegree, Silent, compress};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions, Scene, orbit, render};
+use lexisplat_sample::{SampleOptions, scene};
 
 /// Draws `model` by every path that this GPU has and compares with the processor.
 fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
@@ -93,7 +93,7 @@ fn packed_scenes_look_the_same() {
     let Some(gpu) = gpu() else { return };
     let splats = scene(&SampleOptions::new(3000, 2));
     let cameras = orbit(&splats.geometry, 2, 120, 80);
-    let sensitivity = Sensitivity::guess(&splats.geometry);
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let (packed, _) = packer.pack(1e-5, &Silent).unwrap();
     let model = packed.unpack().unwrap();

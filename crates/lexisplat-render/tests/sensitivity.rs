@@ -1,9 +1,9 @@
 //! Sensitivities against finite differences of the rasteriser itself.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{Splats, sh};
 use lexisplat_render::{Camera, Image, RenderOptions, Scene, render, sensitivity, surround};
+use lexisplat_sample::{SampleOptions, scene};
 
 const GAUSSIANS: usize = 120;
 /// Step of a difference, in the value's own unit: large enough that pixels that appear or vanish, at 1/255,

@@ -111,7 +111,7 @@ fn dialect(dialect: Dialect) -> String {
 fn promise(model: &Model, packed: Option<&Packed>) -> Option<String> {
     let record = &model.record;
     let mut parts = Vec::new();
-    if let Some(p) = packed.and_then(|packed| packed.promise.as_ref()) {
+    if let Some(p) = packed.and_then(|packed| packed.target.as_ref()) {
         parts.push(format!("{:.2} dB mean, {:.2} dB worst of {} views", p.mean_psnr, p.min_psnr, p.views));
     }
     match (record.tolerance, record.max_nonzeros) {
@@ -294,7 +294,7 @@ fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> 
 mod tests {
     use lexisplat::packed::Preset;
     use lexisplat::ply;
-    use lexisplat::sample::{SampleOptions, scene};
+    use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
 

@@ -8,7 +8,7 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use lexisplat::pursuit::{Coder, Encoded, Stop, ValueType};
+use lexisplat::pursuit::{Coder, Encoded, StopRule, ValueType};
 use lexisplat::{Limits, lexi, ply};
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let splats = ply::read(Path::new(scene), &ply::ReadOptions::default())?.splats;
     let dictionary = lexi::read_dictionary(Path::new(dictionary), &Limits::default())?;
-    let stop = Stop::new(Some(tolerance.parse()?), None)?;
+    let stop = StopRule::new(Some(tolerance.parse()?), None)?;
     let repeats: usize = repeats.parse()?;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.parse()?).build()?;
     let signals = &splats.sh_rest;

@@ -8,14 +8,14 @@ use std::path::Path;
 use std::time::Instant;
 
 use lexisplat::learn::{LearnOptions, learn};
-use lexisplat::pursuit::{Coder, Stop, ValueType};
+use lexisplat::pursuit::{Coder, StopRule, ValueType};
 use lexisplat::{Silent, ply};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let scene = arguments.next().ok_or("usage: learning SCENE.ply [option=value ...]")?;
     let mut tolerance = 0.1;
-    let mut options = LearnOptions::new(Stop::new(Some(tolerance), None)?);
+    let mut options = LearnOptions::new(StopRule::new(Some(tolerance), None)?);
     for argument in arguments {
         let (name, value) = argument.split_once('=').ok_or("options are name=value")?;
         match name {
@@ -28,7 +28,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             _ => return Err(format!("no option '{name}'").into()),
         }
     }
-    options.stop = Stop::new(Some(tolerance), None)?;
+    options.stop = StopRule::new(Some(tolerance), None)?;
     let splats = ply::read(Path::new(&scene), &ply::ReadOptions::default())?.splats;
     let start = Instant::now();
     let learned = learn(splats.degree, &splats.sh_rest, &options, &Silent)?;

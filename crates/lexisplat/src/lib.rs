@@ -5,7 +5,7 @@
 //! original than the tolerance.
 //!
 //! ```
-//! use lexisplat::sample::{SampleOptions, scene};
+//! use lexisplat_sample::{SampleOptions, scene};
 //! use lexisplat::{CompressOptions, Limits, Silent, compress, lexi, ply};
 //!
 //! let folder = tempfile::tempdir()?;
@@ -27,12 +27,12 @@
 //!
 //! ```
 //! use lexisplat::packed::{PackOptions, Packer};
-//! use lexisplat::sample::{SampleOptions, scene};
+//! use lexisplat_sample::{SampleOptions, scene};
 //! use lexisplat::{Limits, Sensitivity, Silent, lexi};
 //!
 //! let splats = scene(&SampleOptions::new(2000, 0));
 //! // `lexisplat_render::sensitivity` measures it; without a renderer it can be guessed.
-//! let sensitivity = Sensitivity::guess(&splats.geometry);
+//! let sensitivity = Sensitivity::heuristic(&splats.geometry);
 //! let packer = Packer::new(&splats, &sensitivity, &PackOptions::default())?;
 //! let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?; // about 40 dB
 //!
@@ -50,42 +50,25 @@
 //! The features `parallel` and `mmap` are on by default. Without them the crate needs neither threads nor
 //! files and builds for `wasm32-unknown-unknown`; results are the same bit for bit.
 
-mod codes;
-mod compress;
-mod dictionary;
-mod error;
-mod input;
-pub mod learn;
-pub mod lexi;
-mod limits;
-mod maths;
-mod model;
-pub mod output;
+mod formats;
 pub mod packed;
-mod parallel;
-pub mod ply;
-mod progress;
-pub mod pursuit;
-mod rng;
-mod room;
-pub mod sample;
-mod sensitivity;
-pub mod sh;
-pub mod simd;
-mod spill;
-mod splats;
-pub mod stats;
-mod stopwatch;
+mod scene;
+mod sparse;
 pub mod stream;
+mod support;
 
-pub use codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
-pub use compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
-pub use dictionary::Dictionary;
-pub use error::{Error, FormatError, Result};
-pub use input::Input;
-pub use limits::{Limits, MAX_ATOMS};
-pub use model::{Layout, Model, Pursuit, Record};
-pub use progress::{Progress, Silent, Stage};
-pub use sensitivity::Sensitivity;
-pub use sh::ShDegree;
-pub use splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats};
+pub use formats::{lexi, ply};
+pub use scene::sensitivity::Sensitivity;
+pub use scene::sh::ShDegree;
+pub use scene::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats};
+pub use scene::{sh, stats};
+pub use sparse::codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
+pub use sparse::compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
+pub use sparse::dictionary::Dictionary;
+pub use sparse::model::{Layout, Model, Pursuit, Record};
+pub use sparse::{learn, pursuit};
+pub use support::error::{Error, FormatError, Result};
+pub use support::input::Input;
+pub use support::limits::{Limits, MAX_ATOMS};
+pub use support::progress::{Progress, Silent, Stage};
+pub use support::{output, simd};

@@ -7,11 +7,11 @@
 use std::path::PathBuf;
 
 use lexisplat::lexi::Contents;
-use lexisplat::packed::{PackOptions, Packed, Packer, Promise};
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::packed::{PackOptions, Packed, Packer, TargetRecord};
 use lexisplat::{
     Extra, ExtraValues, Layout, Limits, Model, Sensitivity, ShDegree, Silent, Splats, lexi, ply,
 };
+use lexisplat_sample::{SampleOptions, scene};
 
 const NAMES: [&str; 3] = ["packed", "packed_degree0", "packed_escapes"];
 
@@ -36,8 +36,8 @@ fn ply_bytes(splats: &Splats) -> Vec<u8> {
     bytes
 }
 
-fn promise() -> Promise {
-    Promise::new("psnr", 38.5, [38.562, 33.25], 18, false)
+fn promise() -> TargetRecord {
+    TargetRecord::new("psnr", 38.5, [38.562, 33.25], 18, false)
 }
 
 /// Makes the golden files of a new format version. Never run it to make a failing test pass.
@@ -47,7 +47,7 @@ fn regenerate() {
     let pack = |splats: &Splats, change: fn(&mut PackOptions)| {
         let mut options = PackOptions::default();
         change(&mut options);
-        let sensitivity = Sensitivity::guess(&splats.geometry);
+        let sensitivity = Sensitivity::heuristic(&splats.geometry);
         Packer::new(splats, &sensitivity, &options).unwrap().pack(2e-5, &Silent).unwrap()
     };
     let write = |name: &str, packed: &Packed| {
@@ -68,7 +68,7 @@ fn regenerate() {
         Extra { name: "time".to_owned(), values: ExtraValues::F32(numbers.map(f32::from).collect()) },
     ];
     let (mut packed, _) = pack(&splats, |o| o.keep_order = true);
-    packed.promise = Some(promise());
+    packed.target = Some(promise());
     write("packed", &packed);
 
     let splats = scene(&SampleOptions::new(40, 2)).with_degree_cut(ShDegree::ZERO);
@@ -111,7 +111,7 @@ fn golden_files_are_the_same_on_any_number_of_threads() {
 fn golden_files_say_how_they_were_made() {
     let (packed, model) = (opened("packed"), decoded("packed"));
     assert_eq!((packed.gaussians, packed.degree, model.len()), (300, ShDegree::THREE, 300));
-    assert_eq!(packed.promise, Some(promise()));
+    assert_eq!(packed.target, Some(promise()));
     assert_eq!(packed.meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
     assert!(packed.meta.antialiased && packed.order.is_some() && packed.record.tolerance.is_none());
     assert_eq!(model.meta, packed.meta);
@@ -122,7 +122,7 @@ fn golden_files_say_how_they_were_made() {
 
     let (packed, model) = (opened("packed_degree0"), decoded("packed_degree0"));
     assert_eq!((packed.gaussians, packed.atoms, packed.record.seed), (40, 0, 7));
-    assert!(packed.promise.is_none() && packed.order.is_none() && model.dictionary.is_empty());
+    assert!(packed.target.is_none() && packed.order.is_none() && model.dictionary.is_empty());
 
     let (packed, model) = (opened("packed_escapes"), decoded("packed_escapes"));
     assert_eq!((packed.gaussians, packed.degree), (80, ShDegree::ONE));

@@ -6,11 +6,11 @@ use std::path::Path;
 use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlyChunks, ReadOptions};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{
     CompressOptions, Error, Extra, ExtraValues, Input, Layout, Limits, Sensitivity, Silent, Splats, compress,
     lexi, ply, stats, stream,
 };
+use lexisplat_sample::{SampleOptions, scene};
 
 /// More than two chunks of every kind, with a normal and an extra.
 const GAUSSIANS: usize = 2 * 65_536 + 333;
@@ -101,7 +101,7 @@ fn escapes_and_pointers_are_found_in_every_part() {
 #[test]
 fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
     let whole = splats(40_000).with_degree_cut(lexisplat::ShDegree::new(2).unwrap());
-    let sensitivity = Sensitivity::guess(&whole.geometry);
+    let sensitivity = Sensitivity::heuristic(&whole.geometry);
     let folder = tempfile::tempdir().unwrap();
     for keep_order in [false, true] {
         let mut options = PackOptions::default();

@@ -5,11 +5,11 @@
 use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::PackOptions;
 use lexisplat::ply::{PlyChunks, ReadOptions};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Limits, ShDegree, Silent, Splats, compress, lexi, ply,
     stats, stream,
 };
+use lexisplat_sample::{SampleOptions, scene};
 
 /// Gaussians that readers and coders take together in one place or another.
 const BORDERS: [usize; 4] = [1024, 2048, 32_768, 65_536];
@@ -169,7 +169,7 @@ fn packing_keeps_every_gaussian_and_comes_out_as_if_read_whole() {
             let mut packed = Vec::new();
             let done = stream::pack_to(
                 &chunks,
-                stream::Importance::<lexisplat::Error>::Guess,
+                stream::Importance::<lexisplat::Error>::Heuristic,
                 &options,
                 36.0,
                 &mut packed,

@@ -10,8 +10,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use lexisplat::packed::fuzzing::parts;
-use lexisplat::packed::{PackOptions, Packer, Promise};
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::packed::{PackOptions, Packer, TargetRecord};
+use lexisplat_sample::{SampleOptions, scene};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
@@ -177,10 +177,10 @@ fn packed(root: &Path) -> Done {
                     splats.sh_rest[..degree.rest()].fill(1e6);
                 }
             }
-            let sensitivity = Sensitivity::guess(&splats.geometry);
+            let sensitivity = Sensitivity::heuristic(&splats.geometry);
             let packer = Packer::new(&splats, &sensitivity, &options)?;
             let (mut packed, _) = packer.pack(1e-3, &Silent)?;
-            packed.promise = rich.then(|| Promise::new("size", 3000.0, [31.5, 25.0], 18, false));
+            packed.target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
             let mut bytes = Vec::new();
             lexi::write_packed_to(&mut bytes, &packed)?;
             let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
-use lexisplat_eval::sweep::Method;
+use lexisplat_sweep::Method;
 
 use super::{Views, preset};
 

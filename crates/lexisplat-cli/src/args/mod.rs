@@ -100,7 +100,7 @@ pub(crate) struct Compress {
     /// of 255 levels; 1 if no number is given. How many is reported.
     #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, conflicts_with = "keep_order")]
     pub(crate) prune: Option<f32>,
-    /// Promise: no Gaussian's SH vector is off by more (L2 norm, not squared). Without --layout everything
+    /// TargetRecord: no Gaussian's SH vector is off by more (L2 norm, not squared). Without --layout everything
     /// else is then kept exactly (layout f16); with --layout packed it is quantised all the same.
     #[arg(long, value_name = "T")]
     pub(crate) tol: Option<f64>,

@@ -5,11 +5,11 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::output::Output;
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
-use lexisplat_eval::report::{Picture, Report, html};
 use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage, png, text};
 use lexisplat_render::{Image, Renderer, Scene, orbit};
+use lexisplat_sample::{SampleOptions, scene};
+use lexisplat_sweep::report::{Picture, Report, html};
 use serde_json::json;
 
 use super::compress::error_line;

@@ -68,7 +68,7 @@ pub(crate) fn run(
         None => packer.pack(packer.step_for(args.preset.unwrap_or_default().decibels()), &bars)?,
     };
     drop(packer);
-    packed.drawn_on = renderer.is_gpu().then(|| renderer.name().to_owned());
+    packed.device = renderer.is_gpu().then(|| renderer.name().to_owned());
     let pack_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     let file_bytes = write_output(
@@ -150,10 +150,10 @@ pub(crate) fn run_in_parts(
         Ok(seen?)
     };
     let importance =
-        if args.guess { Importance::Guess } else { Importance::Judge { judge: &mut judge, device } };
+        if args.guess { Importance::Heuristic } else { Importance::Judge { judge: &mut judge, device } };
     // Either one or the other writes.
     let importance = Cell::new(Some(importance));
-    let once = || importance.take().unwrap_or(Importance::Guess);
+    let once = || importance.take().unwrap_or(Importance::Heuristic);
     let done = write_output(
         output,
         common.overwrite,
@@ -266,9 +266,9 @@ impl Outcome<'_> {
             "sh_bytes": whole(sh_bytes(streams)),
             "dense_sh_bytes": packed.gaussians * dim * 4,
             "attribute_bytes": attributes,
-            "promise": packed.promise,
+            "promise": packed.target,
             "importance": if self.looked { "views" } else { "guess" },
-            "device": self.packed.drawn_on.as_deref().unwrap_or("cpu"),
+            "device": self.packed.device.as_deref().unwrap_or("cpu"),
             "pruned": self.pruned.map(|p| json!({
                 "gaussians": p.removed,
                 "largest_change": p.largest_change,
@@ -316,7 +316,7 @@ impl Outcome<'_> {
                 ),
             )?;
         }
-        if let Some(p) = &packed.promise {
+        if let Some(p) = &packed.target {
             line("pictures", promise_line(p))?;
         }
         if packed.degree.rest() > 0 {
@@ -354,7 +354,7 @@ impl Outcome<'_> {
 }
 
 /// What a file of a given quality or size reached.
-pub(crate) fn promise_line(p: &lexisplat::packed::Promise) -> String {
+pub(crate) fn promise_line(p: &lexisplat::packed::TargetRecord) -> String {
     let kind = if p.cameras { "given cameras" } else { "generated views" };
     format!("{:.2} dB on average, {:.2} dB at worst, over {} {kind}", p.mean_psnr, p.min_psnr, p.views)
 }

@@ -6,10 +6,8 @@ use std::path::Path;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::sweep::{
-    Entry, Results, Setting, SweepOptions, Watch, read_manifest, sweep, write_report,
-};
 use lexisplat_eval::{SplitFilter, text};
+use lexisplat_sweep::{Entry, Results, Setting, SweepOptions, Watch, read_manifest, sweep, write_report};
 use serde_json::json;
 
 use super::eval::scorer;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use lexisplat::ply::{self, ReadOptions};
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
 
 /// Gaussians of the test scene: enough to learn from, quick to draw.

@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use lexisplat::ply;
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat_sample::{SampleOptions, scene};
 
 use crate::folder::Folder;
 use crate::runs::{

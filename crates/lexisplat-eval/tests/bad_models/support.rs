@@ -3,7 +3,6 @@
 use std::sync::OnceLock;
 
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::stats::{Lint, lint};
 use lexisplat::{
     CompressOptions, Geometry, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
@@ -11,6 +10,7 @@ use lexisplat::{
 use lexisplat_eval::{CompareOptions, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
+use lexisplat_sample::{SampleOptions, scene};
 
 /// Set where GPU tests may not be skipped.
 const REQUIRE: &str = "LEXISPLAT_REQUIRE_GPU";
@@ -84,7 +84,7 @@ pub(crate) fn everything(splats: &Splats) -> Outcome {
     assert!(found.attributes.iter().all(|a| a.min.is_finite() && a.max.is_finite() && a.mean.is_finite()));
 
     let [exact, escapes] = exact(splats);
-    let guessed = packed(splats, &Sensitivity::guess(&splats.geometry));
+    let guessed = packed(splats, &Sensitivity::heuristic(&splats.geometry));
     let seen = sensitivity(&Scene::from(splats), &cameras(), &mut || ());
     let packed = packed(splats, &seen);
     assert_eq!(guessed.is_some(), packed.is_some());

@@ -88,7 +88,7 @@ impl GpuRenderer {
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::sample::{SampleOptions, scene};
+    use lexisplat_sample::{SampleOptions, scene};
 
     use super::super::path::ShPath;
     use super::super::tests::gpu;

@@ -1,8 +1,8 @@
 //! A scene as it is packed: each ellipsoid described in one of its 24 ways, in the order of its cells.
 
 use super::morton;
-use crate::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
-use crate::splats::Geometry;
+use crate::scene::splats::Geometry;
+use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
 
 /// Thinnest axis kept apart, as the logarithm of its ratio to the longest: thinner ones show as lines
 /// all the same, since pictures blur by 0.3 squared pixels.
@@ -35,13 +35,13 @@ pub(super) struct Canonical {
 
 /// A Gaussian's place in a packed scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) struct Placed {
+pub(crate) struct MortonKey {
     pub(crate) cell: u64,
     /// Its index in the scene.
     pub(crate) source: u32,
 }
 
-impl Placed {
+impl MortonKey {
     pub(super) fn index(self) -> usize {
         self.source as usize
     }
@@ -119,11 +119,11 @@ impl Grid {
 }
 
 /// All Gaussians in the order of their cells.
-pub(super) fn placed(geometry: &Geometry, grid: &Grid) -> Vec<Placed> {
+pub(super) fn placed(geometry: &Geometry, grid: &Grid) -> Vec<MortonKey> {
     // Scenes have at most 2^32 - 2 Gaussians.
-    let mut all: Vec<Placed> = (0_u32..)
+    let mut all: Vec<MortonKey> = (0_u32..)
         .zip(&geometry.positions)
-        .map(|(source, &position)| Placed { cell: grid.cell(position), source })
+        .map(|(source, &position)| MortonKey { cell: grid.cell(position), source })
         .collect();
     all.sort_unstable();
     all

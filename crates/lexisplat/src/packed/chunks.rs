@@ -4,19 +4,19 @@ use half::f16;
 
 use super::CHUNK;
 use super::bits::{unzigzag, zigzag};
+use super::chunk_codec::ChunkCodec;
 use super::entropy::Tables;
 use super::parameters::Parameters;
-use super::stream::{Player, Stream, Symbols};
+use super::stream::{Stream, SymbolDecoder, Symbols};
 use super::unpack::{Packed, StreamBits};
-use super::walk::Walk;
-use crate::codes::{Escapes, Indices, SparseCodes, Values};
-use crate::dictionary::Dictionary;
-use crate::error::{Error, Result};
-use crate::limits::{Limits, MAX_ATOMS};
-use crate::maths::Vec3;
-use crate::room::Room;
-use crate::sh::ShDegree;
-use crate::splats::Geometry;
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::Geometry;
+use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_ATOMS};
+use crate::support::maths::Vec3;
+use crate::support::memory_budget::MemoryBudget;
 
 /// Steps of atoms' coefficients are 2^-k for k up to this.
 pub(super) const MAX_ATOM_BITS: u32 = 14;
@@ -46,7 +46,7 @@ pub(super) struct Piece {
     pub(super) values: Vec<f16>,
     pub(super) escaped: Vec<u32>,
     pub(super) rows: Vec<f32>,
-    pub(super) spent: Spent,
+    pub(super) bit_counts: BitCounts,
 }
 
 /// Why a chunk is not decoded.
@@ -54,7 +54,7 @@ enum Refusal {
     /// No encoder writes it so.
     Damage,
     /// Its codes do not fit in what may be held.
-    Room,
+    MemoryBudget,
     /// A Gaussian of it, counted from its start, has this many nonzeros.
     Nonzeros(usize, u64),
 }
@@ -107,9 +107,9 @@ pub(super) fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {
 
 /// Bits each stream took.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Spent(pub(super) [f64; Stream::ALL.len()]);
+pub(crate) struct BitCounts(pub(super) [f64; Stream::ALL.len()]);
 
-impl Spent {
+impl BitCounts {
     pub(crate) fn add(&mut self, more: &Self) {
         for (a, b) in self.0.iter_mut().zip(more.0) {
             *a += b;
@@ -134,7 +134,7 @@ pub(crate) struct Decoder<'a> {
     file: &'a str,
     limits: Limits,
     pub(crate) dictionary: Dictionary,
-    dictionary_bits: Spent,
+    dictionary_bits: BitCounts,
     parameters: Parameters,
     tables: Tables,
     /// The pieces of the data: two for the dictionary and two for each chunk.
@@ -158,7 +158,7 @@ impl<'a> Decoder<'a> {
     }
 
     /// Bits the dictionary took.
-    pub(crate) fn dictionary_bits(&self) -> Spent {
+    pub(crate) fn dictionary_bits(&self) -> BitCounts {
         self.dictionary_bits
     }
 
@@ -167,18 +167,18 @@ impl<'a> Decoder<'a> {
     pub(crate) fn chunk(
         &self,
         c: usize,
-        room: &Room<'_>,
+        budget: &MemoryBudget<'_>,
         count_bits: bool,
-    ) -> Result<(Geometry, SparseCodes, Spent)> {
+    ) -> Result<(Geometry, SparseCodes, BitCounts)> {
         let first = c * CHUNK;
         let n = self.gaussians.saturating_sub(first).min(CHUNK);
         let (mut g, mut counts) = (zeros(n), vec![0; n]);
         let place = places(&mut g, &mut counts).next().ok_or_else(|| bad(&format!("chunk {c}")))?;
-        let piece = self.piece(c, 0, place, room, count_bits)?;
+        let piece = self.piece(c, 0, place, budget, count_bits)?;
         let escapes = Escapes { gaussians: piece.escaped, rows: piece.rows };
         let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
         let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)?;
-        Ok((g, codes, piece.spent))
+        Ok((g, codes, piece.bit_counts))
     }
 
     /// Decodes chunk `c` to `place`; its first Gaussian is called number `first`.
@@ -187,16 +187,16 @@ impl<'a> Decoder<'a> {
         c: usize,
         first: usize,
         place: Place<'_>,
-        room: &Room<'_>,
+        budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
         let parts = (self.parts.get(2 * c + 2).copied()).zip(self.parts.get(2 * c + 3).copied());
-        let player = parts.and_then(|(symbols, raw)| Player::new(&self.tables, symbols, raw));
+        let player = parts.and_then(|(symbols, raw)| SymbolDecoder::new(&self.tables, symbols, raw));
         let mut player = player.ok_or_else(|| bad(&format!("chunk {c}")))?;
-        player.spent = count_bits.then_some([0.0; Stream::ALL.len()]);
-        self.play(player, first, place, room).map_err(|refusal| match refusal {
+        player.bit_counts = count_bits.then_some([0.0; Stream::ALL.len()]);
+        self.play(player, first, place, budget).map_err(|refusal| match refusal {
             Refusal::Damage => bad(&format!("chunk {c}")),
-            Refusal::Room => room.full(),
+            Refusal::MemoryBudget => budget.full(),
             Refusal::Nonzeros(i, found) => {
                 let over = self.limits.check_nonzeros(self.file, c * CHUNK + i, found);
                 over.err().unwrap_or_else(|| bad(&format!("chunk {c}")))
@@ -207,14 +207,14 @@ impl<'a> Decoder<'a> {
     /// Decodes the chunk of `player`, whose first Gaussian is number `first`.
     fn play(
         &self,
-        mut player: Player<'_>,
+        mut player: SymbolDecoder<'_>,
         first: usize,
         place: Place<'_>,
-        room: &Room<'_>,
+        budget: &MemoryBudget<'_>,
     ) -> std::result::Result<Piece, Refusal> {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let mut piece = Piece::default();
-        let mut walk = Walk::new(parameters, dictionary.dim());
+        let mut walk = ChunkCodec::new(parameters, dictionary.dim());
         let mut code = Vec::with_capacity(dictionary.dim());
         let width = indices(dictionary, Vec::new()).width() + size_of::<f16>();
         let row = size_of::<u32>() + dictionary.dim() * size_of::<f32>();
@@ -249,8 +249,8 @@ impl<'a> Decoder<'a> {
                 if player.overrun() {
                     return Err(Refusal::Damage);
                 }
-                if !(room.grow(nonzeros, width) && room.grow(rows, row)) {
-                    return Err(Refusal::Room);
+                if !(budget.grow(nonzeros, width) && budget.grow(rows, row)) {
+                    return Err(Refusal::MemoryBudget);
                 }
                 (nonzeros, rows) = (0, 0);
             }
@@ -258,7 +258,7 @@ impl<'a> Decoder<'a> {
         if !player.exhausted() {
             return Err(Refusal::Damage);
         }
-        piece.spent = Spent(player.spent.unwrap_or_default());
+        piece.bit_counts = BitCounts(player.bit_counts.unwrap_or_default());
         Ok(piece)
     }
 }
@@ -280,27 +280,32 @@ fn parts<'a>(gaussians: usize, lengths: &[u32], data: &'a [u8]) -> Result<Vec<&'
     Ok(parts)
 }
 
-fn dictionary(packed: &Packed, tables: &Tables, symbols: &[u8], raw: &[u8]) -> Option<(Dictionary, Spent)> {
+fn dictionary(
+    packed: &Packed,
+    tables: &Tables,
+    symbols: &[u8],
+    raw: &[u8],
+) -> Option<(Dictionary, BitCounts)> {
     let dim = packed.degree.rest();
     if dim == 0 {
         return (packed.atoms == 0 && symbols.is_empty() && raw.is_empty())
-            .then(|| (Dictionary::empty(), Spent::default()));
+            .then(|| (Dictionary::empty(), BitCounts::default()));
     }
     if !(1..=MAX_ATOMS).contains(&packed.atoms) || packed.atom_bits > MAX_ATOM_BITS {
         return None;
     }
-    let mut player = Player::new(tables, symbols, raw)?;
-    player.spent = Some([0.0; Stream::ALL.len()]);
-    let rows = dictionary_walk(&mut player, packed.degree, packed.atoms, packed.atom_bits, None);
+    let mut player = SymbolDecoder::new(tables, symbols, raw)?;
+    player.bit_counts = Some([0.0; Stream::ALL.len()]);
+    let rows = code_dictionary(&mut player, packed.degree, packed.atoms, packed.atom_bits, None);
     if !player.exhausted() {
         return None;
     }
-    Some((Dictionary::new(packed.degree, rows).ok()?, Spent(player.spent.unwrap_or_default())))
+    Some((Dictionary::new(packed.degree, rows).ok()?, BitCounts(player.bit_counts.unwrap_or_default())))
 }
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
 /// the encoder's.
-pub(super) fn dictionary_walk<S: Symbols>(
+pub(super) fn code_dictionary<S: Symbols>(
     s: &mut S,
     degree: ShDegree,
     atoms: usize,

@@ -3,8 +3,8 @@
 //! Rows come scaled so that one step of a value is 1 and every Gaussian's error counts the same. A code
 //! minimises `|y - D v|^2 + PRICE * bits(v)` over integer values v, greedily.
 
-use crate::parallel::map_chunks;
-use crate::simd::Simd;
+use crate::support::parallel::map_chunks;
+use crate::support::simd::Simd;
 
 /// Squared error, in steps, that a bit may cost. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit; dead zones and short codes make more of it pay.
@@ -75,7 +75,9 @@ impl Costs {
         let index = (size as usize).saturating_sub(1);
         match self.values.get(index) {
             Some(&bits) => bits,
-            None => self.values[VALUE_COSTS - 1] + 2.0 * crate::maths::log2(size / VALUE_COSTS as f32),
+            None => {
+                self.values[VALUE_COSTS - 1] + 2.0 * crate::support::maths::log2(size / VALUE_COSTS as f32)
+            }
         }
     }
 }
@@ -156,7 +158,7 @@ struct Scratch {
 
 /// When a code is good enough.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Until {
+pub(super) enum StopRule {
     /// More would cost more than it gains.
     Balanced,
     /// The squared error, in steps, is at most this.
@@ -192,7 +194,7 @@ impl Codebook {
     }
 
     /// Codes of all rows; `classes` has one entry a row.
-    pub(super) fn encode(&self, rows: &[f32], classes: &[u8], until: Until) -> Codes {
+    pub(super) fn encode(&self, rows: &[f32], classes: &[u8], stop: StopRule) -> Codes {
         let simd = Simd::detect();
         let parts = map_chunks(classes.len(), CHUNK, |range| {
             let mut codes = Codes::default();
@@ -200,7 +202,7 @@ impl Codebook {
                 book: self,
                 rows: &rows[range.start * self.dim..range.end * self.dim],
                 classes: &classes[range],
-                until,
+                stop,
                 codes: &mut codes,
             });
             codes
@@ -221,18 +223,18 @@ impl Codebook {
     }
 
     #[inline(always)]
-    fn encode_row(&self, s: &mut Scratch, row: &[f32], class: u8, until: Until, out: &mut Vec<(u16, i32)>) {
+    fn encode_row(&self, s: &mut Scratch, row: &[f32], class: u8, stop: StopRule, out: &mut Vec<(u16, i32)>) {
         s.code.clear();
         out.clear();
         let mut energy: f32 = row.iter().map(|x| x * x).sum();
         let counts = &self.costs.counts[usize::from(class).min(COUNT_CLASSES - 1)];
-        let goal = match until {
-            Until::Balanced => 0.0,
-            Until::Error(most) => most,
+        let goal = match stop {
+            StopRule::Balanced => 0.0,
+            StopRule::Error(most) => most,
         };
         // No code gains more than all the error there is.
         let cheapest = PRICE * (counts[1] - counts[0]).max(0.0);
-        if energy <= goal || (until == Until::Balanced && energy <= cheapest) || !energy.is_finite() {
+        if energy <= goal || (stop == StopRule::Balanced && energy <= cheapest) || !energy.is_finite() {
             return;
         }
         s.correlations.fill([0.0; LANES]);
@@ -255,7 +257,7 @@ impl Codebook {
             let n = s.code.len();
             let bits = self.costs.atoms[best] + self.costs.value(value.abs()) + counts[n + 1] - counts[n];
             let worth = gain - PRICE * bits;
-            if gain <= 0.0 || (until == Until::Balanced && worth <= 0.0) {
+            if gain <= 0.0 || (stop == StopRule::Balanced && worth <= 0.0) {
                 break;
             }
             energy -= gain;
@@ -267,7 +269,7 @@ impl Codebook {
             }
             energy -= self.refine(s);
         }
-        if until == Until::Balanced {
+        if stop == StopRule::Balanced {
             self.drop_costly(s, counts);
         }
         #[expect(clippy::cast_possible_truncation, reason = "clamped to a million")]
@@ -350,7 +352,7 @@ struct Job<'a> {
     book: &'a Codebook,
     rows: &'a [f32],
     classes: &'a [u8],
-    until: Until,
+    stop: StopRule,
     codes: &'a mut Codes,
 }
 
@@ -362,7 +364,7 @@ impl pulp::NullaryFnOnce for Job<'_> {
         let mut scratch = self.book.scratch();
         let mut code = Vec::new();
         for (row, &class) in self.rows.chunks_exact(self.book.dim).zip(self.classes) {
-            self.book.encode_row(&mut scratch, row, class, self.until, &mut code);
+            self.book.encode_row(&mut scratch, row, class, self.stop, &mut code);
             self.codes.push(&code);
         }
     }
@@ -382,13 +384,13 @@ pub(super) fn learn(
     rows: &[f32],
     classes: &[u8],
     first: Vec<f32>,
-    until: Until,
+    stop: StopRule,
     on_round: &mut dyn FnMut(),
 ) -> (Vec<f32>, Costs) {
     let count = first.len() / dim;
     let mut book = Codebook::new(dim, first, Costs::guess(count, dim));
     for round in 0..ROUNDS {
-        let codes = book.encode(rows, classes, until);
+        let codes = book.encode(rows, classes, stop);
         let usage = Usage::of(&codes, classes, count, dim);
         let mut residuals = rows.to_vec();
         let mut users: Vec<Vec<(u32, f32)>> = vec![Vec::new(); count];
@@ -413,7 +415,7 @@ pub(super) fn learn(
         book = Codebook::new(dim, atoms, costs);
         on_round();
     }
-    let codes = book.encode(rows, classes, until);
+    let codes = book.encode(rows, classes, stop);
     let usage = Usage::of(&codes, classes, count, dim);
     let mut order: Vec<usize> = (0..count).filter(|&j| usage.atoms[j] > 0.0).collect();
     order.sort_by(|&a, &b| usage.atoms[b].total_cmp(&usage.atoms[a]).then(a.cmp(&b)));

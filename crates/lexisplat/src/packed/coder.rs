@@ -2,22 +2,22 @@
 
 use half::f16;
 
-use super::canonical::{Placed, canonical};
-use super::chunks::{MAX_ATOM_BITS, dictionary_walk, resident};
-use super::codebook::{Codebook, Codes, Costs, Until, learn};
+use super::canonical::{MortonKey, canonical};
+use super::chunk_codec::{ChunkCodec, Code, GaussianValues};
+use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
+use super::codebook::{Codebook, Codes, Costs, StopRule, learn};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::pack::{PackOptions, PackReport};
 use super::parameters::Parameters;
-use super::stream::{Recorder, Stream};
-use super::walk::{Code, Target, Walk};
-use crate::codes::reconstruct;
-use crate::dictionary::Dictionary;
-use crate::error::{Error, Result};
-use crate::model::{Layout, Pursuit, Record};
-use crate::progress::{Progress, Stage};
-use crate::rng::SplitMix64;
-use crate::splats::Splats;
+use super::stream::{Stream, SymbolEncoder};
+use crate::scene::splats::Splats;
+use crate::sparse::codes::reconstruct;
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Layout, Pursuit, Record};
+use crate::support::error::{Error, Result};
+use crate::support::progress::{Progress, Stage};
+use crate::support::rng::SplitMix64;
 
 /// Rows to learn a dictionary from at most.
 const SAMPLE: usize = 24_576;
@@ -42,7 +42,7 @@ const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 pub(super) struct View<'a> {
     pub(super) splats: &'a Splats,
     /// Which Gaussian of `splats` comes next, and its cell.
-    pub(super) scene: &'a [Placed],
+    pub(super) scene: &'a [MortonKey],
     /// Colour and shape class of each, in this order.
     pub(super) classes: &'a [[u8; 2]],
 }
@@ -82,9 +82,9 @@ pub(super) struct ChunkCoder {
     pub(super) dictionary: Dictionary,
     pub(super) atom_bits: u32,
     /// The dictionary's symbols.
-    pub(super) first: Recorder,
+    pub(super) first: SymbolEncoder,
     book: Option<Codebook>,
-    until: Until,
+    stop: StopRule,
     tolerance: Option<f64>,
 }
 
@@ -112,32 +112,32 @@ impl ChunkCoder {
         }
         let degree = view.splats.degree;
         let dim = degree.rest();
-        let until = match options.tolerance {
+        let stop = match options.tolerance {
             #[expect(clippy::cast_possible_truncation, reason = "a share of the tolerance, in steps")]
-            Some(_) => Until::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE),
-            None => Until::Balanced,
+            Some(_) => StopRule::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE),
+            None => StopRule::Balanced,
         };
         let mut coder = Self {
             parameters,
             dictionary: Dictionary::empty(),
             atom_bits: 0,
-            first: Recorder::default(),
+            first: SymbolEncoder::default(),
             book: None,
-            until,
+            stop,
             tolerance: options.tolerance,
         };
         if dim > 0 && view.len() > 0 {
             let (rows, costs) = coder.learn(view, total, options, progress);
             coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
             let atoms = rows.len() / dim;
-            let rounded = dictionary_walk(&mut coder.first, degree, atoms, coder.atom_bits, Some(&rows));
+            let rounded = code_dictionary(&mut coder.first, degree, atoms, coder.atom_bits, Some(&rows));
             coder.dictionary = Dictionary::new(degree, rounded.clone())?;
             coder.book = Some(Codebook::new(dim, rounded, costs));
         } else if dim > 0 {
             // A scene without Gaussians still needs one atom to be valid.
             let mut atom = vec![0.0; dim];
             atom[0] = 1.0;
-            let rounded = dictionary_walk(&mut coder.first, degree, 1, 0, Some(&atom));
+            let rounded = code_dictionary(&mut coder.first, degree, 1, 0, Some(&atom));
             coder.dictionary = Dictionary::new(degree, rounded)?;
         }
         Ok(coder)
@@ -158,7 +158,7 @@ impl ChunkCoder {
         let pay = || (total / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED);
         let first = first_atoms(dim, options.atoms.unwrap_or_else(pay), &rows);
         progress.begin(Stage::Learn, super::codebook::ROUNDS as u64);
-        let learned = learn(dim, &rows, &classes, first, self.until, &mut || progress.advance(1));
+        let learned = learn(dim, &rows, &classes, first, self.stop, &mut || progress.advance(1));
         progress.end();
         learned
     }
@@ -170,7 +170,7 @@ impl ChunkCoder {
         let book = Codebook::new(dim, rows.to_vec(), costs.clone());
         let stride = n.div_ceil(super::codebook::CHUNK).max(1);
         let (sample, classes) = view.scaled((0..n).step_by(stride), &self.parameters);
-        let codes = book.encode(&sample, &classes, self.until);
+        let codes = book.encode(&sample, &classes, self.stop);
         let (mut sum, mut count) = (0.0_f64, 1.0_f64);
         for i in 0..classes.len() {
             for &(_, value) in codes.row(i) {
@@ -188,14 +188,14 @@ impl ChunkCoder {
     pub(super) fn codes(&self, view: View<'_>) -> Codes {
         let Some(book) = &self.book else { return Codes::default() };
         let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
-        book.encode(&rows, &classes, self.until)
+        book.encode(&rows, &classes, self.stop)
     }
 
     /// Codes a chunk, all of `view`.
     pub(super) fn record(&self, view: View<'_>, codes: &Codes) -> Chunk {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let dim = dictionary.dim();
-        let mut walk = Walk::new(parameters, dim);
+        let mut walk = ChunkCodec::new(parameters, dim);
         let mut chunk = Chunk { tally: Tally::new(dim), ..Chunk::default() };
         let tally = &mut chunk.tally;
         let mut values: Vec<(u16, f16)> = Vec::new();
@@ -226,7 +226,7 @@ impl ChunkCoder {
                     tally.histogram[values.len().min(dim)] += 1;
                 }
             }
-            let target = Target {
+            let target = GaussianValues {
                 cell: placed.cell,
                 classes,
                 scales: g.scales,
@@ -245,7 +245,7 @@ impl ChunkCoder {
 /// One chunk recorded, with what it adds to the report.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
-    pub(super) recorder: Recorder,
+    pub(super) recorder: SymbolEncoder,
     pub(super) tally: Tally,
     /// A decoder would refuse it.
     impossible: bool,
@@ -253,7 +253,7 @@ pub(super) struct Chunk {
 
 impl Chunk {
     /// Adds the chunk to what is known of the file, and returns its symbols.
-    pub(super) fn count(self, tally: &mut Tally, histograms: &mut [Histogram]) -> Result<Recorder> {
+    pub(super) fn count(self, tally: &mut Tally, histograms: &mut [Histogram]) -> Result<SymbolEncoder> {
         if self.impossible {
             return Err(too_large());
         }
@@ -302,7 +302,7 @@ impl Tally {
     }
 
     /// What is recorded and reported of `gaussians` Gaussians; `seconds` are those of learning and coding.
-    pub(super) fn told(
+    pub(super) fn into_report(
         self,
         options: &PackOptions,
         gaussians: usize,
@@ -339,7 +339,7 @@ fn too_large() -> Error {
 fn first_atoms(dim: usize, atoms: usize, rows: &[f32]) -> Vec<f32> {
     let mut out = Vec::with_capacity(atoms * dim);
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-    for axis in crate::learn::principal_axes(dim, rows).iter().take(atoms / 2) {
+    for axis in crate::sparse::learn::principal_axes(dim, rows).iter().take(atoms / 2) {
         out.extend(axis.iter().map(|&x| x as f32));
     }
     let mut rows = rows.chunks_exact(dim);

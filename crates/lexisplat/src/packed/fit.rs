@@ -1,12 +1,12 @@
 //! Steps and predictors fitted to a scene.
 
-use super::canonical::{Canonical, Grid, Placed, canonical};
+use super::canonical::{Canonical, Grid, MortonKey, canonical};
 use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
-use crate::maths::{Vec3, at_share};
-use crate::sensitivity::Sensitivity;
-use crate::sh::C0;
-use crate::splats::Geometry;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sh::C0;
+use crate::scene::splats::Geometry;
+use crate::support::maths::{Vec3, at_share};
 
 /// A weight is at least this share of what nine tenths of all are below: what the views did not see may
 /// yet be seen.
@@ -44,12 +44,17 @@ pub(super) struct Fit {
 
 impl Fit {
     /// `scene` is the order of the Gaussians of `geometry`.
-    pub(super) fn new(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[Placed], grid: &Grid) -> Self {
+    pub(super) fn new(
+        geometry: &Geometry,
+        sensitivity: &Sensitivity,
+        scene: &[MortonKey],
+        grid: &Grid,
+    ) -> Self {
         let kinds = [
             Classes::fit(scene.iter().map(|g| sensitivity.colour[g.index()])),
             Classes::fit(scene.iter().map(|g| sensitivity.opacity[g.index()])),
         ];
-        let weights = |g: &Placed| [sensitivity.colour[g.index()], sensitivity.opacity[g.index()]];
+        let weights = |g: &MortonKey| [sensitivity.colour[g.index()], sensitivity.opacity[g.index()]];
         let classes: Vec<[u8; 2]> = scene.iter().map(|g| of(kinds, weights(g))).collect();
         let (dc_mean, dc_axes) = colour_axes(geometry, scene);
         let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
@@ -141,13 +146,13 @@ impl Classes {
 }
 
 /// Mean base colour and its principal axes, strongest first.
-fn colour_axes(geometry: &Geometry, scene: &[Placed]) -> (Vec3, [Vec3; 3]) {
+fn colour_axes(geometry: &Geometry, scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     let dc = || scene.iter().map(|g| geometry.dc[g.index()]);
     let n = scene.len().max(1) as f64;
     let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
     let deviations: Vec<f32> =
         dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
-    let axes = crate::learn::principal_axes(3, &deviations);
+    let axes = crate::sparse::learn::principal_axes(3, &deviations);
     let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     for (row, axis) in out.iter_mut().zip(&axes) {
         *row = std::array::from_fn(|c| single(axis[c]));
@@ -157,7 +162,7 @@ fn colour_axes(geometry: &Geometry, scene: &[Placed]) -> (Vec3, [Vec3; 3]) {
 
 /// For scaling, turning and moving along each axis: the binary logarithm of the step, relative to that
 /// of the opacity, as a linear function of 1 and the scales. Scaling depends on nothing.
-fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[Placed]) -> [[[f64; 4]; 3]; 3] {
+fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKey]) -> [[[f64; 4]; 3]; 3] {
     let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
     let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
     let mut equations: [[Equations<4>; 3]; 3] =
@@ -208,7 +213,7 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
 }
 
 /// Fits the predictions to the scene's own values, as if coded without error.
-fn predictors(geometry: &Geometry, scene: &[Placed], classes: &[[u8; 2]], parameters: &mut Parameters) {
+fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], parameters: &mut Parameters) {
     let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
         let dc = parameters.dc_coordinates(g.dc);
         [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]

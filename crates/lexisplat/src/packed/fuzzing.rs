@@ -2,7 +2,7 @@
 
 use super::Packed;
 use super::entropy::{CONTEXTS, Histogram, SymbolReader, Tables};
-use super::stream::{Player, Recorder, Stream, Symbols};
+use super::stream::{Stream, SymbolDecoder, SymbolEncoder, Symbols};
 
 /// Symbols of the widest alphabet, that of atoms.
 const SYMBOLS: u64 = 1 << 10;
@@ -34,12 +34,14 @@ pub fn decode(tables: &[u8], symbols: &[u8], raw: &[u8], script: &[u8]) -> bool 
     let written = tables.write();
     let again = Tables::read(&written, Stream::ALL.len()).map(|tables| tables.write());
     assert_eq!(again.as_deref(), Some(written.as_slice()), "tables change as they are written");
-    let Some(mut player) = Player::new(&tables, symbols, raw) else { return false };
-    player.spent = Some([0.0; Stream::ALL.len()]);
+    let Some(mut player) = SymbolDecoder::new(&tables, symbols, raw) else { return false };
+    player.bit_counts = Some([0.0; Stream::ALL.len()]);
     for &what in script.as_chunks::<2>().0 {
         ask(&mut player, what, 0);
     }
-    assert!(player.spent.is_some_and(|spent| spent.iter().all(|b| b.is_finite() && *b >= 0.0)));
+    assert!(
+        player.bit_counts.is_some_and(|bit_counts| bit_counts.iter().all(|b| b.is_finite() && *b >= 0.0))
+    );
     player.exhausted() && !player.overrun()
 }
 
@@ -47,7 +49,7 @@ pub fn decode(tables: &[u8], symbols: &[u8], raw: &[u8], script: &[u8]) -> bool 
 /// back and nothing was left.
 #[must_use]
 pub fn round_trip(values: &[(u8, u8, u64)]) -> bool {
-    let mut recorder = Recorder::default();
+    let mut recorder = SymbolEncoder::default();
     let coded: Vec<u64> =
         values.iter().map(|&(stream, context, value)| ask(&mut recorder, [stream, context], value)).collect();
     let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
@@ -55,7 +57,7 @@ pub fn round_trip(values: &[(u8, u8, u64)]) -> bool {
     let Some(tables) = Tables::new(&histograms) else { return false };
     let [symbols, raw] = recorder.finish(&tables);
     let Some(read) = Tables::read(&tables.write(), Stream::ALL.len()) else { return false };
-    let Some(mut player) = Player::new(&read, &symbols, &raw) else { return false };
+    let Some(mut player) = SymbolDecoder::new(&read, &symbols, &raw) else { return false };
     let decoded = values.iter().map(|&(stream, context, _)| ask(&mut player, [stream, context], 0));
     // All of it, wherever the first difference is.
     let decoded: Vec<u64> = decoded.collect();

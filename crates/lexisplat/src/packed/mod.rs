@@ -8,6 +8,7 @@
 
 mod bits;
 mod canonical;
+mod chunk_codec;
 mod chunks;
 mod codebook;
 mod coder;
@@ -22,19 +23,18 @@ mod pack;
 mod parameters;
 mod parts;
 mod preset;
-mod restore;
+mod reorder;
 mod stream;
 mod unpack;
-mod walk;
 
-pub(crate) use canonical::{Bounds, Grid, Placed};
+pub(crate) use canonical::{Bounds, Grid, MortonKey};
 pub(crate) use chunks::Decoder;
 pub(crate) use pack::check;
 pub(crate) use parts::{PartPacker, Whole};
 
 pub use pack::{PackOptions, PackReport, Packer};
 pub use preset::Preset;
-pub use unpack::{Packed, Promise, StreamBits};
+pub use unpack::{Packed, StreamBits, TargetRecord};
 
 /// Gaussians of a chunk: decoded apart from all others, so that decoding is parallel and a viewer need
 /// not wait for the whole file.

@@ -1,7 +1,7 @@
 //! What the Gaussians decoded just before say about the next one.
 
 use super::parameters::TARGETS;
-use crate::maths::Vec3;
+use crate::support::maths::Vec3;
 
 /// Gaussians remembered. More gain little: neighbours on the Morton curve are neighbours in space.
 const WINDOW: usize = 16;

@@ -1,19 +1,19 @@
 //! From a scene to a packed file.
 
 use super::CHUNK;
-use super::canonical::{Grid, Placed, placed};
+use super::canonical::{Grid, MortonKey, placed};
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, Tally, View, length, no_symbols, tables};
 use super::fit::Fit;
-use super::restore::gather;
+use super::reorder::gather;
 use super::unpack::Packed;
-use crate::error::{Error, Result};
-use crate::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
-use crate::parallel::map_chunks;
-use crate::progress::{Progress, Stage};
-use crate::sensitivity::Sensitivity;
-use crate::splats::{Splats, all_finite, for_extra};
-use crate::stopwatch::Stopwatch;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::{Splats, all_finite, for_extra};
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
+use crate::support::parallel::map_chunks;
+use crate::support::progress::{Progress, Stage};
+use crate::support::stopwatch::Stopwatch;
 
 /// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians, how it
 /// grows as the step halves, and by how much faster: fitted to held-out views of the models measured in
@@ -28,7 +28,7 @@ const MOST_DB: f64 = 100.0;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PackOptions {
-    /// Promise: un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
+    /// TargetRecord: un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
     /// then as exact as pictures need.
     pub tolerance: Option<f64>,
     /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
@@ -66,9 +66,9 @@ pub struct PackReport {
     pub nonzero_histogram: Vec<u64>,
     /// Gaussians whose SH are stored exactly.
     pub escapes: u64,
-    /// Seconds spent learning (0 where there is no clock).
+    /// Seconds bit_counts learning (0 where there is no clock).
     pub learn_seconds: f64,
-    /// Seconds spent on everything else.
+    /// Seconds bit_counts on everything else.
     pub code_seconds: f64,
 }
 
@@ -77,7 +77,7 @@ pub struct PackReport {
 pub struct Packer<'a> {
     splats: &'a Splats,
     options: PackOptions,
-    scene: Vec<Placed>,
+    scene: Vec<MortonKey>,
     fit: Fit,
 }
 
@@ -167,7 +167,7 @@ impl<'a> Packer<'a> {
             lengths.push(length(part)?);
             data.extend_from_slice(part);
         }
-        let (record, report) = tally.told(&self.options, n, [learn_seconds, clock.seconds()]);
+        let (record, report) = tally.into_report(&self.options, n, [learn_seconds, clock.seconds()]);
         let packed = Packed {
             degree: self.splats.degree,
             gaussians: n,
@@ -177,8 +177,8 @@ impl<'a> Packer<'a> {
             meta: self.splats.meta.clone(),
             extras: self.extras(),
             order: self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect()),
-            promise: None,
-            drawn_on: None,
+            target: None,
+            device: None,
             parameters: coder.parameters.to_list(),
             tables: tables.write(),
             lengths,
@@ -188,7 +188,7 @@ impl<'a> Packer<'a> {
         Ok((packed, report))
     }
 
-    fn extras(&self) -> Vec<crate::splats::Extra> {
+    fn extras(&self) -> Vec<crate::scene::splats::Extra> {
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
             for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));

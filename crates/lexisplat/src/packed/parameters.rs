@@ -1,6 +1,6 @@
 //! What every chunk is decoded with: steps, predictors, the grid. A fixed list of f32.
 
-use crate::maths::{Vec3, exp, exp2};
+use crate::support::maths::{Vec3, exp, exp2};
 
 /// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
 /// the opacity, three base colours.

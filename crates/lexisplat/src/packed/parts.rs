@@ -3,23 +3,23 @@
 use std::path::Path;
 
 use super::CHUNK;
-use super::canonical::{Grid, Placed};
-use super::chunks::Spent;
+use super::canonical::{Grid, MortonKey};
+use super::chunks::BitCounts;
 use super::coder::{ChunkCoder, Tally, View, length, no_symbols, tables};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::pack::{PackOptions, PackReport, expected_step};
-use super::stream::{Recorder, Stream};
+use super::stream::{Stream, SymbolEncoder};
 use super::unpack::{Packed, StreamBits};
-use crate::error::Result;
-use crate::lexi::{Extras, SpilledPacked};
-use crate::limits::Limits;
-use crate::parallel::{map_chunks, map_vec};
-use crate::progress::Progress;
-use crate::sensitivity::Sensitivity;
-use crate::spill::Spill;
-use crate::splats::{SceneMeta, Splats};
-use crate::stopwatch::Stopwatch;
+use crate::formats::lexi::{Extras, SpilledPacked};
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::{SceneMeta, Splats};
+use crate::support::error::Result;
+use crate::support::limits::Limits;
+use crate::support::parallel::{map_chunks, map_vec};
+use crate::support::progress::Progress;
+use crate::support::spill::Spill;
+use crate::support::stopwatch::Stopwatch;
 
 /// Chunks whose symbols are coded before they are written.
 const CHUNKS_AT_ONCE: usize = 16;
@@ -70,8 +70,8 @@ impl PartPacker {
     ) -> Result<Self> {
         let clock = Stopwatch::start();
         let Whole { gaussians: total, grid, decibels } = scene;
-        let placed = |(source, &position): (u32, &[f32; 3])| Placed { cell: grid.cell(position), source };
-        let scene: Vec<Placed> = (0..).zip(&sample.geometry.positions).map(placed).collect();
+        let placed = |(source, &position): (u32, &[f32; 3])| MortonKey { cell: grid.cell(position), source };
+        let scene: Vec<MortonKey> = (0..).zip(&sample.geometry.positions).map(placed).collect();
         let fit = Fit::new(&sample.geometry, sensitivity, &scene, &grid);
         let view = View { splats: sample, scene: &scene, classes: &fit.classes };
         let step = expected_step(total, decibels);
@@ -99,10 +99,10 @@ impl PartPacker {
 
     /// Codes the next Gaussians, whole chunks unless they are the last. `weights` are the sensitivities of
     /// each to colour and opacity, and `places` its cell and its index in the source; all was checked.
-    pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[Placed]) -> Result<()> {
+    pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[MortonKey]) -> Result<()> {
         self.gaussians += splats.len();
         let classes = self.fit.classes_of(weights);
-        let scene: Vec<Placed> = (0..).zip(places).map(|(source, p)| Placed { source, ..*p }).collect();
+        let scene: Vec<MortonKey> = (0..).zip(places).map(|(source, p)| MortonKey { source, ..*p }).collect();
         let view = View { splats, scene: &scene, classes: &classes };
         let coder = &self.coder;
         let chunks = map_chunks(splats.len(), CHUNK, |range| {
@@ -124,14 +124,14 @@ impl PartPacker {
     }
 
     /// The packed scene, what is as long as the scene set aside; the report; and what the streams take.
-    /// `drawn_on` is the GPU that looked, if one did.
+    /// `device` is the GPU that looked, if one did.
     pub(crate) fn finish(
         self,
         folder: &Path,
-        drawn_on: Option<&str>,
+        device: Option<&str>,
     ) -> Result<(Packed, SpilledPacked, PackReport, Vec<StreamBits>)> {
         let tables = tables(&self.histograms)?;
-        let spent = spent(&self.histograms, &self.raw_bits, &tables);
+        let bit_counts = bit_counts(&self.histograms, &self.raw_bits, &tables);
         let mut data = Spill::new(folder)?;
         let mut lengths = Vec::with_capacity(2 * (self.lengths.len() + 1));
         let mut write = |parts: [Vec<u8>; 2]| -> Result<()> {
@@ -148,11 +148,11 @@ impl PartPacker {
             for &[entries, bytes] in batch {
                 chunks.push((symbols.take::<u16>(entries)?, raw.take::<u8>(bytes)?));
             }
-            let parts = map_vec(chunks, |(symbols, raw)| Recorder::finish_later(&symbols, raw, &tables));
+            let parts = map_vec(chunks, |(symbols, raw)| SymbolEncoder::finish_later(&symbols, raw, &tables));
             parts.into_iter().try_for_each(&mut write)?;
         }
         let seconds = [self.learn_seconds, self.clock.seconds()];
-        let (record, report) = self.tally.told(&self.options, self.gaussians, seconds);
+        let (record, report) = self.tally.into_report(&self.options, self.gaussians, seconds);
         let head = Packed {
             degree: self.coder.dictionary.degree(),
             gaussians: self.gaussians,
@@ -162,8 +162,8 @@ impl PartPacker {
             meta: self.meta,
             extras: Vec::new(),
             order: None,
-            promise: None,
-            drawn_on: drawn_on.map(str::to_owned),
+            target: None,
+            device: device.map(str::to_owned),
             parameters: self.coder.parameters.to_list(),
             tables: tables.write(),
             lengths,
@@ -175,14 +175,14 @@ impl PartPacker {
             None => None,
         };
         let spilled = SpilledPacked { data: data.finish()?, order, extras: self.extras };
-        Ok((head, spilled, report, spent.named()))
+        Ok((head, spilled, report, bit_counts.named()))
     }
 }
 
 /// Bits that all streams take.
-fn spent(histograms: &[Histogram], raw: &[u64], tables: &Tables) -> Spent {
-    let mut spent = Spent::default();
-    let streams = spent.0.iter_mut().zip(raw).zip(histograms.chunks(CONTEXTS)).enumerate();
+fn bit_counts(histograms: &[Histogram], raw: &[u64], tables: &Tables) -> BitCounts {
+    let mut bit_counts = BitCounts::default();
+    let streams = bit_counts.0.iter_mut().zip(raw).zip(histograms.chunks(CONTEXTS)).enumerate();
     for (stream, ((sum, &raw), contexts)) in streams {
         *sum = raw as f64;
         for (context, histogram) in contexts.iter().enumerate() {
@@ -191,5 +191,5 @@ fn spent(histograms: &[Histogram], raw: &[u64], tables: &Tables) -> Spent {
             }
         }
     }
-    spent
+    bit_counts
 }

@@ -1,6 +1,6 @@
 //! Qualities by name.
 
-use crate::error::{Error, Result};
+use crate::support::error::{Error, Result};
 
 /// A quality of packed files, by what it is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]

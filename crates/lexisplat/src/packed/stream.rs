@@ -92,7 +92,7 @@ pub(super) trait Symbols {
 
 /// A chunk as it is being encoded: everything kept until the tables are known.
 #[derive(Debug, Default)]
-pub(super) struct Recorder {
+pub(super) struct SymbolEncoder {
     symbols: Vec<(u16, u16)>,
     raw: BitWriter,
     raw_bits: [u64; Stream::ALL.len()],
@@ -103,7 +103,7 @@ fn index(stream: Stream, context: usize) -> u16 {
     u16::try_from(index).unwrap_or(u16::MAX)
 }
 
-impl Symbols for Recorder {
+impl Symbols for SymbolEncoder {
     fn integer(&mut self, stream: Stream, context: usize, value: impl FnOnce() -> u64) -> u64 {
         let value = value();
         let (token, count, extra) = split(value);
@@ -126,7 +126,7 @@ impl Symbols for Recorder {
     }
 }
 
-impl Recorder {
+impl SymbolEncoder {
     /// Adds the chunk's symbols to the file's statistics.
     pub(super) fn count(&self, histograms: &mut [Histogram]) {
         for &(context, symbol) in &self.symbols {
@@ -165,20 +165,20 @@ impl Recorder {
 
 /// A chunk as it is being decoded.
 #[derive(Debug)]
-pub(super) struct Player<'a> {
+pub(super) struct SymbolDecoder<'a> {
     tables: &'a Tables,
     symbols: SymbolReader,
     raw: BitReader<'a>,
     /// Bits each stream took, if they are to be known.
-    pub(super) spent: Option<[f64; Stream::ALL.len()]>,
+    pub(super) bit_counts: Option<[f64; Stream::ALL.len()]>,
     missing: bool,
 }
 
-impl<'a> Player<'a> {
+impl<'a> SymbolDecoder<'a> {
     /// `None` if the parts are not a chunk's.
     pub(super) fn new(tables: &'a Tables, symbols: &[u8], raw: &'a [u8]) -> Option<Self> {
         let symbols = SymbolReader::new(symbols)?;
-        Some(Self { tables, symbols, raw: BitReader::new(raw), spent: None, missing: false })
+        Some(Self { tables, symbols, raw: BitReader::new(raw), bit_counts: None, missing: false })
     }
 
     /// Whether more bits were asked for than there are.
@@ -198,14 +198,14 @@ impl<'a> Player<'a> {
             return 0;
         };
         let symbol = self.symbols.take(table);
-        if let Some(spent) = &mut self.spent {
-            spent[stream as usize] += table.bits(symbol);
+        if let Some(bit_counts) = &mut self.bit_counts {
+            bit_counts[stream as usize] += table.bits(symbol);
         }
         symbol
     }
 }
 
-impl Symbols for Player<'_> {
+impl Symbols for SymbolDecoder<'_> {
     #[inline]
     fn integer(&mut self, stream: Stream, context: usize, _: impl FnOnce() -> u64) -> u64 {
         let token = self.take(stream, context);
@@ -221,8 +221,8 @@ impl Symbols for Player<'_> {
 
     #[inline]
     fn bits(&mut self, stream: Stream, count: u32, _: impl FnOnce() -> u64) -> u64 {
-        if let Some(spent) = &mut self.spent {
-            spent[stream as usize] += f64::from(count);
+        if let Some(bit_counts) = &mut self.bit_counts {
+            bit_counts[stream as usize] += f64::from(count);
         }
         self.raw.take(count)
     }

@@ -3,16 +3,16 @@
 use serde::{Deserialize, Serialize};
 
 use super::CHUNK;
-use super::chunks::{Decoder, Spent, indices, places, zeros};
-use crate::codes::{Escapes, SparseCodes, Values};
-use crate::dictionary::Dictionary;
-use crate::error::Result;
-use crate::limits::Limits;
-use crate::model::{Layout, Model, Record};
-use crate::parallel::map_vec;
-use crate::room::{COUNT_BYTES, GEOMETRY_BYTES, Room};
-use crate::sh::ShDegree;
-use crate::splats::{Extra, Geometry, SceneMeta};
+use super::chunks::{BitCounts, Decoder, indices, places, zeros};
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::{Extra, Geometry, SceneMeta};
+use crate::sparse::codes::{Escapes, SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Layout, Model, Record};
+use crate::support::error::Result;
+use crate::support::limits::Limits;
+use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
+use crate::support::parallel::map_vec;
 
 /// A packed scene whose file is not known, in errors.
 const UNNAMED: &str = "the packed scene";
@@ -37,10 +37,10 @@ pub struct Packed {
     /// For each Gaussian its index in the source, if that was to be kept.
     pub order: Option<Vec<u32>>,
     /// What was aimed at and reached, if something was.
-    pub promise: Option<Promise>,
+    pub target: Option<TargetRecord>,
     /// The GPU that looked at the scene and judged; `None` if the CPU renderer did, whose results are the same
     /// everywhere.
-    pub drawn_on: Option<String>,
+    pub device: Option<String>,
     /// Steps and predictors.
     pub parameters: Vec<f32>,
     /// Probabilities of all symbols.
@@ -57,7 +57,7 @@ pub struct Packed {
 /// What a search for a quality or a size aimed at and reached.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
-pub struct Promise {
+pub struct TargetRecord {
     /// `psnr`, `min-psnr` or `size`.
     pub target: String,
     /// Decibels or bytes asked for.
@@ -72,7 +72,7 @@ pub struct Promise {
     pub cameras: bool,
 }
 
-impl Promise {
+impl TargetRecord {
     /// A promise of all its parts.
     #[must_use]
     pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
@@ -108,7 +108,7 @@ impl Packed {
         let model = self.decode(file, false)?.0;
         model.geometry.validate()?;
         match &self.order {
-            Some(order) => super::restore::restored(model, order),
+            Some(order) => super::reorder::reordered(model, order),
             None => Ok(model),
         }
     }
@@ -129,36 +129,36 @@ impl Packed {
         Ok(Decoder::new(self, UNNAMED, &self.data)?.dictionary)
     }
 
-    /// Room for the scene beside `self`, of which its geometry is taken.
-    fn room<'a>(&self, file: &'a str) -> Result<Room<'a>> {
+    /// MemoryBudget for the scene beside `self`, of which its geometry is taken.
+    fn budget<'a>(&self, file: &'a str) -> Result<MemoryBudget<'a>> {
         let words = self.parameters.len() + self.lengths.len() + self.order.as_ref().map_or(0, Vec::len);
         let extras = self.extras.iter().map(|e| e.values.width()).sum::<usize>();
         let n = self.gaussians;
         let sizes = [(words, size_of::<u32>()), (self.tables.len(), 1), (self.data.len(), 1), (n, extras)];
         let own = sizes.iter().map(|&(count, each)| (count as u64).saturating_mul(each as u64));
-        let room = Room::new(&self.limits, file, own.fold(0, u64::saturating_add));
+        let budget = MemoryBudget::new(&self.limits, file, own.fold(0, u64::saturating_add));
         for (count, each) in sizes {
-            room.take(count, each)?;
+            budget.take(count, each)?;
         }
-        room.take(n, GEOMETRY_BYTES + COUNT_BYTES + extras)?;
-        Ok(room)
+        budget.take(n, GEOMETRY_BYTES + COUNT_BYTES + extras)?;
+        Ok(budget)
     }
 
-    fn decode(&self, file: &str, count_bits: bool) -> Result<(Model, Spent)> {
+    fn decode(&self, file: &str, count_bits: bool) -> Result<(Model, BitCounts)> {
         let decoder = Decoder::new(self, file, &self.data)?;
-        let mut spent = decoder.dictionary_bits();
+        let mut bit_counts = decoder.dictionary_bits();
         let n = self.gaussians;
-        let room = self.room(file)?;
+        let budget = self.budget(file)?;
         let mut g = Geometry { extras: self.extras.clone(), ..zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let work = places(&mut g, &mut counts).enumerate().collect();
-        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, &room, count_bits));
+        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, &budget, count_bits));
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
         for piece in pieces {
             let piece = piece?;
-            spent.add(&piece.spent);
+            bit_counts.add(&piece.bit_counts);
             atoms.extend(piece.atoms);
             values.extend(piece.values);
             escapes.gaussians.extend(piece.escaped);
@@ -168,6 +168,6 @@ impl Packed {
         let indices = indices(&dictionary, atoms);
         let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)?;
         let record = Record { layout: Layout::Packed, ..self.record.clone() };
-        Ok((Model { geometry: g, meta: self.meta.clone(), dictionary, codes, record }, spent))
+        Ok((Model { geometry: g, meta: self.meta.clone(), dictionary, codes, record }, bit_counts))
     }
 }

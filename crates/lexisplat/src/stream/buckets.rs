@@ -4,8 +4,8 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use crate::error::{Error, Result};
-use crate::spill::{named, temporary};
+use crate::support::error::{Error, Result};
+use crate::support::spill::{named, temporary};
 
 /// Bytes a bucket collects before they are written.
 const BLOCK: usize = 1 << 16;

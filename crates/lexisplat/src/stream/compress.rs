@@ -4,17 +4,17 @@ use std::io::Write;
 use std::path::Path;
 
 use super::counted::Counted;
-use crate::compress::{AT_ONCE, CompressOptions, CompressReport, Encoder};
-use crate::dictionary::Dictionary;
-use crate::error::{Error, Result};
-use crate::lexi::SpilledModel;
-use crate::limits::{Limits, MAX_GAUSSIANS};
-use crate::model::{Layout, Record};
-use crate::output::{Output, write_whole};
-use crate::parallel::CHUNK;
-use crate::ply::PlyChunks;
-use crate::progress::{Progress, Stage};
-use crate::stopwatch::Stopwatch;
+use crate::formats::lexi::SpilledModel;
+use crate::formats::ply::PlyChunks;
+use crate::sparse::compress::{AT_ONCE, CompressOptions, CompressReport, Encoder};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Layout, Record};
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_GAUSSIANS};
+use crate::support::output::{Output, write_whole};
+use crate::support::parallel::CHUNK;
+use crate::support::progress::{Progress, Stage};
+use crate::support::stopwatch::Stopwatch;
 
 /// What [`compress_file`] did.
 #[derive(Debug, Clone)]
@@ -28,7 +28,7 @@ pub struct Compressed {
     pub record: Record,
     /// How learning and coding went.
     pub report: CompressReport,
-    /// Bytes of each tensor, and of the header under `header`, as [`lexi::attribute_bytes`](crate::lexi::attribute_bytes).
+    /// Bytes of each tensor, and of the header under `header`, as [`lexi::attribute_bytes`](crate::formats::lexi::attribute_bytes).
     pub attribute_bytes: Vec<(String, u64)>,
     /// Seconds spent writing the file, all else done.
     pub write_seconds: f64,
@@ -41,15 +41,15 @@ impl Compressed {
         self.attribute_bytes.iter().map(|a| a.1).sum()
     }
 
-    /// Bytes that stand for SH-rest, as [`lexi::sh_bytes`](crate::lexi::sh_bytes).
+    /// Bytes that stand for SH-rest, as [`lexi::sh_bytes`](crate::formats::lexi::sh_bytes).
     #[must_use]
     pub fn sh_bytes(&self) -> u64 {
-        self.attribute_bytes.iter().filter(|a| crate::lexi::is_sh(&a.0)).map(|a| a.1).sum()
+        self.attribute_bytes.iter().filter(|a| crate::formats::lexi::is_sh(&a.0)).map(|a| a.1).sum()
     }
 }
 
 /// Compresses `ply` to the file `output`, whole or not at all: the bytes that
-/// [`compress()`](crate::compress()) and [`lexi::write`](crate::lexi::write()) would make.
+/// [`compress()`](crate::compress()) and [`lexi::write`](crate::formats::lexi::write()) would make.
 ///
 /// # Errors
 /// As those two, [`Error::Io`] also for temporary files beside `output`.
@@ -116,7 +116,7 @@ fn run(
         coded.clear();
     }
     progress.end();
-    let (record, report) = coded.tally.told(options, n, learned, [learn_seconds, clock.seconds()]);
+    let (record, report) = coded.tally.into_report(options, n, learned, [learn_seconds, clock.seconds()]);
     let clock = Stopwatch::start();
     let attribute_bytes = set_aside.finish(&encoder.dictionary, &record, ply.meta(), |fill, bytes| {
         progress.begin(Stage::Write, bytes);
@@ -136,7 +136,7 @@ mod tests {
 
     /// More than two chunks, with normals, extras of several widths, and rows that no code reaches.
     fn scene() -> Splats {
-        let mut splats = crate::sample::scene(&crate::sample::SampleOptions::new(2 * CHUNK + 77, 3));
+        let mut splats = crate::support::testing::scene(2 * CHUNK + 77, 3);
         let n = splats.len();
         splats.geometry.normals = vec![[0.0; 3]; n];
         splats.geometry.normals[n - 1] = [0.0, 1.0, 0.0];
@@ -208,7 +208,7 @@ mod tests {
     #[test]
     fn scenes_without_sh_and_without_gaussians() {
         for (count, degree) in [(3000, 0), (0, 0), (0, 3), (1, 3), (CHUNK, 1)] {
-            let full = crate::sample::scene(&crate::sample::SampleOptions::new(count, 1));
+            let full = crate::support::testing::scene(count, 1);
             let splats = full.with_degree_cut(crate::ShDegree::new(degree).unwrap());
             let mut bytes = Vec::new();
             ply::write_to(&mut bytes, &splats).unwrap();

@@ -2,7 +2,7 @@
 
 use std::io::{self, Write};
 
-use crate::progress::Progress;
+use crate::support::progress::Progress;
 
 /// Passes everything on and tells `progress` of the bytes.
 pub(super) struct Counted<'a, W> {

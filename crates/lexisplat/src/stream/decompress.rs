@@ -4,14 +4,14 @@ use std::io::Write;
 use std::path::Path;
 
 use super::source_order::in_source_order;
-use crate::error::{Error, Result};
-use crate::lexi::LexiChunks;
-use crate::output::{Output, write_whole};
-use crate::ply::{PlyWriter, check};
-use crate::progress::{Progress, Stage};
+use crate::formats::lexi::LexiChunks;
+use crate::formats::ply::{PlyWriter, check};
+use crate::support::error::{Error, Result};
+use crate::support::output::{Output, write_whole};
+use crate::support::progress::{Progress, Stage};
 
 /// Writes the dense scene of `lexi` to the PLY `output`, whole or not at all: the bytes that
-/// [`lexi::read`](crate::lexi::read) and [`ply::write`](crate::ply::write()) would make. Returns their
+/// [`lexi::read`](crate::formats::lexi::read) and [`ply::write`](crate::formats::ply::write()) would make. Returns their
 /// number.
 ///
 /// # Errors

@@ -6,7 +6,7 @@
 //! them if that is no plain file, and have no name.
 //!
 //! ```
-//! use lexisplat::sample::{SampleOptions, scene};
+//! use lexisplat_sample::{SampleOptions, scene};
 //! use lexisplat::{CompressOptions, Input, Limits, Silent, lexi, ply, stream};
 //!
 //! let folder = tempfile::tempdir()?;

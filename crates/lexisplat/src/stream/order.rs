@@ -4,14 +4,14 @@ use std::path::Path;
 
 use super::buckets::Buckets;
 use super::importance::Importance;
-use crate::error::{Error, Result};
-use crate::packed::{Bounds, Grid, Placed, check};
-use crate::ply::{PlyChunks, RowBytes};
-use crate::progress::{Progress, Stage};
-use crate::rng::SplitMix64;
-use crate::sensitivity::{Sensitivity, guessed_total};
-use crate::spill::{Spill, Spilled};
-use crate::splats::Splats;
+use crate::formats::ply::{PlyChunks, RowBytes};
+use crate::packed::{Bounds, Grid, MortonKey, check};
+use crate::scene::sensitivity::{Sensitivity, heuristic_total};
+use crate::scene::splats::Splats;
+use crate::support::error::{Error, Result};
+use crate::support::progress::{Progress, Stage};
+use crate::support::rng::SplitMix64;
+use crate::support::spill::{Spill, Spilled};
 
 /// How much is held at a time. The first does not show in the file, the second only if parts are judged.
 #[derive(Debug, Clone, Copy)]
@@ -34,18 +34,18 @@ const KEY_BYTES: usize = 12;
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
 /// Takes Gaussians, their sensitivities to colour and opacity, and their places.
-type Take<'a> = dyn FnMut(&Splats, &[[f32; 2]], &[Placed]) -> Result<()> + 'a;
+type Take<'a> = dyn FnMut(&Splats, &[[f32; 2]], &[MortonKey]) -> Result<()> + 'a;
 
 /// A scene dealt into buckets in the order of a packed file.
 pub(super) struct Ordered {
     pub(super) grid: Grid,
     /// Sum over all Gaussians of what their weights are guessed from.
-    pub(super) guessed_total: f64,
+    pub(super) heuristic_total: f64,
     rows: RowBytes,
     buckets: Buckets,
     gaussians: usize,
     /// Where runs end, and one run in how many is of the sample.
-    runs: (Vec<Placed>, usize),
+    runs: (Vec<MortonKey>, usize),
 }
 
 /// What is known when all Gaussians were judged.
@@ -88,7 +88,7 @@ impl Ordered {
             let geometry = &splats.geometry;
             let part = Bounds::of(&geometry.positions);
             bounds.get_or_insert(part).add(part);
-            total = guessed_total(total, geometry);
+            total = heuristic_total(total, geometry);
             while let Some(i) = look.next_if(|&i| i < start + splats.len()) {
                 looked.push((geometry.positions[i - start], i));
             }
@@ -97,10 +97,10 @@ impl Ordered {
         let positions: Vec<[f32; 3]> = looked.iter().map(|l| l.0).collect();
         let bounds = bounds.unwrap_or_else(|| Bounds::of(&[]));
         let grid = Grid::fit_sample(&positions, bounds, n);
-        let mut keys: Vec<Placed> = looked.iter().map(|&(p, i)| placed(&grid, p, i)).collect();
+        let mut keys: Vec<MortonKey> = looked.iter().map(|&(p, i)| placed(&grid, p, i)).collect();
         drop((looked, positions));
         keys.sort_unstable();
-        let ends = |parts: usize| -> Vec<Placed> {
+        let ends = |parts: usize| -> Vec<MortonKey> {
             (1..parts).filter_map(|k| keys.get(k * keys.len() / parts)).copied().collect()
         };
         let (bucket_ends, run_ends) = (ends(n.div_ceil(sizes.bucket)), ends(n.div_ceil(sizes.run)));
@@ -121,7 +121,7 @@ impl Ordered {
             Ok(())
         })?;
         progress.end();
-        Ok(Self { grid, guessed_total: total, rows, buckets, gaussians: n, runs: (run_ends, every) })
+        Ok(Self { grid, heuristic_total: total, rows, buckets, gaussians: n, runs: (run_ends, every) })
     }
 
     /// Has all Gaussians judged, bucket by bucket.
@@ -138,13 +138,13 @@ impl Ordered {
             let (mut bytes, mut places) = (Vec::new(), Vec::new());
             in_order(&self.buckets.read(bucket)?, &self.rows, &mut bytes, &mut places);
             let splats = self.rows.unpack(&bytes)?;
-            let mut found = importance.of(&splats, self.gaussians, self.guessed_total)?;
+            let mut found = importance.of(&splats, self.gaussians, self.heuristic_total)?;
             check(&splats, &found)?;
             let pairs: Vec<[f32; 2]> =
                 found.colour.iter().zip(&found.opacity).map(|(&c, &o)| [c, o]).collect();
             weights.push(&pairs)?;
             let (ends, every) = &self.runs;
-            let sampled = |key: &Placed| ends.partition_point(|end| end <= key).is_multiple_of(*every);
+            let sampled = |key: &MortonKey| ends.partition_point(|end| end <= key).is_multiple_of(*every);
             let keep: Vec<bool> = places.iter().map(sampled).collect();
             for (row, _) in bytes.chunks_exact(self.rows.bytes()).zip(&keep).filter(|(_, keep)| **keep) {
                 sample.extend_from_slice(row);
@@ -178,19 +178,19 @@ impl Ordered {
     }
 }
 
-fn placed(grid: &Grid, position: [f32; 3], source: usize) -> Placed {
+fn placed(grid: &Grid, position: [f32; 3], source: usize) -> MortonKey {
     // Scenes have at most 2^32 - 2 Gaussians.
-    Placed { cell: grid.cell(position), source: u32::try_from(source).unwrap_or(u32::MAX) }
+    MortonKey { cell: grid.cell(position), source: u32::try_from(source).unwrap_or(u32::MAX) }
 }
 
 /// Appends the rows of `records` in order to `bytes`, and their places to `places`.
-fn in_order(records: &[u8], rows: &RowBytes, bytes: &mut Vec<u8>, places: &mut Vec<Placed>) {
+fn in_order(records: &[u8], rows: &RowBytes, bytes: &mut Vec<u8>, places: &mut Vec<MortonKey>) {
     let records: Vec<&[u8]> = records.chunks_exact(KEY_BYTES + rows.bytes()).collect();
-    let key = |record: &[u8]| Placed {
+    let key = |record: &[u8]| MortonKey {
         cell: record.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),
         source: record[8..].first_chunk().map_or(0, |s| u32::from_le_bytes(*s)),
     };
-    let mut order: Vec<(Placed, &[u8])> = records.into_iter().map(|r| (key(r), r)).collect();
+    let mut order: Vec<(MortonKey, &[u8])> = records.into_iter().map(|r| (key(r), r)).collect();
     order.sort_unstable_by_key(|o| o.0);
     bytes.reserve(order.len() * rows.bytes());
     for (place, record) in order {

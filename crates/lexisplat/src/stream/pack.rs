@@ -6,14 +6,14 @@ use std::path::Path;
 use super::counted::Counted;
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
-use crate::compress::AT_ONCE;
-use crate::error::{Error, Result};
-use crate::lexi::write_spilled_packed;
-use crate::limits::{Limits, MAX_GAUSSIANS};
-use crate::output::{Output, write_whole};
+use crate::formats::lexi::write_spilled_packed;
+use crate::formats::ply::PlyChunks;
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
-use crate::ply::PlyChunks;
-use crate::progress::{Progress, Stage};
+use crate::sparse::compress::AT_ONCE;
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_GAUSSIANS};
+use crate::support::output::{Output, write_whole};
+use crate::support::progress::{Progress, Stage};
 
 /// Peak of anonymous memory is below 1.5 GiB with these, at SH degree 3.
 const SIZES: Sizes =
@@ -30,7 +30,7 @@ pub struct PackedFile {
     /// What the streams take.
     pub stream_bits: Vec<StreamBits>,
     /// Bytes of each tensor and of the header, as
-    /// [`lexi::packed_tensor_bytes`](crate::lexi::packed_tensor_bytes).
+    /// [`lexi::packed_tensor_bytes`](crate::formats::lexi::packed_tensor_bytes).
     pub tensor_bytes: Vec<(String, u64)>,
 }
 
@@ -123,12 +123,12 @@ fn run<E: From<Error>>(
 mod tests {
     use super::*;
     use crate::packed::Packer;
-    use crate::sensitivity::{Sensitivity, guessed_total};
+    use crate::scene::sensitivity::{Sensitivity, heuristic_total};
     use crate::stream::importance::SHOWN;
-    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply, sample};
+    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply};
 
     fn scene(count: usize) -> Splats {
-        let mut splats = sample::scene(&sample::SampleOptions::new(count, 4));
+        let mut splats = crate::support::testing::scene(count, 4);
         splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
         let values = ExtraValues::U32((0..u32::try_from(count).unwrap()).collect());
         splats.geometry.extras = vec![Extra { name: "number".into(), values }];
@@ -159,13 +159,13 @@ mod tests {
         for count in [CHUNK + 500, 700, 0] {
             let splats = scene(count);
             let all = Sizes { sample: count.max(1), looked_at: count.max(1), ..SIZES };
-            let total = guessed_total(0.0, &splats.geometry) / SHOWN;
-            let sensitivity = Sensitivity::guess_part(&splats.geometry, total);
-            let (found, done) = streamed(&splats, Importance::Guess, all).unwrap();
+            let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+            let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
+            let (found, done) = streamed(&splats, Importance::Heuristic, all).unwrap();
             // A judge that says of each Gaussian what the guess says.
             let mut judge = |part: &Splats| {
                 assert_eq!(part.len(), splats.len());
-                Ok(Sensitivity::guess_part(&part.geometry, total))
+                Ok(Sensitivity::heuristic_part(&part.geometry, total))
             };
             assert!(
                 streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, all).unwrap().0
@@ -189,13 +189,13 @@ mod tests {
     fn many_small_buckets_and_a_small_sample_make_a_file_that_is_as_good() {
         let splats = scene(2 * CHUNK + 2000);
         let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
-        let (found, done) = streamed(&splats, Importance::Guess, small).unwrap();
-        let (whole, _) = streamed(&splats, Importance::Guess, SIZES).unwrap();
+        let (found, done) = streamed(&splats, Importance::Heuristic, small).unwrap();
+        let (whole, _) = streamed(&splats, Importance::Heuristic, SIZES).unwrap();
         let ratio = found.len() as f64 / whole.len() as f64;
         assert!((0.97..1.03).contains(&ratio), "{ratio}");
         let other = Sizes { at_once: 10_000, bucket: 20_000, ..small };
         assert!(
-            streamed(&splats, Importance::Guess, other).unwrap().0 == found,
+            streamed(&splats, Importance::Heuristic, other).unwrap().0 == found,
             "what is held at a time shows"
         );
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
@@ -221,7 +221,7 @@ mod tests {
             let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
             seen.extend_from_slice(numbers);
             parts += 1;
-            Ok(Sensitivity::guess(&part.geometry))
+            Ok(Sensitivity::heuristic(&part.geometry))
         };
         let (found, _) =
             streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, small).unwrap();
@@ -251,7 +251,7 @@ mod tests {
         let mut splats = scene(5000);
         splats.geometry.positions.fill([1.0; 3]);
         let small = Sizes { at_once: 1000, bucket: 700, looked_at: 1000, sample: 2000, run: 100 };
-        let (found, _) = streamed(&splats, Importance::Guess, small).unwrap();
+        let (found, _) = streamed(&splats, Importance::Heuristic, small).unwrap();
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
         assert_eq!(model.geometry.extras, splats.geometry.extras);
     }

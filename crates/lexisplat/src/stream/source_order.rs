@@ -3,12 +3,12 @@
 use std::path::Path;
 
 use super::buckets::Buckets;
-use crate::error::Result;
-use crate::lexi::LexiChunks;
-use crate::model::Model;
+use crate::formats::lexi::LexiChunks;
+use crate::formats::ply::RowBytes;
 use crate::packed::StreamBits;
-use crate::ply::RowBytes;
-use crate::splats::Splats;
+use crate::scene::splats::Splats;
+use crate::sparse::model::Model;
+use crate::support::error::Result;
 
 /// Gaussians of a bucket when a packed file's order is undone: a multiple of a chunk.
 const BUCKET: usize = 4 * crate::packed::CHUNK;
@@ -19,7 +19,7 @@ const PLACE_BYTES: usize = 4;
 /// it, else in that of the file. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
-/// [`crate::Error::Format`] as [`lexi::read`](crate::lexi::read) for what is only found while decoding,
+/// [`crate::Error::Format`] as [`lexi::read`](crate::formats::lexi::read) for what is only found while decoding,
 /// [`crate::Error::Io`] for temporary files, and what `take` says.
 pub fn in_source_order(
     lexi: &LexiChunks<'_>,
@@ -89,18 +89,18 @@ fn by_buckets(
 mod tests {
     use super::*;
     use crate::packed::{CHUNK, PackOptions, Packer};
-    use crate::{Extra, ExtraValues, Limits, Sensitivity, Silent, lexi, ply, sample};
+    use crate::{Extra, ExtraValues, Limits, Sensitivity, Silent, lexi, ply};
 
     #[test]
     fn small_buckets_undo_the_order_of_a_packed_file() {
         let n = CHUNK + 1000;
-        let mut splats = sample::scene(&sample::SampleOptions::new(n, 2));
+        let mut splats = crate::support::testing::scene(n, 2);
         splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
         // A name that no PLY can hold.
         let values = ExtraValues::U32((0..u32::try_from(n).unwrap()).collect());
         splats.geometry.extras = vec![Extra { name: "a name".into(), values }];
         let options = PackOptions { keep_order: true, atoms: Some(8), ..PackOptions::default() };
-        let sensitivity = Sensitivity::guess(&splats.geometry);
+        let sensitivity = Sensitivity::heuristic(&splats.geometry);
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();

@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use super::source_order::parts_and_source_order;
-use crate::error::Result;
-use crate::lexi::LexiChunks;
+use crate::formats::lexi::LexiChunks;
+use crate::formats::ply::PlyChunks;
 use crate::packed::StreamBits;
-use crate::parallel::CHUNK;
-use crate::ply::PlyChunks;
-use crate::progress::{Progress, Stage};
-use crate::stats::{Lint, Linter};
+use crate::scene::stats::{Lint, Linter};
+use crate::support::error::Result;
+use crate::support::parallel::CHUNK;
+use crate::support::progress::{Progress, Stage};
 
 /// Gaussians looked over together.
 const AT_ONCE: usize = 32 * CHUNK;
@@ -34,7 +34,7 @@ pub struct Survey {
     pub stream_bits: Vec<StreamBits>,
 }
 
-/// [`lint`](crate::stats::lint()) of a PLY.
+/// [`lint`](crate::scene::stats::lint()) of a PLY.
 ///
 /// # Errors
 /// As [`PlyChunks::read`].

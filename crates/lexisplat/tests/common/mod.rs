@@ -8,11 +8,11 @@
 
 use half::f16;
 use lexisplat::lexi::LexiChunks;
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{
     Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Limits, Model, Pursuit, Record,
     Result, SceneMeta, ShDegree, SparseCodes, Splats, Values,
 };
+use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
 
 /// A number in a small range, exact in f16, from an index: no library decides what the files hold.

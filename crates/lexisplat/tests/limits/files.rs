@@ -1,11 +1,11 @@
 //! Files of every kind, and what a scene made of each takes in memory.
 
 use lexisplat::packed::{CHUNK, PackOptions, Packer};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{
     CompressOptions, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Sensitivity, ShDegree,
     Silent, Splats, Values, compress, lexi, ply,
 };
+use lexisplat_sample::{SampleOptions, scene};
 
 /// No code of a packed file reaches it.
 pub(crate) const LARGE: f32 = 1e6;
@@ -58,7 +58,7 @@ pub(crate) fn exact(splats: &Splats, layout: Layout) -> Vec<u8> {
 pub(crate) fn packed(splats: &Splats, step: f64, keep_order: bool) -> Vec<u8> {
     let mut options = PackOptions::default();
     (options.keep_order, options.atoms) = (keep_order, Some(8));
-    let sensitivity = Sensitivity::guess(&splats.geometry);
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let mut bytes = Vec::new();
     lexi::write_packed_to(&mut bytes, &packer.pack(step, &Silent).unwrap().0).unwrap();

@@ -1,7 +1,7 @@
 //! Pack, write, read, unpack: the same every way, whatever the degree and the number of Gaussians.
 
 use lexisplat::lexi::Contents;
-use lexisplat::packed::{CHUNK, PackOptions, Packed, Promise};
+use lexisplat::packed::{CHUNK, PackOptions, Packed, TargetRecord};
 use lexisplat::{Layout, Limits, Splats, lexi};
 
 use crate::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
@@ -43,7 +43,7 @@ fn a_file_holds_comments_marks_and_promise() {
     splats.meta.comments = vec!["made by \"hand\"".to_owned(), String::new(), "größer".to_owned()];
     splats.meta.antialiased = true;
     let (mut packed, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
-    packed.promise = Some(Promise::new("min-psnr", 38.5, [41.127, 38.507], 18, true));
+    packed.target = Some(TargetRecord::new("min-psnr", 38.5, [41.127, 38.507], 18, true));
     assert_travels(&packed, "everything");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.lexi");
@@ -53,7 +53,7 @@ fn a_file_holds_comments_marks_and_promise() {
     let Contents::Packed(read) = lexi::open(&path, &Limits::default()).unwrap() else {
         panic!("it is packed");
     };
-    assert_eq!((&read.meta, &read.promise), (&splats.meta, &packed.promise));
+    assert_eq!((&read.meta, &read.promise), (&splats.meta, &packed.target));
     assert_eq!(lexi::read(&path, &Limits::default()).unwrap().meta, splats.meta);
 }
 

@@ -1,8 +1,8 @@
 //! Scenes to pack, and the errors of what comes back.
 
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer};
-use lexisplat::sample::{SampleOptions, scene};
 use lexisplat::{Extra, ExtraValues, Geometry, Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat_sample::{SampleOptions, scene};
 
 /// A step whose files look like the original.
 pub(crate) const STEP: f64 = 1e-5;
@@ -61,7 +61,7 @@ pub(crate) fn options(change: impl FnOnce(&mut PackOptions)) -> PackOptions {
 }
 
 pub(crate) fn pack(splats: &Splats, step: f64, options: &PackOptions) -> (Packed, PackReport) {
-    let sensitivity = Sensitivity::guess(&splats.geometry);
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
     Packer::new(splats, &sensitivity, options).unwrap().pack(step, &Silent).unwrap()
 }
 

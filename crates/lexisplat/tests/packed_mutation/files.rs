@@ -1,18 +1,23 @@
 //! Small packed files of every kind.
 
-use lexisplat::packed::{PackOptions, Packer, Promise};
-use lexisplat::sample::{SampleOptions, scene};
+use lexisplat::packed::{PackOptions, Packer, TargetRecord};
 use lexisplat::{Extra, ExtraValues, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat_sample::{SampleOptions, scene};
 
 use crate::common;
 
-fn packed(splats: &Splats, step: f64, change: fn(&mut PackOptions), promise: Option<Promise>) -> Vec<u8> {
+fn packed(
+    splats: &Splats,
+    step: f64,
+    change: fn(&mut PackOptions),
+    promise: Option<TargetRecord>,
+) -> Vec<u8> {
     let mut options = PackOptions::default();
     change(&mut options);
-    let sensitivity = Sensitivity::guess(&splats.geometry);
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let (mut packed, _) = packer.pack(step, &Silent).unwrap();
-    packed.promise = promise;
+    packed.target = promise;
     let mut bytes = Vec::new();
     lexi::write_packed_to(&mut bytes, &packed).unwrap();
     bytes
@@ -24,7 +29,7 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
     rich.geometry.extras =
         vec![Extra { name: "label".to_owned(), values: ExtraValues::U8((0..60).collect()) }];
     rich.sh_rest[90..99].fill(1e6);
-    let promise = Promise::new("size", 3000.0, [31.5, 25.0], 18, false);
+    let promise = TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false);
     let change = |o: &mut PackOptions| {
         o.tolerance = Some(0.05);
         o.keep_order = true;

@@ -51,8 +51,8 @@ pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
     let tensors = lexi.attribute_bytes();
     let bytes: Map<String, Value> = if packed {
         let streams = &survey.stream_bits;
-        value["promise"] = json!(lexi.promise());
-        value["device"] = lexi.drawn_on().unwrap_or("cpu").into();
+        value["promise"] = json!(lexi.target());
+        value["device"] = lexi.device().unwrap_or("cpu").into();
         value["order_kept"] = lexi.order_kept().into();
         value["sh_bytes"] = sh_bytes(streams).into();
         let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, lexi))));
@@ -88,10 +88,10 @@ pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) 
             record.pursuit,
         )?;
     }
-    if let Some(promise) = lexi.promise() {
+    if let Some(promise) = lexi.target() {
         writeln!(out, "pictures: {}", promise_line(promise))?;
     }
-    if let Some(device) = lexi.drawn_on() {
+    if let Some(device) = lexi.device() {
         writeln!(out, "looked at on: {device}")?;
     }
     if atoms > 0 {

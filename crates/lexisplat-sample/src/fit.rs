@@ -1,0 +1,133 @@
+//! From colour over directions to SH coefficients, by least squares.
+
+use crate::math::{Vec3, sin_cos_turns};
+use crate::random::Random;
+use lexisplat::ShDegree;
+use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, rest_basis};
+
+/// Directions the colour is evaluated in.
+const DIRECTIONS: u32 = 144;
+/// SH coefficients of a channel at degree 3.
+const COEFFICIENTS: usize = 16;
+/// SH-rest values of a Gaussian.
+pub(crate) const REST: usize = CHANNELS * (COEFFICIENTS - 1);
+/// The golden angle in turns.
+const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
+
+/// The directions and the matrix that turns values there into coefficients.
+#[derive(Debug)]
+pub(crate) struct Fit {
+    directions: Vec<Vec3>,
+    /// One row of weights a direction.
+    weights: Vec<[f64; COEFFICIENTS]>,
+}
+
+impl Fit {
+    pub(crate) fn new() -> Self {
+        let mut directions = Vec::new();
+        let mut basis = Vec::new();
+        for k in 0..DIRECTIONS {
+            let y = 1.0 - 2.0 * (f64::from(k) + 0.5) / f64::from(DIRECTIONS);
+            let level = (1.0 - y * y).sqrt();
+            let (sin, cos) = sin_cos_turns(f64::from(k) * GOLDEN_TURN);
+            let direction = [level * cos, y, level * sin];
+            #[expect(clippy::cast_possible_truncation, reason = "the basis is f32 by design")]
+            let rest = rest_basis(ShDegree::THREE, direction.map(|v| v as f32));
+            let mut row = [f64::from(C0); COEFFICIENTS];
+            for (value, rest) in row[1..].iter_mut().zip(rest) {
+                *value = f64::from(rest);
+            }
+            directions.push(direction);
+            basis.push(row);
+        }
+        let weights = pseudo_inverse(&basis);
+        Self { directions, weights }
+    }
+
+    /// DC and channel-major SH-rest of `colour`, which gets the direction from viewer to Gaussian.
+    pub(crate) fn project(&self, colour: impl Fn(Vec3) -> Vec3) -> ([f64; CHANNELS], [f64; REST]) {
+        let mut sums = [[0.0; COEFFICIENTS]; CHANNELS];
+        for (direction, weights) in self.directions.iter().zip(&self.weights) {
+            let value = colour(*direction);
+            for (sums, value) in sums.iter_mut().zip(value) {
+                let value = value - f64::from(COLOUR_OFFSET);
+                for (sum, weight) in sums.iter_mut().zip(weights) {
+                    *sum += value * weight;
+                }
+            }
+        }
+        let mut rest = [0.0; REST];
+        for (rest, sums) in rest.chunks_exact_mut(COEFFICIENTS - 1).zip(&sums) {
+            rest.copy_from_slice(&sums[1..]);
+        }
+        (sums.map(|sums| sums[0]), rest)
+    }
+}
+
+/// `basis (basis^T basis)^-1`, row by row, by Cholesky.
+fn pseudo_inverse(basis: &[[f64; COEFFICIENTS]]) -> Vec<[f64; COEFFICIENTS]> {
+    let mut l = [[0.0; COEFFICIENTS]; COEFFICIENTS];
+    for i in 0..COEFFICIENTS {
+        for j in 0..=i {
+            let gram: f64 = basis.iter().map(|row| row[i] * row[j]).sum();
+            let rest = gram - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            l[i][j] = if i == j { rest.sqrt() } else { rest / l[j][j] };
+        }
+    }
+    let solve = |row: &[f64; COEFFICIENTS]| {
+        let mut x = *row;
+        for i in 0..COEFFICIENTS {
+            x[i] = (x[i] - (0..i).map(|k| l[i][k] * x[k]).sum::<f64>()) / l[i][i];
+        }
+        for i in (0..COEFFICIENTS).rev() {
+            x[i] = (x[i] - (i + 1..COEFFICIENTS).map(|k| l[k][i] * x[k]).sum::<f64>()) / l[i][i];
+        }
+        x
+    };
+    basis.iter().map(solve).collect()
+}
+
+/// Standard deviation of the noise of a typical Gaussian's coefficients.
+const NOISE: f64 = 0.033;
+/// Share of the noise's variance that the channels have in common; trained models have about 0.75.
+const SHARED: f64 = 0.75;
+
+/// Adds what training leaves in any model: noise, alike in all bands and mostly alike in all channels,
+/// stronger on some Gaussians than on others. `amount` 1 is the usual.
+pub(crate) fn add_training_noise(rest: &mut [f64; REST], amount: f64, random: &mut Random) {
+    // From 0.6 to about 3, mean 1.1: few views saw the Gaussians with the most of it.
+    let u = random.uniform();
+    let strength = amount * NOISE * (0.5 + 0.2 / (1.08 - u));
+    let (common, own) = (SHARED.sqrt(), (1.0 - SHARED).sqrt());
+    let shared: [f64; COEFFICIENTS - 1] = std::array::from_fn(|_| random.normal());
+    for channel in rest.chunks_exact_mut(COEFFICIENTS - 1) {
+        for (value, shared) in channel.iter_mut().zip(shared) {
+            *value += strength * (common * shared + own * random.normal());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::*;
+
+    #[test]
+    fn a_function_of_degree_three_is_found_exactly() {
+        let coefficient = |c: usize, k: usize| (c as f64 + 1.0) * (k as f64 - 6.5) / 40.0;
+        let colour = |d: Vec3| {
+            #[expect(clippy::cast_possible_truncation, reason = "the basis is f32 by design")]
+            let basis = rest_basis(ShDegree::THREE, d.map(|v| v as f32));
+            std::array::from_fn(|c| {
+                let rest: f64 = (0..15).map(|k| f64::from(basis[k]) * coefficient(c, k + 1)).sum();
+                0.5 + f64::from(C0) * coefficient(c, 0) + rest
+            })
+        };
+        let (dc, rest) = Fit::new().project(colour);
+        for c in 0..3 {
+            assert!((dc[c] - coefficient(c, 0)).abs() < 1e-9);
+            for k in 0..15 {
+                assert!((rest[c * 15 + k] - coefficient(c, k + 1)).abs() < 1e-9);
+            }
+        }
+    }
+}

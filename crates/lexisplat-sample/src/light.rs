@@ -1,0 +1,300 @@
+//! The studio: its lamps, what blocks them, and the light that leaves a surface.
+
+use crate::material::{Material, Surface};
+use crate::math::{
+    Vec3, add, any_tangent, cross, dot, mix, mul, norm, scale, sin_cos_turns, smoothstep, sub, unit,
+};
+use crate::random::Random;
+use crate::shapes::{UP, reflect};
+
+/// Rays from a surface to each lamp; more make softer shadows.
+const SHADOW_RAYS: usize = 12;
+/// Rays that gather light from all around.
+const GATHER_RAYS: usize = 32;
+/// How far off the surface rays start, in world units: beyond the gaps between beads and surface.
+const LIFT: f64 = 0.012;
+/// Roughness from which reflections of other objects are not traced, only those of the studio.
+const TRACED_ROUGHNESS: f64 = 0.5;
+/// Light to film, before the film's curve.
+const EXPOSURE: f64 = 0.45;
+/// Integral of [`Studio::surroundings`]'s profile of a lamp over its argument: pi / 4.
+const PROFILE: f64 = std::f64::consts::FRAC_PI_4;
+/// Share of the guessed light of a neighbour that is really there; most guesses forget shadows.
+const BOUNCE: f64 = 0.45;
+/// The golden angle in turns.
+const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
+
+/// A soft box far away.
+#[derive(Debug, Clone, Copy)]
+struct Lamp {
+    /// To the lamp; unit length once the studio is built.
+    to: Vec3,
+    colour: Vec3,
+    /// `1 - cos` of its half width as seen from the table.
+    width: f64,
+}
+
+/// Something that blocks light.
+#[derive(Debug, Clone)]
+pub(crate) enum Body {
+    Ball {
+        centre: Vec3,
+        radius: f64,
+    },
+    /// Balls of one radius inside a larger one.
+    Beads {
+        centre: Vec3,
+        bound: f64,
+        beads: Vec<Vec3>,
+        radius: f64,
+    },
+    Disc {
+        centre: Vec3,
+        radius: f64,
+    },
+    Block {
+        centre: Vec3,
+        half: Vec3,
+        right: Vec3,
+    },
+}
+
+/// All bodies with the colour they show in reflections, and the lamps.
+#[derive(Debug)]
+pub(crate) struct Studio {
+    bodies: Vec<(Body, Vec3)>,
+    lamps: [Lamp; 4],
+}
+
+/// Light that falls on a point, and what the point does with it.
+#[derive(Debug)]
+pub(crate) struct Lit<'a> {
+    studio: &'a Studio,
+    position: Vec3,
+    normal: Vec3,
+    surface: Surface,
+    /// Diffuse light that leaves the point.
+    diffuse: Vec3,
+    /// Share of each lamp that reaches it.
+    seen: [f64; 4],
+    /// Share of the surroundings it sees.
+    open: f64,
+}
+
+impl Studio {
+    pub(crate) fn new(bodies: Vec<(Body, &Material)>) -> Self {
+        let lamp = |to, colour, width| Lamp { to: unit(to), colour, width };
+        Self {
+            bodies: bodies.into_iter().map(|(body, material)| (body, material.mean())).collect(),
+            lamps: [
+                lamp([-0.75, -1.0, -0.55], [3.0, 2.75, 2.35], 0.05),
+                lamp([0.95, -0.65, 0.35], [0.75, 1.0, 1.5], 0.05),
+                lamp([-0.1, -0.55, 1.0], [1.1, 0.8, 0.75], 0.04),
+                lamp([0.25, -1.0, -0.9], [0.7, 0.68, 0.65], 0.08),
+            ],
+        }
+    }
+
+    /// The studio's wall: dusk colours by height.
+    pub(crate) fn wall(direction: Vec3) -> Vec3 {
+        let height = dot(direction, UP);
+        let low = mix([0.012, 0.022, 0.045], [0.10, 0.15, 0.22], smoothstep(-0.9, -0.05, height));
+        let high = mix(low, [0.52, 0.40, 0.34], smoothstep(-0.25, 0.18, height));
+        let top = mix(high, [0.09, 0.17, 0.34], smoothstep(0.1, 0.75, height));
+        // One side is warmer, so that the turn is felt.
+        let warm = smoothstep(-0.4, 1.0, direction[0] * 0.8 - direction[2] * 0.6);
+        mul(top, mix([0.8, 0.95, 1.15], [1.25, 1.0, 0.85], warm))
+    }
+
+    /// Light from `direction`, blurred as a surface of `roughness` would, without what is in the way.
+    fn surroundings(&self, direction: Vec3, roughness: f64, seen: &[f64; 4], open: f64) -> Vec3 {
+        let spread = roughness * roughness;
+        let mut light = scale(Self::wall(direction), open);
+        for (lamp, &seen) in self.lamps.iter().zip(seen) {
+            let width = lamp.width + 0.5 * spread;
+            let off = (1.0 - dot(direction, lamp.to)) / width;
+            // A lamp that lights a white surface facing it to 1 sends pi into a solid angle of
+            // 2 pi width PROFILE, however wide roughness spreads it.
+            let strength = 0.5 / (PROFILE * width);
+            light = add(light, scale(lamp.colour, seen * strength / ((1.0 + off * off) * (1.0 + off))));
+        }
+        light
+    }
+
+    /// The nearest thing a ray meets: distance, outward normal, colour.
+    fn hit(&self, origin: Vec3, direction: Vec3) -> Option<(f64, Vec3, Vec3)> {
+        let mut nearest: Option<(f64, Vec3, Vec3)> = None;
+        for (body, colour) in &self.bodies {
+            if let Some((t, normal)) = body.hit(origin, direction)
+                && nearest.is_none_or(|(best, ..)| t < best)
+            {
+                nearest = Some((t, normal, *colour));
+            }
+        }
+        nearest
+    }
+
+    fn blocked(&self, origin: Vec3, direction: Vec3) -> bool {
+        self.bodies.iter().any(|(body, _)| body.hit(origin, direction).is_some())
+    }
+
+    /// Diffuse light from the lamps and the wall, nothing in the way, times `albedo`.
+    fn rough_guess(&self, normal: Vec3, albedo: Vec3) -> Vec3 {
+        let mut light = scale(Self::wall(normal), 0.5);
+        for lamp in &self.lamps {
+            light = add(light, scale(lamp.colour, 0.55 * dot(normal, lamp.to).max(0.0)));
+        }
+        mul(light, albedo)
+    }
+
+    /// What a point of `surface` at `position` sends out.
+    pub(crate) fn light(
+        &self,
+        position: Vec3,
+        normal: Vec3,
+        surface: Surface,
+        random: &mut Random,
+    ) -> Lit<'_> {
+        let origin = add(position, scale(normal, LIFT));
+        let (side, other) = frame(normal);
+        let mut light = [0.0; 3];
+        let mut open = 0.0;
+        let turn = random.uniform();
+        for k in 0..GATHER_RAYS {
+            // Cosine-weighted directions on a turned spiral.
+            let share = (k as f64 + 0.5) / GATHER_RAYS as f64;
+            let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
+            let flat = share.sqrt();
+            let direction = add(
+                add(scale(side, flat * cos), scale(other, flat * sin)),
+                scale(normal, (1.0 - share).sqrt()),
+            );
+            let from = match self.hit(origin, direction) {
+                Some((_, n, colour)) => scale(self.rough_guess(n, colour), BOUNCE),
+                None => {
+                    open += 1.0;
+                    Self::wall(direction)
+                }
+            };
+            light = add(light, from);
+        }
+        light = scale(light, 1.0 / GATHER_RAYS as f64);
+        open /= GATHER_RAYS as f64;
+        let mut seen = [0.0; 4];
+        for (lamp, seen) in self.lamps.iter().zip(&mut seen) {
+            let (side, other) = frame(lamp.to);
+            let turn = random.uniform();
+            let mut sum = 0.0;
+            for k in 0..SHADOW_RAYS {
+                let share = (k as f64 + 0.5) / SHADOW_RAYS as f64;
+                let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
+                let flat = (2.0 * lamp.width * share).sqrt();
+                let to = add(lamp.to, add(scale(side, flat * cos), scale(other, flat * sin)));
+                let facing = dot(normal, to);
+                if facing > 0.0 && !self.blocked(origin, unit(to)) {
+                    sum += 1.0;
+                    light = add(light, scale(lamp.colour, facing / SHADOW_RAYS as f64));
+                }
+            }
+            *seen = sum / SHADOW_RAYS as f64;
+        }
+        let diffuse = mul(light, surface.albedo);
+        Lit { studio: self, position: origin, normal, surface, diffuse, seen, open }
+    }
+}
+
+impl Lit<'_> {
+    /// Display colour, 0 to 1, seen by a viewer in the unit direction `to_viewer`. From behind the
+    /// surface shows the mirror image of its front, so that colour has no jump.
+    pub(crate) fn colour(&self, to_viewer: Vec3) -> Vec3 {
+        let facing = dot(to_viewer, self.normal);
+        let to_viewer =
+            if facing < 0.0 { sub(to_viewer, scale(self.normal, 2.0 * facing)) } else { to_viewer };
+        let facing = facing.abs();
+        let Surface { mirror, roughness, .. } = self.surface;
+        // Schlick's Fresnel term, held back on rough surfaces.
+        let grazing = (1.0 - facing) * (1.0 - facing);
+        let grazing = grazing * grazing * (1.0 - facing) * (1.0 - roughness) * (1.0 - roughness);
+        let strength = mix(mirror, [1.0; 3], grazing);
+        let direction = reflect(to_viewer, self.normal);
+        let traced = roughness < TRACED_ROUGHNESS;
+        let hit = if traced { self.studio.hit(self.position, direction) } else { None };
+        let reflected = match hit {
+            Some((_, normal, colour)) => self.studio.rough_guess(normal, colour),
+            None => {
+                let open = if traced { 1.0 } else { self.open };
+                self.studio.surroundings(direction, roughness, &self.seen, open)
+            }
+        };
+        tone(add(mul(self.diffuse, sub([1.0; 3], strength)), mul(reflected, strength)))
+    }
+}
+
+/// From light to display values: a film-like curve (Narkowicz's fit of ACES), then a square root for
+/// the display's gamma.
+pub(crate) fn tone(light: Vec3) -> Vec3 {
+    light.map(|v| {
+        let x = v.max(0.0) * EXPOSURE;
+        let y = x * (2.51 * x + 0.03) / (x * (2.43 * x + 0.59) + 0.14);
+        y.clamp(0.0, 1.0).sqrt()
+    })
+}
+
+/// Two unit vectors perpendicular to the unit vector `n` and each other.
+fn frame(n: Vec3) -> (Vec3, Vec3) {
+    let side = any_tangent(n);
+    (side, cross(n, side))
+}
+
+/// Distance to a ball in front, and the normal there.
+fn hit_ball(origin: Vec3, direction: Vec3, centre: Vec3, radius: f64) -> Option<(f64, Vec3)> {
+    let to = sub(centre, origin);
+    let along = dot(to, direction);
+    let off = dot(to, to) - along * along;
+    if along < 0.0 || off > radius * radius {
+        return None;
+    }
+    let t = along - (radius * radius - off).sqrt();
+    (t > 0.0).then(|| (t, unit(sub(scale(direction, t), to))))
+}
+
+impl Body {
+    fn hit(&self, origin: Vec3, direction: Vec3) -> Option<(f64, Vec3)> {
+        match self {
+            Self::Ball { centre, radius } => hit_ball(origin, direction, *centre, *radius),
+            Self::Beads { centre, bound, beads, radius } => {
+                let to = sub(*centre, origin);
+                let along = dot(to, direction);
+                let apart = dot(to, to) - bound * bound;
+                // Outside the bound and passing or leaving it.
+                if apart > 0.0 && (along < 0.0 || dot(to, to) - along * along > bound * bound) {
+                    return None;
+                }
+                let hits = beads.iter().filter_map(|bead| hit_ball(origin, direction, *bead, *radius));
+                hits.min_by(|a, b| a.0.total_cmp(&b.0))
+            }
+            Self::Disc { centre, radius } => {
+                let t = (centre[1] - origin[1]) / direction[1];
+                let at = sub(add(origin, scale(direction, t)), *centre);
+                let inside = t > 0.0 && t.is_finite() && norm([at[0], 0.0, at[2]]) < *radius;
+                inside.then_some((t, UP))
+            }
+            Self::Block { centre, half, right } => {
+                let axes = [*right, UP, cross(*right, UP)];
+                let from = sub(origin, *centre);
+                let (mut near, mut far, mut face) = (0.0, f64::INFINITY, None);
+                for (axis, half) in axes.iter().zip(half) {
+                    let (start, step) = (dot(from, *axis), dot(direction, *axis));
+                    let (a, b) = ((-half - start) / step, (half - start) / step);
+                    let (enter, leave) = if a < b { (a, b) } else { (b, a) };
+                    if enter > near {
+                        near = enter;
+                        face = Some(scale(*axis, if step > 0.0 { -1.0 } else { 1.0 }));
+                    }
+                    far = if leave < far { leave } else { far };
+                }
+                face.filter(|_| near < far).map(|normal| (near, normal))
+            }
+        }
+    }
+}

@@ -1,0 +1,127 @@
+//! Small vectors, and the few transcendental functions the scene needs.
+//!
+//! `f64::sin`, `cos` and `ln` may differ in the last bit from one platform's library to the next. The
+//! ones here use only operations IEEE 754 rounds exactly, so the scene is the same everywhere.
+
+/// A point or direction in world units.
+pub(crate) type Vec3 = [f64; 3];
+
+/// Terms of each Taylor series; the last one is below 1e-17 on the reduced range.
+const TERMS: u32 = 10;
+
+pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
+    [a[0] * s, a[1] * s, a[2] * s]
+}
+
+pub(crate) fn mul(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn norm(a: Vec3) -> f64 {
+    dot(a, a).sqrt()
+}
+
+pub(crate) fn unit(a: Vec3) -> Vec3 {
+    scale(a, 1.0 / norm(a))
+}
+
+/// `a` at 0, `b` at 1.
+pub(crate) fn mix(a: Vec3, b: Vec3, t: f64) -> Vec3 {
+    add(a, scale(sub(b, a), t))
+}
+
+/// 0 below `low`, 1 above `high`, smooth between.
+pub(crate) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// `a` without its part along the unit vector `n`, at unit length.
+pub(crate) fn tangent(a: Vec3, n: Vec3) -> Vec3 {
+    unit(sub(a, scale(n, dot(a, n))))
+}
+
+/// Some unit vector perpendicular to the unit vector `n`.
+pub(crate) fn any_tangent(n: Vec3) -> Vec3 {
+    let axis = if n[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    tangent(axis, n)
+}
+
+/// Sine and cosine of `turns` full turns, within 1e-15.
+pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
+    // An eighth of a turn at most on either side of a multiple of a quarter.
+    let quarters = (turns * 4.0).round();
+    let x = (turns - quarters / 4.0) * std::f64::consts::TAU;
+    let (mut sin, mut cos) = (0.0, 0.0);
+    let (mut odd, mut even) = (x, 1.0);
+    for k in 0..TERMS {
+        let k = f64::from(2 * k);
+        sin += odd;
+        cos += even;
+        even *= -x * x / ((k + 1.0) * (k + 2.0));
+        odd *= -x * x / ((k + 2.0) * (k + 3.0));
+    }
+    match quarters.rem_euclid(4.0) {
+        q if q < 0.5 => (sin, cos),
+        q if q < 1.5 => (cos, -sin),
+        q if q < 2.5 => (-sin, -cos),
+        _ => (-cos, sin),
+    }
+}
+
+/// Natural logarithm of a positive, normal `x`, within 1e-14.
+pub(crate) fn ln(x: f64) -> f64 {
+    let (mut mantissa, mut exponent) = (x, 0.0);
+    while mantissa > std::f64::consts::SQRT_2 {
+        mantissa /= 2.0;
+        exponent += 1.0;
+    }
+    while mantissa < std::f64::consts::FRAC_1_SQRT_2 {
+        mantissa *= 2.0;
+        exponent -= 1.0;
+    }
+    // ln m = 2 artanh((m - 1) / (m + 1)); the argument is at most 0.172.
+    let t = (mantissa - 1.0) / (mantissa + 1.0);
+    let mut sum = 0.0;
+    let mut power = t;
+    for k in 0..TERMS {
+        sum += power / f64::from(2 * k + 1);
+        power *= t * t;
+    }
+    2.0 * sum + exponent * std::f64::consts::LN_2
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::*;
+
+    #[test]
+    fn own_functions_agree_with_the_library() {
+        for i in -400_i32..400 {
+            let turns = f64::from(i) / 97.0;
+            let (sin, cos) = sin_cos_turns(turns);
+            let angle = turns * std::f64::consts::TAU;
+            assert!((sin - angle.sin()).abs() < 1e-13, "{turns}");
+            assert!((cos - angle.cos()).abs() < 1e-13, "{turns}");
+            let x = f64::from(i + 401) / 31.0;
+            assert!((ln(x) - x.ln()).abs() < 1e-13, "{x}");
+        }
+        assert!((ln(1e-9) - 1e-9_f64.ln()).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,326 @@
+//! Surfaces, covered evenly with points.
+
+use crate::math::{Vec3, add, any_tangent, cross, dot, norm, scale, sin_cos_turns, sub, tangent, unit};
+
+/// Up in the world: y points down, as in scenes trained from COLMAP's cameras.
+pub(crate) const UP: Vec3 = [0.0, -1.0, 0.0];
+/// The fractional part of the golden ratio. Multiples of it fill the unit interval most evenly, and a
+/// lattice built on it stays even however it is stretched.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+/// Newton steps that spread points evenly by area round a torus tube; far more than needed.
+const NEWTON: usize = 8;
+/// Pieces of the knot's curve in its table of lengths.
+const KNOT_PIECES: u32 = 512;
+
+/// A surface in world units.
+#[derive(Debug, Clone)]
+pub(crate) enum Shape {
+    /// A whole sphere; `inward` turns its normals to the centre.
+    Sphere { centre: Vec3, radius: f64, inward: bool },
+    /// A level disc that faces up.
+    Disc { centre: Vec3, radius: f64 },
+    /// The side of a level disc of some thickness; `centre` is that of its upper face.
+    Rim { centre: Vec3, radius: f64, thickness: f64 },
+    /// A level torus.
+    Torus { centre: Vec3, ring: f64, tube: f64 },
+    /// A trefoil knot that stands upright; `size` is the radius of its tube's tube.
+    Knot { centre: Vec3, size: f64, tube: f64 },
+    /// A level box turned about the vertical; half sides along its own right, up and far.
+    Block { centre: Vec3, half: Vec3, right: Vec3 },
+}
+
+/// A point on a surface.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Point {
+    pub(crate) position: Vec3,
+    /// Outward, unit length.
+    pub(crate) normal: Vec3,
+    /// Along the surface, unit length.
+    pub(crate) tangent: Vec3,
+    /// Position relative to the shape, in its own axes where it has some; patterns use it.
+    pub(crate) local: Vec3,
+    /// The nearest end of the surface, where it has one.
+    pub(crate) edge: Option<Edge>,
+}
+
+/// A line that Gaussians should not reach across.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Edge {
+    /// How far it is, in world units.
+    pub(crate) distance: f64,
+    /// Unit vector along it.
+    pub(crate) along: Vec3,
+}
+
+impl Edge {
+    /// The nearer of two.
+    pub(crate) fn nearer(a: Option<Self>, b: Option<Self>) -> Option<Self> {
+        match (a, b) {
+            (Some(a), Some(b)) => Some(if b.distance < a.distance { b } else { a }),
+            (a, b) => a.or(b),
+        }
+    }
+}
+
+/// The share of the way through `count` points at point `index`, 0 to 1.
+fn share(index: usize, count: usize) -> f64 {
+    (index as f64 + 0.5) / count as f64
+}
+
+/// Golden multiple of `index`, in \[0, 1).
+fn golden(index: usize) -> f64 {
+    let turns = index as f64 * GOLDEN;
+    turns - turns.floor()
+}
+
+impl Shape {
+    /// Area in square world units.
+    pub(crate) fn area(&self) -> f64 {
+        use std::f64::consts::{PI, TAU};
+        match self {
+            Self::Sphere { radius, .. } => 2.0 * TAU * radius * radius,
+            Self::Disc { radius, .. } => PI * radius * radius,
+            Self::Rim { radius, thickness, .. } => TAU * radius * thickness,
+            Self::Torus { ring, tube, .. } => TAU * ring * TAU * tube,
+            Self::Knot { size, tube, .. } => knot_length(*size) * TAU * tube,
+            Self::Block { half, .. } => faces(half).iter().map(|f| f.area).sum(),
+        }
+    }
+
+    /// Point `index` of `count` that cover the surface evenly.
+    pub(crate) fn point(&self, index: usize, count: usize) -> Point {
+        let (u, v) = (share(index, count), golden(index));
+        match self {
+            Self::Sphere { centre, radius, inward } => {
+                let y = 1.0 - 2.0 * u;
+                let (sin, cos) = sin_cos_turns(v);
+                let level = (1.0 - y * y).sqrt();
+                let out = [level * cos, y, level * sin];
+                let normal = if *inward { scale(out, -1.0) } else { out };
+                on(*centre, scale(out, *radius), normal, any_tangent(out))
+            }
+            Self::Disc { centre, radius } => {
+                let (sin, cos) = sin_cos_turns(v);
+                let r = radius * u.sqrt();
+                let edge = Some(Edge { distance: radius - r, along: [-sin, 0.0, cos] });
+                Point { edge, ..on(*centre, [r * cos, 0.0, r * sin], UP, [cos, 0.0, sin]) }
+            }
+            Self::Rim { centre, radius, thickness } => {
+                let (sin, cos) = sin_cos_turns(u);
+                let out = [cos, 0.0, sin];
+                let down = thickness * v;
+                let along = [-sin, 0.0, cos];
+                let edge = Some(Edge { distance: down.min(thickness - down), along });
+                Point { edge, ..on(*centre, add(scale(out, *radius), scale(UP, -down)), out, along) }
+            }
+            Self::Torus { centre, ring, tube } => {
+                let (sin, cos) = sin_cos_turns(u);
+                let out = [cos, 0.0, sin];
+                let (lift, away) = sin_cos_turns(even_round_tube(v, tube / ring));
+                let normal = add(scale(out, away), scale(UP, lift));
+                on(*centre, add(scale(out, *ring), scale(normal, *tube)), normal, [-sin, 0.0, cos])
+            }
+            Self::Knot { centre, size, tube } => {
+                let (curve, along, side) = knot(knot_at_length(u), *size);
+                let (sin, cos) = sin_cos_turns(v);
+                let normal = add(scale(side, cos), scale(cross(along, side), sin));
+                on(*centre, add(curve, scale(normal, *tube)), normal, along)
+            }
+            Self::Block { centre, half, right } => {
+                let axes = [*right, UP, cross(*right, UP)];
+                let mut start = 0.0;
+                let total = self.area();
+                let sides = faces(half);
+                let face = sides.iter().find(|face| {
+                    let found = u * total < start + face.area;
+                    if !found {
+                        start += face.area;
+                    }
+                    found
+                });
+                let Some(face) = face.or(sides.last()) else { unreachable!("a box has five faces") };
+                let along = ((u * total - start) / face.area).clamp(0.0, 1.0);
+                let mut local = [0.0; 3];
+                local[face.axis] = face.sign * half[face.axis];
+                local[face.u] = half[face.u] * (2.0 * along - 1.0);
+                local[face.v] = half[face.v] * (2.0 * v - 1.0);
+                let offset = (0..3).fold([0.0; 3], |sum, a| add(sum, scale(axes[a], local[a])));
+                let normal = scale(axes[face.axis], face.sign);
+                let end = |axis: usize, along: usize| {
+                    Some(Edge { distance: half[axis] - local[axis].abs(), along: axes[along] })
+                };
+                let edge = Edge::nearer(end(face.u, face.v), end(face.v, face.u));
+                Point { position: add(*centre, offset), normal, tangent: axes[face.u], local, edge }
+            }
+        }
+    }
+}
+
+fn on(centre: Vec3, local: Vec3, normal: Vec3, tangent: Vec3) -> Point {
+    Point { position: add(centre, local), normal, tangent, local, edge: None }
+}
+
+/// A face of a box: which axis it faces, which way, and its own two axes.
+struct Face {
+    axis: usize,
+    sign: f64,
+    u: usize,
+    v: usize,
+    area: f64,
+}
+
+/// All but the bottom one, which stands on something.
+fn faces(half: &Vec3) -> [Face; 5] {
+    [(1, 1.0), (0, 1.0), (0, -1.0), (2, 1.0), (2, -1.0)].map(|(axis, sign)| {
+        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        Face { axis, sign, u, v, area: 4.0 * half[u] * half[v] }
+    })
+}
+
+/// Turns round the tube below which the share `v` of a torus's area lies, starting at the outside;
+/// `ratio` is tube over ring radius. Solves `t + ratio sin(2 pi t) / 2 pi = v`.
+fn even_round_tube(v: f64, ratio: f64) -> f64 {
+    let mut t = v;
+    for _ in 0..NEWTON {
+        let (sin, cos) = sin_cos_turns(t);
+        t -= (t + ratio * sin / std::f64::consts::TAU - v) / (1.0 + ratio * cos);
+    }
+    t
+}
+
+/// The trefoil at `t` turns: point, unit tangent, and the normal of the torus it winds on.
+fn knot(t: f64, size: f64) -> (Vec3, Vec3, Vec3) {
+    let (sin2, cos2) = sin_cos_turns(2.0 * t);
+    let (sin3, cos3) = sin_cos_turns(3.0 * t);
+    // In a plane that stands upright: x to the right, y up and down, z to the viewer.
+    let point = [(2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3];
+    let along = [
+        -3.0 * sin3 * cos2 - 2.0 * (2.0 + cos3) * sin2,
+        -3.0 * sin3 * sin2 + 2.0 * (2.0 + cos3) * cos2,
+        3.0 * cos3,
+    ];
+    let along = unit(along);
+    let side = tangent([cos3 * cos2, cos3 * sin2, sin3], along);
+    (scale(point, size), along, side)
+}
+
+/// Length of the knot's curve.
+fn knot_length(size: f64) -> f64 {
+    knot_lengths().last().map_or(0.0, |last| last * size)
+}
+
+/// Length of the unit knot's curve up to each piece's end.
+fn knot_lengths() -> Vec<f64> {
+    let at = |i: u32| knot(f64::from(i) / f64::from(KNOT_PIECES), 1.0).0;
+    let mut sum = 0.0;
+    (0..KNOT_PIECES)
+        .map(|i| {
+            sum += norm(sub(at(i + 1), at(i)));
+            sum
+        })
+        .collect()
+}
+
+/// Turns at which the share `u` of the knot's length is behind.
+fn knot_at_length(u: f64) -> f64 {
+    static LENGTHS: std::sync::OnceLock<Vec<f64>> = std::sync::OnceLock::new();
+    let lengths = LENGTHS.get_or_init(knot_lengths);
+    let target = u * lengths.last().copied().unwrap_or(0.0);
+    let piece = lengths.partition_point(|&l| l < target).min(lengths.len() - 1);
+    let before = if piece == 0 { 0.0 } else { lengths[piece - 1] };
+    let inside = (target - before) / (lengths[piece] - before);
+    (piece as f64 + inside) / f64::from(KNOT_PIECES)
+}
+
+/// Centres of `count` balls along the knot.
+pub(crate) fn knot_beads(centre: Vec3, size: f64, count: usize) -> Vec<Vec3> {
+    (0..count).map(|i| add(centre, knot(knot_at_length(share(i, count)), size).0)).collect()
+}
+
+/// Centres of `count` balls round the torus.
+pub(crate) fn torus_beads(centre: Vec3, ring: f64, count: usize) -> Vec<Vec3> {
+    (0..count)
+        .map(|i| {
+            let (sin, cos) = sin_cos_turns(share(i, count));
+            add(centre, [ring * cos, 0.0, ring * sin])
+        })
+        .collect()
+}
+
+/// The unit quaternion (w, x, y, z) of the rotation with these columns.
+pub(crate) fn quaternion(x: Vec3, y: Vec3, z: Vec3) -> [f64; 4] {
+    // Shepperd's method: divide by the largest component.
+    let trace = x[0] + y[1] + z[2];
+    let of = |diagonal: f64| 1.0 + 2.0 * diagonal - trace;
+    let squares = [1.0 + trace, of(x[0]), of(y[1]), of(z[2])];
+    let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
+    let (a, b, c) = (y[2] - z[1], z[0] - x[2], x[1] - y[0]);
+    let (d, e, f) = (x[1] + y[0], z[0] + x[2], y[2] + z[1]);
+    let raw = match largest {
+        0 => [squares[0], a, b, c],
+        1 => [a, squares[1], d, e],
+        2 => [b, d, squares[2], f],
+        _ => [c, e, f, squares[3]],
+    };
+    let length = raw.iter().map(|v| v * v).sum::<f64>().sqrt();
+    raw.map(|v| v / length)
+}
+
+/// The mirror image of `v` in the direction `n`.
+pub(crate) fn reflect(v: Vec3, n: Vec3) -> Vec3 {
+    sub(scale(n, 2.0 * dot(v, n)), v)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::*;
+
+    fn shapes() -> Vec<Shape> {
+        let centre = [0.3, -0.7, 1.1];
+        vec![
+            Shape::Sphere { centre, radius: 0.8, inward: false },
+            Shape::Disc { centre, radius: 1.3 },
+            Shape::Rim { centre, radius: 1.3, thickness: 0.2 },
+            Shape::Torus { centre, ring: 1.0, tube: 0.4 },
+            Shape::Knot { centre, size: 0.5, tube: 0.2 },
+            Shape::Block { centre, half: [0.4, 0.2, 0.9], right: unit([1.0, 0.0, 0.5]) },
+        ]
+    }
+
+    #[test]
+    fn points_lie_apart_and_cover_the_area() {
+        let count = 2000;
+        for shape in shapes() {
+            let points: Vec<Point> = (0..count).map(|i| shape.point(i, count)).collect();
+            let spacing = (shape.area() / 2000.0).sqrt();
+            let mut nearest: Vec<f64> = (0..count)
+                .map(|i| {
+                    let others = (0..count).filter(|&j| j != i);
+                    others
+                        .map(|j| norm(sub(points[i].position, points[j].position)))
+                        .fold(f64::INFINITY, f64::min)
+                })
+                .collect();
+            nearest.sort_by(f64::total_cmp);
+            assert!(nearest[100] > 0.5 * spacing, "{shape:?}: too close {} {spacing}", nearest[100]);
+            assert!(nearest[1900] < 1.2 * spacing, "{shape:?}: too far {} {spacing}", nearest[1900]);
+            for p in points {
+                assert!((norm(p.normal) - 1.0).abs() < 1e-12 && (norm(p.tangent) - 1.0).abs() < 1e-12);
+                assert!(dot(p.normal, p.tangent).abs() < 1e-9, "{shape:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn quaternions_turn_the_axes() {
+        for (x, n) in [([1.0, 2.0, 3.0], [0.3, -1.0, 0.2]), ([-1.0, 0.1, 0.0], [0.0, 0.0, -1.0])] {
+            let z = unit(n);
+            let x = tangent(x, z);
+            let y = cross(z, x);
+            let [w, i, j, k] = quaternion(x, y, z);
+            let turned_x = [1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j + w * k), 2.0 * (i * k - w * j)];
+            let turned_z = [2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)];
+            assert!(norm(sub(turned_x, x)) < 1e-12 && norm(sub(turned_z, z)) < 1e-12);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! One self-contained HTML page about a sweep.
+//!
+//! The page carries its styles, script, figures and pictures in itself and forbids itself any request.
+//! Without scripts it still shows everything; it follows the reader's light or dark theme.
+
+mod facts;
+mod sections;
+
+use std::fmt::Write;
+
+use facts::Facts;
+
+use super::{Figure, Method, Results};
+
+/// The page's own style comes after that of the other report.
+const BASE_STYLE: &str = include_str!("../report/page.css");
+const STYLE: &str = include_str!("sweep.css");
+const SCRIPT: &str = include_str!("sweep.js");
+
+/// One view of a model and of what compressing made of it, as PNG files of one size.
+#[derive(Debug, Clone, Copy)]
+pub struct SweepPicture<'a> {
+    /// The scene's name.
+    pub scene: &'a str,
+    /// Who trained it.
+    pub method: Method,
+    /// [`Setting::label`](super::Setting::label) of how it was compressed.
+    pub setting_label: &'a str,
+    /// The view's name.
+    pub view: &'a str,
+    /// The original.
+    pub original_png: &'a [u8],
+    /// The compressed.
+    pub compressed_png: &'a [u8],
+    /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
+    pub difference_png: &'a [u8],
+    /// The photo from there, if there is one.
+    pub photo_png: Option<&'a [u8]>,
+}
+
+/// The page as UTF-8 text; the same input gives the same page. `date` is printed as it is.
+#[must_use]
+pub fn sweep_html(
+    results: &Results,
+    figures: &[Figure],
+    pictures: &[SweepPicture<'_>],
+    date: Option<&str>,
+) -> String {
+    let facts = Facts::new(results);
+    let mut page = String::with_capacity(1 << 18);
+    let _ = write!(
+        page,
+        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
+         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
+         style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
+         <title>Sweep \u{b7} lexisplat</title>\n<style>\n{BASE_STYLE}{STYLE}</style></head>\n<body>\n"
+    );
+    sections::header(&mut page, &facts, date);
+    page.push_str("<main>\n");
+    sections::pictures(&mut page, &facts, pictures);
+    sections::figures(&mut page, figures);
+    sections::levels(&mut page, &facts, figures);
+    sections::tables(&mut page, &facts);
+    sections::paper(&mut page, &facts);
+    sections::details(&mut page, &facts, figures);
+    page.push_str("</main>\n");
+    sections::footer(&mut page, &facts, date);
+    let _ = writeln!(page, "<script>\n{SCRIPT}</script>\n</body></html>");
+    page
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::figures::figures;
+    use super::super::testing::{ODD, results};
+    use super::*;
+    use crate::report::testing::check_nesting;
+    use crate::report::text::escape;
+
+    fn picture<'a>(setting_label: &'a str, view: &'a str, photo_png: Option<&'a [u8]>) -> SweepPicture<'a> {
+        SweepPicture {
+            scene: ODD,
+            method: Method::Mcmc,
+            setting_label,
+            view,
+            original_png: b"one",
+            compressed_png: b"two",
+            difference_png: b"three",
+            photo_png,
+        }
+    }
+
+    /// What every page must be.
+    fn check(page: &str) {
+        check_nesting(page);
+        assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
+        for outside in ["http://", "https://", "@import", "<link", "src=\"/", "href=\"/"] {
+            assert!(!page.contains(outside), "{outside}");
+        }
+        // Clip paths of figures are within the page.
+        assert_eq!(page.matches("url(").count(), page.matches("url(#").count());
+        for number in ["NaN", ">inf", " inf", "-inf"] {
+            assert!(!page.contains(number), "{number}");
+        }
+    }
+
+    #[test]
+    fn page_holds_everything() {
+        let results = results();
+        let figures = figures(&results).unwrap();
+        let pictures = [
+            picture("tol 0.1", "front", Some(b"photo")),
+            picture("tol 0.1", "ba<ck", None),
+            picture("balanced", "front", None),
+        ];
+        let page = sweep_html(&results, &figures, &pictures, Some("1 <May> 2026"));
+        check(&page);
+        // "one", "two" and "three" in base64, three times each; the photo once.
+        for (bytes, count) in [("b25l", 3), ("dHdv", 3), ("dGhyZWU=", 3), ("cGhvdG8=", 1)] {
+            assert_eq!(page.matches(&format!("base64,{bytes}\"")).count(), count, "{bytes}");
+        }
+        for figure in &figures {
+            assert_eq!(page.matches(&format!("id=\"figure-{}\"", figure.name)).count(), 1, "{}", figure.name);
+        }
+        assert_eq!(page.matches("<svg ").count(), figures.len());
+        for table in super::super::tables::all(&results) {
+            assert_eq!(page.matches(&format!("id=\"table-{}\"", table.name)).count(), 1, "{}", table.name);
+        }
+        for text in [ODD, "1 <May> 2026", "ba<ck", "no such file: a|b & \"c\"", &results.command] {
+            assert!(page.contains(&escape(text)), "{text}");
+        }
+        assert!(!page.contains(ODD) && !page.contains("<May>"));
+        for note in super::super::NOTES {
+            assert!(page.contains(&escape(note.title)), "{}", note.title);
+        }
+        for paragraph in super::super::level_off(&results) {
+            assert!(page.contains(&escape(&paragraph)));
+        }
+        // 42 dB of bonsai by two methods' means: (42 + 44 + 40) / 3; garden is identical.
+        assert!(page.contains("<dd>42.0 <small>dB</small></dd>"));
+        assert!(page == sweep_html(&results, &figures, &pictures, Some("1 <May> 2026")));
+    }
+
+    #[test]
+    fn empty_results_have_a_page() {
+        let page = sweep_html(&Results::default(), &[], &[], None);
+        check(&page);
+        assert!(page.contains("Nothing was evaluated"));
+        let mut skipped = Results::default();
+        skipped.skipped = results().skipped;
+        let page = sweep_html(&skipped, &[], &[], None);
+        check(&page);
+        assert!(page.contains("play&lt;room&gt;"));
+    }
+
+    #[test]
+    fn long_lists_of_views_are_left_to_files() {
+        let mut results = results();
+        let view = results.scenes[0].points[0].to_original.views[0].clone();
+        results.scenes[0].points[0].to_original.views = vec![view; 2000];
+        let page = sweep_html(&results, &[], &[], None);
+        check(&page);
+        assert!(!page.contains("id=\"table-views\"") && page.contains("too long for this page"));
+    }
+
+    /// The style sheet swaps the figures' colours by their values.
+    #[test]
+    fn the_style_knows_the_figures_colours() {
+        for colour in super::super::figures::colours() {
+            assert!(STYLE.contains(&format!("\"{colour}\"")), "{colour}");
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! What a sweep found out, as it is kept in `results.json`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use lexisplat::packed::Preset;
+use serde::{Deserialize, Serialize};
+
+use lexisplat_eval::Comparison;
+use lexisplat_eval::{Error, Result};
+
+/// Who trained a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Method {
+    /// The 3DGS authors' trainer.
+    #[serde(rename = "3dgs")]
+    Gs3d,
+    /// 3DGS-MCMC.
+    #[serde(rename = "mcmc")]
+    Mcmc,
+    /// Pixel-GS.
+    #[serde(rename = "pixelgs")]
+    PixelGs,
+    /// EAGLES, decoded to a PLY: the paper's competitor, with scalar quantisation.
+    #[serde(rename = "eagles")]
+    Eagles,
+    /// EAGLES trained without scalar quantisation.
+    #[serde(rename = "eagles-no-sq")]
+    EaglesNoSq,
+    /// Anything else.
+    #[serde(rename = "other")]
+    Other,
+}
+
+impl Method {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 6] =
+        [Self::Gs3d, Self::Mcmc, Self::PixelGs, Self::Eagles, Self::EaglesNoSq, Self::Other];
+
+    /// Name in files and manifests.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Gs3d => "3dgs",
+            Self::Mcmc => "mcmc",
+            Self::PixelGs => "pixelgs",
+            Self::Eagles => "eagles",
+            Self::EaglesNoSq => "eagles-no-sq",
+            Self::Other => "other",
+        }
+    }
+
+    /// Name for people, as the paper prints it.
+    #[must_use]
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Gs3d => "3DGS",
+            Self::Mcmc => "MCMC",
+            Self::PixelGs => "PixelGS",
+            Self::Eagles => "EAGLES",
+            Self::EaglesNoSq => "EAGLES, no SQ",
+            Self::Other => "other",
+        }
+    }
+
+    /// Whether the method compresses by itself, so that its models are only scored, not compressed.
+    #[must_use]
+    pub fn is_competitor(self) -> bool {
+        matches!(self, Self::Eagles | Self::EaglesNoSq)
+    }
+}
+
+impl fmt::Display for Method {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Method {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        Self::ALL.into_iter().find(|method| method.name() == text).ok_or_else(|| {
+            let names: Vec<&str> = Self::ALL.iter().map(|method| method.name()).collect();
+            Error::parameter("method", text, format!("one of {}", names.join(", ")))
+        })
+    }
+}
+
+/// How a model was compressed at one point of a sweep.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+#[non_exhaustive]
+pub enum Setting {
+    /// SH within this un-squared L2 norm, geometry exact: the paper's.
+    Tolerance(f64),
+    /// At most so many nonzeros a Gaussian, no tolerance, geometry exact.
+    MaxNonzeros(u8),
+    /// A packed file by preset: everything quantised.
+    Preset(#[serde(with = "by_name")] Preset),
+}
+
+impl Setting {
+    /// Short name, unique within a sweep: `tol 0.1`, `nnz 1`, `balanced`.
+    #[must_use]
+    pub fn label(self) -> String {
+        match self {
+            Self::Tolerance(tolerance) => format!("tol {tolerance}"),
+            Self::MaxNonzeros(most) => format!("nnz {most}"),
+            Self::Preset(preset) => preset.name().to_owned(),
+        }
+    }
+
+    /// Whether this is a setting of the paper's: SH coded, all else untouched.
+    #[must_use]
+    pub fn is_exact(self) -> bool {
+        !matches!(self, Self::Preset(_))
+    }
+}
+
+/// Presets in files: by name.
+mod by_name {
+    use lexisplat::packed::Preset;
+    use serde::de::{Deserialize, Deserializer, Error as _};
+    use serde::ser::Serializer;
+
+    pub(super) fn serialize<S: Serializer>(preset: &Preset, out: S) -> Result<S::Ok, S::Error> {
+        out.serialize_str(preset.name())
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Preset, D::Error> {
+        String::deserialize(from)?.parse().map_err(D::Error::custom)
+    }
+}
+
+/// Frames in a second.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Fps {
+    /// Of the original, SH dense.
+    pub dense: f64,
+    /// Of the compressed, straight from codes.
+    pub sparse: f64,
+}
+
+/// One model compressed in one way.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// How.
+    pub setting: Setting,
+    /// The whole file.
+    pub file_bytes: u64,
+    /// What view-dependent colour takes of it: dictionary, counts, indices, values, escapes.
+    pub sh_bytes: u64,
+    /// What colour takes in memory while drawing from codes, base colour included.
+    pub resident_sh_bytes: u64,
+    /// Atoms of the dictionary.
+    pub atoms: usize,
+    /// Nonzeros a Gaussian on average, an escape counting as a full vector.
+    pub mean_nonzeros: f64,
+    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` where nothing is coded.
+    pub coefficient_ratio: Option<f64>,
+    /// Largest SH error of a Gaussian; `None` for packed files without a promise.
+    pub max_residual: Option<f64>,
+    /// Gaussians over the tolerance; 0 unless nonzeros are capped.
+    pub over_tolerance: u64,
+    /// The compressed against the original's pictures.
+    pub to_original: Comparison,
+    /// The compressed against photos.
+    pub to_photos: Option<Comparison>,
+    /// Speed, if it was measured.
+    pub fps: Option<Fps>,
+    /// Seconds that compressing took, learning included.
+    pub seconds: f64,
+}
+
+/// One model: what it is, and all its points.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SceneResult {
+    /// Data set, such as `Mip-NeRF 360`; empty if not said.
+    pub dataset: String,
+    /// Scene, such as `bonsai`.
+    pub name: String,
+    /// Who trained it.
+    pub method: Method,
+    /// The file, as it was named.
+    pub model: String,
+    /// Its Gaussians.
+    pub gaussians: u64,
+    /// Its SH degree.
+    pub sh_degree: u8,
+    /// Its bytes.
+    pub ply_bytes: u64,
+    /// Bytes of the file that a competitor would ship instead, if the manifest names it.
+    pub shipped_bytes: Option<u64>,
+    /// Where the views are from: a file's name, or `orbit` or `room`.
+    pub views_from: String,
+    /// How many there are.
+    pub views: usize,
+    /// Size of the first one's picture.
+    pub size: [u32; 2],
+    /// What pictures were drawn on: `cpu`, or the GPU's name. FPS are of this device.
+    pub device: String,
+    /// Whether that is a GPU.
+    pub on_gpu: bool,
+    /// The model itself against photos.
+    pub to_photos: Option<Comparison>,
+    /// Frames in a second of the model itself, if measured.
+    pub fps: Option<f64>,
+    /// Each way it was compressed.
+    pub points: Vec<Point>,
+}
+
+/// A model that could not be evaluated.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Skipped {
+    /// Data set.
+    pub dataset: String,
+    /// Scene.
+    pub name: String,
+    /// Who trained it.
+    pub method: Method,
+    /// Why not.
+    pub reason: String,
+}
+
+/// Everything a sweep found out.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Results {
+    /// Version of the program.
+    pub version: String,
+    /// The command line.
+    pub command: String,
+    /// `omp` or `ols`.
+    pub pursuit: String,
+    /// Layout of files with exact geometry: `f16`, `f32` or `paper`.
+    pub layout: String,
+    /// Whether pictures were rounded to 8 bits before scoring.
+    pub eight_bit: bool,
+    /// What was evaluated, in the manifest's order.
+    pub scenes: Vec<SceneResult>,
+    /// What was not.
+    pub skipped: Vec<Skipped>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_and_methods_survive_a_file() {
+        for setting in [Setting::Tolerance(0.03), Setting::MaxNonzeros(1), Setting::Preset(Preset::Balanced)]
+        {
+            let text = serde_json::to_string(&setting).unwrap();
+            assert_eq!(serde_json::from_str::<Setting>(&text).unwrap(), setting, "{text}");
+        }
+        for method in Method::ALL {
+            assert_eq!(method.name().parse::<Method>().unwrap(), method);
+            assert_eq!(serde_json::to_string(&method).unwrap(), format!("\"{method}\""));
+        }
+        assert!("3DGS".parse::<Method>().is_err());
+        assert_eq!(Setting::Tolerance(0.1).label(), "tol 0.1");
+    }
+
+    #[test]
+    fn comparisons_survive_a_file() {
+        use lexisplat_eval::ViewScore;
+        use lexisplat_eval::metrics::Metric;
+        let view = |psnr, flip| ViewScore::new("a", [3, 2], psnr, 0.5, [(Metric::Flip, flip)].into());
+        let comparison = Comparison::of(vec![view(Some(31.5), 0.25), view(None, 0.5)]);
+        assert_eq!(comparison.get(Metric::Flip).unwrap().mean, Some(0.375));
+        assert_eq!(comparison.get(Metric::LpipsVgg), None);
+        assert_eq!(comparison.metrics().collect::<Vec<_>>(), [Metric::Psnr, Metric::Ssim, Metric::Flip]);
+        let text = serde_json::to_string(&comparison).unwrap();
+        assert_eq!(serde_json::from_str::<Comparison>(&text).unwrap(), comparison, "{text}");
+    }
+}

@@ -1,0 +1,66 @@
+//! Tables as Markdown.
+
+use std::fmt::Write;
+
+use super::{Style, Table, one_line};
+
+/// `text` with everything Markdown gives a meaning inside a table cell taken literally.
+pub(crate) fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in one_line(text).chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '\\' | '|' | '*' | '_' | '`' | '[' | ']' | '~' | '$' | '#' => {
+                out.push('\\');
+                out.push(c);
+            }
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+pub(super) fn write(table: &Table) -> String {
+    let mut out = String::from("|");
+    for heading in table.full_header() {
+        let _ = write!(out, " {} |", escape(&heading));
+    }
+    out.push_str("\n|");
+    for column in 0..table.header.len() {
+        out.push_str(if column < table.labels { "---|" } else { "---:|" });
+    }
+    out.push('\n');
+    for row in &table.rows {
+        out.push('|');
+        for column in 0..table.header.len() {
+            let text = escape(&Table::cell(row, column).shown());
+            let mark = match row.style {
+                Style::Total if !text.is_empty() => "**",
+                Style::Paper if !text.is_empty() => "*",
+                _ => "",
+            };
+            let _ = write!(out, " {mark}{text}{mark} |");
+        }
+        out.push('\n');
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::testing::odd;
+
+    #[test]
+    fn markup_is_escaped() {
+        assert_eq!(
+            odd().to_markdown(),
+            "| Scene | Size &amp; more: a\\|b | Size &amp; more: n |\n\
+             |---|---:|---:|\n\
+             | x&amp;y\\|&lt;z&gt;\"\\_%\\$\\#\\\\^\\~\\*\\`\\[1\\] next | 0.00 | 1,234,567 |\n\
+             | *p,q* | *+0.12* | *\u{2013}* |\n\
+             | **short** | **\u{2013}** | **\u{2013}** |\n"
+        );
+    }
+}

@@ -1,0 +1,340 @@
+//! The layouts `f32`, `f16` and `paper`, read whole or a part at a time.
+
+use std::ops::Range;
+
+use half::f16;
+use safetensors::Dtype;
+
+use super::read::{degree, dictionary, extras, meta, record};
+use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, tensor};
+use super::tensors::Checked;
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::{Geometry, SceneMeta};
+use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Layout, Record};
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
+
+/// Gaussians between two offsets into the codes that are kept, and looked at together when a file is opened.
+const BLOCK: usize = 65_536;
+
+/// A file of which everything was looked at but the codes themselves.
+#[derive(Debug)]
+pub(super) struct Exact<'a> {
+    checked: Checked<'a>,
+    gaussians: usize,
+    pub(super) record: Record,
+    pub(super) meta: SceneMeta,
+    pub(super) dictionary: Dictionary,
+    pub(super) normals: bool,
+    pub(super) nonzeros: usize,
+    pub(super) escapes: usize,
+    /// Nonzeros before each [`BLOCK`] of Gaussians.
+    offsets: Vec<usize>,
+    file_bytes: u64,
+    limits: Limits,
+}
+
+impl<'a> Exact<'a> {
+    /// `checked` is a file of `file_bytes`.
+    pub(super) fn open(checked: Checked<'a>, file_bytes: u64, limits: &Limits) -> Result<Self> {
+        let n = match checked.view(tensor::POSITION)?.shape() {
+            [n, 3] => *n,
+            shape => {
+                return Err(checked.malformed(format!("tensor 'position' has shape {shape:?}, not [N, 3]")));
+            }
+        };
+        limits.check_gaussians(checked.file, n as u64)?;
+        let (degree, record) = (degree(&checked)?, record(&checked)?);
+        refuse_unknown(&checked, record.layout, degree)?;
+        let normals = checked.has(tensor::NORMAL);
+        all_finite(&checked, n, normals)?;
+        extras(&checked, n, &(0..0))?;
+        let mut exact = Self {
+            dictionary: Dictionary::empty(),
+            gaussians: n,
+            meta: meta(&checked)?,
+            normals,
+            nonzeros: 0,
+            escapes: 0,
+            offsets: Vec::new(),
+            file_bytes,
+            limits: *limits,
+            record,
+            checked,
+        };
+        if degree != ShDegree::ZERO {
+            exact.validate_codes(degree)?;
+        }
+        Ok(exact)
+    }
+
+    /// Reads the dictionary and whatever says where codes are.
+    fn validate_codes(&mut self, degree: ShDegree) -> Result<()> {
+        let n = self.gaussians;
+        let checked = &self.checked;
+        self.dictionary = dictionary(checked, degree, &self.limits)?;
+        self.nonzeros = match checked.view(tensor::VALUES)?.shape() {
+            [nonzeros] => *nonzeros,
+            shape => return Err(checked.malformed(format!("tensor 'codes.values' has shape {shape:?}"))),
+        };
+        let paper = self.record.layout == Layout::Paper;
+        if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
+            return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
+        }
+        let mut total = 0_usize;
+        let mut offsets = Vec::with_capacity(n.div_ceil(BLOCK));
+        for start in (0..n).step_by(BLOCK) {
+            offsets.push(total);
+            let counts = self.counts(start..n.min(start + BLOCK))?;
+            if let Some(k) = counts.iter().position(|&c| u64::from(c) > self.limits.nonzeros) {
+                self.limits.check_nonzeros(checked.file, start + k, counts[k].into())?;
+            }
+            total = counts.iter().fold(total, |sum, &c| sum.saturating_add(usize::from(c)));
+        }
+        self.offsets = offsets;
+        // Types and shapes too are as they should be, also where there is nothing to read.
+        self.counts(0..0)?;
+        self.read_codes(0..0)?;
+        let checked = &self.checked;
+        if total != self.nonzeros {
+            let expected = format!("{total} entries, the sum of codes.counts");
+            let error = Error::parameter("codes.values", self.nonzeros, expected);
+            return Err(checked.malformed(error.to_string()));
+        }
+        if !checked.has(tensor::ESCAPED) {
+            return Ok(());
+        }
+        self.escapes = match checked.view(tensor::ESCAPED)?.shape() {
+            [count] => *count,
+            shape => return Err(checked.malformed(format!("tensor 'escapes.gaussians' has shape {shape:?}"))),
+        };
+        self.escaped(0..0)?;
+        checked.data(tensor::ESCAPE_ROWS, Dtype::F32, &[self.escapes, self.dictionary.dim()])?;
+        let mut last = None;
+        for start in (0..self.escapes).step_by(BLOCK) {
+            for gaussian in self.escaped(start..self.escapes.min(start + BLOCK))? {
+                if last.is_some_and(|last| last >= gaussian) || gaussian as usize >= n {
+                    let expected = "strictly ascending Gaussians without nonzeros";
+                    let error = Error::parameter("escapes.gaussians", gaussian, expected);
+                    return Err(self.checked.malformed(error.to_string()));
+                }
+                last = Some(gaussian);
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of Gaussians.
+    pub(super) fn len(&self) -> usize {
+        self.gaussians
+    }
+
+    /// Names and types of extras, without values.
+    pub(super) fn extras(&self) -> Result<Vec<crate::scene::splats::Extra>> {
+        extras(&self.checked, self.gaussians, &(0..0))
+    }
+
+    /// What to say when the order of the source is asked for.
+    pub(super) fn no_order(&self) -> Error {
+        self.checked.malformed("only packed files keep an order; this one is in that of its source")
+    }
+
+    /// Geometry and codes of Gaussians `range`; escapes are numbered from its start.
+    pub(super) fn part(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
+        let (checked, n) = (&self.checked, self.gaussians);
+        let budget = self.budget_for_geometry(range.len())?;
+        let geometry = Geometry {
+            positions: checked.part(tensor::POSITION, Dtype::F32, &[n, 3], &range)?,
+            normals: match self.normals {
+                true => checked.part(tensor::NORMAL, Dtype::F32, &[n, 3], &range)?,
+                false => Vec::new(),
+            },
+            dc: checked.part(tensor::DC, Dtype::F32, &[n, 3], &range)?,
+            opacities: checked.part(tensor::OPACITY, Dtype::F32, &[n], &range)?,
+            scales: checked.part(tensor::SCALE, Dtype::F32, &[n, 3], &range)?,
+            rotations: checked.part(tensor::ROTATION, Dtype::F32, &[n, 4], &range)?,
+            extras: extras(checked, n, &range)?,
+        };
+        if self.dictionary.is_empty() {
+            let none = match self.record.layout {
+                Layout::F16 => Values::F16(Vec::new()),
+                _ => Values::F32(Vec::new()),
+            };
+            let (counts, indices) = (vec![0; range.len()], Indices::for_atoms(0));
+            let codes = SparseCodes::new(&self.dictionary, counts, indices, none, Escapes::default())?;
+            return Ok((geometry, codes));
+        }
+        let block = range.start / BLOCK;
+        let before = self.counts(block * BLOCK..range.start)?;
+        let counts = self.counts(range.clone())?;
+        let sum = |counts: &[u8]| counts.iter().map(|&c| usize::from(c)).sum::<usize>();
+        let start = self.offsets.get(block).copied().unwrap_or(self.nonzeros) + sum(&before);
+        let escaped = self.escaped_of(&range)?;
+        let width = Indices::for_atoms(self.dictionary.len()).width() + self.value_width();
+        budget.take(sum(&counts), width)?;
+        budget.take(escaped.len(), size_of::<u32>() + self.dictionary.dim() * size_of::<f32>())?;
+        let (indices, values) = self.read_codes(start..start + sum(&counts))?;
+        let escapes = self.escapes(&range, &escaped)?;
+        let codes = SparseCodes::part(&self.dictionary, range.start, counts, indices, values, escapes)
+            .map_err(|e| checked.malformed(e.to_string()))?;
+        Ok((geometry, codes))
+    }
+
+    /// What is left once there is room for all of `count` Gaussians but their codes.
+    fn budget_for_geometry(&self, count: usize) -> Result<MemoryBudget<'_>> {
+        let normals = if self.normals { 3 * size_of::<f32>() } else { 0 };
+        let extras = self.extras()?.iter().map(|e| e.values.width()).sum::<usize>();
+        let budget = MemoryBudget::new(&self.limits, self.checked.file, self.file_bytes);
+        budget.take(count, GEOMETRY_BYTES + COUNT_BYTES + normals + extras)?;
+        Ok(budget)
+    }
+
+    /// Bytes of a value in memory.
+    fn value_width(&self) -> usize {
+        if self.record.layout == Layout::F16 { size_of::<f16>() } else { size_of::<f32>() }
+    }
+
+    /// Nonzeros of Gaussians `range`.
+    fn counts(&self, range: Range<usize>) -> Result<Vec<u8>> {
+        let (checked, n) = (&self.checked, self.gaussians);
+        if self.record.layout != Layout::Paper {
+            return checked.part(tensor::COUNTS, Dtype::U8, &[n], &range);
+        }
+        let ends = range.start..range.end + 1;
+        let pointers: Vec<i32> = checked.part(tensor::POINTERS, Dtype::I32, &[n + 1], &ends)?;
+        let count = |pair: &[i32]| u8::try_from(i64::from(pair[1]) - i64::from(pair[0])).ok();
+        pointers.windows(2).map(count).collect::<Option<Vec<u8>>>().ok_or_else(|| {
+            checked.malformed("tensor 'codes.pointers' is not monotonic with steps of at most 255")
+        })
+    }
+
+    /// Nonzeros `range` of all.
+    fn read_codes(&self, range: Range<usize>) -> Result<(Indices, Values)> {
+        let (checked, all) = (&self.checked, [self.nonzeros]);
+        let values = if self.record.layout == Layout::F16 {
+            let bits: Vec<u16> = checked.part(tensor::VALUES, Dtype::F16, &all, &range)?;
+            Values::F16(bits.into_iter().map(f16::from_bits).collect())
+        } else {
+            Values::F32(checked.part(tensor::VALUES, Dtype::F32, &all, &range)?)
+        };
+        let small = matches!(Indices::for_atoms(self.dictionary.len()), Indices::U8(_));
+        let bad = |i: i32| checked.malformed(format!("tensor 'codes.indices' holds {i}"));
+        let indices = match (self.record.layout, small) {
+            (Layout::Paper, _) => {
+                let wide: Vec<i32> = checked.part(tensor::INDICES, Dtype::I32, &all, &range)?;
+                let wide = wide.into_iter();
+                if small {
+                    Indices::U8(wide.map(|i| u8::try_from(i).map_err(|_| bad(i))).collect::<Result<_>>()?)
+                } else {
+                    Indices::U16(wide.map(|i| u16::try_from(i).map_err(|_| bad(i))).collect::<Result<_>>()?)
+                }
+            }
+            (_, true) => Indices::U8(checked.part(tensor::INDICES, Dtype::U8, &all, &range)?),
+            (_, false) => Indices::U16(checked.part(tensor::INDICES, Dtype::U16, &all, &range)?),
+        };
+        Ok((indices, values))
+    }
+
+    /// Which Gaussians the escapes `range` are.
+    fn escaped(&self, range: Range<usize>) -> Result<Vec<u32>> {
+        self.checked.part(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
+    }
+
+    /// Which of all escapes are of Gaussians `range`.
+    fn escaped_of(&self, range: &Range<usize>) -> Result<Range<usize>> {
+        if self.escapes == 0 {
+            return Ok(0..0);
+        }
+        let (mut low, mut high) = (0, self.escapes);
+        while low < high {
+            let middle = low.midpoint(high);
+            match self.escaped(middle..middle + 1)?.first() {
+                Some(&gaussian) if (gaussian as usize) < range.start => low = middle + 1,
+                _ => high = middle,
+            }
+        }
+        let gaussians = self.escaped(low..self.escapes.min(low + range.len()))?;
+        Ok(low..low + gaussians.partition_point(|&g| (g as usize) < range.end))
+    }
+
+    /// The escapes `escaped`, which are of Gaussians `range`.
+    fn escapes(&self, range: &Range<usize>, escaped: &Range<usize>) -> Result<Escapes> {
+        if escaped.is_empty() {
+            return Ok(Escapes::default());
+        }
+        let mut gaussians = self.escaped(escaped.clone())?;
+        let start = u32::try_from(range.start).unwrap_or(u32::MAX);
+        gaussians.iter_mut().for_each(|g| *g -= start);
+        let shape = [self.escapes, self.dictionary.dim()];
+        Ok(Escapes { gaussians, rows: self.checked.part(tensor::ESCAPE_ROWS, Dtype::F32, &shape, escaped)? })
+    }
+}
+
+/// Names and widths of what is drawn, in the order errors name them.
+const GEOMETRY: [(&str, usize); 6] = [
+    (tensor::POSITION, 3),
+    (tensor::NORMAL, 3),
+    (tensor::DC, 3),
+    (tensor::OPACITY, 1),
+    (tensor::SCALE, 3),
+    (tensor::ROTATION, 4),
+];
+const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
+const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
+
+/// Refuses tensors that are not of this layout and may change what is drawn.
+pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDegree) -> Result<()> {
+    let counts = if layout == Layout::Paper { tensor::POINTERS } else { tensor::COUNTS };
+    let coded = degree != ShDegree::ZERO;
+    let known = |name: &str| {
+        GEOMETRY.iter().any(|g| g.0 == name)
+            || name == tensor::HEADER_CHECKSUM
+            || (coded && (name == counts || CODES.contains(&name)))
+            || (coded && checked.has(tensor::ESCAPED) && ESCAPES.contains(&name))
+            || name.starts_with(EXTRA_PREFIX)
+            || name.starts_with(IGNORED_PREFIX)
+    };
+    match checked.names().iter().find(|name| !known(name)) {
+        None => Ok(()),
+        Some(name) => {
+            let text = format!("tensor '{name}' is not known for layout '{layout}' and degree {degree}");
+            Err(checked.malformed(text))
+        }
+    }
+}
+
+/// Refuses NaN and infinity in what is drawn. Extras may hold anything.
+fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
+    for (name, width) in GEOMETRY {
+        if name == tensor::NORMAL && !normals {
+            continue;
+        }
+        let shape = [n, width];
+        let shape = if width == 1 { &shape[..1] } else { &shape };
+        checked.data(name, Dtype::F32, shape)?;
+    }
+    for (name, width) in GEOMETRY {
+        if name == tensor::NORMAL && !normals {
+            continue;
+        }
+        let shape = [n, width];
+        let shape = if width == 1 { &shape[..1] } else { &shape };
+        let (mut count, mut first) = (0_u64, None);
+        for start in (0..n).step_by(BLOCK) {
+            let values: Vec<f32> = checked.part(name, Dtype::F32, shape, &(start..n.min(start + BLOCK)))?;
+            let bad = values.chunks_exact(width).enumerate();
+            for (i, _) in bad.filter(|(_, row)| row.iter().any(|v| !v.is_finite())) {
+                count += 1;
+                first.get_or_insert((start + i) as u64);
+            }
+        }
+        if let Some(first) = first {
+            let problem = FormatError::NotFinite { count, first, property: name.to_owned() };
+            return Err(Error::format(checked.file, problem));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,4 @@
+//! Formats and containers: PLY and .lexi.
+
+pub mod lexi;
+pub mod ply;

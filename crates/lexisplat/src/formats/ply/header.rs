@@ -1,0 +1,418 @@
+//! The text at the head of a PLY: strict about sizes, tolerant about dialect.
+
+use serde::Serialize;
+
+use super::names::shown;
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+
+/// Most elements one header may declare. Real files have one to three.
+const MAX_ELEMENTS: u64 = 1024;
+
+/// How the data after the header are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Format {
+    /// One row a line, values as decimal text.
+    Ascii,
+    /// Packed rows, least significant byte first.
+    BinaryLittleEndian,
+    /// Packed rows, most significant byte first.
+    BinaryBigEndian,
+}
+
+/// Type of a scalar property.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ScalarType {
+    /// `char` or `int8`.
+    I8,
+    /// `uchar` or `uint8`.
+    U8,
+    /// `short` or `int16`.
+    I16,
+    /// `ushort` or `uint16`.
+    U16,
+    /// `int` or `int32`.
+    I32,
+    /// `uint` or `uint32`.
+    U32,
+    /// `float` or `float32`.
+    F32,
+    /// `double` or `float64`.
+    F64,
+}
+
+impl ScalarType {
+    /// Bytes of one value in a binary file.
+    #[must_use]
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::I8 | Self::U8 => 1,
+            Self::I16 | Self::U16 => 2,
+            Self::I32 | Self::U32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// The name the first PLY specification gave it, which every reader knows.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::I8 => "char",
+            Self::U8 => "uchar",
+            Self::I16 => "short",
+            Self::U16 => "ushort",
+            Self::I32 => "int",
+            Self::U32 => "uint",
+            Self::F32 => "float",
+            Self::F64 => "double",
+        }
+    }
+
+    fn parse(word: &str) -> Option<Self> {
+        Some(match word {
+            "char" | "int8" => Self::I8,
+            "uchar" | "uint8" => Self::U8,
+            "short" | "int16" => Self::I16,
+            "ushort" | "uint16" => Self::U16,
+            "int" | "int32" => Self::I32,
+            "uint" | "uint32" => Self::U32,
+            "float" | "float32" => Self::F32,
+            "double" | "float64" => Self::F64,
+            _ => return None,
+        })
+    }
+}
+
+/// A property's shape.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    /// One value.
+    Scalar(ScalarType),
+    /// A count, then that many items.
+    List { count: ScalarType, item: ScalarType },
+}
+
+/// A named column of an element.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Property {
+    pub(super) name: String,
+    pub(super) kind: Kind,
+}
+
+/// A table of rows.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Element {
+    pub(super) name: String,
+    pub(super) count: u64,
+    pub(super) properties: Vec<Property>,
+}
+
+impl Element {
+    /// Bytes of one binary row; `None` if a list makes rows differ.
+    pub(super) fn row_bytes(&self) -> Option<usize> {
+        self.properties
+            .iter()
+            .map(|p| match p.kind {
+                Kind::Scalar(ty) => Some(ty.bytes()),
+                Kind::List { .. } => None,
+            })
+            .sum()
+    }
+}
+
+/// A parsed header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Header {
+    pub(super) format: Format,
+    /// Comment texts in order, without the keyword and outer spaces.
+    pub(super) comments: Vec<String>,
+    pub(super) elements: Vec<Element>,
+    /// Where the data start.
+    pub(super) bytes: usize,
+}
+
+impl Header {
+    /// Parses the header at the start of `bytes`, which came from the file called `file`.
+    pub(super) fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
+        check_magic(file, bytes)?;
+        let mut lines = Lines::new(file, bytes, *limits);
+        let (mut format, mut comments, mut elements) = (None, Vec::new(), Vec::<Element>::new());
+        loop {
+            let Some(line) = lines.next()? else {
+                return Err(Error::malformed(
+                    file,
+                    "the header has no 'end_header' line: the file is cut off",
+                ));
+            };
+            let line = String::from_utf8_lossy(line);
+            let number = lines.number;
+            let bad = |why: &str| {
+                Error::malformed(file, format!("header line {number}, '{}': {why}", shown(line.trim())))
+            };
+            let mut words = line.split_whitespace();
+            match words.next() {
+                None | Some("obj_info") => {}
+                Some("ply") if number == 1 => {}
+                Some("end_header") => break,
+                Some(keyword @ "comment") => {
+                    comments.push(line.trim()[keyword.len()..].trim().to_owned());
+                }
+                Some("format") => {
+                    if format.replace(parse_format(words).map_err(bad)?).is_some() {
+                        return Err(bad("a second format line"));
+                    }
+                }
+                Some("element") => {
+                    let what = format!("elements in the header of {file}");
+                    Limits::check(&what, elements.len() as u64 + 1, MAX_ELEMENTS)?;
+                    elements.push(parse_element(words).map_err(bad)?);
+                }
+                Some("property") => {
+                    let Some(element) = elements.last_mut() else {
+                        return Err(bad("a property before any element"));
+                    };
+                    let found = element.properties.len() as u64 + 1;
+                    limits.check_properties(file, found)?;
+                    element.properties.push(parse_property(words).map_err(bad)?);
+                }
+                Some(_) => return Err(bad("not a PLY keyword")),
+            }
+        }
+        let Some(format) = format else {
+            return Err(Error::malformed(file, "the header has no 'format' line"));
+        };
+        Ok(Self { format, comments, elements, bytes: lines.at })
+    }
+}
+
+fn parse_format<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::Result<Format, &'static str> {
+    let format = match words.next() {
+        Some("ascii") => Format::Ascii,
+        Some("binary_little_endian") => Format::BinaryLittleEndian,
+        Some("binary_big_endian") => Format::BinaryBigEndian,
+        _ => return Err("expected ascii, binary_little_endian or binary_big_endian"),
+    };
+    match words.next() {
+        Some("1.0") => Ok(format),
+        _ => Err("expected PLY version 1.0"),
+    }
+}
+
+fn parse_element<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::Result<Element, &'static str> {
+    match (words.next(), words.next().map(str::parse), words.next()) {
+        (Some(name), Some(Ok(count)), None) => {
+            Ok(Element { name: name.to_owned(), count, properties: Vec::new() })
+        }
+        _ => Err("expected a name and a count from 0"),
+    }
+}
+
+fn parse_property<'a>(
+    mut words: impl Iterator<Item = &'a str>,
+) -> std::result::Result<Property, &'static str> {
+    let ty = |word: Option<&str>| word.and_then(ScalarType::parse).ok_or("unknown type");
+    let kind = match words.next() {
+        Some("list") => {
+            let (count, item) = (ty(words.next())?, ty(words.next())?);
+            if matches!(count, ScalarType::F32 | ScalarType::F64) {
+                return Err("a list's count must be an integer type");
+            }
+            Kind::List { count, item }
+        }
+        word => Kind::Scalar(ty(word)?),
+    };
+    match (words.next(), words.next()) {
+        // No writer could repeat it.
+        (Some(name), None) if name.chars().any(char::is_control) => Err("control characters in the name"),
+        (Some(name), None) => Ok(Property { name: name.to_owned(), kind }),
+        _ => Err("expected one name after the type"),
+    }
+}
+
+/// Refuses what is no PLY, naming the splat formats people mix up with it.
+fn check_magic(file: &str, bytes: &[u8]) -> Result<()> {
+    let because = |kind: &str, advice: &str| FormatError::Unsupported {
+        kind: kind.to_owned(),
+        advice: advice.to_owned(),
+    };
+    let unsupported = |kind| because(kind, "convert it to PLY first, for example with splat-transform");
+    let problem = match bytes {
+        [b'p', b'l', b'y', b'\n' | b'\r' | b' ' | b'\t', ..] => return Ok(()),
+        [0x1f, 0x8b, ..] => unsupported("a gzip file (SPZ?)"),
+        [b'P', b'K', 3, 4, ..] => unsupported("a zip archive (SOG?)"),
+        [b'N', b'G', b'S', b'P', ..] => unsupported("SPZ, version 4"),
+        // Python's pickle, protocols 2 to 5.
+        [0x80, 2..=5, ..] => because(
+            "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)",
+            "it is never read here: load it where it was made and write a PLY, for EAGLES with load_compressed_pkl and save_ply",
+        ),
+        [] => FormatError::Malformed("the file is empty".to_owned()),
+        _ => FormatError::Malformed("not a PLY file: it does not start with a line 'ply'".to_owned()),
+    };
+    Err(Error::format(file, problem))
+}
+
+/// Header lines, ended by `\n`, `\r\n` or, throughout a file whose first line is, `\r`.
+struct Lines<'a> {
+    file: &'a str,
+    bytes: &'a [u8],
+    limits: Limits,
+    /// Start of the next line.
+    at: usize,
+    /// Lines returned so far.
+    number: usize,
+    end: u8,
+}
+
+impl<'a> Lines<'a> {
+    fn new(file: &'a str, bytes: &'a [u8], limits: Limits) -> Self {
+        let mac = bytes
+            .windows(2)
+            .find(|w| matches!(w[0], b'\n' | b'\r'))
+            .is_some_and(|w| w[0] == b'\r' && w[1] != b'\n');
+        Self { file, bytes, limits, at: 0, number: 0, end: if mac { b'\r' } else { b'\n' } }
+    }
+
+    /// The next line without its end, or `None` at the end of the bytes.
+    fn next(&mut self) -> Result<Option<&'a [u8]>> {
+        let rest = &self.bytes[self.at..];
+        let budget =
+            usize::try_from(self.limits.header_bytes.saturating_sub(self.at as u64)).unwrap_or(usize::MAX);
+        let window = &rest[..rest.len().min(budget)];
+        let line = match window.iter().position(|&b| b == self.end) {
+            Some(length) => {
+                self.at += length + 1;
+                &window[..length]
+            }
+            None if window.len() < rest.len() => {
+                self.limits.check_header(self.file, self.limits.header_bytes.saturating_add(1))?;
+                return Ok(None);
+            }
+            None if rest.is_empty() => return Ok(None),
+            None => {
+                self.at = self.bytes.len();
+                rest
+            }
+        };
+        self.number += 1;
+        Ok(Some(line))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Header> {
+        Header::parse("t.ply", text.as_bytes(), &Limits::default())
+    }
+
+    fn message(text: &str) -> String {
+        parse(text).expect_err("must be refused").to_string()
+    }
+
+    const PLAIN: &str = "ply\nformat binary_little_endian 1.0\ncomment Made by hand\nobj_info x 1\n\
+         element vertex 3\nproperty float x\nproperty uint8 red\nelement face 2\n\
+         property list uchar int vertex_indices\nend_header\n";
+
+    #[test]
+    fn a_plain_header() {
+        let header = parse(PLAIN).unwrap();
+        assert_eq!(header.format, Format::BinaryLittleEndian);
+        assert_eq!(header.comments, ["Made by hand"]);
+        assert_eq!(header.bytes, PLAIN.len());
+        assert_eq!(header.elements.len(), 2);
+        assert_eq!((header.elements[0].count, header.elements[0].row_bytes()), (3, Some(5)));
+        assert_eq!(header.elements[1].row_bytes(), None);
+    }
+
+    #[test]
+    fn line_ends_and_white_space_do_not_matter() {
+        let plain = parse(PLAIN).unwrap();
+        for odd in [
+            PLAIN.replace('\n', "\r\n"),
+            PLAIN.replace('\n', "\r"),
+            PLAIN.replace(' ', " \t "),
+            PLAIN.replace('\n', " \n"),
+            PLAIN.replace("\nproperty", "\n  property"),
+        ] {
+            let mut header = parse(&format!("{odd}\x00\x01")).unwrap();
+            assert_eq!(header.bytes, odd.len(), "{odd:?}");
+            header.bytes = plain.bytes;
+            header.comments = vec![header.comments[0].split_whitespace().collect::<Vec<_>>().join(" ")];
+            assert_eq!(header, plain, "{odd:?}");
+        }
+    }
+
+    #[test]
+    fn aliases_name_the_same_types() {
+        for (old, new) in [
+            ("char", "int8"),
+            ("uchar", "uint8"),
+            ("short", "int16"),
+            ("ushort", "uint16"),
+            ("int", "int32"),
+            ("uint", "uint32"),
+            ("float", "float32"),
+            ("double", "float64"),
+        ] {
+            let ty = ScalarType::parse(old).unwrap();
+            assert_eq!(Some(ty), ScalarType::parse(new));
+            assert_eq!(ty.name(), old);
+        }
+    }
+
+    #[test]
+    fn pickles_are_never_read() {
+        let error = Header::parse("a.pkl", &[0x80, 4, 0x95, 0], &Limits::default()).unwrap_err().to_string();
+        assert!(error.contains("a.pkl") && error.contains("pickle") && error.contains("save_ply"), "{error}");
+    }
+
+    #[test]
+    fn bad_headers_are_named() {
+        let cases = [
+            ("", "the file is empty"),
+            ("plx\n", "not a PLY file"),
+            ("NGSP", "SPZ, version 4"),
+            ("ply\nformat ascii 1.0\n", "no 'end_header'"),
+            ("ply\nend_header\n", "no 'format'"),
+            ("ply\nformat ascii 2.0\nend_header\n", "version 1.0"),
+            ("ply\nformat zebra 1.0\nend_header\n", "expected ascii"),
+            ("ply\nformat ascii 1.0\nformat ascii 1.0\nend_header\n", "second format"),
+            ("ply\nformat ascii 1.0\nproperty float x\nend_header\n", "before any element"),
+            ("ply\nformat ascii 1.0\nelement vertex -1\nend_header\n", "header line 3, 'element vertex -1'"),
+            ("ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n", "unknown type"),
+            ("ply\nformat ascii 1.0\nelement v 1\nproperty list float int x\nend_header\n", "integer type"),
+            ("ply\nformat ascii 1.0\nelement v 1\nproperty float\nend_header\n", "one name"),
+            (
+                "ply\nformat ascii 1.0\nelement v 1\nproperty uchar la\x05bel\nend_header\n",
+                "'property uchar la\\u{5}bel': control characters",
+            ),
+            ("ply\nformat ascii 1.0\nzebra\nend_header\n", "not a PLY keyword"),
+            ("ply\nformat ascii 1.0\n\x1b[31m\nend_header\n", "'\\u{1b}[31m'"),
+        ];
+        for (text, part) in cases {
+            let said = message(text);
+            assert!(said.starts_with("t.ply: ") && said.contains(part), "{text:?}: {said}");
+            assert!(!said.contains('\n') && !said.contains('\x1b'), "{said:?}");
+        }
+        let gzip = Header::parse("a.spz", &[0x1f, 0x8b, 8], &Limits::default()).unwrap_err().to_string();
+        assert!(gzip.contains("SPZ") && gzip.contains("splat-transform"), "{gzip}");
+    }
+
+    #[test]
+    fn limits_hold() {
+        let limits = Limits { header_bytes: 64, properties: 2, ..Limits::default() };
+        let long = format!("ply\ncomment {}\nformat ascii 1.0\nend_header\n", "x".repeat(80));
+        let said = Header::parse("t.ply", long.as_bytes(), &limits).unwrap_err();
+        assert!(matches!(said, Error::Limit { limit: 64, .. }), "{said}");
+        let wide = "ply\nformat ascii 1.0\nelement v 1\nproperty char a\nproperty char b\nproperty char c\n";
+        let limits = Limits { header_bytes: 1000, ..limits };
+        let said = Header::parse("t.ply", wide.as_bytes(), &limits).unwrap_err();
+        assert!(matches!(said, Error::Limit { found: 3, limit: 2, .. }), "{said}");
+        let many = format!("ply\nformat ascii 1.0\n{}end_header\n", "element e 0\n".repeat(1025));
+        assert!(matches!(parse(&many), Err(Error::Limit { found: 1025, .. })));
+    }
+}

@@ -1,0 +1,220 @@
+//! From property names to places in a row, and the refusal of what is no 3DGS scene.
+
+use std::collections::HashMap;
+
+use super::columns::{Field, Group};
+use super::header::{Element, Header, Kind, ScalarType};
+use super::names::{DC, NORMAL, OPACITY, POSITION, REST_PREFIX, ROTATION, SCALE, VERTEX, listed, shown};
+use crate::scene::sh::ShDegree;
+use crate::support::error::{Error, FormatError, Result};
+
+/// Where everything lies in a vertex row.
+#[derive(Debug)]
+pub(super) struct Layout {
+    pub(super) row_bytes: usize,
+    pub(super) degree: ShDegree,
+    pub(super) position: Group,
+    /// All three normals, if they are there.
+    pub(super) normal: Option<Group>,
+    pub(super) dc: Group,
+    pub(super) rest: Group,
+    pub(super) opacity: Group,
+    pub(super) scale: Group,
+    pub(super) rotation: Group,
+    /// Properties 3DGS does not know, in file order.
+    pub(super) extras: Vec<(String, Field)>,
+    /// What the reader of the file should know about the above.
+    pub(super) warnings: Vec<String>,
+}
+
+impl Layout {
+    /// The layout of `header`'s vertices.
+    pub(super) fn new(file: &str, header: &Header) -> Result<Self> {
+        let refuse = |problem| Error::format(file, problem);
+        let vertex = vertex(header).map_err(refuse)?;
+        let mut columns = Columns::new(vertex).map_err(refuse)?;
+        refuse_other_kinds(&columns).map_err(refuse)?;
+
+        let position = columns.group(&POSITION, "").map_err(refuse)?;
+        let dc = columns
+            .group(&DC, "; colours as red, green and blue alone are no spherical harmonics")
+            .map_err(refuse)?;
+        let opacity = columns.group(&OPACITY, "").map_err(refuse)?;
+        let scale = columns.group(&SCALE, "").map_err(refuse)?;
+        let rotation = columns.group(&ROTATION, "").map_err(refuse)?;
+        let rest_names = rest_names(&columns).map_err(refuse)?;
+        let degree = ShDegree::from_rest(rest_names.len()).unwrap_or(ShDegree::ZERO);
+        let rest = columns.group(&rest_names, "").map_err(refuse)?;
+
+        let mut warnings = Vec::new();
+        let normals: Vec<&str> = NORMAL.into_iter().filter(|n| columns.fields.contains_key(n)).collect();
+        let normal = if normals.len() == NORMAL.len() {
+            Some(columns.group(&NORMAL, "").map_err(refuse)?)
+        } else {
+            if !normals.is_empty() {
+                warnings.push(format!("only part of a normal is there, dropped: {}", listed(&normals)));
+            }
+            for name in normals {
+                columns.take(name);
+            }
+            None
+        };
+        if !columns.converted.is_empty() {
+            warnings.push(format!("converted to 32-bit float: {}", listed(&columns.converted)));
+        }
+        let extras = columns.rest();
+        if !extras.is_empty() {
+            let names: Vec<&str> = extras.iter().map(|(name, _)| name.as_str()).collect();
+            warnings.push(format!("extra properties kept: {}", listed(&names)));
+        }
+        let row_bytes = columns.row_bytes;
+        Ok(Self { row_bytes, degree, position, normal, dc, rest, opacity, scale, rotation, extras, warnings })
+    }
+}
+
+/// Index of the vertex element in `header.elements`.
+pub(super) fn vertex_index(header: &Header) -> Option<usize> {
+    header.elements.iter().position(|e| e.name == VERTEX)
+}
+
+fn vertex(header: &Header) -> std::result::Result<&Element, FormatError> {
+    let has = |name: &str| header.elements.iter().any(|e| e.name == name);
+    let compressed = |e: &Element| e.properties.iter().any(|p| p.name == "packed_position");
+    if has("chunk") || header.elements.iter().any(compressed) {
+        return Err(FormatError::Unsupported {
+            kind: "a PlayCanvas compressed.ply".to_owned(),
+            advice: "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start \
+                     from the trainer's own PLY"
+                .to_owned(),
+        });
+    }
+    let mut found = header.elements.iter().filter(|e| e.name == VERTEX);
+    match (found.next(), found.next()) {
+        (Some(vertex), None) => Ok(vertex),
+        (Some(_), Some(_)) => {
+            Err(FormatError::Malformed("element 'vertex' is declared more than once".to_owned()))
+        }
+        (None, _) => {
+            let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
+            let found = if names.is_empty() { "none".to_owned() } else { listed(&names) };
+            Err(FormatError::Malformed(format!("no element 'vertex'; elements found: {found}")))
+        }
+    }
+}
+
+/// Recognises relatives of 3DGS by the properties they have or lack.
+fn refuse_other_kinds(columns: &Columns<'_>) -> std::result::Result<(), FormatError> {
+    let has = |name: &str| columns.fields.contains_key(name);
+    let unsupported = |kind: &str, advice: &str| {
+        Err(FormatError::Unsupported { kind: kind.to_owned(), advice: advice.to_owned() })
+    };
+    if has("f_anchor_feat_0") {
+        return unsupported(
+            "a Scaffold-GS anchor model",
+            "its Gaussians come out of a network; export them as plain 3DGS first",
+        );
+    }
+    let shaped = has(SCALE[0]) && has(ROTATION[0]);
+    if !has(OPACITY[0]) && !shaped {
+        return unsupported(
+            "a point cloud, not a Gaussian scene (no opacity)",
+            "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
+        );
+    }
+    if has(SCALE[0]) && has(SCALE[1]) && !has(SCALE[2]) {
+        return unsupported(
+            "a 2D Gaussian Splatting model (no scale_2)",
+            "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20",
+        );
+    }
+    Ok(())
+}
+
+/// `f_rest_0` to the highest, whose count must be that of an SH degree.
+fn rest_names(columns: &Columns<'_>) -> std::result::Result<Vec<String>, FormatError> {
+    let number = |name: &str| -> Option<usize> {
+        let digits = name.strip_prefix(REST_PREFIX)?;
+        let number = digits.parse().ok()?;
+        (rest_name(number) == name).then_some(number)
+    };
+    let mut numbers: Vec<usize> = columns.fields.keys().filter_map(|name| number(name)).collect();
+    numbers.sort_unstable();
+    let count = numbers.len();
+    let expected = "expected f_rest_0 onwards, 0, 9, 24, 45 or 72 of them (SH degree 0 to 4)";
+    let gap = numbers.iter().enumerate().find(|&(i, &n)| i != n).map(|(i, _)| i);
+    match (gap, numbers.last()) {
+        (Some(missing), Some(last)) => Err(FormatError::Malformed(format!(
+            "property 'f_rest_{missing}' is missing: {count} f_rest properties found, the highest is \
+             f_rest_{last}; {expected}"
+        ))),
+        _ if ShDegree::from_rest(count).is_none() => {
+            Err(FormatError::Malformed(format!("{count} f_rest properties found; {expected}")))
+        }
+        _ => Ok((0..count).map(rest_name).collect()),
+    }
+}
+
+/// Name of SH-rest coefficient `number`.
+pub(super) fn rest_name(number: usize) -> String {
+    format!("{REST_PREFIX}{number}")
+}
+
+/// The columns of the vertex element that nothing has claimed yet.
+struct Columns<'a> {
+    fields: HashMap<&'a str, Field>,
+    row_bytes: usize,
+    /// Claimed columns that are not f32, as `name (type)`.
+    converted: Vec<String>,
+}
+
+impl<'a> Columns<'a> {
+    fn new(vertex: &'a Element) -> std::result::Result<Self, FormatError> {
+        let (mut fields, mut row_bytes) = (HashMap::with_capacity(vertex.properties.len()), 0);
+        for property in &vertex.properties {
+            let name = property.name.as_str();
+            let Kind::Scalar(ty) = property.kind else {
+                return Err(FormatError::Malformed(format!(
+                    "vertex property '{}' is a list; a Gaussian's properties are single values",
+                    shown(name)
+                )));
+            };
+            if fields.insert(name, Field { offset: row_bytes, ty }).is_some() {
+                return Err(FormatError::Malformed(format!(
+                    "vertex property '{}' is declared twice",
+                    shown(name)
+                )));
+            }
+            row_bytes += ty.bytes();
+        }
+        Ok(Self { fields, row_bytes, converted: Vec::new() })
+    }
+
+    fn take(&mut self, name: &str) -> Option<Field> {
+        self.fields.remove(name)
+    }
+
+    /// Claims `names`, which become one array.
+    fn group<S: AsRef<str>>(&mut self, names: &[S], advice: &str) -> std::result::Result<Group, FormatError> {
+        let mut fields = Vec::with_capacity(names.len());
+        for name in names.iter().map(AsRef::as_ref) {
+            let Some(field) = self.take(name) else {
+                return Err(FormatError::MissingProperty {
+                    name: name.to_owned(),
+                    advice: advice.to_owned(),
+                });
+            };
+            if field.ty != ScalarType::F32 {
+                self.converted.push(format!("{name} ({})", field.ty.name()));
+            }
+            fields.push(field);
+        }
+        Ok(Group::new(&fields))
+    }
+
+    /// What is left, in file order.
+    fn rest(&mut self) -> Vec<(String, Field)> {
+        let mut left: Vec<(String, Field)> = self.fields.drain().map(|(n, f)| (n.to_owned(), f)).collect();
+        left.sort_by_key(|(_, field)| field.offset);
+        left
+    }
+}

@@ -1,0 +1,242 @@
+//! Writes a [`Splats`] in the INRIA layout, which every viewer reads.
+
+use super::header::ScalarType;
+use super::layout::rest_name;
+use super::marks::{ANTIALIASED, mark, marks};
+use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
+use crate::scene::splats::{ExtraValues, SceneMeta, Splats, for_extra};
+use crate::support::error::{Error, Result};
+use crate::support::output::{Output, write_whole};
+use crate::support::parallel::for_each_chunk_mut;
+use std::collections::HashSet;
+use std::io::{self, Write};
+
+/// Rows one thread formats at a time.
+const CHUNK_ROWS: usize = 1024;
+/// Rows formatted before they are written: at 248 bytes a row, 8 MiB.
+const BLOCK_ROWS: usize = 32 * CHUNK_ROWS;
+
+/// Writes `splats` to `output`, whole or not at all; the number of bytes.
+///
+/// Little-endian, in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
+/// own types. Normals are zeros if the scene has none. Comments go back in; the anti-aliasing mark is
+/// added if no comment carries it.
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be written, [`Error::Parameter`] if the arrays differ in length or
+/// an extra's name cannot stand in a header.
+pub fn write<'a>(output: impl Into<Output<'a>>, splats: &Splats) -> Result<u64> {
+    check(splats)?;
+    let output = output.into();
+    let mut bytes = 0;
+    write_whole(output, |file| {
+        bytes = write_checked(file, splats).map_err(|e| Error::io(output.path(), e))?;
+        Ok(())
+    })?;
+    Ok(bytes)
+}
+
+/// Writes `splats` as [`write()`] does; the number of bytes.
+///
+/// # Errors
+/// Whatever `writer` returns, or [`io::ErrorKind::InvalidInput`] for a scene that
+/// [`write()`] refuses.
+pub fn write_to(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
+    check(splats).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
+    write_checked(writer, splats)
+}
+
+fn write_checked(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
+    let mut writer = PlyWriter::begin(writer, splats, splats.len())?;
+    writer.write(splats)?;
+    Ok(writer.bytes)
+}
+
+/// Writes a scene part after part.
+pub(crate) struct PlyWriter<W> {
+    writer: W,
+    layout: RowLayout,
+    block: Vec<u8>,
+    /// Bytes written so far.
+    pub(crate) bytes: u64,
+}
+
+impl<W: Write> PlyWriter<W> {
+    /// Writes the header of a scene of `count` Gaussians that is like `splats`, whose own number is of no
+    /// matter; it was [`check`]ed.
+    pub(crate) fn begin(mut writer: W, splats: &Splats, count: usize) -> io::Result<Self> {
+        let header = header(splats, count);
+        writer.write_all(header.as_bytes())?;
+        let layout = RowLayout::new(splats);
+        let block = vec![0; layout.row_bytes * BLOCK_ROWS.min(count)];
+        Ok(Self { writer, layout, block, bytes: header.len() as u64 })
+    }
+
+    /// Bytes of a Gaussian.
+    pub(crate) fn row_bytes(&self) -> u64 {
+        self.layout.row_bytes as u64
+    }
+
+    /// Writes the next Gaussians.
+    pub(crate) fn write(&mut self, splats: &Splats) -> io::Result<()> {
+        let (count, row_bytes) = (splats.len(), self.layout.row_bytes);
+        for start in (0..count).step_by(BLOCK_ROWS) {
+            let rows = &mut self.block[..row_bytes * BLOCK_ROWS.min(count - start)];
+            let layout = &self.layout;
+            for_each_chunk_mut(rows, row_bytes * CHUNK_ROWS, |chunk, rows| {
+                layout.pack(splats, start + chunk * CHUNK_ROWS, rows);
+            });
+            self.writer.write_all(rows)?;
+        }
+        self.bytes += row_bytes as u64 * count as u64;
+        Ok(())
+    }
+}
+
+/// Names of the properties every file has, in order.
+fn names(rest: usize) -> impl Iterator<Item = String> {
+    let fixed = |names: &'static [&'static str]| names.iter().map(|&n| n.to_owned());
+    fixed(&POSITION)
+        .chain(fixed(&NORMAL))
+        .chain(fixed(&DC))
+        .chain((0..rest).map(rest_name))
+        .chain(fixed(&OPACITY))
+        .chain(fixed(&SCALE))
+        .chain(fixed(&ROTATION))
+}
+
+/// Refuses what no PLY can hold.
+pub(crate) fn check(splats: &Splats) -> Result<()> {
+    splats.validate()?;
+    let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
+    for extra in &splats.geometry.extras {
+        let name = &extra.name;
+        // A line break in a name would let it write header lines of its own.
+        if name.is_empty() || name.chars().any(|c| c.is_whitespace() || c.is_control()) {
+            return Err(Error::parameter(
+                "extra",
+                shown(name),
+                "a name without spaces or control characters",
+            ));
+        }
+        if !taken.insert(name.clone()) {
+            return Err(Error::parameter("extra", shown(name), "a name no other property has"));
+        }
+    }
+    Ok(())
+}
+
+/// The header of a scene of `count` Gaussians that is like `splats`.
+pub(super) fn header(splats: &Splats, count: usize) -> String {
+    let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
+    for comment in comments(&splats.meta) {
+        text.push_str(format!("comment {comment}").trim_end());
+        text.push('\n');
+    }
+    text.push_str(&format!("element vertex {count}\n"));
+    for name in names(splats.degree.rest()) {
+        text.push_str(&format!("property float {name}\n"));
+    }
+    for extra in &splats.geometry.extras {
+        text.push_str(&format!("property {} {}\n", extra_type(&extra.values).name(), extra.name));
+    }
+    text.push_str("end_header\n");
+    text
+}
+
+/// The scene's comments on one line each, brought in agreement with its anti-aliasing mark.
+fn comments(meta: &SceneMeta) -> Vec<String> {
+    let mut out: Vec<String> =
+        meta.comments.iter().map(|c| c.replace(char::is_control, " ").trim().to_owned()).collect();
+    if meta.antialiased && !marks(&out).antialiased {
+        out.push(ANTIALIASED.to_owned());
+    } else if !meta.antialiased {
+        out.retain(|comment| mark(comment) != Some(true));
+    }
+    out
+}
+
+fn extra_type(values: &ExtraValues) -> ScalarType {
+    match values {
+        ExtraValues::I8(_) => ScalarType::I8,
+        ExtraValues::U8(_) => ScalarType::U8,
+        ExtraValues::I16(_) => ScalarType::I16,
+        ExtraValues::U16(_) => ScalarType::U16,
+        ExtraValues::I32(_) => ScalarType::I32,
+        ExtraValues::U32(_) => ScalarType::U32,
+        ExtraValues::F32(_) => ScalarType::F32,
+        ExtraValues::F64(_) => ScalarType::F64,
+    }
+}
+
+/// Byte offsets of the groups in a row.
+pub(super) struct RowLayout {
+    normal: usize,
+    dc: usize,
+    rest: usize,
+    opacity: usize,
+    scale: usize,
+    rotation: usize,
+    extras: Vec<usize>,
+    pub(super) row_bytes: usize,
+}
+
+impl RowLayout {
+    pub(super) fn new(splats: &Splats) -> Self {
+        let mut at = 0;
+        let mut place = |bytes: usize| {
+            let start = at;
+            at += bytes;
+            start
+        };
+        let float = size_of::<f32>();
+        let _position = place(3 * float);
+        let normal = place(3 * float);
+        let dc = place(3 * float);
+        let rest = place(splats.degree.rest() * float);
+        let opacity = place(float);
+        let scale = place(3 * float);
+        let rotation = place(4 * float);
+        let extras = splats.geometry.extras.iter().map(|e| place(extra_type(&e.values).bytes())).collect();
+        Self { normal, dc, rest, opacity, scale, rotation, extras, row_bytes: at }
+    }
+
+    /// Formats the Gaussians from `start` on into `rows`.
+    pub(super) fn pack(&self, splats: &Splats, start: usize, rows: &mut [u8]) {
+        let count = rows.len() / self.row_bytes;
+        let range = start..start + count;
+        let geometry = &splats.geometry;
+        let dim = splats.degree.rest();
+        let mut put = |offset: usize, values: &[f32], width: usize| {
+            if width == 0 {
+                return;
+            }
+            for (row, values) in rows.chunks_exact_mut(self.row_bytes).zip(values.chunks_exact(width)) {
+                let target =
+                    row[offset..offset + width * size_of::<f32>()].chunks_exact_mut(size_of::<f32>());
+                for (target, value) in target.zip(values) {
+                    target.copy_from_slice(&value.to_le_bytes());
+                }
+            }
+        };
+        put(0, geometry.positions[range.clone()].as_flattened(), 3);
+        if geometry.normals.is_empty() {
+            put(self.normal, &vec![0.0; 3 * count], 3);
+        } else {
+            put(self.normal, geometry.normals[range.clone()].as_flattened(), 3);
+        }
+        put(self.dc, geometry.dc[range.clone()].as_flattened(), 3);
+        put(self.rest, &splats.sh_rest[range.start * dim..range.end * dim], dim);
+        put(self.opacity, &geometry.opacities[range.clone()], 1);
+        put(self.scale, geometry.scales[range.clone()].as_flattened(), 3);
+        put(self.rotation, geometry.rotations[range.clone()].as_flattened(), 4);
+        for (extra, &offset) in geometry.extras.iter().zip(&self.extras) {
+            for_extra!(&extra.values, values => {
+                for (row, value) in rows.chunks_exact_mut(self.row_bytes).zip(&values[range.clone()]) {
+                    let bytes = value.to_le_bytes();
+                    row[offset..offset + bytes.len()].copy_from_slice(&bytes);
+                }
+            });
+        }
+    }
+}

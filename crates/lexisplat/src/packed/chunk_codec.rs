@@ -1,0 +1,378 @@
+//! One Gaussian after the other: the walk that encoder and decoder share.
+//!
+//! Every value is coded as the difference from a prediction made of values already decoded, in units of
+//! a step made of values already decoded. The encoder follows what the decoder will see, so errors do
+//! not add up.
+
+use super::bits::{unzigzag, zigzag};
+use super::codebook::COUNT_CLASSES;
+use super::morton;
+use super::neighbours::{AVERAGES, Neighbours};
+use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
+use super::stream::{Stream, Symbols};
+use crate::support::maths::{
+    Vec3, atan2, axis_of_square, cross, dot, frame, logit_of_log, quaternion, sin_cos, square_of_axis,
+};
+
+/// Share of a step by which a difference must exceed the middle between two values to be rounded away
+/// from zero: the smaller one is the cheaper one.
+const DEAD_ZONE: f32 = 0.08;
+/// A logarithm of an opacity above this is opaque: 0.9999.
+const MAX_LOG_OPACITY: f32 = -1e-4;
+/// Differences are at most this many steps.
+const MAX_STEPS: f32 = 1e9;
+/// Bits of each coordinate of an axis, and of a turn, at most.
+const MAX_AXIS_BITS: u32 = 15;
+/// Angle between neighbouring points of the square of axes, per unit of the square, on average.
+const SQUARE_ANGLE: f32 = 1.25;
+/// Sort of a turn: it repeats after half a circle.
+const HALF_TURN: f32 = std::f32::consts::PI;
+/// Widths of a cell, in steps of a position, that are told apart as contexts: 24 half octaves. The first
+/// is that of 2^-2.25 and less.
+const MIN_FINENESS: f32 = 0.210_224_1;
+const MAX_FINENESS: f32 = MIN_FINENESS * 4000.0;
+/// Gaps with at least this many bits share a context.
+const GAP_CONTEXTS: u32 = 23;
+/// Averages that are not predicted: the classes and the number of nonzeros.
+const COLOUR: usize = TARGETS;
+const SHAPE: usize = TARGETS + 1;
+const NONZEROS: usize = TARGETS + 2;
+
+/// A Gaussian as it is to be coded; only the encoder has it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GaussianValues<'a> {
+    /// Its cell's number on the Morton curve, not below the last Gaussian's.
+    pub(super) cell: u64,
+    /// Colour and shape class, at most [`LAST_CLASS`].
+    pub(super) classes: [u8; 2],
+    /// Natural logarithms of the standard deviations, longest first.
+    pub(super) scales: Vec3,
+    /// The axes in that order, right-handed.
+    pub(super) axes: [Vec3; 3],
+    pub(super) position: Vec3,
+    /// Natural logarithm of the opacity after the sigmoid.
+    pub(super) log_opacity: f32,
+    /// Base colour in the file's coordinates.
+    pub(super) dc: Vec3,
+    /// (atom, value in steps), values not zero, largest first; or the exact row.
+    pub(super) code: Code<'a>,
+}
+
+/// What stands for SH-rest.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Code<'a> {
+    Atoms(&'a [(u16, i32)]),
+    Exact(&'a [f32]),
+}
+
+/// A Gaussian as it was coded; its code is in [`ChunkCodec::code`].
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Decoded {
+    pub(super) position: Vec3,
+    pub(super) scales: Vec3,
+    pub(super) rotation: [f32; 4],
+    /// Before the sigmoid.
+    pub(super) opacity: f32,
+    pub(super) dc: Vec3,
+    pub(super) colour_class: u8,
+}
+
+/// A walk over one chunk.
+#[derive(Debug)]
+pub(super) struct ChunkCodec<'p> {
+    parameters: &'p Parameters,
+    /// Length of an SH-rest row.
+    dim: usize,
+    neighbours: Neighbours,
+    cell: u64,
+    gap_bits: u32,
+    /// The last Gaussian's code: (atom, value in steps), in file order.
+    pub(super) code: Vec<(u16, i32)>,
+    /// Its exact row, if it has no code.
+    pub(super) exact: Vec<f32>,
+}
+
+impl<'p> ChunkCodec<'p> {
+    pub(super) fn new(parameters: &'p Parameters, dim: usize) -> Self {
+        Self {
+            parameters,
+            dim,
+            neighbours: Neighbours::new(),
+            cell: 0,
+            gap_bits: 0,
+            code: Vec::with_capacity(dim),
+            exact: Vec::new(),
+        }
+    }
+
+    /// Codes one Gaussian. `target` is `None` in the decoder. `None` comes back if the values are
+    /// impossible, which only a damaged file can make them.
+    #[inline]
+    pub(super) fn step<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        target: Option<&GaussianValues<'_>>,
+    ) -> Option<Decoded> {
+        let p = self.parameters;
+        let gap = s.integer(Stream::Cell, self.gap_bits.min(GAP_CONTEXTS) as usize, || {
+            target.map_or(0, |t| t.cell.wrapping_sub(self.cell))
+        });
+        self.cell = self.cell.checked_add(gap)?;
+        self.gap_bits = u64::BITS - gap.leading_zeros();
+        let centre = p.centre(morton::decode(self.cell)?);
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let near = centre.map(|v| v as f32);
+        let average = self.neighbours.average(near, 0.5 * p.cell);
+        let around = average.unwrap_or_else(|| {
+            let mut around = [0.0; AVERAGES];
+            around[..TARGETS].copy_from_slice(&p.means);
+            around
+        });
+
+        let [colour, shape] = classes(s, target, &around, average.is_some())?;
+        let mut features: [f32; FEATURES] = [1.0, 0.0, f32::from(colour), f32::from(shape), 0.0, 0.0, 0.0];
+        let mut values = [0.0; AVERAGES];
+        let class = usize::from(shape);
+        for k in 0..3 {
+            features[1] = around[k];
+            let stream = Stream::axis([Stream::Scale0, Stream::Scale1, Stream::Scale2], k);
+            let prediction = p.predict(k, &features);
+            let step = p.scale_step(k, shape);
+            let value = difference(s, stream, class, prediction, step, target.map(|t| t.scales[k]));
+            features[4 + k] = value;
+            values[k] = value;
+        }
+        let scales: Vec3 = [values[0], values[1], values[2]];
+        features[1] = around[3];
+        let step = p.opacity_step(shape);
+        let log_opacity = difference(
+            s,
+            Stream::Opacity,
+            class,
+            p.predict(3, &features),
+            step,
+            target.map(|t| t.log_opacity),
+        );
+        values[3] = log_opacity.min(MAX_LOG_OPACITY);
+
+        let axes = rotation(s, p.rotation_steps(shape, scales), scales, target.map(|t| &t.axes));
+        let steps = p.position_steps(shape, scales);
+        let offset = target.map(|t| {
+            #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+            let offset: Vec3 = std::array::from_fn(|k| (f64::from(t.position[k]) - centre[k]) as f32);
+            axes.map(|axis| dot(axis, offset))
+        });
+        let mut position = centre;
+        for k in 0..3 {
+            let stream = Stream::axis([Stream::Position0, Stream::Position1, Stream::Position2], k);
+            let along =
+                difference(s, stream, fineness(p.cell / steps[k]), 0.0, steps[k], offset.map(|o| o[k]));
+            for (x, axis) in position.iter_mut().zip(axes[k]) {
+                *x += f64::from(along) * f64::from(axis);
+            }
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let position = position.map(|v| v as f32);
+
+        let step = p.dc_step(colour);
+        for k in 0..3 {
+            features[1] = around[4 + k];
+            let stream = Stream::axis([Stream::Dc0, Stream::Dc1, Stream::Dc2], k);
+            let prediction = p.predict(4 + k, &features);
+            values[4 + k] =
+                difference(s, stream, usize::from(colour), prediction, step, target.map(|t| t.dc[k]));
+        }
+        let dc = p.dc_of([values[4], values[5], values[6]]);
+        self.sh(s, target, colour, around[NONZEROS])?;
+
+        values[COLOUR] = f32::from(colour);
+        values[SHAPE] = f32::from(shape) - f32::from(colour);
+        #[expect(clippy::cast_precision_loss, reason = "at most 72")]
+        {
+            values[NONZEROS] = self.code.len() as f32;
+        }
+        self.neighbours.push(position, values);
+        let decoded = Decoded {
+            position,
+            scales,
+            rotation: quaternion(axes),
+            opacity: logit_of_log(values[3]),
+            dc,
+            colour_class: colour,
+        };
+        let values = position.iter().chain(&scales).chain(&dc).chain(&decoded.rotation);
+        let finite = values.chain([&decoded.opacity]).all(|v| v.is_finite());
+        finite.then_some(decoded)
+    }
+
+    /// The code, into [`Self::code`] or [`Self::exact`].
+    fn sh<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        target: Option<&GaussianValues<'_>>,
+        colour: u8,
+        around: f32,
+    ) -> Option<()> {
+        self.code.clear();
+        self.exact.clear();
+        if self.dim == 0 {
+            return Some(());
+        }
+        // One more than the longest code marks a row stored exactly.
+        let escape = u64::try_from(self.dim).ok()? + 1;
+        let context = 2 * usize::from(colour).min(COUNT_CLASSES - 1) + usize::from(around > 1.0);
+        let count = s.integer(Stream::Count, context, || match target.map(|t| t.code) {
+            Some(Code::Atoms(code)) => code.len() as u64,
+            Some(Code::Exact(_)) => escape,
+            None => 0,
+        });
+        if count == escape {
+            for k in 0..self.dim {
+                let bits = s.bits(Stream::Value, 32, || match target.map(|t| t.code) {
+                    Some(Code::Exact(row)) => u64::from(row[k].to_bits()),
+                    _ => 0,
+                });
+                self.exact.push(f32::from_bits(u32::try_from(bits).ok()?));
+            }
+            return self.exact.iter().all(|v| v.is_finite()).then_some(());
+        }
+        if count > escape {
+            return None;
+        }
+        let mut last = None;
+        for k in 0..usize::try_from(count).ok()? {
+            let given = target.and_then(|t| match t.code {
+                Code::Atoms(code) => code.get(k).copied(),
+                Code::Exact(_) => None,
+            });
+            let atom = s.symbol(Stream::Atom, usize::from(k > 0), || given.map_or(0, |g| g.0));
+            let context = match last {
+                None => usize::try_from(count - 1).ok()?.min(7),
+                Some(size) => 8 + usize::try_from(size).ok()?.min(15),
+            };
+            let size =
+                s.integer(Stream::Value, context, || given.map_or(0, |g| u64::from(g.1.unsigned_abs()) - 1));
+            let negative = s.bits(Stream::Value, 1, || given.map_or(0, |g| u64::from(g.1 < 0)));
+            let value = i32::try_from(size.checked_add(1)?).ok()?;
+            self.code.push((atom, if negative == 1 { -value } else { value }));
+            last = Some(size);
+        }
+        Some(())
+    }
+}
+
+/// Colour and shape class.
+fn classes<S: Symbols>(
+    s: &mut S,
+    target: Option<&GaussianValues<'_>>,
+    around: &[f32; AVERAGES],
+    known: bool,
+) -> Option<[u8; 2]> {
+    let context = if known { 1 + level(around[COLOUR]) } else { 0 };
+    let colour = s.symbol(Stream::ColourClass, context, || target.map_or(0, |t| u16::from(t.classes[0])));
+    let colour = u8::try_from(colour).ok()?;
+    let expected = (f32::from(colour) + around[SHAPE]).clamp(0.0, f32::from(LAST_CLASS));
+    // Rounded to halves, so that the histogram knows on which side of it the shape class may lie.
+    let context = if known { level(2.0 * (expected - (expected - 0.25).floor())) + 1 } else { 0 };
+    let nearest = level(expected);
+    let shape = s.integer(Stream::ShapeClass, context, || {
+        target.map_or(0, |t| zigzag(i64::from(t.classes[1]) - i64::try_from(nearest).unwrap_or(0)))
+    });
+    let shape = i64::try_from(nearest).ok()?.checked_add(unzigzag(shape))?;
+    let shape = u8::try_from(shape).ok()?;
+    (colour <= LAST_CLASS && shape <= LAST_CLASS).then_some([colour, shape])
+}
+
+/// The nearest whole number from 0 to the last class.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+fn level(x: f32) -> usize {
+    (x + 0.5).floor().clamp(0.0, f32::from(LAST_CLASS)) as usize
+}
+
+/// How many half octaves of steps a cell is wide, from a quarter of a step on, as a context.
+fn fineness(steps: f32) -> usize {
+    // The exponent, and whether the rest is beyond half an octave: a logarithm would take longer.
+    let scaled = steps.clamp(MIN_FINENESS, MAX_FINENESS) / MIN_FINENESS;
+    let bits = scaled.to_bits();
+    let octaves = (bits >> 23) - 127;
+    let half = f32::from_bits((bits & 0x007f_ffff) | 0x3f80_0000) >= std::f32::consts::SQRT_2;
+    (2 * octaves + u32::from(half)) as usize
+}
+
+/// `value` as `prediction` plus whole steps; returns what the decoder makes of it.
+#[inline]
+fn difference<S: Symbols>(
+    s: &mut S,
+    stream: Stream,
+    context: usize,
+    prediction: f32,
+    step: f32,
+    value: Option<f32>,
+) -> f32 {
+    let steps = s.integer(stream, context, || {
+        value.map_or(0, |value| {
+            let steps = ((value - prediction) / step).clamp(-MAX_STEPS, MAX_STEPS);
+            #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+            let whole = (steps.abs() + 0.5 - DEAD_ZONE).floor() as i64;
+            zigzag(if steps < 0.0 { -whole } else { whole })
+        })
+    });
+    #[expect(clippy::cast_precision_loss, reason = "the same in encoder and decoder")]
+    let steps = unzigzag(steps) as f32;
+    prediction + steps * step
+}
+
+/// The axes: the one that matters least by a point on a sphere, the others by a turn about it.
+fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: Option<&[Vec3; 3]>) -> [Vec3; 3] {
+    // Needles hardly change when turned about their longest axis, discs about their shortest.
+    let needle = scales[0] - scales[1] >= scales[1] - scales[2];
+    let (main, other) = if needle { (0, 1) } else { (2, 0) };
+    let across: Vec<f32> = (0..3).filter(|&k| k != main).map(|k| steps[k]).collect();
+    let step = (across[0] * across[1]).sqrt();
+    let count = bits_for(2.0 * SQUARE_ANGLE / step);
+    let size = power(count);
+    let cell = |x: f32| -> u64 {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let cell = ((x + 1.0) * 0.5 * size).floor().clamp(0.0, size - 1.0) as u64;
+        cell
+    };
+    let point = target.map(|axes| square_of_axis(axes[main]));
+    let coordinates: [f32; 2] = std::array::from_fn(|k| {
+        let cell = s.bits(Stream::Rotation, count, || point.map_or(0, |p| cell(p[k])));
+        #[expect(clippy::cast_precision_loss, reason = "at most 15 bits")]
+        let cell = cell as f32;
+        (cell + 0.5) / size * 2.0 - 1.0
+    });
+    let u = axis_of_square(coordinates);
+    let [first, second] = frame(u);
+    let count = bits_for(HALF_TURN / steps[main]);
+    let size = power(count);
+    let turn = s.bits(Stream::Rotation, count, || {
+        target.map_or(0, |axes| {
+            let angle = atan2(dot(axes[other], second), dot(axes[other], first));
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+            let turn = (angle.rem_euclid(HALF_TURN) / HALF_TURN * size).floor().clamp(0.0, size - 1.0) as u64;
+            turn
+        })
+    });
+    #[expect(clippy::cast_precision_loss, reason = "at most 15 bits")]
+    let (sine, cosine) = sin_cos((turn as f32 + 0.5) / size * HALF_TURN);
+    let v: Vec3 = std::array::from_fn(|k| cosine * first[k] + sine * second[k]);
+    if needle { [u, v, cross(u, v)] } else { [v, cross(u, v), u] }
+}
+
+/// Bits for about `values` different values.
+fn bits_for(values: f32) -> u32 {
+    // Comparisons instead of a logarithm, whose last bits differ between machines.
+    let mut count = 0;
+    while count < MAX_AXIS_BITS && values > power(count) * std::f32::consts::SQRT_2 {
+        count += 1;
+    }
+    count
+}
+
+fn power(count: u32) -> f32 {
+    #[expect(clippy::cast_precision_loss, reason = "a power of two")]
+    let size = (1_u64 << count) as f32;
+    size
+}

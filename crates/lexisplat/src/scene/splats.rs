@@ -1,0 +1,268 @@
+//! One trained scene as arrays: what a PLY holds, in the PLY's own units.
+
+use crate::scene::sh::ShDegree;
+use crate::support::error::{Error, Result};
+
+/// Everything of a scene but its SH-rest coefficients, one entry a Gaussian in every array.
+///
+/// Values are as the trainer stored them, before any activation.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Geometry {
+    /// Centres in world units.
+    pub positions: Vec<[f32; 3]>,
+    /// Normals; empty when the file has none or all are zero, as every known trainer writes them.
+    pub normals: Vec<[f32; 3]>,
+    /// SH coefficient 0 of red, green and blue. The base colour is `0.5 + C0 * dc`.
+    pub dc: Vec<[f32; 3]>,
+    /// Opacity before the sigmoid.
+    pub opacities: Vec<f32>,
+    /// Natural logarithms of the standard deviations along the three axes.
+    pub scales: Vec<[f32; 3]>,
+    /// Quaternions (w, x, y, z), not necessarily of unit length.
+    pub rotations: Vec<[f32; 4]>,
+    /// Per-Gaussian properties no layout defines, kept in file order.
+    pub extras: Vec<Extra>,
+}
+
+/// A per-Gaussian property that 3DGS does not define, kept under its own name and type.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Extra {
+    /// Property name in the PLY.
+    pub name: String,
+    /// One value a Gaussian.
+    pub values: ExtraValues,
+}
+
+/// Values of an [`Extra`] in the type the file gave them.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub enum ExtraValues {
+    /// `char` or `int8`.
+    I8(Vec<i8>),
+    /// `uchar` or `uint8`.
+    U8(Vec<u8>),
+    /// `short` or `int16`.
+    I16(Vec<i16>),
+    /// `ushort` or `uint16`.
+    U16(Vec<u16>),
+    /// `int` or `int32`.
+    I32(Vec<i32>),
+    /// `uint` or `uint32`.
+    U32(Vec<u32>),
+    /// `float` or `float32`.
+    F32(Vec<f32>),
+    /// `double` or `float64`.
+    F64(Vec<f64>),
+}
+
+/// Calls `$body` with `$v` bound to the vector inside an [`ExtraValues`].
+macro_rules! for_extra {
+    ($values:expr, $v:ident => $body:expr) => {
+        match $values {
+            $crate::scene::splats::ExtraValues::I8($v) => $body,
+            $crate::scene::splats::ExtraValues::U8($v) => $body,
+            $crate::scene::splats::ExtraValues::I16($v) => $body,
+            $crate::scene::splats::ExtraValues::U16($v) => $body,
+            $crate::scene::splats::ExtraValues::I32($v) => $body,
+            $crate::scene::splats::ExtraValues::U32($v) => $body,
+            $crate::scene::splats::ExtraValues::F32($v) => $body,
+            $crate::scene::splats::ExtraValues::F64($v) => $body,
+        }
+    };
+}
+pub(crate) use for_extra;
+
+impl ExtraValues {
+    /// Number of values.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        for_extra!(self, v => v.len())
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Bytes of one value.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        fn width<T>(_: &[T]) -> usize {
+            size_of::<T>()
+        }
+        for_extra!(self, v => width(v))
+    }
+}
+
+/// What a scene's file says about it beside its Gaussians; travels from PLY to .lexi and back.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct SceneMeta {
+    /// `comment` lines of the source, without the keyword, in order.
+    pub comments: Vec<String>,
+    /// Trained with the anti-aliased (Mip-Splatting) dilation: Brush `SplatRenderMode: mip`,
+    /// Postshot `antialiased 1`.
+    pub antialiased: bool,
+}
+
+/// A scene with dense SH: what a trainer's PLY holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Splats {
+    /// Everything but SH-rest.
+    pub geometry: Geometry,
+    /// SH degree.
+    pub degree: ShDegree,
+    /// SH-rest, `degree.rest()` values a Gaussian, channel-major within each.
+    pub sh_rest: Vec<f32>,
+    /// Comments and marks.
+    pub meta: SceneMeta,
+}
+
+/// Refuses the first value of named arrays that is not finite, as [`Error::Parameter`].
+pub(crate) fn all_finite<'a>(arrays: impl IntoIterator<Item = (&'static str, &'a [f32])>) -> Result<()> {
+    for (name, values) in arrays {
+        if let Some(value) = values.iter().find(|v| !v.is_finite()) {
+            return Err(Error::parameter(name, value, "finite values"));
+        }
+    }
+    Ok(())
+}
+
+impl Geometry {
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+
+    /// Checks that all arrays have the same length.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the array that differs.
+    pub fn validate(&self) -> Result<()> {
+        let n = self.len();
+        let lengths = [
+            ("dc", self.dc.len()),
+            ("opacities", self.opacities.len()),
+            ("scales", self.scales.len()),
+            ("rotations", self.rotations.len()),
+        ];
+        for (name, len) in lengths {
+            if len != n {
+                return Err(Error::parameter(name, len, format!("{n} entries, one a position")));
+            }
+        }
+        if !self.normals.is_empty() && self.normals.len() != n {
+            return Err(Error::parameter("normals", self.normals.len(), format!("none or {n} entries")));
+        }
+        for extra in &self.extras {
+            if extra.values.len() != n {
+                return Err(Error::parameter("extra", &extra.name, format!("{n} entries, one a position")));
+            }
+        }
+        Ok(())
+    }
+
+    /// Checks that every value is finite but those of extras, which may be anything.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the array and the first value that is not.
+    pub(crate) fn validate_values(&self) -> Result<()> {
+        let arrays: [(&'static str, &[f32]); 6] = [
+            ("positions", self.positions.as_flattened()),
+            ("normals", self.normals.as_flattened()),
+            ("dc", self.dc.as_flattened()),
+            ("opacities", &self.opacities),
+            ("scales", self.scales.as_flattened()),
+            ("rotations", self.rotations.as_flattened()),
+        ];
+        all_finite(arrays)
+    }
+
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    pub fn retain(&mut self, keep: &[bool]) {
+        filter(&mut self.positions, keep);
+        filter(&mut self.normals, keep);
+        filter(&mut self.dc, keep);
+        filter(&mut self.opacities, keep);
+        filter(&mut self.scales, keep);
+        filter(&mut self.rotations, keep);
+        for extra in &mut self.extras {
+            for_extra!(&mut extra.values, v => filter(v, keep));
+        }
+    }
+}
+
+/// Keeps the values for which `keep` is true.
+pub(crate) fn filter<T: Copy>(values: &mut Vec<T>, keep: &[bool]) {
+    let mut flags = keep.iter();
+    values.retain(|_| flags.next().copied().unwrap_or(false));
+}
+
+impl Splats {
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.geometry.len()
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.geometry.is_empty()
+    }
+
+    /// SH-rest of Gaussian `i`: `degree.rest()` values, channel-major.
+    ///
+    /// # Panics
+    /// If `i` is not below [`Self::len`].
+    #[must_use]
+    pub fn rest(&self, i: usize) -> &[f32] {
+        let dim = self.degree.rest();
+        &self.sh_rest[i * dim..(i + 1) * dim]
+    }
+
+    /// Checks that all arrays have the same length.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] naming the array that differs.
+    pub fn validate(&self) -> Result<()> {
+        self.geometry.validate()?;
+        let expected = self.len() * self.degree.rest();
+        if self.sh_rest.len() == expected {
+            Ok(())
+        } else {
+            Err(Error::parameter("sh_rest", self.sh_rest.len(), format!("{expected} values")))
+        }
+    }
+
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
+    pub fn retain(&mut self, keep: &[bool]) {
+        self.geometry.retain(keep);
+        let dim = self.degree.rest();
+        let mut kept = 0;
+        for i in (0..keep.len()).filter(|&i| keep[i]) {
+            self.sh_rest.copy_within(i * dim..(i + 1) * dim, kept * dim);
+            kept += 1;
+        }
+        self.sh_rest.truncate(kept * dim);
+    }
+
+    /// The same scene with SH of at most `degree`: higher coefficients are cut off.
+    #[must_use]
+    pub fn with_degree_cut(&self, degree: ShDegree) -> Self {
+        let degree = degree.min(self.degree);
+        let (from, to) = (self.degree.rest_per_channel(), degree.rest_per_channel());
+        let sh_rest = match from {
+            0 => Vec::new(),
+            _ => self.sh_rest.chunks_exact(from).flat_map(|channel| &channel[..to]).copied().collect(),
+        };
+        Self { geometry: self.geometry.clone(), degree, sh_rest, meta: self.meta.clone() }
+    }
+}

@@ -1,0 +1,358 @@
+//! What a scene's values look like, and what looks wrong with them.
+//!
+//! The numbers behind `lexisplat info`. Sums are taken over fixed chunks and added in order, so the
+//! result does not depend on the number of threads.
+
+use std::ops::Range;
+
+use serde::Serialize;
+
+use crate::scene::splats::{Splats, for_extra};
+use crate::support::parallel::{CHUNK, map_chunks};
+
+/// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in
+/// use, 0.03 to 0.3, are edges: the bins below a tolerance hold the Gaussians that need no atom at all.
+pub const NORM_BINS: [f64; 9] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
+
+/// A logarithmic scale above this is a standard deviation over 22,000 units, in scenes that trainers
+/// normalise to a few: debris that covers the whole picture.
+pub const HUGE_LOG_SCALE: f32 = 10.0;
+
+/// `logit(1 / 255)`: below this opacity the INRIA rasteriser skips a Gaussian at its very centre
+/// (`forward.cu`, `alpha < 1.0f / 255.0f`).
+pub const NEVER_DRAWN_OPACITY: f32 = -5.537_334;
+
+/// How far a quaternion's length may be from 1 and still count as unit.
+pub const UNIT_TOLERANCE: f64 = 1e-3;
+
+/// Range of one property over all Gaussians, NaN left out.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct AttributeStats {
+    /// The property's name; `f_rest` stands for all SH-rest values together.
+    pub name: String,
+    /// Smallest value; 0 for an empty scene.
+    pub min: f64,
+    /// Largest value; 0 for an empty scene.
+    pub max: f64,
+    /// Mean; 0 for an empty scene.
+    pub mean: f64,
+}
+
+/// The result of [`lint`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Lint {
+    /// Gaussians in the scene.
+    pub gaussians: u64,
+    /// Range of each property, in the order of the INRIA layout; extras last.
+    pub attributes: Vec<AttributeStats>,
+    /// Gaussians whose SH-rest vector's L2 norm is in each bin of [`NORM_BINS`].
+    pub rest_norms: [u64; NORM_BINS.len()],
+    /// Mean L2 norm of the SH-rest vectors.
+    pub mean_rest_norm: f64,
+    /// Gaussians whose SH-rest is all zero.
+    pub zero_rest: u64,
+    /// Quaternions of length 0, which have no direction to normalise.
+    pub zero_quaternions: u64,
+    /// Quaternions that are neither unit (within [`UNIT_TOLERANCE`]) nor zero. Harmless: renderers
+    /// normalise.
+    pub non_unit_quaternions: u64,
+    /// Gaussians with a logarithmic scale over [`HUGE_LOG_SCALE`].
+    pub huge_scales: u64,
+    /// Gaussians with an opacity below [`NEVER_DRAWN_OPACITY`].
+    pub never_drawn: u64,
+    /// What looks wrong, one sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// Looks a scene over.
+///
+/// # Errors
+/// [`crate::Error::Parameter`] if the scene's arrays differ in length.
+pub fn lint(splats: &Splats) -> crate::Result<Lint> {
+    let mut linter = Linter::default();
+    linter.add(splats)?;
+    Ok(linter.finish())
+}
+
+/// [`lint`] of a scene that comes part after part.
+#[derive(Debug, Default)]
+pub struct Linter {
+    gaussians: u64,
+    view_dependent: bool,
+    counts: Counts,
+    columns: Vec<Column>,
+}
+
+impl Linter {
+    /// Looks the next Gaussians over. Parts are of one scene: the same properties in all of them. The same
+    /// bits come out of one part and of several, if all but the last are a multiple of 2048 Gaussians.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] if the part's arrays differ in length.
+    pub fn add(&mut self, splats: &Splats) -> crate::Result<()> {
+        splats.validate()?;
+        for part in map_chunks(splats.len(), CHUNK, |range| Counts::of(splats, range)) {
+            self.counts.add(&part);
+        }
+        self.gaussians += splats.len() as u64;
+        self.view_dependent = splats.degree.get() > 0;
+        let columns = columns(splats);
+        // An empty part may lack what the others have.
+        if self.columns.iter().all(|c| c.whole.count == 0) && self.columns.len() <= columns.len() {
+            self.columns = columns;
+        } else {
+            self.columns.iter_mut().zip(columns).for_each(|(all, part)| all.parts.extend(part.parts));
+        }
+        self.columns.iter_mut().for_each(Column::join);
+        Ok(())
+    }
+
+    /// What all parts together look like.
+    #[must_use]
+    pub fn finish(self) -> Lint {
+        let (n, counts) = (self.gaussians, self.counts);
+        let mut lint = Lint {
+            gaussians: n,
+            attributes: self.columns.into_iter().map(Column::into_report).collect(),
+            rest_norms: counts.rest_norms,
+            mean_rest_norm: if n == 0 { 0.0 } else { counts.norm_sum / n as f64 },
+            zero_rest: counts.zero_rest,
+            zero_quaternions: counts.zero_quaternions,
+            non_unit_quaternions: counts.non_unit_quaternions,
+            huge_scales: counts.huge_scales,
+            never_drawn: counts.never_drawn,
+            warnings: Vec::new(),
+        };
+        lint.warnings = warnings(&lint, self.view_dependent);
+        lint
+    }
+}
+
+fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
+    let n = lint.gaussians;
+    if n == 0 {
+        return vec!["The scene holds no Gaussians.".to_owned()];
+    }
+    let mut out = Vec::new();
+    let mut warn = |count: u64, what: &str| {
+        if count > 0 {
+            let percent = 100.0 * count as f64 / n as f64;
+            out.push(format!("{count} of {n} Gaussians ({percent:.2} %) {what}."));
+        }
+    };
+    warn(lint.zero_quaternions, "have a rotation of length 0, which no renderer can normalise");
+    warn(lint.huge_scales, "have a logarithmic scale over 10 and may cover the whole picture");
+    warn(lint.never_drawn, "are too transparent to be drawn (opacity under 1/255)");
+    if view_dependent && lint.zero_rest == n {
+        out.push(
+            "All SH-rest values are 0: the scene has the size of its degree but no view dependence.".into(),
+        );
+    }
+    out
+}
+
+/// Counts and sums over some Gaussians.
+#[derive(Debug, Default)]
+struct Counts {
+    rest_norms: [u64; NORM_BINS.len()],
+    norm_sum: f64,
+    zero_rest: u64,
+    zero_quaternions: u64,
+    non_unit_quaternions: u64,
+    huge_scales: u64,
+    never_drawn: u64,
+}
+
+impl Counts {
+    fn of(splats: &Splats, range: Range<usize>) -> Self {
+        let norm = |values: &[f32]| values.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
+        let mut counts = Self::default();
+        let geometry = &splats.geometry;
+        for i in range {
+            let rest = splats.rest(i);
+            let length = norm(rest);
+            // NaN falls into the first bin.
+            let bin = NORM_BINS.iter().rposition(|&edge| length >= edge).unwrap_or(0);
+            counts.rest_norms[bin] += 1;
+            counts.norm_sum += length;
+            counts.zero_rest += u64::from(rest.iter().all(|&v| v == 0.0));
+            let length = norm(&geometry.rotations[i]);
+            counts.zero_quaternions += u64::from(length == 0.0);
+            counts.non_unit_quaternions += u64::from(length != 0.0 && (length - 1.0).abs() > UNIT_TOLERANCE);
+            counts.huge_scales += u64::from(geometry.scales[i].iter().any(|&s| s > HUGE_LOG_SCALE));
+            counts.never_drawn += u64::from(geometry.opacities[i] < NEVER_DRAWN_OPACITY);
+        }
+        counts
+    }
+
+    fn add(&mut self, other: &Self) {
+        for (a, b) in self.rest_norms.iter_mut().zip(other.rest_norms) {
+            *a += b;
+        }
+        self.norm_sum += other.norm_sum;
+        self.zero_rest += other.zero_rest;
+        self.zero_quaternions += other.zero_quaternions;
+        self.non_unit_quaternions += other.non_unit_quaternions;
+        self.huge_scales += other.huge_scales;
+        self.never_drawn += other.never_drawn;
+    }
+}
+
+/// Range and sum of one property.
+#[derive(Debug)]
+struct Column {
+    name: String,
+    whole: Span,
+    /// Those of chunks not yet added to the whole, in order.
+    parts: Vec<Span>,
+}
+
+/// Range, sum and number of values.
+#[derive(Debug, Clone, Copy)]
+struct Span {
+    min: f64,
+    max: f64,
+    sum: f64,
+    count: u64,
+}
+
+impl Span {
+    const EMPTY: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0 };
+}
+
+impl Column {
+    fn join(&mut self) {
+        for part in self.parts.drain(..) {
+            let whole = &mut self.whole;
+            *whole = Span {
+                min: whole.min.min(part.min),
+                max: whole.max.max(part.max),
+                sum: whole.sum + part.sum,
+                count: whole.count + part.count,
+            };
+        }
+    }
+
+    fn into_report(self) -> AttributeStats {
+        let Span { min, max, sum, count } = self.whole;
+        match count {
+            0 => AttributeStats { name: self.name, min: 0.0, max: 0.0, mean: 0.0 },
+            _ => AttributeStats { name: self.name, min, max, mean: sum / count as f64 },
+        }
+    }
+}
+
+/// All properties of some Gaussians.
+fn columns(splats: &Splats) -> Vec<Column> {
+    let geometry = &splats.geometry;
+    let mut out = Vec::new();
+    let mut columns = |names: &[&str], values: &[f32]| {
+        for (column, name) in names.iter().enumerate() {
+            out.push(spans(name, values, column, names.len()));
+        }
+    };
+    columns(&["x", "y", "z"], geometry.positions.as_flattened());
+    if !geometry.normals.is_empty() {
+        columns(&["nx", "ny", "nz"], geometry.normals.as_flattened());
+    }
+    columns(&["f_dc_0", "f_dc_1", "f_dc_2"], geometry.dc.as_flattened());
+    if splats.degree.rest() > 0 {
+        columns(&["f_rest"], &splats.sh_rest);
+    }
+    columns(&["opacity"], &geometry.opacities);
+    columns(&["scale_0", "scale_1", "scale_2"], geometry.scales.as_flattened());
+    columns(&["rot_0", "rot_1", "rot_2", "rot_3"], geometry.rotations.as_flattened());
+    for extra in &geometry.extras {
+        for_extra!(&extra.values, v => out.push(spans(&extra.name, v, 0, 1)));
+    }
+    out
+}
+
+/// Every `width`-th value from `column` on.
+fn spans<T: Copy + Into<f64> + Sync>(name: &str, values: &[T], column: usize, width: usize) -> Column {
+    let parts = map_chunks(values.len() / width, CHUNK, |rows| {
+        let mut part = Span::EMPTY;
+        for row in rows {
+            let value: f64 = values[row * width + column].into();
+            if !value.is_nan() {
+                part = Span {
+                    min: part.min.min(value),
+                    max: part.max.max(value),
+                    sum: part.sum + value,
+                    count: part.count + 1,
+                };
+            }
+        }
+        part
+    });
+    Column { name: name.to_owned(), whole: Span::EMPTY, parts }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Extra, ExtraValues, Geometry, SceneMeta, ShDegree};
+
+    fn scene(n: usize) -> Splats {
+        Splats {
+            geometry: Geometry {
+                positions: vec![[1.0, 2.0, 3.0]; n],
+                dc: vec![[0.0; 3]; n],
+                opacities: vec![0.0; n],
+                scales: vec![[-3.0; 3]; n],
+                rotations: vec![[1.0, 0.0, 0.0, 0.0]; n],
+                ..Geometry::default()
+            },
+            degree: ShDegree::new(1).unwrap(),
+            sh_rest: vec![0.0; 9 * n],
+            meta: SceneMeta::default(),
+        }
+    }
+
+    #[test]
+    fn each_oddity_is_counted_once() {
+        // Several chunks, oddities in the last.
+        let n = 2 * CHUNK + 10;
+        let mut s = scene(n);
+        s.geometry.rotations[n - 1] = [0.0; 4];
+        s.geometry.rotations[n - 2] = [2.0, 0.0, 0.0, 0.0];
+        s.geometry.scales[n - 3][1] = 10.5;
+        s.geometry.opacities[n - 4] = -5.54;
+        s.geometry.opacities[n - 5] = -5.53;
+        s.sh_rest[9 * (n - 1)] = 3.0;
+        s.sh_rest[9 * (n - 1) + 8] = 4.0;
+        s.geometry.positions[n - 1][2] = 3.0 + n as f32;
+        s.geometry.extras = vec![Extra { name: "red".into(), values: ExtraValues::U8([0, 1].repeat(n / 2)) }];
+        let lint = lint(&s).unwrap();
+        assert_eq!(lint.gaussians, n as u64);
+        assert_eq!((lint.zero_quaternions, lint.non_unit_quaternions), (1, 1));
+        assert_eq!((lint.huge_scales, lint.never_drawn, lint.zero_rest), (1, 1, n as u64 - 1));
+        assert_eq!(lint.rest_norms, [n as u64 - 1, 0, 0, 0, 0, 0, 1, 0, 0]);
+        assert!((lint.mean_rest_norm - 5.0 / n as f64).abs() < 1e-12);
+        assert_eq!(lint.warnings.len(), 3, "{:?}", lint.warnings);
+        let stats = |name: &str| lint.attributes.iter().find(|a| a.name == name).unwrap();
+        let z = stats("z");
+        assert_eq!((z.min, z.max), (3.0, 3.0 + n as f64));
+        assert!((z.mean - 4.0).abs() < 1e-9);
+        assert!((stats("red").mean - 0.5).abs() < 1e-9);
+        assert_eq!(stats("f_rest").max, 4.0);
+        assert_eq!(lint.attributes.last().unwrap().name, "red");
+    }
+
+    #[test]
+    fn the_threshold_is_the_logit() {
+        let alpha = 1.0 / 255.0_f64;
+        assert!((f64::from(NEVER_DRAWN_OPACITY) - (alpha / (1.0 - alpha)).ln()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn flat_and_empty_scenes_are_mentioned() {
+        let said = lint(&scene(3)).unwrap().warnings;
+        assert!(said.len() == 1 && said[0].contains("no view dependence"), "{said:?}");
+        let said = lint(&scene(0)).unwrap();
+        assert_eq!(said.warnings, ["The scene holds no Gaussians."]);
+        assert!(said.attributes.iter().all(|a| a.mean == 0.0));
+    }
+}

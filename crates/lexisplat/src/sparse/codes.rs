@@ -1,0 +1,350 @@
+//! Sparse codes, stored column by column: for every Gaussian a few (atom, value) pairs.
+
+use half::f16;
+
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+
+/// Gaussians between two stored offsets: finding a column adds up at most this many counts.
+const CHECKPOINT: usize = 64;
+
+/// Atom numbers, in one byte where the dictionary allows it.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Indices {
+    /// Dictionaries of up to 256 atoms.
+    U8(Vec<u8>),
+    /// Larger ones.
+    U16(Vec<u16>),
+}
+
+/// Coefficients of the atoms.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Full precision.
+    F32(Vec<f32>),
+    /// Half precision.
+    F16(Vec<f16>),
+}
+
+impl Indices {
+    /// An empty list fit for a dictionary of `atoms` atoms.
+    #[must_use]
+    pub fn for_atoms(atoms: usize) -> Self {
+        if atoms <= 256 { Self::U8(Vec::new()) } else { Self::U16(Vec::new()) }
+    }
+
+    /// Number of indices.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::U8(v) => v.len(),
+            Self::U16(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Index at `k`.
+    ///
+    /// # Panics
+    /// If `k` is not below [`Self::len`].
+    #[must_use]
+    #[inline]
+    pub fn get(&self, k: usize) -> usize {
+        match self {
+            Self::U8(v) => usize::from(v[k]),
+            Self::U16(v) => usize::from(v[k]),
+        }
+    }
+
+    /// Bytes of one index.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        match self {
+            Self::U8(_) => 1,
+            Self::U16(_) => 2,
+        }
+    }
+}
+
+impl Values {
+    /// Number of values.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::F16(v) => v.len(),
+        }
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Value at `k`.
+    ///
+    /// # Panics
+    /// If `k` is not below [`Self::len`].
+    #[must_use]
+    #[inline]
+    pub fn get(&self, k: usize) -> f32 {
+        match self {
+            Self::F32(v) => v[k],
+            Self::F16(v) => v[k].to_f32(),
+        }
+    }
+
+    /// Bytes of one value.
+    #[must_use]
+    pub fn width(&self) -> usize {
+        match self {
+            Self::F32(_) => 4,
+            Self::F16(_) => 2,
+        }
+    }
+}
+
+/// Gaussians stored exactly, because no code reaches the tolerance.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Escapes {
+    /// Which Gaussians, strictly ascending.
+    pub gaussians: Vec<u32>,
+    /// Their SH-rest rows, one after the other.
+    pub rows: Vec<f32>,
+}
+
+/// The sparse codes of a whole scene.
+///
+/// Invariants, held by [`SparseCodes::new`]: indices are strictly ascending within a Gaussian and below
+/// the dictionary's length, values are finite, an escaped Gaussian has no nonzeros.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SparseCodes {
+    counts: Vec<u8>,
+    checkpoints: Vec<u64>,
+    indices: Indices,
+    values: Values,
+    escapes: Escapes,
+    dim: usize,
+}
+
+/// What stands for one Gaussian's SH-rest.
+#[derive(Debug, Clone, Copy)]
+pub enum Row<'a> {
+    /// A few atoms.
+    Code(Column<'a>),
+    /// The exact coefficients.
+    Exact(&'a [f32]),
+}
+
+/// The nonzeros of one Gaussian.
+#[derive(Debug, Clone, Copy)]
+pub struct Column<'a> {
+    codes: &'a SparseCodes,
+    start: usize,
+    len: usize,
+}
+
+impl<'a> Column<'a> {
+    /// Number of nonzeros.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// The (atom, value) pairs, by ascending atom.
+    #[inline]
+    pub fn iter(&self) -> impl Iterator<Item = (usize, f32)> + use<'a> {
+        let codes = self.codes;
+        (self.start..self.start + self.len).map(move |k| (codes.indices.get(k), codes.values.get(k)))
+    }
+}
+
+impl SparseCodes {
+    /// Checks all invariants and builds the offsets.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the array and the first bad entry.
+    pub fn new(
+        dictionary: &Dictionary,
+        counts: Vec<u8>,
+        indices: Indices,
+        values: Values,
+        escapes: Escapes,
+    ) -> Result<Self> {
+        Self::part(dictionary, 0, counts, indices, values, escapes)
+    }
+
+    /// [`Self::new`] of a part of a scene, whose first Gaussian errors call number `first`. Escapes are
+    /// numbered from the part's start.
+    pub(crate) fn part(
+        dictionary: &Dictionary,
+        first: usize,
+        counts: Vec<u8>,
+        indices: Indices,
+        values: Values,
+        escapes: Escapes,
+    ) -> Result<Self> {
+        let (dim, atoms) = (dictionary.dim(), dictionary.len());
+        let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
+        let lengths = [("codes.indices", indices.len()), ("codes.values", values.len())];
+        for (name, len) in lengths {
+            if len as u64 != total {
+                return Err(Error::parameter(name, len, format!("{total} entries, the sum of codes.counts")));
+            }
+        }
+        if escapes.rows.len() != escapes.gaussians.len() * dim {
+            let expected = format!("{dim} values for each of {} escapes", escapes.gaussians.len());
+            return Err(Error::parameter("escapes.rows", escapes.rows.len(), expected));
+        }
+        if escapes.rows.iter().any(|v| !v.is_finite()) {
+            return Err(Error::parameter("escapes.rows", "NaN or infinity", "finite values"));
+        }
+        for (k, &g) in escapes.gaussians.iter().enumerate() {
+            let ascending = k == 0 || escapes.gaussians[k - 1] < g;
+            let empty = counts.get(g as usize) == Some(&0);
+            if !ascending || !empty {
+                let expected = "strictly ascending Gaussians without nonzeros";
+                return Err(Error::parameter("escapes.gaussians", first + g as usize, expected));
+            }
+        }
+        let mut start = 0;
+        for (i, &count) in counts.iter().enumerate() {
+            let end = start + usize::from(count);
+            if usize::from(count) > dim {
+                return Err(Error::parameter(
+                    "codes.counts",
+                    count,
+                    format!("at most {dim} (Gaussian {})", first + i),
+                ));
+            }
+            for k in start..end {
+                let index = indices.get(k);
+                if index >= atoms || (k > start && indices.get(k - 1) >= index) {
+                    let expected = format!("ascending atoms below {atoms} (Gaussian {})", first + i);
+                    return Err(Error::parameter("codes.indices", index, expected));
+                }
+            }
+            start = end;
+        }
+        if let Some(k) = (0..values.len()).find(|&k| !values.get(k).is_finite()) {
+            return Err(Error::parameter("codes.values", values.get(k), "finite values"));
+        }
+        let mut checkpoints = Vec::with_capacity(counts.len().div_ceil(CHECKPOINT));
+        let mut offset = 0_u64;
+        for block in counts.chunks(CHECKPOINT) {
+            checkpoints.push(offset);
+            offset += block.iter().map(|&c| u64::from(c)).sum::<u64>();
+        }
+        Ok(Self { counts, checkpoints, indices, values, escapes, dim })
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.counts.len()
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.counts.is_empty()
+    }
+
+    /// Nonzeros of all Gaussians together.
+    #[must_use]
+    pub fn nonzeros(&self) -> usize {
+        self.indices.len()
+    }
+
+    /// Nonzeros of each Gaussian; 0 for an escape.
+    #[must_use]
+    pub fn counts(&self) -> &[u8] {
+        &self.counts
+    }
+
+    /// Atom numbers of all Gaussians, in order.
+    #[must_use]
+    pub fn indices(&self) -> &Indices {
+        &self.indices
+    }
+
+    /// Values of all Gaussians, in order.
+    #[must_use]
+    pub fn values(&self) -> &Values {
+        &self.values
+    }
+
+    /// Bytes these codes take in memory: counts, offsets, indices, values, escapes.
+    #[must_use]
+    pub fn resident_bytes(&self) -> usize {
+        self.counts.len()
+            + size_of_val(self.checkpoints.as_slice())
+            + self.nonzeros() * (self.indices.width() + self.values.width())
+            + size_of_val(self.escapes.gaussians.as_slice())
+            + size_of_val(self.escapes.rows.as_slice())
+    }
+
+    /// The Gaussians stored exactly.
+    #[must_use]
+    pub fn escapes(&self) -> &Escapes {
+        &self.escapes
+    }
+
+    /// What stands for Gaussian `i`.
+    ///
+    /// # Panics
+    /// If `i` is not below [`Self::len`].
+    #[must_use]
+    #[inline]
+    pub fn row(&self, i: usize) -> Row<'_> {
+        let len = usize::from(self.counts[i]);
+        if len == 0 && !self.escapes.gaussians.is_empty() {
+            // Gaussian counts are limited to u32 when codes are made.
+            if let Ok(k) = self.escapes.gaussians.binary_search_by(|&g| (g as usize).cmp(&i)) {
+                return Row::Exact(&self.escapes.rows[k * self.dim..(k + 1) * self.dim]);
+            }
+        }
+        let block = i / CHECKPOINT;
+        let before: usize = self.counts[block * CHECKPOINT..i].iter().map(|&c| usize::from(c)).sum();
+        // The offset counts elements of a vector in memory, so it fits.
+        #[expect(clippy::cast_possible_truncation, reason = "bounded by a Vec's length")]
+        let start = self.checkpoints[block] as usize + before;
+        Row::Code(Column { codes: self, start, len })
+    }
+
+    /// Writes Gaussian `i`'s SH-rest into `out`: exactly the values `decompress` writes.
+    ///
+    /// # Panics
+    /// If `i` is out of range or `out` is not `dictionary.dim()` long.
+    pub fn reconstruct(&self, dictionary: &Dictionary, i: usize, out: &mut [f32]) {
+        match self.row(i) {
+            Row::Exact(row) => out.copy_from_slice(row),
+            Row::Code(column) => reconstruct(dictionary, column.iter(), out),
+        }
+    }
+}
+
+/// The sum of `value * atom` in the order given, one f32 multiply and one f32 add at a time.
+///
+/// This order and rounding are part of the promise: the encoder verifies exactly these values.
+#[inline]
+pub fn reconstruct(dictionary: &Dictionary, code: impl Iterator<Item = (usize, f32)>, out: &mut [f32]) {
+    out.fill(0.0);
+    for (atom, value) in code {
+        for (o, a) in out.iter_mut().zip(dictionary.atom(atom)) {
+            *o += value * a;
+        }
+    }
+}

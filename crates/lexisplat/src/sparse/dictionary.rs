@@ -1,0 +1,92 @@
+//! The dictionary: unit-norm atoms in SH-coefficient space. The type only; see [`mod@crate::learn`].
+
+use crate::scene::sh::ShDegree;
+use crate::support::error::{Error, Result};
+use crate::support::limits::MAX_ATOMS;
+
+/// How far an atom's norm may be from 1: f32 rounding of up to 72 values, with budget.
+pub(crate) const NORM_TOLERANCE: f64 = 1e-5;
+
+/// `len` atoms of `dim` values each, every one of unit norm.
+///
+/// Degree 0 has `dim` 0 and no atoms.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dictionary {
+    degree: ShDegree,
+    atoms: Vec<f32>,
+}
+
+impl Dictionary {
+    /// A dictionary from `atoms`, stored one after the other, each `degree.rest()` long.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the length is not a whole number of atoms, there are none or more than
+    /// [`MAX_ATOMS`] (degree 0: any), or an atom is not finite and of unit norm.
+    pub fn new(degree: ShDegree, atoms: Vec<f32>) -> Result<Self> {
+        let dim = degree.rest();
+        if dim == 0 {
+            if !atoms.is_empty() {
+                return Err(Error::parameter("atoms", atoms.len(), "no values at SH degree 0"));
+            }
+            return Ok(Self { degree, atoms });
+        }
+        if atoms.is_empty() || !atoms.len().is_multiple_of(dim) || atoms.len() / dim > MAX_ATOMS {
+            let expected = format!("1 to {MAX_ATOMS} atoms of {dim} values");
+            return Err(Error::parameter("atoms", format!("{} values", atoms.len()), expected));
+        }
+        for (j, atom) in atoms.chunks_exact(dim).enumerate() {
+            let norm = atom.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
+            if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
+                return Err(Error::parameter("atoms", format!("norm {norm} of atom {j}"), "a unit norm"));
+            }
+        }
+        Ok(Self { degree, atoms })
+    }
+
+    /// The dictionary of a scene without view dependence.
+    #[must_use]
+    pub fn empty() -> Self {
+        Self { degree: ShDegree::ZERO, atoms: Vec::new() }
+    }
+
+    /// SH degree of the vectors it codes.
+    #[must_use]
+    pub fn degree(&self) -> ShDegree {
+        self.degree
+    }
+
+    /// Length of an atom: 0, 9, 24, 45 or 72.
+    #[must_use]
+    pub fn dim(&self) -> usize {
+        self.degree.rest()
+    }
+
+    /// Number of atoms.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.atoms.len().checked_div(self.dim()).unwrap_or(0)
+    }
+
+    /// Whether there are no atoms (degree 0).
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.atoms.is_empty()
+    }
+
+    /// Atom `j`, channel-major as SH-rest is.
+    ///
+    /// # Panics
+    /// If `j` is not below [`Self::len`].
+    #[must_use]
+    #[inline]
+    pub fn atom(&self, j: usize) -> &[f32] {
+        let dim = self.dim();
+        &self.atoms[j * dim..(j + 1) * dim]
+    }
+
+    /// All atoms, one after the other.
+    #[must_use]
+    pub fn as_slice(&self) -> &[f32] {
+        &self.atoms
+    }
+}

@@ -1,0 +1,126 @@
+//! First atoms, replacement of useless ones, and the canonical form of a finished dictionary.
+
+use std::cmp::Reverse;
+
+use super::LearnOptions;
+use super::axes::principal_axes;
+use super::training::Training;
+use super::update::{dot, normalised};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::rng::SplitMix64;
+
+/// Two atoms whose |cos| is over this are one (KSVD-Box, `muthresh`).
+const DUPLICATE_COS: f32 = 0.99;
+/// An atom with fewer users is not worth its place (KSVD-Box, `cleardict`).
+const MIN_USERS: usize = 4;
+/// First atoms should be at most this similar, as long as enough others can be found.
+const FIRST_COS: f32 = 0.9;
+/// Draws per atom while insisting on dissimilar first atoms, and altogether.
+const DRAWS_PER_ATOM: [usize; 2] = [20, 40];
+/// Mixed into the seed, so that the sample and the first atoms are independent.
+const FIRST_STREAM: u64 = 0x46;
+
+fn direction(vector: &[f32]) -> Option<Vec<f32>> {
+    let wide: Vec<f64> = vector.iter().map(|&x| f64::from(x)).collect();
+    normalised(&wide)
+}
+
+/// `atoms` unit vectors: the principal axes, directions of random samples that differ, then whatever is
+/// left, then coordinate axes and random directions when there are too few samples.
+///
+/// Without the principal axes learning ends in worse optima: samples alone share their strongest
+/// directions, and the weak ones, which small tolerances need, are found late or never.
+pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &LearnOptions) -> Vec<f32> {
+    let vectors = sample.len() / dim;
+    let mut rng = SplitMix64::new(options.seed ^ FIRST_STREAM);
+    let mut out: Vec<f32> = Vec::with_capacity(atoms * dim);
+    // At least half must be samples, or a small dictionary would have nothing to tell apart.
+    for axis in principal_axes(dim, sample).iter().take(atoms / 2) {
+        out.extend(normalised(axis).into_iter().flatten());
+    }
+    if vectors > 0 {
+        for draw in 0..DRAWS_PER_ATOM[1] * atoms {
+            if out.len() >= atoms * dim {
+                break;
+            }
+            let i = rng.below(vectors);
+            let Some(candidate) = direction(&sample[i * dim..][..dim]) else { continue };
+            let limit = if draw < DRAWS_PER_ATOM[0] * atoms { FIRST_COS } else { DUPLICATE_COS };
+            if out.chunks_exact(dim).all(|atom| dot(atom, &candidate).abs() <= limit) {
+                out.extend(candidate);
+            }
+        }
+    }
+    for axis in 0..dim {
+        if out.len() < atoms * dim {
+            out.extend((0..dim).map(|d| if d == axis { 1.0 } else { 0.0 }));
+        }
+    }
+    while out.len() < atoms * dim {
+        #[expect(clippy::cast_precision_loss, reason = "any direction will do")]
+        let random: Vec<f64> = (0..dim).map(|_| (rng.next() >> 11) as f64 - (1_u64 << 52) as f64).collect();
+        out.extend(normalised(&random).into_iter().flatten());
+    }
+    out
+}
+
+/// Replaces atoms with few users, and the less used of two alike, by the vectors that cost most.
+pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training: &Training, vectors: &[f32]) {
+    let dim = training.dim;
+    let count = atoms.len() / dim;
+    let mut users = vec![0; count];
+    for &atom in &training.atoms {
+        users[usize::from(atom)] += 1;
+    }
+    let useless: Vec<usize> = (0..count)
+        .filter(|&j| {
+            let rank = |k: usize| (users[k], Reverse(k));
+            let alike = |k: usize| dot(&atoms[j * dim..][..dim], &atoms[k * dim..][..dim]).abs();
+            users[j] < MIN_USERS || (0..count).any(|k| rank(k) > rank(j) && alike(k) > DUPLICATE_COS)
+        })
+        .collect();
+    if useless.is_empty() {
+        return;
+    }
+    // With a tolerance all residuals are about as large; what tells a badly served vector is its count.
+    let mut worst: Vec<(Reverse<usize>, Reverse<u64>, usize)> = (0..training.len())
+        .map(|i| {
+            let residual = &training.residuals[i * dim..][..dim];
+            // Norms are not negative, so their bits order as they do.
+            let error = f64::from(dot(residual, residual).max(0.0)).to_bits();
+            (Reverse(training.starts[i + 1] - training.starts[i]), Reverse(error), i)
+        })
+        .collect();
+    let wanted = useless.len().min(worst.len());
+    if wanted == 0 {
+        return;
+    }
+    worst.select_nth_unstable(wanted - 1);
+    worst.truncate(wanted);
+    worst.sort_unstable();
+    for (j, (_, _, i)) in useless.into_iter().zip(worst) {
+        if let Some(new) = direction(&vectors[i * dim..][..dim]) {
+            atoms[j * dim..][..dim].copy_from_slice(&new);
+            velocity[j * dim..][..dim].fill(0.0);
+        }
+    }
+}
+
+/// The atoms by falling use, each with its largest entry positive.
+pub(super) fn canonical(dictionary: &Dictionary, usage: &[usize]) -> Vec<f32> {
+    let mut order: Vec<usize> = (0..dictionary.len()).collect();
+    order.sort_by_key(|&j| Reverse(usage[j]));
+    let mut out = Vec::with_capacity(dictionary.as_slice().len());
+    for j in order {
+        let atom = dictionary.atom(j);
+        let mut largest = 0.0_f32;
+        for &x in atom {
+            if x.abs() > largest.abs() {
+                largest = x;
+            }
+        }
+        let sign = if largest < 0.0 { -1.0 } else { 1.0 };
+        out.extend(atom.iter().map(|x| sign * x));
+    }
+    out
+}

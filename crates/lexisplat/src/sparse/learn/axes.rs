@@ -1,0 +1,103 @@
+//! Principal axes of a sample: where its energy lies.
+
+/// Vectors that are enough to find the axes.
+const MAX_VECTORS: usize = 16_384;
+/// Passes over all pairs of coordinates; convergence is quadratic, so few are needed.
+const SWEEPS: usize = 12;
+
+/// Eigenvectors of the second moments of `sample` (about zero, not the mean), most energy first; none
+/// for an empty sample.
+///
+/// Cyclic Jacobi rotations in f64: slow beside a library, but exact operations in a fixed order, so the
+/// result is the same everywhere.
+pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
+    if sample.is_empty() {
+        return Vec::new();
+    }
+    let mut moments = vec![vec![0.0_f64; dim]; dim];
+    for vector in sample.chunks_exact(dim).take(MAX_VECTORS) {
+        for (i, row) in moments.iter_mut().enumerate() {
+            let x = f64::from(vector[i]);
+            for (m, y) in row.iter_mut().zip(vector) {
+                *m += x * f64::from(*y);
+            }
+        }
+    }
+    let mut axes: Vec<Vec<f64>> =
+        (0..dim).map(|i| (0..dim).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
+    for _ in 0..SWEEPS {
+        for p in 0..dim {
+            for q in p + 1..dim {
+                rotate(&mut moments, &mut axes, p, q);
+            }
+        }
+    }
+    let mut order: Vec<usize> = (0..dim).collect();
+    order.sort_by(|&a, &b| moments[b][b].total_cmp(&moments[a][a]));
+    order.into_iter().map(|i| axes[i].clone()).collect()
+}
+
+/// Rotates coordinates `p < q` so that their moment becomes zero.
+fn rotate(moments: &mut [Vec<f64>], axes: &mut [Vec<f64>], p: usize, q: usize) {
+    let off = moments[p][q];
+    let theta = (moments[q][q] - moments[p][p]) / (2.0 * off);
+    let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+    // Moments without energy, or already as good as diagonal.
+    if off == 0.0 || !tangent.is_finite() {
+        return;
+    }
+    let cosine = 1.0 / (tangent * tangent + 1.0).sqrt();
+    let sine = tangent * cosine;
+    let turn = |a: f64, b: f64| (cosine * a - sine * b, sine * a + cosine * b);
+    for row in moments.iter_mut() {
+        (row[p], row[q]) = turn(row[p], row[q]);
+    }
+    for matrix in [moments, axes] {
+        let (before, after) = matrix.split_at_mut(q);
+        for (a, b) in before[p].iter_mut().zip(&mut after[0]) {
+            (*a, *b) = turn(*a, *b);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::rng::SplitMix64;
+
+    #[test]
+    fn axes_are_orthonormal_and_diagonalise_the_moments() {
+        let dim = 9;
+        let mut rng = SplitMix64::new(1);
+        let mut noise = || f32::from(u16::try_from(rng.below(2001)).unwrap()) / 1000.0 - 1.0;
+        let mut sample = Vec::new();
+        for _ in 0..500 {
+            let (a, b) = (noise(), noise());
+            sample.extend((0..dim).map(|d| if d % 2 == 0 { a } else { 3.0 * b } + 0.1 * noise()));
+        }
+        let axes = principal_axes(dim, &sample);
+        let energy = |u: &[f64], v: &[f64]| -> f64 {
+            let along = |x: &[f32], w: &[f64]| x.iter().zip(w).map(|(x, w)| f64::from(*x) * w).sum::<f64>();
+            sample.chunks_exact(dim).map(|x| along(x, u) * along(x, v)).sum()
+        };
+        let mut last = f64::INFINITY;
+        for (i, u) in axes.iter().enumerate() {
+            for (j, v) in axes.iter().enumerate() {
+                let dot: f64 = u.iter().zip(v).map(|(x, y)| x * y).sum();
+                assert!((dot - if i == j { 1.0 } else { 0.0 }).abs() < 1e-12, "{i} {j} {dot}");
+                assert!(i == j || energy(u, v).abs() < 1e-6, "{i} {j} {}", energy(u, v));
+            }
+            assert!(energy(u, u) <= last, "most energy comes first");
+            last = energy(u, u);
+        }
+    }
+
+    #[test]
+    fn odd_samples_have_axes() {
+        assert!(principal_axes(9, &[]).is_empty());
+        for sample in [vec![0.0; 18], vec![1e-30; 18], vec![1e19; 9]] {
+            let axes = principal_axes(9, &sample);
+            assert!(axes.iter().flatten().all(|v| v.is_finite()), "{axes:?}");
+        }
+    }
+}

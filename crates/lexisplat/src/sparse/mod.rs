@@ -1,0 +1,8 @@
+//! The method of the paper: a dictionary learned from SH-rest, sparse codes found by a pursuit.
+
+pub(crate) mod codes;
+pub(crate) mod compress;
+pub(crate) mod dictionary;
+pub mod learn;
+pub(crate) mod model;
+pub mod pursuit;

@@ -1,0 +1,206 @@
+//! Coding many vectors: the stopping rule, the value type, and the check that the promise holds.
+
+use half::f16;
+
+use super::greedy::{Plan, Scratch};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::Pursuit;
+use crate::support::error::{Error, Result};
+use crate::support::simd::Simd;
+
+/// Relative distance kept from the tolerance, so that another order of summing f64 squares agrees.
+const PROMISE_MARGIN: f64 = 1e-12;
+/// A vector with a larger squared norm is not coded: f32 squares of its correlations could overflow.
+const MAX_ENERGY: f64 = 1e30;
+/// Below this share of the signal's energy the f32 residual is rounding noise; more atoms add nothing.
+const NOISE_FLOOR: f64 = 1e-12;
+
+/// Precision of the stored values. The error is verified after rounding to it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum ValueType {
+    /// 32-bit float.
+    F32,
+    /// 16-bit float.
+    F16,
+}
+
+/// When a pursuit ends: whichever comes first.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StopRule {
+    tolerance: Option<f64>,
+    max_nonzeros: Option<u8>,
+}
+
+impl StopRule {
+    /// Stops at the un-squared L2 norm `tolerance` of the error, at `max_nonzeros` atoms, or both.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if both are missing, or the tolerance is not finite and above 0.
+    pub fn new(tolerance: Option<f64>, max_nonzeros: Option<u8>) -> Result<Self> {
+        if let Some(tol) = tolerance
+            && (!tol.is_finite() || tol <= 0.0)
+        {
+            return Err(Error::parameter("tol", tol, "a finite number above 0"));
+        }
+        if tolerance.is_none() && max_nonzeros.is_none() {
+            return Err(Error::parameter("tol", "none", "a tolerance, --max-nnz, or both"));
+        }
+        Ok(Self { tolerance, max_nonzeros })
+    }
+
+    /// The tolerance, if any.
+    #[must_use]
+    pub fn tolerance(&self) -> Option<f64> {
+        self.tolerance
+    }
+
+    /// The cap on nonzeros, if any.
+    #[must_use]
+    pub fn max_nonzeros(&self) -> Option<u8> {
+        self.max_nonzeros
+    }
+
+    /// The same stop without the cap.
+    #[must_use]
+    pub fn without_cap(self) -> Self {
+        Self { max_nonzeros: if self.tolerance.is_some() { None } else { self.max_nonzeros }, ..self }
+    }
+}
+
+/// Outcome of coding one vector.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Encoded {
+    /// A code was found; its error in f64 on the values a decoder reconstructs.
+    Code {
+        /// Un-squared L2 norm of the error.
+        error: f64,
+    },
+    /// No code keeps the promise: the vector must be stored exactly.
+    Escape,
+}
+
+/// One coded vector, as [`Coder::encode`] shows it.
+#[derive(Debug, Clone, Copy)]
+pub struct Visit<'a> {
+    /// The vector.
+    pub signal: &'a [f32],
+    /// Its (atom, value) pairs by ascending atom, values already rounded; meaningless for an escape.
+    pub code: &'a [(u16, f32)],
+    /// How it went.
+    pub outcome: Encoded,
+    reconstruction: &'a [f32],
+}
+
+impl Visit<'_> {
+    /// What a decoder makes of the code, as long as the vector.
+    #[must_use]
+    pub fn reconstruction(&self) -> &[f32] {
+        &self.reconstruction[..self.signal.len()]
+    }
+}
+
+/// The loop of [`Coder::encode`] as a value: a closure would not be inlined into the dispatch, and would
+/// then be compiled without its instructions.
+struct Job<'a, F> {
+    coder: &'a Coder,
+    signals: &'a [f32],
+    scratch: &'a mut Scratch,
+    code: &'a mut Vec<(u16, f32)>,
+    sink: &'a mut F,
+}
+
+impl<F: FnMut(Visit<'_>)> pulp::NullaryFnOnce for Job<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { coder, signals, scratch, code, sink } = self;
+        for signal in signals.chunks_exact(coder.plan.dim()) {
+            let outcome = coder.encode_one(scratch, signal, code);
+            sink(Visit { signal, code, outcome, reconstruction: scratch.reconstruction() });
+        }
+    }
+}
+
+/// Codes vectors over one dictionary. Shared by all threads; each makes its own workspace.
+#[derive(Debug)]
+pub struct Coder {
+    plan: Plan,
+    pursuit: Pursuit,
+    stop: StopRule,
+    values: ValueType,
+    simd: Simd,
+}
+
+impl Coder {
+    /// A coder over `dictionary`.
+    #[must_use]
+    pub fn new(dictionary: &Dictionary, pursuit: Pursuit, stop: StopRule, values: ValueType) -> Self {
+        Self::with_simd(dictionary, pursuit, stop, values, Simd::detect())
+    }
+
+    /// A coder that uses the given instructions.
+    pub(super) fn with_simd(
+        dictionary: &Dictionary,
+        pursuit: Pursuit,
+        stop: StopRule,
+        values: ValueType,
+        simd: Simd,
+    ) -> Self {
+        Self { plan: Plan::new(dictionary), pursuit, stop, values, simd }
+    }
+
+    /// Codes the vectors in `signals`, each as long as an atom, and hands each result to `sink`, in order.
+    ///
+    /// # Panics
+    /// If the dictionary is empty (degree 0).
+    pub fn encode(&self, signals: &[f32], mut sink: impl FnMut(Visit<'_>)) {
+        let mut scratch = self.plan.scratch();
+        let mut code = Vec::with_capacity(self.plan.dim());
+        // Compiles the loop once per vector width; the arithmetic is the same in each.
+        self.simd.run(Job { coder: self, signals, scratch: &mut scratch, code: &mut code, sink: &mut sink });
+    }
+
+    #[inline(always)]
+    fn encode_one(&self, s: &mut Scratch, signal: &[f32], code: &mut Vec<(u16, f32)>) -> Encoded {
+        code.clear();
+        let error = self.plan.error(s, signal, code);
+        let promise = self.stop.tolerance.map_or(0.0, |t| t * (1.0 - PROMISE_MARGIN));
+        if error <= promise || self.stop.max_nonzeros == Some(0) {
+            return Encoded::Code { error };
+        }
+        let energy = error * error;
+        if energy.is_nan() || energy > MAX_ENERGY {
+            return Encoded::Escape;
+        }
+        let cap = self.stop.max_nonzeros.map_or(self.plan.dim(), usize::from);
+        let target = (promise * promise).max(energy * NOISE_FLOOR);
+        self.plan.start(s, signal, energy);
+        loop {
+            // At least one atom more than last time: the check below found the recurrence too optimistic,
+            // or rounding to the value type cost the rest.
+            let mut exhausted = false;
+            loop {
+                exhausted |= s.len() >= cap || !self.plan.step(s, self.pursuit);
+                if exhausted || s.energy() <= target {
+                    break;
+                }
+            }
+            self.plan.solve(s, code);
+            if self.values == ValueType::F16 {
+                for (_, value) in code.iter_mut() {
+                    *value = f16::from_f32(*value).to_f32();
+                }
+            }
+            code.retain(|&(_, value)| value != 0.0);
+            let error = self.plan.error(s, signal, code);
+            if error <= promise {
+                return Encoded::Code { error };
+            }
+            if exhausted {
+                let capped = self.stop.max_nonzeros.is_some() && error.is_finite();
+                return if capped { Encoded::Code { error } } else { Encoded::Escape };
+            }
+        }
+    }
+}

@@ -1,0 +1,390 @@
+//! The inner loop of the pursuit: choosing atoms for one vector.
+
+use crate::scene::sh::MAX_REST;
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::Pursuit;
+
+/// Atoms handled together; the padding unit of every per-atom array. Fixed, so that results do not depend
+/// on the CPU's vector width.
+pub(super) const LANES: usize = 16;
+
+/// An atom whose squared distance to the chosen span is below this is as good as inside it: what f32
+/// recurrences say about its direction is noise.
+const MIN_SPAN_DISTANCE: f32 = 1e-5;
+
+/// `LANES` neighbouring entries of a per-atom array, aligned to a cache line.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct Lane(pub(super) [f32; LANES]);
+
+const ZERO: Lane = Lane([0.0; LANES]);
+
+impl Lane {
+    /// `f` of every entry. One operation over one array at a time is what the compiler vectorises.
+    #[inline(always)]
+    fn map(mut self, f: impl Fn(f32) -> f32) -> Self {
+        for x in &mut self.0 {
+            *x = f(*x);
+        }
+        self
+    }
+
+    /// `f` of every pair of entries.
+    #[inline(always)]
+    fn zip(mut self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        for (x, y) in self.0.iter_mut().zip(&other.0) {
+            *x = f(*x, *y);
+        }
+        self
+    }
+}
+
+/// What a dictionary needs precomputed: its transpose, its Gram matrix, and padded atoms.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// Lanes of one per-atom array.
+    blocks: usize,
+    /// Lanes of one atom.
+    atom_blocks: usize,
+    dim: usize,
+    /// `dim` rows of `blocks` lanes: entry (d, j) is coefficient d of atom j.
+    transposed: Vec<Lane>,
+    /// `atoms` rows of `blocks` lanes: inner products of atoms, 0 in the padding.
+    gram: Vec<Lane>,
+    /// `atoms` rows of `atom_blocks` lanes: the atoms, 0 in the padding.
+    padded: Vec<Lane>,
+}
+
+/// Working memory for one vector at a time; reused.
+#[derive(Debug)]
+pub(super) struct Scratch {
+    /// Inner products of the residual with every atom.
+    correlations: Vec<Lane>,
+    /// Squared distance of every atom to the chosen span; infinite once chosen or inside it.
+    distances: Vec<Lane>,
+    /// Row k: inner products of every atom with the k-th orthonormal direction.
+    directions: Vec<Lane>,
+    /// Column l: coordinates of the l-th chosen atom in the orthonormal basis, without its last one.
+    triangle: Vec<f32>,
+    /// Last coordinate of each chosen atom.
+    diagonal: [f32; MAX_REST],
+    /// Coordinates of the signal in the orthonormal basis.
+    amplitudes: [f32; MAX_REST],
+    chosen: [u16; MAX_REST],
+    len: usize,
+    /// Squared norm of the residual, by the recurrence.
+    energy: f64,
+    work: [f32; MAX_REST],
+    reconstruction: [f32; MAX_REST.next_multiple_of(LANES)],
+}
+
+impl Plan {
+    pub(super) fn new(dictionary: &Dictionary) -> Self {
+        let (dim, atoms) = (dictionary.dim(), dictionary.len());
+        let (blocks, atom_blocks) = (atoms.div_ceil(LANES), dim.div_ceil(LANES));
+        let mut transposed = vec![ZERO; dim * blocks];
+        let mut gram = vec![ZERO; atoms * blocks];
+        let mut padded = vec![ZERO; atoms * atom_blocks];
+        for j in 0..atoms {
+            let atom = dictionary.atom(j);
+            for (d, &value) in atom.iter().enumerate() {
+                transposed[d * blocks + j / LANES].0[j % LANES] = value;
+                padded[j * atom_blocks + d / LANES].0[d % LANES] = value;
+            }
+            for i in 0..atoms {
+                let product: f64 =
+                    atom.iter().zip(dictionary.atom(i)).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
+                #[expect(clippy::cast_possible_truncation, reason = "the Gram matrix is kept in f32")]
+                let product = product as f32;
+                gram[j * blocks + i / LANES].0[i % LANES] = product;
+            }
+        }
+        Self { blocks, atom_blocks, dim, transposed, gram, padded }
+    }
+
+    pub(super) fn scratch(&self) -> Scratch {
+        Scratch {
+            correlations: vec![ZERO; self.blocks],
+            distances: vec![ZERO; self.blocks],
+            directions: vec![ZERO; self.dim * self.blocks],
+            triangle: vec![0.0; MAX_REST * MAX_REST],
+            diagonal: [0.0; MAX_REST],
+            amplitudes: [0.0; MAX_REST],
+            chosen: [0; MAX_REST],
+            len: 0,
+            energy: 0.0,
+            work: [0.0; MAX_REST],
+            reconstruction: [0.0; MAX_REST.next_multiple_of(LANES)],
+        }
+    }
+
+    /// Starts on `signal`, whose squared norm is `energy`.
+    #[inline(always)]
+    pub(super) fn start(&self, s: &mut Scratch, signal: &[f32], energy: f64) {
+        s.correlations.fill(ZERO);
+        accumulate(&mut s.correlations, signal, &self.transposed, self.blocks, |sum, x, t| sum + x * t);
+        s.distances.fill(Lane([1.0; LANES]));
+        s.len = 0;
+        s.energy = energy;
+    }
+
+    /// Chooses one more atom. `false` if none helps, or all `dim` are taken.
+    #[inline(always)]
+    pub(super) fn step(&self, s: &mut Scratch, pursuit: Pursuit) -> bool {
+        let k = s.len;
+        if k >= self.dim {
+            return false;
+        }
+        let Some(best) = (match pursuit {
+            Pursuit::Ols => best_ratio(&s.correlations, &s.distances),
+            Pursuit::Omp => best_correlation(&s.correlations),
+        }) else {
+            return false;
+        };
+        let (block, lane, blocks) = (best / LANES, best % LANES, self.blocks);
+        let length = s.distances[block].0[lane].sqrt();
+        let amplitude = s.correlations[block].0[lane] / length;
+        let column = &mut s.triangle[k * MAX_REST..k * MAX_REST + k];
+        for (coordinate, direction) in column.iter_mut().zip(s.directions.chunks_exact(blocks)) {
+            *coordinate = direction[block].0[lane];
+        }
+        let (previous, new) = s.directions.split_at_mut(k * blocks);
+        let gram = &self.gram[best * blocks..(best + 1) * blocks];
+        let new = &mut new[..blocks];
+        for (u, g) in new.iter_mut().zip(gram) {
+            *u = *g;
+        }
+        accumulate(new, column, previous, blocks, |sum, c, u| sum - c * u);
+        let inverse = 1.0 / length;
+        for ((u, r), n) in new.iter_mut().zip(&mut s.correlations).zip(&mut s.distances) {
+            *u = u.map(|x| x * inverse);
+            let distance = n.zip(*u, |n, x| n - x * x);
+            let correlation = r.zip(*u, |r, x| r - amplitude * x);
+            *n = distance.map(|n| if n > MIN_SPAN_DISTANCE { n } else { f32::INFINITY });
+            *r = correlation.zip(distance, |r, n| if n > MIN_SPAN_DISTANCE { r } else { 0.0 });
+        }
+        // Rounding must not leave a chosen atom in play.
+        s.distances[block].0[lane] = f32::INFINITY;
+        s.correlations[block].0[lane] = 0.0;
+        s.diagonal[k] = length;
+        s.amplitudes[k] = amplitude;
+        #[expect(clippy::cast_possible_truncation, reason = "a dictionary has at most 1024 atoms")]
+        {
+            s.chosen[k] = best as u16;
+        }
+        s.len = k + 1;
+        s.energy -= f64::from(amplitude) * f64::from(amplitude);
+        true
+    }
+
+    /// Least-squares coefficients of the chosen atoms, by ascending atom, into `code`.
+    #[inline(always)]
+    pub(super) fn solve(&self, s: &mut Scratch, code: &mut Vec<(u16, f32)>) {
+        let k = s.len;
+        let right = &mut s.work[..k];
+        right.copy_from_slice(&s.amplitudes[..k]);
+        code.clear();
+        for l in (0..k).rev() {
+            let value = right[l] / s.diagonal[l];
+            let column = &s.triangle[l * MAX_REST..l * MAX_REST + l];
+            for (r, &c) in right[..l].iter_mut().zip(column) {
+                *r -= c * value;
+            }
+            code.push((s.chosen[l], value));
+        }
+        // A dozen entries: an insertion sort beats the general one.
+        for i in 1..code.len() {
+            let mut j = i;
+            while j > 0 && code[j - 1].0 > code[j].0 {
+                code.swap(j - 1, j);
+                j -= 1;
+            }
+        }
+    }
+
+    /// Distance of `signal` from what [`crate::sparse::codes::reconstruct`] makes of `code`, in f64.
+    #[inline(always)]
+    pub(super) fn error(&self, s: &mut Scratch, signal: &[f32], code: &[(u16, f32)]) -> f64 {
+        match self.atom_blocks {
+            1 => self.reconstruct::<1>(s, code),
+            2 => self.reconstruct::<2>(s, code),
+            3 => self.reconstruct::<3>(s, code),
+            _ => self.reconstruct::<{ MAX_REST.div_ceil(LANES) }>(s, code),
+        }
+        squared_distance(signal, &s.reconstruction).sqrt()
+    }
+
+    /// The same sums as [`crate::sparse::codes::reconstruct`], `BLOCKS` lanes at a time.
+    #[inline(always)]
+    fn reconstruct<const BLOCKS: usize>(&self, s: &mut Scratch, code: &[(u16, f32)]) {
+        let mut sums = [ZERO; BLOCKS];
+        let stride = self.atom_blocks;
+        for &(atom, value) in code {
+            let atom = &self.padded[usize::from(atom) * stride..][..stride];
+            for (sum, lane) in sums.iter_mut().zip(atom) {
+                *sum = sum.zip(*lane, |s, a| s + value * a);
+            }
+        }
+        for (out, sum) in s.reconstruction.chunks_exact_mut(LANES).zip(&sums) {
+            out.copy_from_slice(&sum.0);
+        }
+    }
+
+    pub(super) fn dim(&self) -> usize {
+        self.dim
+    }
+}
+
+impl Scratch {
+    pub(super) fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// The atoms chosen so far, in order.
+    #[cfg(test)]
+    pub(super) fn chosen(&self) -> &[u16] {
+        &self.chosen[..self.len]
+    }
+
+    /// The vector [`Plan::error`] made last, padded with zeros.
+    pub(super) fn reconstruction(&self) -> &[f32] {
+        &self.reconstruction
+    }
+}
+
+/// Sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
+#[inline(always)]
+pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
+    const PARTS: usize = 8;
+    let mut sums = [0.0_f64; PARTS];
+    let b = &b[..a.len()];
+    let (a_chunks, b_chunks) = (a.chunks_exact(PARTS), b.chunks_exact(PARTS));
+    for (i, (x, y)) in a_chunks.remainder().iter().zip(b_chunks.remainder()).enumerate() {
+        let difference = f64::from(*x) - f64::from(*y);
+        sums[i] += difference * difference;
+    }
+    for (x, y) in a_chunks.zip(b_chunks) {
+        for i in 0..PARTS {
+            let difference = f64::from(x[i]) - f64::from(y[i]);
+            sums[i] += difference * difference;
+        }
+    }
+    ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
+}
+
+/// Folds `factors[l]` and row l of `rows`, each `blocks` lanes long, into `sums`, in order of l.
+///
+/// Works on as many lanes at once as the registers hold, so that `sums` is read and written once.
+#[inline(always)]
+fn accumulate(
+    sums: &mut [Lane],
+    factors: &[f32],
+    rows: &[Lane],
+    blocks: usize,
+    f: impl Fn(f32, f32, f32) -> f32 + Copy,
+) {
+    let mut done = 0;
+    while done + 6 <= sums.len() {
+        accumulate_group::<6>(&mut sums[done..], factors, rows, blocks, done, f);
+        done += 6;
+    }
+    while done + 2 <= sums.len() {
+        accumulate_group::<2>(&mut sums[done..], factors, rows, blocks, done, f);
+        done += 2;
+    }
+    if done < sums.len() {
+        accumulate_group::<1>(&mut sums[done..], factors, rows, blocks, done, f);
+    }
+}
+
+#[inline(always)]
+fn accumulate_group<const GROUP: usize>(
+    sums: &mut [Lane],
+    factors: &[f32],
+    rows: &[Lane],
+    blocks: usize,
+    offset: usize,
+    f: impl Fn(f32, f32, f32) -> f32 + Copy,
+) {
+    // Arrays of a known length, so that the group stays in registers and nothing is checked in the loop.
+    let Some(sums) = sums.first_chunk_mut::<GROUP>() else { return };
+    let mut group = *sums;
+    for (l, &factor) in factors.iter().enumerate() {
+        let Some(row) = rows.get(l * blocks + offset..).and_then(<[Lane]>::first_chunk::<GROUP>) else {
+            return;
+        };
+        for g in 0..GROUP {
+            for i in 0..LANES {
+                group[g].0[i] = f(group[g].0[i], factor, row[g].0[i]);
+            }
+        }
+    }
+    *sums = group;
+}
+
+/// The atom with the largest `correlation^2 / distance`: the one that lowers the residual most.
+///
+/// Lanes compare by cross-multiplication, which is cheaper than dividing every entry.
+#[inline(always)]
+fn best_ratio(correlations: &[Lane], distances: &[Lane]) -> Option<usize> {
+    let mut gains = [0.0_f32; LANES];
+    let mut spans = [1.0_f32; LANES];
+    let mut blocks = [0_u32; LANES];
+    for (number, (r, n)) in (0_u32..).zip(correlations.iter().zip(distances)) {
+        for i in 0..LANES {
+            let gain = r.0[i] * r.0[i];
+            let better = gain * spans[i] > gains[i] * n.0[i];
+            gains[i] = if better { gain } else { gains[i] };
+            spans[i] = if better { n.0[i] } else { spans[i] };
+            blocks[i] = if better { number } else { blocks[i] };
+        }
+    }
+    for i in 0..LANES {
+        gains[i] /= spans[i];
+    }
+    first_maximum(&gains, &blocks)
+}
+
+/// The atom with the largest `correlation^2`; those in the span have 0.
+#[inline(always)]
+fn best_correlation(correlations: &[Lane]) -> Option<usize> {
+    let mut gains = [0.0_f32; LANES];
+    let mut blocks = [0_u32; LANES];
+    for (number, r) in (0_u32..).zip(correlations) {
+        for i in 0..LANES {
+            let gain = r.0[i] * r.0[i];
+            let better = gain > gains[i];
+            gains[i] = if better { gain } else { gains[i] };
+            blocks[i] = if better { number } else { blocks[i] };
+        }
+    }
+    first_maximum(&gains, &blocks)
+}
+
+/// Atom of the first lane that holds the maximum, if that is above 0.
+#[inline(always)]
+fn first_maximum(gains: &[f32; LANES], blocks: &[u32; LANES]) -> Option<usize> {
+    let mut fold = *gains;
+    let mut width = LANES / 2;
+    while width > 0 {
+        for i in 0..width {
+            fold[i] = if fold[i + width] > fold[i] { fold[i + width] } else { fold[i] };
+        }
+        width /= 2;
+    }
+    let maximum = fold[0];
+    let mut mask = 0_u32;
+    for (i, &gain) in gains.iter().enumerate() {
+        mask |= u32::from(gain == maximum) << i;
+    }
+    if maximum > 0.0 && mask != 0 {
+        let lane = mask.trailing_zeros() as usize;
+        Some(blocks[lane % LANES] as usize * LANES + lane)
+    } else {
+        None
+    }
+}

@@ -1,0 +1,219 @@
+//! Limits on what a file may ask for, checked before anything is allocated.
+
+use crate::scene::sh::MAX_REST;
+use crate::support::error::{Error, Result};
+
+/// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
+pub const MAX_ATOMS: usize = 1024;
+/// Most Gaussians of a scene: their numbers are u32, and one more is counted.
+pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64 - 1;
+/// Most bytes of arrays for each byte of a file. The most that a valid file has is 172: a byte of a packed one
+/// is at most 3 Gaussians of 57 bytes, and an offset is kept for every 64.
+const EXPANSION: u64 = 256;
+/// Most bytes of a header. That of a packed scene of 2^32 Gaussians is some kilobytes.
+const HEADER_BYTES: u64 = 4 << 20;
+/// Most properties of an element. INRIA's layout of SH degree 4 has 89.
+const PROPERTIES: u64 = 4096;
+
+/// How much a file may ask for.
+///
+/// A reader allocates at most a constant times the file's own size, whatever the header says: counts are
+/// compared with the bytes present first. The constant is small but for packed files, where a byte may
+/// stand for 3 Gaussians of some hundred bytes. These limits come on top of that. By default every valid file
+/// is within them; for files of unknown origin lower [`Self::gaussians`] or [`Self::bytes`]:
+///
+/// ```
+/// use lexisplat::{Error, Limits, lexi};
+///
+/// let small = Limits::default().with_gaussians(1000).with_bytes(64 << 20);
+/// # let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(2000, 0));
+/// # let (model, _) = lexisplat::compress(splats, &Default::default(), &lexisplat::Silent)?;
+/// # let mut file = Vec::new();
+/// # lexi::write_to(&mut file, &model)?;
+/// let refused = lexi::read_bytes("scene.lexi", &file, &small); // a scene of 2000
+/// assert!(matches!(refused, Err(Error::Limit { found: 2000, limit: 1000, .. })));
+/// # Ok::<(), Error>(())
+/// ```
+///
+/// What is over a limit is an [`Error::Limit`] that names the file and the limit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Limits {
+    /// Most Gaussians in a scene. Default `u32::MAX - 1`, since indices are stored as u32; more are refused
+    /// whatever this says.
+    pub gaussians: u64,
+    /// Most atoms in a dictionary. Default [`MAX_ATOMS`]; more are refused whatever this says.
+    pub atoms: u64,
+    /// Most nonzeros of one Gaussian. Default 72, the dimension at SH degree 4; more than the dimension are
+    /// refused whatever this says.
+    pub nonzeros: u64,
+    /// Most bytes of arrays made of one file and held at once: geometry, SH or codes, extra properties, and what
+    /// of a packed file is kept. The dictionary is not counted, since `atoms` bounds it. A reader of whole scenes
+    /// holds the scene; one that goes part by part ([`ply::PlyChunks`](crate::formats::ply::PlyChunks),
+    /// [`lexi::LexiChunks`](crate::formats::lexi::LexiChunks)) a part. What a reader needs for itself may be twice as much
+    /// again. Also most bytes of a file that has to be held because it cannot be mapped, such as a pipe. Default
+    /// `u64::MAX`: none but the machine's.
+    pub bytes: u64,
+    /// Most of the same bytes for each byte of the file. Default 256; a valid file has at most 172.
+    pub expansion: u64,
+    /// Most bytes of a text header (PLY) or JSON header (.lexi). Default 4 MiB.
+    pub header_bytes: u64,
+    /// Most properties of one PLY element. Default 4096.
+    pub properties: u64,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            gaussians: MAX_GAUSSIANS,
+            atoms: MAX_ATOMS as u64,
+            nonzeros: MAX_REST as u64,
+            bytes: u64::MAX,
+            expansion: EXPANSION,
+            header_bytes: HEADER_BYTES,
+            properties: PROPERTIES,
+        }
+    }
+}
+
+impl Limits {
+    /// The names of all limits, as [`Self::with`] takes them and errors give them.
+    pub const NAMES: [&'static str; 7] =
+        ["gaussians", "atoms", "nonzeros", "bytes", "expansion", "header_bytes", "properties"];
+
+    /// The same with another [`Self::gaussians`].
+    #[must_use]
+    pub fn with_gaussians(self, gaussians: u64) -> Self {
+        Self { gaussians, ..self }
+    }
+
+    /// The same with another [`Self::atoms`].
+    #[must_use]
+    pub fn with_atoms(self, atoms: u64) -> Self {
+        Self { atoms, ..self }
+    }
+
+    /// The same with another [`Self::nonzeros`].
+    #[must_use]
+    pub fn with_nonzeros(self, nonzeros: u64) -> Self {
+        Self { nonzeros, ..self }
+    }
+
+    /// The same with another [`Self::bytes`].
+    #[must_use]
+    pub fn with_bytes(self, bytes: u64) -> Self {
+        Self { bytes, ..self }
+    }
+
+    /// The same with another [`Self::expansion`].
+    #[must_use]
+    pub fn with_expansion(self, expansion: u64) -> Self {
+        Self { expansion, ..self }
+    }
+
+    /// The same with another [`Self::header_bytes`].
+    #[must_use]
+    pub fn with_header_bytes(self, header_bytes: u64) -> Self {
+        Self { header_bytes, ..self }
+    }
+
+    /// The same with another [`Self::properties`].
+    #[must_use]
+    pub fn with_properties(self, properties: u64) -> Self {
+        Self { properties, ..self }
+    }
+
+    /// The same with another limit `name`, one of [`Self::NAMES`].
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for any other name.
+    pub fn with(self, name: &str, value: u64) -> Result<Self> {
+        Ok(match name {
+            "gaussians" => self.with_gaussians(value),
+            "atoms" => self.with_atoms(value),
+            "nonzeros" => self.with_nonzeros(value),
+            "bytes" => self.with_bytes(value),
+            "expansion" => self.with_expansion(value),
+            "header_bytes" => self.with_header_bytes(value),
+            "properties" => self.with_properties(value),
+            _ => return Err(Error::parameter("limit", name, format!("one of {}", Self::NAMES.join(", ")))),
+        })
+    }
+
+    /// `Ok` if `found <= limit`, else an [`Error::Limit`] that names `what`: of one that cannot be raised.
+    pub(crate) fn check(what: &str, found: u64, limit: u64) -> Result<()> {
+        if found <= limit { Ok(()) } else { Err(Error::limit(what, found, limit, None)) }
+    }
+
+    /// More than [`MAX_GAUSSIANS`] are refused whatever the limit.
+    pub(crate) fn check_gaussians(&self, file: &str, found: u64) -> Result<()> {
+        Self::check(&format!("Gaussians in {file}"), found, MAX_GAUSSIANS)?;
+        raisable("Gaussians in", file, found, self.gaussians, "gaussians")
+    }
+
+    /// More than [`MAX_ATOMS`] are damage, and for others to refuse.
+    pub(crate) fn check_atoms(&self, file: &str, found: u64) -> Result<()> {
+        let found = if found > MAX_ATOMS as u64 { 0 } else { found };
+        raisable("atoms in the dictionary of", file, found, self.atoms, "atoms")
+    }
+
+    /// Of Gaussian number `gaussian`. More than any dimension are damage, and for others to refuse.
+    pub(crate) fn check_nonzeros(&self, file: &str, gaussian: usize, found: u64) -> Result<()> {
+        let found = if found > MAX_REST as u64 { 0 } else { found };
+        let what = format!("nonzeros of Gaussian {gaussian} in");
+        raisable(&what, file, found, self.nonzeros, "nonzeros")
+    }
+
+    /// Of a file that is held, not mapped.
+    pub(crate) fn check_file(&self, file: &str, found: u64) -> Result<()> {
+        raisable("bytes of", file, found, self.bytes, "bytes")
+    }
+
+    pub(crate) fn check_header(&self, file: &str, found: u64) -> Result<()> {
+        raisable("bytes in the header of", file, found, self.header_bytes, "header_bytes")
+    }
+
+    /// Of one element.
+    pub(crate) fn check_properties(&self, file: &str, found: u64) -> Result<()> {
+        raisable("properties of an element of", file, found, self.properties, "properties")
+    }
+}
+
+fn raisable(what: &str, file: &str, found: u64, limit: u64, name: &'static str) -> Result<()> {
+    if found <= limit {
+        Ok(())
+    } else {
+        Err(Error::limit(format!("{what} {file}"), found, limit, Some(name)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_sets_its_own_limit() {
+        let fields = |l: Limits| {
+            [l.gaussians, l.atoms, l.nonzeros, l.bytes, l.expansion, l.header_bytes, l.properties]
+        };
+        let before = fields(Limits::default());
+        for (k, name) in Limits::NAMES.into_iter().enumerate() {
+            let mut expected = before;
+            expected[k] = 77;
+            assert_eq!(fields(Limits::default().with(name, 77).unwrap()), expected, "{name}");
+        }
+        let error = Limits::default().with("gaussian", 1).unwrap_err().to_string();
+        assert!(error.contains("limit = gaussian") && error.contains("header_bytes"), "{error}");
+    }
+
+    #[test]
+    fn errors_say_what_raises_a_limit() {
+        let limits = Limits::default().with_gaussians(5);
+        assert!(limits.check_gaussians("a.ply", 5).is_ok());
+        assert_eq!(
+            limits.check_gaussians("a.ply", 6).unwrap_err().to_string(),
+            "Gaussians in a.ply: 6 is over the limit of 5; if you trust the file, raise it with --limit gaussians=N"
+        );
+        assert_eq!(Limits::check("pies", 6, 5).unwrap_err().to_string(), "pies: 6 is over the limit of 5");
+    }
+}

@@ -1,0 +1,81 @@
+//! How much of a file may be held at once.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use crate::support::error::{Error, Result};
+use crate::support::limits::Limits;
+
+/// Bytes of a Gaussian's position, base colour, opacity, scales and rotation.
+pub(crate) const GEOMETRY_BYTES: usize = (3 + 3 + 1 + 3 + 4) * size_of::<f32>();
+/// Bytes of its number of nonzeros.
+pub(crate) const COUNT_BYTES: usize = 1;
+
+/// What [`Limits::bytes`] and [`Limits::expansion`] leave for the arrays made of one file. Threads share it.
+#[derive(Debug)]
+pub(crate) struct MemoryBudget<'a> {
+    file: &'a str,
+    file_bytes: u64,
+    limit: u64,
+    /// Which limit it is: the smaller one.
+    name: &'static str,
+    used: AtomicU64,
+}
+
+impl<'a> MemoryBudget<'a> {
+    /// For `file`, as the caller named it, of `file_bytes`.
+    pub(crate) fn new(limits: &Limits, file: &'a str, file_bytes: u64) -> Self {
+        let expanded = limits.expansion.saturating_mul(file_bytes);
+        let (limit, name) =
+            if expanded < limits.bytes { (expanded, "expansion") } else { (limits.bytes, "bytes") };
+        Self { file, file_bytes, limit, name, used: AtomicU64::new(0) }
+    }
+
+    /// Takes room for `count` things of `each` bytes, before they are allocated.
+    pub(crate) fn take(&self, count: usize, each: usize) -> Result<()> {
+        let bytes = (count as u64).saturating_mul(each as u64);
+        let used = self.used.load(Relaxed).saturating_add(bytes);
+        self.used.store(used, Relaxed);
+        if used <= self.limit { Ok(()) } else { Err(self.error(used, "")) }
+    }
+
+    /// [`Self::take`] where several threads take: whether there was budget.
+    pub(crate) fn grow(&self, count: usize, each: usize) -> bool {
+        let bytes = (count as u64).saturating_mul(each as u64);
+        self.used.fetch_add(bytes, Relaxed).saturating_add(bytes) <= self.limit
+    }
+
+    /// What to say after [`Self::grow`] found none. How much is missing is not known, and which thread notices
+    /// is chance; the text is always the same.
+    pub(crate) fn full(&self) -> Error {
+        self.error(self.limit.saturating_add(1), " (at least)")
+    }
+
+    fn error(&self, found: u64, suffix: &str) -> Error {
+        let of =
+            if self.name == "expansion" { format!("the {} of ", self.file_bytes) } else { String::new() };
+        let what = format!("bytes of arrays for {of}{}{suffix}", self.file);
+        Error::limit(what, found, self.limit, Some(self.name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_smaller_limit_counts_and_is_named() {
+        let limits = Limits::default().with_bytes(1000).with_expansion(3);
+        let budget = MemoryBudget::new(&limits, "a.lexi", 100);
+        assert!(budget.take(50, 4).is_ok() && budget.grow(25, 4) && !budget.grow(1, 1));
+        let said = budget.full().to_string();
+        let expected =
+            "bytes of arrays for the 100 of a.lexi (at least): 301 is over the limit of 300; if you trust ";
+        assert!(said.starts_with(expected) && said.ends_with("--limit expansion=N"), "{said}");
+        let budget = MemoryBudget::new(&limits, "a.lexi", 1000);
+        assert!(budget.take(1, 1000).is_ok());
+        let said = budget.take(1, 1).unwrap_err().to_string();
+        assert!(said.starts_with("bytes of arrays for a.lexi: 1001 is over the limit of 1000; "), "{said}");
+        let none = MemoryBudget::new(&Limits::default().with_expansion(u64::MAX), "a.lexi", u64::MAX);
+        assert!(none.take(usize::MAX, usize::MAX).is_ok());
+    }
+}

@@ -1,0 +1,16 @@
+//! What all other modules use: errors, limits, input and output, threads, vector instructions.
+
+pub(crate) mod error;
+pub(crate) mod input;
+pub(crate) mod limits;
+pub(crate) mod maths;
+pub(crate) mod memory_budget;
+pub mod output;
+pub(crate) mod parallel;
+pub(crate) mod progress;
+pub(crate) mod rng;
+pub mod simd;
+pub(crate) mod spill;
+pub(crate) mod stopwatch;
+#[cfg(test)]
+pub(crate) mod testing;
