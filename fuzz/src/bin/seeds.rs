@@ -11,11 +11,11 @@ use std::path::{Path, PathBuf};
 
 use lexisplat::packed::fuzzing::parts;
 use lexisplat::packed::{PackOptions, Packer, TargetRecord};
-use lexisplat_sample::{SampleOptions, scene};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
 use lexisplat_render::{Camera, orbit};
+use lexisplat_sample::{SampleOptions, scene};
 // What the build with coverage calls.
 use libfuzzer_sys as _;
 

@@ -53,7 +53,7 @@ fn a_file_holds_comments_marks_and_promise() {
     let Contents::Packed(read) = lexi::open(&path, &Limits::default()).unwrap() else {
         panic!("it is packed");
     };
-    assert_eq!((&read.meta, &read.promise), (&splats.meta, &packed.target));
+    assert_eq!((&read.meta, &read.target), (&splats.meta, &packed.target));
     assert_eq!(lexi::read(&path, &Limits::default()).unwrap().meta, splats.meta);
 }
 
