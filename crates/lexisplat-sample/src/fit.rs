@@ -109,7 +109,7 @@ pub(crate) fn add_training_noise(rest: &mut [f64; REST], amount: f64, random: &m
 
 #[cfg(test)]
 mod tests {
-    use crate::*;
+    use super::*;
 
     #[test]
     fn a_function_of_degree_three_is_found_exactly() {

@@ -109,7 +109,7 @@ pub(crate) fn ln(x: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::*;
+    use super::*;
 
     #[test]
     fn own_functions_agree_with_the_library() {

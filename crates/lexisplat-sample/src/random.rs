@@ -69,7 +69,7 @@ pub(crate) fn value_noise(p: [f64; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::*;
+    use super::*;
 
     #[test]
     fn streams_are_uniform_and_unrelated() {

@@ -273,7 +273,7 @@ pub(crate) fn reflect(v: Vec3, n: Vec3) -> Vec3 {
 
 #[cfg(test)]
 mod tests {
-    use crate::*;
+    use super::*;
 
     fn shapes() -> Vec<Shape> {
         let centre = [0.3, -0.7, 1.1];
