@@ -47,6 +47,9 @@ pub enum Error {
         /// Which of [`crate::Limits`] it is; `None` if it cannot be raised.
         name: Option<&'static str>,
     },
+    /// The caller's [`Progress`](crate::Progress) cancelled the work.
+    #[error("cancelled")]
+    Cancelled,
 }
 
 /// How to raise the limit `name`, starting with punctuation.

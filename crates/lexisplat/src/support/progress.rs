@@ -1,36 +1,56 @@
-//! How long work tells its caller where it stands.
+//! How long work reports where it stands, and learns that it shall end.
 
-/// Receives progress from long work. All methods may be called from worker threads.
+use crate::support::error::{Error, Result};
+
+/// Receives progress from long work, and may cancel it. All methods may be called from worker threads.
 pub trait Progress: Sync {
-    /// A stage starts that will do `total` units of work.
+    /// A stage starts. It will do `total` units of work, or an unknown number if `total` is 0.
     fn begin(&self, stage: Stage, total: u64) {
         let _ = (stage, total);
     }
-    /// `units` more are done.
+
+    /// `units` more units of the current stage are done.
     fn advance(&self, units: u64) {
         let _ = units;
     }
-    /// The stage is over.
+
+    /// The current stage is over.
     fn end(&self) {}
+
+    /// Whether the work shall end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves
+    /// no output. The answer must not become `false` again.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
+
+    /// Returns [`Error::Cancelled`] if the work shall end early.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`].
+    fn check(&self) -> Result<()> {
+        if self.is_cancelled() { Err(Error::Cancelled) } else { Ok(()) }
+    }
 }
 
 /// A stage of work, with its unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Stage {
-    /// Reading a file, in bytes.
+    /// Reads a file, in bytes.
     Read,
-    /// Learning the dictionary, in rounds.
+    /// Learns the dictionary, in rounds.
     Learn,
-    /// Drawing parts of the scene to see what shows, in Gaussians.
+    /// Measures the sensitivity of a scene that is looked at part by part, in Gaussians.
     Look,
-    /// Coding, in Gaussians.
+    /// Draws views, in views.
+    Draw,
+    /// Codes Gaussians, in Gaussians.
     Code,
-    /// Writing a file, in bytes.
+    /// Writes a file, in bytes.
     Write,
 }
 
-/// Ignores all progress.
+/// A [`Progress`] that ignores all reports and never cancels.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Silent;
 
