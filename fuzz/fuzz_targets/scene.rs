@@ -82,7 +82,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         Sensitivity::heuristic(&splats.geometry)
     } else {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
-        lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &mut || ())
+        lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &Silent).expect("measured")
     };
     let packer = match Packer::new(splats, &sensitivity, &options) {
         Ok(packer) => packer,

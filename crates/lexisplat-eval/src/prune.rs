@@ -1,6 +1,6 @@
 //! Leaving out Gaussians that no view would miss.
 
-use lexisplat::{Sensitivity, Splats};
+use lexisplat::{Sensitivity, Silent, Splats};
 use lexisplat_render::{Camera, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
@@ -43,7 +43,7 @@ pub fn prune(
     let mut cameras: Vec<Camera> = views.all().cloned().collect();
     if views.are_given() {
         let around = Views::generated(splats);
-        let more = renderer.sensitivity(&Scene::from(&*splats), around.measuring(), &mut || ())?;
+        let more = renderer.sensitivity(&Scene::from(&*splats), around.measuring(), &Silent)?;
         for (a, b) in seen.removal.iter_mut().zip(more.removal) {
             *a = a.max(b);
         }
@@ -114,7 +114,7 @@ mod tests {
         let original = splats.clone();
         let views = Views::generated(&splats);
         let mut cpu = Renderer::cpu();
-        let mut seen = views.sensitivity(&mut cpu, &splats, &mut || ()).unwrap();
+        let mut seen = views.sensitivity(&mut cpu, &splats, &Silent).unwrap();
         let pruned = prune(&mut cpu, &mut splats, &mut seen, &views, 0.5 / 255.0).unwrap();
         assert!(pruned.removed >= 80, "{pruned:?}");
         assert!(pruned.largest_change <= 0.5 / 255.0);

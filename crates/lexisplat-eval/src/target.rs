@@ -138,14 +138,14 @@ impl Views {
     /// by a guess for views that are not among them.
     ///
     /// # Errors
-    /// None on the processor; on a GPU [`Error::Render`] if the scene or a view does not fit.
+    /// [`Error::Render`] if `progress` cancelled the work or, on a GPU, the scene or a view does not fit.
     pub fn sensitivity(
         &self,
         renderer: &mut Renderer,
         splats: &Splats,
-        on_view: &mut dyn FnMut(),
+        progress: &dyn Progress,
     ) -> Result<Sensitivity> {
-        let mut seen = renderer.sensitivity(&Scene::from(splats), &self.measure, on_view)?;
+        let mut seen = renderer.sensitivity(&Scene::from(splats), &self.measure, progress)?;
         seen.blend_with_prior(&splats.geometry, GUESS_SHARE);
         Ok(seen)
     }

@@ -86,7 +86,7 @@ fn packed(
     let clock = Instant::now();
     let seen = match seen {
         Some(seen) => seen,
-        None => seen.insert(Views::generated(splats).sensitivity(renderer, splats, &mut || ())?),
+        None => seen.insert(Views::generated(splats).sensitivity(renderer, splats, progress)?),
     };
     let mut options = PackOptions::default();
     options.seed = seed;

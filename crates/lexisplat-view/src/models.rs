@@ -162,6 +162,7 @@ impl Progress for Gauge {
     fn begin(&self, stage: Stage, total: u64) {
         let label = match stage {
             Stage::Learn => "learning",
+            Stage::Draw => "looking",
             Stage::Code => "coding",
             Stage::Read => "reading",
             Stage::Write => "writing",
@@ -257,10 +258,9 @@ fn compressed(
                 Some(cameras) => Views::given(cameras)?,
                 None => Views::generated(splats),
             };
-            gauge.start("looking", views.len() as u64);
             // By the processor, as the command does unless told otherwise: the same bytes everywhere.
             let mut renderer = Renderer::cpu();
-            let sensitivity = views.sensitivity(&mut renderer, splats, &mut || gauge.advance(1))?;
+            let sensitivity = views.sensitivity(&mut renderer, splats, gauge)?;
             let packer = Packer::new(splats, &sensitivity, &PackOptions::default())?;
             let (packed, _) = packer.pack(packer.step_for(preset.decibels()), gauge)?;
             gauge.start("unpacking", 0);

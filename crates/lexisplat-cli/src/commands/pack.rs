@@ -8,7 +8,7 @@ use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::{PlyChunks, PlyRead};
 use lexisplat::stream::Importance;
-use lexisplat::{Error, Progress, Sensitivity, Splats, lexi, stream};
+use lexisplat::{Error, Sensitivity, Silent, Splats, lexi, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
@@ -48,9 +48,7 @@ pub(crate) fn run(
         None => Views::generated(&splats),
     };
     let mut renderer = Renderer::open(args.device)?;
-    bars.start("looking", "views", views.len() as u64);
-    let mut sensitivity = views.sensitivity(&mut renderer, &splats, &mut || bars.advance(1))?;
-    bars.end();
+    let mut sensitivity = views.sensitivity(&mut renderer, &splats, &bars)?;
     let pruned = match args.prune {
         Some(levels) if !levels.is_finite() || levels <= 0.0 => {
             return Err(Error::parameter("prune", levels, "a finite number above 0").into());
@@ -145,7 +143,7 @@ pub(crate) fn run_in_parts(
     let mut look_seconds = 0.0;
     let mut judge = |part: &Splats| -> Result<Sensitivity> {
         let clock = Instant::now();
-        let seen = Views::of_part(part).sensitivity(&mut renderer, part, &mut || ());
+        let seen = Views::of_part(part).sensitivity(&mut renderer, part, &Silent);
         look_seconds += clock.elapsed().as_secs_f64();
         Ok(seen?)
     };

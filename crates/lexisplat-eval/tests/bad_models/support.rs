@@ -85,7 +85,7 @@ pub(crate) fn everything(splats: &Splats) -> Outcome {
 
     let [exact, escapes] = exact(splats);
     let guessed = packed(splats, &Sensitivity::heuristic(&splats.geometry));
-    let seen = sensitivity(&Scene::from(splats), &cameras(), &mut || ());
+    let seen = sensitivity(&Scene::from(splats), &cameras(), &Silent).unwrap();
     let packed = packed(splats, &seen);
     assert_eq!(guessed.is_some(), packed.is_some());
 
