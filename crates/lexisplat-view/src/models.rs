@@ -308,8 +308,8 @@ mod tests {
             let Loaded::Lexi(model, packed) = &made.loaded else { panic!("a model") };
             let mut bytes = Vec::new();
             match packed {
-                Some(packed) => lexi::write_packed_to(&mut bytes, packed).unwrap(),
-                None => lexi::write_to(&mut bytes, model).unwrap(),
+                Some(packed) => lexi::write_packed(&mut bytes, packed).unwrap(),
+                None => lexi::write(&mut bytes, model).unwrap(),
             };
             assert_eq!(made.bytes, bytes.len() as u64, "{quality}");
             let open = Open::new(1, made, None, SIZE).unwrap();

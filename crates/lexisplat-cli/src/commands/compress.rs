@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::output::Output;
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stream::Compressed;
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
 use serde_json::json;
@@ -60,7 +60,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
     if layout == Layout::Packed && super::pack::is_large(args, bytes.len())? {
         let bars = Bars::new(common.quiet);
-        let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
+        let chunks = PlySource::open(&name, &bytes, &read, &bars)?;
         warn(&name, chunks.warnings());
         return super::pack::run_in_parts(args, common, &output, &chunks, &bars, start);
     }
@@ -70,14 +70,14 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         return super::pack::run(args, common, &output, read, start);
     }
     let bars = Bars::new(common.quiet);
-    let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
+    let chunks = PlySource::open(&name, &bytes, &read, &bars)?;
     warn(&name, chunks.warnings());
     let read_seconds = start.elapsed().as_secs_f64();
     let done = write_output(
         &output,
         common.overwrite,
-        |path| stream::compress_file(&chunks, &options, path, &bars),
-        |out| stream::compress_to(&chunks, &options, out, &bars),
+        |path| stream::compress(&chunks, &options, path, &bars),
+        |out| stream::compress(&chunks, &options, out, &bars),
     )?;
     if let Some(path) = &args.save_dictionary {
         lexi::write_dictionary(Output::new(path, existing(common.overwrite)), &done.dictionary)?;

@@ -29,8 +29,8 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let bytes = write_output(
         &output,
         common.overwrite,
-        |path| stream::decompress_file(&lexi, path, &bars),
-        |out| stream::decompress_to(&lexi, out, &bars),
+        |path| stream::decompress(&lexi, path, &bars),
+        |out| stream::decompress(&lexi, out, &bars),
     )?;
     let seconds = start.elapsed().as_secs_f64();
     let name = output.display();

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
-use lexisplat::ply::{PlyChunks, PlyRead};
+use lexisplat::ply::{PlyRead, PlySource};
 use lexisplat::stream::Importance;
 use lexisplat::{Error, Sensitivity, Silent, Splats, lexi, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
@@ -73,7 +73,7 @@ pub(crate) fn run(
         output,
         common.overwrite,
         |path| lexi::write_packed(path, &packed),
-        |out| lexi::write_packed_to(out, &packed),
+        |out| lexi::write_packed(out, &packed),
     )?;
     let write_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
@@ -130,7 +130,7 @@ pub(crate) fn run_in_parts(
     args: &Compress,
     common: &Common,
     output: &Path,
-    ply: &PlyChunks<'_>,
+    ply: &PlySource<'_>,
     bars: &Bars,
     start: Instant,
 ) -> Result<()> {
@@ -155,8 +155,8 @@ pub(crate) fn run_in_parts(
     let done = write_output(
         output,
         common.overwrite,
-        |path| stream::pack_file(ply, once(), &options, decibels, path, bars),
-        |out| stream::pack_to(ply, once(), &options, decibels, out, bars),
+        |path| stream::pack(ply, once(), &options, decibels, path, bars),
+        |out| stream::pack(ply, once(), &options, decibels, out, bars),
     )?;
     let file_bytes = done.file_bytes();
     let pack_seconds = clock.elapsed().as_secs_f64() - look_seconds;

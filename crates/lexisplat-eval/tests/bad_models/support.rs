@@ -101,7 +101,7 @@ fn exact(splats: &Splats) -> [(Splats, u64); 2] {
         options.layout = layout;
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_to(&mut bytes, &model).unwrap();
+        lexi::write(&mut bytes, &model).unwrap();
         let read = lexi::read_bytes("exact.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(read, model, "{layout}");
         let decoded = read.into_splats();
@@ -128,7 +128,7 @@ fn packed(splats: &Splats, sensitivity: &Sensitivity) -> Option<Splats> {
         }
     };
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packed).unwrap();
+    lexi::write_packed(&mut bytes, &packed).unwrap();
     let back = lexi::read_bytes("packed.lexi", &bytes, &Limits::default()).unwrap().into_splats();
     assert_eq!(back.len(), splats.len());
     assert_finite(&back);

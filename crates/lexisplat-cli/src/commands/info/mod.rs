@@ -6,10 +6,10 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::lexi::LexiChunks;
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::stream::Survey;
-use lexisplat::{Splats, lexi, stream};
+use lexisplat::{SplatSource, Splats, lexi, stream};
 use lexisplat_eval::text;
 use serde_json::json;
 
@@ -30,9 +30,9 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         (Scene::Lexi(Box::new(lexi), Box::new(survey)), lint)
     } else {
         let read = ReadOptions { drop_invalid: args.drop_invalid, limits: common.limits()? };
-        let ply = PlyChunks::open(&name, &bytes, &read, &bars)?;
+        let ply = PlySource::open(&name, &bytes, &read, &bars)?;
         warn(&name, ply.warnings());
-        let lint = stream::lint_ply(&ply, &bars)?;
+        let lint = stream::lint(&ply, &bars)?;
         (Scene::Ply(Box::new(ply)), lint)
     };
     let file = File { name: &name, bytes: bytes.len() as u64, scene };
@@ -54,7 +54,7 @@ struct File<'a> {
 }
 
 enum Scene<'a> {
-    Ply(Box<PlyChunks<'a>>),
+    Ply(Box<PlySource<'a>>),
     Lexi(Box<LexiChunks<'a>>, Box<Survey>),
 }
 
