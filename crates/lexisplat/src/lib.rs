@@ -73,4 +73,5 @@ pub use support::input::Input;
 pub use support::limits::{Limits, MAX_ATOMS};
 pub use support::progress::{Progress, Silent, Stage};
 pub use support::sink::Sink;
+pub use support::stopwatch::Stopwatch;
 pub use support::{output, simd};

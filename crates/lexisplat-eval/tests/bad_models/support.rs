@@ -7,7 +7,7 @@ use lexisplat::stats::{Lint, lint};
 use lexisplat::{
     CompressOptions, Geometry, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
-use lexisplat_eval::{CompareOptions, compare};
+use lexisplat_eval::{DrawOptions, Scorer, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
 use lexisplat_sample::{SampleOptions, scene};
@@ -142,12 +142,13 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
     for mut renderer in renderers() {
         for (other, db) in [(Some(exact), &mut exact_db), (packed, &mut packed_db)] {
             let Some(other) = other else { continue };
-            let mut on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
+            let on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
                 assert!(a.pixels.iter().chain(&b.pixels).flatten().all(|v| v.is_finite() && *v >= 0.0));
+                Ok::<_, lexisplat_eval::Error>(())
             };
             let (a, b) = (Scene::from(original), Scene::from(other));
-            let options = CompareOptions::default();
-            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &mut on_view).unwrap();
+            let options = DrawOptions::default();
+            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &Silent, on_view).unwrap();
             *db = least(*db, found.psnr.min);
         }
         let prepared = renderer.prepare(Scene::from(original)).unwrap();
@@ -155,7 +156,7 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
             let options = RenderOptions::default();
             let image = renderer.render(&prepared, &camera, &options).unwrap();
             let truth = lexisplat_render::render(&Scene::from(original), &camera, &options);
-            let view = lexisplat_eval::score("twin", &truth, &image).unwrap();
+            let view = Scorer::new().score("twin", &truth, &image).unwrap();
             assert!(view.psnr.is_none_or(|db| db > TWIN_DB), "{} draws {:?}", renderer.name(), view.psnr);
             drawn += image.pixels.iter().filter(|p| **p != options.background).count();
         }

@@ -1,5 +1,6 @@
 //! Scenes that are read a part at a time.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::scene::splats::{Geometry, Splats, all_finite};
@@ -31,12 +32,32 @@ pub trait SplatSource {
     /// Bytes of one Gaussian in the source, which is the unit of progress.
     fn row_bytes(&self) -> u64;
 
+    /// Size of the source, in bytes. By default that of the Gaussians.
+    fn source_bytes(&self) -> u64 {
+        (self.len() as u64).saturating_mul(self.row_bytes())
+    }
+
+    /// What is odd about the source, one sentence each.
+    fn warnings(&self) -> &[String] {
+        &[]
+    }
+
     /// Reads Gaussians `range` into `part`, which came from [`Self::empty`] and may have been filled before.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the range ends after the last Gaussian, [`Error::Format`] for damage that is
     /// found only now, [`Error::Limit`] for a range too long to be held.
     fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()>;
+
+    /// The whole scene. A scene in memory is borrowed.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    fn whole(&self) -> Result<Cow<'_, Splats>> {
+        let mut splats = self.empty();
+        self.read(0..self.len(), &mut splats)?;
+        Ok(Cow::Owned(splats))
+    }
 
     /// Appends the SH-rest of `gaussians`, which are in any order, to `out`.
     ///
@@ -110,6 +131,10 @@ impl SplatSource for Splats {
         copy(&mut part.sh_rest, &self.sh_rest[range.start * dim..range.end * dim]);
         part.geometry.validate_values()?;
         all_finite([("sh_rest", part.sh_rest.as_slice())])
+    }
+
+    fn whole(&self) -> Result<Cow<'_, Splats>> {
+        Ok(Cow::Borrowed(self))
     }
 
     fn read_rest(&self, gaussians: &[usize], out: &mut Vec<f32>) -> Result<()> {

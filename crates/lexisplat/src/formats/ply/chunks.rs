@@ -118,6 +118,14 @@ impl SplatSource for PlySource<'_> {
         self.source.summary.row_bytes
     }
 
+    fn source_bytes(&self) -> u64 {
+        self.source.summary.file_bytes
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.source.warnings
+    }
+
     fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
         check_range(&range, self.len())?;
         let rows = match range.end.checked_sub(1) {
