@@ -131,6 +131,7 @@ fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
 
 fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
     match error {
+        lexisplat_render::Error::Codec(e) => codec(e),
         lexisplat_render::Error::Io { file, source } => (3, io(file, source)),
         lexisplat_render::Error::Format { .. } => (4, None),
         lexisplat_render::Error::Parameter { name: "device", .. } => {

@@ -1,13 +1,13 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
 use std::ffi::OsStr;
-use std::io::{BufWriter, ErrorKind, StdoutLock, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat::output::{Existing, Output};
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Error, Input};
+use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::SceneFile;
 
 use crate::args::Common;
@@ -129,19 +129,18 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<
     })?)
 }
 
-/// Writes an output: to its file by `save`, or by `stream` to standard output. Returns what they do.
+/// Lets `write` write an output: a file, or standard output. Returns what `write` does.
 pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
     overwrite: bool,
-    save: impl FnOnce(Output<'_>) -> Result<T, E>,
-    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
+    write: impl FnOnce(Sink<'_>) -> Result<T, E>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return save(Output::new(output, existing(overwrite))).map_err(Into::into);
+        return write(Output::new(output, existing(overwrite)).into()).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let done = stream(&mut out).map_err(|error| match error.into().downcast() {
-        // What the library calls a writer that has no name.
+    let done = write(Sink::from(&mut out)).map_err(|error| match error.into().downcast() {
+        // The library's name for a writer.
         Ok(Error::Io { file, source }) if file == "output" => Error::io(STANDARD_OUTPUT, source).into(),
         Ok(other) => anyhow::Error::from(other),
         Err(other) => other,

@@ -87,6 +87,7 @@ impl Progress for Bars {
         let (label, unit) = match stage {
             Stage::Learn => ("learning", "rounds"),
             Stage::Look => ("looking", "Gaussians"),
+            Stage::Draw => ("looking", "views"),
             Stage::Code => ("coding", "Gaussians"),
             Stage::Read => ("reading", "bytes"),
             Stage::Write => ("writing", "bytes"),

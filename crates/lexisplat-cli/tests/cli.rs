@@ -168,6 +168,10 @@ fn info_lints() {
     assert_eq!(info["statistics"]["zero_quaternions"], 1);
     let text = folder.run(&["info", "scene.ply"]);
     assert!(text.contains("opacity") && text.contains("norm of a Gaussian's SH"), "{text}");
+    folder.run(&["compress", "scene.ply", "--tol", "0.1", "-q"]);
+    let text = folder.run(&["info", "scene.lexi"]);
+    assert!(text.contains("\nSH error: maximum"), "{text}");
+    assert!(!text.lines().any(|line| line.starts_with("error")), "the file is healthy: {text}");
 }
 
 #[test]

@@ -6,7 +6,8 @@ mod folder;
 use std::time::{Duration, Instant};
 
 use assert_cmd::cargo::cargo_bin;
-use folder::{Folder, lexisplat};
+use folder::{Folder, lexisplat, read};
+use lexisplat::ply;
 use serde_json::{Value, json};
 
 /// How long a point of a small sweep may take on a slow machine.
@@ -116,6 +117,27 @@ fn mistakes_in_evaluating_are_named() {
     std::fs::write(folder.path("scene/sparse/0/cameras.txt"), "1 OPENCV 8 8 1 1 1 1 0 0 0 0\n").unwrap();
     let error = folder.fail(&["render", "scene.ply", "--cameras", "scene/sparse/0"], 4);
     assert!(error.contains("OPENCV") && error.contains("image_undistorter"), "{error}");
+}
+
+#[test]
+fn cameras_of_another_scene_are_told() {
+    let folder = with_photos();
+    let photos = ["--cameras", "cameras.json", "--images", "photos", "--device", "cpu", "--no-flip"];
+    let report = folder.json(&[&["eval", "scene.ply"][..], &photos].concat());
+    assert_eq!(report["warnings"], json!([]));
+    let mut elsewhere = read(&folder.path("scene.ply"));
+    elsewhere.geometry.positions.iter_mut().for_each(|p| p[0] += 1000.0);
+    ply::write(&folder.path("other.ply"), &elsewhere).unwrap();
+    let report = folder.json(&[&["eval", "other.ply"][..], &photos].concat());
+    let warnings: Vec<&str> =
+        report["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap()).collect();
+    let [nothing, far] = warnings[..] else { panic!("{warnings:?}") };
+    assert!(nothing.starts_with("2 of 2 views show almost nothing of other.ply"), "{nothing}");
+    assert!(far.contains("dB against the photos") && far.contains("one scene"), "{far}");
+    let quiet = [&["eval", "other.ply", "--quiet"][..], &photos].concat();
+    let output = lexisplat().current_dir(folder.0.path()).args(quiet).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.starts_with("warning: views: 2 of 2 views"), "{error}");
 }
 
 const SMALL: [&str; 8] = ["--tol", "0.1,0.3", "--presets", "small", "--max-nnz", "1", "--device", "cpu"];

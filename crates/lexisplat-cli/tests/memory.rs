@@ -55,7 +55,7 @@ fn what_needs_the_whole_scene_is_refused_before_any_work() {
     let folder = Folder::new();
     for option in [&["--psnr", "40"][..], &["--size", "10kB"], &["--ratio", "12"], &["--prune"]] {
         let error = folder.fail(&[&["compress", "scene.ply"], option, &LITTLE[..]].concat(), 5);
-        assert!(error.contains(option[0]) && error.contains("memory = 100000"), "{error}");
+        assert!(error.contains(&option[0][2..]) && error.contains("memory = 100000"), "{error}");
     }
     assert_eq!(folder.names(), ["scene.ply"]);
 }

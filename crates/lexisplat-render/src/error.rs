@@ -20,6 +20,10 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The codec's error: the arrays of a scene do not fit one another, or the caller's
+    /// [`Progress`](lexisplat::Progress) cancelled the work.
+    #[error(transparent)]
+    Codec(#[from] lexisplat::Error),
     /// The bytes are not what they claim to be. The file is at fault; the text names the camera, the
     /// field and the value.
     #[error("{file}: {problem}")]

@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use lexisplat::Sensitivity;
+use lexisplat::{Progress, Sensitivity};
 
 use crate::camera::Camera;
 use crate::cpu::{RenderOptions, render, sensitivity};
@@ -170,24 +170,24 @@ impl Renderer {
         Ok(render(&prepared.scene, camera, options))
     }
 
-    /// How much the pictures of `scene` from `cameras` change with each value of each Gaussian: see
-    /// [`crate::sensitivity`].
+    /// Returns how much the pictures of `scene` from `cameras` change with each value of each Gaussian: see
+    /// [`crate::sensitivity`]. Reports `Stage::Draw`, in views, to `progress`.
     ///
     /// # Errors
-    /// As [`Self::prepare`] and [`Self::render`].
+    /// [`Error::Codec`] if `progress` cancelled the work; otherwise as [`Self::prepare`] and [`Self::render`].
     pub fn sensitivity(
         &mut self,
         scene: &Scene<'_>,
         cameras: &[Camera],
-        on_view: &mut dyn FnMut(),
+        progress: &dyn Progress,
     ) -> Result<Sensitivity> {
         cameras.iter().try_for_each(Camera::validate)?;
         #[cfg(feature = "gpu")]
         if let Some((gpu, renderer)) = &mut self.gpu {
             let uploaded = GpuScene::new(gpu, scene, ShPath::of(scene))?;
-            return renderer.sensitivity(&uploaded, scene.geometry(), cameras, on_view);
+            return renderer.sensitivity(&uploaded, scene.geometry(), cameras, progress);
         }
-        Ok(sensitivity(scene, cameras, on_view))
+        sensitivity(scene, cameras, progress)
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use lexisplat::ply::{self, ReadOptions};
 use lexisplat::{Sensitivity, Silent, Splats};
@@ -86,7 +87,7 @@ struct Subject {
     shown: Vec<usize>,
     originals: Option<Vec<Image>>,
     pictures_of_photos: Option<Vec<Image>>,
-    seen: Option<Sensitivity>,
+    seen: Option<Arc<Sensitivity>>,
 }
 
 pub(super) struct Runner<'a> {
@@ -242,7 +243,7 @@ impl Runner<'_> {
         let o = self.options;
         let how = How { pursuit: o.pursuit, layout: o.layout, seed: o.seed };
         let renderer = &mut self.renderer;
-        let squeezed = squeeze(subject.splats.clone(), setting, how, renderer, &mut subject.seen, &Silent)?;
+        let squeezed = squeeze(&subject.splats, setting, how, renderer, &mut subject.seen, &Silent)?;
         let scene = Scene::from(&squeezed.model);
         let drawn = self.draw(&scene, &subject.cameras)?;
         let (originals, photos) = (subject.originals(), subject.photographs());
@@ -294,8 +295,8 @@ impl Runner<'_> {
     }
 
     fn draw(&mut self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Vec<Image>> {
-        let options = DrawOptions { background: self.options.background, eight_bit: self.options.eight_bit };
-        draw_views(&mut self.renderer, scene, cameras, &options, &mut || ())
+        let options = DrawOptions::new(self.options.background, self.options.eight_bit);
+        draw_views(&mut self.renderer, scene, cameras, &options, &Silent)
     }
 
     fn fps(&self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Option<f64>> {
@@ -306,8 +307,8 @@ impl Runner<'_> {
         let mut options = BenchOptions::new(WARMUP, repeat);
         options.background = self.options.background;
         let times = match &self.gpu {
-            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, &mut || ())?,
-            None => bench_cpu(scene, cameras, &options, &mut || ())?,
+            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, &Silent)?,
+            None => bench_cpu(scene, cameras, &options, &Silent)?,
         };
         Ok(Some(times.fps))
     }

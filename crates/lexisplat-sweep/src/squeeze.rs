@@ -1,14 +1,15 @@
 //! One model compressed in one way.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use lexisplat::packed::{PackOptions, Packer, Preset};
-use lexisplat::{CompressOptions, Layout, Model, Progress, Pursuit, Sensitivity, Splats, compress, lexi};
+use lexisplat::packed::PackOptions;
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, Pursuit, Sensitivity, Splats, lexi};
+use lexisplat_eval::compression::PackingViews;
+use lexisplat_eval::{Compression, Packing, Result};
 use lexisplat_render::Renderer;
 
 use super::results::Setting;
-use lexisplat_eval::Result;
-use lexisplat_eval::Views;
 
 /// How models are compressed besides the [`Setting`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,82 +31,55 @@ pub(super) struct Squeezed {
     pub(super) seconds: f64,
 }
 
-/// Compresses `splats`. `seen` is what pictures depend on, looked up once a model for its packed files.
+/// Compresses `splats`. The sensitivity is measured for the first packed file of a model and kept in
+/// `sensitivity` for the others.
 pub(super) fn squeeze(
-    splats: Splats,
+    splats: &Splats,
     setting: Setting,
     how: How,
     renderer: &mut Renderer,
-    seen: &mut Option<Sensitivity>,
-    progress: &dyn Progress,
-) -> Result<Squeezed> {
-    match setting {
-        Setting::Tolerance(tolerance) => exact(splats, Some(tolerance), None, how, progress),
-        Setting::MaxNonzeros(most) => exact(splats, None, Some(most), how, progress),
-        Setting::Preset(preset) => packed(&splats, preset, how.seed, renderer, seen, progress),
-    }
-}
-
-fn exact(
-    splats: Splats,
-    tolerance: Option<f64>,
-    max_nonzeros: Option<u8>,
-    how: How,
+    sensitivity: &mut Option<Arc<Sensitivity>>,
     progress: &dyn Progress,
 ) -> Result<Squeezed> {
     let clock = Instant::now();
-    let mut options = CompressOptions::default();
-    options.tolerance = tolerance;
-    options.max_nonzeros = max_nonzeros;
-    options.pursuit = how.pursuit;
-    options.layout = how.layout;
-    options.seed = how.seed;
-    let (model, report) = compress(splats, &options, progress)?;
-    let seconds = clock.elapsed().as_secs_f64();
-    Ok(Squeezed {
-        file_bytes: lexi::file_bytes(&model)?,
-        sh_bytes: lexi::sh_bytes(&model)?,
-        mean_nonzeros: report.mean_nonzeros,
-        coefficient_ratio: report.coefficient_ratio(),
-        max_residual: Some(model.record.max_residual),
-        over_tolerance: model.record.over_tolerance,
-        seconds,
-        model,
-    })
-}
-
-/// As `lexisplat compress --preset` does without cameras.
-fn packed(
-    splats: &Splats,
-    preset: Preset,
-    seed: u64,
-    renderer: &mut Renderer,
-    seen: &mut Option<Sensitivity>,
-    progress: &dyn Progress,
-) -> Result<Squeezed> {
-    let clock = Instant::now();
-    let seen = match seen {
-        Some(seen) => seen,
-        None => seen.insert(Views::generated(splats).sensitivity(renderer, splats, &mut || ())?),
+    let mut exact = CompressOptions::default();
+    (exact.pursuit, exact.layout, exact.seed) = (how.pursuit, how.layout, how.seed);
+    let compression: Compression = match setting {
+        Setting::Tolerance(tolerance) => {
+            exact.tolerance = Some(tolerance);
+            exact.into()
+        }
+        Setting::MaxNonzeros(most) => {
+            (exact.tolerance, exact.max_nonzeros) = (None, Some(most));
+            exact.into()
+        }
+        Setting::Preset(preset) => {
+            let measured = match sensitivity {
+                Some(measured) => measured,
+                None => {
+                    let views = PackingViews::generated(splats);
+                    sensitivity.insert(Arc::new(views.sensitivity(renderer, splats, progress)?))
+                }
+            };
+            let mut options = PackOptions::default();
+            options.seed = how.seed;
+            Packing::new(preset).with_options(options).with_sensitivity(Arc::clone(measured)).into()
+        }
     };
-    let mut options = PackOptions::default();
-    options.seed = seed;
-    let packer = Packer::new(splats, seen, &options)?;
-    let (packed, report) = packer.pack(packer.step_for(preset.decibels()), progress)?;
-    let seconds = clock.elapsed().as_secs_f64();
-    let dim = splats.degree.rest();
-    let is_sh = |name: &str| name == "dictionary" || name.starts_with("codes.");
-    let sh_bits: f64 = packed.stream_bits()?.iter().filter(|s| is_sh(s.attribute)).map(|s| s.bits).sum();
+    let look_seconds = clock.elapsed().as_secs_f64();
+    let mut file = Vec::new();
+    let report = compression.run(splats, &mut file, progress)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the file's size")]
-    let sh_bytes = (sh_bits / 8.0).round() as u64;
+    let sh_bytes = report.sh_bytes.round() as u64;
+    let is_exact = report.record.layout != Layout::Packed;
     Ok(Squeezed {
-        file_bytes: lexi::packed_bytes(&packed),
+        model: lexi::read_bytes("the compressed model", &file, &Limits::default())?,
+        file_bytes: report.file_bytes,
         sh_bytes,
         mean_nonzeros: report.mean_nonzeros,
-        coefficient_ratio: (report.mean_nonzeros > 0.0).then(|| dim as f64 / report.mean_nonzeros),
-        max_residual: None,
-        over_tolerance: packed.record.over_tolerance,
-        seconds,
-        model: lexi::unpack(preset.name(), &packed)?,
+        coefficient_ratio: report.coefficient_ratio,
+        max_residual: is_exact.then_some(report.record.max_residual),
+        over_tolerance: report.record.over_tolerance,
+        seconds: look_seconds + report.pack_seconds,
     })
 }

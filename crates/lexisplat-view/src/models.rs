@@ -4,11 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lexisplat::packed::{PackOptions, Packed, Packer};
+use lexisplat::packed::Packed;
 use lexisplat::ply::{Dialect, ReadOptions};
-use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
-use lexisplat_eval::{Loaded, SceneFile, SplitFilter, Views, choose_views};
-use lexisplat_render::{Camera, Renderer, bulk};
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
+use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
+use lexisplat_render::{Camera, bulk};
 
 use crate::command::{Quality, Which};
 use crate::error::{Error, Result};
@@ -161,6 +161,7 @@ impl Gauge {
 impl Progress for Gauge {
     fn begin(&self, stage: Stage, total: u64) {
         let label = match stage {
+            Stage::Draw => "looking",
             Stage::Learn => "learning",
             Stage::Code => "coding",
             Stage::Read => "reading",
@@ -237,7 +238,7 @@ pub(crate) fn compress_to(
             let expected = "a PLY: compressed scenes are not compressed again";
             return Err(lexisplat::Error::parameter("scene", &original.scene.name, expected).into());
         };
-        let scene = compressed(splats, title, quality, cameras.as_deref(), &told)?;
+        let scene = compressed(splats, &title, quality, cameras.as_deref(), &told)?;
         Open::new(id, scene, None, size)
     });
     Work { id, name, gauge }
@@ -246,35 +247,26 @@ pub(crate) fn compress_to(
 /// `splats` as `lexisplat compress` makes them with this preset or tolerance.
 fn compressed(
     splats: &Splats,
-    name: String,
+    name: &str,
     quality: Quality,
     cameras: Option<&[Camera]>,
     gauge: &Gauge,
 ) -> Result<SceneFile> {
-    match quality {
-        Quality::Preset(preset) => {
-            let views = match cameras {
-                Some(cameras) => Views::given(cameras)?,
-                None => Views::generated(splats),
-            };
-            gauge.start("looking", views.len() as u64);
-            // By the processor, as the command does unless told otherwise: the same bytes everywhere.
-            let mut renderer = Renderer::cpu();
-            let sensitivity = views.sensitivity(&mut renderer, splats, &mut || gauge.advance(1))?;
-            let packer = Packer::new(splats, &sensitivity, &PackOptions::default())?;
-            let (packed, _) = packer.pack(packer.step_for(preset.decibels()), gauge)?;
-            gauge.start("unpacking", 0);
-            let (model, bytes) = (packed.unpack()?, lexi::packed_bytes(&packed));
-            Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), Some(Box::new(packed))), name, bytes })
+    let compression: Compression = match (quality, cameras) {
+        (Quality::Preset(preset), Some(cameras)) => {
+            Packing::new(preset).with_cameras(cameras.to_vec()).into()
         }
-        Quality::Tolerance(tolerance) => {
+        (Quality::Preset(preset), None) => Packing::new(preset).into(),
+        (Quality::Tolerance(tolerance), _) => {
             let mut options = CompressOptions::default();
             options.tolerance = Some(tolerance);
-            let (model, _) = compress(splats.clone(), &options, gauge)?;
-            let bytes = lexi::attribute_bytes(&model)?.iter().map(|part| part.1).sum();
-            Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), None), name, bytes })
+            options.into()
         }
-    }
+    };
+    let mut file = Vec::new();
+    compression.run(splats, &mut file, gauge)?;
+    gauge.start("unpacking", 0);
+    Ok(SceneFile::read_bytes(name, &file, &ReadOptions::default())?)
 }
 
 fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> + Send + 'static) {
@@ -293,7 +285,7 @@ fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> 
 #[cfg(test)]
 mod tests {
     use lexisplat::packed::Preset;
-    use lexisplat::ply;
+    use lexisplat::{lexi, ply};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -304,12 +296,12 @@ mod tests {
     fn compressing_makes_what_a_file_would_hold() {
         let splats = scene(&SampleOptions::new(600, 0));
         for quality in [Quality::Preset(Preset::Small), Quality::Tolerance(0.2)] {
-            let made = compressed(&splats, "made".into(), quality, None, &Gauge::default()).unwrap();
+            let made = compressed(&splats, "made", quality, None, &Gauge::default()).unwrap();
             let Loaded::Lexi(model, packed) = &made.loaded else { panic!("a model") };
             let mut bytes = Vec::new();
             match packed {
-                Some(packed) => lexi::write_packed_to(&mut bytes, packed).unwrap(),
-                None => lexi::write_to(&mut bytes, model).unwrap(),
+                Some(packed) => lexi::write_packed(&mut bytes, packed).unwrap(),
+                None => lexi::write(&mut bytes, model).unwrap(),
             };
             assert_eq!(made.bytes, bytes.len() as u64, "{quality}");
             let open = Open::new(1, made, None, SIZE).unwrap();

@@ -1,8 +1,8 @@
 //! Ten thousand damaged PLY files, read whole and a part at a time: no panic, no memory beyond a multiple of the
 //! file, and one answer.
 
-use lexisplat::Silent;
-use lexisplat::ply::{self, Format, PlyChunks, ReadOptions};
+use lexisplat::ply::{self, Format, PlySource, ReadOptions};
+use lexisplat::{Silent, SplatSource};
 
 #[path = "common/allocator.rs"]
 mod allocator;
@@ -107,7 +107,7 @@ fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
     let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
     let (result, used) = counted(|| ply::read_bytes("t.ply", bytes, &options));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input", bytes.len());
-    let (opened, used) = counted(|| PlyChunks::open("t.ply", bytes, &options, &Silent));
+    let (opened, used) = counted(|| PlySource::open("t.ply", bytes, &options, &Silent));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input, in parts", bytes.len());
     match result {
         Ok(read) => {

@@ -138,9 +138,9 @@ pub(crate) struct Compress {
     /// larger files of the same quality. Of the qualities only --preset can be had.
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "prune"])]
     pub(crate) guess: bool,
-    /// Memory that packing may take, about. A scene that needs more is packed part by part: each part is looked
-    /// at alone, and of the qualities only --preset can be had. Files of the other layouts are the same
-    /// whatever the memory.
+    /// Memory that packing a whole scene may take, about. A scene that needs more is packed part by part, each
+    /// part by its own views, and of the qualities only --preset can be had. That takes up to 1.5 GiB, however
+    /// small BYTES is. Files of the other layouts do not depend on it.
     #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// What looks at the scene and judges pictures: `cpu`, so that the same input gives the same file
@@ -174,19 +174,6 @@ impl Compress {
             ("--keep-order", self.keep_order),
             ("--prune", self.prune.is_some()),
         ]
-    }
-
-    /// Options that need the whole scene in memory, as given.
-    pub(crate) fn whole_only(&self) -> Option<&'static str> {
-        let options = [
-            ("--psnr", self.psnr.is_some()),
-            ("--min-psnr", self.min_psnr.is_some()),
-            ("--size", self.size.is_some()),
-            ("--ratio", self.ratio.is_some()),
-            ("--cameras", self.cameras.is_some()),
-            ("--prune", self.prune.is_some()),
-        ];
-        options.iter().find(|o| o.1).map(|o| o.0)
     }
 
     /// The layout asked for, or the one the other options ask for.

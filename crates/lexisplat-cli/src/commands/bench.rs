@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Progress;
 use lexisplat_eval::{
     BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, text,
 };
@@ -39,8 +38,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     if let Some(gpu) = &gpu {
         speed = Some(measure_speed(gpu)?);
         for &path in &paths {
-            bars.start(path.name(), "views", cameras.len() as u64);
-            match bench_gpu(gpu, &scene, path, &cameras, &options, &mut || bars.advance(1)) {
+            match bench_gpu(gpu, &scene, path, &cameras, &options, &bars) {
                 Ok(times) => results.push(times),
                 // A dictionary that this path has no room for leaves the others to measure.
                 Err(lexisplat_eval::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
@@ -50,14 +48,11 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
                 }
                 Err(error) => return Err(error.into()),
             }
-            bars.end();
         }
     }
     if args.cpu_repeat > 0 {
         options.repeat = args.cpu_repeat;
-        bars.start("cpu", "views", cameras.len() as u64);
-        results.push(bench_cpu(&scene, &cameras, &options, &mut || bars.advance(1))?);
-        bars.end();
+        results.push(bench_cpu(&scene, &cameras, &options, &bars)?);
     }
     let report = Report {
         args,

@@ -3,8 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Progress;
-use lexisplat_eval::{CompareOptions, Comparison, SceneFile, compare, montage, png, text};
+use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, montage, png, text};
 use lexisplat_render::Renderer;
 use serde_json::json;
 
@@ -28,30 +27,19 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             check_free(&path, &[], common.overwrite)?;
             saved.push(path);
         }
-        // Numbers follow the pictures.
+        // The scores follow the pictures.
         stop::while_writing(Work::Files(usize::MAX));
         make_folder(folder)?;
     }
     let bars = Bars::new(common.quiet);
-    bars.start("comparing", "views", cameras.len() as u64);
     let mut paths = saved.iter();
-    let mut failure = None;
-    let options = CompareOptions::new(views.background, args.eight_bit);
+    let options = DrawOptions::new(views.background, args.eight_bit);
     let comparison =
-        compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
-            bars.advance(1);
-            if let Some(path) = paths.next() {
-                let (width, height, pixels) = montage::montage(image_a, image_b);
-                let written = png(width, height, &pixels)
-                    .map_err(Into::into)
-                    .and_then(|bytes| write_bytes(path, &bytes, common.overwrite));
-                failure = failure.take().or(written.err());
-            }
+        compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &bars, |_, image_a, image_b| {
+            let Some(path) = paths.next() else { return Ok(()) };
+            let (width, height, pixels) = montage::montage(image_a, image_b);
+            write_bytes(path, &png(width, height, &pixels)?, common.overwrite)
         })?;
-    bars.end();
-    if let Some(error) = failure {
-        return Err(error);
-    }
     if common.json {
         return print_json(&json!({
             "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },

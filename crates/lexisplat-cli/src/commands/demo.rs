@@ -5,8 +5,8 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::output::Output;
-use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
-use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage, png, text};
+use lexisplat::{CompressOptions, compress, lexi, ply};
+use lexisplat_eval::{DrawOptions, ORBIT_SIZE, compare, montage, png, text};
 use lexisplat_render::{Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_sweep::report::{Picture, Report, html};
@@ -76,28 +76,14 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
 
     say("3. drawing both, the compressed one straight from its codes, and comparing");
     let cameras = orbit(&splats.geometry, VIEWS, ORBIT_SIZE.0, ORBIT_SIZE.1);
-    bars.start("drawing", "views", cameras.len() as u64);
     let mut drawn = Vec::new();
-    let mut failure = None;
     let (a, b) = (Scene::from(&splats), Scene::from(&model));
-    let comparison = compare(
-        &mut Renderer::cpu(),
-        &a,
-        &b,
-        &cameras,
-        &CompareOptions::default(),
-        &mut |view, original, compressed| {
-            match Drawn::new(&view.name, original, compressed) {
-                Ok(view) => drawn.push(view),
-                Err(error) => failure = failure.take().or(Some(error)),
-            }
-            bars.advance(1);
-        },
-    )?;
-    bars.end();
-    if let Some(error) = failure {
-        return Err(error);
-    }
+    let options = DrawOptions::default();
+    let comparison =
+        compare(&mut Renderer::cpu(), &a, &b, &cameras, &options, &bars, |view, original, compressed| {
+            drawn.push(Drawn::new(&view.name, original, compressed)?);
+            anyhow::Ok(())
+        })?;
     save(&views_folder, &drawn)?;
 
     say("4. writing the report");

@@ -9,7 +9,6 @@ mod demo;
 mod devices;
 mod eval;
 mod info;
-mod pack;
 mod render;
 mod sweep;
 #[cfg(feature = "view")]

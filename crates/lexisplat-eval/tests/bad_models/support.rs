@@ -7,7 +7,7 @@ use lexisplat::stats::{Lint, lint};
 use lexisplat::{
     CompressOptions, Geometry, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
-use lexisplat_eval::{CompareOptions, compare};
+use lexisplat_eval::{DrawOptions, Scorer, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
 use lexisplat_sample::{SampleOptions, scene};
@@ -85,7 +85,7 @@ pub(crate) fn everything(splats: &Splats) -> Outcome {
 
     let [exact, escapes] = exact(splats);
     let guessed = packed(splats, &Sensitivity::heuristic(&splats.geometry));
-    let seen = sensitivity(&Scene::from(splats), &cameras(), &mut || ());
+    let seen = sensitivity(&Scene::from(splats), &cameras(), &Silent).unwrap();
     let packed = packed(splats, &seen);
     assert_eq!(guessed.is_some(), packed.is_some());
 
@@ -101,7 +101,7 @@ fn exact(splats: &Splats) -> [(Splats, u64); 2] {
         options.layout = layout;
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_to(&mut bytes, &model).unwrap();
+        lexi::write(&mut bytes, &model).unwrap();
         let read = lexi::read_bytes("exact.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(read, model, "{layout}");
         let decoded = read.into_splats();
@@ -128,7 +128,7 @@ fn packed(splats: &Splats, sensitivity: &Sensitivity) -> Option<Splats> {
         }
     };
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packed).unwrap();
+    lexi::write_packed(&mut bytes, &packed).unwrap();
     let back = lexi::read_bytes("packed.lexi", &bytes, &Limits::default()).unwrap().into_splats();
     assert_eq!(back.len(), splats.len());
     assert_finite(&back);
@@ -142,12 +142,13 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
     for mut renderer in renderers() {
         for (other, db) in [(Some(exact), &mut exact_db), (packed, &mut packed_db)] {
             let Some(other) = other else { continue };
-            let mut on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
+            let on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
                 assert!(a.pixels.iter().chain(&b.pixels).flatten().all(|v| v.is_finite() && *v >= 0.0));
+                Ok::<_, lexisplat_eval::Error>(())
             };
             let (a, b) = (Scene::from(original), Scene::from(other));
-            let options = CompareOptions::default();
-            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &mut on_view).unwrap();
+            let options = DrawOptions::default();
+            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &Silent, on_view).unwrap();
             *db = least(*db, found.psnr.min);
         }
         let prepared = renderer.prepare(Scene::from(original)).unwrap();
@@ -155,7 +156,7 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
             let options = RenderOptions::default();
             let image = renderer.render(&prepared, &camera, &options).unwrap();
             let truth = lexisplat_render::render(&Scene::from(original), &camera, &options);
-            let view = lexisplat_eval::score("twin", &truth, &image).unwrap();
+            let view = Scorer::new().score("twin", &truth, &image).unwrap();
             assert!(view.psnr.is_none_or(|db| db > TWIN_DB), "{} draws {:?}", renderer.name(), view.psnr);
             drawn += image.pixels.iter().filter(|p| **p != options.background).count();
         }

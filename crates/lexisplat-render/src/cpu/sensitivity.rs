@@ -1,9 +1,10 @@
 //! How much pictures change with every parameter of every Gaussian.
 
-use lexisplat::{Geometry, Sensitivity};
+use lexisplat::{Geometry, Progress, Sensitivity, Stage};
 use rayon::prelude::*;
 
 use crate::camera::Camera;
+use crate::error::Result;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
@@ -12,22 +13,26 @@ use super::moments::{self, Moments, SUMS};
 use super::project::{self, Derivatives, Projection, Root, Visible};
 use super::{blend, order, tiles};
 
-/// How much the pictures of `scene` from `cameras`, over black, change with each value of each Gaussian,
-/// averaged over views. Views count alike, whatever their size. `on_view` is called after each.
+/// Returns how much the pictures of `scene` from `cameras`, over black, change with each value of each
+/// Gaussian, averaged over the views. Every view has the same weight, whatever its size.
 ///
-/// If every value is off by an independent small error, the expected mean squared error of the pictures
-/// is the sum of these times the squared errors.
+/// If every value has an independent small error, the expected mean squared error of the pictures is the
+/// sum of the sensitivities times the squared errors.
 ///
-/// # Panics
-/// As [`crate::render`].
-#[must_use]
-pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], on_view: &mut dyn FnMut()) -> Sensitivity {
+/// Reports the stage [`Stage::Draw`], in views, to `progress`, and asks it before each view whether to stop.
+///
+/// # Errors
+/// [`Error::Codec`](crate::Error::Codec) if `progress` cancelled the work; otherwise as [`crate::render`].
+pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progress) -> Result<Sensitivity> {
     let mut total = Sensitivity::zeros(scene.len());
+    progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {
+        progress.check()?;
         add_view(&mut total, scene, camera, cameras.len());
-        on_view();
+        progress.advance(1);
     }
-    total
+    progress.end();
+    Ok(total)
 }
 
 fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: usize) {

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use lexisplat::{Geometry, Sensitivity};
+use lexisplat::{Geometry, Progress, Sensitivity, Stage};
 
 use crate::camera::Camera;
 use crate::cpu::{Moments, Projection, RenderOptions, carry};
@@ -16,18 +16,19 @@ use super::work::WORD;
 impl GpuRenderer {
     /// What [`crate::sensitivity`] measures, measured on the GPU: `scene` is that of `geometry`. The same
     /// bits each time on the same GPU and driver; within rounding of the processor's, but for what lies
-    /// within rounding of a threshold of the rasteriser. `on_view` is called after each view.
+    /// within rounding of a threshold of the rasteriser. Reports [`Stage::Draw`], in views, to `progress`.
     ///
     /// Gives back the memory that pictures took; the next one takes its own again.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; else as [`Self::draw`].
+    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; [`Error::Codec`] if `progress`
+    /// cancelled the work; otherwise as [`Self::draw`].
     pub fn sensitivity(
         &mut self,
         scene: &GpuScene,
         geometry: &Geometry,
         cameras: &[Camera],
-        on_view: &mut dyn FnMut(),
+        progress: &dyn Progress,
     ) -> Result<Sensitivity> {
         if scene.len() as usize != geometry.len() {
             let expected = format!("{} Gaussians, as the scene has", scene.len());
@@ -35,13 +36,16 @@ impl GpuRenderer {
         }
         let mut measuring = self.measuring()?;
         let mut total = Sensitivity::zeros(geometry.len());
+        progress.begin(Stage::Draw, cameras.len() as u64);
         for camera in cameras {
+            progress.check()?;
             let frame = measuring.draw(scene, camera, &RenderOptions::default())?;
             let (gaussians, moments) = measuring.read_moments(frame.stats.visible)?;
             let projection = Projection::new(camera, scene.antialiased());
             carry(&mut total, &projection, geometry, cameras.len(), &moments, |k| gaussians[k] as usize);
-            on_view();
+            progress.advance(1);
         }
+        progress.end();
         Ok(total)
     }
 
@@ -88,6 +92,7 @@ impl GpuRenderer {
 
 #[cfg(test)]
 mod tests {
+    use lexisplat::Silent;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::super::path::ShPath;
@@ -104,7 +109,7 @@ mod tests {
         let cameras = surround(&splats.geometry, 2, [130, 100], [1.0, 4.0]);
         let on_gpu = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();
         let measure =
-            |mut renderer: GpuRenderer| renderer.sensitivity(&on_gpu, &splats.geometry, &cameras, &mut || ());
+            |mut renderer: GpuRenderer| renderer.sensitivity(&on_gpu, &splats.geometry, &cameras, &Silent);
         let mut whole = GpuRenderer::new(&gpu).unwrap();
         let limits = whole.limits;
         // Less than a view has, more than any row of tiles.

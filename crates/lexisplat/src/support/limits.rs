@@ -29,7 +29,7 @@ const PROPERTIES: u64 = 4096;
 /// # let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(2000, 0));
 /// # let (model, _) = lexisplat::compress(splats, &Default::default(), &lexisplat::Silent)?;
 /// # let mut file = Vec::new();
-/// # lexi::write_to(&mut file, &model)?;
+/// # lexi::write(&mut file, &model)?;
 /// let refused = lexi::read_bytes("scene.lexi", &file, &small); // a scene of 2000
 /// assert!(matches!(refused, Err(Error::Limit { found: 2000, limit: 1000, .. })));
 /// # Ok::<(), Error>(())
@@ -49,7 +49,7 @@ pub struct Limits {
     pub nonzeros: u64,
     /// Most bytes of arrays made of one file and held at once: geometry, SH or codes, extra properties, and what
     /// of a packed file is kept. The dictionary is not counted, since `atoms` bounds it. A reader of whole scenes
-    /// holds the scene; one that goes part by part ([`ply::PlyChunks`](crate::formats::ply::PlyChunks),
+    /// holds the scene; one that goes part by part ([`ply::PlySource`](crate::formats::ply::PlySource),
     /// [`lexi::LexiChunks`](crate::formats::lexi::LexiChunks)) a part. What a reader needs for itself may be twice as much
     /// again. Also most bytes of a file that has to be held because it cannot be mapped, such as a pipe. Default
     /// `u64::MAX`: none but the machine's.

@@ -10,6 +10,7 @@ pub(crate) mod parallel;
 pub(crate) mod progress;
 pub(crate) mod rng;
 pub mod simd;
+pub(crate) mod sink;
 pub(crate) mod spill;
 pub(crate) mod stopwatch;
 #[cfg(test)]

@@ -17,8 +17,8 @@ use files::{
     HUGE, LARGE, as_ascii, as_ply, exact, model_bytes, packed, packed_bytes, rich, splats_bytes, two_chunks,
 };
 use lexisplat::lexi::{self, Contents, LexiChunks};
-use lexisplat::ply::{self, PlyChunks, ReadOptions};
-use lexisplat::{Error, Input, Layout, Limits, Result, Silent, stream};
+use lexisplat::ply::{self, PlySource, ReadOptions};
+use lexisplat::{Error, Input, Layout, Limits, Result, Silent, SplatSource, stream};
 
 /// What every file here is called.
 const NAME: &str = "a file.ext";
@@ -36,7 +36,7 @@ fn ply_whole(bytes: &[u8], limits: &Limits) -> Result<()> {
 
 fn ply_parts(bytes: &[u8], limits: &Limits) -> Result<()> {
     let options = ReadOptions { limits: *limits, ..ReadOptions::default() };
-    let ply = PlyChunks::open(NAME, bytes, &options, &Silent)?;
+    let ply = PlySource::open(NAME, bytes, &options, &Silent)?;
     ply.read(0..ply.len(), &mut ply.empty())
 }
 
@@ -57,7 +57,7 @@ fn lexi_surveyed(bytes: &[u8], limits: &Limits) -> Result<()> {
 }
 
 fn lexi_decompressed(bytes: &[u8], limits: &Limits) -> Result<()> {
-    stream::decompress_to(&LexiChunks::open(NAME, bytes, limits)?, &mut std::io::sink(), &Silent).map(drop)
+    stream::decompress(&LexiChunks::open(NAME, bytes, limits)?, &mut std::io::sink(), &Silent).map(drop)
 }
 
 fn dictionary(bytes: &[u8], limits: &Limits) -> Result<()> {

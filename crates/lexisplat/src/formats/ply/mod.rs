@@ -45,16 +45,14 @@ mod layout;
 mod marks;
 mod names;
 mod read;
-mod row_bytes;
 mod rows;
 mod source;
 mod summary;
 mod write;
 
-pub use chunks::PlyChunks;
+pub use chunks::PlySource;
 pub use header::{Format, ScalarType};
 pub use read::{PlyRead, ReadOptions, read, read_bytes};
-pub(crate) use row_bytes::RowBytes;
 pub use summary::{Dialect, PlySummary};
-pub(crate) use write::{PlyWriter, check};
+pub(crate) use write::{PlyWriter, check, file_bytes};
 pub use write::{write, write_to};

@@ -61,6 +61,11 @@ pub(crate) struct PlyWriter<W> {
     pub(crate) bytes: u64,
 }
 
+/// Bytes of the file of a scene of `count` Gaussians that is like `splats`.
+pub(crate) fn file_bytes(splats: &Splats, count: usize) -> u64 {
+    header(splats, count).len() as u64 + RowLayout::new(splats).row_bytes as u64 * count as u64
+}
+
 impl<W: Write> PlyWriter<W> {
     /// Writes the header of a scene of `count` Gaussians that is like `splats`, whose own number is of no
     /// matter; it was [`check`]ed.
@@ -70,11 +75,6 @@ impl<W: Write> PlyWriter<W> {
         let layout = RowLayout::new(splats);
         let block = vec![0; layout.row_bytes * BLOCK_ROWS.min(count)];
         Ok(Self { writer, layout, block, bytes: header.len() as u64 })
-    }
-
-    /// Bytes of a Gaussian.
-    pub(crate) fn row_bytes(&self) -> u64 {
-        self.layout.row_bytes as u64
     }
 
     /// Writes the next Gaussians.

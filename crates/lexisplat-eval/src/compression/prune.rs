@@ -1,50 +1,60 @@
-//! Leaving out Gaussians that no view would miss.
+//! Pruning: Gaussians that no view would miss are left out.
 
-use lexisplat::{Sensitivity, Splats};
+use lexisplat::{Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, RenderOptions, Renderer, Scene};
+use serde::Serialize;
 
-use crate::error::Result;
-use crate::target::Views;
+use super::views::PackingViews;
+use crate::error::{Error, Result};
 
-/// Candidates must change pictures less, each on its own, than the bound for all together, by a power of
-/// this: what many small changes add up to is found by drawing.
+/// Largest value of an 8-bit channel.
+pub(super) const LEVELS: f32 = 255.0;
+/// Factor by which the limit for one Gaussian falls from one try to the next. Many small changes add up, and
+/// only drawing shows to how much.
 const STRICTER: f32 = 0.7;
-/// Powers tried.
+/// Number of limits tried.
 const TRIES: i32 = 16;
 
-/// What was left out.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What pruning did.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Pruned {
-    /// Gaussians left out.
+    /// Number of Gaussians left out.
+    #[serde(rename = "gaussians")]
     pub removed: usize,
     /// Largest change of a channel of any pixel of any view, in units of the channel (0 to 1).
     pub largest_change: f32,
-    /// Views looked at.
+    /// Number of views that were compared.
     pub views: usize,
 }
 
-/// Leaves out Gaussians without which, all together, no channel of any pixel of any view changes by more
-/// than `bound` (0 to 1). Given cameras are joined by generated views, so that what no camera saw is not
-/// lost. `seen` is their [`Views::sensitivity`], and is filtered alike.
+/// Leaves Gaussians out as long as no channel of any pixel of any view changes by more than `levels` of 255.
+/// Views generated from all around join given cameras, so that what no camera saw is not lost. `sensitivity`
+/// is the one that `views` measured. It is filtered as `splats` are.
 ///
 /// # Errors
-/// None on the processor; on a GPU [`crate::Error::Render`] if the scene or a view does not fit.
-///
-/// # Panics
-/// If `seen` and `splats` differ in length.
+/// [`Error::Parameter`] if `levels` is not finite and above 0, or if `sensitivity` and `splats` differ in
+/// length. On a GPU [`Error::Render`] if the scene or a view does not fit.
 pub fn prune(
     renderer: &mut Renderer,
     splats: &mut Splats,
-    seen: &mut Sensitivity,
-    views: &Views,
-    bound: f32,
+    sensitivity: &mut Sensitivity,
+    views: &PackingViews,
+    levels: f32,
+    progress: &dyn Progress,
 ) -> Result<Pruned> {
+    if !levels.is_finite() || levels <= 0.0 {
+        return Err(Error::parameter("prune", levels, "a finite number above 0"));
+    }
+    if sensitivity.len() != splats.len() {
+        return Err(Error::parameter("sensitivity", sensitivity.len(), "one entry a Gaussian"));
+    }
+    let bound = levels / LEVELS;
     let mut cameras: Vec<Camera> = views.all().cloned().collect();
     if views.are_given() {
-        let around = Views::generated(splats);
-        let more = renderer.sensitivity(&Scene::from(&*splats), around.measuring(), &mut || ())?;
-        for (a, b) in seen.removal.iter_mut().zip(more.removal) {
+        let around = PackingViews::generated(splats);
+        let more = renderer.sensitivity(&Scene::from(&*splats), around.measuring(), progress)?;
+        for (a, b) in sensitivity.removal.iter_mut().zip(more.removal) {
             *a = a.max(b);
         }
         cameras.extend(around.all().cloned());
@@ -52,9 +62,10 @@ pub fn prune(
     let nothing = Pruned { removed: 0, largest_change: 0.0, views: cameras.len() };
     let mut last = usize::MAX;
     for power in 0..TRIES {
-        // Not `powi`, whose last bit may differ between machines.
+        progress.check()?;
+        // `powi` may differ between machines in its last bit.
         let limit = bound * (0..power).fold(1.0, |share, _| share * STRICTER);
-        let keep: Vec<bool> = seen.removal.iter().map(|&change| change > limit).collect();
+        let keep: Vec<bool> = sensitivity.removal.iter().map(|&change| change > limit).collect();
         let removed = keep.iter().filter(|&&k| !k).count();
         if removed == 0 {
             return Ok(nothing);
@@ -67,15 +78,15 @@ pub fn prune(
         let largest_change = largest_change(renderer, [splats, &rest], &mut cameras, bound)?;
         if largest_change <= bound {
             *splats = rest;
-            seen.retain(&keep);
+            sensitivity.retain(&keep);
             return Ok(Pruned { removed, largest_change, ..nothing });
         }
     }
     Ok(nothing)
 }
 
-/// Largest difference of any channel of any pixel between two scenes' pictures; of the first cameras alone
-/// if it is over `bound` in one, which then goes first: what fails there is likely to fail at the next try.
+/// Returns the largest difference of any channel of any pixel between the pictures of two scenes. Stops at the
+/// first camera whose difference is over `bound`, and puts it first: the next try is likely to fail there too.
 fn largest_change(
     renderer: &mut Renderer,
     scenes: [&Splats; 2],
@@ -100,6 +111,7 @@ fn largest_change(
 
 #[cfg(test)]
 mod tests {
+    use lexisplat::Silent;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -112,10 +124,10 @@ mod tests {
             splats.geometry.opacities[i] = -8.0;
         }
         let original = splats.clone();
-        let views = Views::generated(&splats);
+        let views = PackingViews::generated(&splats);
         let mut cpu = Renderer::cpu();
-        let mut seen = views.sensitivity(&mut cpu, &splats, &mut || ()).unwrap();
-        let pruned = prune(&mut cpu, &mut splats, &mut seen, &views, 0.5 / 255.0).unwrap();
+        let mut seen = views.sensitivity(&mut cpu, &splats, &Silent).unwrap();
+        let pruned = prune(&mut cpu, &mut splats, &mut seen, &views, 0.5, &Silent).unwrap();
         assert!(pruned.removed >= 80, "{pruned:?}");
         assert!(pruned.largest_change <= 0.5 / 255.0);
         assert_eq!(splats.len() + pruned.removed, original.len());
@@ -131,9 +143,9 @@ mod tests {
     fn nothing_goes_where_everything_shows() {
         let mut splats = scene(&SampleOptions::new(60, 3));
         let original = splats.clone();
-        let views = Views::generated(&splats);
+        let views = PackingViews::generated(&splats);
         let mut seen = Sensitivity::heuristic(&splats.geometry);
-        let pruned = prune(&mut Renderer::cpu(), &mut splats, &mut seen, &views, 0.1).unwrap();
+        let pruned = prune(&mut Renderer::cpu(), &mut splats, &mut seen, &views, 25.5, &Silent).unwrap();
         assert_eq!(pruned.removed, 0);
         assert_eq!(splats, original);
     }
