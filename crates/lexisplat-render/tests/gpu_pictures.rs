@@ -33,7 +33,7 @@ fn wild(random: &mut made::Random, count: usize, degree: ShDegree) -> Splats {
         geometry.opacities.push(random.within(-6.0, 9.0));
     }
     let sh_rest = (0..count * degree.rest()).map(|_| random.within(-0.3, 0.3)).collect();
-    let meta = SceneMeta { antialiased: random.next() < 0.5, ..SceneMeta::default() };
+    let meta = SceneMeta { antialiased: random.unit() < 0.5, ..SceneMeta::default() };
     Splats { geometry, degree, sh_rest, meta }
 }
 
@@ -56,14 +56,14 @@ fn random_scenes_look_the_same() {
     for case in 0..60 {
         let mut random = made::Random::new(case);
         let degree = ShDegree::new((case % 5) as u8).unwrap();
-        let count = (random.next() * 400.0) as usize;
+        let count = (random.unit() * 400.0) as usize;
         let splats = wild(&mut random, count, degree);
         let scene = Scene::from(&splats);
         let (width, height) = sides[case as usize % sides.len()];
         let focal = random.within(2.0, 8.0).exp();
         let camera = Camera { fy: focal * random.within(0.8, 1.2), ..made::straight(width, height, focal) };
-        let background = std::array::from_fn(|_| random.next());
-        let max_degree = (case % 3 == 0).then(|| ShDegree::new((random.next() * 5.0) as u8).unwrap());
+        let background = std::array::from_fn(|_| random.unit());
+        let max_degree = (case % 3 == 0).then(|| ShDegree::new((random.unit() * 5.0) as u8).unwrap());
         let options = RenderOptions { background, max_degree };
         let uploaded = GpuScene::new(&gpu, &scene, ShPath::DenseF32).unwrap();
         let (found, stats) = renderer.render(&uploaded, &camera, &options).unwrap();

@@ -15,7 +15,7 @@ mod naive;
 use lexisplat_render::{Camera, RenderOptions, Scene, Split, read_cameras, render};
 
 fn test_cameras(name: &str) -> Option<Vec<Camera>> {
-    let cameras = read_cameras(common::data(name)?).unwrap();
+    let cameras = read_cameras(lexisplat_testing::real_data(name)?).unwrap();
     Some(cameras.into_iter().filter(|camera| camera.split == Some(Split::Test)).collect())
 }
 

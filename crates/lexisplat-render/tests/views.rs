@@ -75,9 +75,9 @@ fn sources_are_told_apart_by_content() {
 
 /// Bonsai's cameras by COLMAP at the width of its photos, and those of its `cameras.json`, by name.
 fn bonsai() -> Option<Vec<(Camera, Camera)>> {
-    let set = read_colmap(common::data("bonsai-sparse")?).unwrap();
+    let set = read_colmap(lexisplat_testing::real_data("bonsai-sparse")?).unwrap();
     assert_eq!(set.warnings, Vec::<String>::new());
-    let mut known = read_cameras(common::data("bonsai.cameras.json")?).unwrap();
+    let mut known = read_cameras(lexisplat_testing::real_data("bonsai.cameras.json")?).unwrap();
     known.sort_by(|a, b| a.name.cmp(&b.name));
     let found: Vec<Camera> = set.cameras.iter().map(|camera| camera.with_max_width(400)).collect();
     assert_eq!((found.len(), known.len()), (98, 98));

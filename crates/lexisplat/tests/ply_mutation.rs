@@ -10,7 +10,8 @@ mod allocator;
 mod support;
 
 use allocator::counted;
-use support::{File, Random, columns, scene};
+use lexisplat_testing::Random;
+use support::{File, columns, scene};
 
 /// Damaged files read.
 const INPUTS: usize = 10_000;
@@ -160,7 +161,7 @@ fn damaged_files_are_refused_quietly() {
     let wide = format!("element e 0\n{}", "property char a\n".repeat(4000)).repeat(12);
     survive(format!("ply\nformat ascii 1.0\n{wide}end_header\n").as_bytes(), false);
 
-    let mut random = Random(0x1e15);
+    let mut random = Random::new(0x1e15);
     let (mut read, mut accepted) = (0, 0);
     for bytes in &seeds[..3] {
         for length in 0..bytes.len() {

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use lexisplat::ply;
 use lexisplat_sample::{SampleOptions, scene};
+use lexisplat_testing::{Need, missing};
 
 use crate::folder::Folder;
 use crate::runs::{
@@ -151,7 +152,7 @@ fn temporary_files_that_have_a_name_are_removed() {
         command
     };
     if !in_namespace().arg("true").status().is_ok_and(|status| status.success()) {
-        eprintln!("skipped: `unshare -rm` cannot mount here");
+        missing(Need::Mounts, "`unshare -rm` cannot mount here");
         return;
     }
     let folder = Folder::new();

@@ -11,9 +11,8 @@ use lexisplat_eval::{DrawOptions, Scorer, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
 use lexisplat_sample::{SampleOptions, scene};
+use lexisplat_testing::{Need, missing};
 
-/// Set where GPU tests may not be skipped.
-const REQUIRE: &str = "LEXISPLAT_REQUIRE_GPU";
 /// Quality that packing aims at, in dB.
 const PACKED_DB: f64 = 50.0;
 /// Least PSNR of a GPU's picture against the processor's, in dB: what an 8-bit picture cannot show.
@@ -51,9 +50,8 @@ fn renderers() -> Vec<Renderer> {
     static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
     let gpu = GPU.get_or_init(|| match Device::Gpu.open_gpu() {
         Ok(gpu) => gpu,
-        Err(error) if std::env::var_os(REQUIRE).is_some() => panic!("{REQUIRE} is set, but {error}"),
         Err(error) => {
-            eprintln!("only the processor: {error}");
+            missing(Need::Gpu, &format!("only the processor draws, since {error}"));
             None
         }
     });

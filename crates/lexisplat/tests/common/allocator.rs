@@ -7,6 +7,7 @@ struct Counting;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
+static TOTAL: AtomicUsize = AtomicUsize::new(0);
 
 #[expect(unsafe_code, reason = "a global allocator is an unsafe trait; every call goes to the system's")]
 // SAFETY: all requests are passed on unchanged to `System`; counting does not touch the memory.
@@ -33,6 +34,7 @@ unsafe impl GlobalAlloc for Counting {
 fn count(bytes: usize) {
     let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
     PEAK.fetch_max(live, Relaxed);
+    TOTAL.fetch_add(bytes, Relaxed);
 }
 
 #[global_allocator]
@@ -45,4 +47,10 @@ pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, usize) {
     PEAK.store(before, Relaxed);
     let result = work();
     (result, PEAK.load(Relaxed) - before)
+}
+
+/// The bytes that the process has allocated so far, those given back included.
+#[allow(dead_code, reason = "not every test binary asks")]
+pub(crate) fn total() -> usize {
+    TOTAL.load(Relaxed)
 }

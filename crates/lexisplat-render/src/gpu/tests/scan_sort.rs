@@ -130,7 +130,7 @@ fn scans_are_exclusive_sums() {
         [1, 2, GROUP, GROUP + 1, SCAN_BLOCK - 1, SCAN_BLOCK, SCAN_BLOCK + 1, 5 * SCAN_BLOCK + 7, most];
     for length in lengths {
         for fixed in [true, false] {
-            let numbers: Vec<u32> = (0..=most).map(|_| (random.next() * 1000.0) as u32).collect();
+            let numbers: Vec<u32> = (0..=most).map(|_| (random.unit() * 1000.0) as u32).collect();
             bench.fill(&bench.work.offsets, &numbers);
             let mut planner = bench.planner();
             if fixed {
@@ -182,7 +182,7 @@ fn sorts_are_stable() {
     let most = 9 * SORT_BLOCK + 3;
     let bench = Bench::new(&gpu, most);
     let mut random = Random::new(2);
-    let mut bits = || (random.next() * 65_536.0) as u32 | ((random.next() * 65_536.0) as u32) << 16;
+    let mut bits = || (random.unit() * 65_536.0) as u32 | ((random.unit() * 65_536.0) as u32) << 16;
     for length in [0, 1, 2, GROUP, GROUP + 1, SORT_BLOCK - 1, SORT_BLOCK, SORT_BLOCK + 1, most] {
         for (key_bits, distinct_bits) in [(1, 1), (4, 4), (5, 3), (8, 8), (13, 2), (32, 32), (32, 4)] {
             for identity in [true, false] {
