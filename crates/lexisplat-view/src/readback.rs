@@ -1,10 +1,10 @@
-//! Bytes off the graphics device.
+//! Copying buffers from the graphics device to memory.
 
 use std::sync::mpsc::channel;
 
 use crate::error::{Error, Result};
 
-/// All bytes of `source`, which must allow `COPY_SRC`. Waits for everything submitted before.
+/// Returns all bytes of `source`, which must allow `COPY_SRC`. Waits for all work submitted before.
 ///
 /// # Errors
 /// [`Error::Device`] if the device is lost or out of memory.
@@ -16,7 +16,7 @@ pub(crate) fn buffer(device: &wgpu::Device, queue: &wgpu::Queue, source: &wgpu::
     read(device, &mapped)
 }
 
-/// A buffer to copy `size` bytes to and [`read`].
+/// Returns a buffer of `size` bytes for [`read`].
 pub(crate) fn target(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
     device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("readback"),
@@ -26,7 +26,7 @@ pub(crate) fn target(device: &wgpu::Device, size: u64) -> wgpu::Buffer {
     })
 }
 
-/// The bytes of a [`target`] when all that was submitted is done.
+/// Waits for all work submitted, and returns the bytes of a [`target`].
 ///
 /// # Errors
 /// [`Error::Device`] if the device is lost or out of memory.

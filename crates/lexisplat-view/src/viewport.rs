@@ -1,4 +1,4 @@
-//! The picture in the window: pointer, letterbox, labels, and the wipe's line.
+//! The picture in the window, with its labels, the wipe's line, and the pointer's effects on the view.
 
 use std::sync::Arc;
 
@@ -6,44 +6,46 @@ use eframe::{egui, egui_wgpu};
 use egui::{Align2, Color32, CornerRadius, CursorIcon, FontId, Pos2, Rect, Sense, Stroke, Vec2};
 
 use crate::app::App;
-use crate::command::{Command, Mode, Which};
-use crate::eye::fitted;
-use crate::painting::Score;
-use crate::present::{OnScreen, Showing};
+use crate::camera_controller::fitted;
+use crate::command::{Command, Mode, Slot};
+use crate::present::{Composition, PresentCallback};
+use crate::render_thread::Score;
 
-/// Orbit of a drag across the picture's shorter side, in radians.
+/// Angle of orbiting for a drag across the picture's shorter side, in radians.
 const ORBIT: f64 = std::f64::consts::PI;
-/// Turn of the head for the same drag, in radians.
+/// Angle of looking around for the same drag, in radians.
 const LOOK: f64 = 1.0;
-/// Distance left after one point of wheel.
+/// Factor on the distance of the pivot for one point of scrolling.
 const WHEEL: f64 = 0.998;
-/// How near to the wipe's line the pointer drags it, in points.
+/// Largest distance of the pointer from the wipe's line that it drags, in points.
 const GRIP: f32 = 8.0;
 /// Radius of the line's handle, in points.
 const HANDLE: f32 = 7.0;
 /// Inner and outer margins of labels, in points.
 const PADDING: Vec2 = Vec2::new(8.0, 4.0);
 const MARGIN: f32 = 10.0;
-/// Around the picture.
+/// Colour around the picture.
 const BEHIND: Color32 = Color32::from_gray(16);
 
 impl App {
-    /// Shows the picture in all the space that is left, and takes the pointer there.
-    pub(crate) fn stage(&mut self, ui: &mut egui::Ui) {
+    /// Shows the picture in the space that the panel leaves, and handles the pointer there.
+    pub(crate) fn viewport(&mut self, ui: &mut egui::Ui) {
         egui::CentralPanel::no_frame().show(ui, |ui| {
             let whole = ui.max_rect();
             let per_point = ui.ctx().pixels_per_point();
             self.area = (pixels(whole.width(), per_point), pixels(whole.height(), per_point));
             ui.painter().rect_filled(whole, CornerRadius::ZERO, BEHIND);
-            let picture = self.showing().and_then(|showing| {
-                let place = self.place(&showing, whole, per_point)?;
-                let mode = showing.arrangement.mode;
+            let picture = self.composition().and_then(|composition| {
+                let place = self.place(&composition, whole, per_point)?;
+                let mode = composition.arrangement.mode;
                 let presenter = Arc::clone(&self.presenter);
-                ui.painter()
-                    .add(egui_wgpu::Callback::new_paint_callback(place, OnScreen { presenter, showing }));
+                ui.painter().add(egui_wgpu::Callback::new_paint_callback(
+                    place,
+                    PresentCallback { presenter, composition },
+                ));
                 Some((place, mode))
             });
-            let response = ui.interact(whole, ui.scope_id().with("stage"), Sense::click_and_drag());
+            let response = ui.interact(whole, ui.scope_id().with("viewport"), Sense::click_and_drag());
             match picture {
                 Some((place, mode)) => {
                     self.pointer(ui, &response, place, mode);
@@ -63,23 +65,25 @@ impl App {
         });
     }
 
-    /// What can be shown now: the arrangement asked for, or what there is a picture of.
-    fn showing(&self) -> Option<Showing> {
-        let shot = self.shot.as_ref()?;
-        let mut showing = Showing { arrangement: self.state.arrangement, pictures: shot.pictures.clone() };
-        if showing.sides().is_none() {
-            let there = Which::BOTH.into_iter().find(|which| showing.pictures[which.index()].is_some())?;
-            showing.arrangement.mode = Mode::One(there);
+    /// Returns the arrangement chosen, or the one picture there is if the arrangement needs another.
+    fn composition(&self) -> Option<Composition> {
+        let frame = self.frame.as_ref()?;
+        let mut composition =
+            Composition { arrangement: self.state.arrangement, pictures: frame.pictures.clone() };
+        if composition.sides().is_none() {
+            let there = Slot::BOTH.into_iter().find(|slot| composition.pictures[slot.index()].is_some())?;
+            composition.arrangement.mode = Mode::One(there);
         }
-        Some(showing)
+        Some(composition)
     }
 
-    /// Where on screen: on whole pixels, in the middle of `whole`.
-    fn place(&self, showing: &Showing, whole: Rect, per_point: f32) -> Option<Rect> {
-        let camera = &self.shot.as_ref()?.view.camera;
-        let columns = showing.arrangement.columns();
+    /// Returns the rectangle of the picture: in the middle of `whole`, with corners on whole pixels.
+    fn place(&self, composition: &Composition, whole: Rect, per_point: f32) -> Option<Rect> {
+        let camera = &self.frame.as_ref()?.view.camera;
+        let columns = composition.arrangement.columns();
         let (width, height) = (camera.width * columns, camera.height);
-        // Drawn for this area, pixel for pixel; or for another one, until the next picture comes.
+        // A picture drawn for this area is shown pixel for pixel. One drawn for another area, before the window
+        // changed its size, is scaled until the next one is drawn.
         let fills = self.area.0.checked_sub(width).is_some_and(|rest| rest < columns);
         let fits = (fills && height <= self.area.1) || (width <= self.area.0 && height == self.area.1);
         let aspect = f64::from(width) / f64::from(height.max(1));
@@ -110,33 +114,33 @@ impl App {
         let (x, y) = (f64::from(by.x) / short, f64::from(by.y) / short);
         if self.dragging_split {
             if let Some(at) = response.interact_pointer_pos() {
-                self.perform(Command::Split((at.x - place.left()) / place.width().max(1.0)));
+                self.handle(Command::Split((at.x - place.left()) / place.width().max(1.0)));
             }
         } else if response.dragged() && by != Vec2::ZERO {
             let primary = response.dragged_by(egui::PointerButton::Primary);
-            if let Some(eye) = self.state.eye() {
+            if let Some(controller) = self.state.free_camera() {
                 match (primary, modifiers.shift, modifiers.ctrl) {
-                    (true, false, false) => eye.orbit(x * ORBIT, y * ORBIT),
-                    (true, false, true) => eye.look(x * -LOOK, y * -LOOK),
-                    _ => eye.pan(x, y),
+                    (true, false, false) => controller.orbit(x * ORBIT, y * ORBIT),
+                    (true, false, true) => controller.look(x * -LOOK, y * -LOOK),
+                    _ => controller.pan(x, y),
                 }
             }
-            self.moved();
+            self.note_motion();
         }
         let wheel = ui.input(egui::InputState::smooth_scroll_delta).y;
         if response.hovered() && wheel != 0.0 {
-            if let Some(eye) = self.state.eye() {
-                eye.dolly(WHEEL.powf(f64::from(wheel)));
+            if let Some(controller) = self.state.free_camera() {
+                controller.dolly(WHEEL.powf(f64::from(wheel)));
             }
-            self.moved();
+            self.note_motion();
         }
     }
 
     fn overlays(&self, painter: &egui::Painter, place: Rect, mode: Mode) {
-        let name = |which: Which| self.model(which).map(|m| m.short_name()).unwrap_or_default();
+        let name = |slot: Slot| self.model(slot).map(|m| m.short_name()).unwrap_or_default();
         let (left, right) = (place.left_top(), place.right_top());
         match mode {
-            Mode::One(which) => label(painter, left, Align2::LEFT_TOP, &name(which)),
+            Mode::One(slot) => label(painter, left, Align2::LEFT_TOP, &name(slot)),
             Mode::SideBySide | Mode::Wipe => {
                 let share = if mode == Mode::Wipe { self.state.arrangement.split } else { 0.5 };
                 let x = place.left() + place.width() * share;
@@ -147,8 +151,8 @@ impl App {
                     let handle = Pos2::new(x, place.center().y);
                     painter.circle(handle, HANDLE, Color32::from_gray(40), stroke);
                 }
-                label(painter, left, Align2::LEFT_TOP, &name(Which::First));
-                label(painter, right, Align2::RIGHT_TOP, &name(Which::Second));
+                label(painter, left, Align2::LEFT_TOP, &name(Slot::First));
+                label(painter, right, Align2::RIGHT_TOP, &name(Slot::Second));
             }
             Mode::Difference => {
                 let text = format!("difference x {:.3}", self.state.arrangement.gain);
@@ -166,18 +170,18 @@ impl App {
     }
 
     fn waiting(&self, painter: &egui::Painter, whole: Rect) {
-        let busy = self.works.iter().any(Option::is_some) || self.models.iter().any(Option::is_some);
+        let busy = self.jobs.iter().any(Option::is_some) || self.models.iter().any(Option::is_some);
         let text = if busy { "reading ..." } else { "drop a .ply or .lexi file here" };
         middle(painter, whole, text, Color32::from_gray(150));
     }
 }
 
-/// Words in the middle of `place`.
+/// Writes text in the middle of `place`.
 fn middle(painter: &egui::Painter, place: Rect, text: &str, colour: Color32) {
     painter.text(place.center(), Align2::CENTER_CENTER, text, FontId::proportional(18.0), colour);
 }
 
-/// Words over the picture, in the corner `align` of it at `corner`.
+/// Writes text over the picture, inside of its corner `align`, which is at `corner`.
 fn label(painter: &egui::Painter, corner: Pos2, align: Align2, text: &str) {
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
     let sign = align.to_sign();
@@ -187,7 +191,7 @@ fn label(painter: &egui::Painter, corner: Pos2, align: Align2, text: &str) {
     painter.galley(inner.min, galley, Color32::WHITE);
 }
 
-/// Whole pixels in so many points.
+/// Returns the whole pixels in `points`.
 fn pixels(points: f32, per_point: f32) -> u32 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to 65535")]
     let count = (points * per_point).floor().clamp(0.0, 65_535.0) as u32;

@@ -1,41 +1,41 @@
-//! Pictures by the processor.
+//! Drawing by the CPU.
 
 use std::sync::Arc;
 
 use lexisplat_render::{Camera, RenderOptions, render_measured};
 use wgpu::util::DeviceExt;
 
-use super::{Painted, Painter};
-use crate::command::Which;
+use super::{Picture, SceneRenderer};
+use crate::command::Slot;
 use crate::error::{Error, Result};
-use crate::models::Open;
+use crate::models::OpenModel;
 
-/// The reference rasteriser on the processor.
-pub(crate) struct Cpu {
+/// The reference rasteriser on the CPU.
+pub(crate) struct CpuSceneRenderer {
     device: wgpu::Device,
-    models: [Option<Arc<Open>>; 2],
+    models: [Option<Arc<OpenModel>>; 2],
 }
 
-impl Cpu {
+impl CpuSceneRenderer {
     pub(crate) fn new(device: wgpu::Device) -> Self {
         Self { device, models: [None, None] }
     }
 }
 
-impl Painter for Cpu {
+impl SceneRenderer for CpuSceneRenderer {
     fn name(&self) -> String {
         "CPU".to_owned()
     }
 
-    fn set(&mut self, which: Which, model: Option<Arc<Open>>) -> Result<()> {
-        self.models[which.index()] = model;
+    fn set(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) -> Result<()> {
+        self.models[slot.index()] = model;
         Ok(())
     }
 
-    fn paint(&mut self, which: Which, camera: &Camera, options: &RenderOptions) -> Result<Painted> {
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture> {
         camera.validate()?;
-        let Some(model) = &self.models[which.index()] else {
-            return Err(Error::Device(format!("no {which:?} model to draw")));
+        let Some(model) = &self.models[slot.index()] else {
+            return Err(Error::Device(format!("there is no {slot:?} model to draw")));
         };
         let drawn = render_measured(&model.scene.scene(), camera, options);
         let image = drawn.image;
@@ -51,7 +51,7 @@ impl Painter for Cpu {
             contents: bytes,
             usage: wgpu::BufferUsages::STORAGE,
         });
-        Ok(Painted {
+        Ok(Picture {
             pixels,
             width: image.width,
             height: image.height,

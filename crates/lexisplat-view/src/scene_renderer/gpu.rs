@@ -1,39 +1,39 @@
-//! Pictures by the graphics device that also shows them.
+//! Drawing by the GPU that also shows the window.
 
 use std::sync::Arc;
 
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions};
 
-use super::{PIXEL, Painted, Painter};
-use crate::command::Which;
+use super::{PIXEL, Picture, SceneRenderer};
+use crate::command::Slot;
 use crate::error::{Error, Result};
-use crate::models::Open;
+use crate::models::OpenModel;
 
-/// The rasteriser on the GPU. Compressed scenes stay sparse there.
-pub(crate) struct OnGpu {
+/// The rasteriser on the GPU. Compressed scenes stay sparse on it.
+pub(crate) struct GpuSceneRenderer {
     gpu: Gpu,
     renderer: GpuRenderer,
     scenes: [Option<GpuScene>; 2],
 }
 
-impl OnGpu {
+impl GpuSceneRenderer {
     /// # Errors
-    /// If the driver refuses a kernel.
+    /// If the driver rejects a kernel.
     pub(crate) fn new(gpu: Gpu) -> Result<Self> {
         let renderer = GpuRenderer::new(&gpu)?;
         Ok(Self { gpu, renderer, scenes: [None, None] })
     }
 }
 
-impl Painter for OnGpu {
+impl SceneRenderer for GpuSceneRenderer {
     fn name(&self) -> String {
         self.gpu.summary().name.clone()
     }
 
-    fn set(&mut self, which: Which, model: Option<Arc<Open>>) -> Result<()> {
-        let place = &mut self.scenes[which.index()];
-        // The old one goes first: there may be no room for both.
+    fn set(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) -> Result<()> {
+        let place = &mut self.scenes[slot.index()];
+        // The old model is freed first: there may be no memory for both.
         *place = None;
         if let Some(model) = model {
             let scene = model.scene.scene();
@@ -42,12 +42,12 @@ impl Painter for OnGpu {
         Ok(())
     }
 
-    fn paint(&mut self, which: Which, camera: &Camera, options: &RenderOptions) -> Result<Painted> {
-        let Some(scene) = &self.scenes[which.index()] else {
-            return Err(Error::Device(format!("no {which:?} model to draw")));
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture> {
+        let Some(scene) = &self.scenes[slot.index()] else {
+            return Err(Error::Device(format!("there is no {slot:?} model to draw")));
         };
         let frame = self.renderer.draw(scene, camera, options)?;
-        // The renderer's own is drawn over by the next picture.
+        // The renderer reuses its own buffer for the next picture.
         let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL as u64;
         let device = self.gpu.device();
         let pixels = device.create_buffer(&wgpu::BufferDescriptor {
@@ -60,7 +60,7 @@ impl Painter for OnGpu {
         encoder.copy_buffer_to_buffer(&frame.pixels, 0, &pixels, 0, size);
         self.gpu.queue().submit([encoder.finish()]);
         let stages = frame.stats.stages.iter().map(|(stage, time)| (stage.name(), *time));
-        Ok(Painted {
+        Ok(Picture {
             pixels,
             width: frame.width,
             height: frame.height,

@@ -1,4 +1,4 @@
-//! Pictures of scenes, in buffers that the screen can show.
+//! Drawing the two models, on the GPU or the CPU, to buffers that the window can show.
 
 mod cpu;
 mod gpu;
@@ -7,55 +7,55 @@ use std::sync::Arc;
 
 use lexisplat_render::{Camera, Image, RenderOptions};
 
-use crate::command::Which;
+use crate::command::Slot;
 use crate::error::Result;
-use crate::models::Open;
+use crate::models::OpenModel;
 use crate::readback;
 
-pub(crate) use cpu::Cpu;
-pub(crate) use gpu::OnGpu;
+pub(crate) use cpu::CpuSceneRenderer;
+pub(crate) use gpu::GpuSceneRenderer;
 
 /// Bytes of a pixel: four floats.
 const PIXEL: usize = 16;
 
-/// Draws the two models.
-pub(crate) trait Painter: Send {
-    /// What it is called in the panel.
+/// Something that draws the two models.
+pub(crate) trait SceneRenderer: Send {
+    /// Returns the name that the panel shows.
     fn name(&self) -> String;
 
-    /// What `which` is from now on.
+    /// Replaces the model of `slot`.
     ///
     /// # Errors
-    /// If the scene does not fit the device.
-    fn set(&mut self, which: Which, model: Option<Arc<Open>>) -> Result<()>;
+    /// If the scene does not fit on the device.
+    fn set(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) -> Result<()>;
 
-    /// Draws `which`.
+    /// Draws the model of `slot`.
     ///
     /// # Errors
-    /// If it is not open, the camera cannot be drawn with, or the device fails.
-    fn paint(&mut self, which: Which, camera: &Camera, options: &RenderOptions) -> Result<Painted>;
+    /// If there is no such model, the camera is not valid, or the device fails.
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture>;
 
-    /// Bytes that drawing takes on the device: models and work, without the pictures handed out.
+    /// Returns the bytes of models and work buffers on the device, without the pictures returned.
     fn resident_bytes(&self) -> u64;
 }
 
-/// A picture on the device, and what drawing it took.
+/// A picture on the device, and statistics of drawing it.
 #[derive(Debug)]
-pub(crate) struct Painted {
-    /// `width * height` times red, green, blue and 1, as f32, row by row; not clamped.
+pub(crate) struct Picture {
+    /// Red, green, blue and 1 as f32 for each of `width * height` pixels, row by row; not clamped.
     pub(crate) pixels: wgpu::Buffer,
     pub(crate) width: u32,
     pub(crate) height: u32,
-    /// Gaussians that may touch it.
+    /// Number of Gaussians that may touch the picture.
     pub(crate) gaussians: usize,
     /// Milliseconds of each stage.
     pub(crate) stage_times: Vec<(&'static str, f64)>,
-    /// The same picture off the device, where it has been there anyway.
+    /// The same picture in memory, if the CPU drew it.
     pub(crate) image: Option<Image>,
 }
 
-impl Painted {
-    /// The picture off the device.
+impl Picture {
+    /// Returns the picture in memory.
     ///
     /// # Errors
     /// If the device fails.

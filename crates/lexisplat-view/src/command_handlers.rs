@@ -1,4 +1,4 @@
-//! What commands do beyond the state: files, jobs, pictures.
+//! The effects of commands on files, jobs and pictures. `State` handles the others.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -8,25 +8,25 @@ use lexisplat_render::read_cameras;
 use serde_json::json;
 
 use crate::app::App;
-use crate::command::{Command, Mode, Quality, Which};
+use crate::command::{Command, Mode, Quality, Slot};
 use crate::error::{Error, Result};
 use crate::models;
-use crate::painting::{Ask, Score, View};
+use crate::render_thread::{RenderRequest, Score, View};
 
-/// Most pictures that may have the same name but for a number.
+/// Largest number tried in a screenshot's file name.
 const MOST_NAMES: u32 = 100_000;
 
 impl App {
-    /// Does what `command` asks; failures appear in the panel.
-    pub(crate) fn perform(&mut self, command: Command) {
-        if let Err(error) = self.attempt(command) {
-            self.complain(error);
+    /// Carries out `command`. The panel shows its error, if there is one.
+    pub(crate) fn handle(&mut self, command: Command) {
+        if let Err(error) = self.try_handle(command) {
+            self.show_error(error);
         }
     }
 
-    fn attempt(&mut self, command: Command) -> Result<()> {
+    fn try_handle(&mut self, command: Command) -> Result<()> {
         match command {
-            Command::Open(path, which) => self.open(path, which),
+            Command::Open(path, slot) => self.open(path, slot),
             Command::Drop { paths, first } => self.take_dropped(paths, first)?,
             Command::Compress(quality) => self.compress(quality)?,
             Command::Swap => self.swap(),
@@ -47,32 +47,32 @@ impl App {
         self.last_id
     }
 
-    fn open(&mut self, path: PathBuf, which: Which) {
+    fn open(&mut self, path: PathBuf, slot: Slot) {
         let id = self.next_id();
-        let work = models::open(id, which, path, self.options.limits, self.orbit_size(), self.bell.clone());
-        self.works[which.index()] = Some(work);
+        let job = models::open(id, slot, path, self.options.limits, self.orbit_size(), self.notifier.clone());
+        self.jobs[slot.index()] = Some(job);
     }
 
-    /// Takes dropped files: two scenes become both models; one the second, or the first if none is open or
-    /// that is wanted. A JSON file is cameras.
+    /// Opens dropped files. Two scenes become both models. One scene becomes the first model if `first` or if none
+    /// is open, else the second. A JSON file is read as cameras.
     fn take_dropped(&mut self, paths: Vec<PathBuf>, first: bool) -> Result<()> {
         let is_json = |path: &PathBuf| path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let (cameras, scenes): (Vec<PathBuf>, Vec<PathBuf>) = paths.into_iter().partition(is_json);
         if let [one] = scenes.as_slice() {
-            let opened = self.models[0].is_some() || self.works[0].is_some();
-            let which = if first || !opened { Which::First } else { Which::Second };
-            self.open(one.clone(), which);
+            let opened = self.models[0].is_some() || self.jobs[0].is_some();
+            let slot = if first || !opened { Slot::First } else { Slot::Second };
+            self.open(one.clone(), slot);
         } else {
-            for (path, which) in scenes.into_iter().zip(Which::BOTH) {
-                self.open(path, which);
+            for (path, slot) in scenes.into_iter().zip(Slot::BOTH) {
+                self.open(path, slot);
             }
         }
         if let Some(path) = cameras.first() {
             let width = self.options.max_width.max(1);
             let cameras = read_cameras(path)?.iter().map(|c| c.with_max_width(width)).collect();
             self.given = Some(cameras);
-            self.surround();
-            self.say(format!("cameras of {}", path.display()));
+            self.reset_cameras();
+            self.show_message(format!("cameras of {}", path.display()));
         }
         Ok(())
     }
@@ -85,17 +85,17 @@ impl App {
         let id = self.next_id();
         let cameras = self.given.clone().filter(|cameras| cameras.len() > 1);
         let size = self.orbit_size();
-        let work = models::compress_to(id, original, quality, cameras, size, self.bell.clone());
-        self.works[Which::Second.index()] = Some(work);
+        let job = models::compress_to(id, original, quality, cameras, size, self.notifier.clone());
+        self.jobs[Slot::Second.index()] = Some(job);
         Ok(())
     }
 
     fn swap(&mut self) {
-        // Jobs name the place they fill.
-        if self.works.iter().all(Option::is_none) {
+        // A running job keeps the slot that it was started for.
+        if self.jobs.iter().all(Option::is_none) {
             let [first, second] = self.models.clone();
-            self.put(Which::First, second);
-            self.put(Which::Second, first);
+            self.set_model(Slot::First, second);
+            self.set_model(Slot::Second, first);
         }
     }
 
@@ -117,15 +117,15 @@ impl App {
             None => free_name(Path::new(&self.picture_name(&camera.name)))?,
         };
         let view = View { camera, options: self.state.options, models };
-        self.painting.ask(Ask::Screenshot { view, arrangement, file })?;
+        self.render_thread.request(RenderRequest::Screenshot { view, arrangement, file })?;
         self.saving += 1;
         Ok(())
     }
 
-    /// A file name without folder for the picture on screen.
+    /// Returns a file name, without a folder, for the picture on screen.
     fn picture_name(&self, camera: &str) -> String {
         let mode = self.state.arrangement.mode;
-        let shown = if mode == Mode::One(Which::Second) { Which::Second } else { Which::First };
+        let shown = if mode == Mode::One(Slot::Second) { Slot::Second } else { Slot::First };
         let model = self.models[shown.index()].as_ref().map(|m| m.short_name()).unwrap_or_default();
         let model = Path::new(&model).file_stem().unwrap_or_default().to_string_lossy().into_owned();
         let camera = Path::new(camera).file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -138,7 +138,7 @@ impl App {
         format!("{text}.png")
     }
 
-    /// Prints what is shown.
+    /// Prints what is shown as a JSON object.
     fn report(&self) -> Result<()> {
         let models: Vec<_> = self
             .models
@@ -154,34 +154,34 @@ impl App {
                 })
             })
             .collect();
-        let shot = self.shot.as_ref();
-        let score = shot.and_then(|shot| shot.score);
-        let camera = shot.map(|shot| &shot.view.camera);
+        let frame = self.frame.as_ref();
+        let score = frame.and_then(|frame| frame.score);
+        let camera = frame.map(|frame| &frame.view.camera);
         let value = json!({
-            "device": self.painting.name,
+            "device": self.render_thread.name,
             "mode": self.state.arrangement.mode.name(),
             "camera": camera.map(|c| &c.name),
             "width": camera.map(|c| c.width),
             "height": camera.map(|c| c.height),
-            "milliseconds": shot.map(|shot| shot.milliseconds),
-            "drawn": shot.map(|shot| shot.pictures.each_ref().map(|p| p.as_ref().map(|p| p.gaussians))),
-            "resident_bytes": shot.map(|shot| shot.resident_bytes),
+            "milliseconds": frame.map(|frame| frame.milliseconds),
+            "drawn": frame.map(|frame| frame.pictures.each_ref().map(|p| p.as_ref().map(|p| p.gaussians))),
+            "resident_bytes": frame.map(|frame| frame.resident_bytes),
             "psnr": if let Some(Score::Decibels(db)) = score { Some(db) } else { None },
             "identical": score.map(|score| score == Score::Identical),
             "models": models,
         });
-        // A reader that has seen enough is no failure.
+        // A reader that has closed the pipe is not an error.
         let _ = writeln!(std::io::stdout().lock(), "{value}");
         Ok(())
     }
 
-    /// The model shown as `which`.
-    pub(crate) fn model(&self, which: Which) -> Option<&Arc<models::Open>> {
-        self.models[which.index()].as_ref()
+    /// Returns the model of `slot`.
+    pub(crate) fn model(&self, slot: Slot) -> Option<&Arc<models::OpenModel>> {
+        self.models[slot.index()].as_ref()
     }
 }
 
-/// `path`, or with a number before its extension if there is such a file.
+/// Returns `path`, or `path` with a number before its extension if the file exists.
 fn free_name(path: &Path) -> Result<PathBuf> {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     let extension = path.extension().unwrap_or_default().to_string_lossy().into_owned();
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_in_use_are_passed_over() {
+    fn names_in_use_are_skipped() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.b.png");
         assert_eq!(free_name(&path).unwrap(), path);
