@@ -110,7 +110,7 @@ fn as_text(file: &File<'_>, lint: &Lint) -> Result<String> {
         writeln!(out, "trained with the anti-aliased dilation, and drawn so")?;
     }
     for comment in &like.meta.comments {
-        writeln!(out, "comment: {comment}")?;
+        writeln!(out, "comment: {}", text::escape(comment))?;
     }
     match &file.scene {
         Scene::Ply(ply) => {
