@@ -1,6 +1,46 @@
-//! Numbers for people.
+//! Numbers and names for people to read.
 
-/// Bytes in the largest unit that keeps a digit before the point (powers of 1000).
+use std::borrow::Cow;
+
+/// Returns `text` with every character that a terminal obeys instead of showing written as JSON writes it, such
+/// as `\u001b`.
+///
+/// These are the control characters, the line separators and the marks that change the direction of text. Text
+/// from files may hold any of them.
+#[must_use]
+pub fn escape(text: &str) -> Cow<'_, str> {
+    escape_all(text, is_obeyed)
+}
+
+/// [`escape`] for text of several lines: line feeds stay.
+#[must_use]
+pub fn escape_lines(text: &str) -> Cow<'_, str> {
+    escape_all(text, |c| c != '\n' && is_obeyed(c))
+}
+
+fn escape_all(text: &str, is_escaped: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_escaped) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_escaped(c) {
+            // All of them are in the basic plane, so that four digits are enough, as JSON requires.
+            out += &format!("\\u{:04x}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+fn is_obeyed(c: char) -> bool {
+    let is_direction =
+        matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || is_direction || matches!(c, '\u{2028}' | '\u{2029}')
+}
+
+/// Returns `count` bytes in the largest unit that keeps a digit before the point (powers of 1000).
 #[must_use]
 pub fn bytes(count: u64) -> String {
     let units = ["kB", "MB", "GB", "TB"];
@@ -16,7 +56,7 @@ pub fn bytes(count: u64) -> String {
     format!("{value:.1} {}", units[unit])
 }
 
-/// A whole number with commas.
+/// Returns a whole number with a comma between thousands.
 #[must_use]
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
@@ -30,13 +70,13 @@ pub fn count(value: u64) -> String {
     out
 }
 
-/// Decibels, or that the pictures are the same.
+/// Returns a PSNR in decibels, or `identical` for `None`.
 #[must_use]
 pub fn decibels(psnr: Option<f64>) -> String {
     psnr.map_or_else(|| "identical".to_owned(), |value| format!("{value:.2} dB"))
 }
 
-/// `part / whole` as "N.NNx smaller", or a dash where there is nothing to divide.
+/// Returns how many times smaller `part` is than `whole`, such as `2.50x`, or a dash if `part` is 0.
 #[must_use]
 pub fn ratio(whole: u64, part: u64) -> String {
     if part == 0 { "-".to_owned() } else { format!("{:.2}x", whole as f64 / part as f64) }
@@ -45,6 +85,24 @@ pub fn ratio(whole: u64, part: u64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_a_terminal_obeys_is_written_out() {
+        assert_eq!(
+            escape("red \u{1b}[31m, C1 \u{9b}2J, DEL \u{7f}"),
+            r"red \u001b[31m, C1 \u009b2J, DEL \u007f"
+        );
+        assert_eq!(escape("two\nlines\r"), r"two\u000alines\u000d");
+        assert_eq!(escape("turned \u{202e}round\u{2028}"), r"turned \u202eround\u2028");
+        assert_eq!(escape_lines("two\nlines\t"), "two\nlines\\u0009");
+        for shown in ["C:\\scene.ply", "e\u{301}t\u{e9} \u{1f600} \u{5e9}", ""] {
+            assert!(matches!(escape(shown), Cow::Borrowed(same) if same == shown));
+        }
+        // JSON says the same with and without.
+        let value = serde_json::json!({ "name": "\u{9b}31m\n" });
+        let text = value.to_string();
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&escape(&text)).unwrap(), value);
+    }
 
     #[test]
     fn numbers_read_well() {

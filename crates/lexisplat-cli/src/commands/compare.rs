@@ -18,7 +18,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
-    let cameras = views.choose(scene_a.geometry())?;
+    let cameras = super::cameras(views, scene_a.geometry())?;
     let mut renderer = Renderer::open(views.device)?;
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
@@ -75,7 +75,7 @@ fn table(
         writeln!(
             out,
             "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
-            view.name,
+            text::escape(&view.name),
             text::decibels(view.psnr),
             view.ssim
         )?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat_eval::metrics::Metric;
-use lexisplat_eval::views::{ChosenViews, View, photo};
+use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
 use lexisplat_eval::{
     Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, misfit, montage, png, score_views, text,
 };
@@ -72,7 +72,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         None => Some(load(&args.models[0], common)?),
     };
     let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
-    let found = args.views.find(reference.scene().geometry(), Some(&args.photos))?;
+    let found = find_views(&args.views.options(Some(&args.photos)), reference.scene().geometry())?;
     warn("views", &found.warnings);
     let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
     let photos = photos(&found, args.views.background)?;
@@ -222,7 +222,7 @@ fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
     writeln!(out)?;
     for view in &comparison.views {
         let size = format!("{}x{}", view.width, view.height);
-        write!(out, "{:<width$}  {size:>11}", view.name)?;
+        write!(out, "{:<width$}  {size:>11}", text::escape(&view.name))?;
         for (&metric, column) in metrics.iter().zip(&columns) {
             write!(out, "  {:>column$}", number(metric, view.get(metric)))?;
         }

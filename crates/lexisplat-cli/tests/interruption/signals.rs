@@ -71,7 +71,7 @@ fn what_is_said_fits_what_was_written() {
     for (arguments, expected) in [
         (&["compress", "-", "-o", OUTPUT][..], "error: stopped by SIGTERM; no output was written\n"),
         (&["compress", "-", "-o", OUTPUT, "--quiet"], "error: stopped by SIGTERM; no output was written\n"),
-        (&["decompress", "-"], "error: stopped by SIGTERM; what went to standard output is not whole\n"),
+        (&["decompress", "-"], "error: stopped by SIGTERM; standard output is incomplete\n"),
         (&["info", "-"], "error: stopped by SIGTERM\n"),
     ] {
         let mut child = waiting(&folder, arguments);
@@ -135,7 +135,7 @@ fn pictures_that_were_written_are_whole() {
     let text = String::from_utf8(ended.stderr).unwrap();
     let found = pictures();
     assert_eq!(code(ended.status), 130, "{text}");
-    let outcome = format!("; {} outputs are whole, no other was written\n", found.len());
+    let outcome = format!("; {} outputs are complete, no other was written\n", found.len());
     assert!((2..60).contains(&found.len()) && text.ends_with(&outcome), "{text}");
     for path in found {
         assert!(image::open(&path).is_ok(), "{}", path.display());

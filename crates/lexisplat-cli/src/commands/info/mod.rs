@@ -101,8 +101,7 @@ impl<'a> Facts<'a> {
             writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
         }
         for comment in self.comments {
-            // A comment has no place to begin a new line.
-            writeln!(out, "comment: {}", comment.replace(['\n', '\r'], " "))?;
+            writeln!(out, "comment: {}", text::escape(comment))?;
         }
         match &self.kind {
             Kind::Ply { ply, .. } => {
