@@ -1,5 +1,6 @@
 //! How the program ends: one line of error, one of help, and a code that says whose fault it was.
 
+use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
@@ -42,10 +43,13 @@ impl std::fmt::Display for OutputExists {
 
 impl std::error::Error for OutputExists {}
 
+/// What to do about an error.
+type Help = Cow<'static, str>;
+
 /// Exit code of an error, and what to do about it.
-fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
+fn classify(error: &anyhow::Error) -> (u8, Option<Help>) {
     if error.is::<OutputExists>() {
-        return (7, Some(OVERWRITE));
+        return (7, Some(OVERWRITE.into()));
     }
     #[cfg(feature = "view")]
     if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
@@ -61,85 +65,100 @@ fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
 }
 
 #[cfg(feature = "view")]
-fn view(error: &lexisplat_view::Error) -> (u8, Option<&'static str>) {
+fn view(error: &lexisplat_view::Error) -> (u8, Option<Help>) {
     use lexisplat_view::Error;
     match error {
         Error::Codec(e) => codec(e),
         Error::Render(e) => render(e),
         Error::Eval(e) => eval(e),
-        Error::Exists(_) => (7, Some(OVERWRITE)),
+        Error::Exists(_) => (7, Some(OVERWRITE.into())),
         Error::NoDisplay => (
             8,
             Some(
-                "a window needs X11 or Wayland (over ssh: ssh -X; without any: xvfb-run); `lexisplat render` needs neither",
+                "a window needs X11 or Wayland (over ssh: ssh -X; without any: xvfb-run); `lexisplat render` needs neither"
+                    .into(),
             ),
         ),
         Error::NoAdapter => (
             8,
             Some(
-                "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` works without",
+                "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` works without"
+                    .into(),
             ),
         ),
         Error::Window(_) => {
-            (8, Some("a window on X11 needs libxkbcommon-x11-0 too; `lexisplat render` works without any"))
+            (8, Some("a window on X11 needs libxkbcommon-x11-0 too; `lexisplat render` works without any".into()))
         }
-        Error::Device(_) => (8, Some("--device cpu draws without a GPU")),
+        Error::Device(_) => (8, Some("--device cpu draws without a GPU".into())),
         _ => (1, None),
     }
 }
 
-fn eval(error: &lexisplat_eval::Error) -> (u8, Option<&'static str>) {
+fn eval(error: &lexisplat_eval::Error) -> (u8, Option<Help>) {
     match error {
         lexisplat_eval::Error::Codec(e) => codec(e),
         lexisplat_eval::Error::Render(e) => render(e),
-        lexisplat_eval::Error::Io { file, source } => (3, io(file, source)),
+        lexisplat_eval::Error::Io { source, .. } => (3, io(source)),
         lexisplat_eval::Error::Format { .. } => (4, None),
         lexisplat_eval::Error::Limit { .. } => (6, None),
         _ => (5, None),
     }
 }
 
+/// What to do where no temporary file can be written.
+const TEMPORARY_FILES: &str = "free space in that folder: temporary files lie beside the output, or in $TMPDIR if that is standard output";
+
+/// Whether the system found no room.
+fn is_full(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
+}
+
 /// What to do where the system did not write.
-fn io(file: &str, source: &std::io::Error) -> Option<&'static str> {
+fn io(source: &std::io::Error) -> Option<Help> {
     match source.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded if file.ends_with("(temporary file)") => Some(
-            "free space in that folder: temporary files lie beside the output, or in $TMPDIR if that is standard output",
-        ),
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            Some("free space there, or name an output on another disk with -o")
-        }
+        _ if is_full(source) => Some("free space there, or name an output on another disk with -o".into()),
         ErrorKind::FileTooLarge => Some(
-            "the file system or a limit (`ulimit -f`) allows no file so large; name an output elsewhere with -o",
+            "the file system or a limit (`ulimit -f`) allows no file so large; name an output elsewhere with -o"
+                .into(),
         ),
         _ => None,
     }
 }
 
-fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
+fn codec(error: &lexisplat::Error) -> (u8, Option<Help>) {
+    use lexisplat::{Error, FormatError};
     match error {
         // Outputs that came into being after they were looked for.
-        lexisplat::Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
-            (7, Some(OVERWRITE))
+        Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => (7, Some(OVERWRITE.into())),
+        Error::Io { source, .. } | Error::Writer { source } => (3, io(source)),
+        Error::TemporaryFile { source, .. } if is_full(source) => (3, Some(TEMPORARY_FILES.into())),
+        Error::TemporaryFile { source, .. } => (3, io(source)),
+        Error::Format { problem: FormatError::NotFinite { .. }, .. } => {
+            (4, Some("--drop-invalid leaves such Gaussians out".into()))
         }
-        lexisplat::Error::Io { file, source } => (3, io(file, source)),
-        lexisplat::Error::Format { .. } => (4, Some("`lexisplat info FILE` says more about a file")),
-        lexisplat::Error::Parameter { .. } => (5, None),
-        lexisplat::Error::Limit { .. } => (6, None),
+        Error::Format { .. } => (4, Some("`lexisplat info FILE` says more about a file".into())),
+        Error::Parameter { .. } => (5, None),
+        Error::Limit { name: Some(name), .. } => {
+            (6, Some(format!("if you trust the file, raise the limit with --limit {name}=N").into()))
+        }
+        Error::Limit { .. } => (6, None),
         _ => (1, None),
     }
 }
 
-fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
+fn render(error: &lexisplat_render::Error) -> (u8, Option<Help>) {
     match error {
-        lexisplat_render::Error::Io { file, source } => (3, io(file, source)),
+        lexisplat_render::Error::Io { source, .. } => (3, io(source)),
         lexisplat_render::Error::Format { .. } => (4, None),
         lexisplat_render::Error::Parameter { name: "device", .. } => {
-            (5, Some("`lexisplat devices` lists what there is"))
+            (5, Some("`lexisplat devices` lists what there is".into()))
         }
         lexisplat_render::Error::Parameter { .. } => (5, None),
         lexisplat_render::Error::Limit { .. } => (6, None),
-        lexisplat_render::Error::GpuLimit { .. } => (6, Some("--device cpu draws without a GPU's limits")),
-        lexisplat_render::Error::Gpu { .. } => (8, Some("--device cpu draws without a GPU")),
+        lexisplat_render::Error::GpuLimit { .. } => {
+            (6, Some("--device cpu draws without a GPU's limits".into()))
+        }
+        lexisplat_render::Error::Gpu { .. } => (8, Some("--device cpu draws without a GPU".into())),
         _ => (1, None),
     }
 }

@@ -3,9 +3,10 @@
 use std::ffi::OsStr;
 use std::io::{BufWriter, ErrorKind, StdoutLock, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use anyhow::Result;
-use lexisplat::output::{Existing, Output};
+use lexisplat::output::{Existing, Output, OutputGroup};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input};
 use lexisplat_eval::SceneFile;
@@ -54,7 +55,7 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
 /// Reads a PLY or a .lexi, whichever the bytes say it is.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
     let limits = common.limits()?;
-    let options = ReadOptions { limits, ..ReadOptions::default() };
+    let options = ReadOptions::default().with_limits(limits);
     if is_pipe(path) {
         let bytes = Input::read(STANDARD_INPUT, std::io::stdin().lock(), &limits)?;
         return Ok(SceneFile::read_bytes(STANDARD_INPUT, &bytes, &options)?);
@@ -71,9 +72,16 @@ pub(crate) fn output_path(input: &Path, output: Option<&Path>, extension: &str) 
     }
 }
 
-/// What becomes of outputs that are already there.
-pub(crate) fn existing(overwrite: bool) -> Existing {
-    if overwrite { Existing::Replace } else { Existing::Refuse }
+/// All outputs of the program, which a signal ends together.
+pub(crate) fn outputs() -> &'static OutputGroup {
+    static OUTPUTS: LazyLock<OutputGroup> = LazyLock::new(OutputGroup::default);
+    &OUTPUTS
+}
+
+/// The output `path`. An existing file is replaced if `overwrite` is set, else refused.
+pub(crate) fn new_output(path: &Path, overwrite: bool) -> Output<'_> {
+    let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+    Output::new(path, existing).within(outputs())
 }
 
 /// The file that `path` means, however it is written, whether it is there or not.
@@ -90,7 +98,7 @@ fn meant(path: &Path) -> Option<PathBuf> {
 /// `others` are the other files of the command.
 pub(crate) fn check_output(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     check_free(path, others, overwrite)?;
-    if is_pipe(path) { Ok(()) } else { Ok(Output::new(path, existing(overwrite)).check()?) }
+    if is_pipe(path) { Ok(()) } else { Ok(new_output(path, overwrite).check()?) }
 }
 
 /// Refuses outputs that are in the way; their folder need not be there yet.
@@ -124,7 +132,7 @@ pub(crate) fn make_folder(path: &Path) -> Result<()> {
 
 /// Writes `bytes` to `path`, whole or not at all.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
-    Ok(lexisplat::output::write_whole(Output::new(path, existing(overwrite)), |writer| {
+    Ok(lexisplat::output::write_whole(new_output(path, overwrite), |writer| {
         writer.write_all(bytes).map_err(|e| Error::io(path, e))
     })?)
 }
@@ -137,12 +145,11 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return save(Output::new(output, existing(overwrite))).map_err(Into::into);
+        return save(new_output(output, overwrite)).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
     let done = stream(&mut out).map_err(|error| match error.into().downcast() {
-        // What the library calls a writer that has no name.
-        Ok(Error::Io { file, source }) if file == "output" => Error::io(STANDARD_OUTPUT, source).into(),
+        Ok(Error::Writer { source }) => Error::io(STANDARD_OUTPUT, source).into(),
         Ok(other) => anyhow::Error::from(other),
         Err(other) => other,
     })?;

@@ -2,9 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use lexisplat::output;
-
-use crate::files::note;
+use crate::files::{note, outputs};
 use crate::progress;
 
 /// What a command writes, which says what a signal finds.
@@ -29,7 +27,7 @@ pub(crate) fn while_writing(work: Work) {
 
 /// Keeps the program from saying how it ended, and from ending first, if a signal is ending it.
 pub(crate) fn wait_if_stopped() {
-    while output::is_stopped() {
+    while outputs().is_stopped() {
         std::thread::park();
     }
 }
@@ -42,7 +40,7 @@ fn stopped_by(name: &str) -> bool {
         Work::Files(count) => count,
         _ => usize::MAX,
     };
-    let Some(finished) = output::stop(expected) else { return false };
+    let Some(finished) = outputs().stop(expected) else { return false };
     let outcome = match (work, finished) {
         (Work::Nothing, _) => String::new(),
         (Work::Stream, _) => "; what went to standard output is not whole".to_owned(),

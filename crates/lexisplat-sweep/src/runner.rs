@@ -105,7 +105,7 @@ impl Runner<'_> {
             return Err(Stop::Scene(format!("{} is not there", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
-        let options = ReadOptions { limits: self.options.limits, ..ReadOptions::default() };
+        let options = ReadOptions::default().with_limits(self.options.limits);
         let read = ply::read(&entry.model, &options)?;
         for warning in &read.warnings {
             self.watch.warn(&entry.name, warning);
@@ -318,7 +318,8 @@ impl Runner<'_> {
     }
 
     fn save(&self, path: &Path, image: &Image) -> Part<()> {
-        write_whole(path, &png(image.width, image.height, &image.to_8bit())?).map_err(Stop::All)
+        write_whole(&self.options.outputs, path, &png(image.width, image.height, &image.to_8bit())?)
+            .map_err(Stop::All)
     }
 
     fn saved(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> Saved {

@@ -110,8 +110,13 @@ impl App {
         }));
         let (painter, refused) = painter(options.device, graphics)?;
         let ring = Arc::clone(&wake);
-        let painting =
-            Painting::start(painter, graphics.device.clone(), graphics.queue.clone(), move || ring())?;
+        let painting = Painting::start(
+            painter,
+            graphics.device.clone(),
+            graphics.queue.clone(),
+            options.outputs.clone(),
+            move || ring(),
+        )?;
         let (sender, finished) = channel();
         let mut app = Self {
             state: State::new(options.background),

@@ -35,6 +35,7 @@ mod window;
 use std::path::PathBuf;
 
 use lexisplat::Limits;
+use lexisplat::output::OutputGroup;
 use lexisplat_eval::SplitFilter;
 use lexisplat_render::Device;
 
@@ -67,4 +68,6 @@ pub struct Options {
     pub limits: Limits,
     /// What to do without being asked: see [`SCRIPT_WORDS`]. Empty for nothing.
     pub script: String,
+    /// The group of all pictures that are saved.
+    pub outputs: OutputGroup,
 }

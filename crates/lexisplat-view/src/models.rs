@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lexisplat::packed::{PackOptions, Packed, Packer};
 use lexisplat::ply::{Dialect, ReadOptions};
+use lexisplat::simd::Simd;
 use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
 use lexisplat_eval::{Loaded, SceneFile, SplitFilter, Views, choose_views};
 use lexisplat_render::{Camera, Renderer, bulk};
@@ -213,7 +214,7 @@ pub(crate) fn open(
     gauge.start("reading", 0);
     let name = path.display().to_string();
     spawn(id, which, bell, move || {
-        let scene = SceneFile::read(&path, &ReadOptions { limits, ..ReadOptions::default() })?;
+        let scene = SceneFile::read(&path, &ReadOptions::default().with_limits(limits))?;
         Open::new(id, scene, Some(path), size)
     });
     Work { id, name, gauge }
@@ -284,7 +285,9 @@ fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> 
         let _ = bell.sender.send(Finished { id, which, result });
         (bell.wake)();
     };
-    let started = std::thread::Builder::new().name("model".into()).spawn(move || tell(&bell, work()));
+    let simd = Simd::current();
+    let started =
+        std::thread::Builder::new().name("model".into()).spawn(move || tell(&bell, simd.scope(work)));
     if let Err(error) = started {
         tell(&again, Err(Error::Window(format!("cannot start a thread: {error}"))));
     }

@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lexisplat::output::{self, Output, OutputGroup};
+use lexisplat::simd::Simd;
 use lexisplat_eval::metrics::psnr;
 use lexisplat_eval::png;
 use lexisplat_render::{Camera, RenderOptions};
@@ -108,13 +110,15 @@ impl Painting {
         painter: Box<dyn Painter>,
         device: wgpu::Device,
         queue: wgpu::Queue,
+        outputs: OutputGroup,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self> {
         let name = painter.name();
         let (asks, asked) = channel();
         let (tell, told) = channel();
         let composer = Composer::new(device.clone(), queue.clone());
-        let mut studio = Studio { painter, device, queue, composer, compared: None };
+        let mut studio = Studio { painter, device, queue, composer, outputs, compared: None };
+        let simd = Simd::current();
         let work = move || {
             while let Ok(first) = asked.recv() {
                 let mut batch: Vec<Ask> = std::iter::once(first).chain(asked.try_iter()).collect();
@@ -130,7 +134,7 @@ impl Painting {
         };
         let thread = std::thread::Builder::new()
             .name("painting".into())
-            .spawn(work)
+            .spawn(move || simd.scope(work))
             .map_err(|e| Error::Window(format!("cannot start a thread: {e}")))?;
         Ok(Self { asks: Some(asks), told, thread: Some(thread), name })
     }
@@ -182,6 +186,8 @@ struct Studio {
     device: wgpu::Device,
     queue: wgpu::Queue,
     composer: Composer,
+    /// The group of saved pictures.
+    outputs: OutputGroup,
     /// When pictures were compared last.
     compared: Option<Instant>,
 }
@@ -198,7 +204,8 @@ impl Studio {
                 Err(error) => Told::Failed(error),
             }),
             Ask::Screenshot { view, arrangement, file } => {
-                let saved = self.picture(&view, arrangement).and_then(|picture| save(&file, &picture));
+                let saved =
+                    self.picture(&view, arrangement).and_then(|picture| save(&self.outputs, &file, &picture));
                 Some(match saved {
                     Ok(()) => Told::Saved(file),
                     Err(error) => Told::NotSaved(error),
@@ -260,9 +267,9 @@ fn scaled(camera: &Camera, scale: f64) -> Camera {
     camera.with_max_width(width)
 }
 
-fn save(file: &std::path::Path, (width, height, pixels): &Picture) -> Result<()> {
+fn save(outputs: &OutputGroup, file: &std::path::Path, (width, height, pixels): &Picture) -> Result<()> {
     let bytes = png(*width, *height, pixels)?;
-    Ok(lexisplat::output::write_whole(file, |writer| {
+    Ok(output::write_whole(Output::from(file).within(outputs), |writer| {
         std::io::Write::write_all(writer, &bytes).map_err(|e| lexisplat::Error::io(file, e))
     })?)
 }

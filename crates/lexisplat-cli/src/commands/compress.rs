@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::output::Output;
 use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::stream::Compressed;
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
@@ -13,7 +12,7 @@ use serde_json::json;
 use lexisplat_eval::text;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, existing, input, is_pipe, output_path, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, new_output, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -57,7 +56,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
 
     let (name, bytes) = input(&args.input, common)?;
-    let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
+    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     if layout == Layout::Packed && super::pack::is_large(args, bytes.len())? {
         let bars = Bars::new(common.quiet);
         let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
@@ -80,7 +79,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         |out| stream::compress_to(&chunks, &options, out, &bars),
     )?;
     if let Some(path) = &args.save_dictionary {
-        lexi::write_dictionary(Output::new(path, existing(common.overwrite)), &done.dictionary)?;
+        lexi::write_dictionary(new_output(path, common.overwrite), &done.dictionary)?;
     }
     let outcome = Outcome {
         output: &output,

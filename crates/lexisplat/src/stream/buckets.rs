@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use crate::support::error::{Error, Result};
-use crate::support::spill::{named, temporary};
+use crate::support::spill::temporary;
 
 /// Bytes a bucket collects before they are written.
 const BLOCK: usize = 1 << 16;
@@ -63,7 +63,7 @@ impl Buckets {
             file.write_all(pending)?;
             Ok(at)
         };
-        let at = append().map_err(|e| Error::io(named(&self.folder), e))?;
+        let at = append().map_err(|e| Error::temporary_file(&self.folder, e))?;
         written.push((at, pending.len()));
         pending.clear();
         Ok(())
@@ -89,7 +89,7 @@ impl Buckets {
                 let (block, tail) = std::mem::take(&mut rest).split_at_mut(len);
                 file.seek(SeekFrom::Start(at))
                     .and_then(|_| file.read_exact(block))
-                    .map_err(|e| Error::io(named(&self.folder), e))?;
+                    .map_err(|e| Error::temporary_file(&self.folder, e))?;
                 rest = tail;
             }
         }

@@ -12,7 +12,7 @@ use crate::sparse::model::{Layout, Record};
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::output::{Output, write_whole};
-use crate::support::parallel::CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
 use crate::support::progress::{Progress, Stage};
 use crate::support::stopwatch::Stopwatch;
 
@@ -75,9 +75,7 @@ pub fn compress_to(
     writer: &mut impl Write,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    run(ply, options, &std::env::temp_dir(), AT_ONCE, progress, |fill, _| {
-        fill(writer).map_err(|e| Error::io("output", e))
-    })
+    run(ply, options, &std::env::temp_dir(), AT_ONCE, progress, |fill, _| fill(writer).map_err(Error::writer))
 }
 
 /// Writes a file, whose size is told too, to a writer.

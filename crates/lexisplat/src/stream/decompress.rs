@@ -37,14 +37,14 @@ pub fn decompress_file<'a>(
 /// # Errors
 /// As [`decompress_file`]; an [`Error::Io`] of the writer names no file.
 pub fn decompress_to(lexi: &LexiChunks<'_>, writer: &mut impl Write, progress: &dyn Progress) -> Result<u64> {
-    run(lexi, writer, &std::env::temp_dir(), &|e| Error::io("output", e), progress)
+    run(lexi, writer, &std::env::temp_dir(), &Error::writer, progress)
 }
 
 /// Bytes of the PLY that `lexi` becomes.
 fn size(lexi: &LexiChunks<'_>) -> Result<u64> {
     let like = lexi.empty();
     check(&like)?;
-    let ply = PlyWriter::begin(Vec::new(), &like, lexi.len()).map_err(|e| Error::io("output", e))?;
+    let ply = PlyWriter::begin(Vec::new(), &like, lexi.len()).map_err(Error::writer)?;
     Ok(ply.bytes + ply.row_bytes() * lexi.len() as u64)
 }
 

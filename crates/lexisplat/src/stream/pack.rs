@@ -79,7 +79,7 @@ pub fn pack_to<E: From<Error>>(
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
     run(ply, importance, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill, _| {
-        fill(writer).map_err(|e| Error::io("output", e))
+        fill(writer).map_err(Error::writer)
     })
 }
 

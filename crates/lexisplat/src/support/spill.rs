@@ -13,12 +13,7 @@ const BUFFER: usize = 1 << 18;
 
 /// A temporary file in `folder`.
 pub(crate) fn temporary(folder: &Path) -> Result<File> {
-    tempfile::tempfile_in(folder).map_err(|e| Error::io(named(folder), e))
-}
-
-/// What errors call a temporary file in `folder`.
-pub(crate) fn named(folder: &Path) -> PathBuf {
-    folder.join("(temporary file)")
+    tempfile::tempfile_in(folder).map_err(|e| Error::temporary_file(folder, e))
 }
 
 /// Bytes being set aside, and their checksum.
@@ -40,13 +35,13 @@ impl Spill {
     pub(crate) fn push<T: bytemuck::NoUninit>(&mut self, values: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(values);
         self.checksum.update(bytes);
-        self.file.write_all(bytes).map_err(|e| Error::io(named(&self.folder), e))
+        self.file.write_all(bytes).map_err(|e| Error::temporary_file(&self.folder, e))
     }
 
     /// All of it, to be read from the start.
     pub(crate) fn finish(self) -> Result<Spilled> {
         let Self { file, folder, checksum } = self;
-        let io = |e| Error::io(named(&folder), e);
+        let io = |e| Error::temporary_file(&folder, e);
         let mut file = file.into_inner().map_err(|e| io(e.into_error()))?;
         file.rewind().map_err(io)?;
         Ok(Spilled { file, folder, checksum: checksum.finalize() })
@@ -70,7 +65,7 @@ impl Spilled {
     ) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
-        self.file.read_exact(bytes).map_err(|e| Error::io(named(&self.folder), e))?;
+        self.file.read_exact(bytes).map_err(|e| Error::temporary_file(&self.folder, e))?;
         Ok(values)
     }
 

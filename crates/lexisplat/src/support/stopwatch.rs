@@ -1,4 +1,4 @@
-//! Elapsed time, where there is a clock.
+//! Elapsed time, on platforms with a clock.
 
 /// Time since it was started.
 #[derive(Debug, Clone, Copy)]
@@ -16,7 +16,7 @@ impl Stopwatch {
         }
     }
 
-    /// Seconds since the start; 0 where `Instant` would panic, in a browser.
+    /// Seconds since the start. In a browser, where `Instant` would panic, it is 0.
     #[cfg_attr(target_family = "wasm", expect(clippy::unused_self, reason = "there is no clock"))]
     pub(crate) fn seconds(self) -> f64 {
         #[cfg(not(target_family = "wasm"))]

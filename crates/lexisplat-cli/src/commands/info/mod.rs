@@ -9,7 +9,7 @@ use lexisplat::lexi::LexiChunks;
 use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::stream::Survey;
-use lexisplat::{Splats, lexi, stream};
+use lexisplat::{FileKind, Splats, stream};
 use lexisplat_eval::text;
 use serde_json::json;
 
@@ -23,13 +23,13 @@ const BAR: usize = 40;
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.file, common)?;
     let bars = Bars::new(common.quiet || common.json);
-    let (scene, lint) = if lexi::is_lexi(&bytes) {
+    let (scene, lint) = if FileKind::of(&name, &bytes) == FileKind::Lexi {
         let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let lint = survey.lint.clone();
         (Scene::Lexi(Box::new(lexi), Box::new(survey)), lint)
     } else {
-        let read = ReadOptions { drop_invalid: args.drop_invalid, limits: common.limits()? };
+        let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(common.limits()?);
         let ply = PlyChunks::open(&name, &bytes, &read, &bars)?;
         warn(&name, ply.warnings());
         let lint = stream::lint_ply(&ply, &bars)?;

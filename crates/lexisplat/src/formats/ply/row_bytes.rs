@@ -1,13 +1,11 @@
 //! Gaussians as rows of bytes and back, for temporary files.
 
 use super::read::{ReadOptions, read_bytes};
+use super::rows::ROWS_PER_TASK;
 use super::write::{RowLayout, header};
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::Result;
 use crate::support::parallel::for_each_chunk_mut;
-
-/// Rows one thread turns at a time.
-const CHUNK_ROWS: usize = 1024;
 
 /// The rows of a PLY of scenes like a given one, which have no normals.
 pub(crate) struct RowBytes {
@@ -39,8 +37,8 @@ impl RowBytes {
     pub(crate) fn pack(&self, splats: &Splats, bytes: &mut Vec<u8>) {
         bytes.clear();
         bytes.resize(splats.len() * self.bytes(), 0);
-        for_each_chunk_mut(bytes, self.bytes() * CHUNK_ROWS, |chunk, rows| {
-            self.layout.pack(splats, chunk * CHUNK_ROWS, rows);
+        for_each_chunk_mut(bytes, self.bytes() * ROWS_PER_TASK, |chunk, rows| {
+            self.layout.pack(splats, chunk * ROWS_PER_TASK, rows);
         });
     }
 
