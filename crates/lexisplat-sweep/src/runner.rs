@@ -150,7 +150,7 @@ impl Runner<'_> {
             model: entry.model.display().to_string(),
             gaussians,
             sh_degree,
-            ply_bytes: read.source.file_bytes,
+            ply_bytes: read.summary.file_bytes,
             shipped_bytes,
             views_from: found.from,
             views: count,

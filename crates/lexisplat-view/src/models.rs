@@ -49,7 +49,7 @@ impl Open {
         let orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
         let bulk = bulk(geometry);
         let (layout, promise) = match &scene.loaded {
-            Loaded::Ply(read) => (dialect(read.source.dialect), None),
+            Loaded::Ply(read) => (dialect(read.summary.dialect), None),
             Loaded::Lexi(model, packed) => {
                 (model.record.layout.to_string(), promise(model, packed.as_deref()))
             }

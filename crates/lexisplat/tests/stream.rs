@@ -142,7 +142,7 @@ fn a_ply_is_refused_left_out_and_looked_over_as_when_read_whole() {
     let lenient = strict.with_drop_invalid(true);
     let read = ply::read_bytes("t.ply", &bytes, &lenient).unwrap();
     let chunks = PlyChunks::open("t.ply", &bytes, &lenient, &Silent).unwrap();
-    assert_eq!((chunks.warnings(), chunks.summary()), (read.warnings.as_slice(), &read.source));
+    assert_eq!((chunks.warnings(), chunks.summary()), (read.warnings.as_slice(), &read.summary));
     assert_eq!(stream::lint_ply(&chunks, &Silent).unwrap(), stats::lint(&read.splats).unwrap());
     let mut part = chunks.empty();
     let mut start = 0;

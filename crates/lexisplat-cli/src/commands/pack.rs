@@ -35,7 +35,7 @@ pub(crate) fn run(
     let read_seconds = start.elapsed().as_secs_f64();
     let mut splats = read.splats;
     let options = options(args);
-    let goal = goal(args, read.source.file_bytes)?;
+    let goal = goal(args, read.summary.file_bytes)?;
     let bars = Bars::new(common.quiet);
 
     let clock = Instant::now();
@@ -87,7 +87,7 @@ pub(crate) fn run(
         pruned,
         looked: true,
         in_parts: false,
-        ply_bytes: read.source.file_bytes,
+        ply_bytes: read.summary.file_bytes,
         file_bytes,
         seconds: [read_seconds, look_seconds, pack_seconds, write_seconds, start.elapsed().as_secs_f64()],
     };

@@ -1,7 +1,7 @@
 //! Every refusal says what is wrong, where, and what to do, on one line.
 
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
-use lexisplat::{Error, Extra, ExtraValues, Limits};
+use lexisplat::{CompressOptions, Error, Extra, ExtraValues, FormatError, Limits, Silent, lexi};
 
 use crate::support::{Column, File, assert_same, columns, scene};
 
@@ -174,7 +174,7 @@ fn bad_values_are_counted_or_dropped() {
         for format in [Format::BinaryLittleEndian, Format::Ascii] {
             file.format = format;
             let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
-            assert_eq!(found.source.dropped, 3);
+            assert_eq!(found.summary.dropped, 3);
             assert!(
                 found.warnings.iter().any(|w| w.starts_with("dropped 3 of 3000 Gaussians")),
                 "{:?}",
@@ -210,7 +210,7 @@ fn infinite_opacities_are_sure_ones() {
             let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
             let warning = "3 opacities are infinite, taken as 100 (opaque) or -100 (invisible)";
             assert!(found.warnings.iter().any(|w| w == warning), "{:?}", found.warnings);
-            assert_eq!(found.source.dropped, 0);
+            assert_eq!(found.summary.dropped, 0);
             let mut expected = splats.clone();
             let opacities = &mut expected.geometry.opacities;
             (opacities[0], opacities[1501], opacities[2999]) = (100.0, -100.0, 100.0);
@@ -249,6 +249,17 @@ fn names_that_cannot_be_written_are_not_read() {
         assert!(said.contains("control characters in the name"), "{said}");
         assert!(!said.contains(char::is_control), "{said:?}");
     }
+}
+
+#[test]
+fn a_scene_of_the_other_kind_is_named() {
+    let mut lexi = Vec::new();
+    let (model, _) = lexisplat::compress(scene(1, 10, 0), &CompressOptions::default(), &Silent).unwrap();
+    lexi::write_to(&mut lexi, &model).unwrap();
+    assert_eq!(refuse(&lexi), "t.ply: this is a .lexi, not a PLY");
+    let said = lexi::read_bytes("t.lexi", &good().bytes(), &Limits::default()).unwrap_err();
+    assert_eq!(said.to_string(), "t.lexi: this is a PLY, not a .lexi");
+    assert!(matches!(said, Error::Format { problem: FormatError::OtherKind { .. }, .. }));
 }
 
 #[test]

@@ -42,7 +42,7 @@ pub struct PlyRead {
     /// Oddities that did not prevent reading, one plain sentence each.
     pub warnings: Vec<String>,
     /// Description of the file.
-    pub source: PlySummary,
+    pub summary: PlySummary,
 }
 
 /// Reads the PLY at `path`. With the feature `mmap` the file is mapped.
@@ -80,5 +80,5 @@ pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Ply
         splats.retain(&keep);
     }
     splats.meta = file.meta;
-    Ok(PlyRead { splats, warnings: file.warnings, source: file.summary })
+    Ok(PlyRead { splats, warnings: file.warnings, summary: file.summary })
 }
