@@ -31,7 +31,7 @@ pub fn ply(
         };
         let splats = &read.splats;
         assert_eq!(chunks.warnings(), read.warnings);
-        assert_eq!(chunks.summary(), &read.source);
+        assert_eq!(chunks.summary(), &read.summary);
         assert_eq!(chunks.meta(), &splats.meta);
         assert_eq!((chunks.len(), chunks.degree()), (splats.len(), splats.degree));
         assert_eq!(chunks.has_normals() && !chunks.is_empty(), !splats.geometry.normals.is_empty());

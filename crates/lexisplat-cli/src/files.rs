@@ -3,9 +3,10 @@
 use std::ffi::OsStr;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use anyhow::Result;
-use lexisplat::output::{Existing, Output};
+use lexisplat::output::{Existing, Output, OutputGroup};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::SceneFile;
@@ -47,7 +48,7 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
 /// Reads a scene of any kind, which its bytes tell.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
     let (name, bytes) = input(path, common)?;
-    let options = ReadOptions { limits: common.limits()?, ..ReadOptions::default() };
+    let options = ReadOptions::default().with_limits(common.limits()?);
     Ok(SceneFile::read_bytes(&name, &bytes, &options)?)
 }
 
@@ -105,9 +106,16 @@ fn folder_for_file(path: &Path, file: &Path) -> anyhow::Error {
     Misuse { problem, help: format!("name a file in it, such as {}", file.display()) }.into()
 }
 
-/// What becomes of outputs that are already there.
-pub(crate) fn existing(overwrite: bool) -> Existing {
-    if overwrite { Existing::Replace } else { Existing::Refuse }
+/// All outputs of the program, which a signal ends together.
+pub(crate) fn outputs() -> &'static OutputGroup {
+    static OUTPUTS: LazyLock<OutputGroup> = LazyLock::new(OutputGroup::default);
+    &OUTPUTS
+}
+
+/// The output `path`. An existing file is replaced if `overwrite` is set, else refused.
+pub(crate) fn new_output(path: &Path, overwrite: bool) -> Output<'_> {
+    let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+    Output::new(path, existing).within(outputs())
 }
 
 /// Returns the one path of the file that `path` leads to, whether there is such a file yet or not.
@@ -124,7 +132,7 @@ fn resolved(path: &Path) -> Option<PathBuf> {
 /// other files of the command.
 pub(crate) fn check_output(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     check_free(path, others, overwrite)?;
-    if is_pipe(path) { Ok(()) } else { Ok(Output::new(path, existing(overwrite)).check()?) }
+    if is_pipe(path) { Ok(()) } else { Ok(new_output(path, overwrite).check()?) }
 }
 
 /// Refuses an output that is in the way. Its folder need not exist yet.
@@ -158,7 +166,7 @@ pub(crate) fn make_folder(path: &Path) -> Result<()> {
 
 /// Writes `bytes` to `path`, whole or not at all.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
-    Ok(lexisplat::output::write_whole(Output::new(path, existing(overwrite)), |writer| {
+    Ok(lexisplat::output::write_whole(new_output(path, overwrite), |writer| {
         writer.write_all(bytes).map_err(|e| Error::io(path, e))
     })?)
 }
@@ -170,12 +178,11 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     write: impl FnOnce(Sink<'_>) -> Result<T, E>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return write(Output::new(output, existing(overwrite)).into()).map_err(Into::into);
+        return write(new_output(output, overwrite).into()).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
     let done = write(Sink::from(&mut out)).map_err(|error| match error.into().downcast() {
-        // The library's name for a writer.
-        Ok(Error::Io { file, source }) if file == "output" => Error::io(STANDARD_OUTPUT, source).into(),
+        Ok(Error::Writer { source }) => Error::io(STANDARD_OUTPUT, source).into(),
         Ok(other) => anyhow::Error::from(other),
         Err(other) => other,
     })?;

@@ -3,8 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use lexisplat::output;
-
+use crate::files::{note, outputs};
 use crate::progress;
 use crate::terminal::note;
 
@@ -31,7 +30,7 @@ pub(crate) fn while_writing(work: Work) {
 
 /// Blocks if a signal is ending the program, so that its thread alone prints and chooses the exit code.
 pub(crate) fn wait_if_stopped() {
-    while output::is_stopped() {
+    while outputs().is_stopped() {
         std::thread::park();
     }
 }
@@ -44,7 +43,7 @@ fn stopped_by(name: &str) -> bool {
         Work::Files(count) => count,
         _ => usize::MAX,
     };
-    let Some(finished) = output::stop(expected) else { return false };
+    let Some(finished) = outputs().stop(expected) else { return false };
     let outcome = match (work, finished) {
         (Work::Nothing, _) => String::new(),
         (Work::Stream, _) => "; standard output is incomplete".to_owned(),

@@ -10,9 +10,11 @@ use std::collections::BTreeMap;
 use assert_cmd::Command;
 use folder::{Folder, lexisplat};
 use lexisplat::ply;
-use lexisplat::simd::{Simd, VARIABLE};
+use lexisplat::simd::Simd;
 use lexisplat_sample::{SampleOptions, scene};
 
+/// The environment variable that chooses vector instructions.
+const VARIABLE: &str = "LEXISPLAT_SIMD";
 /// Numbers of threads, one for each run of all commands.
 const THREADS: [&str; 3] = ["1", "2", "7"];
 /// Gaussians of the larger scene: three units of work of the exact layouts, so that threads share them.

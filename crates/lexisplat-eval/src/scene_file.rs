@@ -5,7 +5,7 @@ use std::path::Path;
 use lexisplat::lexi::{self, Contents};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{Input, Model, Result};
+use lexisplat::{FileKind, Input, Model, Result};
 use lexisplat_render::Scene;
 
 /// A scene as its file holds it.
@@ -55,7 +55,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
-        let loaded = if lexi::is_lexi(bytes) {
+        let loaded = if FileKind::of(name, bytes) == FileKind::Lexi {
             Loaded::lexi(lexi::open_bytes(name, bytes, &options.limits)?, name)?
         } else {
             Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))

@@ -1,7 +1,7 @@
 //! Colour of a Gaussian seen from a direction, whatever its SH-rest is stored as.
 
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
-use lexisplat::{Dictionary, Row, ShDegree, SparseCodes};
+use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
 
 use crate::scene::Scene;
 
@@ -72,8 +72,8 @@ impl<'a> Radiance<'a> {
                     dense(&all[i * dim..(i + 1) * dim], per_channel, &basis)
                 }
                 Rest::Sparse { codes, atoms } => match codes.row(i) {
-                    Row::Exact(row) => dense(row, per_channel, &basis),
-                    Row::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
+                    CodedRest::Exact(row) => dense(row, per_channel, &basis),
+                    CodedRest::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
                 },
             };
         }

@@ -7,6 +7,7 @@ use super::{
     Figure, Results, Saved, Setting, SweepPicture, figures, survey, sweep_html, sweep_markdown, tables,
     tidy_csv,
 };
+use lexisplat::output::OutputGroup;
 use lexisplat_eval::{Error, Result};
 
 /// The page holds pictures of at most so many bytes in all; browsers grow slow with more. All stay in their
@@ -17,7 +18,7 @@ const SHOWN_FIRST: f64 = 0.1;
 
 /// Writes everything that `results` give into `folder`: `report.html`, `report.md`, `results.json`, `all.csv`,
 /// `tables/`, `figures/`, and `survey/` where there were photos. `saved` are the pictures to show; `date` is
-/// printed as it is. Returns what was written.
+/// printed as it is. Files are members of `outputs`. Returns what was written.
 ///
 /// # Errors
 /// If a figure cannot be drawn, a picture not be read, or a file not be written.
@@ -26,8 +27,9 @@ pub fn write_report(
     results: &Results,
     saved: &[Saved],
     date: Option<&str>,
+    outputs: &OutputGroup,
 ) -> Result<Vec<PathBuf>> {
-    let mut out = Folder { root: folder, written: Vec::new() };
+    let mut out = Folder { root: folder, outputs, written: Vec::new() };
     let json = serde_json::to_string_pretty(results)
         .map_err(|e| Error::format(folder.join("results.json"), e.to_string()))?;
     out.write("results.json", format!("{json}\n").as_bytes())?;
@@ -56,6 +58,7 @@ pub fn write_report(
 
 struct Folder<'a> {
     root: &'a Path,
+    outputs: &'a OutputGroup,
     written: Vec<PathBuf>,
 }
 
@@ -65,7 +68,7 @@ impl Folder<'_> {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|e| Error::io(folder, e))?;
         }
-        write_whole(&path, bytes)?;
+        write_whole(self.outputs, &path, bytes)?;
         self.written.push(path);
         Ok(())
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use lexisplat::output::{self, Output, OutputGroup};
 use lexisplat_eval::{Error, Result};
 
 /// Raised when kept parts mean something else than before: older ones are then made again.
@@ -21,6 +22,7 @@ pub(super) struct Kept {
     folder: PathBuf,
     /// Whether what is there already counts.
     reuse: bool,
+    outputs: OutputGroup,
 }
 
 #[derive(Serialize)]
@@ -38,9 +40,9 @@ struct Loaded<T> {
 }
 
 impl Kept {
-    pub(super) fn new(folder: PathBuf, reuse: bool) -> Result<Self> {
+    pub(super) fn new(folder: PathBuf, reuse: bool, outputs: &OutputGroup) -> Result<Self> {
         std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
-        Ok(Self { folder, reuse })
+        Ok(Self { folder, reuse, outputs: outputs.clone() })
     }
 
     /// The part called `name` that was made from just what `key` says, if it is there and whole.
@@ -62,7 +64,7 @@ impl Kept {
         let path = self.path(name, key);
         let saved = Saved { version: VERSION, key, value };
         let text = serde_json::to_vec_pretty(&saved).map_err(|e| Error::format(&path, e.to_string()))?;
-        write_whole(&path, &text)
+        write_whole(&self.outputs, &path, &text)
     }
 
     fn path(&self, name: &str, key: &str) -> PathBuf {
@@ -70,9 +72,9 @@ impl Kept {
     }
 }
 
-/// Writes `bytes` to `path`, whole or not at all.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    Ok(lexisplat::output::write_whole(path, |writer| {
+/// Writes `bytes` to `path`, whole or not at all, as one of `outputs`.
+pub(super) fn write_whole(outputs: &OutputGroup, path: &Path, bytes: &[u8]) -> Result<()> {
+    Ok(output::write_whole(Output::from(path).within(outputs), |writer| {
         std::io::Write::write_all(writer, bytes).map_err(|e| lexisplat::Error::io(path, e))
     })?)
 }
@@ -95,18 +97,21 @@ mod tests {
     fn parts_are_found_by_their_key_alone() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().join("points");
-        let kept = Kept::new(at.clone(), true).unwrap();
+        let kept = Kept::new(at.clone(), true, &OutputGroup::default()).unwrap();
         assert_eq!(kept.find::<Vec<f64>>("a b/c", "key 1"), None);
         kept.keep("a b/c", "key 1", &vec![1.5, 0.1]).unwrap();
         assert_eq!(kept.find::<Vec<f64>>("a b/c", "key 1"), Some(vec![1.5, 0.1]));
         assert_eq!(kept.find::<Vec<f64>>("a b/c", "key 2"), None);
-        assert_eq!(Kept::new(at, false).unwrap().find::<Vec<f64>>("a b/c", "key 1"), None);
+        assert_eq!(
+            Kept::new(at, false, &OutputGroup::default()).unwrap().find::<Vec<f64>>("a b/c", "key 1"),
+            None
+        );
     }
 
     #[test]
     fn damaged_parts_are_made_again() {
         let folder = tempfile::tempdir().unwrap();
-        let kept = Kept::new(folder.path().to_owned(), true).unwrap();
+        let kept = Kept::new(folder.path().to_owned(), true, &OutputGroup::default()).unwrap();
         kept.keep("a", "key", &7_u32).unwrap();
         let path = kept.path("a", "key");
         let whole = std::fs::read(&path).unwrap();

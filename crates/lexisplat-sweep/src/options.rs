@@ -1,5 +1,6 @@
 //! How to sweep, and who is told how it goes.
 
+use lexisplat::output::OutputGroup;
 use lexisplat::{Layout, Limits, Pursuit};
 use lexisplat_render::Device;
 
@@ -43,6 +44,8 @@ pub struct SweepOptions {
     pub resume: bool,
     /// Stands for what is not among these options but changes scores, such as the weights of LPIPS.
     pub fingerprint: String,
+    /// The group of all files that the sweep writes.
+    pub outputs: OutputGroup,
 }
 
 impl Default for SweepOptions {
@@ -64,6 +67,7 @@ impl Default for SweepOptions {
             pictures: 1,
             resume: true,
             fingerprint: String::new(),
+            outputs: OutputGroup::default(),
         }
     }
 }

@@ -59,7 +59,7 @@ pub fn sweep(
     };
     let pictures = folder.join("pictures");
     std::fs::create_dir_all(&pictures).map_err(|e| Error::io(&pictures, e))?;
-    let kept = Kept::new(folder.join("points"), options.resume)?;
+    let kept = Kept::new(folder.join("points"), options.resume, &options.outputs)?;
     let mut runner = Runner { options, scorer, gpu, renderer, kept, pictures, watch };
     let parts = |entry: &Entry| 1 + settings(entry, options).len() as u64;
     watch.begin(entries.iter().map(parts).sum());

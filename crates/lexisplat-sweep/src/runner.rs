@@ -106,7 +106,7 @@ impl Runner<'_> {
             return Err(Stop::Scene(format!("{} is not there", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
-        let options = ReadOptions { limits: self.options.limits, ..ReadOptions::default() };
+        let options = ReadOptions::default().with_limits(self.options.limits);
         let read = ply::read(&entry.model, &options)?;
         for warning in &read.warnings {
             self.watch.warn(&entry.name, warning);
@@ -151,7 +151,7 @@ impl Runner<'_> {
             model: entry.model.display().to_string(),
             gaussians,
             sh_degree,
-            ply_bytes: read.source.file_bytes,
+            ply_bytes: read.summary.file_bytes,
             shipped_bytes,
             views_from: found.from,
             views: count,
@@ -319,7 +319,8 @@ impl Runner<'_> {
     }
 
     fn save(&self, path: &Path, image: &Image) -> Part<()> {
-        write_whole(path, &png(image.width, image.height, &image.to_8bit())?).map_err(Stop::All)
+        write_whole(&self.options.outputs, path, &png(image.width, image.height, &image.to_8bit())?)
+            .map_err(Stop::All)
     }
 
     fn saved(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> Saved {

@@ -110,10 +110,13 @@ impl App {
         }));
         let (renderer, gpu_error) = renderer(options.device, graphics)?;
         let wake_window = Arc::clone(&wake);
-        let render_thread =
-            RenderThread::start(renderer, graphics.device.clone(), graphics.queue.clone(), move || {
-                wake_window()
-            })?;
+        let render_thread = RenderThread::start(
+            renderer,
+            graphics.device.clone(),
+            graphics.queue.clone(),
+            options.outputs.clone(),
+            move || wake_window(),
+        )?;
         let (sender, finished) = channel();
         let mut app = Self {
             state: State::new(options.background),

@@ -35,6 +35,7 @@ mod window;
 use std::path::PathBuf;
 
 use lexisplat::Limits;
+use lexisplat::output::OutputGroup;
 use lexisplat_eval::SplitFilter;
 use lexisplat_render::Device;
 
@@ -67,4 +68,6 @@ pub struct Options {
     pub limits: Limits,
     /// Commands to carry out at the start, as [`SCRIPT_WORDS`] describes; may be empty.
     pub script: String,
+    /// The group of all pictures that are saved.
+    pub outputs: OutputGroup,
 }

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use lexisplat::packed::Packed;
 use lexisplat::ply::{Dialect, ReadOptions};
+use lexisplat::simd::Simd;
 use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
 use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
 use lexisplat_render::{Camera, bulk};
@@ -49,7 +50,7 @@ impl OpenModel {
         let orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
         let bulk = bulk(geometry);
         let (layout, guarantee) = match &scene.loaded {
-            Loaded::Ply(read) => (dialect(read.source.dialect), None),
+            Loaded::Ply(read) => (dialect(read.summary.dialect), None),
             Loaded::Lexi(model, packed) => {
                 (model.record.layout.to_string(), guarantee(model, packed.as_deref()))
             }
@@ -216,7 +217,7 @@ pub(crate) fn open(
     progress.start("reading", 0);
     let name = path.display().to_string();
     spawn(id, slot, notifier, move || {
-        let scene = SceneFile::read(&path, &ReadOptions { limits, ..ReadOptions::default() })?;
+        let scene = SceneFile::read(&path, &ReadOptions::default().with_limits(limits))?;
         OpenModel::new(id, scene, Some(path), size)
     });
     Job { id, name, progress }
@@ -278,7 +279,9 @@ fn spawn(id: u64, slot: Slot, notifier: Notifier, work: impl FnOnce() -> Result<
         let _ = notifier.sender.send(FinishedJob { id, slot, result });
         (notifier.wake)();
     };
-    let started = std::thread::Builder::new().name("model".into()).spawn(move || tell(&notifier, work()));
+    let simd = Simd::current();
+    let started =
+        std::thread::Builder::new().name("model".into()).spawn(move || tell(&notifier, simd.scope(work)));
     if let Err(error) = started {
         tell(&again, Err(Error::Window(format!("cannot start a thread: {error}"))));
     }

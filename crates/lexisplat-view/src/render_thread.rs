@@ -6,6 +6,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
+use lexisplat::output::{self, Output, OutputGroup};
+use lexisplat::simd::Simd;
 use lexisplat_eval::metrics::psnr;
 use lexisplat_eval::png;
 use lexisplat_render::{Camera, RenderOptions};
@@ -110,13 +112,15 @@ impl RenderThread {
         renderer: Box<dyn SceneRenderer>,
         device: wgpu::Device,
         queue: wgpu::Queue,
+        outputs: OutputGroup,
         wake: impl Fn() + Send + 'static,
     ) -> Result<Self> {
         let name = renderer.name();
         let (requests, requested) = channel();
         let (sender, events) = channel();
         let composer = Composer::new(device.clone(), queue.clone());
-        let mut worker = RenderWorker { renderer, device, queue, composer, last_comparison: None };
+        let mut worker = RenderWorker { renderer, device, queue, composer, outputs, last_comparison: None };
+        let simd = Simd::current();
         let work = move || {
             while let Ok(first) = requested.recv() {
                 let mut batch: Vec<RenderRequest> =
@@ -133,7 +137,7 @@ impl RenderThread {
         };
         let thread = std::thread::Builder::new()
             .name("render".into())
-            .spawn(work)
+            .spawn(move || simd.scope(work))
             .map_err(|e| Error::Window(format!("cannot start a thread: {e}")))?;
         Ok(Self { requests: Some(requests), events, thread: Some(thread), name })
     }
@@ -181,6 +185,8 @@ fn only_the_latest_view(batch: &mut Vec<RenderRequest>) {
 
 /// The state of the render thread.
 struct RenderWorker {
+    /// The group of saved pictures.
+    outputs: OutputGroup,
     renderer: Box<dyn SceneRenderer>,
     device: wgpu::Device,
     queue: wgpu::Queue,
@@ -201,7 +207,8 @@ impl RenderWorker {
                 Err(error) => RenderEvent::FrameFailed(error),
             }),
             RenderRequest::Screenshot { view, arrangement, file } => {
-                let saved = self.picture(&view, arrangement).and_then(|picture| save(&file, &picture));
+                let saved =
+                    self.picture(&view, arrangement).and_then(|picture| save(&self.outputs, &file, &picture));
                 Some(match saved {
                     Ok(()) => RenderEvent::Saved(file),
                     Err(error) => RenderEvent::SaveFailed(error),
@@ -263,9 +270,9 @@ fn scaled(camera: &Camera, scale: f64) -> Camera {
     camera.with_max_width(width)
 }
 
-fn save(file: &std::path::Path, (width, height, pixels): &Rgb8Image) -> Result<()> {
+fn save(outputs: &OutputGroup, file: &std::path::Path, (width, height, pixels): &Rgb8Image) -> Result<()> {
     let bytes = png(*width, *height, pixels)?;
-    Ok(lexisplat::output::write_whole(file, |writer| {
+    Ok(output::write_whole(Output::from(file).within(outputs), |writer| {
         std::io::Write::write_all(writer, &bytes).map_err(|e| lexisplat::Error::io(file, e))
     })?)
 }

@@ -57,13 +57,14 @@ mod sparse;
 pub mod stream;
 mod support;
 
+pub use formats::kind::{FileKind, Unsupported};
 pub use formats::{lexi, ply};
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;
 pub use scene::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats};
 pub use scene::{sh, stats};
-pub use sparse::codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
+pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 pub use sparse::compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;
 pub use sparse::model::{Layout, Model, Pursuit, Record};

@@ -105,7 +105,7 @@ fn flip_bits(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 
 /// Reads damaged bytes; the reader must answer, in one line, within its memory.
 fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
-    let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
+    let options = ReadOptions::default().with_drop_invalid(drop_invalid);
     let (result, used) = counted(|| ply::read_bytes("t.ply", bytes, &options));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input", bytes.len());
     let (opened, used) = counted(|| PlySource::open("t.ply", bytes, &options, &Silent));

@@ -129,7 +129,7 @@ fn comes_out_as(name: &str, bytes: &[u8], whole: &Splats) {
 
 #[test]
 fn exact_layouts_give_the_bytes_of_the_whole_scene() {
-    let read = ReadOptions { drop_invalid: true, ..ReadOptions::default() };
+    let read = ReadOptions::default().with_drop_invalid(true);
     for (name, bytes) in plys() {
         let whole = ply::read_bytes("t.ply", &bytes, &read).unwrap();
         let chunks = PlySource::open("t.ply", &bytes, &read, &Silent).unwrap();
@@ -158,7 +158,7 @@ fn exact_layouts_give_the_bytes_of_the_whole_scene() {
 
 #[test]
 fn packing_keeps_every_gaussian_and_comes_out_as_if_read_whole() {
-    let read = ReadOptions { drop_invalid: true, ..ReadOptions::default() };
+    let read = ReadOptions::default().with_drop_invalid(true);
     for (name, bytes) in plys() {
         let whole = ply::read_bytes("t.ply", &bytes, &read).unwrap().splats;
         let chunks = PlySource::open("t.ply", &bytes, &read, &Silent).unwrap();

@@ -5,7 +5,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::output::Output;
 use lexisplat::packed::{PackOptions, TargetRecord};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, Record, lexi};
@@ -14,7 +13,7 @@ use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, t
 use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, existing, input, is_pipe, output_path, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, new_output, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -56,7 +55,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         })
     })?;
     if let (Some(path), Some(dictionary)) = (&args.save_dictionary, &report.dictionary) {
-        lexi::write_dictionary(Output::new(path, existing(common.overwrite)), dictionary)?;
+        lexi::write_dictionary(new_output(path, common.overwrite), dictionary)?;
     }
     report.read_seconds += opened;
     report.total_seconds = start.elapsed().as_secs_f64();

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::output::Output;
 use lexisplat::{CompressOptions, compress, lexi, ply};
 use lexisplat_eval::{DrawOptions, ORBIT_SIZE, compare, montage, png, text};
 use lexisplat_render::{Image, Renderer, Scene, orbit};
@@ -14,7 +13,7 @@ use serde_json::json;
 
 use super::compress::error_line;
 use crate::args::{Common, Demo};
-use crate::files::{check_free, existing, make_folder, note, print, print_json, view_name, write_bytes};
+use crate::files::{check_free, make_folder, new_output, note, print, print_json, view_name, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -65,14 +64,14 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
 
     say("1. making a scene: a still life of glossy and matte things, as a trainer would leave it");
     let splats = scene(&SampleOptions::new(args.gaussians, args.seed));
-    let ply_bytes = ply::write(Output::new(&ply_path, existing(common.overwrite)), &splats)?;
+    let ply_bytes = ply::write(new_output(&ply_path, common.overwrite), &splats)?;
 
     say("2. compressing it: learning a dictionary, coding every Gaussian, checking every error");
     let bars = Bars::new(common.quiet);
     let mut options = CompressOptions::default();
     options.seed = args.seed;
     let (model, report) = compress(splats.clone(), &options, &bars)?;
-    let file_bytes = lexi::write(Output::new(&lexi_path, existing(common.overwrite)), &model)?;
+    let file_bytes = lexi::write(new_output(&lexi_path, common.overwrite), &model)?;
 
     say("3. drawing both, the compressed one straight from its codes, and comparing");
     let cameras = orbit(&splats.geometry, VIEWS, ORBIT_SIZE.0, ORBIT_SIZE.1);

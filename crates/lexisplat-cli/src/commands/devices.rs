@@ -27,10 +27,10 @@ pub(crate) fn run(common: &Common) -> Result<()> {
             })
             .collect();
         let available: Vec<_> = Simd::available().into_iter().map(Simd::name).collect();
-        let processor = json!({ "simd": Simd::detect().name(), "available": available });
+        let processor = json!({ "simd": Simd::current().name(), "available": available });
         return print_json(&json!({ "devices": list, "processor": processor }));
     }
-    let simd = Simd::detect().name();
+    let simd = Simd::current().name();
     if found.is_empty() {
         return print(&format!(
             "no GPU was found: everything is drawn on the CPU (cpu, {simd})\n\

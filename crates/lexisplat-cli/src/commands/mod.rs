@@ -17,8 +17,8 @@ mod view;
 
 use anyhow::{Context, Result};
 
-use lexisplat::Geometry;
 use lexisplat::simd::Simd;
+use lexisplat::{Error, Geometry};
 use lexisplat_eval::views::find_views;
 use lexisplat_render::Camera;
 
@@ -29,10 +29,13 @@ use crate::terminal::{note, warn};
 /// Most worker threads for each core. More only wait for each other, and very many of them bring a machine to a halt.
 const THREADS_PER_CORE: usize = 4;
 
-/// Starts the worker threads and runs the command.
+/// The environment variable that chooses vector instructions by name.
+const SIMD_VARIABLE: &str = "LEXISPLAT_SIMD";
+
+/// Sets up threads and runs the command.
 pub(crate) fn run(cli: Cli) -> Result<()> {
     let Cli { common, command } = cli;
-    Simd::chosen()?;
+    let simd = instructions()?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(allowed_threads(common.threads))
         .build_global()
@@ -40,7 +43,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
     if !common.quiet && !command.is_interactive() {
         progress::start_lines();
     }
-    match command {
+    simd.scope(|| match command {
         Command::Compress(args) => compress::run(&args, &common),
         Command::Decompress(args) => decompress::run(&args, &common),
         Command::Info(args) => info::run(&args, &common),
@@ -54,6 +57,22 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),
         Command::Completions(args) => completions::run(&args),
+    })
+}
+
+/// The vector instructions that the environment asks for, by default the widest.
+fn instructions() -> Result<Simd> {
+    match std::env::var_os(SIMD_VARIABLE) {
+        Some(name) if !name.is_empty() => {
+            let name = name.to_string_lossy();
+            let refusal = || {
+                let names: Vec<&str> = Simd::available().into_iter().map(Simd::name).collect();
+                let expected = format!("{}: this CPU has no other", names.join(" or "));
+                Error::parameter(SIMD_VARIABLE, &name, expected)
+            };
+            Ok(Simd::named(&name).ok_or_else(refusal)?)
+        }
+        _ => Ok(Simd::widest()),
     }
 }
 

@@ -13,7 +13,7 @@ use serde_json::json;
 use super::eval::scorer;
 use crate::args::{Common, Sweep};
 use crate::exit::OutputExists;
-use crate::files::{make_folder, print, print_json};
+use crate::files::{make_folder, outputs, print, print_json};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     watch.bars.end();
     let (mut results, saved) = outcome?;
     results.command = command();
-    let files = write_report(folder, &results, &saved, args.date.as_deref())?;
+    let files = write_report(folder, &results, &saved, args.date.as_deref(), outputs())?;
     if common.json {
         return print_json(&json!({
             "output": folder.display().to_string(),
@@ -97,6 +97,7 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.device = args.views.device;
     options.pictures = args.pictures;
     options.resume = !args.fresh;
+    options.outputs = outputs().clone();
     for path in &args.measures.lpips {
         let bytes = std::fs::metadata(path).map_err(|e| lexisplat::Error::io(path, e))?.len();
         write!(options.fingerprint, "{} {bytes}; ", path.display())?;

@@ -4,6 +4,7 @@ use anyhow::Result;
 use lexisplat_view::Options;
 
 use crate::args::{Common, View};
+use crate::files::outputs;
 
 pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
     let views = &args.views;
@@ -18,6 +19,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
         overwrite: common.overwrite,
         limits: common.limits()?,
         script: args.actions.clone(),
+        outputs: outputs().clone(),
     };
     Ok(lexisplat_view::run(options)?)
 }

@@ -43,7 +43,7 @@ fn refused(value: f32, property: &str, array: &str, change: Change) {
     let keep: Vec<bool> = (0..60).map(|i| i != 7 && i != 20).collect();
     let mut kept = good;
     kept.retain(&keep);
-    assert_eq!((read.source.dropped, &read.splats), (2, &kept));
+    assert_eq!((read.summary.dropped, &read.splats), (2, &kept));
 
     let error = compress(bad.clone(), &CompressOptions::default(), &Silent).unwrap_err();
     assert!(matches!(error, Error::Parameter { .. }), "{error}");

@@ -42,12 +42,13 @@ impl TilePixels {
 
 /// Draws the tile at `[column, row]` from the splats in `list`, sorted from front to back.
 pub(super) fn tile(
+    simd: Simd,
     splats: &[Visible],
     list: impl Iterator<Item = u32>,
     at: [usize; 2],
     background: [f32; 3],
 ) -> TilePixels {
-    Simd::detect().dispatch(
+    simd.dispatch(
         #[inline(always)]
         || draw(splats, list, at, background),
     )
@@ -179,7 +180,7 @@ mod tests {
                 #[inline(always)]
                 || draw(&splats, 0..300, at, background),
             );
-            let chosen = tile(&splats, 0..300, at, background);
+            let chosen = tile(simd, &splats, 0..300, at, background);
             for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
                 let bits = plain.pixel(x, y).map(f32::to_bits);
                 assert_eq!(wide.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");

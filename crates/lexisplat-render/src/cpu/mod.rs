@@ -18,6 +18,7 @@ pub(crate) mod twin;
 use std::time::Instant;
 
 use lexisplat::ShDegree;
+use lexisplat::simd::Simd;
 use rayon::prelude::*;
 
 use crate::camera::Camera;
@@ -102,6 +103,7 @@ impl Stages {
 /// [`render`] with at most `max_entries` in the tiles' lists at once.
 fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max_entries: u64) -> Drawn {
     let mut stages = Stages::start();
+    let simd = Simd::current();
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![options.background; width * height];
@@ -118,7 +120,7 @@ fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max
             .into_par_iter()
             .map(|tile| {
                 let (column, row) = (tile % grid.columns, band.start + tile / grid.columns);
-                blend::tile(&splats, lists.of(tile), [column, row], options.background)
+                blend::tile(simd, &splats, lists.of(tile), [column, row], options.background)
             })
             .collect();
         let rows = &mut pixels[band.start * TILE * width..(band.end * TILE).min(height) * width];

@@ -40,6 +40,7 @@ impl Moments {
 /// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
 /// `roots` are those of the splats.
 pub(super) fn tile(
+    simd: Simd,
     splats: &[Visible],
     roots: &[Root],
     list: impl Iterator<Item = u32>,
@@ -47,7 +48,7 @@ pub(super) fn tile(
     size: [usize; 2],
     picture: &TilePixels,
 ) -> Vec<(u32, Moments)> {
-    Simd::detect().dispatch(
+    simd.dispatch(
         #[inline(always)]
         || walk(splats, roots, list, at, size, picture),
     )

@@ -1,5 +1,6 @@
 //! How much pictures change with every parameter of every Gaussian.
 
+use lexisplat::simd::Simd;
 use lexisplat::{Geometry, Progress, Sensitivity, Stage};
 use rayon::prelude::*;
 
@@ -36,6 +37,7 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
 }
 
 fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: usize) {
+    let simd = Simd::current();
     let projection = Projection::new(camera, scene.meta().antialiased);
     let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
     let grid = projection.grid;
@@ -54,8 +56,8 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
                 .into_par_iter()
                 .map(|tile| {
                     let at = [tile % grid.columns, band.start + tile / grid.columns];
-                    let picture = blend::tile(&splats, lists.of(tile), at, [0.0; 3]);
-                    moments::tile(&splats, &roots, lists.of(tile), at, size, &picture)
+                    let picture = blend::tile(simd, &splats, lists.of(tile), at, [0.0; 3]);
+                    moments::tile(simd, &splats, &roots, lists.of(tile), at, size, &picture)
                 })
                 .collect();
             for (splat, part) in parts.into_iter().flatten() {

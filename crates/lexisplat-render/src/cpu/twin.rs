@@ -4,6 +4,7 @@ use crate::camera::Camera;
 use crate::conventions::TILE;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
+use lexisplat::simd::Simd;
 
 use super::project::{Projection, Splat, Visible};
 use super::{blend, order, project};
@@ -54,6 +55,6 @@ pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec
         })
         .collect();
     let list = (0..).take(visible.len());
-    let pixels = blend::tile(&visible, list, at, background);
+    let pixels = blend::tile(Simd::current(), &visible, list, at, background);
     (0..TILE * TILE).map(|k| pixels.pixel(k % TILE, k / TILE)).collect()
 }

@@ -7,7 +7,7 @@ use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Layout, Record};
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::parallel::CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
 use crate::support::progress::{Progress, Stage};
 use crate::support::sink::Sink;
 use crate::support::spill::SpillTo;

@@ -8,7 +8,7 @@ use crate::packed::StreamBits;
 use crate::scene::source::SplatSource;
 use crate::scene::stats::{Lint, Linter};
 use crate::support::error::Result;
-use crate::support::parallel::CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
 use crate::support::progress::{Progress, Stage};
 
 /// Gaussians looked over together.

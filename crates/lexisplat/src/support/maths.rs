@@ -1,7 +1,8 @@
-//! Functions that must give the same bits everywhere: a file is decoded with what it was encoded with.
+//! Functions that give the same bits on every machine, because a file must be decoded with the functions that
+//! encoded it.
 //!
-//! IEEE arithmetic and square roots are exact on every machine; the rest comes from `libm`, which is
-//! plain Rust and so the same everywhere, unlike the system's.
+//! IEEE arithmetic and square roots are rounded the same on every machine. The other functions come from `libm`,
+//! which is plain Rust and therefore the same everywhere, unlike the system's library.
 
 /// 2 to the power `x`.
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
@@ -54,7 +55,7 @@ pub(crate) fn logit_of_log(x: f32) -> f32 {
     (x - libm::log(-libm::expm1(x))) as f32
 }
 
-/// The value below which `share` of `sorted` lies; 0 if there is none.
+/// The value below which `share` of the values in `sorted` lie; 0 if `sorted` is empty.
 pub(crate) fn at_share<T: Copy + Default>(sorted: &[T], share: f64) -> T {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
     let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
@@ -79,14 +80,14 @@ pub(crate) fn normalised(a: Vec3) -> Vec3 {
     scaled(a, 1.0 / dot(a, a).sqrt().max(f32::MIN_POSITIVE))
 }
 
-/// Which axes are the longest, the middle and the shortest; equal ones in their own order.
+/// The axes from longest to shortest. Equally long axes keep their order.
 pub(crate) fn longest_first(scales: Vec3) -> [usize; 3] {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
     order
 }
 
-/// Columns of the rotation of a quaternion (w, x, y, z) of any length; the identity for zero.
+/// Columns of the rotation that a quaternion (w, x, y, z) of any length means. Zero means the identity.
 pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     let length = q.iter().map(|v| v * v).sum::<f32>().sqrt();
     if length.is_nan() || length < 1e-12 {
@@ -100,7 +101,7 @@ pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     ]
 }
 
-/// The quaternion (w, x, y, z), w not negative, of a rotation given by its columns.
+/// The quaternion (w, x, y, z) with w >= 0 of the rotation with these columns.
 pub(crate) fn quaternion([a, b, c]: [Vec3; 3]) -> [f32; 4] {
     let trace = [
         1.0 + a[0] + b[1] + c[2],
@@ -127,9 +128,9 @@ pub(crate) fn quaternion([a, b, c]: [Vec3; 3]) -> [f32; 4] {
     if q[0] < 0.0 { q.map(|v| -v) } else { q }
 }
 
-/// Two directions that complete the unit vector `u` to a right-handed frame.
+/// Two unit vectors that make a right-handed frame with the unit vector `u`.
 pub(crate) fn frame(u: Vec3) -> [Vec3; 2] {
-    // The coordinate axis that u is least along.
+    // The coordinate axis that is most perpendicular to u.
     let mut least = 0;
     for k in 1..3 {
         if u[k].abs() < u[least].abs() {
@@ -142,8 +143,8 @@ pub(crate) fn frame(u: Vec3) -> [Vec3; 2] {
     [first, cross(u, first)]
 }
 
-/// A unit vector, or its opposite, as a point of the square from -1 to 1: an octahedron's upper half
-/// folded flat and turned by 45 degrees.
+/// Maps a unit vector and its opposite to one point of the square from -1 to 1: the upper half of an octahedron,
+/// flattened and turned by 45 degrees.
 pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     let u = if u[2] < 0.0 { scaled(u, -1.0) } else { u };
     let sum = u[0].abs() + u[1].abs() + u[2];
@@ -151,7 +152,7 @@ pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     [x + y, x - y]
 }
 
-/// Inverse of [`square_of_axis`], up to the sign.
+/// Inverse of [`square_of_axis`] up to the sign.
 pub(crate) fn axis_of_square([s, t]: [f32; 2]) -> Vec3 {
     let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
     normalised([x, y, (1.0 - x.abs() - y.abs()).max(0.0)])
@@ -183,8 +184,8 @@ mod tests {
         }
     }
 
-    /// Files are decoded with these functions: a new release of the library behind them must not change a
-    /// bit, or old files would decode differently.
+    /// Files are decoded with these functions. A new release of `libm` must not change a bit, or old files would
+    /// decode differently.
     #[test]
     fn values_are_frozen() {
         let mut hash = crc32fast::Hasher::new();

@@ -9,8 +9,6 @@ use crate::support::progress::{Progress, Stage};
 
 /// Bytes passed on at a time; between two such blocks the work can be cancelled.
 const BLOCK: usize = 1 << 20;
-/// What errors call a writer, which has no path.
-const WRITER: &str = "output";
 
 /// Where a result is written: a file that appears when it is whole, or any writer.
 ///
@@ -77,19 +75,19 @@ impl Sink<'_> {
         fill: impl FnOnce(&mut dyn Write, &dyn Fn(io::Error) -> Error) -> Result<()>,
     ) -> Result<u64> {
         progress.begin(Stage::Write, bytes);
-        let fill = |writer: &mut dyn Write, path: &Path| {
+        let fill = |writer: &mut dyn Write, refused: &dyn Fn(io::Error) -> Error| {
             let mut counted = Counted { writer, progress, bytes: 0 };
-            let named = |e: io::Error| e.downcast().unwrap_or_else(|e| Error::io(path, e));
+            let named = |e: io::Error| e.downcast().unwrap_or_else(refused);
             fill(&mut counted, &named)?;
             counted.flush().map_err(named)?;
             Ok(counted.bytes)
         };
         let written = match self.0 {
-            Target::Writer(writer) => fill(writer, Path::new(WRITER))?,
+            Target::Writer(writer) => fill(writer, &Error::writer)?,
             Target::File(output) => {
                 let mut written = 0;
                 write_whole(output.of_bytes(bytes), |writer| {
-                    written = fill(writer, output.path())?;
+                    written = fill(writer, &|e| Error::io(output.path(), e))?;
                     Ok(())
                 })?;
                 written

@@ -28,7 +28,7 @@ pub(crate) struct TemporaryFile {
 
 impl TemporaryFile {
     pub(crate) fn new(folder: &Path) -> Result<Self> {
-        let file = tempfile::tempfile_in(folder).map_err(|e| Error::io(named(folder), e))?;
+        let file = tempfile::tempfile_in(folder).map_err(|e| Error::temporary_file(folder, e))?;
         Ok(Self { file, folder: folder.to_owned() })
     }
 
@@ -39,19 +39,14 @@ impl TemporaryFile {
             file.write_all(bytes)?;
             Ok(start)
         };
-        append(&mut self.file).map_err(|e| Error::io(named(&self.folder), e))
+        append(&mut self.file).map_err(|e| Error::temporary_file(&self.folder, e))
     }
 
     /// Fills `bytes` from `start` on.
     pub(crate) fn read_at(&mut self, start: u64, bytes: &mut [u8]) -> Result<()> {
         let read = self.file.seek(SeekFrom::Start(start)).and_then(|_| self.file.read_exact(bytes));
-        read.map_err(|e| Error::io(named(&self.folder), e))
+        read.map_err(|e| Error::temporary_file(&self.folder, e))
     }
-}
-
-/// What errors call a temporary file in `folder`.
-fn named(folder: &Path) -> PathBuf {
-    folder.join("(temporary file)")
 }
 
 /// Bytes being spilled, and their checksum.
@@ -91,7 +86,9 @@ impl Spill {
                 kept.extend_from_slice(bytes);
                 Ok(())
             }
-            Kept::File { file, folder } => file.write_all(bytes).map_err(|e| Error::io(named(folder), e)),
+            Kept::File { file, folder } => {
+                file.write_all(bytes).map_err(|e| Error::temporary_file(folder, e))
+            }
         }
     }
 
@@ -100,7 +97,7 @@ impl Spill {
         let kept = match self.kept {
             Kept::Memory(bytes) => Kept::Memory(bytes),
             Kept::File { file, folder } => {
-                let io = |e| Error::io(named(&folder), e);
+                let io = |e| Error::temporary_file(&folder, e);
                 let mut file = file.into_inner().map_err(|e| io(e.into_error()))?;
                 file.rewind().map_err(io)?;
                 Kept::File { file, folder }
@@ -136,7 +133,7 @@ impl Spilled {
                 self.taken += bytes.len();
             }
             Kept::File { file, folder } => {
-                file.read_exact(bytes).map_err(|e| Error::io(named(folder), e))?;
+                file.read_exact(bytes).map_err(|e| Error::temporary_file(folder, e))?;
             }
         }
         Ok(values)
@@ -162,7 +159,7 @@ impl Spilled {
         let mut block = vec![0; BUFFER];
         loop {
             let read = file.read(&mut block);
-            match read.map_err(|e| std::io::Error::other(Error::io(named(&folder), e)))? {
+            match read.map_err(|e| std::io::Error::other(Error::temporary_file(&folder, e)))? {
                 0 => return Ok(()),
                 read => writer.write_all(&block[..read])?,
             }

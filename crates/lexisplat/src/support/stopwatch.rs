@@ -1,4 +1,4 @@
-//! Elapsed time where there is a clock.
+//! Elapsed time, on platforms with a clock.
 
 /// Measures the time since it was started.
 #[derive(Debug, Clone, Copy)]
@@ -17,7 +17,7 @@ impl Stopwatch {
         }
     }
 
-    /// Returns the seconds since the start. In a browser there is no clock, and they are 0.
+    /// Seconds since the start. In a browser, where `Instant` would panic, it is 0.
     #[cfg_attr(target_family = "wasm", expect(clippy::unused_self, reason = "there is no clock"))]
     #[must_use]
     pub fn seconds(self) -> f64 {

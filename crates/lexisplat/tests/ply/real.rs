@@ -26,13 +26,13 @@ fn every_real_file_keeps_its_bits() {
         let again = ply::read_bytes("again", &written, &ply::ReadOptions::default()).unwrap();
         assert_eq!(again.splats, read.splats, "{}", path.display());
 
-        if read.source.dialect == ply::Dialect::Inria {
+        if read.summary.dialect == ply::Dialect::Inria {
             // The writer's own layout: the rows are the same bytes, whatever follows them.
             let rows = &written[data_start(&written)..];
             let from = data_start(&original);
             assert!(rows == &original[from..from + rows.len()], "{}", path.display());
         }
-        println!("{}: {:?} {} {:?}", path.display(), read.source.dialect, read.splats.len(), read.warnings);
+        println!("{}: {:?} {} {:?}", path.display(), read.summary.dialect, read.splats.len(), read.warnings);
     }
     assert!(seen > 0, "the data folder holds no PLY");
 }

@@ -8,7 +8,7 @@ use anyhow::Result;
 use lexisplat::lexi::LexiChunks;
 use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
-use lexisplat::{SplatSource as _, Splats, lexi, stream};
+use lexisplat::{FileKind, SplatSource as _, Splats, stream};
 use lexisplat_eval::text;
 use serde::Serialize;
 
@@ -25,14 +25,14 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let bars = Bars::new(common.quiet || common.json);
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
-    if lexi::is_lexi(&bytes) {
+    if FileKind::of(&name, &bytes) == FileKind::Lexi {
         let lexi = LexiChunks::open(&name, &bytes, &limits)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let parts = codes::parts(&lexi, &survey);
         let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
         return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: lexi_facts }).print(common);
     }
-    let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
+    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let ply = PlySource::open(&name, &bytes, &read, &bars)?;
     warn(&name, ply.warnings());
     let lint = stream::lint(&ply, &bars)?;

@@ -17,7 +17,7 @@ pub use chunks::LexiChunks;
 pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
 pub(crate) use packed::{SpilledPacked, write_spilled_packed};
 pub use packed::{packed_bytes, packed_tensor_bytes, write_packed};
-pub use read::{Contents, is_lexi, open, open_bytes, read, read_bytes, unpack};
+pub use read::{Contents, open, open_bytes, read, read_bytes, unpack};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};
 pub(crate) use spilled::{Extras, SpilledModel};
 pub(crate) use write::is_sh;

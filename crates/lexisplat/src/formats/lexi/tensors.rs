@@ -8,6 +8,7 @@ use safetensors::tensor::{SafeTensorError, TensorView};
 use safetensors::{Dtype, SafeTensors};
 
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, key, tensor};
+use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::parallel::map_chunks;
@@ -200,6 +201,7 @@ pub(super) struct Checked<'a> {
 impl<'a> Checked<'a> {
     /// Parses `bytes` and verifies everything that does not need to know what the tensors mean.
     pub(super) fn open(file: &'a str, bytes: &'a [u8], formats: &[&str], limits: &Limits) -> Result<Self> {
+        FileKind::Lexi.expect(file, bytes)?;
         let format = |problem| Error::format(file, problem);
         let malformed = |text: String| Error::malformed(file, text);
         let Some(length) = bytes.first_chunk::<LENGTH_BYTES>() else {

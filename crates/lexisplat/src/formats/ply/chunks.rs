@@ -3,10 +3,10 @@
 use std::ops::Range;
 
 use super::columns::Packed;
+use super::file::PlyFile;
 use super::fill::{Bad, empty, fill, fill_normals};
 use super::read::ReadOptions;
-use super::rows::CHUNK_ROWS;
-use super::source::Source;
+use super::rows::ROWS_PER_TASK;
 use super::summary::PlySummary;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -15,13 +15,13 @@ use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
 
 /// Rows read together when a file is opened.
-const SCAN_ROWS: usize = 64 * CHUNK_ROWS;
+const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 
 /// A PLY whose Gaussians are read a part at a time. It refuses, leaves out and warns of the same as
 /// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
-    source: Source<'a>,
+    source: PlyFile<'a>,
     /// Rows left out, ascending.
     dropped: Vec<usize>,
     /// Whether any Gaussian has a normal.
@@ -40,9 +40,9 @@ impl<'a> PlySource<'a> {
         options: &ReadOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut source = Source::open(name, bytes, options)?;
+        let mut source = PlyFile::open(name, bytes, options)?;
         let (mut bad, mut normals, mut sure) = (Vec::<Bad>::new(), false, 0);
-        source.check_room(source.count.min(SCAN_ROWS), false)?;
+        source.check_memory(source.count.min(SCAN_ROWS), false)?;
         let mut scratch = empty(&source.layout);
         progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
         for start in (0..source.count).step_by(SCAN_ROWS) {
@@ -55,7 +55,7 @@ impl<'a> PlySource<'a> {
             sure += found.sure;
         }
         progress.end();
-        source.judge(&bad, sure, options)?;
+        source.report(&bad, sure, options)?;
         let dropped = bad.into_iter().flat_map(|b| b.rows).collect();
         Ok(Self { source, dropped, normals })
     }
@@ -132,7 +132,7 @@ impl SplatSource for PlySource<'_> {
             Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
             _ => 0..0,
         };
-        self.source.check_room(rows.len(), self.normals)?;
+        self.source.check_memory(rows.len(), self.normals)?;
         fill(&self.source.rows, &self.source.layout, self.source.name, rows.clone(), splats)?;
         if self.normals {
             fill_normals(&self.source.rows, &self.source.layout, rows.clone(), splats)?;
@@ -161,7 +161,7 @@ impl SplatSource for PlySource<'_> {
             gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
         order.sort_unstable();
         let row_bytes = self.source.layout.row_bytes;
-        for group in order.chunk_by(|a, b| a.0 / CHUNK_ROWS == b.0 / CHUNK_ROWS) {
+        for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {
             let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else { continue };
             let (bytes, big) = self.source.rows.packed(first..last + 1)?;
             for &(row, k) in group {

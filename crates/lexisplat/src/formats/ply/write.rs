@@ -1,26 +1,25 @@
-//! Writes a [`Splats`] in the INRIA layout, which every viewer reads.
+//! Writes a [`Splats`] in INRIA's layout, which every viewer reads.
 
-use super::header::ScalarType;
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
-use crate::scene::splats::{ExtraValues, SceneMeta, Splats, for_extra};
+use super::rows::ROWS_PER_TASK;
+use super::scalar::ScalarType;
+use crate::scene::splats::{SceneMeta, Splats, for_extra};
 use crate::support::error::{Error, Result};
 use crate::support::output::{Output, write_whole};
 use crate::support::parallel::for_each_chunk_mut;
 use std::collections::HashSet;
 use std::io::{self, Write};
 
-/// Rows one thread formats at a time.
-const CHUNK_ROWS: usize = 1024;
-/// Rows formatted before they are written: at 248 bytes a row, 8 MiB.
-const BLOCK_ROWS: usize = 32 * CHUNK_ROWS;
+/// Rows formatted in memory before they are written: 8 MiB at 248 bytes a row.
+const BLOCK_ROWS: usize = 32 * ROWS_PER_TASK;
 
-/// Writes `splats` to `output`, whole or not at all; the number of bytes.
+/// Writes `splats` to `output`, whole or not at all. Returns the number of bytes written.
 ///
-/// Little-endian, in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
-/// own types. Normals are zeros if the scene has none. Comments go back in; the anti-aliasing mark is
-/// added if no comment carries it.
+/// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
+/// own types. Normals are zeros if the scene has none. The scene's comments are written too. If the scene is
+/// anti-aliased and no comment says so, a comment is added.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written, [`Error::Parameter`] if the arrays differ in length or
@@ -36,11 +35,10 @@ pub fn write<'a>(output: impl Into<Output<'a>>, splats: &Splats) -> Result<u64> 
     Ok(bytes)
 }
 
-/// Writes `splats` as [`write()`] does; the number of bytes.
+/// Writes `splats` as [`write()`] does. Returns the number of bytes written.
 ///
 /// # Errors
-/// Whatever `writer` returns, or [`io::ErrorKind::InvalidInput`] for a scene that
-/// [`write()`] refuses.
+/// Any error of `writer`, and [`io::ErrorKind::InvalidInput`] for a scene that [`write()`] refuses.
 pub fn write_to(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
     check(splats).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
     write_checked(writer, splats)
@@ -52,7 +50,7 @@ fn write_checked(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
     Ok(writer.bytes)
 }
 
-/// Writes a scene part after part.
+/// Writes a scene part by part.
 pub(crate) struct PlyWriter<W> {
     writer: W,
     layout: RowLayout,
@@ -67,8 +65,8 @@ pub(crate) fn file_bytes(splats: &Splats, count: usize) -> u64 {
 }
 
 impl<W: Write> PlyWriter<W> {
-    /// Writes the header of a scene of `count` Gaussians that is like `splats`, whose own number is of no
-    /// matter; it was [`check`]ed.
+    /// Writes the header of a scene of `count` Gaussians. `splats`, which was [`check`]ed, gives its properties and
+    /// comments and may hold any number of Gaussians.
     pub(crate) fn begin(mut writer: W, splats: &Splats, count: usize) -> io::Result<Self> {
         let header = header(splats, count);
         writer.write_all(header.as_bytes())?;
@@ -83,8 +81,8 @@ impl<W: Write> PlyWriter<W> {
         for start in (0..count).step_by(BLOCK_ROWS) {
             let rows = &mut self.block[..row_bytes * BLOCK_ROWS.min(count - start)];
             let layout = &self.layout;
-            for_each_chunk_mut(rows, row_bytes * CHUNK_ROWS, |chunk, rows| {
-                layout.pack(splats, start + chunk * CHUNK_ROWS, rows);
+            for_each_chunk_mut(rows, row_bytes * ROWS_PER_TASK, |chunk, rows| {
+                layout.pack(splats, start + chunk * ROWS_PER_TASK, rows);
             });
             self.writer.write_all(rows)?;
         }
@@ -93,7 +91,7 @@ impl<W: Write> PlyWriter<W> {
     }
 }
 
-/// Names of the properties every file has, in order.
+/// Returns the names of the properties that every file has, in order.
 fn names(rest: usize) -> impl Iterator<Item = String> {
     let fixed = |names: &'static [&'static str]| names.iter().map(|&n| n.to_owned());
     fixed(&POSITION)
@@ -105,13 +103,13 @@ fn names(rest: usize) -> impl Iterator<Item = String> {
         .chain(fixed(&ROTATION))
 }
 
-/// Refuses what no PLY can hold.
+/// Refuses a scene that no PLY can hold.
 pub(crate) fn check(splats: &Splats) -> Result<()> {
     splats.validate()?;
     let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
     for extra in &splats.geometry.extras {
         let name = &extra.name;
-        // A line break in a name would let it write header lines of its own.
+        // A name with a line break could add lines to the header.
         if name.is_empty() || name.chars().any(|c| c.is_whitespace() || c.is_control()) {
             return Err(Error::parameter(
                 "extra",
@@ -126,7 +124,7 @@ pub(crate) fn check(splats: &Splats) -> Result<()> {
     Ok(())
 }
 
-/// The header of a scene of `count` Gaussians that is like `splats`.
+/// Returns the header of a scene of `count` Gaussians with the properties and comments of `splats`.
 pub(super) fn header(splats: &Splats, count: usize) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments(&splats.meta) {
@@ -138,13 +136,13 @@ pub(super) fn header(splats: &Splats, count: usize) -> String {
         text.push_str(&format!("property float {name}\n"));
     }
     for extra in &splats.geometry.extras {
-        text.push_str(&format!("property {} {}\n", extra_type(&extra.values).name(), extra.name));
+        text.push_str(&format!("property {} {}\n", ScalarType::of(&extra.values).name(), extra.name));
     }
     text.push_str("end_header\n");
     text
 }
 
-/// The scene's comments on one line each, brought in agreement with its anti-aliasing mark.
+/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark.
 fn comments(meta: &SceneMeta) -> Vec<String> {
     let mut out: Vec<String> =
         meta.comments.iter().map(|c| c.replace(char::is_control, " ").trim().to_owned()).collect();
@@ -154,19 +152,6 @@ fn comments(meta: &SceneMeta) -> Vec<String> {
         out.retain(|comment| mark(comment) != Some(true));
     }
     out
-}
-
-fn extra_type(values: &ExtraValues) -> ScalarType {
-    match values {
-        ExtraValues::I8(_) => ScalarType::I8,
-        ExtraValues::U8(_) => ScalarType::U8,
-        ExtraValues::I16(_) => ScalarType::I16,
-        ExtraValues::U16(_) => ScalarType::U16,
-        ExtraValues::I32(_) => ScalarType::I32,
-        ExtraValues::U32(_) => ScalarType::U32,
-        ExtraValues::F32(_) => ScalarType::F32,
-        ExtraValues::F64(_) => ScalarType::F64,
-    }
 }
 
 /// Byte offsets of the groups in a row.
@@ -197,11 +182,12 @@ impl RowLayout {
         let opacity = place(float);
         let scale = place(3 * float);
         let rotation = place(4 * float);
-        let extras = splats.geometry.extras.iter().map(|e| place(extra_type(&e.values).bytes())).collect();
+        let extras =
+            splats.geometry.extras.iter().map(|e| place(ScalarType::of(&e.values).bytes())).collect();
         Self { normal, dc, rest, opacity, scale, rotation, extras, row_bytes: at }
     }
 
-    /// Formats the Gaussians from `start` on into `rows`.
+    /// Writes the Gaussians from `start` on into `rows`.
     pub(super) fn pack(&self, splats: &Splats, start: usize, rows: &mut [u8]) {
         let count = rows.len() / self.row_bytes;
         let range = start..start + count;

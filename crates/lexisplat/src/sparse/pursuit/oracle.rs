@@ -1,4 +1,4 @@
-//! The naive truth in f64: every candidate of every step projected afresh, by Gram-Schmidt.
+//! A naive pursuit in f64 for tests: it projects every candidate afresh in every step, by Gram-Schmidt.
 
 use crate::sparse::model::Pursuit;
 
@@ -9,7 +9,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// What is left of `vector` off the span of an orthonormal `basis`; projected twice, for rounding.
+/// The part of `vector` outside the span of an orthonormal `basis`. It is projected twice because of rounding.
 fn off(basis: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
     let mut left = vector.to_vec();
     for _ in 0..2 {
@@ -29,7 +29,7 @@ fn normalised(mut vector: Vec<f64>) -> Vec<f64> {
     vector
 }
 
-/// The basis that a set of chosen atoms spans.
+/// An orthonormal basis of the span of chosen atoms.
 fn basis_of(atoms: &[Vec<f64>], chosen: impl IntoIterator<Item = usize>) -> Vec<Vec<f64>> {
     let mut basis = Vec::new();
     for j in chosen {
@@ -38,9 +38,9 @@ fn basis_of(atoms: &[Vec<f64>], chosen: impl IntoIterator<Item = usize>) -> Vec<
     basis
 }
 
-/// How much a pursuit that has chosen `basis` wants each atom, and by how much it would lower the squared
-/// residual. Atoms too close to the span have neither.
-fn wishes(pursuit: Pursuit, atoms: &[Vec<f64>], basis: &[Vec<f64>], residual: &[f64]) -> Vec<Option<f64>> {
+/// The score by which a pursuit whose chosen atoms span `basis` prefers each atom; `None` for atoms too close to the
+/// span.
+fn scores(pursuit: Pursuit, atoms: &[Vec<f64>], basis: &[Vec<f64>], residual: &[f64]) -> Vec<Option<f64>> {
     atoms
         .iter()
         .map(|atom| {
@@ -67,11 +67,11 @@ mod tests {
     use crate::support::rng::SplitMix64;
     use crate::support::simd::Simd;
 
-    /// Share of the best wish that two atoms may differ by and still be one to f32.
+    /// Two atoms whose scores differ by at most this share of the best score are equally good in f32.
     const CLOSE: f64 = 1e-3;
     /// Squared rounding noise of f32 recurrences over at most 72 steps, as a share of the signal's energy.
     const NOISE: f64 = 1e-9;
-    /// How far f32 recurrences may stray, as a share of the signal; a promise is checked apart, in f64.
+    /// Largest error of f32 recurrences, as a share of the signal. The tolerance is checked in f64, not by them.
     const ROUNDING: f64 = 1e-3;
 
     #[expect(clippy::cast_possible_truncation, reason = "test data are small")]
@@ -122,13 +122,13 @@ mod tests {
                     let mut residual = exact.clone();
                     plan.start(&mut scratch, signal, dot(&exact, &exact));
                     while dot(&residual, &residual).sqrt() > tol {
-                        let wishes = wishes(pursuit, &all, &basis, &residual);
-                        let best = wishes.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
+                        let scores = scores(pursuit, &all, &basis, &residual);
+                        let best = scores.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
                         prop_assert!(plan.step(&mut scratch, pursuit) || best == 0.0);
                         let taken = scratch.chosen().last().copied().map(usize::from).unwrap();
-                        if let Some(wish) = wishes[taken] {
+                        if let Some(score) = scores[taken] {
                             let slack = CLOSE * best + NOISE * dot(&exact, &exact);
-                            prop_assert!(wish >= best - slack, "{} {}", wish, best);
+                            prop_assert!(score >= best - slack, "{} {}", score, best);
                         }
                         basis.push(normalised(off(&basis, &all[taken])));
                         residual = off(&basis, &exact);
@@ -223,11 +223,12 @@ mod tests {
             let signals = random_signals(degree, 200, 0.2, &mut rng);
             for pursuit in [Pursuit::Omp, Pursuit::Ols] {
                 let stop = StopRule::new(Some(0.05), None).unwrap();
-                let coder = |simd| Coder::with_simd(&dictionary, pursuit, stop, ValueType::F16, simd);
-                let plain = bits(&coder(Simd::PLAIN), &signals);
+                let coder = Coder::new(&dictionary, pursuit, stop, ValueType::F16);
+                let coded = |simd: Simd| simd.scope(|| bits(&coder, &signals));
+                let plain = coded(Simd::PLAIN);
                 assert!(plain.iter().any(|(code, _)| code.len() > 2));
                 for simd in Simd::available() {
-                    assert_eq!(bits(&coder(simd), &signals), plain, "{simd:?} {pursuit} {atoms} atoms");
+                    assert_eq!(coded(simd), plain, "{simd:?} {pursuit} {atoms} atoms");
                 }
             }
         }

@@ -1,4 +1,4 @@
-//! What is known of a PLY before its values are looked at.
+//! A PLY whose header was read and whose values were not.
 
 use super::fill::{Bad, SURE_OPACITY};
 use super::header::Header;
@@ -13,14 +13,14 @@ use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{GEOMETRY_BYTES, MemoryBudget};
 
-/// A PLY whose header is understood and whose rows are all there.
+/// A PLY with a valid header and all its rows.
 #[derive(Debug)]
-pub(super) struct Source<'a> {
-    /// The file, as the caller named it.
+pub(super) struct PlyFile<'a> {
+    /// The file's name in messages.
     pub(super) name: &'a str,
     pub(super) rows: Rows<'a>,
     pub(super) layout: Layout,
-    /// Rows of the vertex element.
+    /// Number of rows of the vertex element.
     pub(super) count: usize,
     pub(super) meta: SceneMeta,
     pub(super) warnings: Vec<String>,
@@ -28,8 +28,8 @@ pub(super) struct Source<'a> {
     limits: Limits,
 }
 
-impl<'a> Source<'a> {
-    /// Understands `bytes`, which messages call `name`.
+impl<'a> PlyFile<'a> {
+    /// Reads the header of `bytes`, which messages call `name`.
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
         let header = Header::parse(name, bytes, &options.limits)?;
         let layout = Layout::new(name, &header)?;
@@ -52,16 +52,17 @@ impl<'a> Source<'a> {
         Ok(Self { name, rows, layout, count, meta, warnings, summary, limits: options.limits })
     }
 
-    /// Refuses to hold `rows` rows, with normals or without, if they are more than limits allow.
-    pub(super) fn check_room(&self, rows: usize, normals: bool) -> Result<()> {
+    /// Refuses to hold `rows` rows, with normals or without, if the limits do not allow it.
+    pub(super) fn check_memory(&self, rows: usize, normals: bool) -> Result<()> {
         let extras = self.layout.extras.iter().map(|(_, field)| field.ty.bytes()).sum::<usize>();
         let floats = self.layout.degree.rest() + if normals { NORMAL.len() } else { 0 };
         let budget = MemoryBudget::new(&self.limits, self.name, self.summary.file_bytes);
         budget.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
     }
 
-    /// Refuses the rows that are `bad`, or notes that they are left out, and notes `sure` infinite opacities.
-    pub(super) fn judge(&mut self, bad: &[Bad], sure: usize, options: &ReadOptions) -> Result<()> {
+    /// Refuses the file if there are `bad` rows, or adds a warning that they are dropped. Adds a warning about `sure`
+    /// infinite opacities.
+    pub(super) fn report(&mut self, bad: &[Bad], sure: usize, options: &ReadOptions) -> Result<()> {
         if sure > 0 {
             self.warnings.push(format!(
                 "{sure} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)"
