@@ -1,5 +1,6 @@
 //! How the program ends: what it says about a failure, and an exit code that tells whose fault it was.
 
+use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
@@ -80,11 +81,14 @@ impl Kind {
 }
 
 /// The kind of an error, and what to do about it.
-type Blame = (Kind, Option<&'static str>);
+type Blame = (Kind, Option<Cow<'static, str>>);
 
 fn classify(error: &anyhow::Error) -> Blame {
     if error.is::<OutputExists>() {
-        return (Kind::Exists, Some(OVERWRITE));
+        return (Kind::Exists, Some(OVERWRITE.into()));
+    }
+    if let Some(misuse) = error.downcast_ref::<Misuse>() {
+        return (Kind::Parameter, Some(misuse.help.clone().into()));
     }
     #[cfg(feature = "view")]
     if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
@@ -106,7 +110,7 @@ fn view(error: &lexisplat_view::Error) -> Blame {
         Error::Codec(e) => return codec(e),
         Error::Render(e) => return render(e),
         Error::Eval(e) => return eval(e),
-        Error::Exists(_) => return (Kind::Exists, Some(OVERWRITE)),
+        Error::Exists(_) => return (Kind::Exists, Some(OVERWRITE.into())),
         Error::NoDisplay => {
             "a window needs X11 or Wayland (over ssh: `ssh -X`; without a display: `xvfb-run`); `lexisplat render` needs neither"
         }
@@ -119,7 +123,7 @@ fn view(error: &lexisplat_view::Error) -> Blame {
         Error::Device(_) => USE_CPU,
         _ => return (Kind::Unexpected, None),
     };
-    (Kind::Graphics, Some(advice))
+    (Kind::Graphics, Some(advice.into()))
 }
 
 fn eval(error: &lexisplat_eval::Error) -> Blame {
@@ -135,11 +139,18 @@ fn eval(error: &lexisplat_eval::Error) -> Blame {
 }
 
 fn codec(error: &lexisplat::Error) -> Blame {
-    use lexisplat::Error;
+    use lexisplat::{Error, FormatError};
     match error {
         Error::Io { source, .. } => io(source),
+        Error::Format { problem: FormatError::NotFinite { .. }, .. } => {
+            (Kind::Format, Some("--drop-invalid leaves such Gaussians out".into()))
+        }
         Error::Format { .. } => (Kind::Format, None),
         Error::Parameter { .. } => (Kind::Parameter, None),
+        Error::Limit { name: Some(name), .. } => {
+            let advice = format!("if you trust the file, raise the limit with --limit {name}=N");
+            (Kind::Limit, Some(advice.into()))
+        }
         Error::Limit { .. } => (Kind::Limit, None),
         _ => (Kind::Unexpected, None),
     }
@@ -151,12 +162,14 @@ fn render(error: &lexisplat_render::Error) -> Blame {
         Error::Io { source, .. } => io(source),
         Error::Format { .. } => (Kind::Format, None),
         Error::Parameter { name: "device", .. } => {
-            (Kind::Parameter, Some("`lexisplat devices` lists the devices"))
+            (Kind::Parameter, Some("`lexisplat devices` lists the devices".into()))
         }
         Error::Parameter { .. } => (Kind::Parameter, None),
         Error::Limit { .. } => (Kind::Limit, None),
-        Error::GpuLimit { .. } => (Kind::Limit, Some("--device cpu draws without the limits of a GPU")),
-        Error::Gpu { .. } => (Kind::Graphics, Some(USE_CPU)),
+        Error::GpuLimit { .. } => {
+            (Kind::Limit, Some("--device cpu draws without the limits of a GPU".into()))
+        }
+        Error::Gpu { .. } => (Kind::Graphics, Some(USE_CPU.into())),
         _ => (Kind::Unexpected, None),
     }
 }
@@ -165,7 +178,7 @@ fn render(error: &lexisplat_render::Error) -> Blame {
 fn io(source: &std::io::Error) -> Blame {
     let advice = match source.kind() {
         // An output that came into being after it was looked for.
-        ErrorKind::AlreadyExists => return (Kind::Exists, Some(OVERWRITE)),
+        ErrorKind::AlreadyExists => return (Kind::Exists, Some(OVERWRITE.into())),
         ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
             "free space there, or name an output on another disk with -o; temporary files lie beside the output, or in $TMPDIR if that is standard output"
         }
@@ -174,7 +187,7 @@ fn io(source: &std::io::Error) -> Blame {
         }
         _ => return (Kind::Io, None),
     };
-    (Kind::Io, Some(advice))
+    (Kind::Io, Some(advice.into()))
 }
 
 /// Reports `error`, as a JSON object on standard output or as text on standard error. Returns its exit code.
@@ -193,10 +206,8 @@ pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
         }
     }
     let message = message.replace('\n', " ");
-    let (kind, help) = match error.downcast_ref::<Misuse>() {
-        Some(misuse) => (Kind::Parameter, Some(misuse.help.as_str())),
-        None => classify(error),
-    };
+    let (kind, help) = classify(error);
+    let help = help.as_deref();
     if !json || print_json(&object(kind, &message, help)).is_err() {
         note(&format!("error: {message}"));
         if let Some(help) = help {

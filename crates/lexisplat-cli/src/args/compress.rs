@@ -90,8 +90,9 @@ pub(crate) struct Compress {
     /// faster and makes larger files of the same quality. The only target is then --preset.
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "prune"])]
     pub(crate) guess: bool,
-    /// Approximate memory that packing may take, such as 500MB. A larger scene is packed in parts, each drawn on
-    /// its own, and the only target is then --preset. Files of the other layouts do not depend on it.
+    /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
+    /// parts, each drawn on its own, and the only target is then --preset. Packing in parts takes up to 1.5 GiB,
+    /// however small BYTES is. Files of the other layouts do not depend on it.
     #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// The device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one) or a number from `lexisplat

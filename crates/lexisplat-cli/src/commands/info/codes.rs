@@ -109,7 +109,7 @@ pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) 
     } else {
         writeln!(out, "\nbytes")?;
         for (name, bytes) in lexi.attribute_bytes() {
-            let one = each(*bytes as f64, lexi);
+            let (name, one) = (text::escape(name), each(*bytes as f64, lexi));
             writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", text::bytes(*bytes))?;
         }
     }
@@ -138,6 +138,7 @@ fn packed_bytes(out: &mut String, lexi: &LexiChunks<'_>, streams: &[StreamBits])
                 parts.iter().map(part).collect::<Vec<_>>().join(", ")
             }
         };
+        let name = text::escape(&name);
         let line = format!("{name:<14} {size:>10} {:>16.2}   {parts}", each(8.0 * bytes, lexi));
         writeln!(out, "{}", line.trim_end())?;
     }

@@ -130,7 +130,7 @@ fn as_text(file: &File<'_>, lint: &Lint) -> Result<String> {
     }
     writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
     for a in &lint.attributes {
-        writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", a.name, a.min, a.mean, a.max)?;
+        writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", text::escape(&a.name), a.min, a.mean, a.max)?;
     }
     if like.degree.rest() > 0 {
         writeln!(out, "\nnorm of a Gaussian's SH without DC, mean {:.4}", lint.mean_rest_norm)?;
