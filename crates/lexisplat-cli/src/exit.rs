@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::terminal::{note, print_json};
@@ -51,8 +52,9 @@ pub(crate) struct Misuse {
     pub(crate) help: String,
 }
 
-/// Whose fault a failure is. The number is the exit code.
-#[derive(Debug, Clone, Copy)]
+/// Whose fault a failure is. The number is the exit code, and JSON has the name.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum Kind {
     Unexpected = 1,
     Usage,
@@ -62,22 +64,6 @@ enum Kind {
     Limit,
     Exists,
     Graphics,
-}
-
-impl Kind {
-    /// What JSON calls it.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Unexpected => "unexpected",
-            Self::Usage => "usage",
-            Self::Io => "io",
-            Self::Format => "format",
-            Self::Parameter => "parameter",
-            Self::Limit => "limit",
-            Self::Exists => "exists",
-            Self::Graphics => "graphics",
-        }
-    }
 }
 
 /// The kind of an error, and what to do about it.
@@ -238,7 +224,7 @@ pub(crate) fn report_usage(error: &clap::Error, json: bool) -> ExitCode {
 }
 
 fn object(kind: Kind, message: &str, help: Option<&str>) -> Value {
-    let mut error = json!({ "code": kind as u8, "kind": kind.name(), "message": message });
+    let mut error = json!({ "code": kind as u8, "kind": kind, "message": message });
     if let Some(help) = help {
         error["help"] = help.into();
     }
