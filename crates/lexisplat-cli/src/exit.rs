@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
+use serde::Serialize;
 use serde_json::{Value, json};
 
 use crate::terminal::{note, print_json};
@@ -51,8 +52,9 @@ pub(crate) struct Misuse {
     pub(crate) help: String,
 }
 
-/// Whose fault a failure is. The number is the exit code.
-#[derive(Debug, Clone, Copy)]
+/// Whose fault a failure is. The number is the exit code, and JSON has the name.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "lowercase")]
 enum Kind {
     Unexpected = 1,
     Usage,
@@ -64,28 +66,15 @@ enum Kind {
     Graphics,
 }
 
-impl Kind {
-    /// What JSON calls it.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Unexpected => "unexpected",
-            Self::Usage => "usage",
-            Self::Io => "io",
-            Self::Format => "format",
-            Self::Parameter => "parameter",
-            Self::Limit => "limit",
-            Self::Exists => "exists",
-            Self::Graphics => "graphics",
-        }
-    }
-}
-
 /// The kind of an error, and what to do about it.
 type Blame = (Kind, Option<Cow<'static, str>>);
 
 fn classify(error: &anyhow::Error) -> Blame {
     if error.is::<OutputExists>() {
         return (Kind::Exists, Some(OVERWRITE.into()));
+    }
+    if let Some(misuse) = error.downcast_ref::<Misuse>() {
+        return (Kind::Parameter, Some(misuse.help.clone().into()));
     }
     #[cfg(feature = "view")]
     if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
@@ -212,11 +201,9 @@ pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
         }
     }
     let message = message.replace('\n', " ");
-    let (kind, help) = match error.downcast_ref::<Misuse>() {
-        Some(misuse) => (Kind::Parameter, Some(misuse.help.as_str().into())),
-        None => classify(error),
-    };
-    if !json || print_json(&object(kind, &message, help.as_deref())).is_err() {
+    let (kind, help) = classify(error);
+    let help = help.as_deref();
+    if !json || print_json(&object(kind, &message, help)).is_err() {
         note(&format!("error: {message}"));
         if let Some(help) = help {
             note(&format!("help: {help}"));
@@ -246,7 +233,7 @@ pub(crate) fn report_usage(error: &clap::Error, json: bool) -> ExitCode {
 }
 
 fn object(kind: Kind, message: &str, help: Option<&str>) -> Value {
-    let mut error = json!({ "code": kind as u8, "kind": kind.name(), "message": message });
+    let mut error = json!({ "code": kind as u8, "kind": kind, "message": message });
     if let Some(help) = help {
         error["help"] = help.into();
     }

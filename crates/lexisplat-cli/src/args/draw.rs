@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat_render::gpu::ShPath;
 
-use super::Views;
 use super::values::{sh_path, whole};
+use super::views::Views;
 
 /// Draw a scene to PNG files. A .lexi is drawn straight from its sparse codes.
 #[derive(Debug, Args)]

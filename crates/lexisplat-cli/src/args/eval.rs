@@ -8,7 +8,7 @@ use lexisplat::{Layout, Pursuit};
 use lexisplat_sweep::Method;
 
 use super::values::{preset, whole};
-use super::{Photos, Views};
+use super::views::{Photos, Views};
 
 /// What to measure.
 #[derive(Debug, Args)]

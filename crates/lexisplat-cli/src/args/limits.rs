@@ -2,21 +2,21 @@
 
 use lexisplat::Limits;
 
-use super::Common;
 use super::values::size;
 
-impl Common {
-    /// Returns the most that files may ask for.
-    ///
-    /// # Errors
-    /// An unknown name, which the parser of the command line has refused already.
-    pub(crate) fn limits(&self) -> Result<Limits, lexisplat::Error> {
-        self.limits.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
-    }
+/// A limit that was given: its name and its value.
+pub(super) type Limit = (String, u64);
+
+/// Returns the default limits with those of `given` in their place.
+///
+/// # Errors
+/// An unknown name, which [`limit`] refuses too.
+pub(super) fn all(given: &[Limit]) -> Result<Limits, lexisplat::Error> {
+    given.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
 }
 
 /// Parses a limit: `NAME=N`, where N is a [`size`] or 0.
-pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
+pub(super) fn limit(text: &str) -> Result<Limit, String> {
     let (name, value) = text.split_once('=').ok_or("expected NAME=N, such as gaussians=1000000")?;
     let value = if value == "0" { 0 } else { size(value)? };
     Limits::default().with(name, value).map_err(|e| e.to_string())?;

@@ -9,7 +9,8 @@ mod views;
 
 use std::path::PathBuf;
 
-use clap::{ArgMatches, Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
+use lexisplat::Limits;
 
 pub(crate) use self::compress::{Compress, Decompress};
 #[cfg(feature = "view")]
@@ -17,7 +18,7 @@ pub(crate) use self::draw::View;
 pub(crate) use self::draw::{Bench, Compare, Render};
 pub(crate) use self::eval::{Eval, Measures, Sweep};
 use self::values::whole;
-pub(crate) use self::views::{Photos, Views};
+pub(crate) use self::views::Views;
 use crate::exit::AFTER_HELP;
 
 /// Compress trained 3D Gaussian Splatting scenes within an error bound; draw and compare them.
@@ -53,7 +54,17 @@ pub(crate) struct Common {
     /// `expansion`, the bytes in memory for each byte of a file (256), `header_bytes` (4MiB), and `properties` of one
     /// element of a PLY (4096).
     #[arg(long = "limit", global = true, value_name = "NAME=N", value_parser = limits::limit)]
-    limits: Vec<(String, u64)>,
+    limits: Vec<limits::Limit>,
+}
+
+impl Common {
+    /// Returns the most that files may ask for.
+    ///
+    /// # Errors
+    /// An unknown name, which the parser of the command line has refused already.
+    pub(crate) fn limits(&self) -> Result<Limits, lexisplat::Error> {
+        limits::all(&self.limits)
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -122,8 +133,7 @@ pub(crate) struct Completions {
 
 /// Parses the command line of this process.
 pub(crate) fn parse() -> Result<Cli, clap::Error> {
-    let matches: ArgMatches = command().try_get_matches()?;
-    Cli::from_arg_matches(&matches)
+    Cli::from_arg_matches(&command().try_get_matches()?)
 }
 
 /// Returns the definition of the command line.

@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::packed::Preset;
+use lexisplat_eval::{SceneKind, SplitFilter};
 use lexisplat_render::gpu::ShPath;
 
 /// What a size looks like, for messages.
@@ -19,6 +20,24 @@ pub(super) fn preset() -> impl TypedValueParser<Value = Preset> {
 /// Returns the parser of the name of a way to hold SH, which also lists the names in the help.
 pub(super) fn sh_path() -> impl TypedValueParser<Value = ShPath> {
     PossibleValuesParser::new(ShPath::ALL.map(ShPath::name)).try_map(|name| name.parse::<ShPath>())
+}
+
+/// Returns the parser of the place of generated views.
+pub(super) fn scene_kind() -> impl TypedValueParser<Value = SceneKind> {
+    PossibleValuesParser::new(["auto", "object", "room"]).map(|name| match name.as_str() {
+        "object" => SceneKind::Object,
+        "room" => SceneKind::Room,
+        _ => SceneKind::Auto,
+    })
+}
+
+/// Returns the parser of a split of cameras.
+pub(super) fn split() -> impl TypedValueParser<Value = SplitFilter> {
+    PossibleValuesParser::new(["all", "train", "test"]).map(|name| match name.as_str() {
+        "train" => SplitFilter::Train,
+        "test" => SplitFilter::Test,
+        _ => SplitFilter::All,
+    })
 }
 
 /// Returns the parser of a whole number within `range`. Its message gives the range, also for a negative number.

@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use lexisplat_eval::{SplitFilter, ViewOptions};
+use clap::Args;
+use lexisplat_eval::{SceneKind, SplitFilter, ViewOptions};
 use lexisplat_render::Device;
 
-use super::values::{colour, whole};
+use super::values::{colour, scene_kind, split, whole};
 
 /// Which cameras to draw from, and on what.
 #[derive(Debug, Args)]
@@ -17,14 +17,14 @@ pub(crate) struct Views {
     pub(crate) cameras: Option<PathBuf>,
     /// The cameras to use: all of them, or those of one split. If the file marks no split, --hold makes one
     /// [default: all; with photos, test].
-    #[arg(long, value_enum, requires = "cameras")]
-    pub(crate) split: Option<Split>,
+    #[arg(long, value_parser = split(), requires = "cameras")]
+    pub(crate) split: Option<SplitFilter>,
     /// Where the file marks no split, every N-th camera in order of names is a test camera, starting with the
     /// first; at least 1.
     #[arg(long, default_value_t = lexisplat_eval::DEFAULT_HOLD, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), requires = "cameras")]
     pub(crate) hold: usize,
     /// The place of generated views: around an `object`, or inside a `room`. `auto` decides by the scene.
-    #[arg(long, value_enum, default_value_t = SceneKind::Auto)]
+    #[arg(long, value_parser = scene_kind(), default_value = "auto")]
     pub(crate) scene: SceneKind,
     /// Number of generated views, 1 to 65535.
     #[arg(long, default_value_t = lexisplat_eval::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
@@ -60,54 +60,15 @@ impl Views {
         let mut options = ViewOptions::default();
         options.cameras.clone_from(&self.cameras);
         options.hold = self.hold;
-        options.kind = self.scene.into();
+        options.kind = self.scene;
         options.count = self.orbit;
         options.max_width = self.width;
         if let Some(photos) = photos {
             options.images.clone_from(&photos.images);
             options.resolution = photos.resolution;
         }
-        let with_photos = options.images.is_some();
-        options.split = match self.split {
-            Some(split) => split.into(),
-            None if with_photos => SplitFilter::Test,
-            None => SplitFilter::All,
-        };
+        let default = if options.images.is_some() { SplitFilter::Test } else { SplitFilter::All };
+        options.split = self.split.unwrap_or(default);
         options
-    }
-}
-
-/// Where generated views are.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum SceneKind {
-    Auto,
-    Object,
-    Room,
-}
-
-impl From<SceneKind> for lexisplat_eval::SceneKind {
-    fn from(kind: SceneKind) -> Self {
-        match kind {
-            SceneKind::Auto => Self::Auto,
-            SceneKind::Object => Self::Object,
-            SceneKind::Room => Self::Room,
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(crate) enum Split {
-    All,
-    Train,
-    Test,
-}
-
-impl From<Split> for SplitFilter {
-    fn from(split: Split) -> Self {
-        match split {
-            Split::All => Self::All,
-            Split::Train => Self::Train,
-            Split::Test => Self::Test,
-        }
     }
 }

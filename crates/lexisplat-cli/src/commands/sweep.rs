@@ -70,7 +70,7 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
         entry.cameras.clone_from(&args.views.cameras);
         entry.images.clone_from(&args.photos.images);
         entry.resolution = args.photos.resolution;
-        entry.split = args.views.split.map_or(SplitFilter::Test, Into::into);
+        entry.split = args.views.split.unwrap_or(SplitFilter::Test);
     }
     Ok(entries)
 }
@@ -92,7 +92,7 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.background = args.views.background;
     options.max_width = args.views.width;
     options.generated = args.views.orbit;
-    options.kind = args.views.scene.into();
+    options.kind = args.views.scene;
     options.hold = args.views.hold;
     options.device = args.views.device;
     options.pictures = args.pictures;

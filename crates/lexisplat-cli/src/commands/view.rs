@@ -11,7 +11,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
     let options = Options {
         files: args.files.clone(),
         cameras: views.cameras.clone(),
-        split: views.split.map_or(lexisplat_eval::SplitFilter::All, Into::into),
+        split: views.split.unwrap_or_default(),
         orbit: views.orbit,
         max_width: views.width,
         background: views.background,

@@ -114,7 +114,7 @@ impl<'a> LexiFacts<'a> {
             writeln!(out, "pictures: {}", target_line(target))?;
         }
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
-            writeln!(out, "measured on: {}", packed.device)?;
+            writeln!(out, "measured on: {}", text::escape(packed.device))?;
         }
         if *atoms > 0 {
             writeln!(out, "SH error: {}", error_line(self.record))?;
@@ -150,6 +150,7 @@ impl<'a> LexiFacts<'a> {
                 .map(|s| format!("{} {:.2}", s.name, self.each(s.bits)))
                 .collect();
             let streams = if streams.len() > 1 { streams.join(", ") } else { String::new() };
+            let name = text::escape(name);
             let line = format!("{name:<18} {size:>10} {:>16.2}   {streams}", self.each(8.0 * bytes));
             writeln!(out, "{}", line.trim_end())?;
         }

@@ -118,7 +118,7 @@ impl<'a> Facts<'a> {
         }
         writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
         for a in &self.statistics.attributes {
-            writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", a.name, a.min, a.mean, a.max)?;
+            writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", text::escape(&a.name), a.min, a.mean, a.max)?;
         }
         if self.sh_degree > 0 {
             let mean = self.statistics.mean_rest_norm;
