@@ -174,7 +174,7 @@ pub fn compare(
     if cameras.is_empty() {
         return Err(Error::parameter("cameras", "none", "at least one view"));
     }
-    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let drawing = RenderOptions::default().with_background(options.background);
     let (a, b) = (renderer.prepare(*a)?, renderer.prepare(*b)?);
     let mut views = Vec::with_capacity(cameras.len());
     for camera in cameras {

@@ -26,7 +26,7 @@ pub fn draw_views(
     options: &DrawOptions,
     on_view: &mut dyn FnMut(),
 ) -> Result<Vec<Image>> {
-    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let drawing = RenderOptions::default().with_background(options.background);
     let prepared = renderer.prepare(*scene)?;
     let mut draw = |camera| {
         let image = renderer.render(&prepared, camera, &drawing)?;

@@ -2,11 +2,8 @@
 
 use std::path::Path;
 
-/// Result with this crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
-
-/// A value, or what is wrong with it where the file is not known.
-pub(crate) type Checked<T> = std::result::Result<T, String>;
+/// Result with this crate's [`Error`]. Functions that do not know the file return a text instead.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Any failure of this crate. The variant tells whose fault it is.
 #[derive(Debug, thiserror::Error)]

@@ -26,7 +26,7 @@
 //!     meta: Default::default(),
 //! };
 //! for camera in orbit(&splats.geometry, 3, 64, 48) {
-//!     let image = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+//!     let image = render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap();
 //!     let [red, _, blue] = image.pixels[24 * 64 + 32];
 //!     assert!(red > 0.7 && red > blue);
 //! }
@@ -45,29 +45,38 @@ mod error;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod image;
+mod interior_views;
 mod object;
 mod orbit;
+mod parallel;
 mod radiance;
+mod read_views;
 mod renderer;
-mod room;
 mod scene;
-mod sight;
 mod surround;
 mod transforms;
+mod transmittance;
+mod view_files;
 mod view_set;
+#[cfg(any(feature = "gpu", not(target_family = "wasm")))]
+mod wait;
 
 pub use camera::{Camera, MAX_SIDE, Split};
-pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
-pub use colmap::{MAX_COLMAP_BYTES, read_colmap, read_colmap_binary, read_colmap_text};
+pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
+pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
 pub use cpu::{Drawn, RenderOptions, render, render_measured, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
+pub use interior_views::{interior_views, is_interior};
 pub use object::{object, subject};
 pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
+#[cfg(not(target_family = "wasm"))]
+pub use read_views::{read_cameras, read_colmap, read_nerf, read_transforms, read_views};
+pub use read_views::{read_view_files, read_views_bytes};
 pub use renderer::{Device, Prepared, Renderer};
-pub use room::{is_room, room};
 pub use scene::Scene;
 pub use surround::surround;
-pub use transforms::{read_nerf, read_transforms, read_transforms_bytes};
-pub use view_set::{SizeOf, ViewSet, read_views};
+pub use transforms::read_transforms_bytes;
+pub use view_files::{MAX_CAMERAS_BYTES, ReadSeek, ViewFile, ViewFiles};
+pub use view_set::{SizeOf, ViewSet};

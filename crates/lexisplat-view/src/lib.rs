@@ -26,7 +26,6 @@ mod painter;
 mod painting;
 mod panel;
 mod present;
-mod readback;
 mod script;
 mod stage;
 mod state;

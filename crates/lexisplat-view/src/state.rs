@@ -58,7 +58,7 @@ impl State {
             visited: false,
             eye: None,
             arrangement: Arrangement { mode: Mode::One(Which::First), split: 0.5, gain: GAIN },
-            options: RenderOptions { background, ..RenderOptions::default() },
+            options: RenderOptions::default().with_background(background),
             open: [false; 2],
             panel: true,
         }

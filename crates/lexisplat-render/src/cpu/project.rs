@@ -1,13 +1,13 @@
 //! From Gaussians in the world to ellipses on screen.
 
 use lexisplat::Geometry;
-use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::conventions::{
     ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, POWER_SLACK, QUATERNION_FLOOR, RADIUS_SIGMAS,
     TAN_LIMIT, W_EPSILON,
 };
+use crate::parallel::*;
 use crate::radiance::Radiance;
 
 use super::math::{exp, sigmoid};

@@ -1,10 +1,10 @@
 //! How much pictures change with every parameter of every Gaussian.
 
 use lexisplat::{Geometry, Progress, Sensitivity, Stage};
-use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::error::Result;
+use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
@@ -24,6 +24,8 @@ use super::{blend, order, tiles};
 /// # Errors
 /// [`Error::Codec`](crate::Error::Codec) if `progress` cancelled the work; otherwise as [`crate::render`].
 pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progress) -> Result<Sensitivity> {
+    scene.validate()?;
+    cameras.iter().try_for_each(Camera::validate)?;
     let mut total = Sensitivity::zeros(scene.len());
     progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {

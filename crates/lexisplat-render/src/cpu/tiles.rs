@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use rayon::prelude::*;
-
 use crate::conventions::TILE;
+use crate::parallel::*;
 
 use super::project::Visible;
 

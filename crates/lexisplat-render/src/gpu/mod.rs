@@ -15,6 +15,7 @@
 //! pictures whose lists are larger into bands, which look for their own Gaussians where those of the whole
 //! view are too many.
 
+mod buffer;
 mod columns;
 mod constants;
 mod device;
@@ -22,24 +23,29 @@ mod moments;
 mod path;
 mod plan;
 mod radiance;
+mod radiance_table;
+pub mod readback;
 mod renderer;
 mod scene;
 mod sensitivity;
+mod sh_data;
 mod shaders;
-mod source;
 mod speed;
-mod stamps;
-mod table;
 #[cfg(test)]
 mod tests;
+mod timestamps;
 mod uniforms;
 mod work;
 
 pub use wgpu;
 
-pub use device::{AdapterSummary, Gpu, GpuChoice, adapters, rank};
+#[cfg(not(target_family = "wasm"))]
+pub use device::adapters;
+pub use device::{AdapterSummary, Gpu, GpuChoice, adapters_async, rank};
 pub use path::ShPath;
-pub use plan::Stage;
+pub use plan::DrawStage;
 pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};
 pub use scene::{GpuScene, SceneBytes};
-pub use speed::{Speed, measure_speed};
+#[cfg(not(target_family = "wasm"))]
+pub use speed::measure_speed;
+pub use speed::{Speed, measure_speed_async};

@@ -4,8 +4,9 @@ use std::sync::{Arc, Weak};
 
 use crate::error::Result;
 
+use super::buffer::Buffer;
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::scene::GpuScene;
 use super::shaders::{Bound, Kernels, bind};
 use super::uniforms::{Band, Pass, Scan};
@@ -16,7 +17,7 @@ use crate::conventions::TILE;
 /// A part of drawing that is timed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Stage {
+pub enum DrawStage {
     /// Which Gaussians may be seen.
     Cull,
     /// Ellipses on screen.
@@ -31,7 +32,7 @@ pub enum Stage {
     Blend,
 }
 
-impl Stage {
+impl DrawStage {
     /// All, in the order they run.
     pub const ALL: [Self; 6] =
         [Self::Cull, Self::Project, Self::Radiance, Self::Sort, Self::Tiles, Self::Blend];
@@ -77,7 +78,7 @@ pub(super) struct Plan {
 
 /// Steps of one stage, in one compute pass.
 pub(super) struct StagePass {
-    pub(super) stage: Stage,
+    pub(super) stage: DrawStage,
     pub(super) steps: Vec<Step>,
 }
 
@@ -140,7 +141,8 @@ struct Planner<'a> {
 }
 
 impl Plan {
-    pub(super) fn new(
+    /// Plans pictures of `shape` of `scene`, drawn with the buffers in `work`.
+    pub(super) async fn new(
         gpu: &Gpu,
         kernels: &Kernels,
         scene: &GpuScene,
@@ -149,7 +151,7 @@ impl Plan {
     ) -> Result<Self> {
         let planner =
             Planner { gpu, kernels, work, uniforms: Vec::new(), steps: Vec::new(), passes: Vec::new() };
-        planner.plan(scene, shape)
+        gpu.checked("bindings", || planner.plan(scene, shape)).await
     }
 
     /// Whether its scene is still there.
@@ -195,12 +197,12 @@ impl Planner<'_> {
                 (4, all(&work.starts)),
                 (5, all(&band)),
             ];
-            self.step(&kernels.cull, &bound, Size::Groups(chunk.blocks))?;
+            self.step(&kernels.cull, &bound, Size::Groups(chunk.blocks));
         }
         self.scan(&work.starts, Counter::Found, Some(scene.blocks() + 1), None)?;
         let bound =
             [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
-        self.step(&kernels.compact, &bound, Size::Groups(scene.blocks()))?;
+        self.step(&kernels.compact, &bound, Size::Groups(scene.blocks()));
         let bound = [
             (0, all(&work.frame)),
             (1, all(&work.starts)),
@@ -208,8 +210,8 @@ impl Planner<'_> {
             (3, all(&work.counters)),
             (4, all(&work.dispatches)),
         ];
-        self.step(&kernels.plan_slots, &bound, Size::Groups(1))?;
-        self.end(Stage::Cull);
+        self.step(&kernels.plan_slots, &bound, Size::Groups(1));
+        self.end(DrawStage::Cull);
 
         for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
             let bound = [
@@ -225,9 +227,9 @@ impl Planner<'_> {
                 (9, all(&work.rects)),
             ];
             let size = Size::chunk(k);
-            self.step(&kernels.project, &bound, size)?;
+            self.step(&kernels.project, &bound, size);
         }
-        self.end(Stage::Project);
+        self.end(DrawStage::Project);
 
         for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
             let mut bound = vec![
@@ -241,9 +243,9 @@ impl Planner<'_> {
             bound.extend(chunk.sh.iter().zip(6..).map(|(buffer, binding)| (binding, all(buffer))));
             bound.extend(scene.table.iter().flat_map(|table| table.bound()));
             let size = Size::chunk(k);
-            self.step(&scene.radiance, &bound, size)?;
+            self.step(&scene.radiance, &bound, size);
         }
-        self.end(Stage::Radiance);
+        self.end(DrawStage::Radiance);
 
         let by_depth = self.sort(&Sorting {
             keys: work.slot_keys.each_ref(),
@@ -256,7 +258,7 @@ impl Planner<'_> {
             scan_groups: Dispatch::SlotDigits,
             identity: true,
         })?;
-        self.end(Stage::Sort);
+        self.end(DrawStage::Sort);
 
         self.uniforms.push(band);
         Ok(by_depth)
@@ -279,7 +281,7 @@ impl Planner<'_> {
                 (7, all(&work.offsets)),
             ]
         };
-        self.step(&kernels.count_tiles, &common(), Size::of(Dispatch::SlotsAndEnd))?;
+        self.step(&kernels.count_tiles, &common(), Size::of(Dispatch::SlotsAndEnd));
         self.scan(&work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))?;
         let bound = [
             (0, all(&work.frame)),
@@ -287,12 +289,12 @@ impl Planner<'_> {
             (4, all(&work.dispatches)),
             (5, all(&work.offsets)),
         ];
-        self.step(&kernels.plan_entries, &bound, Size::Groups(1))?;
+        self.step(&kernels.plan_entries, &bound, Size::Groups(1));
         let measuring = kernels.moments.as_ref().zip(work.moments.as_ref());
         let listed_slots = measuring.map_or(&work.entry_values[0], |(_, moments)| &moments.listed_slots);
         let lists = [(8, all(&work.entry_keys[0])), (9, all(listed_slots))];
         let bound: Vec<_> = common().into_iter().chain(lists).collect();
-        self.step(&kernels.list_tiles, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+        self.step(&kernels.list_tiles, &bound, Size::of(Dispatch::SlotsAndEnd));
         let by_tile = self.sort(&Sorting {
             keys: work.entry_keys.each_ref(),
             values: work.entry_values.each_ref(),
@@ -315,7 +317,7 @@ impl Planner<'_> {
                 (2, all(&moments.listed_slots)),
                 (3, all(entry_slots)),
             ];
-            self.step(&kernels.slots_of_entries, &bound, Size::of(Dispatch::Entries))?;
+            self.step(&kernels.slots_of_entries, &bound, Size::of(Dispatch::Entries));
         }
         let bound = [
             (0, all(&band)),
@@ -323,8 +325,8 @@ impl Planner<'_> {
             (2, all(&work.entry_keys[by_tile])),
             (3, all(&work.ranges)),
         ];
-        self.step(&kernels.find_ranges, &bound, Size::of(Dispatch::Entries))?;
-        self.end(Stage::Tiles);
+        self.step(&kernels.find_ranges, &bound, Size::of(Dispatch::Entries));
+        self.end(DrawStage::Tiles);
 
         let tile = u64::try_from(TILE).unwrap_or(u64::MAX);
         let line = u64::from(shape.width) * PIXEL;
@@ -344,12 +346,12 @@ impl Planner<'_> {
             ]
         };
         let bound: Vec<_> = tile().into_iter().chain([(7, pixels())]).collect();
-        self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
+        self.step(&kernels.blend, &bound, Size::Groups(tiles));
         if let Some((kernels, moments)) = measuring {
             let measured =
                 [(7, all(&work.entry_values[by_tile])), (8, pixels()), (9, all(&moments.of_entries))];
             let bound: Vec<_> = tile().into_iter().chain(measured).collect();
-            self.step(&kernels.tile_moments, &bound, Size::Groups(tiles))?;
+            self.step(&kernels.tile_moments, &bound, Size::Groups(tiles));
             let bound = [
                 (0, all(&work.frame)),
                 (1, all(&work.counters)),
@@ -358,25 +360,19 @@ impl Planner<'_> {
                 (4, all(&moments.of_entries)),
                 (5, all(&moments.of_slots)),
             ];
-            self.step(&kernels.gather_moments, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+            self.step(&kernels.gather_moments, &bound, Size::of(Dispatch::SlotsAndEnd));
         }
-        self.end(Stage::Blend);
+        self.end(DrawStage::Blend);
         self.uniforms.push(band);
         Ok(())
     }
 
-    fn step(
-        &mut self,
-        pipeline: &wgpu::ComputePipeline,
-        bound: &[(u32, Bound<'_>)],
-        size: Size,
-    ) -> Result<()> {
-        let bindings = bind(self.gpu, pipeline, bound)?;
+    fn step(&mut self, pipeline: &wgpu::ComputePipeline, bound: &[(u32, Bound<'_>)], size: Size) {
+        let bindings = bind(self.gpu, pipeline, bound);
         self.steps.push(Step { pipeline: pipeline.clone(), bindings, size });
-        Ok(())
     }
 
-    fn end(&mut self, stage: Stage) {
+    fn end(&mut self, stage: DrawStage) {
         self.passes.push(StagePass { stage, steps: std::mem::take(&mut self.steps) });
     }
 
@@ -396,10 +392,10 @@ impl Planner<'_> {
             Some(dispatch) => Size::of(dispatch),
             None => Size::Groups(fixed.unwrap_or(0).div_ceil(SCAN_BLOCK)),
         };
-        self.step(&kernels.scan_reduce, &bound(), size())?;
+        self.step(&kernels.scan_reduce, &bound(), size());
         let spine = [(0, all(&uniform)), (1, all(&work.counters)), (3, all(&work.sums))];
-        self.step(&kernels.scan_spine, &spine, Size::Groups(1))?;
-        self.step(&kernels.scan_spread, &bound(), size())?;
+        self.step(&kernels.scan_spine, &spine, Size::Groups(1));
+        self.step(&kernels.scan_spread, &bound(), size());
         self.uniforms.push(uniform);
         Ok(())
     }
@@ -425,12 +421,12 @@ impl Planner<'_> {
                     (3, all(&work.histogram)),
                 ]
             };
-            self.step(&kernels.sort_count, &common(), Size::of(sorting.groups))?;
+            self.step(&kernels.sort_count, &common(), Size::of(sorting.groups));
             self.scan(&work.histogram, sorting.digits, None, Some(sorting.scan_groups))?;
             let moved =
                 [(4, all(sorting.values[from])), (5, all(sorting.keys[to])), (6, all(sorting.values[to]))];
             let bound: Vec<_> = common().into_iter().chain(moved).collect();
-            self.step(&kernels.sort_scatter, &bound, Size::of(sorting.groups))?;
+            self.step(&kernels.sort_scatter, &bound, Size::of(sorting.groups));
             self.uniforms.push(uniform);
         }
         Ok((passes % 2) as usize)

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 /// What is the same for a whole picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Frame {
+pub(super) struct FrameUniform {
     pub(super) right: [f32; 3],
     pub(super) degree: u32,
     pub(super) down: [f32; 3],
@@ -30,7 +30,7 @@ pub(super) struct Frame {
 /// A part of the scene that fits in one binding.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Chunk {
+pub(super) struct ChunkUniform {
     pub(super) first: u32,
     pub(super) count: u32,
     pub(super) first_block: u32,

@@ -6,8 +6,9 @@ use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };
 
-use crate::cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES};
-use crate::error::Checked;
+use crate::cameras_json::MAX_CAMERAS;
+use crate::error::Result;
+use crate::view_files::MAX_CAMERAS_BYTES;
 
 /// Most rows of a matrix, and most entries of a list of distortion parameters.
 const MAX_ROWS: usize = 4;
@@ -75,16 +76,16 @@ impl Lens {
     }
 
     /// Focal length along x for pictures `width` pixels wide.
-    pub(super) fn focal_x(&self, width: u32) -> Checked<Option<f64>> {
+    pub(super) fn focal_x(&self, width: u32) -> Result<Option<f64>, String> {
         self.focal(0, width)
     }
 
     /// Focal length along y for pictures `height` pixels high.
-    pub(super) fn focal_y(&self, height: u32) -> Checked<Option<f64>> {
+    pub(super) fn focal_y(&self, height: u32) -> Result<Option<f64>, String> {
         self.focal(1, height)
     }
 
-    fn focal(&self, axis: usize, side: u32) -> Checked<Option<f64>> {
+    fn focal(&self, axis: usize, side: u32) -> Result<Option<f64>, String> {
         if self.fl[axis].is_some() {
             return Ok(self.fl[axis]);
         }
@@ -117,7 +118,7 @@ pub(super) struct Transforms {
 }
 
 impl Transforms {
-    pub(super) fn parse(bytes: &[u8]) -> Checked<Self> {
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         if u64::try_from(bytes.len()).is_ok_and(|len| len > MAX_CAMERAS_BYTES) {
             return Err(format!("over the limit of {MAX_CAMERAS_BYTES} bytes"));
         }

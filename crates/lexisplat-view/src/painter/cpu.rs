@@ -33,11 +33,10 @@ impl Painter for Cpu {
     }
 
     fn paint(&mut self, which: Which, camera: &Camera, options: &RenderOptions) -> Result<Painted> {
-        camera.validate()?;
         let Some(model) = &self.models[which.index()] else {
             return Err(Error::Device(format!("no {which:?} model to draw")));
         };
-        let drawn = render_measured(&model.scene.scene(), camera, options);
+        let drawn = render_measured(&model.scene.scene(), camera, options)?;
         let image = drawn.image;
         let padded: Vec<[f32; 4]> = image.pixels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&padded);

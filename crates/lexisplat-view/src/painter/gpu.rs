@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions};
 
-use super::{PIXEL, Painted, Painter};
+use super::{Painted, Painter};
 use crate::command::Which;
 use crate::error::{Error, Result};
 use crate::models::Open;
@@ -48,7 +48,7 @@ impl Painter for OnGpu {
         };
         let frame = self.renderer.draw(scene, camera, options)?;
         // The renderer's own is drawn over by the next picture.
-        let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL as u64;
+        let size = u64::from(frame.width) * u64::from(frame.height) * size_of::<[f32; 4]>() as u64;
         let device = self.gpu.device();
         let pixels = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("picture"),

@@ -2,18 +2,18 @@
 
 use std::ops::Range;
 
+use crate::conventions::ALPHA_MIN;
+use crate::error::{Error, Result};
+use crate::parallel::*;
+use crate::scene::Scene;
 use half::f16;
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Geometry, Model};
-use rayon::prelude::*;
 
-use crate::conventions::ALPHA_MIN;
-use crate::error::{Error, Result};
-use crate::scene::Scene;
-
+use super::buffer::Buffer;
 use super::columns::{escapes_in, group_words};
 use super::constants::{COLUMN_GROUP, GROUP, vectors};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 
 /// Log scales below this, whose exponential is no normal number, count as this.
 const LEAST_SCALE: f32 = -87.0;
@@ -25,12 +25,12 @@ const LOGIT_SLACK: f32 = 0.01;
 const MOST_SIGMA: f32 = 1e30;
 
 /// Where SH comes from.
-pub(super) enum Source<'a> {
+pub(super) enum ShData<'a> {
     Dense { scene: &'a Scene<'a>, half: bool },
     Codes(&'a Model),
 }
 
-impl Source<'_> {
+impl ShData<'_> {
     /// Whether the SH-rest of Gaussian `i` is finite. Codes always are.
     pub(super) fn finite(&self, i: usize) -> bool {
         match self {
@@ -126,12 +126,17 @@ pub(super) fn shape(geometry: &Geometry, i: usize) -> [f32; 8] {
 }
 
 /// Dense rows of a run of Gaussians: coefficients in order, DC first, three channels side by side.
-pub(super) fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half: bool) -> Result<Buffer> {
+pub(super) async fn dense_rows(
+    gpu: &Gpu,
+    scene: &Scene<'_>,
+    range: Range<usize>,
+    half: bool,
+) -> Result<Buffer> {
     let per_channel = scene.degree().rest_per_channel();
     let dim = scene.degree().rest();
     let row_len = 4 * vectors(per_channel + 1);
     let mut rows = vec![0.0_f32; range.len() * row_len];
-    rows.par_chunks_exact_mut(row_len).zip(range).for_each(|(row, i)| {
+    rows.par_chunks_mut(row_len).zip(range).for_each(|(row, i)| {
         row[..CHANNELS].copy_from_slice(&scene.geometry().dc[i]);
         let mut decoded;
         let rest = match scene {
@@ -145,12 +150,10 @@ pub(super) fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half
         interleave(rest, per_channel, &mut row[CHANNELS..]);
     });
     if half {
-        let halves: Vec<f16> = rows.par_iter().map(|&v| f16::from_f32(v)).collect();
-        let bits: &[u16] =
-            bytemuck::cast_slice(half::slice::HalfFloatSliceExt::reinterpret_cast(&halves[..]));
-        return gpu.upload("dense rows", bits);
+        let bits: Vec<u16> = rows.par_iter().map(|&v| f16::from_f32(v).to_bits()).collect();
+        return gpu.upload("dense rows", &bits).await;
     }
-    gpu.upload("dense rows", &rows)
+    gpu.upload("dense rows", &rows).await
 }
 
 /// A channel-major row with the channels of each coefficient side by side.

@@ -2,9 +2,9 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use lexisplat::Geometry;
-use rayon::prelude::*;
 
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN};
+use crate::parallel::*;
 
 /// Gaussians in one unit of work. Sums over units are added in their order, so that the result does not
 /// depend on the number of threads.

@@ -7,13 +7,13 @@ use crate::cameras_json::{MAX_CAMERAS, MAX_NAME};
 use crate::error::{Error, Result};
 
 /// Little-endian values of a reader of known length.
-pub(super) struct Source<'a, R> {
+pub(super) struct BinaryReader<'a, R> {
     file: &'a str,
     reader: R,
     left: u64,
 }
 
-impl<'a, R: BufRead + Seek> Source<'a, R> {
+impl<'a, R: BufRead + Seek> BinaryReader<'a, R> {
     pub(super) fn new(file: &'a str, reader: R, len: u64) -> Self {
         Self { file, reader, left: len }
     }

@@ -7,8 +7,8 @@ use crate::camera::Camera;
 use crate::conventions::NEAR_Z;
 use crate::object::{object, subject};
 use crate::orbit::{TRIM, UP, bulk, middle, opacity_weights, single};
-use crate::sight::{Ray, transmittances};
 use crate::surround::{PLASTIC, detail};
+use crate::transmittance::{Ray, transmittances};
 
 /// Views of the orbit that are tried.
 const TRIED_VIEWS: usize = 8;
@@ -53,9 +53,9 @@ const FIELD_OF_VIEW: f64 = 60.0;
 const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
 
 /// Whether `geometry` is a scene to look at from inside: [`object`]'s cameras see next to none of its detail,
-/// as walls are in the way, and [`room`]'s places most of it.
+/// as walls are in the way, and [`interior_views`]'s places most of it.
 #[must_use]
-pub fn is_room(geometry: &Geometry) -> bool {
+pub fn is_interior(geometry: &Geometry) -> bool {
     let targets = targets(geometry);
     let around: Vec<DVec3> = object(geometry, TRIED_VIEWS, 1, 1)
         .iter()
@@ -102,7 +102,7 @@ fn targets(geometry: &Geometry) -> Vec<DVec3> {
 /// middle of its bulk that have little before them, named `room_000` and so on; the same for the same
 /// input. World y is taken to point down, as for [`crate::orbit`].
 #[must_use]
-pub fn room(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
     let focal = single(f64::from(width.min(height)) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians()));
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
@@ -241,23 +241,23 @@ mod tests {
 
     #[test]
     fn rooms_are_told_from_objects() {
-        assert!(!is_room(&still_life()));
-        assert!(is_room(&hollow_box()));
+        assert!(!is_interior(&still_life()));
+        assert!(is_interior(&hollow_box()));
         // Coarse models of objects hide themselves, from within as well.
         for gaussians in [100, 300, 1500, 6000] {
             let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(gaussians, 0));
-            assert!(!is_room(&splats.geometry), "{gaussians}");
+            assert!(!is_interior(&splats.geometry), "{gaussians}");
         }
         // Without walls and ceiling in the way, furniture is looked at from outside.
         let mut open = hollow_box();
         open.opacities[..4000].fill(-4.0);
-        assert!(!is_room(&open));
+        assert!(!is_interior(&open));
     }
 
     #[test]
     fn views_of_a_room_are_inside_upright_and_all_around() {
         let g = hollow_box();
-        let cameras = room(&g, 12, 320, 200);
+        let cameras = interior_views(&g, 12, 320, 200);
         assert_eq!(cameras.len(), 12);
         assert_eq!(cameras[7].name, "room_007");
         let mut sum = DVec3::ZERO;
@@ -281,8 +281,8 @@ mod tests {
         places.sort_by(|a, b| a[0].total_cmp(&b[0]));
         places.dedup();
         assert!(places.len() > 1, "from more than one place");
-        assert_eq!(cameras, room(&g, 12, 320, 200));
-        assert!(room(&g, 0, 10, 10).is_empty());
+        assert_eq!(cameras, interior_views(&g, 12, 320, 200));
+        assert!(interior_views(&g, 0, 10, 10).is_empty());
     }
 
     #[test]
@@ -299,8 +299,8 @@ mod tests {
         put(&mut huge, [-3e38; 3], 1e30, 9.0);
         put(&mut huge, [3e38; 3], 1e-30, 9.0);
         for geometry in [Geometry::default(), one, broken, equal, huge] {
-            let _ = is_room(&geometry);
-            for camera in room(&geometry, 3, 0, 10) {
+            let _ = is_interior(&geometry);
+            for camera in interior_views(&geometry, 3, 0, 10) {
                 camera.validate().unwrap();
             }
         }
