@@ -8,6 +8,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess
 
 use crate::camera::{Camera, Split};
 use crate::error::{Error, Result};
+use crate::orbit::single;
 use crate::view_files::MAX_CAMERAS_BYTES;
 
 /// Most cameras in a file.
@@ -15,7 +16,7 @@ pub const MAX_CAMERAS: usize = 100_000;
 /// Longest name of a camera, in bytes.
 pub(crate) const MAX_NAME: usize = 1024;
 
-/// The cameras in `bytes`, in order; `file` names them in errors.
+/// Returns the cameras in `bytes`, in order. `file` names them in errors.
 ///
 /// # Errors
 /// [`Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
@@ -131,19 +132,11 @@ impl<'de> Visitor<'de> for CameraAt {
     }
 }
 
-/// `value` as a whole number, if it is one; some writers print `400.0`.
+/// Returns `value` as a whole number, if it is one. Some writers print `400.0`.
 pub(crate) fn whole(value: f64) -> Option<u32> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "compared with the original")]
     let integer = value as u32;
     (f64::from(integer) == value).then_some(integer)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "rounding is meant; what overflows is refused as infinite"
-)]
-fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

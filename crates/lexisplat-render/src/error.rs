@@ -1,4 +1,4 @@
-//! What can go wrong, split by who is to blame.
+//! Errors, split by whose fault they are.
 
 use std::path::Path;
 
@@ -40,7 +40,7 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// A file has more than a limit allows. The text names what, how much, and the limit.
+    /// A file has more of something than a limit allows.
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
         /// What there is too much of.
@@ -50,7 +50,7 @@ pub enum Error {
         /// The most allowed.
         limit: u64,
     },
-    /// More than this GPU holds. The CPU renderer has no such limit.
+    /// Something is larger than this GPU can hold. The CPU renderer has no such limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     GpuLimit {
         /// What there is too much of.
@@ -60,10 +60,10 @@ pub enum Error {
         /// The most that the GPU takes.
         limit: u64,
     },
-    /// The GPU or its driver refused, or there is none. The CPU renderer needs neither.
+    /// There is no GPU, or it or its driver refused something. The CPU renderer needs neither.
     #[error("{problem}")]
     Gpu {
-        /// What it said.
+        /// What the driver said, or what is missing.
         problem: String,
     },
 }

@@ -1,12 +1,15 @@
 //! Cameras and rasterisers that draw 3D Gaussian Splatting scenes.
 //!
-//! A [`Scene`] is a trained model with dense SH or a compressed one; [`render`] draws either through
-//! the same [`Radiance`] interface, the compressed one straight from its sparse codes. The rules are
-//! those of the 3DGS authors' rasteriser, number by number: see [`conventions`].
+//! A [`Scene`] is a trained model with dense SH, or a compressed one. [`render`] draws either through the same
+//! [`Radiance`] interface, and the compressed one straight from its sparse codes. The rules and numbers are those
+//! of the 3DGS authors' rasteriser: see [`conventions`].
 //!
-//! [`render`] draws on the processor, the same bits on every machine. With the feature `gpu` (on by default)
-//! the module `gpu` draws the same pictures through Vulkan, Metal or DX12; [`Renderer`] is one interface to
-//! both.
+//! [`render`] draws on the processor, with the same bits on every machine. With the feature `gpu` (on by default)
+//! the module `gpu` draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. [`Renderer`] is
+//! one interface to both. Its methods that may wait for a GPU are async, with twins that block outside of
+//! browsers.
+//!
+//! Without the feature `parallel` (on by default) everything runs on the calling thread.
 //!
 //! ```
 //! use lexisplat::{Geometry, ShDegree, Splats};
@@ -32,7 +35,7 @@
 //! }
 //! ```
 
-// Tests in here share helpers with those beside the crate, which know it by its name.
+// Tests in here share helpers with those in `tests/`, which use the crate by its name.
 #[cfg(all(test, feature = "gpu"))]
 extern crate self as lexisplat_render;
 

@@ -1,4 +1,4 @@
-//! One interface to drawing on the processor and on a GPU.
+//! One interface for drawing on the processor and on a GPU.
 
 use std::str::FromStr;
 
@@ -14,15 +14,15 @@ use crate::scene::Scene;
 #[cfg(not(target_family = "wasm"))]
 use crate::wait::block_on;
 
-/// What to draw on.
+/// The device to draw on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
-    /// The best GPU that is not software, or else the processor.
+    /// The best GPU that is not software; the processor if there is none.
     #[default]
     Auto,
-    /// The processor: the same bits on every machine.
+    /// The processor, which gives the same bits on every machine.
     Cpu,
-    /// The best GPU, software such as lavapipe if there is nothing else.
+    /// The best GPU, or software such as lavapipe if there is nothing else.
     Gpu,
     /// The GPU at this place in `gpu::adapters`.
     Index(usize),
@@ -68,7 +68,7 @@ impl FromStr for Device {
     }
 }
 
-/// Draws scenes on what it was opened for.
+/// Draws scenes on the device that it was opened for.
 #[derive(Debug)]
 pub struct Renderer {
     #[cfg(feature = "gpu")]
@@ -88,7 +88,7 @@ pub struct Prepared<'a> {
 const CPU: &str = "cpu";
 
 impl Renderer {
-    /// Draws on the processor.
+    /// Makes a renderer that draws on the processor.
     #[must_use]
     pub fn cpu() -> Self {
         Self {
@@ -153,7 +153,7 @@ impl Renderer {
         gpu.block_on(Self::on_async(gpu))
     }
 
-    /// What it draws on: `cpu`, or the GPU's name.
+    /// The name of what it draws on: `cpu`, or that of the GPU.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name

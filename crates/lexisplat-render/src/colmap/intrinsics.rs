@@ -1,4 +1,4 @@
-//! What a COLMAP camera is: size, model and parameters.
+//! A COLMAP camera: size, model and parameters.
 
 use std::collections::BTreeMap;
 
@@ -34,7 +34,7 @@ pub(super) enum Pinhole {
 }
 
 impl Pinhole {
-    /// The model of this name, or what to do about another one.
+    /// Returns the model of this name. The error for another model says what to do.
     pub(super) fn named(name: &str) -> Result<Self, String> {
         match name {
             "SIMPLE_PINHOLE" => Ok(Self::Simple),
@@ -45,7 +45,7 @@ impl Pinhole {
         }
     }
 
-    /// The model of this number in binary files.
+    /// Returns the model of this number in binary files.
     pub(super) fn numbered(number: u32) -> Result<Self, String> {
         let name = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
         name.map_or_else(|| Self::named(&format!("number {number}")), |name| Self::named(name))

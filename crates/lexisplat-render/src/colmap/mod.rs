@@ -1,9 +1,9 @@
 //! Reads COLMAP models: `cameras.bin` and `images.bin`, or the same as text.
 //!
-//! Only `PINHOLE` and `SIMPLE_PINHOLE` are cameras that the rasteriser can draw from; COLMAP's
-//! `image_undistorter` makes such ones. Points are never read. The principal point is ignored as the
-//! 3DGS authors' loader does (`gaussian-splatting/scene/dataset_readers.py`, `readColmapCameras`), so
-//! that models trained with it are drawn as they were trained; see [`ViewSet::warnings`].
+//! The rasteriser can draw only from the cameras `PINHOLE` and `SIMPLE_PINHOLE`; COLMAP's `image_undistorter`
+//! makes such ones. Points are never read. The principal point is ignored, as the 3DGS authors' loader does
+//! (`gaussian-splatting/scene/dataset_readers.py`, `readColmapCameras`). Models trained with that loader are so
+//! drawn as they were trained; see [`ViewSet::warnings`].
 //!
 //! Formats: COLMAP's documentation, "Output Format", and `src/colmap/scene/reconstruction_io.cc`.
 

@@ -19,14 +19,14 @@ pub(super) struct Posed {
 }
 
 impl Posed {
-    /// The image as a camera with `intrinsics`.
+    /// Returns the image as a camera with `intrinsics`.
     pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Result<Camera, String> {
         let [w, x, y, z] = self.quaternion;
         let quaternion = DQuat::from_xyzw(x, y, z, w);
         let squares = quaternion.length_squared();
         if !(squares.is_normal() && DVec3::from_array(self.translation).is_finite()) {
             return Err(format!(
-                "its pose is no pose: quaternion {:?}, translation {:?}",
+                "not a pose: quaternion {:?}, translation {:?}",
                 self.quaternion, self.translation
             ));
         }

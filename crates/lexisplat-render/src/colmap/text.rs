@@ -35,7 +35,7 @@ pub(super) fn cameras<R: BufRead>(mut lines: Lines<'_, R>) -> Result<Cameras> {
 fn camera(line: &str) -> Result<(u32, Intrinsics), String> {
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let [number, model, width, height, parameters @ ..] = words.as_slice() else {
-        return Err("no camera: expected number, model, width, height and parameters".into());
+        return Err("not a camera: expected number, model, width, height and parameters".into());
     };
     let number: u32 = parsed("number of the camera", number)?;
     let about = |problem: String| format!("camera {number}: {problem}");
@@ -93,9 +93,9 @@ fn image(line: &str) -> Result<Posed, String> {
     let mut rest = line;
     let mut words = [""; WORDS_BEFORE_NAME];
     for word in &mut words {
-        let (next, after) = rest
-            .split_once(|c: char| c.is_ascii_whitespace())
-            .ok_or_else(|| "no image: expected number, rotation, translation, camera and name".to_owned())?;
+        let (next, after) = rest.split_once(|c: char| c.is_ascii_whitespace()).ok_or_else(|| {
+            "not an image: expected number, rotation, translation, camera and name".to_owned()
+        })?;
         (*word, rest) = (next, after.trim_ascii_start());
     }
     let [number, qw, qx, qy, qz, tx, ty, tz, camera] = words;
@@ -114,5 +114,5 @@ fn image(line: &str) -> Result<Posed, String> {
 }
 
 fn parsed<T: std::str::FromStr>(what: &str, word: &str) -> Result<T, String> {
-    word.parse().map_err(|_| format!("{what} is '{word}', which is no such number"))
+    word.parse().map_err(|_| format!("{what} is '{word}', which is not a number of this kind"))
 }

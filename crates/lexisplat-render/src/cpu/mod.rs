@@ -1,11 +1,12 @@
 //! The reference rasteriser: 3DGS's rules on the processor.
 //!
 //! `project` turns Gaussians into ellipses on screen, `order` sorts them by depth, `tiles` lists for
-//! every tile what may touch it, and `blend` draws the tiles. Every step works in parallel on pieces
-//! whose borders and order do not depend on the number of threads, and uses only operations that round
-//! the same everywhere, so a picture is the same bit for bit on any machine.
+//! every tile the splats that may touch it, and `blend` draws the tiles. Every step works in parallel on pieces
+//! whose borders and order do not depend on the number of threads. It uses only operations that round the same
+//! everywhere. A picture therefore has the same bits on any machine.
 
 mod blend;
+mod grid;
 mod math;
 mod moments;
 mod order;

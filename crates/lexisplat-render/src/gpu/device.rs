@@ -147,15 +147,6 @@ impl Gpu {
         pollster::block_on(Self::open_async(choice))
     }
 
-    /// Blocks on [`Self::find_async`].
-    ///
-    /// # Errors
-    /// As [`Self::find_async`].
-    #[cfg(not(target_family = "wasm"))]
-    pub fn find(choice: GpuChoice) -> Result<Option<Self>> {
-        pollster::block_on(Self::find_async(choice))
-    }
-
     /// [`Self::find_async`] that asks the device for what `reduce` leaves of the limits.
     pub(super) async fn find_with(
         choice: GpuChoice,

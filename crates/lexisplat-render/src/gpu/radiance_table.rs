@@ -1,8 +1,9 @@
-//! Each atom's radiance over directions, so that a nonzero costs one filtered lookup instead of a dot
-//! product: the dictionary is small, fixed and shared by all Gaussians.
+//! A table of each atom's radiance over directions. With it, a nonzero costs one filtered lookup instead of a
+//! dot product. The dictionary is small, fixed and shared by all Gaussians.
 //!
-//! The table is a cube of [`TABLE_SIDE`]² texels a face in half precision, sampled bilinearly. The outer
-//! texels' centres lie on the faces' edges, so a sample never mixes faces and the whole is continuous.
+//! The table is a cube with [`TABLE_SIDE`]² texels on each face, in half precision, sampled bilinearly. The
+//! centres of the outer texels lie on the edges of the faces. A sample so never mixes two faces, and the whole
+//! is continuous.
 
 use half::f16;
 use lexisplat::Dictionary;
@@ -82,7 +83,7 @@ impl RadianceTable {
         self.bytes.size()
     }
 
-    /// What radiance is given after the buffers.
+    /// What is bound to the radiance kernel after the buffers.
     pub(super) fn bound(&self) -> [(u32, Bound<'_>); 2] {
         [(10, Bound::Texture(&self.view)), (11, Bound::Sampler(&self.sampler))]
     }
@@ -103,7 +104,7 @@ fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
     d.map(|v| v / length)
 }
 
-/// RGBA texels of all layers, one layer an atom, rows of six faces.
+/// Returns the RGBA texels of all layers. Each layer is of one atom, and its rows span the six faces.
 fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
     let degree = dictionary.degree();
     let per_channel = degree.rest_per_channel();
@@ -130,7 +131,7 @@ fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
         .concat()
 }
 
-/// The kernel's lookup, for tests: the atoms' radiance towards `d` by the table.
+/// Returns an atom's radiance towards `d` by the table, looked up as the kernel does.
 #[cfg(test)]
 pub(super) fn sample(texels: &[[f16; 4]], atom: usize, d: [f32; 3]) -> [f32; 3] {
     let size = d.map(f32::abs);

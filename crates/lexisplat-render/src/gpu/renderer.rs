@@ -1,4 +1,4 @@
-//! Drawing a scene.
+//! Draws scenes on the GPU, and draws again with larger buffers where a view needs them.
 
 use std::collections::HashMap;
 
@@ -20,17 +20,17 @@ use super::timestamps::Timestamps;
 use super::uniforms::FrameUniform;
 use super::work::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT, Work};
 
-/// Slots and entries there is room for at first.
+/// Slots and entries that the first buffers hold.
 const FIRST_ROOM: u32 = 1 << 18;
-/// Room is made for this share more than was missing, so that moving a little costs no second try.
+/// New buffers hold this many times what a view needed, so that moving the camera a little needs no others.
 const SPARE: f64 = 1.125;
-/// Most entries in the tiles' lists at once, unless one row of tiles needs more: 1 GiB of lists.
+/// Most entries in the tiles' lists at once: 1 GiB of lists.
 const MAX_ENTRIES: u64 = 1 << 26;
-/// Passes timed at most; a view drawn in more bands than that is timed no further.
+/// Most passes that are timed. The passes of a view in many bands beyond these are not.
 const MAX_TIMED: u32 = 1024;
-/// Plans kept: two scenes in turn, from cameras whose depths need a bit more or less.
+/// Plans kept. They serve two scenes in turn, from cameras whose depths need one bit more or less.
 const MAX_PLANS: usize = 4;
-/// Cuts remembered before all are forgotten.
+/// Most cuts remembered. One more, and all are forgotten.
 const MAX_CUTS: usize = 64;
 
 /// A drawn picture, still on the GPU.
@@ -44,41 +44,41 @@ pub struct Frame {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// What it took.
+    /// Measurements of drawing it.
     pub stats: FrameStats,
 }
 
 /// Milliseconds of each stage.
 pub type StageTimes = Vec<(DrawStage, f64)>;
 
-/// What a picture took.
+/// Measurements of drawing a picture.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FrameStats {
-    /// Gaussians that passed the coarse test and were projected and shaded; those of the fullest band where
-    /// bands had to look for their own.
+    /// Gaussians that passed the coarse test and were projected and coloured. Where bands looked for their own,
+    /// those of the fullest band.
     pub visible: u32,
-    /// Pairs of a Gaussian and a tile it may touch.
+    /// Pairs of a Gaussian and a tile that it may touch.
     pub entries: u32,
-    /// Runs of rows of tiles it was drawn in: more than one where the lists do not fit at once.
+    /// Bands of rows of tiles that it was drawn in. There is more than one where the lists do not fit at once.
     pub bands: u32,
-    /// How often it was tried again with more room. Not 0 only where a view is fuller than all before.
+    /// How often it was drawn again with larger buffers. Above 0 only where a view is fuller than all before.
     pub retries: u32,
-    /// Milliseconds on the GPU of each stage; empty where time stamps are not to be had.
+    /// Milliseconds of each stage on the GPU; empty where the GPU has no timestamps.
     pub stages: StageTimes,
     /// Milliseconds from the first stage's start to the last one's end.
     pub total: Option<f64>,
 }
 
-/// Draws scenes on one GPU, keeping its buffers from picture to picture.
+/// Draws scenes on one GPU. Keeps its buffers from picture to picture.
 pub struct GpuRenderer {
     pub(super) gpu: Gpu,
     pub(super) kernels: Kernels,
     pub(super) work: Option<Work>,
-    /// Of the last scenes and sizes, the latest last.
+    /// The plans of the last scenes and sizes, the latest last.
     pub(super) plans: Vec<Plan>,
     pub(super) timestamps: Option<Timestamps>,
-    /// How scenes' pictures of a size are cut, once they were found not to fit as they are.
+    /// The cuts of pictures that were found not to fit at once.
     pub(super) cuts: HashMap<PictureKey, Cut>,
     pub(super) limits: CapacityLimits,
 }
@@ -89,7 +89,7 @@ impl std::fmt::Debug for GpuRenderer {
     }
 }
 
-/// A scene, by its number, and a picture's width and height.
+/// The number of a scene, and the width and height of a picture of it.
 pub(super) type PictureKey = (u64, u32, u32);
 
 /// How a picture is cut into bands.
@@ -97,11 +97,11 @@ pub(super) type PictureKey = (u64, u32, u32);
 pub(super) struct Cut {
     /// Rows of tiles drawn at once.
     rows: u32,
-    /// Whether bands look for their own Gaussians.
+    /// Whether each band looks for its own Gaussians.
     see: bool,
 }
 
-/// Largest arrays.
+/// The largest arrays that a kernel can work on.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CapacityLimits {
     pub(super) slots: u64,
@@ -142,7 +142,7 @@ impl GpuRenderer {
         })
     }
 
-    /// The same with smaller arrays than the GPU allows.
+    /// This renderer with smaller arrays than the GPU allows.
     #[cfg(test)]
     pub(super) fn with_limits(mut self, limits: CapacityLimits) -> Self {
         self.limits = limits;
@@ -254,7 +254,7 @@ impl GpuRenderer {
         }
     }
 
-    /// Sizes of the picture, and how it is cut into bands.
+    /// Returns the sizes of the picture, and how it is cut into bands.
     fn shape(&mut self, scene: &GpuScene, camera: &Camera) -> Result<Shape> {
         // Sides are at most 16384.
         let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
@@ -276,8 +276,8 @@ impl GpuRenderer {
         Ok(Shape { columns, rows, width, height, band_rows, bands_see, depth_bits })
     }
 
-    /// Makes sure that buffers are large enough for the scene and the picture, and for as many slots and
-    /// entries as `wanted`.
+    /// Makes sure that the buffers are large enough for the scene and the picture, and for `wanted` slots and
+    /// entries.
     async fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
         let chunks = u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX);
         let limit = |value: u32, most: u64| value.min(u32::try_from(most).unwrap_or(u32::MAX));
@@ -300,7 +300,7 @@ impl GpuRenderer {
             pixels: now.pixels.max(least.pixels),
         };
         if self.work.as_ref().is_none_or(|work| work.capacity != capacity) {
-            // The old buffers go first: both together may not fit.
+            // The old buffers are freed first, since both together may not fit.
             self.plans.clear();
             self.work = None;
             self.work = Some(Work::new(&self.gpu, capacity, self.kernels.moments.is_some()).await?);
@@ -322,7 +322,7 @@ impl GpuRenderer {
         let Some(work) = &self.work else {
             return Err(Error::Gpu { problem: "no buffers".to_owned() });
         };
-        // A plan holds on to its scene's buffers.
+        // A plan keeps its scene's buffers alive.
         self.plans.retain(Plan::is_of_use);
         let known = self.plans.iter().position(|plan| plan.scene == scene.id && plan.shape == shape);
         let plan = match known {
@@ -352,7 +352,7 @@ impl GpuRenderer {
                 timed.push(stage.stage);
             }
             if stage.stage == DrawStage::Cull {
-                // The place after the last block's, which `cull` does not write.
+                // `cull` does not write the place after that of the last block.
                 encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
             }
             if stage.stage == DrawStage::Tiles {
@@ -400,7 +400,7 @@ impl GpuRenderer {
         Ok((Frame { pixels, width: shape.width, height: shape.height, stats }, found))
     }
 
-    /// Milliseconds of each stage, bands together, and of everything.
+    /// Returns the milliseconds of each stage, of all bands together, and those of the whole picture.
     async fn times(&self, timed: &[DrawStage]) -> Result<(StageTimes, Option<f64>)> {
         let Some(timestamps) = &self.timestamps else { return Ok((Vec::new(), None)) };
         let passes = timestamps.read(&self.gpu, u32::try_from(timed.len()).unwrap_or(0)).await?;
@@ -412,7 +412,7 @@ impl GpuRenderer {
         Ok((stages.to_vec(), total))
     }
 
-    /// What to make larger before trying again, if anything.
+    /// Returns what the view lacked, if anything.
     fn missing(&self, found: [u32; COUNTERS], shape: Shape) -> Result<Option<Missing>> {
         let Some(capacity) = self.work.as_ref().map(|work| work.capacity) else { return Ok(None) };
         let spare = |found: u32, most: u64| {
@@ -425,7 +425,7 @@ impl GpuRenderer {
             if u64::from(slots) <= self.limits.slots {
                 return Ok(Some(Missing::Capacity { slots: spare(slots, self.limits.slots), entries: 0 }));
             }
-            // Moments are summed over bands in slots, which must stay the same.
+            // Moments are summed over bands by slot, so slots must be the same in all bands.
             let one = shape.bands_see && shape.band_rows == 1;
             if one || self.kernels.moments.is_some() {
                 let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" }.to_owned();
@@ -461,13 +461,13 @@ enum Missing {
         slots: u32,
         entries: u32,
     },
-    /// Bands of half as many rows; whether each must look for its own Gaussians.
+    /// Bands of half as many rows. `see` tells whether each must look for its own Gaussians.
     Bands {
         see: bool,
     },
 }
 
-/// Significant bits of depth keys: those of the farthest corner of what can be seen.
+/// Returns the number of significant bits of depth keys: those of the farthest corner of the scene.
 fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
     let Some(bounds) = scene.bounds else { return 1 };
     let farthest = (0..8)
@@ -476,10 +476,10 @@ fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
             camera.to_view(at)[2]
         })
         .fold(0.0, f32::max);
-    // The corner's depth is rounded otherwise than a Gaussian's there.
+    // The depth of a corner may round differently than that of a Gaussian there.
     const ROUNDING: f32 = 1.0001;
     let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(KEY_FIRST);
-    // One more, so that what comes last is behind everything.
+    // One bit more, so that the key of slots that come last is above all others.
     (u32::BITS - key.leading_zeros() + 1).min(u32::BITS)
 }
 

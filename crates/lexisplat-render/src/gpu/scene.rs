@@ -25,21 +25,21 @@ use super::uniforms::ChunkUniform;
 pub struct SceneBytes {
     /// Positions, shapes and opacities.
     pub geometry: u64,
-    /// Everything colour needs: base colours, coefficients or codes, dictionary, table.
+    /// Everything that colours need: base colours, coefficients or codes, dictionary, table.
     pub sh: u64,
 }
 
-/// A scene uploaded for one [`ShPath`]. Of its own size on the GPU; the source may be dropped.
+/// A scene uploaded for one [`ShPath`]. The scene that it was made from may be dropped.
 #[derive(Debug)]
 pub struct GpuScene {
     pub(super) id: u64,
-    /// Gone when the scene is.
+    /// Plans hold weak references to this, and so know whether the scene still lives.
     pub(super) lives: Arc<()>,
     pub(super) chunks: Vec<ChunkBuffers>,
     pub(super) chunk_blocks: Buffer,
     pub(super) radiance: wgpu::ComputePipeline,
     pub(super) table: Option<RadianceTable>,
-    /// Corners of what can be seen, if anything.
+    /// The corners of a box around all positions that can be drawn; `None` if there are none.
     pub(super) bounds: Option<[[f32; 3]; 2]>,
     gpu: Gpu,
     path: ShPath,
@@ -47,23 +47,24 @@ pub struct GpuScene {
     degree: ShDegree,
     antialiased: bool,
     bytes: SceneBytes,
-    /// Of those for SH, what all Gaussians share.
+    /// Those of the bytes for SH that all Gaussians share: dictionary and table.
     shared_bytes: u64,
 }
 
-/// Buffers of a part of the scene.
+/// The buffers of a part of the scene.
 #[derive(Debug)]
 pub(super) struct ChunkBuffers {
     pub(super) blocks: u32,
     pub(super) uniform: Buffer,
     pub(super) bodies: Buffer,
     pub(super) shapes: Buffer,
-    /// From binding 6 of radiance: dense rows; or base colours, columns, nonzeros, atoms.
+    /// What the radiance kernel has from binding 6 on: dense rows; or base colours, columns, nonzeros and atoms.
     pub(super) sh: Vec<Buffer>,
 }
 
-/// Numbers scenes, so that bindings made for one are not used for another.
+/// The number of the next scene. Numbers keep bindings made for one scene from being used for another.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
 impl GpuScene {
     /// Blocks on [`Self::new_async`].
     ///
@@ -184,7 +185,7 @@ impl GpuScene {
             padding: [0; 2],
         };
         let uniform = gpu.checked("chunk", || gpu.uniform("chunk", &uniform)).await?;
-        // Of codes, the last buffer is the atoms.
+        // Where there are codes, the last buffer has the atoms.
         self.shared_bytes += sh.get(3).map_or(0, Buffer::bytes);
         self.bytes.geometry += bodies.bytes() + shapes.bytes();
         self.bytes.sh += sh.iter().map(Buffer::bytes).sum::<u64>();
@@ -222,18 +223,17 @@ impl GpuScene {
         self.bytes
     }
 
-    /// Bytes that shading one visible Gaussian moves on average: its slot, position, SH and colour. The
-    /// dictionary or table, which caches hold, is not counted.
+    /// Bytes that colouring one visible Gaussian moves on average: its slot, position, SH and colour. The
+    /// dictionary or table is not counted, since caches hold it.
     #[must_use]
     pub fn shading_bytes(&self) -> f64 {
-        let shared: u64 = self.shared_bytes;
-        let own = self.bytes.sh.saturating_sub(shared) as f64 / f64::from(self.len.max(1));
+        let own = self.bytes.sh.saturating_sub(self.shared_bytes) as f64 / f64::from(self.len.max(1));
         let (slot, body, colour) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 3]>());
         own + (slot + body + colour) as f64
     }
 
-    /// Bytes of geometry read to look for and project `visible` Gaussians: the positions of all, and slot,
-    /// position and shape of those.
+    /// Bytes of geometry that finding and projecting `visible` Gaussians reads: the positions of all, and the slots,
+    /// positions and shapes of those.
     #[must_use]
     pub fn looking_bytes(&self, visible: f64) -> f64 {
         let (slot, body, shape) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 8]>());

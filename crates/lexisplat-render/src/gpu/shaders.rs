@@ -1,4 +1,4 @@
-//! Kernels, compiled.
+//! Compiles kernels and binds buffers to them.
 
 use crate::error::Result;
 
@@ -23,14 +23,14 @@ pub(super) struct Kernels {
     pub(super) list_tiles: wgpu::ComputePipeline,
     pub(super) find_ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
-    /// Only while measuring.
+    /// There only while sensitivities are measured.
     pub(super) moments: Option<MomentKernels>,
 }
 
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 const TILE: &str = include_str!("kernels/tile.wgsl");
 
-/// The texts of all kernels, by name: what a test validates.
+/// The texts of all kernels but radiance, by name.
 pub(super) const TEXTS: [(&str, &[&str]); 12] = [
     ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
@@ -106,34 +106,34 @@ pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> w
     })
 }
 
-/// What a kernel is given at one binding.
+/// What is bound to a kernel at one binding.
 pub(super) enum Bound<'a> {
     /// All of a buffer.
     All(&'a wgpu::Buffer),
-    /// Bytes of a buffer: first, and how many.
+    /// A part of a buffer: its first byte, and the number of bytes.
     Part(&'a wgpu::Buffer, u64, u64),
     /// A texture.
     Texture(&'a wgpu::TextureView),
-    /// How a texture is read.
+    /// A sampler for a texture.
     Sampler(&'a wgpu::Sampler),
 }
 
 /// Binds `entries` to the one group of `pipeline`.
-pub(super) fn bind(
+pub(super) fn bind<'a>(
     gpu: &Gpu,
     pipeline: &wgpu::ComputePipeline,
-    entries: &[(u32, Bound<'_>)],
+    entries: impl IntoIterator<Item = (u32, Bound<'a>)>,
 ) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
-        .iter()
+        .into_iter()
         .map(|(binding, bound)| wgpu::BindGroupEntry {
-            binding: *binding,
+            binding,
             resource: match bound {
                 Bound::All(buffer) => buffer.as_entire_binding(),
                 Bound::Part(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                     buffer,
-                    offset: *offset,
-                    size: std::num::NonZeroU64::new(*size),
+                    offset,
+                    size: std::num::NonZeroU64::new(size),
                 }),
                 Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
                 Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),

@@ -52,9 +52,9 @@ pub async fn measure_speed_async(gpu: &Gpu) -> Result<Speed> {
         let module = compile(gpu, "speed", include_str!("kernels/speed.wgsl"));
         let (from, to) = (gpu.storage("from", size)?, gpu.storage("to", size)?);
         let copy = pipeline(gpu, &module, "copy_vectors");
-        let copied = bind(gpu, &copy, &[(0, Bound::All(&from.raw)), (1, Bound::All(&to.raw))]);
+        let copied = bind(gpu, &copy, [(0, Bound::All(&from.raw)), (1, Bound::All(&to.raw))]);
         let work = pipeline(gpu, &module, "multiply_add");
-        let worked = bind(gpu, &work, &[(1, Bound::All(&to.raw))]);
+        let worked = bind(gpu, &work, [(1, Bound::All(&to.raw))]);
         Ok([(copy, copied), (work, worked)])
     };
     let [(copy, copied), (work, worked)] = gpu.checked("speed", make).await?;

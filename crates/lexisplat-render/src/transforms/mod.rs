@@ -23,11 +23,11 @@ use crate::view_files::ViewFiles;
 use crate::view_set::{PrincipalPoints, SizeOf, ViewSet};
 use file::{Frame, Lens, Transforms};
 
-/// Files of a `NeRF` synthetic folder and the split that each is; `transforms_val.json` is not used, as in
-/// the 3DGS authors' loader.
+/// Files of a `NeRF` synthetic folder, each with its split. As in the 3DGS authors' loader, `transforms_val.json`
+/// is not used.
 const NERF_FILES: [(&str, Split); 2] =
     [("transforms_train.json", Split::Train), ("transforms_test.json", Split::Test)];
-/// How far the last row of a matrix may be from (0, 0, 0, 1).
+/// Largest difference of the last row of a matrix from (0, 0, 0, 1).
 const LAST_ROW_TOLERANCE: f64 = 1e-6;
 
 /// What to do about a lens that the rasteriser cannot draw through.
@@ -57,14 +57,14 @@ pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<
     Ok(all)
 }
 
-/// The cameras in `bytes`, in order, named by their `file_path` as written; `file` stands for them in
+/// Returns the cameras in `bytes`, in order, named by their `file_path` as written. `file` stands for them in
 /// errors.
 ///
-/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`, of the
-/// frame before those of the file; one for both axes if only x has any. Where `w` and `h` are missing,
+/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Those of the frame
+/// come before those of the file. If only x has one, it holds for both axes. Where `w` and `h` are missing,
 /// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`].
-/// `train_filenames` and `test_filenames` set the split; `val_filenames` count as test if there are no
-/// `test_filenames`, as in nerfstudio's own evaluation.
+/// `train_filenames` and `test_filenames` set the split. If there are no `test_filenames`, `val_filenames` count
+/// as test, as in nerfstudio's own evaluation.
 ///
 /// # Errors
 /// [`Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
@@ -157,7 +157,7 @@ impl Frame {
     }
 }
 
-/// Names of the frames of each split, where the file has such lists.
+/// The names of the frames of each split, where the file lists them.
 struct Splits<'a> {
     train: HashSet<&'a str>,
     test: HashSet<&'a str>,
@@ -187,12 +187,14 @@ impl<'a> Splits<'a> {
         [("train", lost(&self.train)), ("test", lost(&self.test))]
             .into_iter()
             .filter(|(_, lost)| *lost > 0)
-            .map(|(split, lost)| format!("{lost} of the names listed for the {split} split are of no frame"))
+            .map(|(split, lost)| {
+                format!("{lost} of the names listed for the {split} split belong to no frame")
+            })
             .collect()
     }
 }
 
-/// A path without the `./` that some writers put before it.
+/// Returns a path without the `./` that some writers put before it.
 fn plain(path: &str) -> &str {
     path.strip_prefix("./").unwrap_or(path)
 }

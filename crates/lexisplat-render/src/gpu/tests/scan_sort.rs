@@ -71,14 +71,8 @@ impl Bench {
         self.fill(&work.starts, &[count]);
         let frame = FrameUniform { slots: work.capacity.slots, ..FrameUniform::default() };
         self.gpu.block_on(self.gpu.write(&work.frame, bytemuck::bytes_of(&frame))).unwrap();
-        let bound = [
-            (0, all(&work.frame)),
-            (1, all(&work.starts)),
-            (2, all(&work.masks)),
-            (3, all(&work.counters)),
-            (4, all(&work.dispatches)),
-        ];
-        planner.step(&self.kernels.plan_slots, &bound, Size::Groups(1));
+        let bound = [&work.frame, &work.starts, &work.masks, &work.counters, &work.dispatches];
+        planner.step(&self.kernels.plan_slots, all_from(0, bound), Size::Groups(1));
     }
 }
 
@@ -112,9 +106,8 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     gpu.block_on(gpu.write(&bench.work.frame, bytemuck::bytes_of(&frame))).unwrap();
     let mut planner = bench.planner();
     let work = &bench.work;
-    let bound =
-        [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
-    planner.step(&bench.kernels.compact, &bound, Size::Groups(blocks));
+    let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
+    planner.step(&bench.kernels.compact, all_from(0, bound), Size::Groups(blocks));
     bench.run(&planner.steps);
     let found: Vec<u32> = gpu.read_back(&work.gaussians);
     assert!(found[..marked.len()] == marked);
