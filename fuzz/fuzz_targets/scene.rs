@@ -11,7 +11,7 @@ use lexisplat::{
 };
 use lexisplat_fuzz::made::{Bytes, scene};
 use lexisplat_fuzz::{invariants, limits, one_thread};
-use lexisplat_render::{RenderOptions, Scene, object, orbit, render, room, surround};
+use lexisplat_render::{RenderOptions, Scene, interior_views, object, orbit, render, surround};
 use libfuzzer_sys::fuzz_target;
 
 /// Pixels of the pictures drawn: a few tiles, one of them cut.
@@ -143,7 +143,7 @@ fn drawn(splats: &Splats, how: u8) {
     let cameras = match how % 4 {
         0 => orbit(geometry, 2, width, height),
         1 => surround(geometry, 2, [width, height], [1.0, 2.0]),
-        2 => room(geometry, 2, width, height),
+        2 => interior_views(geometry, 2, width, height),
         _ => object(geometry, 2, width, height),
     };
     for camera in cameras {
@@ -151,7 +151,7 @@ fn drawn(splats: &Splats, how: u8) {
         if camera.validate().is_err() {
             continue;
         }
-        let image = render(&Scene::from(splats), &camera, &RenderOptions::default());
+        let image = render(&Scene::from(splats), &camera, &RenderOptions::default()).expect("drawn");
         assert!(image.pixels.iter().flatten().all(|v| v.is_finite()), "pixels not finite");
     }
 }

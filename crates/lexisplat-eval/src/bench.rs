@@ -181,7 +181,7 @@ pub fn bench_gpu(
 ) -> Result<PathTimes> {
     let mut renderer = GpuRenderer::new(gpu)?;
     let uploaded = GpuScene::new(gpu, scene, path)?;
-    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let drawing = RenderOptions::default().with_background(options.background);
     let times = run(path.name(), cameras, options, progress, |camera| {
         let clock = Instant::now();
         let stats = renderer.draw(&uploaded, camera, &drawing)?.stats;
@@ -214,7 +214,7 @@ pub fn bench_cpu(
     options: &BenchOptions,
     progress: &dyn Progress,
 ) -> Result<PathTimes> {
-    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
+    let drawing = RenderOptions::default().with_background(options.background);
     let (path, sh_bytes) = match scene {
         Scene::Dense(splats) => {
             let dc = size_of_val(splats.geometry.dc.as_slice());
@@ -223,9 +223,8 @@ pub fn bench_cpu(
         Scene::Sparse(model) => ("cpu-sparse", model.resident_sh_bytes()),
     };
     let times = run(path, cameras, options, progress, |camera| {
-        camera.validate()?;
         let clock = Instant::now();
-        let drawn = render_measured(scene, camera, &drawing);
+        let drawn = render_measured(scene, camera, &drawing)?;
         Ok(Sample {
             total: clock.elapsed().as_secs_f64() * 1e3,
             stages: drawn.stage_times.iter().map(|(name, ms)| ((*name).to_owned(), *ms)).collect(),

@@ -36,10 +36,10 @@ const VALUES: [f32; 12] = [
 
 fn compare(gpu: &Gpu, renderer: &mut GpuRenderer, splats: &Splats, camera: &Camera, case: &str) {
     let scene = Scene::from(splats);
-    let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background([0.3, 0.6, 0.9]);
     let uploaded = GpuScene::new(gpu, &scene, ShPath::DenseF32).unwrap();
     let found = renderer.render(&uploaded, camera, &options).unwrap().0;
-    twins::check(&found, &render(&scene, camera, &options), case);
+    twins::check(&found, &render(&scene, camera, &options).unwrap(), case);
 }
 
 /// What puts one value into one property of a Gaussian.

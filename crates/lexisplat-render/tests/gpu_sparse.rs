@@ -24,7 +24,7 @@ use lexisplat_sample::{SampleOptions, scene};
 fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let dense = model.to_splats();
-    let options = RenderOptions { background: [0.2, 0.5, 1.0], ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background([0.2, 0.5, 1.0]);
     for path in ShPath::ALL {
         let uploaded = match GpuScene::new(gpu, &Scene::from(model), path) {
             Ok(uploaded) => uploaded,
@@ -40,13 +40,13 @@ fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
             let (found, _) = renderer.render(&uploaded, camera, &options).unwrap();
             let name = format!("{case}, {}, {}", path.name(), camera.name);
             if path == ShPath::SparseTable {
-                let db = common::psnr(&found, &render(&Scene::from(model), camera, &options), true);
+                let db = common::psnr(&found, &render(&Scene::from(model), camera, &options).unwrap(), true);
                 assert!(db > TABLE_DB, "{name}: {db:.1} dB");
                 continue;
             }
             // The codes, and the same made dense: on the processor, and on the GPU by the path before.
-            twins::check(&found, &render(&Scene::from(model), camera, &options), &name);
-            twins::check(&found, &render(&Scene::from(&dense), camera, &options), &name);
+            twins::check(&found, &render(&Scene::from(model), camera, &options).unwrap(), &name);
+            twins::check(&found, &render(&Scene::from(&dense), camera, &options).unwrap(), &name);
         }
     }
 }

@@ -24,7 +24,7 @@ fn mean_against_photos(scene: &str, cameras: &str, photos: &str) -> Option<f64> 
     let (splats, cameras) = (common::load(scene)?, test_cameras(cameras)?);
     let mut sum = 0.0;
     for camera in &cameras {
-        let image = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let image = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         sum += common::psnr(&image, &common::photo(photos, &camera.name)?, true);
     }
     Some(sum / cameras.len() as f64)
@@ -55,7 +55,7 @@ fn bonsai_agrees_with_the_twin() {
     };
     for (k, camera) in cameras.iter().enumerate() {
         splats.meta.antialiased = k == 0;
-        let found = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let found = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         let db = common::psnr(&found, &naive::render(&splats, camera, [0.0; 3]), false);
         println!("{}: {db:.1} dB", camera.name);
         assert!(db >= 70.0, "{}: {db:.1} dB", camera.name);

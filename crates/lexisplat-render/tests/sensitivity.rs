@@ -16,7 +16,7 @@ const STEP: f32 = 2e-2;
 const LEAST_SHARE: f64 = 1e-3;
 
 fn draw(splats: &Splats, camera: &Camera) -> Image {
-    render(&Scene::from(splats), camera, &RenderOptions::default())
+    render(&Scene::from(splats), camera, &RenderOptions::default()).unwrap()
 }
 
 /// Squared derivative of the pictures, averaged over pixels, channels and cameras, by what `change` does

@@ -106,7 +106,7 @@ fn bonsai_looks_like_its_photos_through_colmaps_cameras() {
     let (Some(splats), Some(pairs)) = (common::load("bonsai-3dgs.ply"), bonsai()) else { return };
     let (mut sum, mut count) = (0.0, 0);
     for (camera, _) in pairs.iter().filter(|(_, known)| known.split == Some(Split::Test)) {
-        let image = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let image = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         let Some(photo) = common::photo("bonsai-photos", &camera.name) else { return };
         sum += common::psnr(&image, &photo, true);
         count += 1;

@@ -1,8 +1,9 @@
 //! Drawing an arrangement of pictures to memory instead of the screen.
 
+use lexisplat_render::gpu::readback;
+
 use crate::error::{Error, Result};
 use crate::present::{Composition, Presenter};
-use crate::readback;
 
 /// Bytes that rows of a texture are padded to when copied to a buffer.
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
@@ -86,7 +87,7 @@ impl Composer {
             extent,
         );
         self.queue.submit([encoder.finish()]);
-        let bytes = readback::read(device, &target)?;
+        let bytes: Vec<u8> = readback::read(device, &target)?;
         let pixels = bytes
             .chunks_exact(row as usize)
             .flat_map(|line| line[..(width * PIXEL) as usize].chunks_exact(PIXEL as usize))

@@ -24,7 +24,6 @@ mod keys;
 mod models;
 mod panel;
 mod present;
-mod readback;
 mod render_thread;
 mod scene_renderer;
 mod script;

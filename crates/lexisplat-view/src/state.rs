@@ -58,7 +58,7 @@ impl State {
             visited: false,
             free_camera: None,
             arrangement: Arrangement { mode: Mode::One(Slot::First), split: 0.5, gain: GAIN },
-            options: RenderOptions { background, ..RenderOptions::default() },
+            options: RenderOptions::default().with_background(background),
             open: [false; 2],
             panel: true,
         }

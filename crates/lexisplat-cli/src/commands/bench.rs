@@ -6,7 +6,7 @@ use anyhow::Result;
 use lexisplat_eval::{
     BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, text,
 };
-use lexisplat_render::gpu::{Gpu, ShPath, Speed, Stage, measure_speed};
+use lexisplat_render::gpu::{DrawStage, Gpu, ShPath, Speed, measure_speed};
 use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
@@ -199,7 +199,7 @@ impl Report<'_> {
                 text::bytes(self.most_bytes.unwrap_or(0))
             )?;
         }
-        let stages = Stage::ALL.map(Stage::name);
+        let stages = DrawStage::ALL.map(DrawStage::name);
         write!(out, "\n{:<14} {:>9} {:>19} {:>8}", "path", "ms/frame", "10 % - 90 %", "fps")?;
         for stage in stages {
             write!(out, " {stage:>9}")?;

@@ -35,7 +35,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let prepared = renderer.prepare(scene)?;
     stop::while_writing(Work::Files(paths.len()));
     make_folder(&folder)?;
-    let options = RenderOptions { background: views.background, ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background(views.background);
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();

@@ -10,7 +10,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use lexisplat::Geometry;
-use lexisplat_render::{Camera, ViewSet, is_room, object, orbit, read_views, room};
+use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orbit, read_views};
 
 use crate::error::{Error, Result};
 use folder::PhotoFolder;
@@ -29,7 +29,7 @@ const DIVISORS: [u32; 4] = [1, 2, 4, 8];
 /// Where generated views are taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SceneKind {
-    /// From where [`is_room`] says.
+    /// From where [`is_interior`] says.
     #[default]
     Auto,
     /// From around the scene ([`object`]).
@@ -153,13 +153,13 @@ fn generated(options: &ViewOptions, divisor: u32, geometry: &Geometry) -> Result
         return Err(Error::parameter("images", "a folder", "a folder only with the cameras of the photos"));
     }
     let inside = match options.kind {
-        SceneKind::Auto => is_room(geometry),
+        SceneKind::Auto => is_interior(geometry),
         SceneKind::Object => false,
         SceneKind::Room => true,
     };
     let (count, (width, height)) = (usize::from(options.count), ORBIT_SIZE);
     let (cameras, from) = if inside {
-        (room(geometry, count, width, height), "room")
+        (interior_views(geometry, count, width, height), "room")
     } else {
         (object(geometry, count, width, height), "orbit")
     };

@@ -339,7 +339,7 @@ fn bonsai_is_evaluated_as_the_field_does() {
     assert_eq!((chosen.views.len(), chosen.warnings.len()), (13, 0), "{:?}", chosen.warnings);
     let mut sum = 0.0;
     for view in &chosen.views {
-        let picture = render(&Scene::from(&splats), &view.camera, &RenderOptions::default());
+        let picture = render(&Scene::from(&splats), &view.camera, &RenderOptions::default()).unwrap();
         sum += psnr(&picture, &photo(view, [0.0; 3]).unwrap()).unwrap().unwrap();
     }
     let mean = sum / 13.0;

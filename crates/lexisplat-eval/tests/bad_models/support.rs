@@ -153,7 +153,7 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
         for camera in cameras() {
             let options = RenderOptions::default();
             let image = renderer.render(&prepared, &camera, &options).unwrap();
-            let truth = lexisplat_render::render(&Scene::from(original), &camera, &options);
+            let truth = lexisplat_render::render(&Scene::from(original), &camera, &options).unwrap();
             let view = Scorer::new().score("twin", &truth, &image).unwrap();
             assert!(view.psnr.is_none_or(|db| db > TWIN_DB), "{} draws {:?}", renderer.name(), view.psnr);
             drawn += image.pixels.iter().filter(|p| **p != options.background).count();

@@ -33,11 +33,10 @@ impl SceneRenderer for CpuSceneRenderer {
     }
 
     fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture> {
-        camera.validate()?;
         let Some(model) = &self.models[slot.index()] else {
             return Err(Error::Device(format!("there is no {slot:?} model to draw")));
         };
-        let drawn = render_measured(&model.scene.scene(), camera, options);
+        let drawn = render_measured(&model.scene.scene(), camera, options)?;
         let image = drawn.image;
         let padded: Vec<[f32; 4]> = image.pixels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
         let bytes: &[u8] = bytemuck::cast_slice(&padded);

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions};
 
-use super::{PIXEL, Picture, SceneRenderer};
+use super::{Picture, SceneRenderer};
 use crate::command::Slot;
 use crate::error::{Error, Result};
 use crate::models::OpenModel;
@@ -48,7 +48,7 @@ impl SceneRenderer for GpuSceneRenderer {
         };
         let frame = self.renderer.draw(scene, camera, options)?;
         // The renderer reuses its own buffer for the next picture.
-        let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL as u64;
+        let size = u64::from(frame.width) * u64::from(frame.height) * size_of::<[f32; 4]>() as u64;
         let device = self.gpu.device();
         let pixels = device.create_buffer(&wgpu::BufferDescriptor {
             label: Some("picture"),

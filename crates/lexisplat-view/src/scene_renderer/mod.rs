@@ -5,18 +5,15 @@ mod gpu;
 
 use std::sync::Arc;
 
+use lexisplat_render::gpu::readback;
 use lexisplat_render::{Camera, Image, RenderOptions};
 
 use crate::command::Slot;
 use crate::error::Result;
 use crate::models::OpenModel;
-use crate::readback;
 
 pub(crate) use cpu::CpuSceneRenderer;
 pub(crate) use gpu::GpuSceneRenderer;
-
-/// Bytes of a pixel: four floats.
-const PIXEL: usize = 16;
 
 /// Something that draws the two models.
 pub(crate) trait SceneRenderer: Send {
@@ -63,14 +60,9 @@ impl Picture {
         if let Some(image) = &self.image {
             return Ok(image.clone());
         }
-        let bytes = readback::buffer(device, queue, &self.pixels)?;
-        let values = bytes.chunks_exact(PIXEL).map(|pixel| {
-            std::array::from_fn(|c| {
-                let value = std::array::from_fn(|k| pixel[4 * c + k]);
-                f32::from_le_bytes(value)
-            })
-        });
+        let pixels: Vec<[f32; 4]> = readback::read_buffer(device, queue, &self.pixels)?;
         let count = self.width as usize * self.height as usize;
-        Ok(Image { width: self.width, height: self.height, pixels: values.take(count).collect() })
+        let pixels = pixels.into_iter().take(count).map(|[r, g, b, _]| [r, g, b]).collect();
+        Ok(Image { width: self.width, height: self.height, pixels })
     }
 }

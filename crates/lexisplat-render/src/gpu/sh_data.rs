@@ -1,36 +1,36 @@
-//! What a scene's arrays on the GPU are made of, chunk by chunk.
+//! The arrays of a scene on the GPU, and how the scene is cut into chunks whose arrays fit in a binding.
 
 use std::ops::Range;
 
+use crate::conventions::ALPHA_MIN;
+use crate::error::{Error, Result};
+use crate::parallel::*;
+use crate::scene::Scene;
 use half::f16;
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Geometry, Model};
-use rayon::prelude::*;
 
-use crate::conventions::ALPHA_MIN;
-use crate::error::{Error, Result};
-use crate::scene::Scene;
-
+use super::buffer::Buffer;
 use super::columns::{escapes_in, group_words};
 use super::constants::{COLUMN_GROUP, GROUP, vectors};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 
-/// Log scales below this, whose exponential is no normal number, count as this.
+/// Smaller log scales are raised to this: the exponential of a smaller one is not a normal number.
 const LEAST_SCALE: f32 = -87.0;
-/// Opacity logits are clamped to this: beyond it the opacity is 0 or 1 in f32.
+/// Opacity logits are clamped to this on both sides: beyond it the opacity is 0 or 1 in f32.
 const MOST_LOGIT: f32 = 80.0;
-/// Logits this far below that of `ALPHA_MIN` are surely invisible.
+/// A Gaussian whose opacity logit is this far below that of `ALPHA_MIN` is invisible for sure.
 const LOGIT_SLACK: f32 = 0.01;
-/// Standard deviations stay below this, so that squares of them overflow in the kernels' own tests.
+/// Larger standard deviations are lowered to this. Their squares overflow, which the kernels test for.
 const MOST_SIGMA: f32 = 1e30;
 
-/// Where SH comes from.
-pub(super) enum Source<'a> {
+/// The SH of a scene, as the GPU will hold it.
+pub(super) enum ShData<'a> {
     Dense { scene: &'a Scene<'a>, half: bool },
     Codes(&'a Model),
 }
 
-impl Source<'_> {
+impl ShData<'_> {
     /// Whether the SH-rest of Gaussian `i` is finite. Codes always are.
     pub(super) fn finite(&self, i: usize) -> bool {
         match self {
@@ -42,8 +42,8 @@ impl Source<'_> {
         }
     }
 
-    /// Cuts `len` Gaussians into runs each of whose arrays fits in `limit` bytes. All but the last are whole
-    /// blocks.
+    /// Cuts `len` Gaussians into runs. Each array of a run fits in `limit` bytes, and all runs but the last are
+    /// whole blocks.
     pub(super) fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
         let block = GROUP as usize;
         let mut chunks = Vec::new();
@@ -72,7 +72,7 @@ impl Source<'_> {
         Ok(chunks)
     }
 
-    /// Bytes that every chunk's arrays have: shapes, rows or nonzeros, atoms, columns.
+    /// Bytes that the arrays of every chunk have: of shapes, of rows or nonzeros, of atoms, and of columns.
     fn fixed(&self) -> [u64; 4] {
         match self {
             Self::Dense { .. } => [0; 4],
@@ -80,7 +80,7 @@ impl Source<'_> {
         }
     }
 
-    /// Bytes that a block of Gaussians adds to them.
+    /// Bytes that a block of Gaussians adds to those arrays.
     fn block_bytes(&self, range: Range<usize>) -> [u64; 4] {
         let shapes = range.len() as u64 * size_of::<[f32; 8]>() as u64;
         match self {
@@ -104,7 +104,8 @@ impl Source<'_> {
     }
 }
 
-/// Position and the largest standard deviation, or -1 for what is never drawn.
+/// Returns the position and the largest standard deviation of Gaussian `i`. The latter is -1 for one that is
+/// never drawn.
 pub(super) fn body(geometry: &Geometry, rest_finite: bool, i: usize) -> [f32; 4] {
     let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
     let (position, scales) = (geometry.positions[i], geometry.scales[i]);
@@ -118,20 +119,26 @@ pub(super) fn body(geometry: &Geometry, rest_finite: bool, i: usize) -> [f32; 4]
     [position[0], position[1], position[2], if drawn { largest } else { -1.0 }]
 }
 
-/// Log scales, opacity logit, quaternion.
+/// Returns the log scales, the opacity logit and the quaternion of Gaussian `i`.
 pub(super) fn shape(geometry: &Geometry, i: usize) -> [f32; 8] {
     let [a, b, c] = geometry.scales[i].map(|s| s.max(LEAST_SCALE));
     let [w, x, y, z] = geometry.rotations[i];
     [a, b, c, geometry.opacities[i].clamp(-MOST_LOGIT, MOST_LOGIT), w, x, y, z]
 }
 
-/// Dense rows of a run of Gaussians: coefficients in order, DC first, three channels side by side.
-pub(super) fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half: bool) -> Result<Buffer> {
+/// Uploads the dense rows of a run of Gaussians: coefficients in order, DC first, with the three channels side by
+/// side.
+pub(super) async fn dense_rows(
+    gpu: &Gpu,
+    scene: &Scene<'_>,
+    range: Range<usize>,
+    half: bool,
+) -> Result<Buffer> {
     let per_channel = scene.degree().rest_per_channel();
     let dim = scene.degree().rest();
     let row_len = 4 * vectors(per_channel + 1);
     let mut rows = vec![0.0_f32; range.len() * row_len];
-    rows.par_chunks_exact_mut(row_len).zip(range).for_each(|(row, i)| {
+    rows.par_chunks_mut(row_len).zip(range).for_each(|(row, i)| {
         row[..CHANNELS].copy_from_slice(&scene.geometry().dc[i]);
         let mut decoded;
         let rest = match scene {
@@ -145,15 +152,13 @@ pub(super) fn dense_rows(gpu: &Gpu, scene: &Scene<'_>, range: Range<usize>, half
         interleave(rest, per_channel, &mut row[CHANNELS..]);
     });
     if half {
-        let halves: Vec<f16> = rows.par_iter().map(|&v| f16::from_f32(v)).collect();
-        let bits: &[u16] =
-            bytemuck::cast_slice(half::slice::HalfFloatSliceExt::reinterpret_cast(&halves[..]));
-        return gpu.upload("dense rows", bits);
+        let bits: Vec<u16> = rows.par_iter().map(|&v| f16::from_f32(v).to_bits()).collect();
+        return gpu.upload("dense rows", &bits).await;
     }
-    gpu.upload("dense rows", &rows)
+    gpu.upload("dense rows", &rows).await
 }
 
-/// A channel-major row with the channels of each coefficient side by side.
+/// Copies a channel-major row to `out`, with the channels of each coefficient side by side.
 fn interleave(row: &[f32], per_channel: usize, out: &mut [f32]) {
     for (k, out) in out.chunks_exact_mut(CHANNELS).take(per_channel).enumerate() {
         for (c, out) in out.iter_mut().enumerate() {
@@ -167,7 +172,8 @@ fn atom_bytes(model: &Model) -> usize {
     vectors(model.dictionary.degree().rest_per_channel()) * size_of::<[f32; 4]>()
 }
 
-/// The atoms, and the exact rows of the escaped Gaussians in `range`, each filled up to whole vectors.
+/// Returns the atoms, and the exact rows of the escaped Gaussians in `range`. Each is filled up to whole
+/// vectors.
 pub(super) fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
     let dictionary = &model.dictionary;
     let (dim, per_channel) = (dictionary.dim(), dictionary.degree().rest_per_channel());

@@ -1,20 +1,20 @@
-//! How much light passes through a scene along a line.
+//! Works out how much light passes through a scene along a line.
 
 use glam::{DMat3, DQuat, DVec3};
 use lexisplat::Geometry;
-use rayon::prelude::*;
 
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN};
+use crate::parallel::*;
 
-/// Gaussians in one unit of work. Sums over units are added in their order, so that the result does not
-/// depend on the number of threads.
-const CHUNK: usize = 8192;
-/// Of more Gaussians only every second, third and so on is asked, and counts as often: enough to tell what is
-/// in the way, and seconds for the largest scenes.
+/// Gaussians that one task sums. The sums of tasks are added in order, so that the result does not depend on the
+/// number of threads.
+const GAUSSIANS_PER_TASK: usize = 8192;
+/// Most Gaussians that are looked at. Of a larger scene every second, third and so on is, and counts two, three
+/// and so on times. That is enough to tell what is in the way, and takes seconds for the largest scenes.
 const MAX_ASKED: usize = 1 << 20;
 /// Beyond this many standard deviations every Gaussian is below [`ALPHA_MIN`]: `sqrt(2 ln 255)`.
 const REACH_SIGMAS: f64 = 3.33;
-/// Natural logarithms of scales are held within this of 0, so that squares of scales and of their
+/// Natural logarithms of scales are clamped to this on both sides of 0, so that squares of scales and of their
 /// reciprocals are finite.
 const MAX_LOG_SCALE: f64 = 60.0;
 
@@ -24,13 +24,13 @@ pub(crate) struct Ray {
     pub(crate) origin: DVec3,
     /// Of length 1.
     pub(crate) direction: DVec3,
-    /// Where the piece begins and ends, in world units from the origin.
+    /// The distances from the origin at which the piece begins and ends, in world units.
     pub(crate) from: f64,
     pub(crate) to: f64,
 }
 
-/// What is left of the light along every ray, 0 to 1: the product of `1 - alpha` over the Gaussians whose
-/// densest point on the ray lies on its piece, with their alpha there.
+/// Returns the share of light left along every ray, 0 to 1. It is the product of `1 - alpha` over the Gaussians
+/// whose densest point on the ray lies on its piece, with their alpha at that point.
 pub(crate) fn transmittances(geometry: &Geometry, rays: &[Ray]) -> Vec<f64> {
     thinned(geometry, rays, geometry.len().div_ceil(MAX_ASKED).max(1))
 }
@@ -38,11 +38,11 @@ pub(crate) fn transmittances(geometry: &Geometry, rays: &[Ray]) -> Vec<f64> {
 /// [`transmittances`] by every `step`-th Gaussian.
 fn thinned(geometry: &Geometry, rays: &[Ray], step: usize) -> Vec<f64> {
     let asked = geometry.len().div_ceil(step);
-    let sums: Vec<Vec<f64>> = (0..asked.div_ceil(CHUNK))
+    let sums: Vec<Vec<f64>> = (0..asked.div_ceil(GAUSSIANS_PER_TASK))
         .into_par_iter()
-        .map(|chunk| {
-            let end = asked.min((chunk + 1) * CHUNK);
-            logs(geometry, (chunk * CHUNK..end).map(|i| i * step), rays)
+        .map(|task| {
+            let end = asked.min((task + 1) * GAUSSIANS_PER_TASK);
+            logs(geometry, (task * GAUSSIANS_PER_TASK..end).map(|i| i * step), rays)
         })
         .collect();
     let mut totals = vec![0.0; rays.len()];
@@ -52,7 +52,7 @@ fn thinned(geometry: &Geometry, rays: &[Ray], step: usize) -> Vec<f64> {
     totals.into_iter().map(|log| libm::exp(log * step as f64)).collect()
 }
 
-/// Logarithms of the light that some of the Gaussians leave of every ray.
+/// Returns the logarithms of the light that some of the Gaussians leave of every ray.
 fn logs(geometry: &Geometry, some: impl Iterator<Item = usize>, rays: &[Ray]) -> Vec<f64> {
     let mut logs = vec![0.0; rays.len()];
     for i in some {
@@ -69,14 +69,14 @@ fn logs(geometry: &Geometry, some: impl Iterator<Item = usize>, rays: &[Ray]) ->
 struct Gaussian {
     centre: DVec3,
     alpha: f64,
-    /// Farthest it is seen from its centre, in world units.
+    /// Largest distance from its centre at which it shows, in world units.
     reach: f64,
     rotation: DQuat,
     scales: DVec3,
 }
 
 impl Gaussian {
-    /// The Gaussian at `i`; `None` if it does not show or is not finite.
+    /// Returns the Gaussian at `i`; `None` if it does not show or is not finite.
     fn new(geometry: &Geometry, i: usize) -> Option<Self> {
         let alpha = 1.0 / (1.0 + libm::exp(-f64::from(*geometry.opacities.get(i)?)));
         let centre = DVec3::from_array(geometry.positions.get(i)?.map(f64::from));
@@ -93,7 +93,7 @@ impl Gaussian {
         Some(Self { centre, alpha, reach: REACH_SIGMAS * scales.max_element(), rotation, scales })
     }
 
-    /// Its alpha where it is densest on the ray, if that is on the ray's piece and shows.
+    /// Returns its alpha where it is densest on the ray; `None` if that is not on the ray's piece or does not show.
     #[inline]
     fn alpha(&self, ray: &Ray) -> Option<f64> {
         let offset = self.centre - ray.origin;
@@ -102,7 +102,7 @@ impl Gaussian {
         if aside > self.reach * self.reach || along + self.reach < ray.from || along - self.reach > ray.to {
             return None;
         }
-        // In units of standard deviations along its axes.
+        // From here on lengths are in standard deviations along its axes.
         let to_axes = DMat3::from_quat(self.rotation).transpose();
         let (offset, direction) = (to_axes * offset / self.scales, to_axes * ray.direction / self.scales);
         let squares = direction.length_squared();

@@ -1,4 +1,4 @@
-//! Views from inside a scene that comes without cameras, and whether it wants them.
+//! Views from inside a scene that comes without cameras, and whether a scene is to be looked at from inside.
 
 use glam::DVec3;
 use lexisplat::Geometry;
@@ -6,56 +6,57 @@ use lexisplat::Geometry;
 use crate::camera::Camera;
 use crate::conventions::NEAR_Z;
 use crate::object::{object, subject};
-use crate::orbit::{TRIM, UP, bulk, middle, opacity_weights, single};
-use crate::sight::{Ray, transmittances};
+use crate::orbit::{TRIM, UP, axes, bulk, middle, opacity_weights, pinhole};
 use crate::surround::{PLASTIC, detail};
+use crate::transmittance::{Ray, transmittances};
 
-/// Views of the orbit that are tried.
+/// Views of [`object`] that are tried.
 const TRIED_VIEWS: usize = 8;
-/// Gaussians that each of them should see.
+/// Gaussians that each of these views should see.
 const TARGETS: usize = 24;
-/// A line of sight ends so far before its target, in radii of what is looked at: the target's neighbours on
-/// the same surface are not in the way.
+/// Distance before its target at which a line of sight ends, in radii of the subject. The target's neighbours on
+/// the same surface so are not in the way.
 const SHORT: f64 = 0.1;
-/// A target is seen if this share of the light arrives.
+/// A target is seen if at least this share of the light arrives.
 const SEEN: f64 = 0.5;
-/// In a room fewer than this share of the lines are free. Of real objects, with and without a background
-/// (bonsai, snowmiku, flowers, leica, fruit), 0.34 to 0.66 are; of a made-up room none.
+/// A scene is an interior only if less than this share of the lines from outside are free. It is 0.34 to 0.66 for
+/// real objects, with and without a background (bonsai, snowmiku, flowers, leica, fruit), and 0 for a made-up
+/// room.
 const FEW: f64 = 0.15;
 
-/// And from inside, at least this share. Of the sample scene, whose objects hide each other when they are made
-/// of few Gaussians, at most 0.5 are; of a made-up room all.
+/// A scene is an interior only if at least this share of the lines from inside are free. It is at most 0.5 for the
+/// sample scene, whose objects hide each other when they are made of few Gaussians, and 1 for a made-up room.
 const MANY: f64 = 0.7;
 
-/// Places tried to stand at.
+/// Places for cameras that are tried.
 const PLACES: u32 = 32;
-/// How far from the centre they are to either side, in half extents of the bulk.
+/// Largest distance of these places from the centre to either side, in half extents of the bulk.
 const ASIDE: f64 = 0.7;
-/// How far above the centre they are at most, in half extents of the bulk: below it are floors, and under
-/// those nothing that is free because nobody saw it.
+/// Largest height of these places above the centre, in half extents of the bulk. None is below the centre: floors
+/// are there, and what is below a floor is free only because no training camera saw it.
 const ABOVE: f64 = 0.5;
-/// Directions in which a place should be free.
+/// Directions in which the way from a place is tried.
 const DIRECTIONS: u32 = 8;
-/// How far it should be free there, in radii of the bulk.
+/// Length of these ways, in radii of the bulk.
 const FREE: f64 = 0.5;
-/// What has to be free before a view: its middle, and points this far to the right and down, in tangents of
-/// the angle from it.
+/// Lines that have to be free before a view: its middle, and lines this far to the right and down of it, in
+/// tangents of the angle.
 const BUNDLE: [[f64; 2]; 5] = [[0.0, 0.0], [0.4, 0.3], [-0.4, 0.3], [0.4, -0.3], [-0.4, -0.3]];
-/// Places that views are spread over.
+/// Most places that views are spread over.
 const STANDS: usize = 3;
-/// A place with less than this share of the free ways of the best is not stood at.
+/// A place counts only if it has at least this share of the free ways of the best place.
 const GOOD: f64 = 0.8;
-/// A view with less than this share of the light left on its free way is taken from elsewhere.
+/// A view is moved to another place if less than this share of the light is left on its way.
 const CLEAR: f64 = 0.8;
 /// Field of view along the picture's shorter side, in degrees.
 const FIELD_OF_VIEW: f64 = 60.0;
-/// How far views look up or down in turn, in degrees.
+/// Elevations of the views, in turn, in degrees.
 const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
 
-/// Whether `geometry` is a scene to look at from inside: [`object`]'s cameras see next to none of its detail,
-/// as walls are in the way, and [`room`]'s places most of it.
+/// Returns whether `geometry` is to be looked at from inside: walls hide nearly all of its detail from the cameras
+/// of [`object`], and the places of [`interior_views`] see most of it.
 #[must_use]
-pub fn is_room(geometry: &Geometry) -> bool {
+pub fn is_interior(geometry: &Geometry) -> bool {
     let targets = targets(geometry);
     let around: Vec<DVec3> = object(geometry, TRIED_VIEWS, 1, 1)
         .iter()
@@ -68,7 +69,7 @@ pub fn is_room(geometry: &Geometry) -> bool {
     seen(geometry, &stands(geometry, radius), &targets).is_some_and(|share| share >= MANY)
 }
 
-/// Share of the lines from `places` to `targets` that are free; `None` if there are none.
+/// Returns the share of the lines from `places` to `targets` that are free; `None` if there are no lines.
 fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3]) -> Option<f64> {
     let (_, radius) = subject(geometry);
     let mut lines = Vec::with_capacity(places.len() * targets.len());
@@ -83,7 +84,7 @@ fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3]) -> Option<f64>
     (!lines.is_empty()).then(|| free as f64 / lines.len() as f64)
 }
 
-/// Centres of up to [`TARGETS`] opaque Gaussians of the detail, evenly spread over the file.
+/// Returns the centres of up to [`TARGETS`] opaque Gaussians of the detail, evenly spread over the file.
 fn targets(geometry: &Geometry) -> Vec<DVec3> {
     let (centre, half) = detail(geometry);
     let all: Vec<DVec3> = geometry
@@ -98,55 +99,40 @@ fn targets(geometry: &Geometry) -> Vec<DVec3> {
     all.into_iter().step_by(step).collect()
 }
 
-/// `count` cameras inside `geometry` that look outwards all around, upright, from a few places near the
-/// middle of its bulk that have little before them, named `room_000` and so on; the same for the same
-/// input. World y is taken to point down, as for [`crate::orbit`].
+/// Returns `count` upright cameras inside `geometry` that look outwards all around, named `room_000`, `room_001`
+/// and so on. They stand at a few places near the middle of the bulk that have little in front of them. The same
+/// input gives the same cameras. World y is taken to point down, as for [`crate::orbit`].
 #[must_use]
-pub fn room(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
-    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
-    let focal = single(f64::from(width.min(height)) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians()));
+pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
+    let size = [width, height].map(|side| side.clamp(1, crate::MAX_SIDE));
+    let focal = f64::from(size[0].min(size[1])) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians());
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     let (_, radius) = bulk(geometry);
     let stands = stands(geometry, radius);
-    let looks: Vec<[DVec3; 3]> = (0..steps).map(|i| axes(look(i, steps))).collect();
+    let looks: Vec<[DVec3; 3]> = (0..steps).map(|i| axes(look(i, steps), UP)).collect();
     let light = free_ways(geometry, &stands, &looks, radius);
     let light = |stand: usize, look: usize| light[stand * looks.len() + look];
     (0..steps)
         .zip(&looks)
         .enumerate()
         .map(|(at, (i, columns))| {
-            // In turn, unless something is in the way there.
+            // Places take turns, unless something is in the way.
             let own = at % stands.len();
             let best = (0..stands.len()).fold(own, |a, b| if light(b, at) > light(a, at) { b } else { a });
             let stand = if light(own, at) >= CLEAR { own } else { best };
-            Camera {
-                name: format!("room_{i:03}"),
-                width,
-                height,
-                fx: focal,
-                fy: focal,
-                position: stands[stand].to_array().map(single),
-                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
-                split: None,
-            }
+            pinhole(format!("room_{i:03}"), size, focal, stands[stand], *columns)
         })
         .collect()
 }
 
-/// The direction of look `i` of `count`: around once, up and down in turn.
+/// Returns direction `i` of `count`. They go around once, with the elevations in turn.
 fn look(i: u32, count: u32) -> DVec3 {
     let (sine, cosine) = libm::sincos(f64::from(i) / f64::from(count) * std::f64::consts::TAU);
     let (up, level) = libm::sincos(PITCH[i as usize % PITCH.len()].to_radians());
     DVec3::new(sine, 0.0, -cosine) * level + UP * up
 }
 
-/// Right, down and forward of a camera that looks along `forward`, which is not upright.
-fn axes(forward: DVec3) -> [DVec3; 3] {
-    let right = forward.cross(UP).normalize();
-    [right, forward.cross(right), forward]
-}
-
-/// Mean light left before every look from every place, place by place.
+/// Returns the mean light left on the way along every look from every place, place by place.
 fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius: f64) -> Vec<f64> {
     let from = f64::from(NEAR_Z);
     let mut rays = Vec::with_capacity(places.len() * looks.len() * BUNDLE.len());
@@ -162,18 +148,18 @@ fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius
     light.chunks_exact(BUNDLE.len()).map(|bundle| bundle.iter().sum::<f64>() / BUNDLE.len() as f64).collect()
 }
 
-/// One to [`STANDS`] places: the freest, then those that are about as free and farthest from the others.
+/// Returns one to [`STANDS`] places: the freest, then those that are about as free and farthest from the others.
 fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     let places: Vec<DVec3> = (0..PLACES)
         .map(|i| {
-            // The first is above the centre.
+            // The first place is above the centre.
             let share = |k: usize| (0.5 + f64::from(i) * PLASTIC[k]).fract();
             let aside = |k: usize| ASIDE * (2.0 * share(k) - 1.0);
             centre + half * (DVec3::new(aside(0), 0.0, aside(2)) + UP * ABOVE * share(1))
         })
         .collect();
-    let looks: Vec<[DVec3; 3]> = (0..DIRECTIONS).map(|i| axes(look(i, DIRECTIONS))).collect();
+    let looks: Vec<[DVec3; 3]> = (0..DIRECTIONS).map(|i| axes(look(i, DIRECTIONS), UP)).collect();
     let light = free_ways(geometry, &places, &looks, radius);
     let scores: Vec<f64> = light.chunks_exact(looks.len()).map(|ways| ways.iter().sum()).collect();
     let best = (0..places.len()).fold(0, |a, b| if scores[b] > scores[a] { b } else { a });
@@ -190,6 +176,7 @@ fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::orbit::single;
 
     fn put(g: &mut Geometry, at: [f64; 3], scale: f64, opacity: f32) {
         g.positions.push(at.map(single));
@@ -241,23 +228,23 @@ mod tests {
 
     #[test]
     fn rooms_are_told_from_objects() {
-        assert!(!is_room(&still_life()));
-        assert!(is_room(&hollow_box()));
+        assert!(!is_interior(&still_life()));
+        assert!(is_interior(&hollow_box()));
         // Coarse models of objects hide themselves, from within as well.
         for gaussians in [100, 300, 1500, 6000] {
             let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(gaussians, 0));
-            assert!(!is_room(&splats.geometry), "{gaussians}");
+            assert!(!is_interior(&splats.geometry), "{gaussians}");
         }
         // Without walls and ceiling in the way, furniture is looked at from outside.
         let mut open = hollow_box();
         open.opacities[..4000].fill(-4.0);
-        assert!(!is_room(&open));
+        assert!(!is_interior(&open));
     }
 
     #[test]
     fn views_of_a_room_are_inside_upright_and_all_around() {
         let g = hollow_box();
-        let cameras = room(&g, 12, 320, 200);
+        let cameras = interior_views(&g, 12, 320, 200);
         assert_eq!(cameras.len(), 12);
         assert_eq!(cameras[7].name, "room_007");
         let mut sum = DVec3::ZERO;
@@ -281,8 +268,8 @@ mod tests {
         places.sort_by(|a, b| a[0].total_cmp(&b[0]));
         places.dedup();
         assert!(places.len() > 1, "from more than one place");
-        assert_eq!(cameras, room(&g, 12, 320, 200));
-        assert!(room(&g, 0, 10, 10).is_empty());
+        assert_eq!(cameras, interior_views(&g, 12, 320, 200));
+        assert!(interior_views(&g, 0, 10, 10).is_empty());
     }
 
     #[test]
@@ -299,8 +286,8 @@ mod tests {
         put(&mut huge, [-3e38; 3], 1e30, 9.0);
         put(&mut huge, [3e38; 3], 1e-30, 9.0);
         for geometry in [Geometry::default(), one, broken, equal, huge] {
-            let _ = is_room(&geometry);
-            for camera in room(&geometry, 3, 0, 10) {
+            let _ = is_interior(&geometry);
+            for camera in interior_views(&geometry, 3, 0, 10) {
                 camera.validate().unwrap();
             }
         }

@@ -2,7 +2,7 @@
 
 use lexisplat::ShDegree;
 
-use super::super::renderer::RoomLimits;
+use super::super::renderer::CapacityLimits;
 use super::super::{FrameStats, Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use super::{adapter, bits, gpu, made};
 use crate::camera::Camera;
@@ -12,9 +12,9 @@ use crate::image::Image;
 use crate::scene::Scene;
 
 /// More than any of these views needs.
-const PLENTY: RoomLimits = RoomLimits { slots: 1 << 24, entries: 1 << 24, pixels: 1 << 30 };
+const PLENTY: CapacityLimits = CapacityLimits { slots: 1 << 24, entries: 1 << 24, pixels: 1 << 30 };
 
-fn draw(gpu: &Gpu, limits: RoomLimits, camera: &Camera) -> Result<(Image, FrameStats), Error> {
+fn draw(gpu: &Gpu, limits: CapacityLimits, camera: &Camera) -> Result<(Image, FrameStats), Error> {
     let splats = made::scene(8, 1500, ShDegree::ONE, false);
     let scene = GpuScene::new(gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();
     GpuRenderer::new(gpu).unwrap().with_limits(limits).render(&scene, camera, &RenderOptions::default())
@@ -26,17 +26,18 @@ fn bands_look_for_their_own_gaussians_where_all_are_too_many() {
     let camera = made::camera(1, 100, 120);
     let (whole, stats) = draw(&gpu, PLENTY, &camera).unwrap();
     let all = u64::from(stats.visible);
-    let exact = RoomLimits { slots: all, ..PLENTY };
+    let exact = CapacityLimits { slots: all, ..PLENTY };
     assert_eq!(draw(&gpu, exact, &camera).unwrap().1.bands, 1);
-    let (cut, cut_stats) = draw(&gpu, RoomLimits { slots: all - 1, ..PLENTY }, &camera).unwrap();
+    let (cut, cut_stats) = draw(&gpu, CapacityLimits { slots: all - 1, ..PLENTY }, &camera).unwrap();
     assert!(cut_stats.bands > 1 && cut_stats.retries > 0, "{cut_stats:?}");
     assert!(u64::from(cut_stats.visible) < all);
     assert_eq!(cut_stats.entries, stats.entries);
     assert!(bits(&cut) == bits(&whole));
     // With lists cut as well.
-    let both = RoomLimits { slots: all - 1, entries: u64::from(stats.entries) / 3, ..PLENTY };
+    let both = CapacityLimits { slots: all - 1, entries: u64::from(stats.entries) / 3, ..PLENTY };
     assert!(bits(&draw(&gpu, both, &camera).unwrap().0) == bits(&whole));
-    let Err(Error::GpuLimit { what, found, limit }) = draw(&gpu, RoomLimits { slots: 10, ..PLENTY }, &camera)
+    let Err(Error::GpuLimit { what, found, limit }) =
+        draw(&gpu, CapacityLimits { slots: 10, ..PLENTY }, &camera)
     else {
         panic!("drew more Gaussians than there is room for")
     };
@@ -51,12 +52,12 @@ fn bands_draw_the_same_picture() {
     let (whole, stats) = draw(&gpu, PLENTY, &camera).unwrap();
     assert_eq!((stats.bands, stats.retries), (1, 0));
     let all = u64::from(stats.entries);
-    let (cut, cut_stats) = draw(&gpu, RoomLimits { entries: all / 3, ..PLENTY }, &camera).unwrap();
+    let (cut, cut_stats) = draw(&gpu, CapacityLimits { entries: all / 3, ..PLENTY }, &camera).unwrap();
     assert!(cut_stats.bands > 2 && cut_stats.retries > 0, "{cut_stats:?}");
     assert_eq!(cut_stats.entries, stats.entries);
     assert!(bits(&cut) == bits(&whole));
     // Eight rows of tiles cannot be cut finer.
-    let refused = draw(&gpu, RoomLimits { entries: all / 20, ..PLENTY }, &camera);
+    let refused = draw(&gpu, CapacityLimits { entries: all / 20, ..PLENTY }, &camera);
     assert!(
         matches!(refused, Err(Error::GpuLimit { limit, found, .. }) if limit == all / 20 && found > limit)
     );
@@ -68,10 +69,10 @@ fn pictures_larger_than_a_binding_are_cut() {
     let camera = made::camera(1, 100, 120);
     let (whole, _) = draw(&gpu, PLENTY, &camera).unwrap();
     let row = 100 * 16 * 16;
-    let (cut, stats) = draw(&gpu, RoomLimits { pixels: 3 * row, ..PLENTY }, &camera).unwrap();
+    let (cut, stats) = draw(&gpu, CapacityLimits { pixels: 3 * row, ..PLENTY }, &camera).unwrap();
     assert_eq!((stats.bands, stats.retries), (3, 0));
     assert!(bits(&cut) == bits(&whole));
-    let refused = draw(&gpu, RoomLimits { pixels: row - 1, ..PLENTY }, &camera);
+    let refused = draw(&gpu, CapacityLimits { pixels: row - 1, ..PLENTY }, &camera);
     assert!(matches!(refused, Err(Error::GpuLimit { found, limit, .. }) if (found, limit) == (row, row - 1)));
 }
 
@@ -120,7 +121,7 @@ fn scenes_in_turn_are_drawn_without_trying_again() {
     let camera = made::camera(1, 100, 120);
     let options = RenderOptions::default();
     let (_, stats) = draw(&gpu, PLENTY, &camera).unwrap();
-    let limits = RoomLimits { entries: u64::from(stats.entries) / 3, ..PLENTY };
+    let limits = CapacityLimits { entries: u64::from(stats.entries) / 3, ..PLENTY };
     let mut renderer = GpuRenderer::new(&gpu).unwrap().with_limits(limits);
     let scenes = [8, 9].map(|seed| {
         let splats = made::scene(seed, 1500, ShDegree::ONE, false);

@@ -1,18 +1,20 @@
-//! Each atom's radiance over directions, so that a nonzero costs one filtered lookup instead of a dot
-//! product: the dictionary is small, fixed and shared by all Gaussians.
+//! A table of each atom's radiance over directions. With it, a nonzero costs one filtered lookup instead of a
+//! dot product. The dictionary is small, fixed and shared by all Gaussians.
 //!
-//! The table is a cube of [`TABLE_SIDE`]² texels a face in half precision, sampled bilinearly. The outer
-//! texels' centres lie on the faces' edges, so a sample never mixes faces and the whole is continuous.
+//! The table is a cube with [`TABLE_SIDE`]² texels on each face, in half precision, sampled bilinearly. The
+//! centres of the outer texels lie on the edges of the faces. A sample so never mixes two faces, and the whole
+//! is continuous.
 
 use half::f16;
 use lexisplat::Dictionary;
 use lexisplat::sh::rest_basis;
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
+use crate::parallel::*;
 
+use super::buffer::Counted;
 use super::constants::TABLE_SIDE;
-use super::device::{Counted, Gpu};
+use super::device::Gpu;
 use super::shaders::Bound;
 
 /// Faces of a cube: +x, -x, +y, -y, +z, -z.
@@ -20,14 +22,15 @@ const FACES: u32 = 6;
 
 /// The table on the GPU.
 #[derive(Debug)]
-pub(super) struct Table {
+pub(super) struct RadianceTable {
     pub(super) view: wgpu::TextureView,
     pub(super) sampler: wgpu::Sampler,
     bytes: Counted,
 }
 
-impl Table {
-    pub(super) fn new(gpu: &Gpu, dictionary: &Dictionary) -> Result<Self> {
+impl RadianceTable {
+    /// Works the table out and uploads it.
+    pub(super) async fn new(gpu: &Gpu, dictionary: &Dictionary) -> Result<Self> {
         let side = TABLE_SIDE;
         let layers = u32::try_from(dictionary.len()).unwrap_or(u32::MAX).max(1);
         let most = gpu.limits().max_texture_array_layers;
@@ -37,18 +40,17 @@ impl Table {
         }
         let size = wgpu::Extent3d { width: FACES * side, height: side, depth_or_array_layers: layers };
         let texel = size_of::<[f16; 4]>();
-        let texture = gpu.checked("table", || {
-            gpu.device().create_texture(&wgpu::TextureDescriptor {
-                label: Some("atom radiance"),
-                size,
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: wgpu::TextureFormat::Rgba16Float,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
-                view_formats: &[],
-            })
-        })?;
+        let descriptor = wgpu::TextureDescriptor {
+            label: Some("atom radiance"),
+            size,
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: wgpu::TextureFormat::Rgba16Float,
+            usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
+            view_formats: &[],
+        };
+        let texture = gpu.checked("radiance table", || Ok(gpu.device().create_texture(&descriptor))).await?;
         let texels: Vec<u16> = texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
         let per_row = u32::try_from(texel).unwrap_or(0) * size.width;
         if !dictionary.is_empty() {
@@ -81,7 +83,7 @@ impl Table {
         self.bytes.size()
     }
 
-    /// What radiance is given after the buffers.
+    /// What is bound to the radiance kernel after the buffers.
     pub(super) fn bound(&self) -> [(u32, Bound<'_>); 2] {
         [(10, Bound::Texture(&self.view)), (11, Bound::Sampler(&self.sampler))]
     }
@@ -102,7 +104,7 @@ fn direction(face: u32, column: u32, row: u32) -> [f32; 3] {
     d.map(|v| v / length)
 }
 
-/// RGBA texels of all layers, one layer an atom, rows of six faces.
+/// Returns the RGBA texels of all layers. Each layer is of one atom, and its rows span the six faces.
 fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
     let degree = dictionary.degree();
     let per_channel = degree.rest_per_channel();
@@ -113,20 +115,23 @@ fn texels(dictionary: &Dictionary) -> Vec<[f16; 4]> {
         .collect();
     (0..dictionary.len())
         .into_par_iter()
-        .flat_map_iter(|j| {
-            let atom = dictionary.atom(j);
-            bases.iter().map(move |basis| {
+        .map(|j| {
+            let texel = |basis: &[f32]| {
                 let mut texel = [f16::ZERO; 4];
-                for (out, channel) in texel.iter_mut().zip(atom.chunks_exact(per_channel.max(1))) {
+                for (out, channel) in
+                    texel.iter_mut().zip(dictionary.atom(j).chunks_exact(per_channel.max(1)))
+                {
                     *out = f16::from_f32(channel.iter().zip(basis).map(|(a, b)| a * b).sum());
                 }
                 texel
-            })
+            };
+            bases.iter().map(|basis| texel(basis)).collect::<Vec<_>>()
         })
-        .collect()
+        .collect::<Vec<_>>()
+        .concat()
 }
 
-/// The kernel's lookup, for tests: the atoms' radiance towards `d` by the table.
+/// Returns an atom's radiance towards `d` by the table, looked up as the kernel does.
 #[cfg(test)]
 pub(super) fn sample(texels: &[[f16; 4]], atom: usize, d: [f32; 3]) -> [f32; 3] {
     let size = d.map(f32::abs);

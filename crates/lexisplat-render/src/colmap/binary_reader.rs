@@ -1,4 +1,4 @@
-//! A binary file from front to back, none of whose counts is believed.
+//! Reads a binary file from front to back. A count in it is checked against the bytes that follow.
 
 use std::fmt::{Arguments, Display};
 use std::io::{BufRead, ErrorKind, Seek};
@@ -6,19 +6,19 @@ use std::io::{BufRead, ErrorKind, Seek};
 use crate::cameras_json::{MAX_CAMERAS, MAX_NAME};
 use crate::error::{Error, Result};
 
-/// Little-endian values of a reader of known length.
-pub(super) struct Source<'a, R> {
+/// Reads little-endian values from a reader of known length.
+pub(super) struct BinaryReader<'a, R> {
     file: &'a str,
     reader: R,
     left: u64,
 }
 
-impl<'a, R: BufRead + Seek> Source<'a, R> {
+impl<'a, R: BufRead + Seek> BinaryReader<'a, R> {
     pub(super) fn new(file: &'a str, reader: R, len: u64) -> Self {
         Self { file, reader, left: len }
     }
 
-    /// An error about the file.
+    /// Returns an error about the file.
     pub(super) fn wrong(&self, what: impl Display, problem: impl Display) -> Error {
         Error::format(self.file, format!("{what}: {problem}"))
     }
@@ -28,7 +28,7 @@ impl<'a, R: BufRead + Seek> Source<'a, R> {
     }
 
     fn cut(&self, what: Arguments<'_>) -> Error {
-        self.wrong(what, "the file ends in it; it is cut off or no such file")
+        self.wrong(what, "the file ends here; it is cut off or not a file of this kind")
     }
 
     fn take<const N: usize>(&mut self, what: Arguments<'_>) -> Result<[u8; N]> {
@@ -54,7 +54,7 @@ impl<'a, R: BufRead + Seek> Source<'a, R> {
         Ok(values)
     }
 
-    /// The number of entries that follow, of at least `least` bytes each.
+    /// Reads the number of entries that follow, of at least `least` bytes each.
     pub(super) fn count(&mut self, what: &str, least: u64) -> Result<u64> {
         let count = self.u64(format_args!("number of {what}"))?;
         if count > self.left / least {
@@ -68,7 +68,7 @@ impl<'a, R: BufRead + Seek> Source<'a, R> {
         Ok(count)
     }
 
-    /// Leaves out `count` entries of `size` bytes.
+    /// Skips `count` entries of `size` bytes.
     pub(super) fn skip(&mut self, count: u64, size: u64, what: Arguments<'_>) -> Result<()> {
         let bytes = count.checked_mul(size).filter(|bytes| *bytes <= self.left);
         let Some((bytes, offset)) = bytes.and_then(|b| Some((b, i64::try_from(b).ok()?))) else {
@@ -79,7 +79,7 @@ impl<'a, R: BufRead + Seek> Source<'a, R> {
         self.reader.seek_relative(offset).map_err(|e| self.failed(what, e))
     }
 
-    /// Text up to a zero byte.
+    /// Reads a text up to a zero byte.
     pub(super) fn name(&mut self, what: Arguments<'_>) -> Result<String> {
         let mut bytes = Vec::new();
         loop {
