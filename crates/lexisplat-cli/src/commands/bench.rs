@@ -12,6 +12,7 @@ use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
 use crate::args::{Bench, Common};
+use crate::device::open_gpu;
 use crate::files::{load, note, print, print_json, warn_of};
 use crate::progress::Bars;
 
@@ -26,7 +27,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     let scene = input.scene();
     let views = &args.views;
     let cameras = views.choose(scene.geometry())?;
-    let gpu = views.device.open_gpu()?;
+    let gpu = open_gpu(views.device)?;
     if gpu.is_none() && views.device == Device::Auto {
         note("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
     }

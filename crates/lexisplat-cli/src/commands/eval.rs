@@ -10,10 +10,11 @@ use lexisplat_eval::views::{ChosenViews, View, photo};
 use lexisplat_eval::{
     Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, montage, png, score_views, text,
 };
-use lexisplat_render::{Camera, Image, Renderer};
+use lexisplat_render::{Camera, Image};
 use serde_json::{Value, json};
 
 use crate::args::{Common, Eval, Measures};
+use crate::device::open_renderer;
 use crate::files::{
     check_free, check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
 };
@@ -50,7 +51,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         stop::while_writing(Work::Files(usize::MAX));
     }
     let scorer = scorer(&args.measures)?;
-    let mut renderer = Renderer::open(args.views.device)?;
+    let mut renderer = open_renderer(args.views.device)?;
     let drawing = DrawOptions { background: args.views.background, eight_bit: args.measures.eight_bit };
     // Views that are generated fit the original; all models are seen from the same.
     let original = args.original.as_deref().map(|path| load(path, common)).transpose()?;

@@ -15,6 +15,7 @@ use serde_json::{Value, json};
 
 use super::compress::error_line;
 use crate::args::{Common, Compress};
+use crate::device::open_renderer;
 use crate::files::{tell, warn, write_output};
 use crate::progress::Bars;
 
@@ -47,7 +48,7 @@ pub(crate) fn run(
         }
         None => Views::generated(&splats),
     };
-    let mut renderer = Renderer::open(args.device)?;
+    let mut renderer = open_renderer(args.device)?;
     bars.start("looking", "views", views.len() as u64);
     let mut sensitivity = views.sensitivity(&mut renderer, &splats, &mut || bars.advance(1))?;
     bars.end();
@@ -140,7 +141,7 @@ pub(crate) fn run_in_parts(
     let options = options(args);
     let decibels = args.preset.unwrap_or_default().decibels();
     let clock = Instant::now();
-    let mut renderer = if args.guess { Renderer::cpu() } else { Renderer::open(args.device)? };
+    let mut renderer = if args.guess { Renderer::cpu() } else { open_renderer(args.device)? };
     let device = renderer.is_gpu().then(|| renderer.name().to_owned());
     let mut look_seconds = 0.0;
     let mut judge = |part: &Splats| -> Result<Sensitivity> {
