@@ -11,6 +11,7 @@ use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
 use crate::args::{Bench, Common};
+use crate::device::open_gpu;
 use crate::files::{load, note, print, print_json, warn_of};
 use crate::progress::Bars;
 
@@ -25,7 +26,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     let scene = input.scene();
     let views = &args.views;
     let cameras = super::cameras(views, scene.geometry())?;
-    let gpu = views.device.open_gpu()?;
+    let gpu = open_gpu(views.device)?;
     if gpu.is_none() && views.device == Device::Auto {
         note(
             "warning: the only GPU is emulated in software, so only the CPU is measured; --device gpu measures it too",

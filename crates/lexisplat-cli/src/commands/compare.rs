@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, montage, png, text};
-use lexisplat_render::Renderer;
 use serde_json::json;
 
 use crate::args::{Common, Compare};
+use crate::device::open_renderer;
 use crate::files::{check_free, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
@@ -19,7 +19,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
     let cameras = super::cameras(views, scene_a.geometry())?;
-    let mut renderer = Renderer::open(views.device)?;
+    let mut renderer = open_renderer(views.device)?;
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
         for (i, camera) in cameras.iter().enumerate() {

@@ -3,10 +3,11 @@
 use anyhow::Result;
 use lexisplat::simd::Simd;
 use lexisplat_eval::text;
-use lexisplat_render::gpu::{AdapterSummary, adapters};
+use lexisplat_render::gpu::AdapterSummary;
 use serde_json::json;
 
 use crate::args::Common;
+use crate::device::adapters;
 use crate::files::{print, print_json};
 
 pub(crate) fn run(common: &Common) -> Result<()> {

@@ -9,10 +9,11 @@ use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
 use lexisplat_eval::{
     Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, misfit, montage, png, score_views, text,
 };
-use lexisplat_render::{Camera, Image, Renderer};
+use lexisplat_render::{Camera, Image};
 use serde::Serialize;
 
 use crate::args::{Common, Eval, Measures};
+use crate::device::open_renderer;
 use crate::files::{
     check_free, check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
 };
@@ -63,7 +64,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         stop::while_writing(Work::Files(usize::MAX));
     }
     let scorer = scorer(&args.measures)?;
-    let mut renderer = Renderer::open(args.views.device)?;
+    let mut renderer = open_renderer(args.views.device)?;
     let drawing = DrawOptions::new(args.views.background, args.measures.eight_bit);
     // Generated views fit the original, and all models are drawn from the same views.
     let original = args.original.as_deref().map(|path| load(path, common)).transpose()?;

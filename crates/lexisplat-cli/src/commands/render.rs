@@ -6,10 +6,11 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::Progress;
 use lexisplat_eval::png;
-use lexisplat_render::{RenderOptions, Renderer};
+use lexisplat_render::RenderOptions;
 use serde_json::json;
 
 use crate::args::{Common, Render};
+use crate::device::open_renderer;
 use crate::files::{
     check_free, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
 };
@@ -31,7 +32,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     for path in &paths {
         check_free(path, &[], common.overwrite)?;
     }
-    let mut renderer = Renderer::open(views.device)?;
+    let mut renderer = open_renderer(views.device)?;
     let prepared = renderer.prepare(scene)?;
     stop::while_writing(Work::Files(paths.len()));
     make_folder(&folder)?;

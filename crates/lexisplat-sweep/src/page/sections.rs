@@ -2,9 +2,11 @@
 
 use std::fmt::Write;
 
+use base64::Engine;
+
 use super::SweepPicture;
 use super::facts::Facts;
-use crate::report::{base64, text};
+use crate::report::text;
 use crate::table::Table;
 use crate::{Figure, Method, NOTES, SceneResult, level_off, tables};
 use lexisplat_eval::montage::AMPLIFICATION;
@@ -101,7 +103,7 @@ fn cards(page: &mut String, facts: &Facts<'_>) {
 
 fn image(page: &mut String, class: &str, alt: &str, png: &[u8]) {
     let _ = write!(page, "<img class=\"{class}\" alt=\"{}\" src=\"data:image/png;base64,", text::escape(alt));
-    base64::encode(png, page);
+    base64::engine::general_purpose::STANDARD.encode_string(png, page);
     page.push_str("\">");
 }
 
