@@ -182,5 +182,7 @@ fn compared(
 ) -> Result<Comparison> {
     let (original, compressed) = (Scene::from(original), Scene::from(compressed));
     let (mut renderer, options) = (Renderer::cpu(), DrawOptions::default());
-    compare(&mut renderer, &original, &compressed, cameras, &options, progress, |view, a, b| draw(&view.name, a, b))
+    compare(&mut renderer, &original, &compressed, cameras, &options, progress, |view, a, b| {
+        draw(&view.name, a, b)
+    })
 }
