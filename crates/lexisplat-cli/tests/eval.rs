@@ -13,7 +13,8 @@ use serde_json::{Value, json};
 /// How long a point of a small sweep may take on a slow machine.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Nine cameras, so that two are test views by name, as a `cameras.json` and as a COLMAP model, and photos.
+/// Returns a folder with photos and their nine cameras, as a `cameras.json` and as a COLMAP model. Two of the cameras are
+/// test views, by the order of their names.
 fn with_photos() -> Folder {
     let folder = Folder::new();
     let mut cameras = Vec::new();

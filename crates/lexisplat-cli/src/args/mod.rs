@@ -9,6 +9,7 @@ mod views;
 
 use std::path::PathBuf;
 
+use clap::error::{ContextKind, ContextValue};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use lexisplat::Limits;
 
@@ -133,7 +134,17 @@ pub(crate) struct Completions {
 
 /// Parses the command line of this process.
 pub(crate) fn parse() -> Result<Cli, clap::Error> {
-    Cli::from_arg_matches(&command().try_get_matches()?)
+    Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice_on_numbers)?)
+}
+
+/// Replaces the advice that clap gives on an unexpected negative number, which is to use it as the name of a file.
+fn with_advice_on_numbers(mut error: clap::Error) -> clap::Error {
+    let argument = error.get(ContextKind::InvalidArg);
+    if matches!(argument, Some(ContextValue::String(text)) if text.parse::<f64>().is_ok()) {
+        let advice = "the value of an option such as --prune is written behind '=': --prune=2";
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    }
+    error
 }
 
 /// Returns the definition of the command line.
