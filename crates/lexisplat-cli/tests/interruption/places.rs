@@ -3,8 +3,8 @@
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::process::Command;
 
+use super::runs::{JOBS, OLD, OUTPUT, program, ready};
 use crate::folder::Folder;
-use crate::runs::{JOBS, OLD, OUTPUT, program, ready};
 
 /// A folder with a PLY that nobody could read: what is refused before it is read is refused for the output.
 fn unread() -> Folder {
