@@ -1,9 +1,6 @@
 //! The program as a user runs it.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, GAUSSIANS, lexisplat, read};
+use crate::folder::{Folder, GAUSSIANS, lexisplat, read};
 use lexisplat::ply;
 use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;

@@ -1,14 +1,11 @@
 //! The same input, options and seed give the same bytes on any number of threads and with every set of vector
 //! instructions that this CPU has, by everything that a user runs: exact and packed files, pictures that judge
 //! quality, scenes packed part by part, decompressed scenes, drawn ones.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod folder;
 
 use std::collections::BTreeMap;
 
+use crate::folder::{Folder, lexisplat};
 use assert_cmd::Command;
-use folder::{Folder, lexisplat};
 use lexisplat::ply;
 use lexisplat::simd::Simd;
 use lexisplat_sample::{SampleOptions, scene};

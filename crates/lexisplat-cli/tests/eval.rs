@@ -1,12 +1,9 @@
 //! `eval` and `sweep` as a user runs them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod folder;
 
 use std::time::{Duration, Instant};
 
+use crate::folder::{Folder, lexisplat, read};
 use assert_cmd::cargo::cargo_bin;
-use folder::{Folder, lexisplat, read};
 use lexisplat::ply;
 use serde_json::{Value, json};
 

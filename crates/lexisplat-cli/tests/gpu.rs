@@ -1,9 +1,7 @@
 //! Drawing on a GPU, as a user asks for it. Without an adapter these tests are skipped.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, lexisplat};
+use crate::folder;
+use crate::folder::{Folder, lexisplat};
 use lexisplat_testing::{Need, missing};
 use serde_json::Value;
 

@@ -1,9 +1,6 @@
 //! `--limit` with every command that reads a model.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, GAUSSIANS, lexisplat};
+use crate::folder::{Folder, GAUSSIANS, lexisplat};
 
 /// Exit code of a size over a limit.
 const LIMIT: i32 = 6;

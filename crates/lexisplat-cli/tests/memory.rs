@@ -1,9 +1,7 @@
 //! Scenes that are said to be larger than memory, as a user packs them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, GAUSSIANS, read};
+use crate::folder;
+use crate::folder::{Folder, GAUSSIANS, read};
 
 /// Less than any scene takes.
 const LITTLE: [&str; 2] = ["--memory", "100kB"];

@@ -1,9 +1,7 @@
 //! Packed files as a user makes and reads them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, read};
+use crate::folder;
+use crate::folder::{Folder, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.

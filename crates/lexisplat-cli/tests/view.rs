@@ -1,8 +1,4 @@
 //! The window, on a display of its own. Without Xvfb or an adapter these tests are skipped.
-#![cfg(feature = "view")]
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod folder;
 
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -10,7 +6,7 @@ use std::process::{Child, Command, Output, Stdio};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-use folder::{Folder, lexisplat};
+use crate::folder::{Folder, lexisplat};
 use image::RgbImage;
 use lexisplat_testing::{Need, missing};
 use serde_json::Value;

@@ -1,19 +1,7 @@
 //! Values that are not finite or huge, in every property: the GPU leaves out what the processor does.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{made, twins};
 use lexisplat::sh::rest_basis;
 use lexisplat::{ShDegree, Splats};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};

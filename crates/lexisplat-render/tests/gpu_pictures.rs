@@ -1,19 +1,7 @@
 //! Whole pictures of the GPU against the processor's.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{adapter, common, made, twins};
 use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
 use lexisplat_render::gpu::{GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Image, RenderOptions, Scene, render};

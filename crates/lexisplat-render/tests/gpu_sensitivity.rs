@@ -1,18 +1,9 @@
 //! Sensitivities measured on the GPU against those of the processor.
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod made;
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use adapter::{gpu, opened};
+use crate::adapter::{gpu, opened};
+use crate::made;
 use lexisplat::{Progress, Sensitivity, ShDegree, Silent, Splats};
 use lexisplat_render::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Error, Scene, sensitivity, surround};

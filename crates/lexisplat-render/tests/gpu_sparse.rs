@@ -1,19 +1,7 @@
 //! Drawing from codes on the GPU, made up and compressed for real.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{common, made, twins};
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{CompressOptions, Layout, Model, Sensitivity, ShDegree, Silent, compress};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};

@@ -1,17 +1,7 @@
 //! Real models against the photos they were trained on, and against the twin. Skipped without the data
 //! folder.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-#[expect(clippy::cast_sign_loss, reason = "pixels are not negative")]
-mod naive;
-
+use crate::{common, naive};
 use lexisplat_render::{Camera, RenderOptions, Scene, Split, read_cameras, render};
 
 fn test_cameras(name: &str) -> Option<Vec<Camera>> {

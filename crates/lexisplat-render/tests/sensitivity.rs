@@ -1,5 +1,4 @@
 //! Sensitivities against finite differences of the rasteriser itself.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 

@@ -1,15 +1,6 @@
 //! Drawing from codes against drawing the same scene made dense.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-mod made;
-
+use crate::{common, made};
 use lexisplat::ShDegree;
 use lexisplat_render::{Radiance, RenderOptions, Scene, render};
 

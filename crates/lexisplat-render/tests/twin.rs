@@ -1,17 +1,6 @@
 //! The tile rasteriser against its naive f64 twin, on scenes made to hit every rule.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-mod made;
-#[expect(clippy::cast_sign_loss, reason = "pixels are not negative")]
-mod naive;
-
+use crate::{common, made, naive};
 use lexisplat::ShDegree;
 use lexisplat_render::{RenderOptions, Scene, render};
 

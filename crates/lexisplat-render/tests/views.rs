@@ -1,16 +1,9 @@
 //! Cameras from files and folders of each kind; with the data folder, those of a real COLMAP model.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-
 use std::fs;
 use std::path::Path;
 
+use crate::common;
 use lexisplat_render::{
     Camera, Error, RenderOptions, Scene, Split, ViewSet, read_cameras, read_colmap, read_views, render,
 };

@@ -1,10 +1,7 @@
 //! The encoder as a whole: the promise, every degree, odd scenes, and bytes that depend on nothing but
 //! the input.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
-
-use common::written;
+use crate::common::written;
 use lexisplat::{
     CompressOptions, Dictionary, Error, Geometry, Layout, Limits, Pursuit, SceneMeta, ShDegree, Silent,
     Splats, compress, lexi,

@@ -1,12 +1,8 @@
 //! Files written by released versions stay readable, and today's bytes are theirs.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
 use std::path::PathBuf;
 
-use common::{models, written};
+use crate::common::{models, written};
 use lexisplat::{Error, FormatError, Limits, Splats, lexi};
 use lexisplat_testing::repository_file;
 

@@ -1,13 +1,7 @@
 //! Damaged and hostile .lexi files, read whole and a part at a time: refused, without panic, within memory.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-#[path = "common/allocator.rs"]
-mod allocator;
-mod common;
-
-use allocator::counted;
-use common::{count_in_parts, models, reseal, written};
+use crate::allocator::{alone, counted};
+use crate::common::{count_in_parts, models, reseal, written};
 use lexisplat::{Limits, Model, lexi};
 use lexisplat_testing::Random;
 use serde_json::Value;
@@ -87,9 +81,9 @@ fn change_header(header: &mut Value, random: &mut Random) {
     }
 }
 
-/// One test, since the allocator counts for the whole process.
 #[test]
 fn damage_is_refused_within_memory() {
+    let _alone = alone();
     let files: Vec<(&str, Vec<u8>)> = models().into_iter().map(|(name, m)| (name, written(&m))).collect();
     for (name, bytes) in &files {
         assert!(accepted(bytes), "{name}");

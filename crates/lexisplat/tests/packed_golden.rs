@@ -2,8 +2,6 @@
 //!
 //! Nothing is packed here but by hand, so a better encoder changes nothing.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::path::PathBuf;
 
 use lexisplat::lexi::Contents;

@@ -4,14 +4,9 @@
 use lexisplat::ply::{self, Format, PlySource, ReadOptions};
 use lexisplat::{Silent, SplatSource};
 
-#[path = "common/allocator.rs"]
-mod allocator;
-#[path = "ply/support.rs"]
-mod support;
-
-use allocator::counted;
+use crate::allocator::{alone, counted};
+use crate::ply_support::{File, columns, scene};
 use lexisplat_testing::Random;
-use support::{File, columns, scene};
 
 /// Damaged files read.
 const INPUTS: usize = 10_000;
@@ -136,6 +131,7 @@ fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
 /// One test only: the counters are the whole process's.
 #[test]
 fn damaged_files_are_refused_quietly() {
+    let _alone = alone();
     let seeds = seeds();
     // Starts the thread pool, whose own memory is not the reader's.
     let warm = File::new(columns(&scene(3, 5000, 1))).bytes();

@@ -1,5 +1,4 @@
 //! Streams give what whole scenes give, from and to files, on any number of threads.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
 

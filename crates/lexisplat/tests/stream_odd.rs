@@ -1,6 +1,5 @@
 //! Odd scenes go through the streams as they go through memory: none, one, the same again and again, rows left out at
 //! the borders of parts, properties of every type, normals, text.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::PackOptions;

@@ -1,7 +1,5 @@
 //! Every file with `unsafe` in it is in the table of SECURITY.md, which says why and what tests it.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 

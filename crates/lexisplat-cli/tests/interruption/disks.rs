@@ -4,8 +4,8 @@ use std::process::{Command, Output, Stdio};
 
 use lexisplat_testing::{Need, missing};
 
+use super::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready};
 use crate::folder::Folder;
-use crate::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready};
 
 /// Mounts a disk of `$SIZE` on `disk`, puts an output there, runs the command, and shows what is left.
 const ON_A_DISK: &str = r#"

@@ -2,7 +2,7 @@
 
 use lexisplat_testing::Random;
 
-use crate::runs::{JOBS, OLD, OUTPUT, assert_old_or_new, program, ready, undisturbed};
+use super::runs::{JOBS, OLD, OUTPUT, assert_old_or_new, program, ready, undisturbed};
 
 /// Kills of each job, with and without an output to replace.
 const KILLS: usize = 4;

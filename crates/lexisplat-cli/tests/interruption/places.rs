@@ -3,8 +3,8 @@
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::process::Command;
 
+use super::runs::{JOBS, OLD, OUTPUT, program, ready};
 use crate::folder::Folder;
-use crate::runs::{JOBS, OLD, OUTPUT, program, ready};
 
 /// Returns a folder with a PLY that cannot be read. What is refused before it is read is refused for its output.
 fn unread() -> Folder {

@@ -8,11 +8,11 @@ use lexisplat::ply;
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_testing::{Need, missing};
 
-use crate::folder::Folder;
-use crate::runs::{
+use super::runs::{
     JOBS, OLD, OUTPUT, PATIENCE, PROGRAM, assert_old_or_new, code, program, ready, send, undisturbed,
     wait_until_watching,
 };
+use crate::folder::Folder;
 
 /// Signals with their numbers and exit codes.
 const SIGNALS: [(&str, i32, i32); 3] = [("HUP", 1, 129), ("INT", 2, 130), ("TERM", 15, 143)];

@@ -2,6 +2,7 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 struct Counting;
 
@@ -50,7 +51,12 @@ pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, usize) {
 }
 
 /// The bytes that the process has allocated so far, those given back included.
-#[allow(dead_code, reason = "not every test binary asks")]
 pub(crate) fn total() -> usize {
     TOTAL.load(Relaxed)
+}
+
+/// Waits until no other test counts. The caller counts until it drops what this returns.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }

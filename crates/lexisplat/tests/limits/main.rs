@@ -1,18 +1,12 @@
 //! Every limit, with every reader: what is just at it is read, what is just over is refused before it is
 //! allocated, and the error says which file it was and how to raise the limit.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
-
-#[path = "../common/allocator.rs"]
-mod allocator;
-#[path = "../common/mod.rs"]
-mod common;
 mod files;
 
 use std::cell::Cell;
 
-use allocator::counted;
-use common::copies;
+use crate::allocator::{alone, counted};
+use crate::common::copies;
 use files::{
     HUGE, LARGE, as_ascii, as_ply, exact, model_bytes, packed, packed_bytes, rich, splats_bytes, two_chunks,
 };
@@ -232,9 +226,9 @@ fn pipes() {
     }
 }
 
-/// One test, since the allocator counts for the whole process.
 #[test]
 fn limits_hold_for_every_reader() {
+    let _alone = alone();
     // Starts the threads, whose own memory is not a reader's.
     lexi_whole(&exact(&rich(5000, LARGE), Layout::F16), &Limits::default()).unwrap();
     plys();

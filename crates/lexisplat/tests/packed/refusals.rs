@@ -3,7 +3,7 @@
 use lexisplat::packed::{PackOptions, Packed, Packer};
 use lexisplat::{Error, Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
 
-use crate::support::{STEP, bytes, options, pack, sample, with_extras};
+use super::support::{STEP, bytes, options, pack, sample, with_extras};
 
 fn refused(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> String {
     let error = Packer::new(splats, sensitivity, options).unwrap_err();

@@ -1,25 +1,17 @@
 //! Damaged and hostile packed files, read whole and a part at a time: refused or decoded to finite numbers, without
 //! panic, within memory.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-#[path = "../common/allocator.rs"]
-mod allocator;
-#[path = "../common/mod.rs"]
-mod common;
 mod files;
 mod mutations;
-#[path = "../common/parts.rs"]
-mod parts;
 
-use allocator::{counted, total};
-use common::count_in_parts;
+use crate::allocator::{alone, counted, total};
+use crate::common::count_in_parts;
+use crate::parts::Parts;
 use files::{copies, files};
 use lexisplat::packed::CHUNK;
 use lexisplat::{Limits, Model, Splats, lexi};
 use lexisplat_testing::Random;
 use mutations::{change_metadata, change_parameters, change_tensor, make_up};
-use parts::Parts;
 use serde_json::Value;
 
 /// A reader may hold this many bytes per byte of input. A byte is at most 3 Gaussians, each 57 bytes as it is
@@ -70,9 +62,9 @@ fn accepted(bytes: &[u8]) -> bool {
     }
 }
 
-/// One test, since the allocator counts for the whole process.
 #[test]
 fn damage_is_refused_within_bounds() {
+    let _alone = alone();
     let files = files();
     for (name, bytes) in &files {
         assert!(accepted(bytes), "{name}");

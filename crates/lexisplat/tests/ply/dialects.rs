@@ -3,7 +3,7 @@
 use lexisplat::ply::{self, Dialect, Format, PlyRead, ReadOptions, ScalarType};
 use lexisplat::{Extra, ExtraValues, Splats};
 
-use crate::support::{Column, File, assert_same, columns, scene};
+use super::support::{Column, File, assert_same, columns, scene};
 
 const NORMALS: [&str; 3] = ["nx", "ny", "nz"];
 /// More than two chunks of rows.

@@ -7,7 +7,7 @@ use lexisplat::{Extra, ExtraValues, Geometry, SceneMeta, ShDegree, Splats};
 use lexisplat_testing::Random;
 use proptest::prelude::*;
 
-use crate::support::{Column, File, TYPES, assert_same, columns, scene};
+use super::support::{Column, File, TYPES, assert_same, columns, scene};
 
 /// A value in its own type, as text that loses nothing for integers and as bits for floats.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
 use lexisplat::{CompressOptions, Error, Extra, ExtraValues, FormatError, Limits, Silent, lexi};
 
-use crate::support::{Column, File, assert_same, columns, scene};
+use super::support::{Column, File, assert_same, columns, scene};
 
 fn refuse(bytes: &[u8]) -> String {
     let said =
