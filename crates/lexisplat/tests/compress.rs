@@ -197,9 +197,9 @@ fn wrong_options_are_named() {
         assert!(matches!(error, Error::Parameter { .. }), "{error}");
         error.to_string()
     };
-    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tol = 0"));
-    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tol = NaN"));
-    assert!(run(|o| o.tolerance = None).starts_with("tol = none"));
+    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tolerance = 0"));
+    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tolerance = NaN"));
+    assert!(run(|o| o.tolerance = None).starts_with("tolerance = none"));
     assert!(run(|o| o.atoms = Some(0)).starts_with("atoms = 0"));
     assert!(run(|o| o.atoms = Some(1025)).contains("1 to 1024"));
     assert!(run(|o| o.dictionary = Some(Dictionary::empty())).contains("degree 3"));

@@ -50,7 +50,7 @@ impl PackOptions {
         if let Some(tol) = self.tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
-            return Err(Error::parameter("tol", tol, "a finite number above 0"));
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
         }
         Ok(())
     }

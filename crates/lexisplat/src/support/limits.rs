@@ -1,6 +1,7 @@
 //! Limits on what a file may ask for, checked before anything is allocated.
 
 use crate::scene::sh::MAX_REST;
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 
 /// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
@@ -80,47 +81,15 @@ impl Limits {
     pub const NAMES: [&'static str; 7] =
         ["gaussians", "atoms", "nonzeros", "bytes", "expansion", "header_bytes", "properties"];
 
-    /// Sets [`Self::gaussians`].
-    #[must_use]
-    pub fn with_gaussians(self, gaussians: u64) -> Self {
-        Self { gaussians, ..self }
-    }
-
-    /// Sets [`Self::atoms`].
-    #[must_use]
-    pub fn with_atoms(self, atoms: u64) -> Self {
-        Self { atoms, ..self }
-    }
-
-    /// Sets [`Self::nonzeros`].
-    #[must_use]
-    pub fn with_nonzeros(self, nonzeros: u64) -> Self {
-        Self { nonzeros, ..self }
-    }
-
-    /// Sets [`Self::bytes`].
-    #[must_use]
-    pub fn with_bytes(self, bytes: u64) -> Self {
-        Self { bytes, ..self }
-    }
-
-    /// Sets [`Self::expansion`].
-    #[must_use]
-    pub fn with_expansion(self, expansion: u64) -> Self {
-        Self { expansion, ..self }
-    }
-
-    /// Sets [`Self::header_bytes`].
-    #[must_use]
-    pub fn with_header_bytes(self, header_bytes: u64) -> Self {
-        Self { header_bytes, ..self }
-    }
-
-    /// Sets [`Self::properties`].
-    #[must_use]
-    pub fn with_properties(self, properties: u64) -> Self {
-        Self { properties, ..self }
-    }
+    builder_methods!(
+        with_gaussians(gaussians: u64),
+        with_atoms(atoms: u64),
+        with_nonzeros(nonzeros: u64),
+        with_bytes(bytes: u64),
+        with_expansion(expansion: u64),
+        with_header_bytes(header_bytes: u64),
+        with_properties(properties: u64),
+    );
 
     /// Sets the limit called `name`, one of [`Self::NAMES`].
     ///

@@ -4,55 +4,53 @@
 //! IEEE arithmetic and square roots are rounded the same on every machine. The other functions come from `libm`,
 //! which is plain Rust and therefore the same everywhere, unlike the system's library.
 
-/// 2 to the power `x`.
 #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+#[inline]
+fn rounded(x: f64) -> f32 {
+    x as f32
+}
+
+/// 2 to the power `x`.
 pub(crate) fn exp2(x: f32) -> f32 {
-    libm::exp2(f64::from(x)) as f32
+    rounded(libm::exp2(f64::from(x)))
 }
 
 /// e to the power `x`.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn exp(x: f32) -> f32 {
-    libm::exp(f64::from(x)) as f32
+    rounded(libm::exp(f64::from(x)))
 }
 
 /// Natural logarithm.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn ln(x: f32) -> f32 {
-    libm::log(f64::from(x)) as f32
+    rounded(libm::log(f64::from(x)))
 }
 
 /// Binary logarithm.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn log2(x: f32) -> f32 {
-    libm::log2(f64::from(x)) as f32
+    rounded(libm::log2(f64::from(x)))
 }
 
 /// The angle of the point (x, y).
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
-    libm::atan2(f64::from(y), f64::from(x)) as f32
+    rounded(libm::atan2(f64::from(y), f64::from(x)))
 }
 
 /// Sine and cosine.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     let (sine, cosine) = libm::sincos(f64::from(x));
-    (sine as f32, cosine as f32)
+    (rounded(sine), rounded(cosine))
 }
 
 /// ln(sigmoid(x)): the logarithm of an opacity, from what a trainer stores.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn log_sigmoid(x: f32) -> f32 {
     let x = f64::from(x);
-    (x.min(0.0) - libm::log1p(libm::exp(-x.abs()))) as f32
+    rounded(x.min(0.0) - libm::log1p(libm::exp(-x.abs())))
 }
 
 /// Inverse of [`log_sigmoid`], for arguments below 0.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn logit_of_log(x: f32) -> f32 {
     let x = f64::from(x);
-    (x - libm::log(-libm::expm1(x))) as f32
+    rounded(x - libm::log(-libm::expm1(x)))
 }
 
 /// The value below which `share` of the values in `sorted` lie; 0 if `sorted` is empty.

@@ -75,10 +75,7 @@ fn at_least(least: u64, name: &'static str, (what, read): (&str, Reader), bytes:
     let error = read(bytes, &with(least - 1)).expect_err(&format!("{what}, {name} {}", least - 1));
     let said = error.to_string();
     assert!(matches!(&error, Error::Limit { name: Some(n), .. } if *n == name), "{what}, {name}: {said}");
-    assert!(
-        said.contains(NAME) && said.ends_with(&format!("is over the limit of {}", least - 1)),
-        "{what}: {said}"
-    );
+    assert!(said.contains(NAME) && said.contains(" is over the limit of "), "{what}: {said}");
     for value in [0, least / 2] {
         assert!(matches!(read(bytes, &with(value)), Err(Error::Limit { .. })), "{what}, {name} {value}");
     }

@@ -6,6 +6,7 @@ use super::file::PlyFile;
 use super::fill::{empty, fill, fill_normals};
 use super::summary::PlySummary;
 use crate::scene::splats::Splats;
+use crate::support::builder::builder_methods;
 use crate::support::error::Result;
 use crate::support::input::Input;
 use crate::support::limits::Limits;
@@ -21,17 +22,7 @@ pub struct ReadOptions {
 }
 
 impl ReadOptions {
-    /// Sets [`Self::drop_invalid`].
-    #[must_use]
-    pub fn with_drop_invalid(self, drop_invalid: bool) -> Self {
-        Self { drop_invalid, ..self }
-    }
-
-    /// Sets [`Self::limits`].
-    #[must_use]
-    pub fn with_limits(self, limits: Limits) -> Self {
-        Self { limits, ..self }
-    }
+    builder_methods!(with_drop_invalid(drop_invalid: bool), with_limits(limits: Limits));
 }
 
 /// A scene and a description of its file.

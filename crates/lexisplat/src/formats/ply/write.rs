@@ -15,6 +15,10 @@ use std::io::{self, Write};
 /// Rows formatted in memory before they are written: 8 MiB at 248 bytes a row.
 const BLOCK_ROWS: usize = 32 * ROWS_PER_TASK;
 
+/// Floats of a row besides SH-rest.
+const FIXED_FLOATS: usize =
+    POSITION.len() + NORMAL.len() + DC.len() + OPACITY.len() + SCALE.len() + ROTATION.len();
+
 /// Writes `splats` to `output`, whole or not at all. Returns the number of bytes written.
 ///
 /// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
@@ -154,37 +158,15 @@ fn comments(meta: &SceneMeta) -> Vec<String> {
     out
 }
 
-/// Byte offsets of the groups in a row.
+/// How scenes with the same properties become rows.
 pub(super) struct RowLayout {
-    normal: usize,
-    dc: usize,
-    rest: usize,
-    opacity: usize,
-    scale: usize,
-    rotation: usize,
-    extras: Vec<usize>,
     pub(super) row_bytes: usize,
 }
 
 impl RowLayout {
     pub(super) fn new(splats: &Splats) -> Self {
-        let mut at = 0;
-        let mut place = |bytes: usize| {
-            let start = at;
-            at += bytes;
-            start
-        };
-        let float = size_of::<f32>();
-        let _position = place(3 * float);
-        let normal = place(3 * float);
-        let dc = place(3 * float);
-        let rest = place(splats.degree.rest() * float);
-        let opacity = place(float);
-        let scale = place(3 * float);
-        let rotation = place(4 * float);
-        let extras =
-            splats.geometry.extras.iter().map(|e| place(ScalarType::of(&e.values).bytes())).collect();
-        Self { normal, dc, rest, opacity, scale, rotation, extras, row_bytes: at }
+        let extras: usize = splats.geometry.extras.iter().map(|e| e.values.width()).sum();
+        Self { row_bytes: (FIXED_FLOATS + splats.degree.rest()) * size_of::<f32>() + extras }
     }
 
     /// Writes the Gaussians from `start` on into `rows`.
@@ -193,36 +175,35 @@ impl RowLayout {
         let range = start..start + count;
         let geometry = &splats.geometry;
         let dim = splats.degree.rest();
-        let mut put = |offset: usize, values: &[f32], width: usize| {
-            if width == 0 {
-                return;
-            }
+        let no_normals = if geometry.normals.is_empty() { vec![[0.0; 3]; count] } else { Vec::new() };
+        let normals = geometry.normals.get(range.clone()).unwrap_or(&no_normals);
+        let groups = [
+            (geometry.positions[range.clone()].as_flattened(), POSITION.len()),
+            (normals.as_flattened(), NORMAL.len()),
+            (geometry.dc[range.clone()].as_flattened(), DC.len()),
+            (&splats.sh_rest[range.start * dim..range.end * dim], dim),
+            (&geometry.opacities[range.clone()], OPACITY.len()),
+            (geometry.scales[range.clone()].as_flattened(), SCALE.len()),
+            (geometry.rotations[range.clone()].as_flattened(), ROTATION.len()),
+        ];
+        let mut offset = 0;
+        for (values, width) in groups.into_iter().filter(|group| group.1 > 0) {
+            let field = offset..offset + width * size_of::<f32>();
             for (row, values) in rows.chunks_exact_mut(self.row_bytes).zip(values.chunks_exact(width)) {
-                let target =
-                    row[offset..offset + width * size_of::<f32>()].chunks_exact_mut(size_of::<f32>());
-                for (target, value) in target.zip(values) {
+                for (target, value) in row[field.clone()].chunks_exact_mut(size_of::<f32>()).zip(values) {
                     target.copy_from_slice(&value.to_le_bytes());
                 }
             }
-        };
-        put(0, geometry.positions[range.clone()].as_flattened(), 3);
-        if geometry.normals.is_empty() {
-            put(self.normal, &vec![0.0; 3 * count], 3);
-        } else {
-            put(self.normal, geometry.normals[range.clone()].as_flattened(), 3);
+            offset = field.end;
         }
-        put(self.dc, geometry.dc[range.clone()].as_flattened(), 3);
-        put(self.rest, &splats.sh_rest[range.start * dim..range.end * dim], dim);
-        put(self.opacity, &geometry.opacities[range.clone()], 1);
-        put(self.scale, geometry.scales[range.clone()].as_flattened(), 3);
-        put(self.rotation, geometry.rotations[range.clone()].as_flattened(), 4);
-        for (extra, &offset) in geometry.extras.iter().zip(&self.extras) {
+        for extra in &geometry.extras {
+            let field = offset..offset + extra.values.width();
             for_extra!(&extra.values, values => {
                 for (row, value) in rows.chunks_exact_mut(self.row_bytes).zip(&values[range.clone()]) {
-                    let bytes = value.to_le_bytes();
-                    row[offset..offset + bytes.len()].copy_from_slice(&bytes);
+                    row[field.clone()].copy_from_slice(&value.to_le_bytes());
                 }
             });
+            offset = field.end;
         }
     }
 }

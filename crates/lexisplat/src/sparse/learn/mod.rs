@@ -15,6 +15,7 @@ use crate::scene::sh::ShDegree;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 use crate::sparse::pursuit::{Coder, StopRule, ValueType};
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 use crate::support::progress::{Progress, Stage};
@@ -77,35 +78,13 @@ impl LearnOptions {
         }
     }
 
-    /// Sets [`Self::atoms`].
-    #[must_use]
-    pub fn with_atoms(self, atoms: Option<usize>) -> Self {
-        Self { atoms, ..self }
-    }
-
-    /// Sets [`Self::pursuit`].
-    #[must_use]
-    pub fn with_pursuit(self, pursuit: Pursuit) -> Self {
-        Self { pursuit, ..self }
-    }
-
-    /// Sets [`Self::seed`].
-    #[must_use]
-    pub fn with_seed(self, seed: u64) -> Self {
-        Self { seed, ..self }
-    }
-
-    /// Sets [`Self::sample`].
-    #[must_use]
-    pub fn with_sample(self, sample: usize) -> Self {
-        Self { sample, ..self }
-    }
-
-    /// Sets [`Self::momentum`].
-    #[must_use]
-    pub fn with_momentum(self, momentum: f32) -> Self {
-        Self { momentum, ..self }
-    }
+    builder_methods!(
+        with_atoms(atoms: Option<usize>),
+        with_pursuit(pursuit: Pursuit),
+        with_seed(seed: u64),
+        with_sample(sample: usize),
+        with_momentum(momentum: f32),
+    );
 }
 
 /// A learned dictionary and a report of the learning.

@@ -40,10 +40,10 @@ impl StopRule {
         if let Some(tol) = tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
-            return Err(Error::parameter("tol", tol, "a finite number above 0"));
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
         }
         if tolerance.is_none() && max_nonzeros.is_none() {
-            return Err(Error::parameter("tol", "none", "a tolerance, a cap on nonzeros, or both"));
+            return Err(Error::parameter("tolerance", "none", "a tolerance, a cap on nonzeros, or both"));
         }
         Ok(Self { tolerance, max_nonzeros })
     }

@@ -14,6 +14,6 @@ mod engine;
 mod greedy;
 pub(crate) mod lanes;
 #[cfg(test)]
-mod oracle;
+mod tests;
 
 pub use engine::{Coder, Encoded, StopRule, ValueType, Visit};
