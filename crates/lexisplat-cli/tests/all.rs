@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod cli;
+mod demo;
 mod determinism;
 mod eval;
 mod folder;
@@ -12,7 +13,10 @@ mod gpu;
 mod interruption;
 mod limits;
 mod memory;
+mod misuse;
 mod packed;
+mod printed;
+mod standard_error;
 #[cfg(feature = "view")]
 mod view;
 

@@ -1,9 +1,6 @@
 //! The demo, as a newcomer runs it, on a smaller scene.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::Folder;
+use crate::folder::Folder;
 
 /// Largest page, in bytes.
 const MOST_BYTES: usize = 4_000_000;

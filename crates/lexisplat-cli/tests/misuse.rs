@@ -1,9 +1,6 @@
 //! Commands that cannot be meant so: the message says what is wrong and what to do.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, lexisplat};
+use crate::folder::{Folder, lexisplat};
 
 /// Exit code of an argument out of range.
 const RANGE: i32 = 5;

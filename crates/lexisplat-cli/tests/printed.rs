@@ -1,12 +1,9 @@
 //! What the program prints, whatever files hold and whatever goes wrong.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod folder;
 
 use std::io::{BufRead, BufReader, Write};
 use std::process::{Command, Output, Stdio};
 
-use folder::{Folder, lexisplat, read};
+use crate::folder::{Folder, lexisplat, read};
 use lexisplat::{CompressOptions, Extra, ExtraValues, Silent, compress, lexi};
 use serde_json::{Value, json};
 

@@ -1,9 +1,6 @@
 //! Standard error of commands that succeed.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, lexisplat};
+use crate::folder::{Folder, lexisplat};
 
 /// Drivers print to standard error on machines without a desktop. Nothing of that reaches the user.
 #[test]
