@@ -3,7 +3,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use crate::files::{note, outputs};
+use crate::files::outputs;
 use crate::progress;
 use crate::terminal::note;
 

@@ -29,7 +29,7 @@ impl DrawOptions {
         scene: &Prepared<'_>,
         camera: &Camera,
     ) -> Result<Image> {
-        let drawing = RenderOptions { background: self.background, ..RenderOptions::default() };
+        let drawing = RenderOptions::default().with_background(self.background);
         let image = renderer.render(scene, camera, &drawing)?;
         if !self.eight_bit {
             return Ok(image);

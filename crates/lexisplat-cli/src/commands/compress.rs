@@ -43,7 +43,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let compression = compression(args, &limits)?;
 
     let (name, bytes) = input(&args.input, common)?;
-    let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
+    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let bars = Bars::new(common.quiet);
     let source = PlySource::open(&name, &bytes, &read, &bars)?;
     warn(&name, source.warnings());
