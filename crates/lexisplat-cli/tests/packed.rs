@@ -79,7 +79,10 @@ fn a_size_is_never_exceeded() {
     let error = folder.fail(&["compress", "scene.ply", "--size", "300", "--overwrite"], 5);
     assert!(error.contains("nothing smaller can be made"), "{error}");
     let error = folder.fail(&["compress", "scene.ply", "--ratio", "1000", "--overwrite"], 5);
-    assert!(error.contains("ratio = 1000: at most") && !error.contains("bytes"), "a ratio for a ratio: {error}");
+    assert!(
+        error.contains("ratio = 1000: at most") && !error.contains("bytes"),
+        "a ratio for a ratio: {error}"
+    );
     assert!(before == std::fs::read(folder.path("scene.lexi")).unwrap(), "the old file stays");
 }
 

@@ -140,7 +140,7 @@ pub(crate) struct Compress {
     pub(crate) guess: bool,
     /// Memory that packing a whole scene may take, about. A scene that needs more is packed part by part, each
     /// part by its own views, and of the qualities only --preset can be had. That takes up to 1.5 GiB, however
-    /// small BYTES is. Files of the other layouts do not depend on it.
+    /// small BYTES is: 0.3 GB for a million Gaussians. Files of the other layouts do not depend on it.
     #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// What looks at the scene and judges pictures: `cpu`, so that the same input gives the same file

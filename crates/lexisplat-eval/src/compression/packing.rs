@@ -121,7 +121,8 @@ impl Packing {
         Self { device, ..self }
     }
 
-    /// Allows about `bytes` bytes of memory for packing a whole scene.
+    /// Allows about `bytes` bytes of memory for packing a whole scene. A scene that needs more is packed part by
+    /// part, which takes up to 1.5 GiB however small `bytes` is: 0.3 GB was measured for a million Gaussians.
     #[must_use]
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: bytes, ..self }

@@ -155,6 +155,7 @@ impl Packing {
         packed.device = device;
         let pack_seconds = clock.seconds();
 
+        progress.check()?;
         let clock = Stopwatch::start();
         lexi::write_packed(sink, &packed)?;
         let write_seconds = clock.seconds();

@@ -30,7 +30,8 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let parts = codes::parts(&lexi, &survey);
         let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
-        return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: lexi_facts }).print(common);
+        return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: Box::new(lexi_facts) })
+            .print(common);
     }
     let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
     let ply = PlySource::open(&name, &bytes, &read, &bars)?;
@@ -60,7 +61,7 @@ struct Facts<'a> {
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum Kind<'a> {
     Ply { ply: &'a PlySummary, warnings: &'a [String] },
-    Lexi { lexi: LexiFacts<'a> },
+    Lexi { lexi: Box<LexiFacts<'a>> },
 }
 
 impl<'a> Facts<'a> {
