@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lexisplat::lexi::{self, Contents};
+use lexisplat::lexi::{self, LexiReader};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
 use lexisplat::{Input, Model, Result};
@@ -18,12 +18,10 @@ pub enum Loaded {
 }
 
 impl Loaded {
-    fn lexi(contents: Contents, name: &str) -> Result<Self> {
-        Ok(match contents {
-            Contents::Packed(packed) => {
-                Self::Lexi(Box::new(lexi::unpack(name, &packed)?), Some(Box::new(packed)))
-            }
-            contents => Self::Lexi(Box::new(contents.into_model(name)?), None),
+    fn lexi(reader: &LexiReader<'_>) -> Result<Self> {
+        Ok(match reader.packed()? {
+            Some(packed) => Self::Lexi(Box::new(packed.unpack()?), Some(Box::new(packed))),
+            None => Self::Lexi(Box::new(reader.model()?), None),
         })
     }
 }
@@ -43,7 +41,7 @@ impl SceneFile {
     /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
     ///
     /// # Errors
-    /// What [`Input::open_within`], [`ply::read_bytes`] and [`lexi::open_bytes`] say.
+    /// What [`Input::open_within`], [`ply::read_bytes`] and [`LexiReader::open`] say.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         // Once, for a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
@@ -56,7 +54,7 @@ impl SceneFile {
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
         let loaded = if lexi::is_lexi(bytes) {
-            Loaded::lexi(lexi::open_bytes(name, bytes, &options.limits)?, name)?
+            Loaded::lexi(&LexiReader::open(name, bytes, &options.limits)?)?
         } else {
             Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))
         };

@@ -1,7 +1,10 @@
 //! Packing to a target: the smallest file of a quality, or the best quality of a size. No photos needed.
 
+use std::borrow::Borrow;
+
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackReport, Packed, Packer, TargetRecord};
-use lexisplat::{Model, Progress, Sensitivity, Splats, lexi};
+use lexisplat::{Model, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, Split, surround};
 
 use crate::error::{Error, Result};
@@ -261,7 +264,7 @@ struct Try {
 /// # Errors
 /// [`Error::Parameter`] if it cannot be met; what packing and drawing say.
 pub fn pack_to(
-    packer: &Packer<'_>,
+    packer: &Packer<impl Borrow<Splats>>,
     judge: &mut Judge<'_>,
     goal: Goal,
     progress: &dyn Progress,
@@ -285,7 +288,7 @@ pub fn pack_to(
     for _ in 0..MAX_TRIES {
         log_step = log_step.clamp(libm::log2(STEPS[0]), libm::log2(STEPS[1]));
         let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
-        let bytes = lexi::packed_bytes(&packed);
+        let bytes = LexiWriter::packed(&packed).file_bytes();
         let mut reached = [f64::NAN; 2];
         #[expect(clippy::cast_precision_loss, reason = "file sizes are far below 2^52")]
         let value = if size {
@@ -310,7 +313,7 @@ pub fn pack_to(
         let Some(next) = next_step(&tries, wanted + 0.5 * close, &mut slope) else { break };
         log_step = next;
     }
-    let Some((_, mut packed, report, mut reached)) = best else {
+    let Some((_, packed, report, mut reached)) = best else {
         let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
         let expected = if size {
             format!("at least {:.0} bytes: nothing smaller can be made of this scene", libm::exp2(-found))
@@ -323,9 +326,8 @@ pub fn pack_to(
         reached = judge.score(&packed.unpack()?)?;
     }
     let views = u32::try_from(judge.views.len()).unwrap_or(u32::MAX);
-    packed.target =
-        Some(TargetRecord::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.given));
-    Ok((packed, report))
+    let target = TargetRecord::new(goal.name(), goal.asked(), reached.map(rounded), views, judge.given);
+    Ok((packed.with_target(target), report))
 }
 
 /// Room kept for the promise in the header of a file of a given size.

@@ -2,8 +2,9 @@
 
 use std::time::Instant;
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, Preset};
-use lexisplat::{CompressOptions, Layout, Model, Progress, Pursuit, Sensitivity, Splats, compress, lexi};
+use lexisplat::{CompressOptions, Layout, Model, Progress, Pursuit, Sensitivity, Splats, compress};
 use lexisplat_render::Renderer;
 
 use super::results::Setting;
@@ -58,17 +59,20 @@ fn exact(
     options.tolerance = tolerance;
     options.max_nonzeros = max_nonzeros;
     options.pursuit = how.pursuit;
-    options.layout = how.layout;
+    options.values = how.layout.values();
     options.seed = how.seed;
     let (model, report) = compress(splats, &options, progress)?;
     let seconds = clock.elapsed().as_secs_f64();
+    let writer = LexiWriter::exact(&model, how.layout.codes())?;
+    let (file_bytes, sh_bytes) = (writer.file_bytes(), writer.sh_bytes());
+    drop(writer);
     Ok(Squeezed {
-        file_bytes: lexi::file_bytes(&model)?,
-        sh_bytes: lexi::sh_bytes(&model)?,
+        file_bytes,
+        sh_bytes,
         mean_nonzeros: report.mean_nonzeros,
         coefficient_ratio: report.coefficient_ratio(),
-        max_residual: Some(model.record.max_residual),
-        over_tolerance: model.record.over_tolerance,
+        max_residual: Some(model.record().max_residual),
+        over_tolerance: model.record().over_tolerance,
         seconds,
         model,
     })
@@ -99,13 +103,13 @@ fn packed(
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the file's size")]
     let sh_bytes = (sh_bits / 8.0).round() as u64;
     Ok(Squeezed {
-        file_bytes: lexi::packed_bytes(&packed),
+        file_bytes: LexiWriter::packed(&packed).file_bytes(),
         sh_bytes,
         mean_nonzeros: report.mean_nonzeros,
         coefficient_ratio: (report.mean_nonzeros > 0.0).then(|| dim as f64 / report.mean_nonzeros),
         max_residual: None,
-        over_tolerance: packed.record.over_tolerance,
+        over_tolerance: packed.head().record().over_tolerance,
         seconds,
-        model: lexi::unpack(preset.name(), &packed)?,
+        model: packed.unpack()?,
     })
 }

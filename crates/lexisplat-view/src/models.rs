@@ -4,9 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 
+use lexisplat::lexi::{CodeLayout, LexiWriter};
 use lexisplat::packed::{PackOptions, Packed, Packer};
 use lexisplat::ply::{Dialect, ReadOptions};
-use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress};
 use lexisplat_eval::{Loaded, SceneFile, SplitFilter, Views, choose_views};
 use lexisplat_render::{Camera, Renderer, bulk};
 
@@ -50,7 +51,9 @@ impl Open {
         let (layout, promise) = match &scene.loaded {
             Loaded::Ply(read) => (dialect(read.source.dialect), None),
             Loaded::Lexi(model, packed) => {
-                (model.record.layout.to_string(), promise(model, packed.as_deref()))
+                let exact = Layout::of(CodeLayout::Compact, model.codes().values().value_type());
+                let layout = if packed.is_some() { Layout::Packed } else { exact };
+                (layout.to_string(), promise(model, packed.as_deref()))
             }
         };
         Ok(Self { id, scene, path, layout, promise, orbit, bulk })
@@ -109,9 +112,9 @@ fn dialect(dialect: Dialect) -> String {
 
 /// What a compressed file says it keeps, in a line.
 fn promise(model: &Model, packed: Option<&Packed>) -> Option<String> {
-    let record = &model.record;
+    let record = model.record();
     let mut parts = Vec::new();
-    if let Some(p) = packed.and_then(|packed| packed.target.as_ref()) {
+    if let Some(p) = packed.and_then(|packed| packed.head().target()) {
         parts.push(format!("{:.2} dB mean, {:.2} dB worst of {} views", p.mean_psnr, p.min_psnr, p.views));
     }
     match (record.tolerance, record.max_nonzeros) {
@@ -121,7 +124,7 @@ fn promise(model: &Model, packed: Option<&Packed>) -> Option<String> {
         (Some(_), Some(most)) => parts.push(format!("at most {most} nonzeros")),
         _ => {}
     }
-    if record.layout != Layout::Packed {
+    if packed.is_none() {
         parts.push("geometry exact".to_owned());
     }
     (!parts.is_empty()).then(|| parts.join("; "))
@@ -264,14 +267,14 @@ fn compressed(
             let packer = Packer::new(splats, &sensitivity, &PackOptions::default())?;
             let (packed, _) = packer.pack(packer.step_for(preset.decibels()), gauge)?;
             gauge.start("unpacking", 0);
-            let (model, bytes) = (packed.unpack()?, lexi::packed_bytes(&packed));
+            let (model, bytes) = (packed.unpack()?, LexiWriter::packed(&packed).file_bytes());
             Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), Some(Box::new(packed))), name, bytes })
         }
         Quality::Tolerance(tolerance) => {
             let mut options = CompressOptions::default();
             options.tolerance = Some(tolerance);
             let (model, _) = compress(splats.clone(), &options, gauge)?;
-            let bytes = lexi::attribute_bytes(&model)?.iter().map(|part| part.1).sum();
+            let bytes = LexiWriter::exact(&model, CodeLayout::Compact)?.file_bytes();
             Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), None), name, bytes })
         }
     }
@@ -308,8 +311,8 @@ mod tests {
             let Loaded::Lexi(model, packed) = &made.loaded else { panic!("a model") };
             let mut bytes = Vec::new();
             match packed {
-                Some(packed) => lexi::write_packed(&mut bytes, packed).unwrap(),
-                None => lexi::write(&mut bytes, model).unwrap(),
+                Some(packed) => LexiWriter::packed(packed).write(&mut bytes, &lexisplat::Silent).unwrap(),
+                None => lexisplat::lexi::write(&mut bytes, model).unwrap(),
             };
             assert_eq!(made.bytes, bytes.len() as u64, "{quality}");
             let open = Open::new(1, made, None, SIZE).unwrap();

@@ -49,7 +49,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     options.max_nonzeros = args.max_nnz;
     options.atoms = args.atoms;
     options.pursuit = args.pursuit.unwrap_or(options.pursuit);
-    options.layout = layout;
+    options.values = layout.values();
     options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
     if let Some(path) = &args.dictionary {
@@ -76,8 +76,8 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let done = write_output(
         &output,
         common.overwrite,
-        |path| stream::compress(&chunks, &options, path, &bars),
-        |out| stream::compress(&chunks, &options, out, &bars),
+        |path| stream::compress(&chunks, &options, layout.codes(), path, &bars),
+        |out| stream::compress(&chunks, &options, layout.codes(), out, &bars),
     )?;
     if let Some(path) = &args.save_dictionary {
         lexi::write_dictionary(Output::new(path, existing(common.overwrite)), &done.dictionary)?;
@@ -85,6 +85,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let outcome = Outcome {
         output: &output,
         done: &done,
+        layout,
         ply_bytes: chunks.summary().file_bytes,
         seconds: [read_seconds, start.elapsed().as_secs_f64()],
     };
@@ -95,6 +96,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
 struct Outcome<'a> {
     output: &'a Path,
     done: &'a Compressed,
+    layout: Layout,
     ply_bytes: u64,
     /// Reading, everything.
     seconds: [f64; 2],
@@ -114,8 +116,8 @@ impl Outcome<'_> {
             "gaussians": done.gaussians,
             "sh_degree": done.dictionary.degree().get(),
             "atoms": done.dictionary.len(),
-            "pursuit": record.pursuit.name(),
-            "layout": record.layout.name(),
+            "pursuit": record.pursuit.map(lexisplat::Pursuit::name),
+            "layout": self.layout.name(),
             "tol": record.tolerance,
             "max_nnz": record.max_nonzeros,
             "seed": record.seed,

@@ -5,10 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
+use lexisplat::lexi::LexiWriter;
+use lexisplat::packed::{PackOptions, PackReport, PackedHead, Packer, StreamBits};
 use lexisplat::ply::{PlyRead, PlySource};
 use lexisplat::stream::Importance;
-use lexisplat::{Error, Progress, Sensitivity, Splats, lexi, stream};
+use lexisplat::{Error, Progress, Sensitivity, Splats, stream};
 use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
@@ -63,26 +64,26 @@ pub(crate) fn run(
     let clock = Instant::now();
     let packer = Packer::new(&splats, &sensitivity, &options)?;
     drop(sensitivity);
-    let (mut packed, report) = match goal {
+    let (packed, report) = match goal {
         Some(goal) => pack_to(&packer, &mut Judge::new(&mut renderer, &splats, &views)?, goal, &bars)?,
         None => packer.pack(packer.step_for(args.preset.unwrap_or_default().decibels()), &bars)?,
     };
     drop(packer);
-    packed.device = renderer.is_gpu().then(|| renderer.name().to_owned());
+    let packed = packed.with_device(renderer.is_gpu().then(|| renderer.name().to_owned()));
     let pack_seconds = clock.elapsed().as_secs_f64();
     let clock = Instant::now();
     let file_bytes = write_output(
         output,
         common.overwrite,
-        |path| lexi::write_packed(path, &packed),
-        |out| lexi::write_packed(out, &packed),
+        |path| LexiWriter::packed(&packed).write(path, &bars),
+        |out| LexiWriter::packed(&packed).write(out, &bars),
     )?;
     let write_seconds = clock.elapsed().as_secs_f64();
     let outcome = Outcome {
         output,
-        packed: &packed,
+        packed: packed.head(),
         streams: if common.quiet && !common.json { Vec::new() } else { packed.stream_bits()? },
-        tensors: lexi::packed_tensor_bytes(&packed),
+        tensors: LexiWriter::packed(&packed).attribute_bytes().to_vec(),
         report: &report,
         pruned,
         looked: true,
@@ -220,7 +221,7 @@ pub(crate) fn sh_bytes(streams: &[StreamBits]) -> f64 {
 /// What was done, to be told in text or JSON.
 struct Outcome<'a> {
     output: &'a Path,
-    packed: &'a Packed,
+    packed: &'a PackedHead,
     streams: Vec<StreamBits>,
     tensors: Vec<(String, u64)>,
     report: &'a PackReport,
@@ -237,21 +238,21 @@ struct Outcome<'a> {
 
 impl Outcome<'_> {
     fn json(&self, warnings: &[String]) -> Value {
-        let (packed, report, record) = (self.packed, self.report, &self.packed.record);
+        let (packed, report, record) = (self.packed, self.report, self.packed.record());
         let streams = &self.streams;
         let whole = |bytes: f64| (bytes * 8.0).round() / 8.0;
         let attributes: serde_json::Map<String, Value> = attribute_bytes(&self.tensors, streams)
             .into_iter()
             .map(|(name, bytes)| (name, json!(whole(bytes))))
             .collect();
-        let dim = packed.degree.rest();
+        let dim = packed.degree().rest();
         let nonzeros = report.mean_nonzeros;
         json!({
             "output": self.output.display().to_string(),
-            "gaussians": packed.gaussians,
-            "sh_degree": packed.degree.get(),
-            "atoms": packed.atoms,
-            "layout": record.layout.name(),
+            "gaussians": packed.len(),
+            "sh_degree": packed.degree().get(),
+            "atoms": packed.atoms(),
+            "layout": lexisplat::Layout::Packed.name(),
             "tol": record.tolerance,
             "seed": record.seed,
             "mean_nonzeros": nonzeros,
@@ -264,11 +265,11 @@ impl Outcome<'_> {
             "ply_bytes": self.ply_bytes,
             "file_bytes": self.file_bytes,
             "sh_bytes": whole(sh_bytes(streams)),
-            "dense_sh_bytes": packed.gaussians * dim * 4,
+            "dense_sh_bytes": packed.len() * dim * 4,
             "attribute_bytes": attributes,
-            "promise": packed.target,
+            "promise": packed.target(),
             "importance": if self.looked { "views" } else { "guess" },
-            "device": self.packed.device.as_deref().unwrap_or("cpu"),
+            "device": self.packed.device().unwrap_or("cpu"),
             "pruned": self.pruned.map(|p| json!({
                 "gaussians": p.removed,
                 "largest_change": p.largest_change,
@@ -290,10 +291,10 @@ impl Outcome<'_> {
         let (packed, report) = (self.packed, self.report);
         let mut out = String::new();
         let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-        let gaussians = text::count(packed.gaussians as u64);
+        let gaussians = text::count(packed.len() as u64);
         line(
             "wrote",
-            format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), packed.degree),
+            format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), packed.degree()),
         )?;
         line(
             "file bytes",
@@ -302,7 +303,7 @@ impl Outcome<'_> {
                 text::bytes(self.file_bytes),
                 text::bytes(self.ply_bytes),
                 text::ratio(self.ply_bytes, self.file_bytes),
-                self.file_bytes as f64 / packed.gaussians.max(1) as f64
+                self.file_bytes as f64 / packed.len().max(1) as f64
             ),
         )?;
         if let Some(p) = self.pruned {
@@ -316,24 +317,23 @@ impl Outcome<'_> {
                 ),
             )?;
         }
-        if let Some(p) = &packed.target {
+        if let Some(p) = packed.target() {
             line("pictures", promise_line(p))?;
         }
-        if packed.degree.rest() > 0 {
+        if packed.degree().rest() > 0 {
             line(
                 "codes",
-                format!("{:.2} nonzeros a Gaussian over {} atoms", report.mean_nonzeros, packed.atoms),
+                format!("{:.2} nonzeros a Gaussian over {} atoms", report.mean_nonzeros, packed.atoms()),
             )?;
         }
-        if packed.record.tolerance.is_some() {
-            line("error", error_line(&packed.record))?;
+        if packed.record().tolerance.is_some() {
+            line("error", error_line(packed.record()))?;
             if report.escapes > 0 {
                 line("escapes", format!("{} Gaussians' SH stored exactly", text::count(report.escapes)))?;
             }
         }
-        let bits = |(name, bytes): &(String, f64)| {
-            format!("{name} {:.1}", 8.0 * bytes / packed.gaussians.max(1) as f64)
-        };
+        let bits =
+            |(name, bytes): &(String, f64)| format!("{name} {:.1}", 8.0 * bytes / packed.len().max(1) as f64);
         let attributes = attribute_bytes(&self.tensors, &self.streams);
         let parts: Vec<String> = attributes.iter().map(bits).collect();
         line("bits each", parts.join(", "))?;

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::Layout;
-use lexisplat::lexi::{self, LexiChunks};
-use lexisplat::packed::StreamBits;
+use lexisplat::lexi::{self, LexiReader};
+use lexisplat::packed::{PackedHead, StreamBits};
 use lexisplat::stream::Survey;
 use serde_json::{Map, Value, json};
 
@@ -20,20 +20,20 @@ const DENSE_SH_BYTES: usize = 192;
 /// Atoms listed as the most used.
 const TOP_ATOMS: usize = 8;
 
-fn each(bytes: f64, lexi: &LexiChunks<'_>) -> f64 {
+fn each(bytes: f64, lexi: &LexiReader<'_>) -> f64 {
     bytes / lexi.len().max(1) as f64
 }
 
-fn is_packed(lexi: &LexiChunks<'_>) -> bool {
-    lexi.record().layout == Layout::Packed
+fn is_packed(lexi: &LexiReader<'_>) -> bool {
+    lexi.layout() == Layout::Packed
 }
 
-pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
+pub(super) fn as_json(lexi: &LexiReader<'_>, survey: &Survey) -> Value {
     let record = lexi.record();
     let packed = is_packed(lexi);
     let mut value = json!({
         "version": if packed { lexi::PACKED_VERSION } else { lexi::VERSION },
-        "layout": record.layout.name(),
+        "layout": lexi.layout().name(),
         "tol": record.tolerance,
         "seed": record.seed,
         "max_residual": record.max_residual,
@@ -51,15 +51,15 @@ pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
     let tensors = lexi.attribute_bytes();
     let bytes: Map<String, Value> = if packed {
         let streams = &survey.stream_bits;
-        value["promise"] = json!(lexi.target());
-        value["device"] = lexi.device().unwrap_or("cpu").into();
+        value["promise"] = json!(lexi.packed_head().and_then(PackedHead::target));
+        value["device"] = lexi.packed_head().and_then(PackedHead::device).unwrap_or("cpu").into();
         value["order_kept"] = lexi.order_kept().into();
         value["sh_bytes"] = sh_bytes(streams).into();
         let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, lexi))));
         value["stream_bits_per_gaussian"] = Value::Object(bits.collect());
         attribute_bytes(tensors, streams).into_iter().map(|(name, bytes)| (name, bytes.into())).collect()
     } else {
-        value["pursuit"] = record.pursuit.name().into();
+        value["pursuit"] = record.pursuit.map(lexisplat::Pursuit::name).into();
         value["max_nnz"] = record.max_nonzeros.into();
         value["sh_bytes"] = lexi.sh_bytes().into();
         tensors.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect()
@@ -68,7 +68,7 @@ pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
     value
 }
 
-pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) -> Result<()> {
+pub(super) fn as_text(out: &mut String, lexi: &LexiReader<'_>, survey: &Survey) -> Result<()> {
     let record = lexi.record();
     let atoms = lexi.dictionary().len();
     let packed = is_packed(lexi);
@@ -84,14 +84,14 @@ pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) 
             out,
             ".lexi version {}, layout {}, pursuit {}, {atoms} atoms, all checksums right",
             lexi::VERSION,
-            record.layout,
-            record.pursuit,
+            lexi.layout(),
+            record.pursuit.map_or("none", lexisplat::Pursuit::name),
         )?;
     }
-    if let Some(promise) = lexi.target() {
+    if let Some(promise) = lexi.packed_head().and_then(PackedHead::target) {
         writeln!(out, "pictures: {}", promise_line(promise))?;
     }
-    if let Some(device) = lexi.device() {
+    if let Some(device) = lexi.packed_head().and_then(PackedHead::device) {
         writeln!(out, "looked at on: {device}")?;
     }
     if atoms > 0 {
@@ -125,7 +125,7 @@ pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) 
 }
 
 /// Each attribute with the streams it is made of.
-fn packed_bytes(out: &mut String, lexi: &LexiChunks<'_>, streams: &[StreamBits]) -> Result<()> {
+fn packed_bytes(out: &mut String, lexi: &LexiReader<'_>, streams: &[StreamBits]) -> Result<()> {
     writeln!(out, "\n{:<14} {:>10} {:>16}   streams", "attribute", "bytes", "bits a Gaussian")?;
     for (name, bytes) in attribute_bytes(lexi.attribute_bytes(), streams) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]

@@ -5,7 +5,7 @@ mod codes;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::stream::Survey;
@@ -24,7 +24,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.file, common)?;
     let bars = Bars::new(common.quiet || common.json);
     let (scene, lint) = if lexi::is_lexi(&bytes) {
-        let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
+        let lexi = LexiReader::open(&name, &bytes, &common.limits()?)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let lint = survey.lint.clone();
         (Scene::Lexi(Box::new(lexi), Box::new(survey)), lint)
@@ -55,7 +55,7 @@ struct File<'a> {
 
 enum Scene<'a> {
     Ply(Box<PlySource<'a>>),
-    Lexi(Box<LexiChunks<'a>>, Box<Survey>),
+    Lexi(Box<LexiReader<'a>>, Box<Survey>),
 }
 
 impl Scene<'_> {
