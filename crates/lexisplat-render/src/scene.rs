@@ -29,7 +29,7 @@ impl<'a> Scene<'a> {
     pub fn geometry(&self) -> &'a Geometry {
         match self {
             Self::Dense(splats) => &splats.geometry,
-            Self::Sparse(model) => &model.geometry,
+            Self::Sparse(model) => model.geometry(),
         }
     }
 
@@ -38,7 +38,7 @@ impl<'a> Scene<'a> {
     pub fn meta(&self) -> &'a SceneMeta {
         match self {
             Self::Dense(splats) => &splats.meta,
-            Self::Sparse(model) => &model.meta,
+            Self::Sparse(model) => model.meta(),
         }
     }
 

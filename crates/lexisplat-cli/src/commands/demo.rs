@@ -4,6 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
+use lexisplat::lexi::{CodeLayout, LexiWriter};
 use lexisplat::output::Output;
 use lexisplat::{CompressOptions, compress, lexi, ply};
 use lexisplat_eval::{DrawOptions, ORBIT_SIZE, compare, montage, png, text};
@@ -102,7 +103,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         model: &model,
         ply_bytes,
         file_bytes,
-        attributes: &lexi::attribute_bytes(&model)?,
+        attributes: &LexiWriter::exact(&model, CodeLayout::Compact)?.attribute_bytes(),
         learn_seconds: report.learn_seconds,
         code_seconds: report.code_seconds,
         comparison: &comparison,
@@ -120,9 +121,9 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
             "coefficient_ratio": report.coefficient_ratio(),
             "ply_bytes": ply_bytes,
             "file_bytes": file_bytes,
-            "sh_bytes": lexi::sh_bytes(&model)?,
-            "max_residual": model.record.max_residual,
-            "rms_residual": model.record.rms_residual,
+            "sh_bytes": LexiWriter::exact(&model, CodeLayout::Compact)?.sh_bytes(),
+            "max_residual": model.record().max_residual,
+            "rms_residual": model.record().rms_residual,
             "psnr": comparison.psnr,
             "ssim": comparison.ssim,
             "total_seconds": seconds,
@@ -139,7 +140,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         text::bytes(file_bytes),
         text::ratio(ply_bytes, file_bytes),
         report.mean_nonzeros,
-        error_line(&model.record),
+        error_line(&model.record()),
         text::decibels(comparison.psnr.mean),
         text::decibels(comparison.psnr.min),
         comparison.views.len(),

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use lexisplat::packed::{PackOptions, Preset};
-use lexisplat::{CompressOptions, Sensitivity};
+use lexisplat::{CodeLayout, CompressOptions, Sensitivity};
 use lexisplat_render::{Camera, Device};
 
 use super::target::Target;
@@ -16,8 +16,8 @@ const MEMORY_PER_BYTE: u64 = 2;
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Compression {
-    /// The geometry stays exact, and the SH become codes over a dictionary.
-    Exact(CompressOptions),
+    /// The geometry stays exact, and the SH become codes over a dictionary, laid out as given.
+    Exact(CompressOptions, CodeLayout),
     /// Everything is quantised and entropy-coded as far as views of the scene allow.
     Packed(Packing),
     /// Everything is quantised and entropy-coded without drawing the scene: what shows follows from each
@@ -28,7 +28,7 @@ pub enum Compression {
 
 impl From<CompressOptions> for Compression {
     fn from(options: CompressOptions) -> Self {
-        Self::Exact(options)
+        Self::Exact(options, CodeLayout::default())
     }
 }
 

@@ -88,7 +88,7 @@ impl GpuScene {
             }
         };
         let table = match (path, model) {
-            (ShPath::SparseTable, Some(model)) => Some(Table::new(gpu, &model.dictionary)?),
+            (ShPath::SparseTable, Some(model)) => Some(Table::new(gpu, model.dictionary())?),
             _ => None,
         };
         let radiance = radiance_pipeline(gpu, &source, path)?;
@@ -113,7 +113,8 @@ impl GpuScene {
         for range in source.chunks(scene.len(), gpu.max_binding())? {
             this.add(scene.geometry(), &source, range.clone(), nonzero)?;
             if let Source::Codes(model) = source {
-                nonzero += model.codes.counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
+                nonzero +=
+                    model.codes().counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
             }
             chunk_blocks.push(u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
         }
@@ -147,7 +148,7 @@ impl GpuScene {
         let sh = match source {
             Source::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half)?],
             Source::Codes(model) => {
-                let columns = Columns::new(&model.codes, range.clone(), nonzero);
+                let columns = Columns::new(model.codes(), range.clone(), nonzero);
                 escapes =
                     [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
                 vec![

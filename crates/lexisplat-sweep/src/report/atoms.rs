@@ -17,8 +17,8 @@ pub(super) struct Usage {
 
 impl Usage {
     pub(super) fn of(model: &Model) -> Self {
-        let mut users = vec![0_u64; model.dictionary.len()];
-        let indices = model.codes.indices();
+        let mut users = vec![0_u64; model.dictionary().len()];
+        let indices = model.codes().indices();
         for k in 0..indices.len() {
             if let Some(users) = users.get_mut(indices.get(k)) {
                 *users += 1;
@@ -39,7 +39,7 @@ pub(super) fn json(model: &Model, usage: &Usage) -> String {
     let mut out = format!("{{\"degree\":{},\"atoms\":[", model.degree());
     for (k, &(atom, _)) in usage.shown().iter().enumerate() {
         out.push_str(if k == 0 { "[" } else { ",[" });
-        for (i, value) in model.dictionary.atom(atom).iter().enumerate() {
+        for (i, value) in model.dictionary().atom(atom).iter().enumerate() {
             let comma = if i == 0 { "" } else { "," };
             let _ = write!(out, "{comma}{:.0}", value * STEPS);
         }

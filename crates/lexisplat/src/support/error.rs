@@ -147,11 +147,6 @@ impl Error {
         Self::Limit { what: what.into(), found, limit, name }
     }
 
-    /// This error about what was read from `file`: a limit stays one, anything else is the file's fault.
-    pub(crate) fn of_file(self, file: &str) -> Self {
-        if matches!(self, Self::Limit { .. }) { self } else { Self::malformed(file, self.to_string()) }
-    }
-
     /// An [`Error::Parameter`].
     pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }

@@ -1,5 +1,6 @@
 //! What all other modules use: errors, limits, input and output, threads, vector instructions.
 
+pub(crate) mod builders;
 pub(crate) mod error;
 pub(crate) mod input;
 pub(crate) mod limits;

@@ -5,7 +5,7 @@ mod codes;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::{SplatSource as _, Splats, lexi, stream};
@@ -26,7 +26,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
     if lexi::is_lexi(&bytes) {
-        let lexi = LexiChunks::open(&name, &bytes, &limits)?;
+        let lexi = LexiReader::open(&name, &bytes, &limits)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let parts = codes::parts(&lexi, &survey);
         let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
