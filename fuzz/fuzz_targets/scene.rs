@@ -2,11 +2,12 @@
 //! kind of view and described, each with a result that keeps what it promises.
 #![no_main]
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stream::Importance;
 use lexisplat::{
-    CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
+    CodeLayout, CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
     stats, stream,
 };
 use lexisplat_fuzz::made::{Bytes, scene};
@@ -42,12 +43,13 @@ fuzz_target!(init: one_thread(), |data: &[u8]| {
 
 fn exact(splats: Splats, how: u8, in_parts: bool) {
     let mut options = CompressOptions::default();
-    options.layout = [Layout::F32, Layout::F16, Layout::Paper][usize::from(how % 3)];
+    let layout = [Layout::F32, Layout::F16, Layout::Paper][usize::from(how % 3)];
+    options.values = layout.values();
     options.pursuit = if how & 4 == 0 { Pursuit::Ols } else { Pursuit::Omp };
     options.max_nonzeros = (how & 8 != 0).then_some(2);
     options.atoms = Some(usize::from(how >> 4) + 1);
     if in_parts {
-        return exact_in_parts(splats, &options);
+        return exact_in_parts(splats, &options, layout.codes());
     }
     let original = splats.clone();
     let model = match compress(splats, &options, &Silent) {
@@ -56,15 +58,15 @@ fn exact(splats: Splats, how: u8, in_parts: bool) {
         Err(error) => panic!("{error}"),
     };
     invariants::model(&model);
-    invariants::exact_round_trip(&model);
-    assert_eq!(model.geometry, original.geometry);
+    invariants::exact_round_trip(&model, layout.codes());
+    assert_eq!(*model.geometry(), original.geometry);
     let tolerance = options.tolerance.unwrap_or(f64::INFINITY);
-    assert!(options.max_nonzeros.is_some() || model.record.max_residual <= tolerance);
+    assert!(options.max_nonzeros.is_some() || model.record().max_residual <= tolerance);
     let dense = model.dense_rest();
     let dim = original.degree.rest().max(1);
     for (a, b) in original.sh_rest.chunks(dim).zip(dense.chunks(dim)) {
         let error = a.iter().zip(b).map(|(x, y)| (f64::from(*x) - f64::from(*y)).powi(2)).sum::<f64>().sqrt();
-        let most = model.record.max_residual * (1.0 + SUM_SLACK);
+        let most = model.record().max_residual * (1.0 + SUM_SLACK);
         assert!(error <= most, "{error} is over {most}");
     }
 }
@@ -97,7 +99,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         Err(error) => panic!("{error}"),
     };
     let mut bytes = Vec::new();
-    lexi::write_packed(&mut bytes, &packed).expect("written");
+    LexiWriter::packed(&packed).write(&mut bytes, &Silent).expect("written");
     let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
     assert_eq!(model.len(), splats.len());
     invariants::model(&model);
@@ -109,13 +111,16 @@ fn as_ply(splats: &Splats) -> Vec<u8> {
     bytes
 }
 
-fn exact_in_parts(splats: Splats, options: &CompressOptions) {
+fn exact_in_parts(splats: Splats, options: &CompressOptions, codes: CodeLayout) {
     let file = as_ply(&splats);
     let parts = PlySource::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let (mut streamed, mut whole) = (Vec::new(), Vec::new());
-    let done = stream::compress(&parts, options, &mut streamed, &Silent);
+    let done = stream::compress(&parts, options, codes, &mut streamed, &Silent);
     match compress(Splats { meta: parts.meta().clone(), ..splats }, options, &Silent) {
-        Ok((model, _)) => drop(lexi::write(&mut whole, &model).expect("written")),
+        Ok((model, _)) => {
+            let writer = LexiWriter::exact(&model, codes).expect("few nonzeros");
+            writer.write(&mut whole, &Silent).expect("written");
+        }
         Err(Error::Parameter { .. }) => return assert!(done.is_err(), "refused when held whole only"),
         Err(error) => panic!("{error}"),
     }

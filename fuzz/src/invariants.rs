@@ -1,6 +1,7 @@
 //! What must hold of anything that a reader accepted.
 
-use lexisplat::{Geometry, Indices, Model, SparseCodes, Splats, lexi, ply};
+use lexisplat::lexi::LexiWriter;
+use lexisplat::{CodeLayout, Geometry, Indices, Model, Silent, SparseCodes, Splats, lexi, ply};
 
 /// Gaussians up to which a scene is made dense and written: more says nothing new and takes long.
 const SMALL: usize = 4096;
@@ -53,9 +54,9 @@ fn codes(codes: &SparseCodes, atoms: usize, dim: usize) {
 /// # Panics
 /// If not.
 pub fn model(model: &Model) {
-    geometry(&model.geometry);
-    assert_eq!(model.codes.len(), model.len());
-    codes(&model.codes, model.dictionary.len(), model.dictionary.dim());
+    geometry(model.geometry());
+    assert_eq!(model.codes().len(), model.len());
+    codes(model.codes(), model.dictionary().len(), model.dictionary().dim());
     if model.len() > SMALL {
         return;
     }
@@ -87,12 +88,15 @@ fn may_mean_something_else(splats: &Splats) -> bool {
 ///
 /// # Panics
 /// If not.
-pub fn exact_round_trip(model: &Model) {
-    let mut bytes = Vec::new();
-    lexi::write(&mut bytes, model).expect("what was read can be written");
+pub fn exact_round_trip(model: &Model, codes: CodeLayout) {
+    let written = |model: &Model| {
+        let mut bytes = Vec::new();
+        let writer = LexiWriter::exact(model, codes).expect("what was read can be written");
+        writer.write(&mut bytes, &Silent).expect("what was read can be written");
+        bytes
+    };
+    let bytes = written(model);
     let again =
         lexi::read_bytes("again.lexi", &bytes, &crate::limits()).expect("what was written can be read");
-    let mut second = Vec::new();
-    lexi::write(&mut second, &again).expect("written again");
-    assert!(bytes == second, "written, read and written again differs");
+    assert!(bytes == written(&again), "written, read and written again differs");
 }

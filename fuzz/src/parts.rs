@@ -1,7 +1,7 @@
 //! Readers that take a file a part at a time, beside those that read it whole: they accept the same files and
 //! give the same Gaussians, bit by bit.
 
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, PlyRead, ReadOptions};
 use lexisplat::{Error, ExtraValues, Geometry, Model, Row, Silent, SplatSource, Splats, ply, stream};
 
@@ -66,15 +66,15 @@ fn sizes(data: &[u8], gaussians: usize) -> impl Iterator<Item = usize> {
 pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byte, base]: [usize; 2]) {
     let limits = crate::limits();
     let read = bounded(data, per_byte, base, || {
-        let chunks = LexiChunks::open("fuzz.lexi", data, &limits)?;
+        let chunks = LexiReader::open("fuzz.lexi", data, &limits)?;
         let mut seen = 0;
         chunks.each_of(at_once, &mut |start, part| {
             assert_eq!(start, seen);
             seen += part.len();
             let Ok(whole) = whole else { return Ok(()) };
-            assert!(part.len() == part.codes.len() && part.geometry.validate().is_ok(), "arrays differ");
-            assert_eq!((&part.record, &part.meta), (&whole.record, &whole.meta));
-            assert_eq!(part.dictionary, whole.dictionary);
+            assert!(part.len() == part.codes().len() && part.geometry().validate().is_ok(), "arrays differ");
+            assert_eq!((part.record(), part.meta()), (whole.record(), whole.meta()));
+            assert_eq!(part.dictionary(), whole.dictionary());
             let range = start..start + part.len();
             let places = match chunks.order_kept() {
                 true => chunks.order(range)?.into_iter().map(|place| place as usize).collect(),
@@ -92,7 +92,7 @@ pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byt
         (Err(error), Ok(_)) => panic!("refused when read in parts only: {error}"),
     };
     assert_eq!((seen, chunks.len()), (whole.len(), whole.len()));
-    assert_eq!(chunks.degree(), whole.dictionary.degree());
+    assert_eq!(chunks.degree(), whole.dictionary().degree());
     if whole.len() > SMALL {
         return;
     }
@@ -109,8 +109,8 @@ fn same_splat(a: &Splats, i: usize, b: &Splats, j: usize) {
 }
 
 fn same_coded(a: &Model, i: usize, b: &Model, j: usize) {
-    same_geometry(&a.geometry, i, &b.geometry, j);
-    match (a.codes.row(i), b.codes.row(j)) {
+    same_geometry(a.geometry(), i, b.geometry(), j);
+    match (a.codes().row(i), b.codes().row(j)) {
         (Row::Exact(a), Row::Exact(b)) => same(a, b),
         (Row::Code(a), Row::Code(b)) => {
             let bits = |(atom, value): (usize, f32)| (atom, value.to_bits());

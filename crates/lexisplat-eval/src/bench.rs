@@ -279,7 +279,7 @@ impl RadianceModel {
 /// within blocks of `block`.
 #[must_use]
 pub fn busy_lanes(model: &Model, lanes: usize, block: usize) -> [f64; 2] {
-    let counts = model.codes.counts();
+    let counts = model.codes().counts();
     let busy = |counts: &[u8]| {
         let used: u64 = counts.iter().map(|&c| u64::from(c)).sum();
         let held: u64 = counts

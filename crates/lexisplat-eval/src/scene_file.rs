@@ -1,69 +1,67 @@
-//! Scene files of any kind, recognised by their content.
+//! Scenes of either kind from files, told apart by content.
 
 use std::path::Path;
 
-use lexisplat::lexi::{self, Contents};
+use lexisplat::lexi::LexiReader;
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
 use lexisplat::{FileKind, Input, Model, Result};
 use lexisplat_render::Scene;
 
-/// A scene as its file holds it.
+/// A scene of either kind.
 #[derive(Debug)]
 pub enum Loaded {
     /// A PLY.
     Ply(Box<PlyRead>),
-    /// The model in a .lexi file, and the packed scene it was decoded from if the file is packed.
+    /// A .lexi, and before it was decoded if it is a packed one.
     Lexi(Box<Model>, Option<Box<Packed>>),
 }
 
 impl Loaded {
-    fn lexi(contents: Contents, name: &str) -> Result<Self> {
-        Ok(match contents {
-            Contents::Packed(packed) => {
-                Self::Lexi(Box::new(lexi::unpack(name, &packed)?), Some(Box::new(packed)))
-            }
-            contents => Self::Lexi(Box::new(contents.into_model(name)?), None),
+    fn lexi(reader: &LexiReader<'_>) -> Result<Self> {
+        Ok(match reader.packed()? {
+            Some(packed) => Self::Lexi(Box::new(packed.unpack()?), Some(Box::new(packed))),
+            None => Self::Lexi(Box::new(reader.model()?), None),
         })
     }
 }
 
-/// A scene file that was read, ready to be drawn.
+/// A scene, its name and its size.
 #[derive(Debug)]
 pub struct SceneFile {
     /// The scene.
     pub loaded: Loaded,
-    /// Name of the file in messages.
+    /// The file's name as the user gave it, or what stands for it.
     pub name: String,
     /// Size of the file in bytes.
     pub bytes: u64,
 }
 
 impl SceneFile {
-    /// Reads a scene file, of the kind that its bytes say. Of the options, a .lexi file uses only the limits.
+    /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
     ///
     /// # Errors
-    /// As [`Input::open_within`], [`ply::read_bytes`] and [`lexi::open_bytes`].
+    /// What [`Input::open_within`], [`ply::read_bytes`] and [`LexiReader::open`] say.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
-        // The file is read once, because a pipe gives its bytes once.
+        // Once, for a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
         Self::read_bytes(&path.display().to_string(), &bytes, options)
     }
 
-    /// Reads a scene file in memory, as [`Self::read`] does. Errors call it `name`.
+    /// [`Self::read`] of a file in memory, called `name` in errors.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
         let loaded = if FileKind::of(name, bytes) == FileKind::Lexi {
-            Loaded::lexi(lexi::open_bytes(name, bytes, &options.limits)?, name)?
+            Loaded::lexi(&LexiReader::open(name, bytes, &options.limits)?)?
         } else {
             Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))
         };
         Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
     }
 
-    /// Returns the scene to draw.
+    /// The scene, to draw.
     #[must_use]
     pub fn scene(&self) -> Scene<'_> {
         match &self.loaded {
@@ -72,7 +70,7 @@ impl SceneFile {
         }
     }
 
-    /// Returns what is odd about the file, one sentence each.
+    /// What is odd about the file.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         match &self.loaded {

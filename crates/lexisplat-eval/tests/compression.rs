@@ -180,8 +180,9 @@ fn work_that_is_cancelled_leaves_no_file() {
 fn the_geometry_of_exact_layouts_is_exact() {
     let splats = sample();
     let mut options = CompressOptions::default();
-    options.layout = Layout::F32;
+    options.values = Layout::F32.values();
     let (file, report) = run(options, &splats);
+    assert_eq!(report.layout, Layout::F32);
     let model = lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap();
     assert_eq!(model.into_splats().geometry, splats.geometry);
     assert_eq!(report.dictionary.map(|dictionary| dictionary.len()), Some(report.atoms));

@@ -39,7 +39,7 @@ impl<'a> Radiance<'a> {
         let rest = match scene {
             Scene::Dense(splats) => Rest::Dense(&splats.sh_rest),
             Scene::Sparse(model) => {
-                Rest::Sparse { codes: &model.codes, atoms: interleave(&model.dictionary) }
+                Rest::Sparse { codes: model.codes(), atoms: interleave(model.dictionary()) }
             }
         };
         let degree = scene.degree();

@@ -31,7 +31,7 @@ impl<'a> Scene<'a> {
     pub fn geometry(&self) -> &'a Geometry {
         match self {
             Self::Dense(splats) => &splats.geometry,
-            Self::Sparse(model) => &model.geometry,
+            Self::Sparse(model) => model.geometry(),
         }
     }
 
@@ -40,7 +40,7 @@ impl<'a> Scene<'a> {
     pub fn meta(&self) -> &'a SceneMeta {
         match self {
             Self::Dense(splats) => &splats.meta,
-            Self::Sparse(model) => &model.meta,
+            Self::Sparse(model) => model.meta(),
         }
     }
 
@@ -60,14 +60,8 @@ impl<'a> Scene<'a> {
     pub fn validate(&self) -> Result<()> {
         match self {
             Self::Dense(splats) => splats.validate()?,
-            Self::Sparse(model) => {
-                model.geometry.validate()?;
-                let (found, len) = (model.codes.len(), model.geometry.len());
-                if found != len {
-                    let expected = format!("{len} entries, one for each Gaussian");
-                    return Err(lexisplat::Error::parameter("codes", found, expected).into());
-                }
-            }
+            // A model checks its arrays when it is made.
+            Self::Sparse(_) => {}
         }
         Ok(())
     }

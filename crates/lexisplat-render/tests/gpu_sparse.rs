@@ -3,7 +3,8 @@
 use crate::adapter::gpu;
 use crate::{common, made, twins};
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::{CompressOptions, Layout, Model, Sensitivity, ShDegree, Silent, compress};
+use lexisplat::pursuit::ValueType;
+use lexisplat::{CompressOptions, Model, Sensitivity, ShDegree, Silent, compress};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions, Scene, orbit, render};
 use lexisplat_sample::{SampleOptions, scene};
@@ -65,14 +66,14 @@ fn compressed_scenes_look_the_same() {
     let Some(gpu) = gpu() else { return };
     let splats = scene(&SampleOptions::new(3000, 1));
     let cameras = orbit(&splats.geometry, 2, 120, 80);
-    for layout in [Layout::F16, Layout::F32] {
+    for values in [ValueType::F16, ValueType::F32] {
         let mut options = CompressOptions::default();
-        options.layout = layout;
+        options.values = values;
         options.atoms = Some(60);
         options.sample = 3000;
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
         assert!(report.mean_nonzeros > 0.5, "{report:?}");
-        check(&gpu, &model, &cameras, &format!("{layout:?}"));
+        check(&gpu, &model, &cameras, &format!("{values:?}"));
     }
 }
 
@@ -85,7 +86,7 @@ fn packed_scenes_look_the_same() {
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
     let (packed, _) = packer.pack(1e-5, &Silent).unwrap();
     let model = packed.unpack().unwrap();
-    assert!(model.codes.counts().iter().any(|&count| count > 0));
+    assert!(model.codes().counts().iter().any(|&count| count > 0));
     check(&gpu, &model, &cameras, "packed");
 }
 
@@ -93,7 +94,7 @@ fn packed_scenes_look_the_same() {
 fn codes_take_as_many_bytes_as_stated() {
     let Some(gpu) = gpu() else { return };
     let model = made::model(ShDegree::THREE, 90, true);
-    let codes = &model.codes;
+    let codes = model.codes();
     // For every 16 Gaussians 20 bytes, then atom numbers and values, each filled up to words.
     let words: u64 = codes
         .counts()
@@ -102,7 +103,7 @@ fn codes_take_as_many_bytes_as_stated() {
         .map(|n| n.div_ceil(4) + n.div_ceil(2))
         .sum();
     let escapes = codes.escapes().gaussians.len() as u64;
-    let n = model.geometry.positions.len() as u64;
+    let n = model.geometry().positions.len() as u64;
     let columns = 20 * n.div_ceil(16) + 4 * escapes;
     // 15 coefficients of three channels fill twelve vectors of four floats.
     let atoms = 12 * 16 * (90 + escapes);

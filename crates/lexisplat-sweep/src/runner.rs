@@ -263,7 +263,7 @@ impl Runner<'_> {
             file_bytes: squeezed.file_bytes,
             sh_bytes: squeezed.sh_bytes,
             resident_sh_bytes: squeezed.model.resident_sh_bytes() as u64,
-            atoms: squeezed.model.dictionary.len(),
+            atoms: squeezed.model.dictionary().len(),
             mean_nonzeros: squeezed.mean_nonzeros,
             coefficient_ratio: squeezed.coefficient_ratio,
             max_residual: squeezed.max_residual,

@@ -43,15 +43,15 @@ pub(super) fn squeeze(
 ) -> Result<Squeezed> {
     let clock = Instant::now();
     let mut exact = CompressOptions::default();
-    (exact.pursuit, exact.layout, exact.seed) = (how.pursuit, how.layout, how.seed);
+    (exact.pursuit, exact.values, exact.seed) = (how.pursuit, how.layout.values(), how.seed);
     let compression: Compression = match setting {
         Setting::Tolerance(tolerance) => {
             exact.tolerance = Some(tolerance);
-            exact.into()
+            Compression::Exact(exact, how.layout.codes())
         }
         Setting::MaxNonzeros(most) => {
             (exact.tolerance, exact.max_nonzeros) = (None, Some(most));
-            exact.into()
+            Compression::Exact(exact, how.layout.codes())
         }
         Setting::Preset(preset) => {
             let measured = match sensitivity {
@@ -71,7 +71,7 @@ pub(super) fn squeeze(
     let report = compression.run(splats, &mut file, progress)?;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the file's size")]
     let sh_bytes = report.sh_bytes.round() as u64;
-    let is_exact = report.record.layout != Layout::Packed;
+    let is_exact = report.layout != Layout::Packed;
     Ok(Squeezed {
         model: lexi::read_bytes("the compressed model", &file, &Limits::default())?,
         file_bytes: report.file_bytes,

@@ -7,7 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{Dialect, ReadOptions};
 use lexisplat::simd::Simd;
-use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
+use lexisplat::{CodeLayout, CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
 use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
 use lexisplat_render::{Camera, bulk};
 
@@ -52,7 +52,9 @@ impl OpenModel {
         let (layout, guarantee) = match &scene.loaded {
             Loaded::Ply(read) => (dialect(read.summary.dialect), None),
             Loaded::Lexi(model, packed) => {
-                (model.record.layout.to_string(), guarantee(model, packed.as_deref()))
+                let exact = Layout::of(CodeLayout::Compact, model.codes().values().value_type());
+                let layout = if packed.is_some() { Layout::Packed } else { exact };
+                (layout.to_string(), guarantee(model, packed.as_deref()))
             }
         };
         Ok(Self { id, scene, path, layout, guarantee, orbit, bulk })
@@ -112,9 +114,9 @@ fn dialect(dialect: Dialect) -> String {
 
 /// Returns what a compressed file guarantees, in one line.
 fn guarantee(model: &Model, packed: Option<&Packed>) -> Option<String> {
-    let record = &model.record;
+    let record = model.record();
     let mut parts = Vec::new();
-    if let Some(p) = packed.and_then(|packed| packed.target.as_ref()) {
+    if let Some(p) = packed.and_then(|packed| packed.head().target()) {
         parts.push(format!("{:.2} dB mean, {:.2} dB worst of {} views", p.mean_psnr, p.min_psnr, p.views));
     }
     match (record.tolerance, record.max_nonzeros) {
@@ -124,7 +126,7 @@ fn guarantee(model: &Model, packed: Option<&Packed>) -> Option<String> {
         (Some(_), Some(most)) => parts.push(format!("at most {most} nonzeros")),
         _ => {}
     }
-    if record.layout != Layout::Packed {
+    if packed.is_none() {
         parts.push("geometry exact".to_owned());
     }
     (!parts.is_empty()).then(|| parts.join("; "))
@@ -305,7 +307,9 @@ mod tests {
             let Loaded::Lexi(model, packed) = &made.loaded else { panic!("a model") };
             let mut bytes = Vec::new();
             match packed {
-                Some(packed) => lexi::write_packed(&mut bytes, packed).unwrap(),
+                Some(packed) => {
+                    lexi::LexiWriter::packed(packed).write(&mut bytes, &lexisplat::Silent).unwrap()
+                }
                 None => lexi::write(&mut bytes, model).unwrap(),
             };
             assert_eq!(made.bytes, bytes.len() as u64, "{quality}");

@@ -4,14 +4,15 @@
 use std::path::Path;
 use std::time::Instant;
 
-use lexisplat::lexi::{self, Contents};
-use lexisplat::{Error, Limits};
+use lexisplat::lexi::LexiReader;
+use lexisplat::{Error, Input, Limits};
 
 fn main() -> Result<(), Error> {
     let mut arguments = std::env::args().skip(1);
     let file = arguments.next().unwrap_or_default();
     let rounds: usize = arguments.next().and_then(|a| a.parse().ok()).unwrap_or(10);
-    let Contents::Packed(packed) = lexi::open(Path::new(&file), &Limits::default())? else {
+    let bytes = Input::open(Path::new(&file))?;
+    let Some(packed) = LexiReader::open(&file, bytes, &Limits::default())?.packed()? else {
         eprintln!("{file} is not packed");
         return Ok(());
     };
@@ -20,8 +21,8 @@ fn main() -> Result<(), Error> {
         let clock = Instant::now();
         let model = packed.unpack()?;
         best = best.min(clock.elapsed().as_secs_f64());
-        assert_eq!(model.len(), packed.gaussians);
+        assert_eq!(model.len(), packed.len());
     }
-    println!("{:.4} s at best, {:.0} Gaussians a second", best, packed.gaussians as f64 / best);
+    println!("{:.4} s at best, {:.0} Gaussians a second", best, packed.len() as f64 / best);
     Ok(())
 }

@@ -18,7 +18,7 @@
 //! println!("{:.1} of 45 nonzeros a Gaussian", report.mean_nonzeros);
 //!
 //! let decoded = lexi::read(&output, &Limits::default())?.into_splats();
-//! assert!(model.record.max_residual <= 0.1);
+//! assert!(model.record().max_residual <= 0.1);
 //! assert_eq!(decoded.geometry, original.geometry);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -37,7 +37,7 @@
 //! let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?; // about 40 dB
 //!
 //! let mut file = Vec::new();
-//! lexi::write_packed(&mut file, &packed)?;
+//! lexi::LexiWriter::packed(&packed).write(&mut file, &Silent)?;
 //! let model = lexi::read_bytes("scene.lexi", &file, &Limits::default())?; // drawn as it is
 //! assert_eq!(model.len(), splats.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -58,6 +58,7 @@ pub mod stream;
 mod support;
 
 pub use formats::kind::{FileKind, Unsupported};
+pub use formats::lexi::{CodeLayout, Layout};
 pub use formats::{lexi, ply};
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
@@ -67,7 +68,7 @@ pub use scene::{sh, stats};
 pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 pub use sparse::compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;
-pub use sparse::model::{Layout, Model, Pursuit, Record};
+pub use sparse::model::{Model, Pursuit, Record};
 pub use sparse::{learn, pursuit};
 pub use support::error::{Error, FormatError, Result};
 pub use support::input::Input;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use crate::common;
 use crate::parts::Parts;
-use lexisplat::lexi::{self, LexiChunks};
+use lexisplat::lexi::{self, LexiReader};
 use lexisplat::{Error, FormatError, Limits, Model, Result, Splats};
 use serde_json::Value;
 
@@ -32,7 +32,7 @@ fn golden(name: &str) -> Vec<u8> {
 fn read(bytes: &[u8]) -> [Result<Splats>; 2] {
     let whole = lexi::read_bytes("file.lexi", bytes, &Limits::default()).map(Model::into_splats);
     let in_parts = || {
-        let chunks = LexiChunks::open("file.lexi", bytes, &Limits::default())?;
+        let chunks = LexiReader::open("file.lexi", bytes, &Limits::default())?;
         let mut all = Vec::new();
         lexisplat::stream::in_source_order(&chunks, &std::env::temp_dir(), &mut |part| {
             all.push(part);
@@ -76,7 +76,7 @@ fn dictionary_alone() -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("d.lexi");
     let scene = lexi::read_bytes("f32.lexi", &golden("f32"), &Limits::default()).unwrap();
-    lexi::write_dictionary(&path, &scene.dictionary).unwrap();
+    lexi::write_dictionary(&path, scene.dictionary()).unwrap();
     std::fs::read(path).unwrap()
 }
 

@@ -2,9 +2,13 @@
 //! the input.
 
 use crate::common::written;
+use lexisplat::lexi::{LexiReader, LexiWriter};
+use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::ply::{self, PlySource, ReadOptions};
+use lexisplat::pursuit::ValueType;
 use lexisplat::{
-    CompressOptions, Dictionary, Error, Geometry, Layout, Limits, Pursuit, SceneMeta, ShDegree, Silent,
-    Splats, compress, lexi,
+    CodeLayout, CompressOptions, Dictionary, Error, Extra, Geometry, Layout, Limits, Model, Progress,
+    Pursuit, SceneMeta, Sensitivity, ShDegree, Silent, SplatSource, Splats, compress, lexi, stream,
 };
 use lexisplat_testing::Random;
 
@@ -61,21 +65,22 @@ fn every_degree_and_layout_keeps_the_promise_and_the_geometry() {
     for degree in 0..=4 {
         for layout in [Layout::F32, Layout::F16, Layout::Paper] {
             let splats = scene(700, degree, 3);
-            let options = options(|o| o.layout = layout);
+            let options = options(|o| o.values = layout.values());
             let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
-            let read = lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap();
+            let bytes = written(&model, layout.codes());
+            let read = lexi::read_bytes("m", &bytes, &Limits::default()).unwrap();
             assert_eq!(read, model, "degree {degree} {layout}");
             let decoded = read.into_splats();
             assert_eq!(decoded.geometry, splats.geometry);
             let error = worst(&splats, &decoded);
             assert!(error <= 0.1, "degree {degree} {layout}: {error}");
             assert!(
-                (error - model.record.max_residual).abs() < 1e-12,
+                (error - model.record().max_residual).abs() < 1e-12,
                 "{error} {}",
-                model.record.max_residual
+                model.record().max_residual
             );
-            assert_eq!(model.record.over_tolerance, 0);
-            assert_eq!(model.dictionary.len(), 2 * splats.degree.rest());
+            assert_eq!(model.record().over_tolerance, 0);
+            assert_eq!(model.dictionary().len(), 2 * splats.degree.rest());
             if degree > 0 {
                 assert!(error > 0.02, "degree {degree}: an error of {error} wastes the tolerance");
                 assert!(report.mean_nonzeros < 12.0, "degree {degree}: {}", report.mean_nonzeros);
@@ -93,7 +98,7 @@ fn threads_do_not_change_the_bytes() {
     let bytes = |threads: usize, seed: u64| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let options = options(|o| o.seed = seed);
-        written(&pool.install(|| compress(splats.clone(), &options, &Silent)).unwrap().0)
+        written(&pool.install(|| compress(splats.clone(), &options, &Silent)).unwrap().0, CodeLayout::Compact)
     };
     let one = bytes(1, 0);
     for threads in [2, 5] {
@@ -131,18 +136,18 @@ fn a_cap_lifts_the_promise_and_is_counted() {
     let splats = scene(500, 3, 7);
     let options = options(|o| o.max_nonzeros = Some(1));
     let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
-    assert!(model.codes.counts().iter().all(|&c| c <= 1));
+    assert!(model.codes().counts().iter().all(|&c| c <= 1));
     let decoded = model.to_splats();
     let over = (0..splats.len()).filter(|&i| {
         let squares = splats.rest(i).iter().zip(decoded.rest(i)).map(|(x, y)| f64::from(x - y).powi(2));
         squares.sum::<f64>().sqrt() > 0.1
     });
-    assert_eq!(over.count() as u64, model.record.over_tolerance);
-    assert!(model.record.over_tolerance > 0 && report.escapes == 0);
+    assert_eq!(over.count() as u64, model.record().over_tolerance);
+    assert!(model.record().over_tolerance > 0 && report.escapes == 0);
     let mut only_cap = options;
     only_cap.tolerance = None;
     let (model, _) = compress(splats, &only_cap, &Silent).unwrap();
-    assert_eq!((model.record.tolerance, model.record.over_tolerance), (None, 0));
+    assert_eq!((model.record().tolerance, model.record().over_tolerance), (None, 0));
 }
 
 #[test]
@@ -150,20 +155,26 @@ fn odd_scenes_have_results() {
     for count in [0, 1, 2, 9] {
         let splats = scene(count, 3, 8);
         let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent).unwrap();
-        assert_eq!(lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap(), model, "{count}");
+        assert_eq!(
+            lexi::read_bytes("m", &written(&model, CodeLayout::Compact), &Limits::default()).unwrap(),
+            model,
+            "{count}"
+        );
         assert!(worst(&splats, &model.into_splats()) <= 0.1);
     }
     let mut flat = scene(300, 3, 9);
     flat.sh_rest.fill(0.0);
     let (model, report) = compress(flat, &CompressOptions::default(), &Silent).unwrap();
-    assert_eq!((model.codes.nonzeros(), report.mean_nonzeros, report.coefficient_ratio()), (0, 0.0, None));
+    assert_eq!((model.codes().nonzeros(), report.mean_nonzeros, report.coefficient_ratio()), (0, 0.0, None));
 
     let mut huge = scene(300, 3, 10);
     huge.sh_rest[..45].fill(1e7);
     huge.sh_rest[45..90].fill(f32::MAX);
     let (model, report) = compress(huge.clone(), &CompressOptions::default(), &Silent).unwrap();
-    assert_eq!((report.escapes, &model.codes.escapes().gaussians[..]), (2, &[0, 1][..]));
-    let decoded = lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap().into_splats();
+    assert_eq!((report.escapes, &model.codes().escapes().gaussians[..]), (2, &[0, 1][..]));
+    let decoded = lexi::read_bytes("m", &written(&model, CodeLayout::Compact), &Limits::default())
+        .unwrap()
+        .into_splats();
     assert_eq!(decoded.rest(1), huge.rest(1), "an escape is exact");
     assert!(worst(&huge, &decoded) <= 0.1);
 
@@ -174,7 +185,7 @@ fn odd_scenes_have_results() {
         splats
     };
     let (model, _) = compress(same, &CompressOptions::default(), &Silent).unwrap();
-    assert!(model.codes.counts().iter().all(|&c| c == 1), "one atom is the vector itself");
+    assert!(model.codes().counts().iter().all(|&c| c == 1), "one atom is the vector itself");
 }
 
 #[test]
@@ -183,8 +194,12 @@ fn any_number_of_atoms_works() {
     for atoms in [1, 2, 9, 255, 256, 257, 1024] {
         let options = options(|o| o.atoms = Some(atoms));
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
-        assert_eq!(model.dictionary.len(), atoms);
-        assert_eq!(lexi::read_bytes("m", &written(&model), &Limits::default()).unwrap(), model, "{atoms}");
+        assert_eq!(model.dictionary().len(), atoms);
+        assert_eq!(
+            lexi::read_bytes("m", &written(&model, CodeLayout::Compact), &Limits::default()).unwrap(),
+            model,
+            "{atoms}"
+        );
         assert!(worst(&splats, &model.into_splats()) <= 0.1, "{atoms} atoms");
         assert!(report.escapes == 0 || atoms < 9);
     }
@@ -230,5 +245,94 @@ fn values_that_are_not_finite_are_named() {
             // Learning, which may see the rows first, calls them signals.
             assert!(found == name || (name, found) == ("sh_rest", "signals"), "{name}: {found}");
         }
+    }
+}
+
+/// Values of either type fit either layout of codes, and mean the same.
+#[test]
+fn no_layout_is_refused() {
+    let splats = scene(500, 3, 16);
+    for values in [ValueType::F16, ValueType::F32] {
+        let (model, _) = compress(splats.clone(), &options(|o| o.values = values), &Silent).unwrap();
+        for codes in [CodeLayout::Compact, CodeLayout::Paper] {
+            let bytes = written(&model, codes);
+            let read = lexi::read_bytes("m", &bytes, &Limits::default()).unwrap();
+            assert_eq!((read.to_splats(), read.record()), (model.to_splats(), model.record()));
+        }
+    }
+}
+
+#[test]
+fn parts_that_do_not_fit_make_no_model() {
+    let (model, _) = compress(scene(50, 1, 17), &options(|o| o.atoms = Some(4)), &Silent).unwrap();
+    let (geometry, meta, dictionary, codes, record) = model.into_parts();
+    let refused = |geometry: Geometry, dictionary: Dictionary| {
+        let made = Model::new(geometry, meta.clone(), dictionary, codes.clone(), record.clone());
+        made.unwrap_err().to_string()
+    };
+    let mut shorter = geometry.clone();
+    shorter.opacities.pop();
+    assert!(refused(shorter, dictionary.clone()).starts_with("opacities = 49"));
+    assert!(refused(Geometry::default(), dictionary.clone()).starts_with("codes = 50"));
+    let fewer = Dictionary::new(ShDegree::ONE, dictionary.as_slice()[..27].to_vec()).unwrap();
+    assert!(refused(geometry.clone(), fewer).starts_with("dictionary = 3 atoms"));
+    assert!(refused(geometry, Dictionary::empty()).starts_with("dictionary = 0 atoms"));
+}
+
+/// Progress that cancels at once.
+struct Cancelled;
+
+impl Progress for Cancelled {
+    fn is_cancelled(&self) -> bool {
+        true
+    }
+}
+
+#[test]
+fn cancelled_work_ends() {
+    let splats = scene(3000, 1, 18);
+    let error = compress(splats.clone(), &CompressOptions::default(), &Cancelled).unwrap_err();
+    assert!(matches!(error, Error::Cancelled), "{error}");
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let packer = Packer::new(splats.clone(), &sensitivity, &PackOptions::default()).unwrap();
+    let error = packer.pack(1e-4, &Cancelled).unwrap_err();
+    assert!(matches!(error, Error::Cancelled), "{error}");
+    let mut bytes = Vec::new();
+    let options = CompressOptions::default();
+    let error = stream::compress(&splats, &options, CodeLayout::Compact, &mut bytes, &Cancelled).unwrap_err();
+    assert!(matches!(error, Error::Cancelled) && bytes.is_empty(), "{error}");
+}
+
+/// A scene in memory and a .lexi file are sources as a PLY is.
+#[test]
+fn sources_of_every_kind_give_the_same_bytes() {
+    let mut splats = scene(3000, 2, 19);
+    splats.geometry.extras =
+        vec![Extra { name: "n".into(), values: (0..3000_u32).collect::<Vec<_>>().into() }];
+    let options = options(|o| (o.atoms, o.sample) = (Some(9), 300));
+    let compressed = |source: &dyn SplatSource| {
+        let mut bytes = Vec::new();
+        stream::compress(source, &options, CodeLayout::Compact, &mut bytes, &Silent).unwrap();
+        bytes
+    };
+    let mut ply = Vec::new();
+    ply::write_to(&mut ply, &splats).unwrap();
+    let ply = PlySource::open("t.ply", &ply, &ReadOptions::default(), &Silent).unwrap();
+    let bytes = compressed(&splats);
+    assert!(bytes == compressed(&ply));
+    // What a .lexi file gives is what it decodes to, whether exact or packed.
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
+    let mut packed = Vec::new();
+    LexiWriter::packed(&packer.pack(1e-4, &Silent).unwrap().0).write(&mut packed, &Silent).unwrap();
+    for bytes in [bytes, packed] {
+        let reader = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
+        let decoded = reader.model().unwrap().into_splats();
+        assert!(compressed(&reader) == compressed(&decoded));
+        let mut part = reader.empty();
+        reader.read(700..2100, &mut part).unwrap();
+        assert_eq!(part.geometry.positions, decoded.geometry.positions[700..2100]);
+        assert_eq!(part.geometry.extras[0].values.len(), 1400);
+        assert!(reader.read(2900..3001, &mut part).is_err());
     }
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::common::{models, written};
+use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::{Error, FormatError, Limits, Splats, lexi};
 use lexisplat_testing::repository_file;
 
@@ -14,14 +15,14 @@ fn golden(name: &str) -> PathBuf {
 #[test]
 #[ignore = "writes tests/golden"]
 fn regenerate() {
-    for (name, model) in models() {
-        std::fs::write(golden(name), written(&model)).unwrap();
+    for (name, codes, model) in models() {
+        std::fs::write(golden(name), written(&model, codes)).unwrap();
     }
 }
 
 #[test]
 fn golden_files_read_as_they_were_written() {
-    for (name, model) in models() {
+    for (name, _, model) in models() {
         let read = lexi::read(&golden(name), &Limits::default()).unwrap();
         assert_eq!(read, model, "{name}");
     }
@@ -29,24 +30,25 @@ fn golden_files_read_as_they_were_written() {
 
 #[test]
 fn todays_bytes_are_the_golden_ones() {
-    for (name, model) in models() {
-        let bytes = written(&model);
+    for (name, codes, model) in models() {
+        let bytes = written(&model, codes);
         assert!(bytes == std::fs::read(golden(name)).unwrap(), "{name} is written differently now");
-        assert_eq!(lexi::file_bytes(&model).unwrap(), bytes.len() as u64, "{name}");
-        let listed: u64 = lexi::attribute_bytes(&model).unwrap().iter().map(|a| a.1).sum();
-        assert_eq!(listed, bytes.len() as u64, "{name}");
+        let writer = LexiWriter::exact(&model, codes).unwrap();
+        assert_eq!(writer.file_bytes(), bytes.len() as u64, "{name}");
+        let reader = LexiReader::open(name, bytes, &Limits::default()).unwrap();
+        assert_eq!(writer.attribute_bytes(), reader.attribute_bytes(), "{name}");
     }
 }
 
 #[test]
 fn other_readers_of_safetensors_take_them() {
-    for (name, model) in models() {
-        let bytes = written(&model);
+    for (name, codes, model) in models() {
+        let bytes = written(&model, codes);
         let tensors = safetensors::SafeTensors::deserialize(&bytes).unwrap();
         assert_eq!(tensors.tensor("position").unwrap().shape(), [5, 3], "{name}");
         assert_eq!(
             tensors.tensor("position").unwrap().data(),
-            bytemuck::cast_slice::<_, u8>(&model.geometry.positions)
+            bytemuck::cast_slice::<_, u8>(&model.geometry().positions)
         );
         for (_, view) in tensors.iter() {
             let size = view.dtype().bitsize() / 8;
@@ -59,16 +61,19 @@ fn other_readers_of_safetensors_take_them() {
 #[test]
 fn a_dictionary_travels_alone() {
     let folder = tempfile::tempdir().unwrap();
-    for (name, model) in models() {
+    for (name, _, model) in models() {
         let path = folder.path().join("d.lexi");
-        if model.dictionary.is_empty() {
-            assert!(matches!(lexi::write_dictionary(&path, &model.dictionary), Err(Error::Parameter { .. })));
+        if model.dictionary().is_empty() {
+            assert!(matches!(
+                lexi::write_dictionary(&path, model.dictionary()),
+                Err(Error::Parameter { .. })
+            ));
             assert!(lexi::read_dictionary(&golden(name), &Limits::default()).is_err());
             continue;
         }
-        lexi::write_dictionary(&path, &model.dictionary).unwrap();
-        assert_eq!(lexi::read_dictionary(&path, &Limits::default()).unwrap(), model.dictionary, "{name}");
-        assert_eq!(lexi::read_dictionary(&golden(name), &Limits::default()).unwrap(), model.dictionary);
+        lexi::write_dictionary(&path, model.dictionary()).unwrap();
+        assert_eq!(&lexi::read_dictionary(&path, &Limits::default()).unwrap(), model.dictionary(), "{name}");
+        assert_eq!(&lexi::read_dictionary(&golden(name), &Limits::default()).unwrap(), model.dictionary());
         let error = lexi::read(&path, &Limits::default()).unwrap_err().to_string();
         assert!(error.contains("'lexi-dictionary'"), "{error}");
     }
@@ -76,18 +81,18 @@ fn a_dictionary_travels_alone() {
 
 #[test]
 fn dense_values_are_the_sum_of_atoms() {
-    for (name, model) in models() {
+    for (name, _, model) in models() {
         let Splats { sh_rest, degree, .. } = model.to_splats();
         let dim = degree.rest();
         let mut k = 0;
-        for (i, &count) in model.codes.counts().iter().enumerate() {
+        for (i, &count) in model.codes().counts().iter().enumerate() {
             let mut expected = vec![0.0_f32; dim];
-            if let Some(e) = model.codes.escapes().gaussians.iter().position(|&g| g as usize == i) {
-                expected.copy_from_slice(&model.codes.escapes().rows[e * dim..][..dim]);
+            if let Some(e) = model.codes().escapes().gaussians.iter().position(|&g| g as usize == i) {
+                expected.copy_from_slice(&model.codes().escapes().rows[e * dim..][..dim]);
             }
             for _ in 0..count {
-                let (atom, value) = (model.codes.indices().get(k), model.codes.values().get(k));
-                for (e, a) in expected.iter_mut().zip(model.dictionary.atom(atom)) {
+                let (atom, value) = (model.codes().indices().get(k), model.codes().values().get(k));
+                for (e, a) in expected.iter_mut().zip(model.dictionary().atom(atom)) {
                     *e += value * a;
                 }
                 k += 1;
@@ -99,8 +104,8 @@ fn dense_values_are_the_sum_of_atoms() {
 
 #[test]
 fn newer_versions_are_refused_by_number() {
-    let (_, model) = models().swap_remove(1);
-    let mut bytes = written(&model);
+    let (_, codes, model) = models().swap_remove(1);
+    let mut bytes = written(&model, codes);
     let text = b"\"version\":\"1\"";
     let at = bytes.windows(text.len()).position(|w| w == text).unwrap();
     bytes[at + text.len() - 2] = b'9';

@@ -84,7 +84,8 @@ fn change_header(header: &mut Value, random: &mut Random) {
 #[test]
 fn damage_is_refused_within_memory() {
     let _alone = alone();
-    let files: Vec<(&str, Vec<u8>)> = models().into_iter().map(|(name, m)| (name, written(&m))).collect();
+    let files: Vec<(&str, Vec<u8>)> =
+        models().into_iter().map(|(name, codes, m)| (name, written(&m, codes))).collect();
     for (name, bytes) in &files {
         assert!(accepted(bytes), "{name}");
         for len in 0..bytes.len() {

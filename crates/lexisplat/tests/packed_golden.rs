@@ -4,11 +4,9 @@
 
 use std::path::PathBuf;
 
-use lexisplat::lexi::Contents;
+use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::packed::{PackOptions, Packed, Packer, TargetRecord};
-use lexisplat::{
-    Extra, ExtraValues, Layout, Limits, Model, Sensitivity, ShDegree, Silent, Splats, lexi, ply,
-};
+use lexisplat::{Extra, ExtraValues, Limits, Model, Sensitivity, ShDegree, Silent, Splats, lexi, ply};
 use lexisplat_sample::{SampleOptions, scene};
 
 const NAMES: [&str; 3] = ["packed", "packed_degree0", "packed_escapes"];
@@ -18,10 +16,8 @@ fn golden(name: &str, kind: &str) -> PathBuf {
 }
 
 fn opened(name: &str) -> Packed {
-    match lexi::open(&golden(name, "lexi"), &Limits::default()).unwrap() {
-        Contents::Packed(packed) => packed,
-        other => panic!("{name}: {other:?}"),
-    }
+    let bytes = std::fs::read(golden(name, "lexi")).unwrap();
+    LexiReader::open(name, bytes, &Limits::default()).unwrap().packed().unwrap().unwrap()
 }
 
 fn decoded(name: &str) -> Model {
@@ -49,7 +45,7 @@ fn regenerate() {
         Packer::new(splats, &sensitivity, &options).unwrap().pack(2e-5, &Silent).unwrap()
     };
     let write = |name: &str, packed: &Packed| {
-        lexi::write_packed(&golden(name, "lexi"), packed).unwrap();
+        LexiWriter::packed(packed).write(&golden(name, "lexi"), &Silent).unwrap();
         let splats = packed.unpack().unwrap().into_splats();
         std::fs::write(golden(name, "ply"), ply_bytes(&splats)).unwrap();
     };
@@ -65,9 +61,8 @@ fn regenerate() {
         },
         Extra { name: "time".to_owned(), values: ExtraValues::F32(numbers.map(f32::from).collect()) },
     ];
-    let (mut packed, _) = pack(&splats, |o| o.keep_order = true);
-    packed.target = Some(promise());
-    write("packed", &packed);
+    let (packed, _) = pack(&splats, |o| o.keep_order = true);
+    write("packed", &packed.with_target(promise()));
 
     let splats = scene(&SampleOptions::new(40, 2)).with_degree_cut(ShDegree::ZERO);
     write("packed_degree0", &pack(&splats, |o| o.seed = 7).0);
@@ -108,32 +103,36 @@ fn golden_files_are_the_same_on_any_number_of_threads() {
 #[test]
 fn golden_files_say_how_they_were_made() {
     let (packed, model) = (opened("packed"), decoded("packed"));
-    assert_eq!((packed.gaussians, packed.degree, model.len()), (300, ShDegree::THREE, 300));
-    assert_eq!(packed.target, Some(promise()));
-    assert_eq!(packed.meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
-    assert!(packed.meta.antialiased && packed.order.is_some() && packed.record.tolerance.is_none());
-    assert_eq!(model.meta, packed.meta);
+    assert_eq!((packed.len(), packed.head().degree(), model.len()), (300, ShDegree::THREE, 300));
+    assert_eq!(packed.head().target(), Some(&promise()));
+    assert_eq!(packed.head().meta().comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
+    assert!(
+        packed.head().meta().antialiased
+            && packed.order().is_some()
+            && packed.head().record().tolerance.is_none()
+    );
+    assert_eq!(model.meta(), packed.head().meta());
     // Back in the source's order they count up again.
-    let [label, time] = model.geometry.extras.as_slice() else { panic!("two extras") };
+    let [label, time] = model.geometry().extras.as_slice() else { panic!("two extras") };
     assert_eq!((label.name.as_str(), time.name.as_str()), ("label", "time"));
     assert_eq!(time.values, ExtraValues::F32((0..300_u16).map(f32::from).collect()));
 
     let (packed, model) = (opened("packed_degree0"), decoded("packed_degree0"));
-    assert_eq!((packed.gaussians, packed.atoms, packed.record.seed), (40, 0, 7));
-    assert!(packed.target.is_none() && packed.order.is_none() && model.dictionary.is_empty());
+    assert_eq!((packed.len(), packed.head().atoms(), packed.head().record().seed), (40, 0, 7));
+    assert!(packed.head().target().is_none() && packed.order().is_none() && model.dictionary().is_empty());
 
     let (packed, model) = (opened("packed_escapes"), decoded("packed_escapes"));
-    assert_eq!((packed.gaussians, packed.degree), (80, ShDegree::ONE));
-    assert_eq!((packed.record.tolerance, packed.record.over_tolerance), (Some(0.05), 0));
-    assert!((0.01..=0.05).contains(&packed.record.max_residual));
-    let escapes = model.codes.escapes();
-    assert!(escapes.gaussians.len() >= 3 && model.codes.nonzeros() > 80);
+    assert_eq!((packed.len(), packed.head().degree()), (80, ShDegree::ONE));
+    assert_eq!((packed.head().record().tolerance, packed.head().record().over_tolerance), (Some(0.05), 0));
+    assert!((0.01..=0.05).contains(&packed.head().record().max_residual));
+    let escapes = model.codes().escapes();
+    assert!(escapes.gaussians.len() >= 3 && model.codes().nonzeros() > 80);
     assert!(escapes.rows.chunks_exact(9).filter(|row| **row == [1e6; 9]).count() == 3);
 
     for name in NAMES {
-        assert_eq!(decoded(name).record.layout, Layout::Packed, "{name}");
+        assert_eq!(decoded(name).record().pursuit, None, "{name}");
         let packed = opened(name);
-        assert_eq!(packed.unpack_dictionary().unwrap(), decoded(name).dictionary, "{name}");
+        assert_eq!(&packed.unpack_dictionary().unwrap(), decoded(name).dictionary(), "{name}");
     }
 }
 
@@ -141,7 +140,7 @@ fn golden_files_say_how_they_were_made() {
 fn their_bytes_are_still_written() {
     for name in NAMES {
         let mut bytes = Vec::new();
-        lexi::write_packed(&mut bytes, &opened(name)).unwrap();
+        LexiWriter::packed(&opened(name)).write(&mut bytes, &Silent).unwrap();
         assert!(bytes == std::fs::read(golden(name, "lexi")).unwrap(), "{name} is written differently now");
     }
 }
@@ -156,6 +155,6 @@ fn other_readers_of_safetensors_take_them() {
             let offset = view.data().as_ptr() as usize - bytes.as_ptr() as usize;
             assert!(offset.is_multiple_of(size), "{name}: {tensor} is not aligned to its entries");
         }
-        assert_eq!(tensors.tensor("packed.data").unwrap().data(), opened(name).data, "{name}");
+        assert_eq!(tensors.tensor("packed.data").unwrap().data(), opened(name).data(), "{name}");
     }
 }

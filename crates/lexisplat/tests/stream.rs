@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{
-    CompressOptions, Error, Extra, ExtraValues, Input, Layout, Limits, Sensitivity, Silent, SplatSource,
-    Splats, compress, lexi, ply, stats, stream,
+    CodeLayout, CompressOptions, Error, Extra, ExtraValues, Input, Layout, Limits, Sensitivity, Silent,
+    SplatSource, Splats, compress, lexi, ply, stats, stream,
 };
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -25,7 +25,7 @@ fn splats(count: usize) -> Splats {
 
 fn options(layout: Layout) -> CompressOptions {
     let mut options = CompressOptions::default();
-    options.layout = layout;
+    options.values = layout.values();
     options.atoms = Some(16);
     options.sample = 400;
     // Short codes: learning and coding are not what is tested.
@@ -55,15 +55,19 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     lexi::write(&mut expected, &model).unwrap();
     for threads in [1, 3] {
         let done = on_threads(threads, || {
-            stream::compress(&chunks, &options(Layout::F16), &path("out.lexi"), &Silent).unwrap()
+            stream::compress(&chunks, &options(Layout::F16), CodeLayout::Compact, &path("out.lexi"), &Silent)
+                .unwrap()
         });
         assert!(std::fs::read(path("out.lexi")).unwrap() == expected, "{threads} threads");
-        assert_eq!(done.record, model.record);
-        assert_eq!(done.attribute_bytes, lexi::attribute_bytes(&model).unwrap());
-        assert_eq!(done.sh_bytes(), lexi::sh_bytes(&model).unwrap());
+        assert_eq!(&done.record, model.record());
+        assert_eq!(
+            done.attribute_bytes,
+            lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().attribute_bytes()
+        );
+        assert_eq!(done.sh_bytes(), lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().sh_bytes());
     }
     let bytes = Input::open(&path("out.lexi")).unwrap();
-    let chunks = LexiChunks::open("out.lexi", &bytes, &Limits::default()).unwrap();
+    let chunks = LexiReader::open("out.lexi", &bytes, &Limits::default()).unwrap();
     let mut expected = Vec::new();
     ply::write_to(&mut expected, &model.to_splats()).unwrap();
     let written = stream::decompress(&chunks, &path("back.ply"), &Silent).unwrap();
@@ -71,11 +75,14 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     assert!(std::fs::read(path("back.ply")).unwrap() == expected);
     let survey = stream::survey(&chunks, folder.path()).unwrap();
     assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
-    assert_eq!(survey.nonzeros, model.codes.nonzeros() as u64);
+    assert_eq!(survey.nonzeros, model.codes().nonzeros() as u64);
     assert_eq!(survey.resident_sh_bytes, model.resident_sh_bytes() as u64);
     assert_eq!(survey.nonzero_histogram.iter().sum::<u64>() + survey.escapes, GAUSSIANS as u64);
     assert_eq!(survey.atom_usage.iter().sum::<u64>(), survey.nonzeros);
-    assert_eq!(chunks.attribute_bytes(), lexi::attribute_bytes(&model).unwrap());
+    assert_eq!(
+        chunks.attribute_bytes(),
+        lexi::LexiWriter::exact(&model, CodeLayout::Compact).unwrap().attribute_bytes()
+    );
     assert_eq!(files(folder.path()), 3);
 }
 
@@ -89,9 +96,9 @@ fn escapes_and_pointers_are_found_in_every_part() {
         let (model, report) = compress(whole.clone(), &options(layout), &Silent).unwrap();
         assert_eq!(report.escapes, 6);
         let (mut bytes, mut expected, mut found) = (Vec::new(), Vec::new(), Vec::new());
-        lexi::write(&mut bytes, &model).unwrap();
+        lexi::LexiWriter::exact(&model, layout.codes()).unwrap().write(&mut bytes, &Silent).unwrap();
         ply::write_to(&mut expected, &model.into_splats()).unwrap();
-        let chunks = LexiChunks::open("t.lexi", &bytes, &Limits::default()).unwrap();
+        let chunks = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(stream::decompress(&chunks, &mut found, &Silent).unwrap(), expected.len() as u64);
         assert!(found == expected, "{layout}");
     }
@@ -108,11 +115,11 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
         let packer = Packer::new(&whole, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_packed(&mut bytes, &packed).unwrap();
+        lexi::LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
         let model = lexi::read_bytes("t.lexi", &bytes, &Limits::default()).unwrap();
-        let chunks = LexiChunks::open("t.lexi", &bytes, &Limits::default()).unwrap();
+        let chunks = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(chunks.order_kept(), keep_order);
-        assert_eq!(chunks.attribute_bytes(), lexi::packed_tensor_bytes(&packed));
+        assert_eq!(chunks.attribute_bytes(), lexi::LexiWriter::packed(&packed).attribute_bytes());
         let (mut expected, mut found) = (Vec::new(), Vec::new());
         ply::write_to(&mut expected, &model.to_splats()).unwrap();
         stream::decompress(&chunks, &mut found, &Silent).unwrap();
@@ -177,9 +184,9 @@ fn ascii_rows_are_found_at_any_place() {
         assert_eq!(part.geometry.positions, whole.geometry.positions[range]);
     }
     let (mut from_ascii, mut from_binary) = (Vec::new(), Vec::new());
-    stream::compress(&chunks, &options(Layout::F16), &mut from_ascii, &Silent).unwrap();
+    stream::compress(&chunks, &options(Layout::F16), CodeLayout::Compact, &mut from_ascii, &Silent).unwrap();
     let chunks = PlySource::open("t.ply", &binary, &ReadOptions::default(), &Silent).unwrap();
-    stream::compress(&chunks, &options(Layout::F16), &mut from_binary, &Silent).unwrap();
+    stream::compress(&chunks, &options(Layout::F16), CodeLayout::Compact, &mut from_binary, &Silent).unwrap();
     assert!(from_ascii == from_binary);
 }
 
@@ -192,7 +199,7 @@ fn a_damaged_file_leaves_no_output_behind() {
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     let expected = lexi::read_bytes("t.lexi", &bytes, &Limits::default()).unwrap_err().to_string();
-    let found = LexiChunks::open("t.lexi", &bytes, &Limits::default()).unwrap_err();
+    let found = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap_err();
     assert_eq!(found.to_string(), expected);
     assert!(matches!(found, Error::Format { .. }));
 }

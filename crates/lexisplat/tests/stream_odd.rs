@@ -1,7 +1,7 @@
 //! Odd scenes go through the streams as they go through memory: none, one, the same again and again, rows left out at
 //! the borders of parts, properties of every type, normals, text.
 
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::packed::PackOptions;
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{
@@ -102,7 +102,7 @@ fn plys() -> Vec<(&'static str, Vec<u8>)> {
 
 fn options(layout: Layout) -> CompressOptions {
     let mut options = CompressOptions::default();
-    options.layout = layout;
+    options.values = layout.values();
     options.atoms = Some(6);
     options.sample = 300;
     options.tolerance = Some(0.4);
@@ -115,7 +115,7 @@ fn unpacked(bytes: &[u8]) -> Splats {
 
 /// The .lexi file `bytes` decompressed and looked over in parts, as `whole`.
 fn comes_out_as(name: &str, bytes: &[u8], whole: &Splats) {
-    let chunks = LexiChunks::open("t.lexi", bytes, &Limits::default()).unwrap();
+    let chunks = LexiReader::open("t.lexi", bytes, &Limits::default()).unwrap();
     let mut found = Vec::new();
     let written = stream::decompress(&chunks, &mut found, &Silent).unwrap();
     assert!(found == file(whole), "{name}");
@@ -142,12 +142,13 @@ fn exact_layouts_give_the_bytes_of_the_whole_scene() {
         for layout in [Layout::F16, Layout::F32, Layout::Paper] {
             let (model, _) = compress(whole.splats.clone(), &options(layout), &Silent).unwrap();
             let (mut expected, mut found) = (Vec::new(), Vec::new());
-            lexi::write(&mut expected, &model).unwrap();
-            let done = stream::compress(&chunks, &options(layout), &mut found, &Silent).unwrap();
+            lexi::LexiWriter::exact(&model, layout.codes()).unwrap().write(&mut expected, &Silent).unwrap();
+            let done =
+                stream::compress(&chunks, &options(layout), layout.codes(), &mut found, &Silent).unwrap();
             assert!(found == expected, "{name}, {layout}");
             assert_eq!(
                 (done.gaussians, done.record),
-                (model.len(), model.record.clone()),
+                (model.len(), model.record().clone()),
                 "{name}, {layout}"
             );
             comes_out_as(name, &found, &model.into_splats());

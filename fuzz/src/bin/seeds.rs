@@ -10,6 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use lexisplat::packed::fuzzing::parts;
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, TargetRecord};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
@@ -146,17 +147,17 @@ fn exact(root: &Path) -> Done {
                 splats.sh_rest[4 * degree.rest()..][..degree.rest()].fill(-1e6);
             }
             let mut options = CompressOptions::default();
-            options.layout = layout;
+            options.values = layout.values();
             options.atoms = Some(if layout == Layout::F32 && degree == ShDegree::ONE { 300 } else { ATOMS });
             let (model, _) = compress(splats, &options, &Silent)?;
             let mut bytes = Vec::new();
-            lexi::write(&mut bytes, &model)?;
+            LexiWriter::exact(&model, layout.codes())?.write(&mut bytes, &Silent)?;
             let name = format!("{layout}-{degree}");
             save(root, "lexi", &name, &bytes)?;
             save(root, "dictionary", &name, &bytes)?;
             if degree != ShDegree::ZERO {
                 let path = root.join("dictionary").join(format!("seed-alone-{name}"));
-                lexi::write_dictionary(&path, &model.dictionary)?;
+                lexi::write_dictionary(&path, model.dictionary())?;
             }
         }
     }
@@ -179,10 +180,11 @@ fn packed(root: &Path) -> Done {
             }
             let sensitivity = Sensitivity::heuristic(&splats.geometry);
             let packer = Packer::new(&splats, &sensitivity, &options)?;
-            let (mut packed, _) = packer.pack(1e-3, &Silent)?;
-            packed.target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
+            let (packed, _) = packer.pack(1e-3, &Silent)?;
+            let target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
+            let packed = packed.with_target(target);
             let mut bytes = Vec::new();
-            lexi::write_packed(&mut bytes, &packed)?;
+            LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;
             let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });
             save(root, "packed", &name, &bytes)?;
             if gaussians == 2 {

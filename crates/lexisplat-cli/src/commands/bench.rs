@@ -97,7 +97,7 @@ struct Report<'a> {
 impl Report<'_> {
     fn nonzeros(&self) -> Option<f64> {
         match self.scene {
-            Scene::Sparse(model) => Some(model.codes.nonzeros() as f64 / model.len().max(1) as f64),
+            Scene::Sparse(model) => Some(model.codes().nonzeros() as f64 / model.len().max(1) as f64),
             Scene::Dense(_) => None,
         }
     }

@@ -71,7 +71,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
 fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     let layout = args.chosen_layout()?;
     if layout != Layout::Packed {
-        return Ok(exact(args, layout, limits)?.into());
+        return Ok(Compression::Exact(exact(args, layout, limits)?, layout.codes()));
     }
     let mut options = PackOptions::default();
     options.tolerance = args.tol;
@@ -113,7 +113,7 @@ fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOpt
     options.max_nonzeros = args.max_nnz;
     options.atoms = args.atoms;
     options.pursuit = args.pursuit.unwrap_or(options.pursuit);
-    options.layout = layout;
+    options.values = layout.values();
     options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
     if let Some(path) = &args.dictionary {
@@ -177,7 +177,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
             let sample = text::count(sample as u64);
             format!("{atoms} atoms from {sample} Gaussians in {rounds} rounds, {learn_seconds:.1} s")
         }
-        _ if record.layout == Layout::Packed => format!("{atoms} atoms, {learn_seconds:.1} s"),
+        _ if report.layout == Layout::Packed => format!("{atoms} atoms, {learn_seconds:.1} s"),
         _ => format!("{atoms} atoms, given"),
     };
     line("dictionary", dictionary)?;
@@ -191,7 +191,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
             ),
         )?;
     }
-    if record.layout != Layout::Packed || record.tolerance.is_some() {
+    if report.layout != Layout::Packed || record.tolerance.is_some() {
         line("error", error_line(record))?;
         if report.escapes > 0 {
             line("escapes", format!("{} Gaussians' SH stored exactly", text::count(report.escapes)))?;

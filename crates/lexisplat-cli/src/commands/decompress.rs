@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::{Error, stream};
 use serde_json::json;
 
@@ -24,7 +24,7 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     check_output(&output, &[&args.input], common.overwrite)?;
     stop::while_writing(if is_pipe(&output) { Work::Stream } else { Work::Files(1) });
     let (name, bytes) = input(&args.input, common)?;
-    let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
+    let lexi = LexiReader::open(&name, &bytes, &common.limits()?)?;
     let bars = Bars::new(common.quiet);
     let bytes = write_output(&output, common.overwrite, |sink| stream::decompress(&lexi, sink, &bars))?;
     let seconds = start.elapsed().as_secs_f64();

@@ -135,8 +135,8 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         exact_file["mean_nonzeros"] = json!(report.mean_nonzeros);
         exact_file["coefficient_ratio"] = json!(report.coefficient_ratio);
         exact_file["sh_bytes"] = json!(report.sh_bytes);
-        exact_file["max_residual"] = json!(exact.record.max_residual);
-        exact_file["rms_residual"] = json!(exact.record.rms_residual);
+        exact_file["max_residual"] = json!(exact.record().max_residual);
+        exact_file["rms_residual"] = json!(exact.record().rms_residual);
         return print_json(&json!({
             "folder": folder.display().to_string(),
             "gaussians": exact.len(),
@@ -167,7 +167,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         line(FILES[1], packed_report.file_bytes, "packed", &packed_scores),
         line(FILES[2], report.file_bytes, "geometry exact", &exact_scores),
         "",
-        error_line(&exact.record),
+        error_line(exact.record()),
         page_path.display(),
     ))
 }

@@ -1,7 +1,7 @@
 //! Facts about a .lexi file, as reports give them.
 
 use lexisplat::packed::StreamBits;
-use lexisplat::{Layout, Record};
+use lexisplat::{Pursuit, Record};
 use serde::Serialize;
 
 /// How a .lexi file was made, and its errors, to serialize. docs/FORMAT.md has the meaning of the keys.
@@ -9,7 +9,6 @@ use serde::Serialize;
 #[allow(missing_docs, reason = "the fields are those of a record, by their keys in reports")]
 #[non_exhaustive]
 pub struct RecordReport {
-    pub layout: &'static str,
     /// `None` for a packed file.
     pub pursuit: Option<&'static str>,
     pub tol: Option<f64>,
@@ -23,8 +22,7 @@ pub struct RecordReport {
 impl From<&Record> for RecordReport {
     fn from(record: &Record) -> Self {
         Self {
-            layout: record.layout.name(),
-            pursuit: (record.layout != Layout::Packed).then(|| record.pursuit.name()),
+            pursuit: record.pursuit.map(Pursuit::name),
             tol: record.tolerance,
             max_nnz: record.max_nonzeros,
             seed: record.seed,

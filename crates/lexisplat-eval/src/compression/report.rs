@@ -1,7 +1,8 @@
 //! What a compression did: the facts that programs print as text and as JSON.
 
-use lexisplat::packed::{PackReport, Packed, StreamBits, TargetRecord};
-use lexisplat::{CompressReport, Dictionary, Record, ShDegree};
+use lexisplat::packed::{PackReport, PackedHead, StreamBits, TargetRecord};
+use lexisplat::stream::Compressed;
+use lexisplat::{Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
 use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
@@ -20,6 +21,9 @@ pub struct CompressionReport {
     pub sh_degree: u8,
     /// Number of atoms.
     pub atoms: usize,
+    /// Layout of the file.
+    #[serde(serialize_with = "name")]
+    pub layout: Layout,
     /// How the file was made, and its errors. The keys are those of [`RecordReport`].
     #[serde(flatten, serialize_with = "record")]
     pub record: Record,
@@ -95,6 +99,7 @@ pub enum SensitivitySource {
 
 /// What the reports of the exact and of the packed codec share.
 struct Coding<'a> {
+    layout: Layout,
     record: &'a Record,
     mean_nonzeros: f64,
     nonzero_histogram: &'a [u64],
@@ -112,13 +117,21 @@ impl CompressionReport {
         tensors: &[(String, u64)],
         streams: &[StreamBits],
     ) -> Self {
-        let &Coding { record, mean_nonzeros, nonzero_histogram, escapes, learn_seconds, code_seconds } =
-            coding;
+        let &Coding {
+            layout,
+            record,
+            mean_nonzeros,
+            nonzero_histogram,
+            escapes,
+            learn_seconds,
+            code_seconds,
+        } = coding;
         let (parts, dim) = (part_bytes(tensors, streams), degree.rest());
         Self {
             gaussians,
             sh_degree: degree.get(),
             atoms,
+            layout,
             record: record.clone(),
             mean_nonzeros,
             coefficient_ratio: (mean_nonzeros > 0.0).then(|| dim as f64 / mean_nonzeros),
@@ -149,15 +162,11 @@ impl CompressionReport {
         }
     }
 
-    /// Returns the report of a file with exact geometry, whose tensors take the bytes in `tensors`.
-    pub(super) fn exact(
-        gaussians: usize,
-        dictionary: &Dictionary,
-        record: &Record,
-        report: &CompressReport,
-        tensors: &[(String, u64)],
-    ) -> Self {
+    /// Returns the report of a file with exact geometry.
+    pub(super) fn exact(done: &Compressed, layout: Layout) -> Self {
+        let Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds, .. } = done;
         let coding = Coding {
+            layout,
             record,
             mean_nonzeros: report.mean_nonzeros,
             nonzero_histogram: &report.nonzero_histogram,
@@ -166,26 +175,29 @@ impl CompressionReport {
             code_seconds: report.code_seconds,
         };
         let learned = report.learned.as_ref();
+        let (degree, atoms) = (dictionary.degree(), dictionary.len());
         Self {
             learn_rounds: learned.map(|l| l.rounds),
             learn_sample: learned.map(|l| l.sample),
             held_out_nonzeros: learned.map(|l| l.held_out_nonzeros),
+            write_seconds: *write_seconds,
             dictionary: Some(dictionary.clone()),
-            ..Self::new(gaussians, dictionary.degree(), dictionary.len(), &coding, tensors, &[])
+            ..Self::new(*gaussians, degree, atoms, &coding, attribute_bytes, &[])
         }
     }
 
     /// Returns the report of a packed file, whose tensors take the bytes in `tensors` and whose streams the
     /// bits in `streams`.
     pub(super) fn packed(
-        head: &Packed,
+        head: &PackedHead,
         report: &PackReport,
         tensors: &[(String, u64)],
         streams: &[StreamBits],
         importance: SensitivitySource,
     ) -> Self {
         let coding = Coding {
-            record: &head.record,
+            layout: Layout::Packed,
+            record: head.record(),
             mean_nonzeros: report.mean_nonzeros,
             nonzero_histogram: &report.nonzero_histogram,
             escapes: report.escapes,
@@ -193,12 +205,16 @@ impl CompressionReport {
             code_seconds: report.code_seconds,
         };
         Self {
-            target: head.target.clone(),
+            target: head.target().cloned(),
             importance: Some(importance),
-            device: Some(head.device.clone().unwrap_or_else(|| "cpu".to_owned())),
-            ..Self::new(head.gaussians, head.degree, head.atoms, &coding, tensors, streams)
+            device: Some(head.device().unwrap_or("cpu").to_owned()),
+            ..Self::new(head.len(), head.degree(), head.atoms(), &coding, tensors, streams)
         }
     }
+}
+
+fn name<S: Serializer>(layout: &Layout, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(layout.name())
 }
 
 fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Error> {

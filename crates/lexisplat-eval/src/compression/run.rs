@@ -1,8 +1,9 @@
 //! The steps from a source of splats to a written file and its report.
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, Preset};
 use lexisplat::stream::{self, Importance};
-use lexisplat::{CompressOptions, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch, lexi};
+use lexisplat::{Layout, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
 use lexisplat_render::Renderer;
 
 use super::judge::Judge;
@@ -34,7 +35,10 @@ impl Compression {
         let clock = Stopwatch::start();
         let sink = sink.into();
         let mut report = match self {
-            Self::Exact(options) => exact(options, source, sink, progress)?,
+            Self::Exact(options, codes) => {
+                let done = stream::compress(source, options, *codes, sink, progress)?;
+                CompressionReport::exact(&done, Layout::of(*codes, options.values))
+            }
             Self::Heuristic(preset, options) => in_parts(options, *preset, None, source, sink, progress)?,
             Self::Packed(packing) => packing.run(source, sink, progress)?,
         };
@@ -43,24 +47,6 @@ impl Compression {
         report.total_seconds = clock.seconds();
         Ok(report)
     }
-}
-
-fn exact(
-    options: &CompressOptions,
-    source: &dyn SplatSource,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<CompressionReport> {
-    let done = stream::compress(source, options, sink, progress)?;
-    let write_seconds = done.write_seconds;
-    let report = CompressionReport::exact(
-        done.gaussians,
-        &done.dictionary,
-        &done.record,
-        &done.report,
-        &done.attribute_bytes,
-    );
-    Ok(CompressionReport { write_seconds, ..report })
 }
 
 /// Packs part by part. `renderer` measures the parts. Without one the heuristic does.
@@ -142,9 +128,9 @@ impl Packing {
         let look_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
-        let packer = Packer::new(&splats, &sensitivity, &self.options)?;
+        let packer = Packer::new(&*splats, &sensitivity, &self.options)?;
         drop(sensitivity);
-        let (mut packed, report) = match self.quality {
+        let (packed, report) = match self.quality {
             Quality::Preset(preset) => packer.pack(packer.step_for(preset.decibels()), progress)?,
             Quality::Target(target) => {
                 let mut judge = Judge::new(renderer, &splats, &views)?;
@@ -152,15 +138,17 @@ impl Packing {
             }
         };
         drop(packer);
-        packed.device = device;
+        let packed = packed.with_device(device);
         let pack_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
-        lexi::write_packed(sink, &packed)?;
+        let writer = LexiWriter::packed(&packed);
+        let tensors = writer.attribute_bytes().to_vec();
+        writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
-        let (tensors, streams) = (lexi::packed_tensor_bytes(&packed), packed.stream_bits()?);
+        let streams = packed.stream_bits()?;
         let report =
-            CompressionReport::packed(&packed, &report, &tensors, &streams, SensitivitySource::Views);
+            CompressionReport::packed(packed.head(), &report, &tensors, &streams, SensitivitySource::Views);
         Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
     }
 }

@@ -1,7 +1,10 @@
 //! The search for the smallest file of a quality, or for the best file of a size.
 
+use std::borrow::Borrow;
+
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackReport, Packed, Packer, TargetRecord};
-use lexisplat::{Progress, lexi};
+use lexisplat::{Progress, Splats};
 
 use super::judge::Judge;
 use crate::error::{Error, Result};
@@ -118,7 +121,7 @@ struct Try {
 /// # Errors
 /// [`Error::Parameter`] if the target is out of range or cannot be met. Errors of packing and drawing.
 pub fn pack_to_target(
-    packer: &Packer<'_>,
+    packer: &Packer<impl Borrow<Splats>>,
     judge: &mut Judge,
     target: Target,
     source_bytes: u64,
@@ -144,7 +147,7 @@ pub fn pack_to_target(
         log_step = log_step.clamp(libm::log2(STEPS[0]), libm::log2(STEPS[1]));
         let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
         let (value, reached) = if size {
-            (-libm::log2((lexi::packed_bytes(&packed) + RECORD_BYTES) as f64), None)
+            (-libm::log2((LexiWriter::packed(&packed).file_bytes() + RECORD_BYTES) as f64), None)
         } else {
             let [mean, least] = judge.score(&packed.unpack()?)?;
             (if matches!(target, Target::MinPsnr(_)) { least } else { mean }, Some([mean, least]))
@@ -163,7 +166,7 @@ pub fn pack_to_target(
         let Some(next) = next_step(&tries, wanted + 0.5 * close, &mut slope) else { break };
         log_step = next;
     }
-    let Some((_, mut packed, report, reached)) = best else {
+    let Some((_, packed, report, reached)) = best else {
         let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
         return Err(target.unreachable(found, source_bytes));
     };
@@ -173,8 +176,8 @@ pub fn pack_to_target(
     };
     let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
     let given = judge.views_are_given();
-    packed.target = Some(TargetRecord::new(recorded.name(), asked, reached.map(rounded), views, given));
-    Ok((packed, report))
+    let record = TargetRecord::new(recorded.name(), asked, reached.map(rounded), views, given);
+    Ok((packed.with_target(record), report))
 }
 
 /// Rounds decibels to the thousandths that a file records.

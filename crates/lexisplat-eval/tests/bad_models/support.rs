@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::stats::{Lint, lint};
 use lexisplat::{
@@ -96,10 +97,10 @@ fn exact(splats: &Splats) -> [(Splats, u64); 2] {
     let mut kept = Vec::new();
     for layout in [Layout::F32, Layout::Paper, Layout::F16] {
         let mut options = CompressOptions::default();
-        options.layout = layout;
+        options.values = layout.values();
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write(&mut bytes, &model).unwrap();
+        LexiWriter::exact(&model, layout.codes()).unwrap().write(&mut bytes, &Silent).unwrap();
         let read = lexi::read_bytes("exact.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(read, model, "{layout}");
         let decoded = read.into_splats();
@@ -126,7 +127,7 @@ fn packed(splats: &Splats, sensitivity: &Sensitivity) -> Option<Splats> {
         }
     };
     let mut bytes = Vec::new();
-    lexi::write_packed(&mut bytes, &packed).unwrap();
+    LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
     let back = lexi::read_bytes("packed.lexi", &bytes, &Limits::default()).unwrap().into_splats();
     assert_eq!(back.len(), splats.len());
     assert_finite(&back);

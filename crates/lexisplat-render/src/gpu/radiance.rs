@@ -18,7 +18,7 @@ pub(super) async fn radiance_pipeline(
     path: ShPath,
 ) -> Result<wgpu::ComputePipeline> {
     if let (ShData::Codes(model), ShPath::SparseShared) = (sh, path) {
-        let shared = size_of_val(model.dictionary.as_slice());
+        let shared = size_of_val(model.dictionary().as_slice());
         let most = gpu.limits().max_compute_workgroup_storage_size as usize;
         if shared + SHARED_RESERVE > most {
             let expected = format!("a dictionary of at most {most} bytes for this GPU's workgroup memory");
@@ -53,7 +53,7 @@ pub(super) fn radiance_text(sh: &ShData<'_>, path: ShPath) -> String {
             format!("const ROW_VECTORS: u32 = {vectors}u;\n{common}{dense}")
         }
         ShData::Codes(model) => {
-            let dictionary = &model.dictionary;
+            let dictionary = model.dictionary();
             let entry = match path {
                 ShPath::SparseOrdered => concat!(
                     include_str!("kernels/radiance_cached.wgsl"),
@@ -69,7 +69,7 @@ pub(super) fn radiance_text(sh: &ShData<'_>, path: ShPath) -> String {
                     include_str!("kernels/radiance_codes.wgsl")
                 ),
             };
-            let (index, value) = (model.codes.indices().width(), model.codes.values().width());
+            let (index, value) = (model.codes().indices().width(), model.codes().values().width());
             let per_channel = dictionary.degree().rest_per_channel();
             let codes = codes.replace("// ATOM_TERMS", &atom_terms(per_channel));
             let entry = entry.replace("// SHARED_TERMS", &shared_atom_terms(per_channel));

@@ -101,7 +101,7 @@ impl GpuScene {
             }
         };
         let table = match (path, model) {
-            (ShPath::SparseTable, Some(model)) => Some(RadianceTable::new(gpu, &model.dictionary).await?),
+            (ShPath::SparseTable, Some(model)) => Some(RadianceTable::new(gpu, model.dictionary()).await?),
             _ => None,
         };
         let radiance = radiance_pipeline(gpu, &sh, path).await?;
@@ -126,7 +126,8 @@ impl GpuScene {
         for range in sh.chunks(scene.len(), gpu.max_binding())? {
             this.add(scene.geometry(), &sh, range.clone(), nonzero).await?;
             if let ShData::Codes(model) = sh {
-                nonzero += model.codes.counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
+                nonzero +=
+                    model.codes().counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
             }
             chunk_blocks.push(u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
         }
@@ -160,7 +161,7 @@ impl GpuScene {
         let sh = match data {
             ShData::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half).await?],
             ShData::Codes(model) => {
-                let columns = Columns::new(&model.codes, range.clone(), nonzero);
+                let columns = Columns::new(model.codes(), range.clone(), nonzero);
                 escapes =
                     [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
                 vec![

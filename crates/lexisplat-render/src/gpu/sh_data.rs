@@ -76,7 +76,7 @@ impl ShData<'_> {
     fn fixed(&self) -> [u64; 4] {
         match self {
             Self::Dense { .. } => [0; 4],
-            Self::Codes(model) => [0, 0, (model.dictionary.len() * atom_bytes(model)) as u64, 0],
+            Self::Codes(model) => [0, 0, (model.dictionary().len() * atom_bytes(model)) as u64, 0],
         }
     }
 
@@ -90,12 +90,12 @@ impl ShData<'_> {
                 [shapes, (range.len() * row) as u64, 0, 0]
             }
             Self::Codes(model) => {
-                let codes = &model.codes;
+                let codes = model.codes();
                 let words: usize = codes.counts()[range.clone()]
                     .chunks(COLUMN_GROUP as usize)
                     .map(|counts| group_words(codes, counts))
                     .sum();
-                let escapes = escapes_in(&model.codes, &range).len();
+                let escapes = escapes_in(model.codes(), &range).len();
                 let row = escapes * atom_bytes(model);
                 let columns = range.len() * size_of::<u32>();
                 [shapes, 4 * words as u64, row as u64, columns as u64]
@@ -145,7 +145,7 @@ pub(super) async fn dense_rows(
             Scene::Dense(splats) => &splats.sh_rest[i * dim..(i + 1) * dim],
             Scene::Sparse(model) => {
                 decoded = vec![0.0; dim];
-                model.codes.reconstruct(&model.dictionary, i, &mut decoded);
+                model.codes().reconstruct(model.dictionary(), i, &mut decoded);
                 &decoded
             }
         };
@@ -169,16 +169,16 @@ fn interleave(row: &[f32], per_channel: usize, out: &mut [f32]) {
 
 /// Bytes of an atom or exact row as kernels read them.
 fn atom_bytes(model: &Model) -> usize {
-    vectors(model.dictionary.degree().rest_per_channel()) * size_of::<[f32; 4]>()
+    vectors(model.dictionary().degree().rest_per_channel()) * size_of::<[f32; 4]>()
 }
 
 /// Returns the atoms, and the exact rows of the escaped Gaussians in `range`. Each is filled up to whole
 /// vectors.
 pub(super) fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
-    let dictionary = &model.dictionary;
+    let dictionary = model.dictionary();
     let (dim, per_channel) = (dictionary.dim(), dictionary.degree().rest_per_channel());
-    let escapes = escapes_in(&model.codes, range);
-    let rows = &model.codes.escapes().rows[escapes.start * dim..escapes.end * dim];
+    let escapes = escapes_in(model.codes(), range);
+    let rows = &model.codes().escapes().rows[escapes.start * dim..escapes.end * dim];
     let row_len = 4 * vectors(per_channel);
     let mut out = vec![0.0; (dictionary.len() + escapes.len()) * row_len];
     if dim > 0 {

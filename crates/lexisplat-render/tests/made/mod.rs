@@ -2,8 +2,8 @@
 #![allow(dead_code, reason = "each test file uses a part")]
 
 use lexisplat::{
-    Dictionary, Escapes, Geometry, Indices, Layout, Model, Pursuit, Record, SceneMeta, ShDegree, SparseCodes,
-    Splats, Values,
+    Dictionary, Escapes, Geometry, Indices, Model, Pursuit, Record, SceneMeta, ShDegree, SparseCodes, Splats,
+    Values,
 };
 use lexisplat_render::Camera;
 pub(crate) use lexisplat_testing::Random;
@@ -110,12 +110,11 @@ pub(crate) fn model_of(splats: Splats, atoms: usize, half: bool) -> Model {
     let record = Record {
         tolerance: None,
         max_nonzeros: None,
-        pursuit: Pursuit::Ols,
+        pursuit: Some(Pursuit::Ols),
         seed: 0,
-        layout: if half { Layout::F16 } else { Layout::F32 },
         max_residual: 0.0,
         rms_residual: 0.0,
         over_tolerance: 0,
     };
-    Model { geometry: splats.geometry, meta: splats.meta, dictionary, codes, record }
+    Model::new(splats.geometry, splats.meta, dictionary, codes, record).unwrap()
 }

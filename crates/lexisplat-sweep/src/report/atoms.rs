@@ -15,8 +15,8 @@ pub(super) struct Usage {
 
 impl Usage {
     pub(super) fn of(model: &Model) -> Self {
-        let mut users = vec![0_u64; model.dictionary.len()];
-        let indices = model.codes.indices();
+        let mut users = vec![0_u64; model.dictionary().len()];
+        let indices = model.codes().indices();
         for k in 0..indices.len() {
             if let Some(users) = users.get_mut(indices.get(k)) {
                 *users += 1;
@@ -36,7 +36,7 @@ impl Usage {
 pub(super) fn json(model: &Model, usage: &Usage) -> String {
     let thousandths = |value: &f32| (value * STEPS).round();
     let atom = |&(atom, _): &(usize, u64)| {
-        model.dictionary.atom(atom).iter().map(thousandths).map(|v| v as i32).collect::<Vec<_>>()
+        model.dictionary().atom(atom).iter().map(thousandths).map(|v| v as i32).collect::<Vec<_>>()
     };
     let atoms: Vec<_> = usage.shown().iter().map(atom).collect();
     serde_json::json!({ "degree": model.degree().get(), "atoms": atoms }).to_string()

@@ -1,6 +1,6 @@
 //! The parts of the page about the file in an exact layout: the paper's method and the bound on its error.
 
-use lexisplat::{Pursuit, Record};
+use lexisplat::{CodeLayout, Layout, Pursuit, Record};
 use maud::{Markup, PreEscaped, html};
 
 use super::atoms::{self, Usage};
@@ -20,8 +20,8 @@ impl<'a> Facts<'a> {
     pub(super) fn new(report: &'a Report<'a>) -> Self {
         let model = report.model;
         let gaussians = model.len() as u64;
-        let mean_nonzeros = model.codes.nonzeros() as f64 / gaussians.max(1) as f64;
-        Self { report, record: &model.record, gaussians, dim: model.degree().rest(), mean_nonzeros }
+        let mean_nonzeros = model.codes().nonzeros() as f64 / gaussians.max(1) as f64;
+        Self { report, record: model.record(), gaussians, dim: model.degree().rest(), mean_nonzeros }
     }
 
     pub(super) fn summary(&self) -> Markup {
@@ -86,19 +86,19 @@ impl<'a> Facts<'a> {
                         @if packed::ply_groups(report)[0] > report.ply_bytes as f64 / 2.0 { ": most of the PLY" } "."
                     }
                     li {
-                        strong { "Learn" } "From a sample of them, " (text::count(model.dictionary.len() as u64))
+                        strong { "Learn" } "From a sample of them, " (text::count(model.dictionary().len() as u64))
                         " typical patterns were learnt: the dictionary\u{2019}s atoms." (seconds(report.learn_seconds))
                     }
                     li {
                         strong { "Code" }
-                        @match self.record.pursuit { Pursuit::Omp => "Orthogonal matching pursuit", _ => "Orthogonal least squares" }
+                        @match self.record.pursuit { Some(Pursuit::Omp) => "Orthogonal matching pursuit", _ => "Orthogonal least squares" }
                         " picked a few atoms and their amounts for every Gaussian, one by one, " (stop) "."
                         (seconds(report.code_seconds))
                     }
                     li {
                         strong { "Check" } "Every Gaussian was put together again from what the file holds, in double \
                          precision, and measured. "
-                        @match model.codes.escapes().gaussians.len() {
+                        @match model.codes().escapes().gaussians.len() {
                             0 => "All of them are within the bound.",
                             1 => "One that did not fit is stored exactly.",
                             n => { (text::count(n as u64)) " that did not fit are stored exactly." }
@@ -188,7 +188,7 @@ impl<'a> Facts<'a> {
         if self.dim == 0 || self.gaussians == 0 {
             return html! {};
         }
-        let codes = &self.report.model.codes;
+        let codes = self.report.model.codes();
         let mut counts = vec![0_u64; self.dim + 1];
         for &n in codes.counts() {
             if let Some(count) = counts.get_mut(usize::from(n)) {
@@ -227,7 +227,7 @@ impl<'a> Facts<'a> {
 
     pub(super) fn dictionary(&self) -> Markup {
         let model = self.report.model;
-        if model.dictionary.is_empty() {
+        if model.dictionary().is_empty() {
             return html! {};
         }
         let usage = Usage::of(model);
@@ -267,8 +267,9 @@ impl<'a> Facts<'a> {
                 p { "Make this again:" }
                 pre { (self.report.command) }
                 p {
-                    "SH degree " (self.report.model.degree()) " \u{b7} exact values as " (self.record.layout) " \u{b7} "
-                    (self.record.pursuit) " pursuit \u{b7} seed " (self.record.seed)
+                    "SH degree " (self.report.model.degree()) " \u{b7} exact values as " (Layout::of(CodeLayout::Compact, self.report.model.codes().values().value_type())) " \u{b7} "
+                    @if let Some(pursuit) = self.record.pursuit { (pursuit) " pursuit \u{b7} " }
+                    "seed " (self.record.seed)
                     ". This page holds everything it shows and asks nothing of the network."
                 }
             }

@@ -173,8 +173,7 @@ pub(crate) mod testing {
 #[cfg(test)]
 mod tests {
     use lexisplat::{
-        Dictionary, Escapes, Geometry, Indices, Layout, Pursuit, Record, SceneMeta, ShDegree, SparseCodes,
-        Values,
+        Dictionary, Escapes, Geometry, Indices, Pursuit, Record, SceneMeta, ShDegree, SparseCodes, Values,
     };
 
     use super::testing::check_nesting;
@@ -199,29 +198,24 @@ mod tests {
             let codes = SparseCodes::new(&dictionary, vec![1, 2, 0, 0], indices, values, escapes);
             (dictionary, codes)
         };
-        Model {
-            geometry: Geometry {
-                positions: vec![[0.0; 3]; n],
-                dc: vec![[0.0; 3]; n],
-                opacities: vec![0.0; n],
-                scales: vec![[0.0; 3]; n],
-                rotations: vec![[1.0, 0.0, 0.0, 0.0]; n],
-                ..Geometry::default()
-            },
-            meta: SceneMeta::default(),
-            dictionary,
-            codes: codes.unwrap(),
-            record: Record {
-                tolerance: Some(0.1),
-                max_nonzeros: None,
-                pursuit: Pursuit::Ols,
-                seed: 0,
-                layout: Layout::F16,
-                max_residual: 0.099,
-                rms_residual: 0.08,
-                over_tolerance: 0,
-            },
-        }
+        let geometry = Geometry {
+            positions: vec![[0.0; 3]; n],
+            dc: vec![[0.0; 3]; n],
+            opacities: vec![0.0; n],
+            scales: vec![[0.0; 3]; n],
+            rotations: vec![[1.0, 0.0, 0.0, 0.0]; n],
+            ..Geometry::default()
+        };
+        let record = Record {
+            tolerance: Some(0.1),
+            max_nonzeros: None,
+            pursuit: Some(Pursuit::Ols),
+            seed: 0,
+            max_residual: 0.099,
+            rms_residual: 0.08,
+            over_tolerance: 0,
+        };
+        Model::new(geometry, SceneMeta::default(), dictionary, codes.unwrap(), record).unwrap()
     }
 
     fn page(model: &Model, comparison: &Comparison, name: &str) -> String {
@@ -291,14 +285,16 @@ mod tests {
 
     #[test]
     fn a_bound_that_was_not_asked_for_is_not_called_kept() {
-        let mut model = model(ShDegree::THREE);
+        let with = |change: fn(&mut Record)| {
+            let (geometry, meta, dictionary, codes, mut record) = model(ShDegree::THREE).into_parts();
+            change(&mut record);
+            Model::new(geometry, meta, dictionary, codes, record).unwrap()
+        };
         let scores = Comparison::of(vec![view("front", Some(45.25))]);
-        assert!(page(&model, &scores, "front").contains("Kept"));
-        model.record.max_nonzeros = Some(4);
-        model.record.over_tolerance = 2;
-        assert!(!page(&model, &scores, "front").contains("Kept"));
-        model.record.over_tolerance = 0;
-        model.record.tolerance = None;
-        assert!(!page(&model, &scores, "front").contains("Kept"));
+        assert!(page(&model(ShDegree::THREE), &scores, "front").contains("Kept"));
+        let capped = with(|record| (record.max_nonzeros, record.over_tolerance) = (Some(4), 2));
+        assert!(!page(&capped, &scores, "front").contains("Kept"));
+        let free = with(|record| (record.max_nonzeros, record.tolerance) = (Some(4), None));
+        assert!(!page(&free, &scores, "front").contains("Kept"));
     }
 }

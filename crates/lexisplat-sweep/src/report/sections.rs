@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use lexisplat::sh::CHANNELS;
+use lexisplat::{CodeLayout, Layout, Pursuit};
 
 use super::atoms::{self, Usage};
 use super::charts::{self, Part};
@@ -64,7 +65,7 @@ impl<'a> Facts<'a> {
         for (name, bytes) in report.attributes {
             parts[group(name)].after += bytes;
         }
-        let mean_nonzeros = model.codes.nonzeros() as f64 / (gaussians.max(1)) as f64;
+        let mean_nonzeros = model.codes().nonzeros() as f64 / (gaussians.max(1)) as f64;
         let (sh_before, sh_after) = (parts[0].before, parts[0].after);
         Self { report, gaussians, dim, mean_nonzeros, sh_before, sh_after, parts: parts.into() }
     }
@@ -76,7 +77,7 @@ impl<'a> Facts<'a> {
 
     /// Whether every Gaussian is within the tolerance, if there is one.
     fn kept(&self) -> Option<f64> {
-        let record = &self.report.model.record;
+        let record = self.report.model.record();
         record.tolerance.filter(|tolerance| record.over_tolerance == 0 && record.max_residual <= *tolerance)
     }
 }
@@ -178,7 +179,7 @@ pub(super) fn steps(page: &mut String, facts: &Facts<'_>) {
         );
         return;
     }
-    let stop = match (model.record.tolerance, model.record.max_nonzeros) {
+    let stop = match (model.record().tolerance, model.record().max_nonzeros) {
         (Some(tolerance), None) => format!("until the rest is within {tolerance}"),
         (Some(tolerance), Some(most)) => format!("until the rest is within {tolerance} or {most} are used"),
         (None, Some(most)) => format!("until {most} are used"),
@@ -199,14 +200,14 @@ pub(super) fn steps(page: &mut String, facts: &Facts<'_>) {
         dim = facts.dim,
         most = if facts.sh_dominates() { ": most of the file" } else { "" },
         degree = model.degree(),
-        atoms = text::count(model.dictionary.len() as u64),
+        atoms = text::count(model.dictionary().len() as u64),
         learn = seconds(report.learn_seconds),
-        pursuit = match model.record.pursuit {
-            lexisplat::Pursuit::Omp => "Orthogonal matching pursuit",
+        pursuit = match model.record().pursuit {
+            Some(Pursuit::Omp) => "Orthogonal matching pursuit",
             _ => "Orthogonal least squares",
         },
         code = seconds(report.code_seconds),
-        escapes = match model.codes.escapes().gaussians.len() {
+        escapes = match model.codes().escapes().gaussians.len() {
             0 => "All of them fit.".to_owned(),
             1 => "One that did not fit is stored exactly.".to_owned(),
             n => format!("{} that did not fit are stored exactly.", text::count(n as u64)),
@@ -215,7 +216,7 @@ pub(super) fn steps(page: &mut String, facts: &Facts<'_>) {
 }
 
 pub(super) fn promise(page: &mut String, facts: &Facts<'_>) {
-    let record = &facts.report.model.record;
+    let record = facts.report.model.record();
     if facts.dim == 0 {
         return;
     }
@@ -322,13 +323,13 @@ pub(super) fn nonzeros(page: &mut String, facts: &Facts<'_>) {
         return;
     }
     let mut counts = vec![0_u64; facts.dim + 1];
-    for &n in facts.report.model.codes.counts() {
+    for &n in facts.report.model.codes().counts() {
         if let Some(count) = counts.get_mut(usize::from(n)) {
             *count += 1;
         }
     }
     // A Gaussian stored exactly has no code; it is told of elsewhere.
-    counts[0] -= (facts.report.model.codes.escapes().gaussians.len() as u64).min(counts[0]);
+    counts[0] -= (facts.report.model.codes().escapes().gaussians.len() as u64).min(counts[0]);
     let _ = write!(
         page,
         "<section aria-labelledby=\"need\"><h2 id=\"need\">Each takes what it needs</h2>\n\
@@ -340,7 +341,7 @@ pub(super) fn nonzeros(page: &mut String, facts: &Facts<'_>) {
 
 pub(super) fn dictionary(page: &mut String, facts: &Facts<'_>) {
     let model = facts.report.model;
-    if model.dictionary.is_empty() {
+    if model.dictionary().is_empty() {
         return;
     }
     let usage = Usage::of(model);
@@ -417,7 +418,7 @@ pub(super) fn views(page: &mut String, facts: &Facts<'_>) {
 }
 
 pub(super) fn footer(page: &mut String, facts: &Facts<'_>) {
-    let record = &facts.report.model.record;
+    let record = facts.report.model.record();
     let _ = write!(
         page,
         "<footer><p>Make this again:</p><pre>{}</pre>\
@@ -425,8 +426,8 @@ pub(super) fn footer(page: &mut String, facts: &Facts<'_>) {
          asks nothing of the network.</p></footer>",
         text::escape(facts.report.command),
         facts.report.model.degree(),
-        record.layout,
-        record.pursuit,
+        Layout::of(CodeLayout::Compact, facts.report.model.codes().values().value_type()),
+        record.pursuit.map_or("no", Pursuit::name),
         record.seed
     );
 }

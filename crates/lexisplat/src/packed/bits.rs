@@ -1,11 +1,11 @@
-//! Bits one after the other, and integers split into a token worth modelling and bits that are not.
+//! Writing and reading bits, and splitting integers into a token that is modelled and low bits that are not.
 
 /// Integers below this are their own token.
 const DIRECT: u64 = 16;
 /// Bits of [`DIRECT`] minus one: the length of the last direct integers.
 const DIRECT_BITS: u32 = 4;
 
-/// `value` as a token and the number and value of its low bits.
+/// Splits `value` into a token, and the number and value of its low bits.
 ///
 /// From 16 on the token holds the bit length and the bit after the leading one.
 pub(super) fn split(value: u64) -> (u16, u32, u64) {
@@ -39,7 +39,7 @@ pub(super) fn join(token: u16, extra: u64) -> u64 {
     ((2 + ((token - DIRECT) & 1)) << shift) | extra
 }
 
-/// Signed integers in order of size: 0, -1, 1, -2, ...
+/// Maps signed integers to unsigned ones by magnitude: 0, -1, 1, -2, ...
 pub(super) fn zigzag(value: i64) -> u64 {
     ((value << 1) ^ (value >> 63)).cast_unsigned()
 }
@@ -69,7 +69,7 @@ impl BitWriter {
         }
     }
 
-    /// The bytes; the last is filled up with zeros.
+    /// Returns the bytes. The last one is filled up with zeros.
     pub(super) fn finish(mut self) -> Vec<u8> {
         if self.count > 0 {
             self.bytes.push(self.held.to_le_bytes()[0]);
@@ -78,7 +78,7 @@ impl BitWriter {
     }
 }
 
-/// Reads what a [`BitWriter`] wrote. Beyond the end there are zeros, and [`Self::overrun`] says so.
+/// Reads what a [`BitWriter`] wrote. Bits beyond the end are 0, and [`Self::overrun`] reports them.
 #[derive(Debug, Clone)]
 pub(super) struct BitReader<'a> {
     bytes: &'a [u8],
@@ -114,12 +114,12 @@ impl<'a> BitReader<'a> {
         value
     }
 
-    /// Whether more was taken than there is.
+    /// Whether bits beyond the end were taken.
     pub(super) fn overrun(&self) -> bool {
         self.missing
     }
 
-    /// Whether everything was taken but less than a byte of zeros.
+    /// Whether all bits were taken, except less than a byte of zeros.
     pub(super) fn exhausted(&self) -> bool {
         !self.missing && self.at == self.bytes.len() && self.held == 0
     }

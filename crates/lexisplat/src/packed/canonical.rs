@@ -1,22 +1,22 @@
-//! A scene as it is packed: each ellipsoid described in one of its 24 ways, in the order of its cells.
+//! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, in the order of cells.
 
 use super::morton;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
 
-/// Thinnest axis kept apart, as the logarithm of its ratio to the longest: thinner ones show as lines
-/// all the same, since pictures blur by 0.3 squared pixels.
+/// Largest logarithm of the ratio of the longest axis to the thinnest. Thinner ellipsoids look the same, since
+/// pictures blur by 0.3 squared pixels.
 const MAX_THINNESS: f32 = 9.0;
-/// Largest logarithm of a standard deviation, either sign: beyond it exp leaves f32.
+/// Largest magnitude of the logarithm of a standard deviation. Beyond it exp leaves f32.
 const MAX_LOG_SCALE: f32 = 40.0;
-/// Half the logarithm of the largest f32: of a larger scale the variance leaves f32, and no rasteriser draws the
-/// Gaussian. Limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
+/// Half the logarithm of the largest f32. The variance of a larger scale leaves f32, and no rasteriser draws the
+/// Gaussian. With its scale limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
 const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
-/// Smallest logarithm of an opacity: of less nothing is left in f32.
+/// Smallest logarithm of an opacity. The exponential of a smaller one is about 0 in f32.
 const MIN_LOG_OPACITY: f32 = -100.0;
 /// Cells along the longest side of the bulk, for each Gaussian in it.
 const CELLS_PER_GAUSSIAN: f64 = 3000.0;
-/// Share of the Gaussians, at either end of each axis, that is not the bulk.
+/// Share of the Gaussians at either end of each axis that are not part of the bulk.
 const TRIM: f64 = 0.01;
 
 /// One Gaussian in canonical form.
@@ -24,7 +24,7 @@ const TRIM: f64 = 0.01;
 pub(super) struct Canonical {
     /// Longest first.
     pub(super) scales: Vec3,
-    /// Which axis of the source each is.
+    /// The axis of the source that each is.
     pub(super) order: [usize; 3],
     /// In that order, right-handed.
     pub(super) axes: [Vec3; 3],
@@ -47,7 +47,7 @@ impl MortonKey {
     }
 }
 
-/// Least and largest coordinates; 0 if there are none.
+/// Smallest and largest coordinates; 0 if there are no positions.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bounds {
     least: Vec3,
@@ -63,10 +63,10 @@ impl Bounds {
         bounds
     }
 
-    /// Makes them those of both.
+    /// Includes `other`.
     pub(crate) fn add(&mut self, other: Self) {
         for k in 0..3 {
-            // The order of `sort_by(total_cmp)`, by which a grid's corner was always found.
+            // The corner of the grid has always been found by `total_cmp`, which orders -0 before 0.
             self.least[k] = std::cmp::min_by(self.least[k], other.least[k], f32::total_cmp);
             self.most[k] = std::cmp::max_by(self.most[k], other.most[k], f32::total_cmp);
         }
@@ -81,12 +81,12 @@ pub(crate) struct Grid {
 }
 
 impl Grid {
-    /// A grid over all positions whose cells hold about one Gaussian where most are.
+    /// A grid over all positions. Its cells hold about one Gaussian where most Gaussians are.
     pub(super) fn fit(positions: &[Vec3]) -> Self {
         Self::fit_sample(positions, Bounds::of(positions), positions.len())
     }
 
-    /// [`Self::fit`] for `total` positions within `bounds`, of which `sample` are some.
+    /// [`Self::fit`] for `total` positions within `bounds`, from a sample of them.
     pub(crate) fn fit_sample(sample: &[Vec3], bounds: Bounds, total: usize) -> Self {
         let mut bulk = 0.0_f64;
         for k in 0..3 {
@@ -98,7 +98,7 @@ impl Grid {
         let Bounds { least: origin, most } = bounds;
         let whole = (0..3).map(|k| f64::from(most[k]) - f64::from(origin[k])).fold(0.0, f64::max);
         let wanted = bulk / libm::cbrt(CELLS_PER_GAUSSIAN * total.max(1) as f64);
-        // All coordinates must fit, and cells must be something.
+        // All coordinates must fit, and cells must not be empty.
         let least = whole / f64::from((1_u32 << morton::BITS) - 2);
         let cell = wanted.max(least).max(whole * 1e-6).max(1e-9);
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
@@ -135,7 +135,7 @@ pub(super) fn canonical(geometry: &Geometry, i: usize) -> Canonical {
     let order = longest_first(scales);
     let given = columns(geometry.rotations[i]);
     let [first, second, third] = order.map(|k| given[k]);
-    // Turning an axis around leaves the ellipsoid as it is.
+    // An ellipsoid does not change when an axis is reversed.
     let third = if dot(cross(first, second), third) < 0.0 { third.map(|v| -v) } else { third };
     let drawn = scales[order[0]] <= MAX_DRAWN_LOG_SCALE;
     let log_opacity = if drawn { log_sigmoid(geometry.opacities[i]) } else { MIN_LOG_OPACITY };

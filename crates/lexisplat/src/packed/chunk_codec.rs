@@ -1,8 +1,8 @@
-//! One Gaussian after the other: the walk that encoder and decoder share.
+//! The loop over the Gaussians of a chunk, which encoder and decoder share.
 //!
-//! Every value is coded as the difference from a prediction made of values already decoded, in units of
-//! a step made of values already decoded. The encoder follows what the decoder will see, so errors do
-//! not add up.
+//! Every value is coded as the difference from a prediction, in units of a step. Prediction and step are
+//! computed from values that are already decoded. The encoder computes them from the same rounded values as
+//! the decoder, so errors do not add up.
 
 use super::bits::{unzigzag, zigzag};
 use super::codebook::COUNT_CLASSES;
@@ -14,21 +14,21 @@ use crate::support::maths::{
     Vec3, atan2, axis_of_square, cross, dot, frame, logit_of_log, quaternion, sin_cos, square_of_axis,
 };
 
-/// Share of a step by which a difference must exceed the middle between two values to be rounded away
-/// from zero: the smaller one is the cheaper one.
+/// Share of a step by which a difference must exceed the middle between two values to be rounded away from
+/// zero. The value nearer to zero takes fewer bits.
 const DEAD_ZONE: f32 = 0.08;
-/// A logarithm of an opacity above this is opaque: 0.9999.
+/// Largest logarithm of an opacity. Its exponential, 0.9999, counts as opaque.
 const MAX_LOG_OPACITY: f32 = -1e-4;
-/// Differences are at most this many steps.
+/// Largest difference, in steps.
 const MAX_STEPS: f32 = 1e9;
-/// Bits of each coordinate of an axis, and of a turn, at most.
+/// Largest number of bits of each coordinate of an axis, and of a turn.
 const MAX_AXIS_BITS: u32 = 15;
 /// Angle between neighbouring points of the square of axes, per unit of the square, on average.
 const SQUARE_ANGLE: f32 = 1.25;
-/// Sort of a turn: it repeats after half a circle.
+/// A turn by this angle gives the same ellipsoid.
 const HALF_TURN: f32 = std::f32::consts::PI;
-/// Widths of a cell, in steps of a position, that are told apart as contexts: 24 half octaves. The first
-/// is that of 2^-2.25 and less.
+/// Smallest and largest width of a cell, in steps of a position, that have contexts of their own. Between them
+/// are 24 half octaves, and the first one stands for 2^-2.25 and less.
 const MIN_FINENESS: f32 = 0.210_224_1;
 const MAX_FINENESS: f32 = MIN_FINENESS * 4000.0;
 /// Gaps with at least this many bits share a context.
@@ -38,10 +38,10 @@ const COLOUR: usize = TARGETS;
 const SHAPE: usize = TARGETS + 1;
 const NONZEROS: usize = TARGETS + 2;
 
-/// A Gaussian as it is to be coded; only the encoder has it.
+/// A Gaussian to be coded. Only the encoder has it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GaussianValues<'a> {
-    /// Its cell's number on the Morton curve, not below the last Gaussian's.
+    /// Number of its cell on the Morton curve. It is not below that of the last Gaussian.
     pub(super) cell: u64,
     /// Colour and shape class, at most [`LAST_CLASS`].
     pub(super) classes: [u8; 2],
@@ -54,7 +54,7 @@ pub(super) struct GaussianValues<'a> {
     pub(super) log_opacity: f32,
     /// Base colour in the file's coordinates.
     pub(super) dc: Vec3,
-    /// (atom, value in steps), values not zero, largest first; or the exact row.
+    /// Pairs (atom, value in steps) with values that are not zero, largest first; or the exact row.
     pub(super) code: Code<'a>,
 }
 
@@ -65,7 +65,7 @@ pub(super) enum Code<'a> {
     Exact(&'a [f32]),
 }
 
-/// A Gaussian as it was coded; its code is in [`ChunkCodec::code`].
+/// A decoded Gaussian. Its code is in [`ChunkCodec::code`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Decoded {
     pub(super) position: Vec3,
@@ -77,7 +77,7 @@ pub(super) struct Decoded {
     pub(super) colour_class: u8,
 }
 
-/// A walk over one chunk.
+/// The state of coding one chunk.
 #[derive(Debug)]
 pub(super) struct ChunkCodec<'p> {
     parameters: &'p Parameters,
@@ -105,8 +105,8 @@ impl<'p> ChunkCodec<'p> {
         }
     }
 
-    /// Codes one Gaussian. `target` is `None` in the decoder. `None` comes back if the values are
-    /// impossible, which only a damaged file can make them.
+    /// Codes one Gaussian. `target` is `None` in the decoder. Returns `None` for impossible values, which only
+    /// damaged files hold.
     #[inline]
     pub(super) fn step<S: Symbols>(
         &mut self,
@@ -205,7 +205,7 @@ impl<'p> ChunkCodec<'p> {
         finite.then_some(decoded)
     }
 
-    /// The code, into [`Self::code`] or [`Self::exact`].
+    /// Codes the code of a Gaussian, and leaves it in [`Self::code`] or [`Self::exact`].
     fn sh<S: Symbols>(
         &mut self,
         s: &mut S,
@@ -218,7 +218,7 @@ impl<'p> ChunkCodec<'p> {
         if self.dim == 0 {
             return Some(());
         }
-        // One more than the longest code marks a row stored exactly.
+        // A count above that of the longest code marks a row that is stored exactly.
         let escape = u64::try_from(self.dim).ok()? + 1;
         let context = 2 * usize::from(colour).min(COUNT_CLASSES - 1) + usize::from(around > 1.0);
         let count = s.integer(Stream::Count, context, || match target.map(|t| t.code) {
@@ -272,7 +272,7 @@ fn classes<S: Symbols>(
     let colour = s.symbol(Stream::ColourClass, context, || target.map_or(0, |t| u16::from(t.classes[0])));
     let colour = u8::try_from(colour).ok()?;
     let expected = (f32::from(colour) + around[SHAPE]).clamp(0.0, f32::from(LAST_CLASS));
-    // Rounded to halves, so that the histogram knows on which side of it the shape class may lie.
+    // In halves, so that the context also says on which side of the rounded value the class may lie.
     let context = if known { level(2.0 * (expected - (expected - 0.25).floor())) + 1 } else { 0 };
     let nearest = level(expected);
     let shape = s.integer(Stream::ShapeClass, context, || {
@@ -289,9 +289,9 @@ fn level(x: f32) -> usize {
     (x + 0.5).floor().clamp(0.0, f32::from(LAST_CLASS)) as usize
 }
 
-/// How many half octaves of steps a cell is wide, from a quarter of a step on, as a context.
+/// The context of a cell's width: its number of half octaves above a quarter of a step.
 fn fineness(steps: f32) -> usize {
-    // The exponent, and whether the rest is beyond half an octave: a logarithm would take longer.
+    // The exponent, and whether the mantissa is beyond half an octave. A logarithm would take longer.
     let scaled = steps.clamp(MIN_FINENESS, MAX_FINENESS) / MIN_FINENESS;
     let bits = scaled.to_bits();
     let octaves = (bits >> 23) - 127;
@@ -299,7 +299,7 @@ fn fineness(steps: f32) -> usize {
     (2 * octaves + u32::from(half)) as usize
 }
 
-/// `value` as `prediction` plus whole steps; returns what the decoder makes of it.
+/// Codes `value` as `prediction` plus whole steps, and returns the value that is decoded.
 #[inline]
 fn difference<S: Symbols>(
     s: &mut S,
@@ -322,9 +322,9 @@ fn difference<S: Symbols>(
     prediction + steps * step
 }
 
-/// The axes: the one that matters least by a point on a sphere, the others by a turn about it.
+/// Codes the axes: the one that matters least as a point on a sphere, and the others as a turn about it.
 fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: Option<&[Vec3; 3]>) -> [Vec3; 3] {
-    // Needles hardly change when turned about their longest axis, discs about their shortest.
+    // A needle hardly changes when turned about its longest axis, and a disc about its shortest.
     let needle = scales[0] - scales[1] >= scales[1] - scales[2];
     let (main, other) = if needle { (0, 1) } else { (2, 0) };
     let across: Vec<f32> = (0..3).filter(|&k| k != main).map(|k| steps[k]).collect();
@@ -363,7 +363,7 @@ fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: Option<&[V
 
 /// Bits for about `values` different values.
 fn bits_for(values: f32) -> u32 {
-    // Comparisons instead of a logarithm, whose last bits differ between machines.
+    // A loop of comparisons, because the last bits of a logarithm differ between machines.
     let mut count = 0;
     while count < MAX_AXIS_BITS && values > power(count) * std::f32::consts::SQRT_2 {
         count += 1;

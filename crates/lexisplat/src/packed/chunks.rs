@@ -1,4 +1,6 @@
-//! A packed scene's chunks, each decoded apart from all others.
+//! Decoding the chunks of a packed scene, each without the others.
+
+use std::ops::Range;
 
 use half::f16;
 
@@ -7,8 +9,9 @@ use super::bits::{unzigzag, zigzag};
 use super::chunk_codec::ChunkCodec;
 use super::entropy::Tables;
 use super::parameters::Parameters;
+use super::scene::PackedHead;
 use super::stream::{Stream, SymbolDecoder, Symbols};
-use super::unpack::{Packed, StreamBits};
+use super::unpack::StreamBits;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
@@ -20,12 +23,12 @@ use crate::support::memory_budget::MemoryBudget;
 
 /// Steps of atoms' coefficients are 2^-k for k up to this.
 pub(super) const MAX_ATOM_BITS: u32 = 14;
-/// Gaussians of a chunk after which is asked whether there are bits and room left.
+/// Gaussians after which the decoder checks that bits and memory are left.
 const LOOK_AFTER: usize = 256;
 
-/// A part that no encoder writes so.
-fn bad(what: &str) -> Error {
-    Error::parameter("packed", what, "what the encoder writes")
+/// The error about a part of `file` that no encoder writes so.
+fn bad(file: &str, what: &str) -> Error {
+    Error::malformed(file, format!("packed {what} is damaged: no encoder writes it"))
 }
 
 /// Where a chunk's geometry goes.
@@ -39,7 +42,7 @@ pub(super) struct Place<'a> {
     counts: &'a mut [u8],
 }
 
-/// The rest of a chunk: what is not of one length for every Gaussian.
+/// What a chunk holds beside geometry and counts.
 #[derive(Default)]
 pub(super) struct Piece {
     pub(super) atoms: Vec<u16>,
@@ -53,9 +56,9 @@ pub(super) struct Piece {
 enum Refusal {
     /// No encoder writes it so.
     Damage,
-    /// Its codes do not fit in what may be held.
+    /// Its codes do not fit in the memory budget.
     MemoryBudget,
-    /// A Gaussian of it, counted from its start, has this many nonzeros.
+    /// The Gaussian of this number in the chunk has this many nonzeros, more than the limits allow.
     Nonzeros(usize, u64),
 }
 
@@ -65,7 +68,7 @@ impl From<std::num::TryFromIntError> for Refusal {
     }
 }
 
-/// The Geometry of `n` Gaussians, to be filled.
+/// Geometry of `n` Gaussians, all zeros.
 pub(super) fn zeros(n: usize) -> Geometry {
     Geometry {
         positions: vec![[0.0; 3]; n],
@@ -129,32 +132,37 @@ impl BitCounts {
 
 /// What all chunks of a packed scene are decoded with, and where they are.
 #[derive(Debug)]
-pub(crate) struct Decoder<'a> {
-    /// Its name in errors about limits.
-    file: &'a str,
+pub(crate) struct Decoder {
+    /// The file, as the caller named it.
+    file: String,
     limits: Limits,
     pub(crate) dictionary: Dictionary,
     dictionary_bits: BitCounts,
     parameters: Parameters,
     tables: Tables,
-    /// The pieces of the data: two for the dictionary and two for each chunk.
-    parts: Vec<&'a [u8]>,
+    /// The parts of the data: two for the dictionary and two for each chunk.
+    parts: Vec<Range<usize>>,
     gaussians: usize,
 }
 
-impl<'a> Decoder<'a> {
-    /// Of `packed`, whose own data may be left out, and its `data`; errors about limits call it `file`.
-    pub(crate) fn new(packed: &Packed, file: &'a str, data: &'a [u8]) -> Result<Self> {
-        let limits = packed.limits;
-        limits.check_gaussians(file, packed.gaussians as u64)?;
-        limits.check_atoms(file, packed.atoms as u64)?;
-        let parameters = Parameters::from_list(&packed.parameters).ok_or_else(|| bad("parameters"))?;
-        let tables = Tables::read(&packed.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
-        let gaussians = packed.gaussians;
-        let parts = parts(gaussians, &packed.lengths, data)?;
-        let (dictionary, dictionary_bits) =
-            dictionary(packed, &tables, parts[0], parts[1]).ok_or_else(|| bad("dictionary"))?;
+impl Decoder {
+    /// Reads what all chunks need from `head` and from the start of `data`.
+    pub(crate) fn new(head: &PackedHead, data: &[u8]) -> Result<Self> {
+        let (file, limits, gaussians) = (head.file.clone(), head.limits, head.gaussians);
+        let bad = |what| bad(&file, what);
+        limits.check_gaussians(&file, gaussians as u64)?;
+        limits.check_atoms(&file, head.atoms as u64)?;
+        let parameters = Parameters::from_list(&head.parameters).ok_or_else(|| bad("parameters"))?;
+        let tables = Tables::read(&head.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
+        let parts = parts(gaussians, &head.lengths, data.len()).ok_or_else(|| bad("lengths"))?;
+        let part = |k: usize| parts.get(k).and_then(|range| data.get(range.clone()));
+        let dictionary = part(0).zip(part(1)).and_then(|parts| dictionary(head, &tables, parts));
+        let (dictionary, dictionary_bits) = dictionary.ok_or_else(|| bad("dictionary"))?;
         Ok(Self { file, limits, dictionary, dictionary_bits, parameters, tables, parts, gaussians })
+    }
+
+    fn bad_chunk(&self, c: usize) -> Error {
+        bad(&self.file, &format!("chunk {c}"))
     }
 
     /// Bits the dictionary took.
@@ -162,10 +170,11 @@ impl<'a> Decoder<'a> {
         self.dictionary_bits
     }
 
-    /// Chunk `c` alone, without extras, its escapes numbered from its start; and if
-    /// `count_bits` what it took. In `room` there is room for all but its codes.
+    /// Decodes chunk `c` of `data` without extras. Escapes are numbered from its start. `budget` already holds
+    /// everything except its codes. Its bits are counted if `count_bits`.
     pub(crate) fn chunk(
         &self,
+        data: &[u8],
         c: usize,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
@@ -173,33 +182,36 @@ impl<'a> Decoder<'a> {
         let first = c * CHUNK;
         let n = self.gaussians.saturating_sub(first).min(CHUNK);
         let (mut g, mut counts) = (zeros(n), vec![0; n]);
-        let place = places(&mut g, &mut counts).next().ok_or_else(|| bad(&format!("chunk {c}")))?;
-        let piece = self.piece(c, 0, place, budget, count_bits)?;
+        let place = places(&mut g, &mut counts).next().ok_or_else(|| self.bad_chunk(c))?;
+        let piece = self.piece(data, c, 0, place, budget, count_bits)?;
         let escapes = Escapes { gaussians: piece.escaped, rows: piece.rows };
         let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
-        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)?;
+        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)
+            .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
         Ok((g, codes, piece.bit_counts))
     }
 
-    /// Decodes chunk `c` to `place`; its first Gaussian is called number `first`.
+    /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
     pub(super) fn piece(
         &self,
+        data: &[u8],
         c: usize,
         first: usize,
         place: Place<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
-        let parts = (self.parts.get(2 * c + 2).copied()).zip(self.parts.get(2 * c + 3).copied());
+        let part = |k: usize| self.parts.get(k).and_then(|range| data.get(range.clone()));
+        let parts = part(2 * c + 2).zip(part(2 * c + 3));
         let player = parts.and_then(|(symbols, raw)| SymbolDecoder::new(&self.tables, symbols, raw));
-        let mut player = player.ok_or_else(|| bad(&format!("chunk {c}")))?;
+        let mut player = player.ok_or_else(|| self.bad_chunk(c))?;
         player.bit_counts = count_bits.then_some([0.0; Stream::ALL.len()]);
         self.play(player, first, place, budget).map_err(|refusal| match refusal {
-            Refusal::Damage => bad(&format!("chunk {c}")),
+            Refusal::Damage => self.bad_chunk(c),
             Refusal::MemoryBudget => budget.full(),
             Refusal::Nonzeros(i, found) => {
-                let over = self.limits.check_nonzeros(self.file, c * CHUNK + i, found);
-                over.err().unwrap_or_else(|| bad(&format!("chunk {c}")))
+                let over = self.limits.check_nonzeros(&self.file, c * CHUNK + i, found);
+                over.err().unwrap_or_else(|| self.bad_chunk(c))
             }
         })
     }
@@ -244,7 +256,7 @@ impl<'a> Decoder<'a> {
                 piece.atoms.push(atom);
                 piece.values.push(value);
             }
-            // A damaged file could ask for more than it holds, or than may be held.
+            // A damaged file could decode to more than it holds, or to more than fits in memory.
             if i % LOOK_AFTER == LOOK_AFTER - 1 || i + 1 == place.counts.len() {
                 if player.overrun() {
                     return Err(Refusal::Damage);
@@ -263,44 +275,40 @@ impl<'a> Decoder<'a> {
     }
 }
 
-/// The pieces of `data`: two for the dictionary and two for each chunk.
-fn parts<'a>(gaussians: usize, lengths: &[u32], data: &'a [u8]) -> Result<Vec<&'a [u8]>> {
-    let chunks = gaussians.div_ceil(CHUNK);
+/// The parts of data of `len` bytes: two for the dictionary and two for each chunk. `None` if `lengths` do not
+/// fit.
+fn parts(gaussians: usize, lengths: &[u32], len: usize) -> Option<Vec<Range<usize>>> {
     let total: u64 = lengths.iter().map(|&l| u64::from(l)).sum();
-    if lengths.len() != 2 * (chunks + 1) || total != data.len() as u64 {
-        return Err(bad("lengths"));
+    if lengths.len() != 2 * (gaussians.div_ceil(CHUNK) + 1) || total != len as u64 {
+        return None;
     }
-    let mut parts = Vec::with_capacity(lengths.len());
-    let mut rest = data;
-    for &length in lengths {
-        let (part, tail) = rest.split_at_checked(length as usize).ok_or_else(|| bad("lengths"))?;
-        parts.push(part);
-        rest = tail;
-    }
-    Ok(parts)
+    let ends = lengths.iter().scan(0, |end, &length| {
+        let start = *end;
+        *end += length as usize;
+        Some(start..*end)
+    });
+    Some(ends.collect())
 }
 
 fn dictionary(
-    packed: &Packed,
+    head: &PackedHead,
     tables: &Tables,
-    symbols: &[u8],
-    raw: &[u8],
+    (symbols, raw): (&[u8], &[u8]),
 ) -> Option<(Dictionary, BitCounts)> {
-    let dim = packed.degree.rest();
-    if dim == 0 {
-        return (packed.atoms == 0 && symbols.is_empty() && raw.is_empty())
+    if head.degree.rest() == 0 {
+        return (head.atoms == 0 && symbols.is_empty() && raw.is_empty())
             .then(|| (Dictionary::empty(), BitCounts::default()));
     }
-    if !(1..=MAX_ATOMS).contains(&packed.atoms) || packed.atom_bits > MAX_ATOM_BITS {
+    if !(1..=MAX_ATOMS).contains(&head.atoms) || head.atom_bits > MAX_ATOM_BITS {
         return None;
     }
     let mut player = SymbolDecoder::new(tables, symbols, raw)?;
     player.bit_counts = Some([0.0; Stream::ALL.len()]);
-    let rows = code_dictionary(&mut player, packed.degree, packed.atoms, packed.atom_bits, None);
+    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, None);
     if !player.exhausted() {
         return None;
     }
-    Some((Dictionary::new(packed.degree, rows).ok()?, BitCounts(player.bit_counts.unwrap_or_default())))
+    Some((Dictionary::new(head.degree, rows).ok()?, BitCounts(player.bit_counts.unwrap_or_default())))
 }
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds

@@ -1,4 +1,4 @@
-//! What all chunks of a file are coded with, and the coding of one.
+//! Coding of one chunk, and everything that all chunks of a file are coded with.
 
 use half::f16;
 
@@ -14,27 +14,28 @@ use super::stream::{Stream, SymbolEncoder};
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Layout, Pursuit, Record};
+use crate::sparse::model::Record;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
-/// Rows to learn a dictionary from at most.
+/// Largest number of rows to learn a dictionary from.
 const SAMPLE: usize = 24_576;
 /// Most rows that decide how finely atoms are rounded.
 const ATOM_BITS_SAMPLE: usize = 2048;
 /// Gaussians that pay for one more atom.
 const GAUSSIANS_PER_ATOM: usize = 64;
-/// Atoms learned unless asked otherwise at most: as many as one byte counts. At least there are as many as
-/// a row has coefficients, without which nothing comes near.
+/// Largest number of atoms that are learned by default: as many as one byte counts. There are at least as many
+/// atoms as coefficients in a row, since fewer do not span the rows.
 const MAX_LEARNED: usize = 256;
-/// Steps an atom's coefficient is rounded to, for each step of an average value.
+/// Rounding steps of a coefficient of an atom, for each step of an average value.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
 const VALUE_STEP_PER_TOLERANCE: f64 = 0.35;
-/// Share of the squared tolerance a code is first asked to stay below; the rest is for f16.
+/// Share of the squared tolerance that the pursuit may use. The rest is for rounding to f16.
 const TOLERANCE_SHARE: f32 = 0.995;
-/// A code whose error is above this, the largest f16, is no code, promise or not: the row is stored exactly.
+/// A row whose code has a larger error than this, the largest f16, is stored exactly, with or without a
+/// promised tolerance.
 const MAX_ERROR: f64 = 65_504.0;
 /// Mixed into the seed of the sample.
 const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
@@ -43,14 +44,14 @@ const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct View<'a> {
     pub(super) splats: &'a Splats,
-    /// Which Gaussian of `splats` comes next, and its cell.
+    /// For each Gaussian its index in `splats` and its cell.
     pub(super) scene: &'a [MortonKey],
     /// Colour and shape class of each, in this order.
     pub(super) classes: &'a [[u8; 2]],
 }
 
 impl<'a> View<'a> {
-    /// The part `range` of it.
+    /// Gaussians `range`.
     pub(super) fn part(self, range: std::ops::Range<usize>) -> Self {
         Self { splats: self.splats, scene: &self.scene[range.clone()], classes: &self.classes[range] }
     }
@@ -77,7 +78,7 @@ impl<'a> View<'a> {
     }
 }
 
-/// What all chunks are coded with.
+/// Everything that all chunks are coded with.
 #[derive(Debug)]
 pub(super) struct ChunkCoder {
     pub(super) parameters: Parameters,
@@ -155,14 +156,14 @@ impl ChunkCoder {
         let dim = view.splats.degree.rest();
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
         let (rows, classes) = view.scaled(sample, &self.parameters);
-        // A promise is cheaper to keep with more atoms than exact rows.
+        // More atoms take fewer bits than exact rows to keep a promised tolerance.
         let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
         let pay = || (total / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED);
         let first = first_atoms(dim, options.atoms.unwrap_or_else(pay), &rows);
         learn(dim, &rows, &classes, first, self.stop, progress)
     }
 
-    /// How finely atoms need be rounded: the larger the values, the more their errors show.
+    /// Chooses how finely atoms are rounded. Errors of atoms show more with larger values.
     fn choose_atom_bits(&self, view: View<'_>, rows: &[f32], costs: &Costs) -> u32 {
         let dim = view.splats.degree.rest();
         let n = view.len();
@@ -241,38 +242,33 @@ impl ChunkCoder {
     }
 }
 
-/// One chunk recorded, with what it adds to the report.
+/// The symbols of one chunk, and what it adds to the report.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
-    pub(super) recorder: SymbolEncoder,
-    pub(super) tally: Tally,
+    recorder: SymbolEncoder,
+    tally: Tally,
     /// A decoder would refuse it.
     impossible: bool,
 }
 
 impl Chunk {
-    /// Adds the chunk to what is known of the file, and returns its symbols.
-    pub(super) fn count(self, tally: &mut Tally, histograms: &mut [Histogram]) -> Result<SymbolEncoder> {
-        if self.impossible {
-            return Err(too_large());
-        }
-        tally.add(&self.tally);
-        self.recorder.count(histograms);
-        Ok(self.recorder)
+    /// Its counts and its symbols; an error if a decoder would refuse them.
+    pub(super) fn into_parts(self) -> Result<(Tally, SymbolEncoder)> {
+        if self.impossible { Err(too_large()) } else { Ok((self.tally, self.recorder)) }
     }
 }
 
-/// No symbols yet, of any stream in any context.
+/// Empty histograms of every stream in every context.
 pub(super) fn no_symbols() -> Vec<Histogram> {
     vec![Histogram::default(); Stream::ALL.len() * CONTEXTS]
 }
 
-/// The tables for what was counted.
+/// Makes the tables from histograms.
 pub(super) fn tables(histograms: &[Histogram]) -> Result<Tables> {
     Tables::new(histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))
 }
 
-/// Length of a part of a chunk as the file has it.
+/// The length of a part of a chunk, as it is written.
 pub(super) fn length(part: &[u8]) -> Result<u32> {
     u32::try_from(part.len()).map_err(|_| Error::parameter("chunk", part.len(), "parts of less than 4 GiB"))
 }
@@ -300,7 +296,7 @@ impl Tally {
         self.nonzeros += part.nonzeros;
     }
 
-    /// What is recorded and reported of `gaussians` Gaussians; `seconds` are those of learning and coding.
+    /// The record and the report of `gaussians` Gaussians; `seconds` are those of learning and of coding.
     pub(super) fn into_report(
         self,
         options: &PackOptions,
@@ -312,9 +308,8 @@ impl Tally {
         let record = Record {
             tolerance: options.tolerance,
             max_nonzeros: None,
-            pursuit: Pursuit::Omp,
+            pursuit: None,
             seed: options.seed,
-            layout: Layout::Packed,
             max_residual: self.max_error,
             rms_residual: (self.squared_error / count).sqrt(),
             over_tolerance: 0,

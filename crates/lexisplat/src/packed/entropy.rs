@@ -1,4 +1,4 @@
-//! Histograms, which contexts share one, their transmission, and coding with them.
+//! Entropy coding: histograms, contexts that share one, tables in files, coding with tables.
 
 use constriction::UnwrapInfallible;
 use constriction::stream::model::{ContiguousCategoricalEntropyModel, ContiguousLookupDecoderModel};
@@ -7,7 +7,7 @@ use constriction::stream::{Decode, Encode};
 
 use super::bits::{BitReader, BitWriter};
 
-/// Probabilities are multiples of 2^-12: finer ones cost more in tables than they save.
+/// Bits of a probability. Finer probabilities cost more in tables than they save.
 pub(super) const PRECISION: usize = 12;
 const TOTAL: u32 = 1 << PRECISION;
 /// Contexts of one stream.
@@ -19,9 +19,9 @@ const LENGTH_BITS: u32 = 4;
 const MANTISSA_BITS: u32 = 3;
 /// Bits of a cluster's number in the context map.
 const CLUSTER_BITS: u32 = 5;
-/// What a symbol of a table costs, about: its length and mantissa.
+/// About the bits of a symbol in a table: its length and its mantissa.
 const SYMBOL_COST: f64 = 6.5;
-/// Most symbols of one table; atoms are the widest alphabet.
+/// Largest number of symbols of a table. Atoms are the widest alphabet.
 const MAX_SYMBOLS: usize = 1 << 10;
 
 type Encoder = ContiguousCategoricalEntropyModel<u16, Vec<u16>, PRECISION>;
@@ -55,20 +55,20 @@ impl Histogram {
         self.counts.is_empty()
     }
 
-    /// Bits that `table` codes all its symbols in.
+    /// Bits of all its symbols when coded with `table`.
     pub(super) fn bits(&self, table: &Table) -> f64 {
         let used = (0_u16..).zip(&self.counts).filter(|(_, count)| **count > 0);
         used.map(|(symbol, &count)| f64::from(count) * table.bits(symbol)).sum()
     }
 
-    /// Bits of all its symbols under its own probabilities, and of its table.
+    /// Bits of all its symbols when coded with its own probabilities, and of its table.
     fn cost(&self) -> f64 {
         let total: u64 = self.counts.iter().map(|&c| u64::from(c)).sum();
         let total = total as f64;
         let mut bits = 0.0;
         let mut used = 0;
         for &count in self.counts.iter().filter(|&&c| c > 0) {
-            // No probability is below one unit of precision.
+            // A probability is at least one unit of precision.
             let share = (f64::from(count) / total).max(1.0 / f64::from(TOTAL));
             bits -= f64::from(count) * libm::log2(share);
             used += 1;
@@ -77,7 +77,7 @@ impl Histogram {
         bits + f64::from(SYMBOLS_BITS) + SYMBOL_COST * used as f64 + f64::from(LENGTH_BITS) * gaps as f64
     }
 
-    /// Counts rounded to what a table can say.
+    /// Counts rounded to those that a table can hold.
     fn rounded(&self) -> Vec<u32> {
         let largest = self.counts.iter().copied().max().unwrap_or(0).max(1);
         let round = |count: u32| {
@@ -102,9 +102,9 @@ pub(super) struct Table {
     symbols: Vec<u16>,
     /// Probability of each of `symbols` in units of 2^-12.
     shares: Vec<u16>,
-    /// Position in `symbols`; `u16::MAX` for what does not occur.
+    /// Position in `symbols`; `u16::MAX` for symbols that do not occur.
     ranks: Vec<u16>,
-    /// `None` if there is but one symbol, which then costs nothing.
+    /// `None` if there is only one symbol, which takes no bits.
     models: Option<(Encoder, Decoder)>,
 }
 
@@ -118,7 +118,7 @@ impl Table {
         }
         let share = |&s: &usize| (u64::from(counts[s]) * u64::from(TOTAL) / total).max(1);
         let mut shares: Vec<i64> = used.iter().map(|s| share(s).cast_signed()).collect();
-        // What rounding left over or took too much goes to the most frequent symbols, which feel it least.
+        // The difference that rounding leaves goes to the most frequent symbols, where it costs least.
         let mut left = i64::from(TOTAL) - shares.iter().sum::<i64>();
         while left != 0 {
             let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
@@ -152,12 +152,12 @@ impl Table {
     }
 }
 
-/// All tables of a file and which context of which stream uses which.
+/// All tables of a file, and the table of each context of each stream.
 #[derive(Debug, Clone)]
 pub(super) struct Tables {
-    /// A cluster for every context, stream by stream; `u8::MAX` where it is never used.
+    /// The cluster of every context, stream by stream; `u8::MAX` for contexts that are never used.
     map: Vec<u8>,
-    /// For each stream its tables.
+    /// The tables of each stream.
     tables: Vec<Vec<Table>>,
 }
 
@@ -188,7 +188,7 @@ impl Tables {
         for (tables, map) in self.tables.iter().zip(self.map.chunks(CONTEXTS)) {
             let mut last = 0;
             for &cluster in map {
-                // An unused context may as well share its neighbour's table.
+                // An unused context shares its neighbour's table.
                 let cluster = if cluster == u8::MAX { last } else { cluster };
                 out.put(1, u64::from(cluster != last));
                 if cluster != last {
@@ -211,7 +211,7 @@ impl Tables {
         out.finish()
     }
 
-    /// Reads what [`Self::write`] wrote, for `streams` streams. `None` if it is not that.
+    /// Reads what [`Self::write`] wrote, for `streams` streams; `None` for anything else.
     pub(super) fn read(bytes: &[u8], streams: usize) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
         let mut map = Vec::with_capacity(streams * CONTEXTS);
@@ -247,8 +247,8 @@ impl Tables {
     }
 }
 
-/// Greedy clustering: the two that gain most by sharing are joined until none gains. Returns the joined
-/// histograms and each context's number among them.
+/// Greedy clustering: joins the two histograms that gain most by sharing a table until none gains. Returns the
+/// joined histograms, and for each context the number of its histogram among them.
 fn cluster(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
     let mut groups: Vec<(Histogram, Vec<usize>, f64)> = (0..contexts.len())
         .filter(|&c| !contexts[c].is_empty())
@@ -289,7 +289,7 @@ fn cluster(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
 /// Codes symbols, each with its table. Returns little-endian words.
 pub(super) fn encode<'t>(symbols: impl DoubleEndedIterator<Item = (&'t Table, u16)>) -> Vec<u8> {
     let mut coder = AnsCoder::<u32, u64>::new();
-    // Last in, first out.
+    // The coder is a stack: the symbol that is coded last is decoded first.
     for (table, symbol) in symbols.rev() {
         let Some((encoder, _)) = &table.models else { continue };
         let rank = table.ranks.get(usize::from(symbol)).copied().unwrap_or(0);
@@ -315,7 +315,7 @@ impl SymbolReader {
         rest.is_empty().then_some(Self { coder })
     }
 
-    /// The next symbol. Beyond the end any symbol of the table.
+    /// The next symbol. Beyond the end it is any symbol of the table.
     #[inline]
     pub(super) fn take(&mut self, table: &Table) -> u16 {
         let rank = match &table.models {
@@ -325,7 +325,7 @@ impl SymbolReader {
         table.symbols.get(rank).copied().unwrap_or(0)
     }
 
-    /// Whether exactly everything was decoded.
+    /// Whether all words were decoded, and nothing beyond them.
     pub(super) fn exhausted(&self) -> bool {
         self.coder.is_empty()
     }

@@ -8,26 +8,26 @@ use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share};
 
-/// A weight is at least this share of what nine tenths of all are below: what the views did not see may
-/// yet be seen.
+/// Smallest weight, as a share of the 90th percentile of weights. Other views may show Gaussians that the measured
+/// ones did not.
 const WEIGHT_FLOOR: f64 = 1e-3;
 const FLOOR_QUANTILE: f64 = 0.9;
-/// Weights above this share of all do not make the finest class finer.
+/// Weights above this quantile do not make the finest class finer.
 const TOP_QUANTILE: f64 = 0.9995;
-/// The least weighted tell nothing about how steps depend on shape.
+/// Gaussians with weights below this quantile are left out when the dependence of steps on shape is fitted.
 const FIT_QUANTILE: f64 = 0.05;
-/// Added to squared derivatives, as a share of that by opacity, before logarithms are taken.
+/// Added to squared derivatives before their logarithm is taken, as a share of the one by opacity.
 const DERIVATIVE_FLOOR: f64 = 1e-4;
-/// Factors on steps, found by trial: derivatives are those of small errors, and small errors are not
-/// what is made (docs/METHOD.md). Colour, SH values, opacity, scale, rotation, position.
+/// Factors on the steps of colour, SH values, opacity, scale, rotation and position, found by trial. Derivatives
+/// hold for small errors, and the errors of packing are not small (docs/METHOD.md).
 const DC_FACTOR: f32 = 1.6;
 const VALUE_FACTOR: f32 = 1.1;
 const OPACITY_FACTOR: f32 = 1.8;
 const SCALE_FACTOR: f64 = 1.1;
 const ROTATION_FACTOR: f64 = 0.8;
 const POSITION_FACTOR: f64 = 1.12;
-/// Steps of class 0: below, values around 1 have no more digits in f32, and differences too many; above,
-/// everything is as good as unknown.
+/// Smallest and largest step of class 0. Values around 1 have no finer digits in f32, and with the largest step
+/// a value is as good as unknown.
 const STEPS: [f64; 2] = [1.0 / 16_777_216.0, 1e6];
 /// Keeps the normal equations solvable.
 const RIDGE: f64 = 1e-6;
@@ -38,7 +38,7 @@ pub(super) struct Fit {
     pub(super) parameters: Parameters,
     /// Colour and shape class of each Gaussian.
     pub(super) classes: Vec<[u8; 2]>,
-    /// Those of the colour and of the shape.
+    /// How weights become classes of colour and of shape.
     kinds: [Classes; 2],
 }
 
@@ -66,7 +66,7 @@ impl Fit {
                 DC_FACTOR / C0,
                 VALUE_FACTOR / C0,
                 OPACITY_FACTOR,
-                // Scales have no scales before them to depend on: their rows are constants.
+                // The steps of scales depend on nothing: no scale is decoded before them.
                 single(libm::exp2(scale_rows[0][0])),
                 single(libm::exp2(scale_rows[1][0])),
                 single(libm::exp2(scale_rows[2][0])),
@@ -83,8 +83,8 @@ impl Fit {
         Self { parameters, classes, kinds }
     }
 
-    /// Colour and shape class of each Gaussian of another part of the scene, of which `weights` are its
-    /// sensitivities to colour and opacity.
+    /// Colour and shape class of each Gaussian of another part of the scene. `weights` are its sensitivities to
+    /// colour and opacity.
     pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
         weights.iter().map(|&weights| of(self.kinds, weights)).collect()
     }
@@ -160,8 +160,8 @@ fn colour_axes(geometry: &Geometry, scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     (mean, out)
 }
 
-/// For scaling, turning and moving along each axis: the binary logarithm of the step, relative to that
-/// of the opacity, as a linear function of 1 and the scales. Scaling depends on nothing.
+/// Fits the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of
+/// the opacity, as a linear function of 1 and the scales. The steps of scaling are constant.
 fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKey]) -> [[[f64; 4]; 3]; 3] {
     let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
     let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
@@ -195,7 +195,7 @@ fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKe
     [rows(SCALE, SCALE_FACTOR), rows(ROTATION, ROTATION_FACTOR), rows(POSITION, POSITION_FACTOR)]
 }
 
-/// Kinds of derivatives by an axis.
+/// Indices of the derivatives by an axis.
 const SCALE: usize = 0;
 const ROTATION: usize = 1;
 const POSITION: usize = 2;
@@ -212,7 +212,7 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
     [g.order.map(|k| sensitivity.scale[i][k]), g.order.map(|k| sensitivity.rotation[i][k]), g.axes.map(along)]
 }
 
-/// Fits the predictions to the scene's own values, as if coded without error.
+/// Fits the predictions to the values of the scene before they are rounded.
 fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], parameters: &mut Parameters) {
     let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
         let dc = parameters.dc_coordinates(g.dc);
@@ -273,7 +273,7 @@ impl<const N: usize> Equations<N> {
         }
     }
 
-    /// The coefficients; zero for features that never vary from zero.
+    /// The coefficients; 0 for features that are always 0.
     fn solve(&self) -> [f64; N] {
         let (mut m, mut r) = (self.matrix, self.right);
         let scale = (0..N).map(|i| m[i][i]).fold(1e-30, f64::max);

@@ -7,7 +7,7 @@ use super::stream::{Stream, SymbolDecoder, SymbolEncoder, Symbols};
 /// Symbols of the widest alphabet, that of atoms.
 const SYMBOLS: u64 = 1 << 10;
 
-/// What one entry of a script asks for, by its lowest bits.
+/// Codes what one entry of a script asks for.
 fn ask<S: Symbols>(s: &mut S, [stream, context]: [u8; 2], value: u64) -> u64 {
     let kind = stream / 32 % 3;
     let stream = Stream::ALL[usize::from(stream) % Stream::ALL.len()];
@@ -23,8 +23,9 @@ fn ask<S: Symbols>(s: &mut S, [stream, context]: [u8; 2], value: u64) -> u64 {
     }
 }
 
-/// Reads `tables` and with them, entry by entry of `script` (two bytes each: what, and in which context), the
-/// modelled symbols of `symbols` and the bits of `raw`. Whether all of it was just used up.
+/// Reads `tables`, and with them the modelled symbols of `symbols` and the bits of `raw`. Each two bytes of
+/// `script` say what is read next and in which context. Returns whether everything was read to its end, and not
+/// beyond.
 ///
 /// # Panics
 /// If tables that were read are not the same once written and read again.
@@ -45,7 +46,7 @@ pub fn decode(tables: &[u8], symbols: &[u8], raw: &[u8], script: &[u8]) -> bool 
     player.exhausted() && !player.overrun()
 }
 
-/// Codes `values`, each with what it is and its context as in [`decode`], and decodes them. Whether they came
+/// Codes `values`, each with its two bytes of a script as in [`decode`], and decodes them. Returns whether they came
 /// back and nothing was left.
 #[must_use]
 pub fn round_trip(values: &[(u8, u8, u64)]) -> bool {
@@ -59,18 +60,18 @@ pub fn round_trip(values: &[(u8, u8, u64)]) -> bool {
     let Some(read) = Tables::read(&tables.write(), Stream::ALL.len()) else { return false };
     let Some(mut player) = SymbolDecoder::new(&read, &symbols, &raw) else { return false };
     let decoded = values.iter().map(|&(stream, context, _)| ask(&mut player, [stream, context], 0));
-    // All of it, wherever the first difference is.
+    // Decodes everything, even after a difference.
     let decoded: Vec<u64> = decoded.collect();
     decoded == coded && player.exhausted() && SymbolReader::new(&symbols).is_some()
 }
 
-/// The bytes of the tables, and the modelled symbols and raw bits of the first chunk, or nothing where there is
-/// none: what [`decode`] starts from.
+/// The input of [`decode`]: the tables, and the modelled symbols and raw bits of the first chunk, which are empty if
+/// there is none.
 #[must_use]
 pub fn parts(packed: &Packed) -> [&[u8]; 3] {
-    let length = |k: usize| packed.lengths.get(k).map_or(0, |&l| l as usize);
+    let length = |k: usize| packed.head().lengths.get(k).map_or(0, |&l| l as usize);
     let symbols = length(0) + length(1);
     let raw = symbols + length(2);
-    let part = |from: usize, to: usize| packed.data.get(from..to).unwrap_or_default();
-    [&packed.tables, part(symbols, raw), part(raw, raw + length(3))]
+    let part = |from: usize, to: usize| packed.data().get(from..to).unwrap_or_default();
+    [&packed.head().tables, part(symbols, raw), part(raw, raw + length(3))]
 }

@@ -1,10 +1,11 @@
 //! The packed form: every attribute quantised as far as pictures allow and entropy-coded.
 //!
-//! [`Packer`] takes a scene and its [`Sensitivity`](crate::Sensitivity) and makes [`Packed`] files of any quality;
+//! [`Packer`] takes a scene and its [`Sensitivity`](crate::Sensitivity) and makes [`Packed`] scenes of any quality;
 //! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
 //! the mathematics, docs/FORMAT.md the bytes.
 //!
-//! `walk.rs` is the heart: one walk over the Gaussians of a chunk that encoder and decoder share.
+//! `encoding.rs` packs a scene whole or in parts. `chunk_codec.rs` goes over the Gaussians of a chunk; encoder and
+//! decoder share it.
 
 mod bits;
 mod canonical;
@@ -12,6 +13,7 @@ mod chunk_codec;
 mod chunks;
 mod codebook;
 mod coder;
+mod encoding;
 mod entropy;
 mod fit;
 #[cfg(feature = "fuzzing")]
@@ -24,18 +26,21 @@ mod parameters;
 mod parts;
 mod preset;
 mod reorder;
+mod scene;
 mod stream;
 mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
-pub(crate) use chunks::Decoder;
+pub(crate) use chunks::{BitCounts, Decoder};
 pub(crate) use pack::check;
 pub(crate) use parts::{PartPacker, Whole};
+pub(crate) use scene::SpilledPacked;
 
 pub use pack::{PackOptions, PackReport, Packer};
 pub use preset::Preset;
-pub use unpack::{Packed, StreamBits, TargetRecord};
+pub use scene::{Packed, PackedHead, TargetRecord};
+pub use unpack::StreamBits;
 
-/// Gaussians of a chunk: decoded apart from all others, so that decoding is parallel and a viewer need
-/// not wait for the whole file.
+/// Gaussians of a chunk. Chunks are decoded independently of each other, so that decoding is parallel and a
+/// viewer need not wait for the whole file.
 pub const CHUNK: usize = 32_768;

@@ -3,12 +3,12 @@
 /// Bits of each coordinate.
 pub(super) const BITS: u32 = 21;
 
-/// The cell (x, y, z) as a number whose bits are theirs interleaved; coordinates are below 2^21.
+/// The number of the cell (x, y, z): the interleaved bits of its coordinates, which are below 2^21.
 pub(super) fn encode(cell: [u32; 3]) -> u64 {
     spread(cell[0]) | spread(cell[1]) << 1 | spread(cell[2]) << 2
 }
 
-/// Inverse of [`encode`]; `None` for numbers it does not give.
+/// Inverse of [`encode`]; `None` for numbers that are not of a cell.
 pub(super) fn decode(code: u64) -> Option<[u32; 3]> {
     (code >> (3 * BITS) == 0).then(|| [gather(code), gather(code >> 1), gather(code >> 2)])
 }

@@ -1,9 +1,10 @@
-//! What the Gaussians decoded just before say about the next one.
+//! Predicts a Gaussian from those decoded just before it.
 
 use super::parameters::TARGETS;
 use crate::support::maths::Vec3;
 
-/// Gaussians remembered. More gain little: neighbours on the Morton curve are neighbours in space.
+/// Gaussians remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
+/// space.
 const WINDOW: usize = 16;
 /// Values averaged: those that are predicted, the two classes and the number of nonzeros.
 pub(super) const AVERAGES: usize = TARGETS + 3;
@@ -40,7 +41,7 @@ impl Neighbours {
                 *sum += weight * value;
             }
         }
-        // Distances beyond f32 leave no weight.
+        // At distances beyond f32 all weights are 0.
         let average = sums.map(|sum| sum / total);
         average.iter().all(|v| v.is_finite()).then_some(average)
     }

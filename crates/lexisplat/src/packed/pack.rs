@@ -1,46 +1,63 @@
 //! From a scene to a packed file.
 
+use std::borrow::Borrow;
+use std::ops::Range;
+
 use super::CHUNK;
 use super::canonical::{Grid, MortonKey, placed};
 use super::codebook::Codes;
-use super::coder::{ChunkCoder, Tally, View, length, no_symbols, tables};
+use super::coder::{ChunkCoder, View};
+use super::encoding::{Counts, Encoding, Finished, WriteChunk};
+use super::entropy::Tables;
 use super::fit::Fit;
 use super::reorder::gather;
-use super::unpack::Packed;
+use super::scene::Packed;
 use crate::scene::sensitivity::Sensitivity;
-use crate::scene::splats::{Splats, all_finite, for_extra};
+use crate::scene::splats::{Extra, Splats, all_finite, for_extra};
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
 use crate::support::parallel::map_chunks;
 use crate::support::progress::{Progress, Stage};
-use crate::support::stopwatch::Stopwatch;
+use crate::support::spill::SpillTo;
 
-/// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians, how it
-/// grows as the step halves, and by how much faster: fitted to held-out views of the models measured in
-/// docs/METHOD.md, which it misses by up to 3 dB.
+/// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
+/// next three constants are fitted to held-out views of the models in docs/METHOD.md, which they miss by up to
+/// 3 dB.
 const EXPECTED_DB: f64 = 40.0;
 const EXPECTED_STEP: f64 = 2.3e-3;
+/// Growth of the PSNR when the step halves, and the growth of that growth.
 const DB_PER_OCTAVE: f64 = 4.5;
 const DB_PER_OCTAVE_2: f64 = 0.15;
-/// Better than this nothing is expected to become.
+/// Largest PSNR that is expected, in dB.
 const MOST_DB: f64 = 100.0;
+
 /// How to pack.
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PackOptions {
-    /// The promised un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
-    /// then as exact as pictures need.
+    /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are then as exact as
+    /// pictures need.
     pub tolerance: Option<f64>,
     /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
     pub atoms: Option<usize>,
-    /// Keep each Gaussian's index in the source.
+    /// Store each Gaussian's place in the source.
     pub keep_order: bool,
     /// Seed of the learning sample.
     pub seed: u64,
 }
 
 impl PackOptions {
-    /// Refuses what is out of range.
+    builder_methods!(
+        with_tolerance(tolerance: impl Into<Option<f64>>),
+        with_atoms(atoms: impl Into<Option<usize>>),
+        with_keep_order(keep_order: bool),
+        with_seed(seed: u64),
+    );
+}
+
+impl PackOptions {
+    /// Refuses options out of range.
     pub(crate) fn check(&self) -> Result<()> {
         if let Some(atoms) = self.atoms
             && !(1..=MAX_ATOMS).contains(&atoms)
@@ -62,7 +79,7 @@ impl PackOptions {
 pub struct PackReport {
     /// Mean nonzeros a Gaussian, an escape counting as a full row.
     pub mean_nonzeros: f64,
-    /// Gaussians by number of nonzeros; escapes not among them.
+    /// Gaussians by number of nonzeros, without escapes.
     pub nonzero_histogram: Vec<u64>,
     /// Gaussians whose SH are stored exactly.
     pub escapes: u64,
@@ -72,25 +89,25 @@ pub struct PackReport {
     pub code_seconds: f64,
 }
 
-/// A scene prepared for packing at any quality.
+/// A scene prepared for packing at any quality. `S` owns or borrows the scene.
 #[derive(Debug)]
-pub struct Packer<'a> {
-    splats: &'a Splats,
+pub struct Packer<S> {
+    splats: S,
     options: PackOptions,
     scene: Vec<MortonKey>,
     fit: Fit,
 }
 
-impl<'a> Packer<'a> {
-    /// Prepares `splats`, of whose values pictures depend as `sensitivity` says.
+impl<S: Borrow<Splats>> Packer<S> {
+    /// Prepares `splats`. `sensitivity` says how much pictures depend on each of its values.
     ///
     /// # Errors
     /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or weights that
     /// are not finite.
-    pub fn new(splats: &'a Splats, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
-        check(splats, sensitivity)?;
+    pub fn new(splats: S, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
+        check(splats.borrow(), sensitivity)?;
         options.check()?;
-        let g = &splats.geometry;
+        let g = &splats.borrow().geometry;
         let grid = Grid::fit(&g.positions);
         let scene = placed(g, &grid);
         let fit = Fit::new(g, sensitivity, &scene, &grid);
@@ -103,93 +120,64 @@ impl<'a> Packer<'a> {
         self.scene.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.scene.is_empty()
     }
 
-    /// The overall step that pictures of about this PSNR, in dB, are expected of: errors of all Gaussians
-    /// add up, so it falls with the root of their number.
+    /// The overall step for pictures of about this PSNR, in dB. Errors of all Gaussians add up, so the step
+    /// falls with the root of their number.
     #[must_use]
     pub fn step_for(&self, decibels: f64) -> f64 {
         expected_step(self.len(), decibels)
     }
 
-    /// Packs with an overall step: roughly, the root of the mean squared error of pictures that each
-    /// value of each Gaussian may make on its own. Half the step is about 5 dB better.
+    /// Packs with an overall step: about the root of the mean squared error of pictures that each value of
+    /// each Gaussian may make on its own. Half the step gives about 5 dB more.
     ///
     /// # Errors
     /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
-    /// leave f32.
+    /// leave f32; [`Error::Cancelled`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, PackReport)> {
-        let clock = Stopwatch::start();
-        let n = self.len();
-        let view = View { splats: self.splats, scene: &self.scene, classes: &self.fit.classes };
-        let mut coder = ChunkCoder::new(view, n, &self.fit, step, &self.options, progress)?;
-        let first = std::mem::take(&mut coder.first);
+        let (splats, n) = (self.splats.borrow(), self.len());
+        let view = View { splats, scene: &self.scene, classes: &self.fit.classes };
+        let mut encoding = Encoding::new(view, n, &self.fit, step, &self.options, progress)?;
         progress.begin(Stage::Code, n as u64);
         let codes = (0..n.div_ceil(CHUNK)).map(|c| {
+            progress.check()?;
             let part = view.part(c * CHUNK..n.min((c + 1) * CHUNK));
-            let codes = coder.codes(part);
+            let codes = encoding.coder.codes(part);
             progress.advance(part.scene.len() as u64);
-            codes
+            Ok(codes)
         });
-        let codes: Vec<Codes> = codes.collect();
+        let codes = codes.collect::<Result<Vec<Codes>>>()?;
         progress.end();
-        let learn_seconds = clock.seconds();
-        let clock = Stopwatch::start();
-        // Twice: once to count what the tables are made of, once to code. To keep all symbols in between
-        // would take more memory than the scene's geometry.
-        let record = |range: std::ops::Range<usize>| {
-            let codes = &codes[range.start / CHUNK];
-            coder.record(view.part(range), codes)
+        encoding.end_learning();
+        // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
+        // symbols in memory would take more than the scene's geometry.
+        let record = |coder: &ChunkCoder, range: Range<usize>| {
+            progress.check()?;
+            Ok(coder.record(view.part(range.clone()), &codes[range.start / CHUNK]))
         };
-        let chunks = map_chunks(n, CHUNK, |range| {
-            let mut tally = Tally::new(coder.dictionary.dim());
-            let mut histograms = no_symbols();
-            record(range).count(&mut tally, &mut histograms).map(|_| (tally, histograms))
-        });
-        let mut tally = Tally::new(coder.dictionary.dim());
-        let mut histograms = no_symbols();
-        first.count(&mut histograms);
+        let chunks = map_chunks(n, CHUNK, |range| Ok(Counts::of(record(&encoding.coder, range)?)?.0));
         for chunk in chunks {
-            let (counted, symbols) = chunk?;
-            tally.add(&counted);
-            histograms.iter_mut().zip(&symbols).for_each(|(sum, more)| sum.merge(more));
+            encoding.counts.add(&chunk?);
         }
-        let tables = tables(&histograms)?;
-        let mut parts = vec![first.finish(&tables)];
-        parts.extend(map_chunks(n, CHUNK, |range| record(range).recorder.finish(&tables)));
-        let mut lengths = Vec::with_capacity(2 * parts.len());
-        let mut data = Vec::new();
-        for part in parts.iter().flatten() {
-            lengths.push(length(part)?);
-            data.extend_from_slice(part);
-        }
-        let (record, report) = tally.into_report(&self.options, n, [learn_seconds, clock.seconds()]);
-        let packed = Packed {
-            degree: self.splats.degree,
-            gaussians: n,
-            atoms: coder.dictionary.len(),
-            atom_bits: coder.atom_bits,
-            record,
-            meta: self.splats.meta.clone(),
-            extras: self.extras(),
-            order: self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect()),
-            target: None,
-            device: None,
-            parameters: coder.parameters.to_list(),
-            tables: tables.write(),
-            lengths,
-            data,
-            limits: Limits::default(),
+        let mut code_chunks = |coder: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
+            let parts =
+                map_chunks(n, CHUNK, |range| Ok(record(coder, range)?.into_parts()?.1.finish(tables)));
+            parts.into_iter().try_for_each(|part| write(part?))
         };
-        Ok((packed, report))
+        let meta = splats.meta.clone();
+        let Finished { head, data, report, .. } =
+            encoding.finish(n, &self.options, meta, SpillTo::Memory, &mut code_chunks)?;
+        let order = self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect());
+        Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
     }
 
-    fn extras(&self) -> Vec<crate::scene::splats::Extra> {
-        let mut extras = self.splats.geometry.extras.clone();
+    fn extras(&self) -> Vec<Extra> {
+        let mut extras = self.splats.borrow().geometry.extras.clone();
         for extra in &mut extras {
             for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));
         }
@@ -206,7 +194,7 @@ pub(super) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
     EXPECTED_STEP * libm::exp2(-octaves) / (gaussians.max(1) as f64).sqrt()
 }
 
-/// Refuses scenes and sensitivities that do not go together or are not finite.
+/// Refuses scenes and sensitivities that do not fit one another or are not finite.
 pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
     splats.validate()?;
     Limits::check("Gaussians", splats.len() as u64, MAX_GAUSSIANS)?;

@@ -1,19 +1,19 @@
-//! What every chunk is decoded with: steps, predictors, the grid. A fixed list of f32.
+//! The parameters of a file: steps, predictors, the grid. They are a fixed list of f32.
 
 use crate::support::maths::{Vec3, exp, exp2};
 
 /// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
 /// the opacity, three base colours.
 pub(super) const TARGETS: usize = 7;
-/// What a prediction is made of: 1, the neighbours' average of the same value, the two classes, and the
-/// scales known so far.
+/// Features of a prediction: 1, the neighbours' average of the same value, the two classes, and the scales known
+/// so far.
 pub(super) const FEATURES: usize = 7;
 /// Features a step depends on: 1 and the scales.
 const STEP_FEATURES: usize = 4;
 /// Number of the coarsest class of steps.
 pub(super) const LAST_CLASS: u8 = 15;
 
-/// Largest steps: beyond them a value is as good as unknown, and errors no longer small.
+/// Largest steps. With larger ones a value is as good as unknown, and errors are no longer small.
 const MAX_LOG_STEP: f32 = 1.5;
 const MAX_ANGLE_STEP: f32 = 1.2;
 /// The same for positions, in standard deviations along the longest axis.
@@ -26,11 +26,11 @@ pub(super) struct Parameters {
     pub(super) origin: Vec3,
     /// Side of a cell of the grid, in world units.
     pub(super) cell: f32,
-    /// Step of class 0; each further class doubles it: colour, shape.
+    /// Step of class 0 for colour and for shape. Each further class doubles it.
     pub(super) base: [f32; 2],
     /// Factors on the steps of base colour, SH values, opacity and the three scales.
     pub(super) factors: [f32; 6],
-    /// Step of all SH values alike, where an error was promised; else 0.
+    /// Step of all SH values if a tolerance is promised; otherwise 0.
     pub(super) promised: f32,
     /// Binary logarithm of the factor for turning about each axis, as a linear function of 1 and the
     /// scales.
@@ -140,7 +140,7 @@ impl Parameters {
         self.position.map(|row| (step * exp2(linear(row, scales))).min(most).max(f32::MIN_POSITIVE))
     }
 
-    /// What `target` is expected to be.
+    /// Predicts `target`.
     pub(super) fn predict(&self, target: usize, features: &[f32; FEATURES]) -> f32 {
         self.predictors[target].iter().zip(features).fold(0.0, |sum, (p, f)| sum + p * f)
     }

@@ -1,18 +1,18 @@
-//! Qualities by name.
+//! Presets of quality.
 
 use crate::support::error::{Error, Result};
 
-/// A quality of packed files, by what it is for.
+/// A quality of packed files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Preset {
-    /// To look at on a phone: about 35 dB.
+    /// For phones: about 35 dB.
     Small,
-    /// Hard to tell from the original: about 40 dB.
+    /// Looks like the original unless both are compared closely: about 40 dB.
     #[default]
     Balanced,
-    /// Not to be told from the original: about 45 dB.
+    /// Looks the same as the original: about 45 dB.
     High,
-    /// To keep instead of the original: about 54 dB.
+    /// Replaces the original: about 54 dB.
     Archive,
 }
 
@@ -31,8 +31,7 @@ impl Preset {
         }
     }
 
-    /// What it stands for: the PSNR expected on average, in dB; for
-    /// [`Packer::step_for`](super::Packer::step_for).
+    /// The expected average PSNR in dB, for [`Packer::step_for`](super::Packer::step_for).
     #[must_use]
     pub fn decibels(self) -> f64 {
         match self {

@@ -1,13 +1,13 @@
-//! Unpacked Gaussians back in the order of their source.
+//! Puts unpacked Gaussians back in the order of their source.
 
 use crate::scene::splats::for_extra;
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 
-/// For each of `len` Gaussians of the source where in the file it is; `None` if `order` is not a
+/// The place in the file of each of `len` Gaussians of the source; `None` if `order` is not a
 /// permutation of them.
-pub(crate) fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
+fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
     let mut from = vec![usize::MAX; len];
     for (k, &source) in order.iter().enumerate() {
         let slot = from.get_mut(source as usize)?;
@@ -19,11 +19,11 @@ pub(crate) fn inverse(order: &[u32], len: usize) -> Option<Vec<usize>> {
     (order.len() == len).then_some(from)
 }
 
-/// `model` with Gaussian k moved to `order[k]`.
-pub(super) fn reordered(model: Model, order: &[u32]) -> Result<Model> {
+/// `model`, which is from `file`, with Gaussian k moved to `order[k]`.
+pub(super) fn reordered(model: Model, order: &[u32], file: &str) -> Result<Model> {
     let from = inverse(order, model.len())
-        .ok_or_else(|| Error::parameter("packed", "order", "a permutation of the Gaussians"))?;
-    let Model { mut geometry, meta, dictionary, codes, record } = model;
+        .ok_or_else(|| Error::malformed(file, "the packed order is not a permutation of the Gaussians"))?;
+    let (mut geometry, meta, dictionary, codes, record) = model.into_parts();
     let g = &mut geometry;
     gather(&mut g.positions, from.iter().copied());
     gather(&mut g.normals, from.iter().copied());
@@ -35,10 +35,10 @@ pub(super) fn reordered(model: Model, order: &[u32]) -> Result<Model> {
         for_extra!(&mut extra.values, v => gather(v, from.iter().copied()));
     }
     let codes = codes_reordered(&codes, &from, &dictionary)?;
-    Ok(Model { geometry, meta, dictionary, codes, record })
+    Model::new(geometry, meta, dictionary, codes, record)
 }
 
-/// Entries become those that `from` names, one after the other; arrays that are left out stay so.
+/// Replaces `values` by the entries at the indices `from`. Empty arrays stay empty.
 pub(super) fn gather<T: Copy>(values: &mut Vec<T>, from: impl Iterator<Item = usize>) {
     if !values.is_empty() {
         *values = from.map(|k| values[k]).collect();

@@ -1,4 +1,4 @@
-//! What is coded: one stream an attribute, and the two ends that speak it.
+//! The streams of a chunk, and their encoder and decoder.
 
 use super::bits::{BitReader, BitWriter, extra_bits, join, split};
 use super::entropy::{CONTEXTS, Histogram, SymbolReader, Table, Tables, encode};
@@ -57,7 +57,7 @@ impl Stream {
         Self::Dictionary,
     ];
 
-    /// The attribute a user knows it by.
+    /// The attribute that it belongs to, by the name in reports.
     pub(super) fn attribute(self) -> &'static str {
         match self {
             Self::Cell | Self::Position0 | Self::Position1 | Self::Position2 => "position",
@@ -73,14 +73,15 @@ impl Stream {
         }
     }
 
-    /// One of three neighbouring streams.
+    /// Number `k` of three streams.
     pub(super) fn axis(streams: [Self; 3], k: usize) -> Self {
         streams[k.min(2)]
     }
 }
 
-/// Either end of a chunk's streams. The encoder gives values and gets them back; the decoder gets them
-/// from the file and never calls the closures, so one walk over a chunk serves both.
+/// The encoder or the decoder of a chunk's streams. The encoder records the values of the closures and returns
+/// them. The decoder returns values from the file and never calls the closures. So one loop over a chunk serves
+/// both.
 pub(super) trait Symbols {
     /// An integer whose token is modelled in `context`, below [`CONTEXTS`]; low bits of large ones are not.
     fn integer(&mut self, stream: Stream, context: usize, value: impl FnOnce() -> u64) -> u64;
@@ -90,7 +91,7 @@ pub(super) trait Symbols {
     fn bits(&mut self, stream: Stream, count: u32, value: impl FnOnce() -> u64) -> u64;
 }
 
-/// A chunk as it is being encoded: everything kept until the tables are known.
+/// The encoder of a chunk. It keeps all symbols until the tables are known.
 #[derive(Debug, Default)]
 pub(super) struct SymbolEncoder {
     symbols: Vec<(u16, u16)>,
@@ -139,12 +140,12 @@ impl SymbolEncoder {
         self.raw_bits
     }
 
-    /// All that [`Self::finish_later`] needs: symbols with their contexts, and raw bits.
+    /// Everything that [`Self::finish_later`] needs: symbols with their contexts, and raw bits.
     pub(super) fn set_aside(self) -> (Vec<u16>, Vec<u8>) {
         (self.symbols.iter().flat_map(|&(context, symbol)| [context, symbol]).collect(), self.raw.finish())
     }
 
-    /// The two parts of a chunk that was set aside.
+    /// The two parts of a chunk that was [set aside](Self::set_aside).
     pub(super) fn finish_later(symbols: &[u16], raw: Vec<u8>, tables: &Tables) -> [Vec<u8>; 2] {
         let symbols = symbols.as_chunks::<2>().0.iter().map(|&[context, symbol]| (context, symbol)).collect();
         let [coded, _] = Self { symbols, ..Self::default() }.finish(tables);
@@ -163,30 +164,30 @@ impl SymbolEncoder {
     }
 }
 
-/// A chunk as it is being decoded.
+/// The decoder of a chunk.
 #[derive(Debug)]
 pub(super) struct SymbolDecoder<'a> {
     tables: &'a Tables,
     symbols: SymbolReader,
     raw: BitReader<'a>,
-    /// Bits each stream took, if they are to be known.
+    /// Bits of each stream, if they are counted.
     pub(super) bit_counts: Option<[f64; Stream::ALL.len()]>,
     missing: bool,
 }
 
 impl<'a> SymbolDecoder<'a> {
-    /// `None` if the parts are not a chunk's.
+    /// `None` if the parts cannot be those of a chunk.
     pub(super) fn new(tables: &'a Tables, symbols: &[u8], raw: &'a [u8]) -> Option<Self> {
         let symbols = SymbolReader::new(symbols)?;
         Some(Self { tables, symbols, raw: BitReader::new(raw), bit_counts: None, missing: false })
     }
 
-    /// Whether more bits were asked for than there are.
+    /// Whether bits beyond the end were read.
     pub(super) fn overrun(&self) -> bool {
         self.raw.overrun() || self.missing
     }
 
-    /// Whether both parts held exactly what was asked of them.
+    /// Whether both parts were read to their end, and not beyond.
     pub(super) fn exhausted(&self) -> bool {
         self.symbols.exhausted() && self.raw.exhausted() && !self.missing
     }

@@ -1,87 +1,17 @@
-//! From a packed file's parts to a scene.
-
-use serde::{Deserialize, Serialize};
+//! Decoding a packed scene as a whole.
 
 use super::CHUNK;
 use super::chunks::{BitCounts, Decoder, indices, places, zeros};
-use crate::scene::sh::ShDegree;
-use crate::scene::splats::{Extra, Geometry, SceneMeta};
+use super::scene::Packed;
+use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Layout, Model, Record};
-use crate::support::error::Result;
-use crate::support::limits::Limits;
+use crate::sparse::model::Model;
+use crate::support::error::{Error, Result};
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 use crate::support::parallel::map_vec;
 
-/// A packed scene whose file is not known, in errors.
-const UNNAMED: &str = "the packed scene";
-
-/// A packed scene as it lies in a file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Packed {
-    /// SH degree.
-    pub degree: ShDegree,
-    /// Number of Gaussians.
-    pub gaussians: usize,
-    /// Number of atoms; 0 for degree 0.
-    pub atoms: usize,
-    /// Atoms' coefficients are multiples of 2 to the power of minus this.
-    pub atom_bits: u32,
-    /// How it was made and what it promises.
-    pub record: Record,
-    /// Comments and marks of the source.
-    pub meta: SceneMeta,
-    /// Properties 3DGS does not define, in the packed order.
-    pub extras: Vec<Extra>,
-    /// For each Gaussian its index in the source, if that was to be kept.
-    pub order: Option<Vec<u32>>,
-    /// What was aimed at and reached, if something was.
-    pub target: Option<TargetRecord>,
-    /// The GPU that looked at the scene and judged; `None` if the CPU renderer did, whose results are the same
-    /// everywhere.
-    pub device: Option<String>,
-    /// Steps and predictors.
-    pub parameters: Vec<f32>,
-    /// Probabilities of all symbols.
-    pub tables: Vec<u8>,
-    /// Bytes of each part in `data`: modelled symbols and raw bits, of the dictionary first and then of each
-    /// chunk of [`CHUNK`] Gaussians.
-    pub lengths: Vec<u32>,
-    /// All parts.
-    pub data: Vec<u8>,
-    /// What may be made of it: the limits of whoever read it; the default ones of a scene that was packed here.
-    pub limits: Limits,
-}
-
-/// What a search for a quality or a size aimed at and reached.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[non_exhaustive]
-pub struct TargetRecord {
-    /// `psnr`, `min-psnr` or `size`.
-    pub target: String,
-    /// Decibels or bytes asked for.
-    pub asked: f64,
-    /// Mean PSNR over the views searched with, in decibels.
-    pub mean_psnr: f64,
-    /// PSNR of the worst of them.
-    pub min_psnr: f64,
-    /// Number of views.
-    pub views: u32,
-    /// Whether they were given; else they were generated.
-    pub cameras: bool,
-}
-
-impl TargetRecord {
-    /// A promise of all its parts.
-    #[must_use]
-    pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
-        let [mean_psnr, min_psnr] = reached;
-        Self { target: target.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
-    }
-}
-
-/// What one stream takes.
+/// Size of one stream.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct StreamBits {
@@ -94,21 +24,15 @@ pub struct StreamBits {
 }
 
 impl Packed {
-    /// The scene, its SH as sparse codes; in the order of its source if that was kept.
+    /// Decodes the scene, whose SH stay sparse codes, in the order of its source if that was kept.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] naming the part that is not as it should be, [`crate::Error::Limit`] if there is more than
-    /// [`Self::limits`] allow.
+    /// [`crate::Error::Format`] naming the damaged part, [`crate::Error::Limit`] for a scene larger than the
+    /// limits of its reader.
     pub fn unpack(&self) -> Result<Model> {
-        self.unpack_from(UNNAMED)
-    }
-
-    /// [`Self::unpack`]; errors about limits call it `file`.
-    pub(crate) fn unpack_from(&self, file: &str) -> Result<Model> {
-        let model = self.decode(file, false)?.0;
-        model.geometry.validate()?;
-        match &self.order {
-            Some(order) => super::reorder::reordered(model, order),
+        let model = self.decode(false)?.0;
+        match self.order() {
+            Some(order) => super::reorder::reordered(model, order, &self.head().file),
             None => Ok(model),
         }
     }
@@ -118,7 +42,7 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        Ok(self.decode(UNNAMED, true)?.1.named())
+        Ok(self.decode(true)?.1.named())
     }
 
     /// The dictionary alone.
@@ -126,17 +50,18 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
-        Ok(Decoder::new(self, UNNAMED, &self.data)?.dictionary)
+        Ok(Decoder::new(self.head(), self.data())?.dictionary)
     }
 
-    /// The memory budget for the scene beside `self`, of which its geometry is taken.
-    fn budget<'a>(&self, file: &'a str) -> Result<MemoryBudget<'a>> {
-        let words = self.parameters.len() + self.lengths.len() + self.order.as_ref().map_or(0, Vec::len);
-        let extras = self.extras.iter().map(|e| e.values.width()).sum::<usize>();
-        let n = self.gaussians;
-        let sizes = [(words, size_of::<u32>()), (self.tables.len(), 1), (self.data.len(), 1), (n, extras)];
+    /// What the limits leave for the codes after `self` and the geometry of the scene.
+    fn budget(&self) -> Result<MemoryBudget<'_>> {
+        let head = self.head();
+        let words = head.parameters.len() + head.lengths.len() + self.order().map_or(0, <[u32]>::len);
+        let extras = self.extras().iter().map(|e| e.values.width()).sum::<usize>();
+        let n = self.len();
+        let sizes = [(words, size_of::<u32>()), (head.tables.len(), 1), (self.data().len(), 1), (n, extras)];
         let own = sizes.iter().map(|&(count, each)| (count as u64).saturating_mul(each as u64));
-        let budget = MemoryBudget::new(&self.limits, file, own.fold(0, u64::saturating_add));
+        let budget = MemoryBudget::new(&head.limits, &head.file, own.fold(0, u64::saturating_add));
         for (count, each) in sizes {
             budget.take(count, each)?;
         }
@@ -144,16 +69,18 @@ impl Packed {
         Ok(budget)
     }
 
-    fn decode(&self, file: &str, count_bits: bool) -> Result<(Model, BitCounts)> {
-        let decoder = Decoder::new(self, file, &self.data)?;
+    fn decode(&self, count_bits: bool) -> Result<(Model, BitCounts)> {
+        let head = self.head();
+        let decoder = Decoder::new(head, self.data())?;
         let mut bit_counts = decoder.dictionary_bits();
-        let n = self.gaussians;
-        let budget = self.budget(file)?;
-        let mut g = Geometry { extras: self.extras.clone(), ..zeros(n) };
+        let n = self.len();
+        let budget = self.budget()?;
+        let mut g = Geometry { extras: self.extras().to_vec(), ..zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let work = places(&mut g, &mut counts).enumerate().collect();
-        let pieces = map_vec(work, |(c, place)| decoder.piece(c, c * CHUNK, place, &budget, count_bits));
+        let pieces =
+            map_vec(work, |(c, place)| decoder.piece(self.data(), c, c * CHUNK, place, &budget, count_bits));
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
         for piece in pieces {
@@ -166,8 +93,8 @@ impl Packed {
         }
         let dictionary = decoder.dictionary;
         let indices = indices(&dictionary, atoms);
-        let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)?;
-        let record = Record { layout: Layout::Packed, ..self.record.clone() };
-        Ok((Model { geometry: g, meta: self.meta.clone(), dictionary, codes, record }, bit_counts))
+        let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)
+            .map_err(|e| Error::malformed(&head.file, e.to_string()))?;
+        Ok((Model::new(g, head.meta.clone(), dictionary, codes, head.record.clone())?, bit_counts))
     }
 }

@@ -3,5 +3,6 @@
 pub(crate) mod sensitivity;
 pub mod sh;
 pub(crate) mod source;
+pub(crate) mod spilled;
 pub(crate) mod splats;
 pub mod stats;

@@ -24,25 +24,25 @@ pub struct Sensitivity {
     pub removal: Vec<f32>,
 }
 
-/// Share of a picture's squared colour that a change of opacity shows as, beside one of colour: what
-/// scenes measured with a renderer have on average.
+/// Squared change of a picture by the opacity, as a share of that by the colour. This and the shares below are
+/// averages of scenes measured with a renderer.
 const CONTRAST: f32 = 0.08;
-/// The same shares for a change of the standard deviation along the axes, longest first.
+/// The same share for the standard deviation along each axis, longest first.
 const SCALE_SHARES: [f32; 3] = [0.6, 0.1, 0.05];
-/// The same for a turn, per squared lever.
+/// The same share for a turn, for each squared unit of lever.
 const ROTATION_SHARE: f32 = 0.1;
 
-/// Powers of opacity and of the two longest standard deviations' product that weights measured with a
-/// renderer go with.
+/// Measured weights are about proportional to these powers of the opacity and of the product of the two
+/// longest standard deviations.
 const ALPHA_POWER: f32 = 1.7;
 const AREA_POWER: f32 = 0.6;
-/// A sum of guessed weights is taken to be at least this, so that its reciprocal is an f32.
+/// Smallest sum of guessed weights. The reciprocal of a smaller one is no f32.
 const LEAST_TOTAL: f64 = 1e-30;
-/// A weight below this share of what nine tenths are below counts as not seen.
+/// A weight below this share of the 90th percentile of weights counts as not seen.
 const UNSEEN: f32 = 1e-4;
 
 impl Sensitivity {
-    /// `count` Gaussians that nothing depends on.
+    /// The sensitivity of pictures that depend on none of `count` Gaussians.
     #[must_use]
     pub fn zeros(count: usize) -> Self {
         Self {
@@ -61,13 +61,13 @@ impl Sensitivity {
         self.colour.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.colour.is_empty()
     }
 
-    /// Keeps what `keep`, one entry a Gaussian, says.
+    /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     ///
     /// # Panics
     /// If `keep` differs in length.
@@ -81,7 +81,7 @@ impl Sensitivity {
         filter(&mut self.removal, keep);
     }
 
-    /// Appends that of further Gaussians.
+    /// Appends the sensitivity of further Gaussians.
     pub(crate) fn append(&mut self, mut other: Self) {
         self.colour.append(&mut other.colour);
         self.opacity.append(&mut other.opacity);
@@ -91,16 +91,16 @@ impl Sensitivity {
         self.removal.append(&mut other.removal);
     }
 
-    /// What it is if the pictures are only `share` of all there are, and the others do not show these
-    /// Gaussians.
+    /// Scales the sensitivity to pictures of which only `share` show these Gaussians.
     pub(crate) fn share(&mut self, share: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();
         let shapes = shapes.chain(self.scale.as_flattened_mut()).chain(self.rotation.as_flattened_mut());
         self.colour.iter_mut().chain(&mut self.opacity).chain(shapes).for_each(|v| *v *= share);
     }
 
-    /// An estimate from the Gaussians alone: what is opaque and large shows. Knows nothing of what hides
-    /// what, so files made with it are larger for the same quality than with a measured one.
+    /// An estimate from the Gaussians alone: opaque and large ones weigh most. It does not know which
+    /// Gaussians hide others, so files made with it are larger than files of the same quality made with a
+    /// measured sensitivity.
     #[must_use]
     pub fn heuristic(geometry: &Geometry) -> Self {
         Self::heuristic_part(geometry, heuristic_total(0.0, geometry))
@@ -119,7 +119,7 @@ impl Sensitivity {
         out
     }
 
-    /// Everything of Gaussian `i` but its removal, guessed from its sensitivity to colour.
+    /// Estimates everything of Gaussian `i` except its removal from its sensitivity to colour.
     fn set_heuristic(&mut self, geometry: &Geometry, i: usize, colour: f32) {
         let shape = CONTRAST * colour;
         self.colour[i] = colour;
@@ -139,9 +139,9 @@ impl Sensitivity {
         self.position[i] = [along, 0.0, 0.0, along, 0.0, along];
     }
 
-    /// Mixes what was measured with a guess that knows nothing of views: weights become the geometric mean
-    /// of both, the guess having `share` of the say. What the views hardly showed then keeps a weight,
-    /// for other views may show it. `geometry` is that of the same Gaussians.
+    /// Mixes the measured sensitivity with the heuristic one, which does not depend on views. Each weight becomes
+    /// the geometric mean of both, in which the heuristic one has the exponent `share`. Gaussians that the views
+    /// hardly showed keep a weight, because other views may show them. `geometry` is that of the same Gaussians.
     ///
     /// # Panics
     /// If the two differ in length.
@@ -186,12 +186,12 @@ impl Sensitivity {
     }
 }
 
-/// Adds to `sum`, one after the other, what the weights of all Gaussians are expected to be proportional to.
+/// Adds the expected weights of all Gaussians, before they are scaled, to `sum`, one after the other.
 pub(crate) fn heuristic_total(sum: f64, geometry: &Geometry) -> f64 {
     (0..geometry.len()).fold(sum, |sum, i| sum + f64::from(heuristic_weight(geometry, i)))
 }
 
-/// What a Gaussian's weight is expected to be proportional to.
+/// The expected weight of a Gaussian before it is scaled.
 fn heuristic_weight(geometry: &Geometry, i: usize) -> f32 {
     let scales = geometry.scales[i];
     let [longest, middle, _] = maths::longest_first(scales).map(|k| scales[k]);

@@ -6,8 +6,8 @@ use std::ops::Range;
 use crate::scene::splats::{Geometry, Splats, all_finite};
 use crate::support::error::{Error, Result};
 
-/// Gaussians among which rows are looked for together.
-const BLOCK: usize = 2048;
+/// Gaussians among which rows are looked for together: as many as a packed file decodes together.
+const BLOCK: usize = 32_768;
 
 /// A scene whose Gaussians are read a part at a time. A reader of any format implements it, and so does a
 /// scene in memory.

@@ -1,4 +1,4 @@
-//! One trained scene as arrays: what a PLY holds, in the PLY's own units.
+//! A trained scene as arrays, in the units of its PLY.
 
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
@@ -10,7 +10,7 @@ use crate::support::error::{Error, Result};
 pub struct Geometry {
     /// Centres in world units.
     pub positions: Vec<[f32; 3]>,
-    /// Normals; empty when the file has none or all are zero, as every known trainer writes them.
+    /// Normals. Empty if the file has none or all are zero; every known trainer writes zeros.
     pub normals: Vec<[f32; 3]>,
     /// SH coefficient 0 of red, green and blue. The base colour is `0.5 + C0 * dc`.
     pub dc: Vec<[f32; 3]>,
@@ -20,7 +20,7 @@ pub struct Geometry {
     pub scales: Vec<[f32; 3]>,
     /// Quaternions (w, x, y, z), not necessarily of unit length.
     pub rotations: Vec<[f32; 4]>,
-    /// Per-Gaussian properties no layout defines, kept in file order.
+    /// Per-Gaussian properties that no layout defines, in file order.
     pub extras: Vec<Extra>,
 }
 
@@ -74,6 +74,15 @@ pub(crate) use for_extra;
 
 macro_rules! values_from {
     ($($variant:ident: $type:ty),+) => {
+        impl ExtraValues {
+            /// Appends values of the same type.
+            fn append(&mut self, other: Self) {
+                match (self, other) {
+                    $((Self::$variant(to), Self::$variant(from)) => to.extend(from),)+
+                    _ => debug_assert!(false, "extras of different types"),
+                }
+            }
+        }
         $(impl From<Vec<$type>> for ExtraValues {
             fn from(values: Vec<$type>) -> Self {
                 Self::$variant(values)
@@ -97,7 +106,7 @@ impl ExtraValues {
         for_extra!(self, v => v.len())
     }
 
-    /// Whether there are none.
+    /// Whether there are no values.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -113,7 +122,7 @@ impl ExtraValues {
     }
 }
 
-/// What a scene's file says about it beside its Gaussians; travels from PLY to .lexi and back.
+/// What the file of a scene says about it beside its Gaussians. It is kept from PLY to .lexi and back.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct SceneMeta {
     /// `comment` lines of the source, without the keyword, in order.
@@ -187,7 +196,7 @@ impl Geometry {
         Ok(())
     }
 
-    /// Checks that every value is finite but those of extras, which may be anything.
+    /// Checks that every value is finite, except those of extras.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the array and the first value that is not.
@@ -258,6 +267,21 @@ impl Splats {
         } else {
             Err(Error::parameter("sh_rest", self.sh_rest.len(), format!("{expected} values")))
         }
+    }
+
+    /// Appends the Gaussians of `other`, which has the same degree and the same extras.
+    pub(crate) fn append(&mut self, other: Self) {
+        let (to, from) = (&mut self.geometry, other.geometry);
+        to.positions.extend(from.positions);
+        to.normals.extend(from.normals);
+        to.dc.extend(from.dc);
+        to.opacities.extend(from.opacities);
+        to.scales.extend(from.scales);
+        to.rotations.extend(from.rotations);
+        for (to, from) in to.extras.iter_mut().zip(from.extras) {
+            to.values.append(from.values);
+        }
+        self.sh_rest.extend(other.sh_rest);
     }
 
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.

@@ -1,4 +1,4 @@
-//! What a scene's values look like, and what looks wrong with them.
+//! Statistics of a scene's values, and warnings about them.
 //!
 //! The numbers behind `lexisplat info`. Sums are taken over fixed chunks and added in order, so the
 //! result does not depend on the number of threads.
@@ -14,18 +14,18 @@ use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 /// use, 0.03 to 0.3, are edges: the bins below a tolerance hold the Gaussians that need no atom at all.
 pub const NORM_BINS: [f64; 9] = [0.0, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0];
 
-/// A logarithmic scale above this is a standard deviation over 22,000 units, in scenes that trainers
-/// normalise to a few: debris that covers the whole picture.
+/// A logarithmic scale above this is a standard deviation over 22,000 units. Trainers normalise scenes to a
+/// few units, so such a Gaussian is debris that covers the whole picture.
 pub const HUGE_LOG_SCALE: f32 = 10.0;
 
 /// `logit(1 / 255)`: below this opacity the INRIA rasteriser skips a Gaussian at its very centre
 /// (`forward.cu`, `alpha < 1.0f / 255.0f`).
 pub const NEVER_DRAWN_OPACITY: f32 = -5.537_334;
 
-/// How far a quaternion's length may be from 1 and still count as unit.
+/// Largest difference from 1 of the length of a unit quaternion.
 pub const UNIT_TOLERANCE: f64 = 1e-3;
 
-/// Range of one property over all Gaussians, NaN left out.
+/// Range of one property over all Gaussians, without NaN.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct AttributeStats {
@@ -55,18 +55,18 @@ pub struct Lint {
     pub zero_rest: u64,
     /// Quaternions of length 0, which have no direction to normalise.
     pub zero_quaternions: u64,
-    /// Quaternions that are neither unit (within [`UNIT_TOLERANCE`]) nor zero. Harmless: renderers
+    /// Quaternions that are neither unit (within [`UNIT_TOLERANCE`]) nor zero. They are harmless, since renderers
     /// normalise.
     pub non_unit_quaternions: u64,
     /// Gaussians with a logarithmic scale over [`HUGE_LOG_SCALE`].
     pub huge_scales: u64,
     /// Gaussians with an opacity below [`NEVER_DRAWN_OPACITY`].
     pub never_drawn: u64,
-    /// What looks wrong, one sentence each.
+    /// Warnings, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// Looks a scene over.
+/// Computes the statistics of a scene.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] if the scene's arrays differ in length.
@@ -86,8 +86,8 @@ pub struct Linter {
 }
 
 impl Linter {
-    /// Looks the next Gaussians over. Parts are of one scene: the same properties in all of them. The same
-    /// bits come out of one part and of several, if all but the last are a multiple of 2048 Gaussians.
+    /// Adds the next Gaussians. All parts are of one scene and have the same properties. The result does not
+    /// depend on the parts, down to the bit, if all but the last are of a multiple of 2048 Gaussians.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if the part's arrays differ in length.
@@ -99,7 +99,7 @@ impl Linter {
         self.gaussians += splats.len() as u64;
         self.view_dependent = splats.degree.get() > 0;
         let columns = columns(splats);
-        // An empty part may lack what the others have.
+        // An empty part may lack properties that the others have.
         if self.columns.iter().all(|c| c.whole.count == 0) && self.columns.len() <= columns.len() {
             self.columns = columns;
         } else {
@@ -109,7 +109,7 @@ impl Linter {
         Ok(())
     }
 
-    /// What all parts together look like.
+    /// The statistics of all parts together.
     #[must_use]
     pub fn finish(self) -> Lint {
         let (n, counts) = (self.gaussians, self.counts);
@@ -205,7 +205,7 @@ impl Counts {
 struct Column {
     name: String,
     whole: Span,
-    /// Those of chunks not yet added to the whole, in order.
+    /// Spans of chunks that are not yet added to the whole, in order.
     parts: Vec<Span>,
 }
 

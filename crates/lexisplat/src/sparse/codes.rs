@@ -3,6 +3,7 @@
 use half::f16;
 
 use crate::sparse::dictionary::Dictionary;
+use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
 
 /// Gaussians between two stored offsets. To find a column, fewer than this many counts are added up.
@@ -72,6 +73,24 @@ impl Indices {
 }
 
 impl Values {
+    /// An empty list of values of type `value_type`.
+    #[must_use]
+    pub fn empty(value_type: ValueType) -> Self {
+        match value_type {
+            ValueType::F32 => Self::F32(Vec::new()),
+            ValueType::F16 => Self::F16(Vec::new()),
+        }
+    }
+
+    /// Type of the values.
+    #[must_use]
+    pub fn value_type(&self) -> ValueType {
+        match self {
+            Self::F32(_) => ValueType::F32,
+            Self::F16(_) => ValueType::F16,
+        }
+    }
+
     /// Number of values.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -131,6 +150,8 @@ pub struct SparseCodes {
     values: Values,
     escapes: Escapes,
     dim: usize,
+    /// Atoms of the dictionary they were made for.
+    atoms: usize,
 }
 
 /// The stored form of one Gaussian's SH-rest.
@@ -247,7 +268,12 @@ impl SparseCodes {
             checkpoints.push(offset);
             offset += block.iter().map(|&c| u64::from(c)).sum::<u64>();
         }
-        Ok(Self { counts, checkpoints, indices, values, escapes, dim })
+        Ok(Self { counts, checkpoints, indices, values, escapes, dim, atoms })
+    }
+
+    /// Whether they were made for a dictionary of this size.
+    pub(crate) fn fit(&self, dictionary: &Dictionary) -> bool {
+        (self.dim, self.atoms) == (dictionary.dim(), dictionary.len())
     }
 
     /// Number of Gaussians.

@@ -1,16 +1,18 @@
-//! The whole encoder: a dense scene in, a [`Model`] and a report out.
+//! The encoder of the exact layouts.
 
 use std::ops::Range;
 
 use half::f16;
 
 use crate::scene::sh::ShDegree;
-use crate::scene::splats::Splats;
+use crate::scene::source::SplatSource;
+use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::learn::{DEFAULT_SAMPLE, Fetch, LearnOptions, Learned, learn_from};
-use crate::sparse::model::{Layout, Model, Pursuit, Record};
-use crate::sparse::pursuit::{Coder, Encoded, StopRule, ValueType};
+use crate::sparse::model::{Model, Pursuit, Record};
+use crate::sparse::pursuit::{self, Coder, StopRule, ValueType};
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
@@ -19,7 +21,7 @@ use crate::support::stopwatch::Stopwatch;
 
 /// The paper's main tolerance.
 pub const DEFAULT_TOLERANCE: f64 = 0.1;
-/// Gaussians coded before their results are appended: bounds what is held twice.
+/// Gaussians coded before their codes are appended. It bounds the codes that are in memory twice.
 pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
 /// How to compress.
@@ -28,20 +30,33 @@ pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 pub struct CompressOptions {
     /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default [`DEFAULT_TOLERANCE`].
     pub tolerance: Option<f64>,
-    /// Most nonzeros of a Gaussian. Setting it lifts the promise of `tolerance`.
+    /// Largest number of nonzeros of a Gaussian. With it, `tolerance` is no longer promised.
     pub max_nonzeros: Option<u8>,
     /// Atoms to learn; `None` for twice the dimension. Ignored when `dictionary` is given.
     pub atoms: Option<usize>,
     /// The pursuit. Default OLS.
     pub pursuit: Pursuit,
-    /// Layout of the codes in the file. Default f16.
-    pub layout: Layout,
+    /// Type of the values of codes. Default f16.
+    pub values: ValueType,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Gaussians to learn from at most.
+    /// Largest number of Gaussians to learn from.
     pub sample: usize,
     /// A dictionary to use instead of learning one. Its degree must be the scene's.
     pub dictionary: Option<Dictionary>,
+}
+
+impl CompressOptions {
+    builder_methods!(
+        with_tolerance(tolerance: impl Into<Option<f64>>),
+        with_max_nonzeros(max_nonzeros: impl Into<Option<u8>>),
+        with_atoms(atoms: impl Into<Option<usize>>),
+        with_pursuit(pursuit: Pursuit),
+        with_values(values: ValueType),
+        with_seed(seed: u64),
+        with_sample(sample: usize),
+        with_dictionary(dictionary: impl Into<Option<Dictionary>>),
+    );
 }
 
 impl Default for CompressOptions {
@@ -51,7 +66,7 @@ impl Default for CompressOptions {
             max_nonzeros: None,
             atoms: None,
             pursuit: Pursuit::Ols,
-            layout: Layout::F16,
+            values: ValueType::F16,
             seed: 0,
             sample: DEFAULT_SAMPLE,
             dictionary: None,
@@ -90,45 +105,67 @@ impl CompressReport {
 ///
 /// # Errors
 /// [`Error::Parameter`] for options out of range, a dictionary of another degree, or a scene whose arrays
-/// differ in length or whose values are not finite.
+/// differ in length or whose values are not finite; [`Error::Cancelled`].
 pub fn compress(
     splats: Splats,
     options: &CompressOptions,
     progress: &dyn Progress,
 ) -> Result<(Model, CompressReport)> {
     splats.validate()?;
-    // What a reader would refuse is not written.
     splats.geometry.validate_values()?;
-    let (n, dim) = (splats.len(), splats.degree.rest());
-    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
-    let clock = Stopwatch::start();
-    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| {
-        numbers.iter().for_each(|&i| out.extend_from_slice(splats.rest(i)));
-        Ok(())
-    };
-    let (encoder, learned) = Encoder::new(splats.degree, n, &mut fetch, options, progress)?;
-    let learn_seconds = clock.seconds();
-    let clock = Stopwatch::start();
-    let mut coded = encoder.nothing();
-    if dim > 0 && splats.sh_rest.iter().any(|v| !v.is_finite()) {
-        return Err(Error::parameter("sh_rest", "NaN or infinity", "finite values"));
-    }
-    progress.begin(Stage::Code, n as u64);
-    for start in (0..n).step_by(AT_ONCE) {
-        let end = n.min(start + AT_ONCE);
-        encoder.code(&splats.sh_rest[start * dim..end * dim], start..end, &mut coded, progress);
-    }
-    progress.end();
-    let (record, report) = coded.tally.into_report(options, n, learned, [learn_seconds, clock.seconds()]);
-    let Encoder { dictionary, .. } = encoder;
+    let dim = splats.degree.rest();
+    let Encoded { dictionary, coded, record, report } =
+        encode(&splats, options, AT_ONCE, progress, &mut |encoder, range, coded| {
+            encoder.code(&splats.sh_rest[range.start * dim..range.end * dim], range, coded, progress)
+        })?;
     let codes = SparseCodes::new(&dictionary, coded.counts, coded.indices, coded.values, coded.escapes)?;
     let Splats { geometry, meta, .. } = splats;
-    Ok((Model { geometry, meta, dictionary, codes, record }, report))
+    Ok((Model::new(geometry, meta, dictionary, codes, record)?, report))
+}
+
+/// Codes the Gaussians of a range and appends them.
+type CodePart<'a> = dyn FnMut(&Encoder, Range<usize>, &mut Coded) -> Result<()> + 'a;
+
+/// What [`encode`] made.
+pub(crate) struct Encoded {
+    pub(crate) dictionary: Dictionary,
+    /// All codes that `code_part` left.
+    pub(crate) coded: Coded,
+    pub(crate) record: Record,
+    pub(crate) report: CompressReport,
+}
+
+/// Checks `options`, learns the dictionary from rows of `source`, and lets `code_part` code one range of
+/// Gaussians after the other. Each range but the last is of `at_once` Gaussians, a multiple of [`GAUSSIANS_PER_TASK`].
+pub(crate) fn encode(
+    source: &dyn SplatSource,
+    options: &CompressOptions,
+    at_once: usize,
+    progress: &dyn Progress,
+    code_part: &mut CodePart<'_>,
+) -> Result<Encoded> {
+    debug_assert!(at_once.is_multiple_of(GAUSSIANS_PER_TASK), "sums would be added in another order");
+    let n = source.len();
+    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
+    let clock = Stopwatch::start();
+    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
+    let (encoder, learned) = Encoder::new(source.empty().degree, n, &mut fetch, options, progress)?;
+    let learn_seconds = clock.seconds();
+    let clock = Stopwatch::start();
+    let mut coded = Coded::empty(&encoder.dictionary, options.values);
+    progress.begin(Stage::Code, n as u64);
+    for start in (0..n).step_by(at_once) {
+        progress.check()?;
+        code_part(&encoder, start..n.min(start + at_once), &mut coded)?;
+    }
+    progress.end();
+    let (record, report) = coded.tally.to_report(options, n, learned, [learn_seconds, clock.seconds()]);
+    Ok(Encoded { dictionary: encoder.dictionary, coded, record, report })
 }
 
 /// A dictionary, and how to code with it.
 pub(crate) struct Encoder {
-    pub(crate) dictionary: Dictionary,
+    dictionary: Dictionary,
     coder: Option<Coder>,
     tolerance: Option<f64>,
     values: ValueType,
@@ -136,7 +173,7 @@ pub(crate) struct Encoder {
 
 impl Encoder {
     /// Checks `options` and learns the dictionary from `vectors` rows of SH-rest, unless one is given.
-    pub(crate) fn new(
+    fn new(
         degree: ShDegree,
         vectors: usize,
         fetch: &mut Fetch<'_>,
@@ -163,38 +200,45 @@ impl Encoder {
                 (learned.dictionary.clone(), Some(learned))
             }
         };
-        let values = if options.layout == Layout::F16 { ValueType::F16 } else { ValueType::F32 };
+        let values = options.values;
         let coder = (degree.rest() > 0).then(|| Coder::new(&dictionary, options.pursuit, stop, values));
         Ok((Self { dictionary, coder, tolerance: stop.tolerance(), values }, learned))
     }
 
-    /// Codes of no Gaussians.
-    pub(crate) fn nothing(&self) -> Coded {
-        Coded::empty(&self.dictionary, self.values)
-    }
-
-    /// Codes `rest`, the SH-rest of Gaussians `range`, and appends to `coded`. The same bits come out of one
-    /// call and of several, if all but the last are for a multiple of [`GAUSSIANS_PER_TASK`] Gaussians.
-    pub(crate) fn code(&self, rest: &[f32], range: Range<usize>, coded: &mut Coded, progress: &dyn Progress) {
+    /// Codes `rest`, the SH-rest of Gaussians `range`, and appends the codes to `coded`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for values that are not finite, [`Error::Cancelled`].
+    pub(crate) fn code(
+        &self,
+        rest: &[f32],
+        range: Range<usize>,
+        coded: &mut Coded,
+        progress: &dyn Progress,
+    ) -> Result<()> {
         let dim = self.dictionary.dim();
         let Some(coder) = &self.coder else {
             coded.counts.resize(coded.counts.len() + range.len(), 0);
             coded.tally.histogram[0] += range.len() as u64;
             progress.advance(range.len() as u64);
-            return;
+            return Ok(());
         };
         let parts = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
-            let mut part = self.nothing();
+            progress.check()?;
+            let mut part = Coded::empty(&self.dictionary, self.values);
             let start = range.start + piece.start;
-            coder.encode(&rest[piece.start * dim..piece.end * dim], |visit| {
+            let rest = &rest[piece.start * dim..piece.end * dim];
+            all_finite([("sh_rest", rest)])?;
+            coder.encode(rest, |visit| {
                 part.push(start, visit.signal, visit.code, visit.outcome, self.tolerance);
             });
             progress.advance(piece.len() as u64);
-            part
+            Ok(part)
         });
-        for part in parts {
-            coded.append(part);
-        }
+        parts.into_iter().try_for_each(|part| {
+            coded.append(part?);
+            Ok(())
+        })
     }
 }
 
@@ -220,8 +264,8 @@ impl Tally {
         self.over_tolerance += part.over_tolerance;
     }
 
-    /// What is recorded and reported of `gaussians` Gaussians; `seconds` are those of learning and coding.
-    pub(crate) fn into_report(
+    /// The record and the report of `gaussians` Gaussians; `seconds` are those of learning and of coding.
+    fn to_report(
         &self,
         options: &CompressOptions,
         gaussians: usize,
@@ -233,9 +277,8 @@ impl Tally {
         let record = Record {
             tolerance: options.tolerance,
             max_nonzeros: options.max_nonzeros,
-            pursuit: options.pursuit,
+            pursuit: Some(options.pursuit),
             seed: options.seed,
-            layout: options.layout,
             max_residual: self.max_error,
             rms_residual: (self.squared_error / count).sqrt(),
             over_tolerance: self.over_tolerance,
@@ -267,10 +310,7 @@ impl Coded {
         Self {
             counts: Vec::new(),
             indices: Indices::for_atoms(dictionary.len()),
-            values: match values {
-                ValueType::F32 => Values::F32(Vec::new()),
-                ValueType::F16 => Values::F16(Vec::new()),
-            },
+            values: Values::empty(values),
             escapes: Escapes::default(),
             tally: Tally { histogram: vec![0; dictionary.dim() + 1], ..Tally::default() },
         }
@@ -281,11 +321,10 @@ impl Coded {
         start: usize,
         signal: &[f32],
         code: &[(u16, f32)],
-        outcome: Encoded,
+        outcome: pursuit::Encoded,
         tolerance: Option<f64>,
     ) {
-        let Encoded::Code { error } = outcome else {
-            // Scenes are limited to u32 Gaussians, a code to `dim` atoms, dictionaries to u16 atoms.
+        let pursuit::Encoded::Code { error } = outcome else {
             #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
             self.escapes.gaussians.push((start + self.counts.len()) as u32);
             self.escapes.rows.extend_from_slice(signal);
@@ -311,7 +350,7 @@ impl Coded {
         self.tally.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
     }
 
-    /// Forgets the codes, but not what was counted.
+    /// Removes the codes and keeps the counts.
     pub(crate) fn clear(&mut self) {
         self.counts.clear();
         match &mut self.indices {

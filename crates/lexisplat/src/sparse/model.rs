@@ -1,37 +1,20 @@
-//! A compressed scene: what a .lexi file holds.
+//! Compressed scenes.
 
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::sparse::codes::SparseCodes;
 use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, for_each_chunk_mut};
 
-/// A scene whose SH-rest is a dictionary and sparse codes.
+/// A scene whose SH-rest is a dictionary and sparse codes. Its parts always fit one another.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Model {
-    /// Everything but SH-rest, exactly as in the source.
-    pub geometry: Geometry,
-    /// Comments and marks of the source.
-    pub meta: SceneMeta,
-    /// The atoms.
-    pub dictionary: Dictionary,
-    /// The codes, one column a Gaussian.
-    pub codes: SparseCodes,
-    /// How it was made and what it promises.
-    pub record: Record,
-}
-
-/// How the codes of a [`Model`] are laid out on disk.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum Layout {
-    /// u8 counts, u8 or u16 indices, f32 values.
-    F32,
-    /// u8 counts, u8 or u16 indices, f16 values.
-    F16,
-    /// The paper's own count: i32 pointers, i32 indices, f32 values.
-    Paper,
-    /// Everything quantised and entropy-coded, geometry included ([`crate::packed`]).
-    Packed,
+    geometry: Geometry,
+    meta: SceneMeta,
+    dictionary: Dictionary,
+    codes: SparseCodes,
+    record: Record,
 }
 
 /// Which greedy pursuit chose the atoms.
@@ -44,19 +27,17 @@ pub enum Pursuit {
     Ols,
 }
 
-/// How a [`Model`] was made and what it promises. Written to the file as it stands here.
+/// How a [`Model`] was made and what it promises.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {
-    /// Tolerance: un-squared L2 norm of the SH-rest error. `None` when only `max_nonzeros` stopped.
+    /// Un-squared L2 norm of the SH-rest error. `None` if only `max_nonzeros` ended the pursuit.
     pub tolerance: Option<f64>,
     /// Cap on nonzeros a Gaussian. With it the tolerance is no promise.
     pub max_nonzeros: Option<u8>,
-    /// The pursuit.
-    pub pursuit: Pursuit,
+    /// The pursuit; `None` for packed scenes, whose atoms are chosen by the bits they cost.
+    pub pursuit: Option<Pursuit>,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Layout of the codes.
-    pub layout: Layout,
     /// Largest error over all Gaussians, in f64 on the values `decompress` writes.
     pub max_residual: f64,
     /// Root of the mean squared error over all Gaussians.
@@ -90,10 +71,72 @@ macro_rules! named {
         }
     };
 }
-named!(Layout, "layout", F32 => "f32", F16 => "f16", Paper => "paper", Packed => "packed");
+pub(crate) use named;
+
 named!(Pursuit, "pursuit", Omp => "omp", Ols => "ols");
 
 impl Model {
+    /// Puts a scene together from its parts.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the arrays of `geometry` differ in length, if there is not one column of codes for
+    /// each Gaussian, or if the codes were not made for a dictionary of this size.
+    pub fn new(
+        geometry: Geometry,
+        meta: SceneMeta,
+        dictionary: Dictionary,
+        codes: SparseCodes,
+        record: Record,
+    ) -> Result<Self> {
+        geometry.validate()?;
+        if codes.len() != geometry.len() {
+            let expected = format!("{} columns, one a Gaussian", geometry.len());
+            return Err(Error::parameter("codes", codes.len(), expected));
+        }
+        if !codes.fit(&dictionary) {
+            let expected = "a dictionary as large as that of the codes";
+            return Err(Error::parameter("dictionary", format!("{} atoms", dictionary.len()), expected));
+        }
+        Ok(Self { geometry, meta, dictionary, codes, record })
+    }
+
+    /// Everything but SH-rest. Readers of the exact layouts and [`compress()`](crate::compress()) give it exactly
+    /// as in the source.
+    #[must_use]
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Comments and marks of the source.
+    #[must_use]
+    pub fn meta(&self) -> &SceneMeta {
+        &self.meta
+    }
+
+    /// The atoms.
+    #[must_use]
+    pub fn dictionary(&self) -> &Dictionary {
+        &self.dictionary
+    }
+
+    /// The codes, one column a Gaussian.
+    #[must_use]
+    pub fn codes(&self) -> &SparseCodes {
+        &self.codes
+    }
+
+    /// How it was made and what it promises.
+    #[must_use]
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// The parts that [`Self::new`] takes, in its order.
+    #[must_use]
+    pub fn into_parts(self) -> (Geometry, SceneMeta, Dictionary, SparseCodes, Record) {
+        (self.geometry, self.meta, self.dictionary, self.codes, self.record)
+    }
+
     /// Number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -126,24 +169,16 @@ impl Model {
         let dim = self.dictionary.dim();
         let mut rest = vec![0.0; self.len() * dim];
         if dim > 0 {
-            crate::support::parallel::for_each_chunk_mut(
-                &mut rest,
-                dim * crate::support::parallel::GAUSSIANS_PER_TASK,
-                |chunk, rows| {
-                    for (k, row) in rows.chunks_exact_mut(dim).enumerate() {
-                        self.codes.reconstruct(
-                            &self.dictionary,
-                            chunk * crate::support::parallel::GAUSSIANS_PER_TASK + k,
-                            row,
-                        );
-                    }
-                },
-            );
+            for_each_chunk_mut(&mut rest, dim * GAUSSIANS_PER_TASK, |chunk, rows| {
+                for (i, row) in (chunk * GAUSSIANS_PER_TASK..).zip(rows.chunks_exact_mut(dim)) {
+                    self.codes.reconstruct(&self.dictionary, i, row);
+                }
+            });
         }
         rest
     }
 
-    /// The dense scene, sharing nothing with `self`.
+    /// A dense copy of the scene.
     #[must_use]
     pub fn to_splats(&self) -> Splats {
         Splats {

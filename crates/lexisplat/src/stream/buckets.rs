@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::support::error::Result;
-use crate::support::spill::TemporaryFile;
+use crate::support::spill::{SpillTo, Temporary};
 
 /// Bytes a bucket collects before they are written.
 const BLOCK: usize = 1 << 16;
@@ -13,7 +13,7 @@ const FILES: usize = 64;
 /// Records of one length in buckets. Within a bucket they stay in the order in which they came.
 #[derive(Debug)]
 pub(super) struct Buckets {
-    files: Vec<Option<TemporaryFile>>,
+    files: Vec<Option<Temporary>>,
     /// Buckets that share a file.
     shared: usize,
     buckets: Vec<Bucket>,
@@ -31,7 +31,7 @@ impl Buckets {
     /// Makes `count` empty buckets with temporary files in `folder`.
     pub(super) fn new(folder: &Path, count: usize) -> Result<Self> {
         let shared = count.div_ceil(FILES).max(1);
-        let files = (0..count.div_ceil(shared)).map(|_| TemporaryFile::new(folder).map(Some));
+        let files = (0..count.div_ceil(shared)).map(|_| Temporary::new(SpillTo::Folder(folder)).map(Some));
         Ok(Self { files: files.collect::<Result<_>>()?, shared, buckets: vec![Bucket::default(); count] })
     }
 

@@ -1,14 +1,12 @@
-//! The exact layouts: sample and learn first, then code and set aside, then write.
+//! The exact layouts, a part at a time.
 
-use crate::formats::lexi::SpilledModel;
+use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel, sh_bytes};
 use crate::scene::source::SplatSource;
-use crate::sparse::compress::{AT_ONCE, CompressOptions, CompressReport, Encoder};
+use crate::sparse::compress::{AT_ONCE, CompressOptions, CompressReport, Encoded, encode};
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Layout, Record};
-use crate::support::error::{Error, Result};
-use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
-use crate::support::progress::{Progress, Stage};
+use crate::sparse::model::Record;
+use crate::support::error::Result;
+use crate::support::progress::Progress;
 use crate::support::sink::Sink;
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
@@ -21,13 +19,13 @@ pub struct Compressed {
     pub gaussians: usize,
     /// The atoms.
     pub dictionary: Dictionary,
-    /// What the file says of itself.
+    /// How the scene was made and what is promised.
     pub record: Record,
     /// How learning and coding went.
     pub report: CompressReport,
-    /// Bytes of each tensor, and of the header under `header`, as [`lexi::attribute_bytes`](crate::formats::lexi::attribute_bytes).
+    /// Bytes of each tensor, and of the header under `header`, as [`LexiWriter::attribute_bytes`].
     pub attribute_bytes: Vec<(String, u64)>,
-    /// Seconds spent writing the file, all else done.
+    /// Seconds spent writing the file after everything else.
     pub write_seconds: f64,
 }
 
@@ -38,78 +36,65 @@ impl Compressed {
         self.attribute_bytes.iter().map(|a| a.1).sum()
     }
 
-    /// Bytes that stand for SH-rest, as [`lexi::sh_bytes`](crate::formats::lexi::sh_bytes).
+    /// Bytes that stand for SH-rest, as [`LexiWriter::sh_bytes`].
     #[must_use]
     pub fn sh_bytes(&self) -> u64 {
-        self.attribute_bytes.iter().filter(|a| crate::formats::lexi::is_sh(&a.0)).map(|a| a.1).sum()
+        sh_bytes(&self.attribute_bytes)
     }
 }
 
 /// Compresses the scene of `source` and writes it to `sink`: the bytes that
-/// [`compress()`](crate::compress()) and [`lexi::write`](crate::formats::lexi::write()) would make.
+/// [`compress()`](crate::compress()) and [`LexiWriter::exact`] would make.
 ///
 /// # Errors
-/// As those two, [`Error::Io`] also for temporary files, and [`Error::Cancelled`].
+/// As those two, [`crate::Error::Io`] also for temporary files.
 pub fn compress<'a>(
     source: &dyn SplatSource,
     options: &CompressOptions,
+    codes: CodeLayout,
     sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    run(source, options, sink.into(), AT_ONCE, progress)
+    run(source, options, codes, sink.into(), AT_ONCE, progress)
 }
 
-/// `at_once` Gaussians, a multiple of [`CHUNK`], are in memory at a time.
+/// `at_once` Gaussians are in memory at a time.
 fn run(
     source: &dyn SplatSource,
     options: &CompressOptions,
+    codes: CodeLayout,
     sink: Sink<'_>,
     at_once: usize,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    debug_assert!(at_once.is_multiple_of(CHUNK), "sums would be added in another order");
-    let n = source.len();
-    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
-    if options.layout == Layout::Packed {
-        let expected = "f32, f16 or paper: layout packed is what `pack_file` writes";
-        return Err(Error::parameter("layout", options.layout, expected));
-    }
     let folder = sink.spill_folder()?;
-    let clock = Stopwatch::start();
-    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
+    let mut spilled = SpilledModel::new(SpillTo::Folder(&folder), source, codes, options.values)?;
     let mut splats = source.empty();
-    let (encoder, learned) = Encoder::new(splats.degree, n, &mut fetch, options, progress)?;
-    let learn_seconds = clock.seconds();
+    let Encoded { dictionary, record, report, .. } =
+        encode(source, options, at_once, progress, &mut |encoder, range, coded| {
+            source.read(range.clone(), &mut splats)?;
+            encoder.code(&splats.sh_rest, range, coded, progress)?;
+            spilled.push(&splats.geometry, coded)?;
+            coded.clear();
+            Ok(())
+        })?;
     let clock = Stopwatch::start();
-    let mut set_aside =
-        SpilledModel::new(SpillTo::Folder(&folder), &splats, source.has_normals(), options.layout)?;
-    let mut coded = encoder.nothing();
-    progress.begin(Stage::Code, n as u64);
-    for start in (0..n).step_by(at_once) {
-        progress.check()?;
-        let range = start..n.min(start + at_once);
-        source.read(range.clone(), &mut splats)?;
-        encoder.code(&splats.sh_rest, range, &mut coded, progress);
-        set_aside.push(&splats.geometry, &coded)?;
-        coded.clear();
-    }
-    progress.end();
-    let (record, report) = coded.tally.into_report(options, n, learned, [learn_seconds, clock.seconds()]);
-    let clock = Stopwatch::start();
-    let attribute_bytes = set_aside.finish(&encoder.dictionary, &record, &splats.meta, sink, progress)?;
-    let write_seconds = clock.seconds();
-    let dictionary = encoder.dictionary;
-    Ok(Compressed { gaussians: n, dictionary, record, report, attribute_bytes, write_seconds })
+    let writer = LexiWriter::spilled(spilled, &dictionary, &record, &splats.meta)?;
+    let attribute_bytes = writer.attribute_bytes().to_vec();
+    writer.write(sink, progress)?;
+    let (gaussians, write_seconds) = (source.len(), clock.seconds());
+    Ok(Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply};
+    use crate::support::parallel::GAUSSIANS_PER_TASK;
+    use crate::{Error, Extra, ExtraValues, Layout, Silent, Splats, ply};
 
     /// More than two chunks, with normals, extras of several widths, and rows that no code reaches.
     fn scene() -> Splats {
-        let mut splats = crate::support::testing::scene(2 * CHUNK + 77, 3);
+        let mut splats = crate::support::testing::scene(2 * GAUSSIANS_PER_TASK + 77, 3);
         let n = splats.len();
         splats.geometry.normals = vec![[0.0; 3]; n];
         splats.geometry.normals[n - 1] = [0.0, 1.0, 0.0];
@@ -118,35 +103,39 @@ mod tests {
             Extra { name: "a".into(), values: ExtraValues::U8(vec![7; n]) },
             Extra { name: "b".into(), values: ExtraValues::F64(numbers().collect()) },
         ];
-        for i in [5, CHUNK, n - 1] {
+        for i in [5, GAUSSIANS_PER_TASK, n - 1] {
             splats.sh_rest[45 * i] = 1e20;
         }
         splats
     }
 
-    fn streamed(bytes: &[u8], options: &CompressOptions, drop_invalid: bool, at_once: usize) -> Vec<u8> {
+    fn streamed(bytes: &[u8], (options, codes): &Options, drop_invalid: bool, at_once: usize) -> Vec<u8> {
         let read = ply::ReadOptions { drop_invalid, ..ply::ReadOptions::default() };
         let chunks = ply::PlySource::open("t.ply", bytes, &read, &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");
-        let done = run(&chunks, options, Sink::from(&output), at_once, &Silent).unwrap();
+        let done = run(&chunks, options, *codes, Sink::from(&output), at_once, &Silent).unwrap();
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
         let out = std::fs::read(output).unwrap();
         assert_eq!(done.file_bytes(), out.len() as u64);
         out
     }
 
-    fn in_memory(bytes: &[u8], options: &CompressOptions, drop_invalid: bool) -> Vec<u8> {
+    fn in_memory(bytes: &[u8], (options, codes): &Options, drop_invalid: bool) -> Vec<u8> {
         let read = ply::ReadOptions { drop_invalid, ..ply::ReadOptions::default() };
         let splats = ply::read_bytes("t.ply", bytes, &read).unwrap().splats;
         let mut out = Vec::new();
-        lexi::write(&mut out, &crate::compress(splats, options, &Silent).unwrap().0).unwrap();
+        let (model, _) = crate::compress(splats, options, &Silent).unwrap();
+        LexiWriter::exact(&model, *codes).unwrap().write(&mut out, &Silent).unwrap();
         out
     }
 
-    fn quick(layout: Layout) -> CompressOptions {
-        // Few atoms and a small sample: learning is not what is tested.
-        CompressOptions { layout, atoms: Some(20), sample: 500, ..CompressOptions::default() }
+    type Options = (CompressOptions, CodeLayout);
+
+    /// Few atoms and a small sample: learning is not what is tested.
+    fn quick(layout: Layout) -> Options {
+        let options = CompressOptions::default().with_values(layout.values()).with_atoms(20).with_sample(500);
+        (options, layout.codes())
     }
 
     #[test]
@@ -156,7 +145,7 @@ mod tests {
         for layout in [Layout::F16, Layout::F32, Layout::Paper] {
             let options = quick(layout);
             let expected = in_memory(&bytes, &options, false);
-            for at_once in [CHUNK, 2 * CHUNK, AT_ONCE] {
+            for at_once in [GAUSSIANS_PER_TASK, 2 * GAUSSIANS_PER_TASK, AT_ONCE] {
                 assert!(streamed(&bytes, &options, false, at_once) == expected, "{layout} {at_once}");
             }
         }
@@ -171,21 +160,22 @@ mod tests {
         }
         let mut bytes = Vec::new();
         ply::write_to(&mut bytes, &splats).unwrap();
-        let options = CompressOptions { max_nonzeros: Some(3), ..quick(Layout::F16) };
+        let (options, codes) = quick(Layout::F16);
+        let options = (options.with_max_nonzeros(3), codes);
         // The only Gaussian with a normal is among those left out.
-        assert!(streamed(&bytes, &options, true, CHUNK) == in_memory(&bytes, &options, true));
+        assert!(streamed(&bytes, &options, true, GAUSSIANS_PER_TASK) == in_memory(&bytes, &options, true));
     }
 
     #[test]
     fn scenes_without_sh_and_without_gaussians() {
-        for (count, degree) in [(3000, 0), (0, 0), (0, 3), (1, 3), (CHUNK, 1)] {
+        for (count, degree) in [(3000, 0), (0, 0), (0, 3), (1, 3), (GAUSSIANS_PER_TASK, 1)] {
             let full = crate::support::testing::scene(count, 1);
             let splats = full.with_degree_cut(crate::ShDegree::new(degree).unwrap());
             let mut bytes = Vec::new();
             ply::write_to(&mut bytes, &splats).unwrap();
             let options = quick(Layout::F16);
             let expected = in_memory(&bytes, &options, false);
-            assert!(streamed(&bytes, &options, false, CHUNK) == expected, "{count} {degree}");
+            assert!(streamed(&bytes, &options, false, GAUSSIANS_PER_TASK) == expected, "{count} {degree}");
         }
     }
 
@@ -197,7 +187,8 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");
         std::fs::create_dir(&output).unwrap();
-        let error = compress(&chunks, &quick(Layout::F16), &output, &Silent).unwrap_err();
+        let (options, codes) = quick(Layout::F16);
+        let error = compress(&chunks, &options, codes, &output, &Silent).unwrap_err();
         assert!(matches!(&error, Error::Io { file, .. } if file.ends_with("out.lexi")), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

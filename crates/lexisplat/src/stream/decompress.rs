@@ -1,8 +1,9 @@
 //! From a .lexi file to a PLY, a part at a time.
 
 use super::source_order::in_source_order;
-use crate::formats::lexi::LexiChunks;
+use crate::formats::lexi::LexiReader;
 use crate::formats::ply::{PlyWriter, check, file_bytes};
+use crate::scene::source::SplatSource;
 use crate::support::error::Result;
 use crate::support::progress::Progress;
 use crate::support::sink::Sink;
@@ -14,7 +15,7 @@ use crate::support::sink::Sink;
 /// As those two; [`crate::Error::Io`] also for temporary files, which a packed file with its source's order
 /// needs; [`crate::Error::Cancelled`].
 pub fn decompress<'a>(
-    lexi: &LexiChunks<'_>,
+    lexi: &LexiReader<'_>,
     sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<u64> {
@@ -24,6 +25,9 @@ pub fn decompress<'a>(
     check(&like)?;
     sink.write(file_bytes(&like, lexi.len()), progress, |writer, named| {
         let mut ply = PlyWriter::begin(writer, &like, lexi.len()).map_err(named)?;
-        in_source_order(lexi, &folder, &mut |splats| ply.write(&splats).map_err(named))
+        in_source_order(lexi, &folder, &mut |splats| {
+            progress.check()?;
+            ply.write(&splats).map_err(named)
+        })
     })
 }

@@ -1,23 +1,23 @@
-//! What shows of a scene that no picture can be drawn of whole.
+//! The sensitivity of pictures to a scene that is too large to be drawn as a whole.
 
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 
-/// What views measure of the squared weights that a guess sums to 1: where several Gaussians share a pixel,
-/// or none is, squares sum to less. Without it files came out 7 to 9 dB better than asked (leica-brush,
-/// fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
+/// Sum of the squared weights that views measure. The heuristic scales its weights to a sum of 1, but squares sum
+/// to less where several Gaussians share a pixel or none covers it. Without this factor files came out 7 to 9 dB
+/// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(super) const SHOWN: f64 = 0.1;
 
-/// How a part of a scene is judged: some 262,144 Gaussians, neighbours of each other.
+/// How the sensitivity to a part of a scene is found. A part holds about 262,144 Gaussians near each other.
 pub enum Importance<'a, E = Error> {
     /// From each Gaussian alone ([`Sensitivity::heuristic`]).
     Heuristic,
-    /// By a renderer. The parts count by their Gaussians.
+    /// By a renderer. Parts are weighted by their number of Gaussians.
     Judge {
-        /// Is given the parts, once each and in order; says how pictures of one depend on its values.
+        /// Measures how pictures of a part depend on its values. It is called once for each part, in order.
         judge: &'a mut dyn FnMut(&Splats) -> Result<Sensitivity, E>,
-        /// The GPU that draws, to be noted in the file; `None` for the processor.
+        /// Name of the GPU that draws, which the file records; `None` for the CPU renderer.
         device: Option<String>,
     },
 }
@@ -25,14 +25,14 @@ pub enum Importance<'a, E = Error> {
 impl<E> std::fmt::Debug for Importance<'_, E> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
-            Self::Heuristic => "Guess",
+            Self::Heuristic => "Heuristic",
             Self::Judge { .. } => "Judge",
         })
     }
 }
 
 impl<E> Importance<'_, E> {
-    /// The GPU that drew, if one did.
+    /// Name of the GPU that drew, if one did.
     pub(super) fn device(&self) -> Option<&str> {
         match self {
             Self::Heuristic => None,
@@ -40,7 +40,7 @@ impl<E> Importance<'_, E> {
         }
     }
 
-    /// That of `part` of a scene of `gaussians` Gaussians, whose
+    /// The sensitivity to `part` of a scene of `gaussians` Gaussians, whose
     /// [`heuristic_total`](crate::scene::sensitivity::heuristic_total) is `total`.
     pub(super) fn of(&mut self, part: &Splats, gaussians: usize, total: f64) -> Result<Sensitivity, E> {
         match self {

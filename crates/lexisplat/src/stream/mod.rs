@@ -15,13 +15,13 @@
 //! ply::write(&input, &scene(&SampleOptions::new(2000, 0)))?;
 //!
 //! let bytes = Input::open(&input)?;
-//! let chunks = ply::PlySource::open("scene.ply", &bytes, &ply::ReadOptions::default(), &Silent)?;
-//! let done = stream::compress(&chunks, &CompressOptions::default(), &small, &Silent)?;
+//! let source = ply::PlySource::open("scene.ply", &bytes, &ply::ReadOptions::default(), &Silent)?;
+//! let done = stream::compress(&source, &CompressOptions::default(), lexi::CodeLayout::Compact, &small, &Silent)?;
 //! assert_eq!(done.gaussians, 2000);
 //!
 //! let bytes = Input::open(&small)?;
-//! let chunks = lexi::LexiChunks::open("scene.lexi", &bytes, &Limits::default())?;
-//! stream::decompress(&chunks, &back, &Silent)?;
+//! let reader = lexi::LexiReader::open("scene.lexi", &bytes, &Limits::default())?;
+//! stream::decompress(&reader, &back, &Silent)?;
 //! assert_eq!(std::fs::metadata(&back)?.len(), std::fs::metadata(&input)?.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -1,4 +1,4 @@
-//! Gaussians put in the order of a packed file by way of temporary files.
+//! Sorts Gaussians into the order of a packed file by way of temporary files.
 
 use std::path::Path;
 
@@ -14,46 +14,47 @@ use crate::support::progress::{Progress, Stage};
 use crate::support::rng::SplitMix64;
 use crate::support::spill::{Spill, SpillTo, Spilled};
 
-/// How much is held at a time. The first does not show in the file, the second only if parts are judged.
+/// Numbers of Gaussians that are held or sampled. The file does not depend on `at_once`, and on `bucket` only
+/// with [`Importance::Judge`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sizes {
     /// Gaussians read together.
     pub(super) at_once: usize,
-    /// Gaussians of a bucket, about.
+    /// Approximate number of Gaussians of a bucket.
     pub(super) bucket: usize,
-    /// Gaussians whose cells are looked at to know where buckets end.
+    /// Gaussians whose cells decide where buckets end.
     pub(super) looked_at: usize,
-    /// Gaussians to fit steps and predictors to, about.
+    /// Approximate number of Gaussians that steps and predictors are fitted to.
     pub(super) sample: usize,
-    /// Gaussians of a run of the sample, neighbours in the order of the file, about.
+    /// Approximate number of Gaussians of a run of the sample. They are neighbours in the file.
     pub(super) run: usize,
 }
 
 /// Bytes of a record before the values: cell and index in the source.
 const KEY_BYTES: usize = 12;
-/// Mixed into the seed of what is looked at.
+/// Mixed into the seed of the Gaussians whose cells are looked at.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
 /// Takes Gaussians, their sensitivities to colour and opacity, and their places.
 type Take<'a> = dyn FnMut(&Splats, &[[f32; 2]], &[MortonKey]) -> Result<()> + 'a;
 
-/// A scene dealt into buckets in the order of a packed file.
+/// A scene distributed over buckets in the order of a packed file.
 pub(super) struct Ordered {
     pub(super) grid: Grid,
-    /// Sum over all Gaussians of what their weights are guessed from.
+    /// The [`heuristic_total`] of all Gaussians.
     pub(super) heuristic_total: f64,
     rows: RowLayout,
     buckets: Buckets,
     gaussians: usize,
-    /// Where runs end, and one run in how many is of the sample.
+    /// The ends of runs, and the number of runs of which one is part of the sample.
     runs: (Vec<MortonKey>, usize),
 }
 
-/// What is known when all Gaussians were judged.
+/// The sensitivity of all Gaussians.
 pub(super) struct Judged {
     /// Some of the Gaussians, in order.
     pub(super) sample: Splats,
-    /// Theirs.
+    /// The sensitivity of the sample.
     pub(super) sensitivity: Sensitivity,
     /// Sensitivities to colour and opacity of all Gaussians, in order, as pairs of f32.
     pub(super) weights: Spilled,
@@ -107,7 +108,7 @@ impl Ordered {
         };
         let (bucket_ends, run_ends) = (ends(n.div_ceil(sizes.bucket)), ends(n.div_ceil(sizes.run)));
         drop(keys);
-        // One run in so many is of the sample.
+        // Of so many runs one is part of the sample.
         let every = n.div_ceil(sizes.sample).max(1);
 
         let rows = RowLayout::new(source.empty());
@@ -126,7 +127,7 @@ impl Ordered {
         Ok(Self { grid, heuristic_total: total, rows, buckets, gaussians: n, runs: (run_ends, every) })
     }
 
-    /// Has all Gaussians judged, bucket by bucket.
+    /// Finds the sensitivity to all Gaussians, bucket by bucket.
     pub(super) fn judge<E: From<Error>>(
         &mut self,
         importance: &mut Importance<'_, E>,
@@ -161,8 +162,8 @@ impl Ordered {
         Ok(Judged { sample, sensitivity, weights: weights.finish()? })
     }
 
-    /// Hands all Gaussians to `take` in order, with their `weights` and their places: a multiple
-    /// of `chunk` of them each time but the last.
+    /// Hands all Gaussians to `take` in order, with their `weights` and their places. Each time but the last their
+    /// number is a multiple of `chunk`.
     pub(super) fn each(mut self, mut weights: Spilled, chunk: usize, take: &mut Take<'_>) -> Result<()> {
         let (mut bytes, mut places) = (Vec::new(), Vec::new());
         let count = self.buckets.len();
@@ -202,7 +203,8 @@ fn in_order(records: &[u8], rows: &RowLayout, bytes: &mut Vec<u8>, places: &mut 
     }
 }
 
-/// One random number of each of about `count` equal parts of the numbers below `n`, ascending.
+/// Divides the numbers below `n` into about `count` equal parts, and returns one random number of each,
+/// ascending.
 fn stratified(n: usize, count: usize, seed: u64) -> impl Iterator<Item = usize> {
     let stride = n.div_ceil(count).max(1);
     let mut random = SplitMix64::new(seed ^ LOOK_STREAM);

@@ -2,8 +2,8 @@
 
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
-use crate::formats::lexi::write_spilled_packed;
-use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
+use crate::formats::lexi::LexiWriter;
+use crate::packed::{CHUNK, PackOptions, PackReport, PackedHead, PartPacker, StreamBits, Whole};
 use crate::scene::source::SplatSource;
 use crate::sparse::compress::AT_ONCE;
 use crate::support::error::{Error, Result};
@@ -20,14 +20,13 @@ const SIZES: Sizes =
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PackedFile {
-    /// The packed scene without what is as long as the scene: extras, order and data.
-    pub head: Packed,
-    /// How it went.
+    /// Everything of the packed scene that is not as long as the scene.
+    pub head: PackedHead,
+    /// How packing went.
     pub report: PackReport,
-    /// What the streams take.
+    /// Sizes of the streams.
     pub stream_bits: Vec<StreamBits>,
-    /// Bytes of each tensor and of the header, as
-    /// [`lexi::packed_tensor_bytes`](crate::formats::lexi::packed_tensor_bytes).
+    /// Bytes of each tensor and of the header, as [`LexiWriter::attribute_bytes`].
     pub tensor_bytes: Vec<(String, u64)>,
 }
 
@@ -87,8 +86,10 @@ fn run<E: From<Error>>(
         Ok(())
     })?;
     progress.end();
-    let (head, spilled, report, stream_bits) = packer.finish(to, importance.device())?;
-    let tensor_bytes = write_spilled_packed(&head, spilled, sink, progress)?;
+    let (head, spilled, report, stream_bits) = packer.finish(to, importance.device(), progress)?;
+    let writer = LexiWriter::spilled_packed(&head, spilled);
+    let tensor_bytes = writer.attribute_bytes().to_vec();
+    writer.write(sink, progress)?;
     Ok(PackedFile { head, report, stream_bits, tensor_bytes })
 }
 
@@ -145,9 +146,9 @@ mod tests {
             let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
             let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
             let mut expected = Vec::new();
-            lexi::write_packed(&mut expected, &packed).unwrap();
+            LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
             assert!(found == expected, "{count}");
-            assert_eq!(done.tensor_bytes, lexi::packed_tensor_bytes(&packed));
+            assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
             let bits = packed.stream_bits().unwrap();
             for (a, b) in done.stream_bits.iter().zip(&bits) {
                 assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
@@ -170,11 +171,11 @@ mod tests {
         );
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
         // The order was kept, so each Gaussian is where it was.
-        assert_eq!(model.geometry.extras, splats.geometry.extras);
+        assert_eq!(model.geometry().extras, splats.geometry.extras);
         let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
-        let moved = model.geometry.positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
+        let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
         assert_eq!(moved.count(), 0);
-        assert_eq!(done.head.gaussians, splats.len());
+        assert_eq!(done.head.len(), splats.len());
         assert_eq!(
             done.report.nonzero_histogram.iter().sum::<u64>() + done.report.escapes,
             splats.len() as u64
@@ -197,7 +198,7 @@ mod tests {
             streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, small).unwrap();
         assert_eq!(parts, 4);
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        assert_eq!(model.geometry.extras, splats.geometry.extras);
+        assert_eq!(model.geometry().extras, splats.geometry.extras);
         seen.sort_unstable();
         assert!(seen.into_iter().eq(0..12_000));
     }
@@ -223,6 +224,6 @@ mod tests {
         let small = Sizes { at_once: 1000, bucket: 700, looked_at: 1000, sample: 2000, run: 100 };
         let (found, _) = streamed(&splats, Importance::Heuristic, small).unwrap();
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        assert_eq!(model.geometry.extras, splats.geometry.extras);
+        assert_eq!(model.geometry().extras, splats.geometry.extras);
     }
 }

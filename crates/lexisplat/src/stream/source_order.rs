@@ -1,28 +1,29 @@
-//! The Gaussians of a .lexi file as they were in their source, a part at a time.
+//! The Gaussians of a .lexi file in the order of their source, a part at a time.
 
 use std::path::Path;
 
 use super::buckets::Buckets;
 use super::rows::RowLayout;
-use crate::formats::lexi::LexiChunks;
+use crate::formats::lexi::LexiReader;
 use crate::packed::StreamBits;
+use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
 use crate::support::error::Result;
 
-/// Gaussians of a bucket when a packed file's order is undone: a multiple of a chunk.
+/// Gaussians of a bucket: a multiple of a chunk.
 const BUCKET: usize = 4 * crate::packed::CHUNK;
 /// Bytes of a Gaussian's place, before its values.
 const PLACE_BYTES: usize = 4;
 
-/// Hands the dense scene of `lexi` to `take`, part after part: in the order of its source if the file knows
-/// it, else in that of the file. Temporary files, if any are needed, are in `folder`.
+/// Hands the dense scene of `lexi` to `take` part after part: in the order of its source if the file holds it,
+/// otherwise in the order of the file. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
-/// [`crate::Error::Format`] as [`lexi::read`](crate::formats::lexi::read) for what is only found while decoding,
-/// [`crate::Error::Io`] for temporary files, and what `take` says.
+/// [`crate::Error::Format`] for damage that only decoding finds, [`crate::Error::Io`] for temporary files, and
+/// what `take` returns.
 pub fn in_source_order(
-    lexi: &LexiChunks<'_>,
+    lexi: &LexiReader<'_>,
     folder: &Path,
     take: &mut dyn FnMut(Splats) -> Result<()>,
 ) -> Result<()> {
@@ -30,10 +31,10 @@ pub fn in_source_order(
     Ok(())
 }
 
-/// [`in_source_order`] that first shows every part to `see` as it is in the file. Returns what the streams
-/// of a packed file take if `count_bits`.
+/// [`in_source_order`] that first shows every part to `see` as it is in the file. Returns the sizes of the
+/// streams of a packed file if `count_bits`.
 pub(super) fn parts_and_source_order(
-    lexi: &LexiChunks<'_>,
+    lexi: &LexiReader<'_>,
     folder: &Path,
     count_bits: bool,
     see: &mut dyn FnMut(&Model),
@@ -49,7 +50,7 @@ pub(super) fn parts_and_source_order(
 }
 
 fn by_buckets(
-    lexi: &LexiChunks<'_>,
+    lexi: &LexiReader<'_>,
     folder: &Path,
     bucket_len: usize,
     count_bits: bool,
@@ -104,9 +105,9 @@ mod tests {
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_packed(&mut bytes, &packed).unwrap();
+        lexi::LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
         let whole = lexi::read_bytes("t", &bytes, &Limits::default()).unwrap().into_splats();
-        let chunks = LexiChunks::open("t", &bytes, &Limits::default()).unwrap();
+        let chunks = LexiReader::open("t", &bytes, &Limits::default()).unwrap();
         let folder = tempfile::tempdir().unwrap();
         for bucket in [4099, n, BUCKET] {
             let mut start = 0;

@@ -1,36 +1,36 @@
-//! What `lexisplat info` says of a file, a part at a time.
+//! Statistics of a file, a part at a time.
 
 use std::path::Path;
 
 use super::source_order::parts_and_source_order;
-use crate::formats::lexi::LexiChunks;
+use crate::formats::lexi::LexiReader;
 use crate::packed::StreamBits;
 use crate::scene::source::SplatSource;
 use crate::scene::stats::{Lint, Linter};
 use crate::support::error::Result;
-use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK;
 use crate::support::progress::{Progress, Stage};
 
-/// Gaussians looked over together.
-const AT_ONCE: usize = 32 * CHUNK;
+/// Gaussians read together.
+const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
-/// What a .lexi file's Gaussians and codes are like.
+/// Statistics of the Gaussians and the codes of a .lexi file.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Survey {
-    /// What the dense scene looks like.
+    /// Statistics of the dense scene.
     pub lint: Lint,
     /// Nonzeros in all.
     pub nonzeros: u64,
     /// Gaussians stored exactly.
     pub escapes: u64,
-    /// Gaussians by number of nonzeros, from 0 to the dimension; escapes not among them.
+    /// Gaussians by number of nonzeros, from 0 to the dimension, without escapes.
     pub nonzero_histogram: Vec<u64>,
     /// Gaussians that use each atom.
     pub atom_usage: Vec<u64>,
     /// As [`Model::resident_sh_bytes`](crate::Model::resident_sh_bytes).
     pub resident_sh_bytes: u64,
-    /// What the streams of a packed file take; empty for other layouts.
+    /// Sizes of the streams of a packed file; empty for other layouts.
     pub stream_bits: Vec<StreamBits>,
 }
 
@@ -55,11 +55,11 @@ pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     Ok(linter.finish())
 }
 
-/// Looks a .lexi file over. Temporary files, if any are needed, are in `folder`.
+/// Decodes a .lexi file for its statistics. Temporary files, if any are needed, are in `folder`.
 ///
 /// # Errors
 /// As [`in_source_order`](super::in_source_order).
-pub fn survey(lexi: &LexiChunks<'_>, folder: &Path) -> Result<Survey> {
+pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
     let mut linter = Linter::default();
     linter.add(&lexi.empty())?;
     let dictionary = lexi.dictionary();
@@ -77,14 +77,14 @@ pub fn survey(lexi: &LexiChunks<'_>, folder: &Path) -> Result<Survey> {
         folder,
         true,
         &mut |model| {
-            let codes = &model.codes;
+            let codes = model.codes();
             let escapes = codes.escapes().gaussians.len() as u64;
             out.escapes += escapes;
             out.nonzeros += codes.nonzeros() as u64;
             codes.counts().iter().for_each(|&count| out.nonzero_histogram[usize::from(count)] += 1);
             out.nonzero_histogram[0] -= escapes;
             (0..codes.nonzeros()).for_each(|k| out.atom_usage[codes.indices().get(k)] += 1);
-            let base = size_of_val(model.geometry.dc.as_slice());
+            let base = size_of_val(model.geometry().dc.as_slice());
             out.resident_sh_bytes += (codes.resident_bytes() + base) as u64;
         },
         &mut |splats| linter.add(&splats),

@@ -1,12 +1,13 @@
 //! Builder methods of option structs.
 
-/// Defines public methods `$with(value)`, each of which sets the field `$field`.
+/// Defines public methods `$with(value)`, each of which sets the field `$field`. A `value` converts to the type of the
+/// field, so that an option takes a value as it is.
 macro_rules! builder_methods {
     ($($with:ident($field:ident: $type:ty)),* $(,)?) => {$(
         #[doc = concat!("Sets [`Self::", stringify!($field), "`].")]
         #[must_use]
         pub fn $with(mut self, $field: $type) -> Self {
-            self.$field = $field;
+            self.$field = $field.into();
             self
         }
     )*};

@@ -175,11 +175,6 @@ impl Error {
         Self::Limit { what: what.into(), found, limit, name }
     }
 
-    /// Blames `file` for an error about what was read from it. A limit stays a limit.
-    pub(crate) fn of_file(self, file: &str) -> Self {
-        if matches!(self, Self::Limit { .. }) { self } else { Self::malformed(file, self.to_string()) }
-    }
-
     /// An [`Error::Parameter`].
     pub fn parameter(name: &'static str, value: impl ToString, expected: impl Into<String>) -> Self {
         Self::Parameter { name, value: value.to_string(), expected: expected.into() }

@@ -1,4 +1,4 @@
-//! How much of a file may be held at once.
+//! The memory that the arrays of one file may take.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -7,22 +7,22 @@ use crate::support::limits::Limits;
 
 /// Bytes of a Gaussian's position, base colour, opacity, scales and rotation.
 pub(crate) const GEOMETRY_BYTES: usize = (3 + 3 + 1 + 3 + 4) * size_of::<f32>();
-/// Bytes of its number of nonzeros.
+/// Bytes of a Gaussian's number of nonzeros.
 pub(crate) const COUNT_BYTES: usize = 1;
 
-/// What [`Limits::bytes`] and [`Limits::expansion`] leave for the arrays made of one file. Threads share it.
+/// The memory that [`Limits::bytes`] and [`Limits::expansion`] leave for the arrays of one file. Threads share it.
 #[derive(Debug)]
 pub(crate) struct MemoryBudget<'a> {
     file: &'a str,
     file_bytes: u64,
     limit: u64,
-    /// Which limit it is: the smaller one.
+    /// Name of the limit that is smaller.
     name: &'static str,
     used: AtomicU64,
 }
 
 impl<'a> MemoryBudget<'a> {
-    /// For `file`, as the caller named it, of `file_bytes`.
+    /// The budget of `file`, as the caller named it, which has `file_bytes` bytes.
     pub(crate) fn new(limits: &Limits, file: &'a str, file_bytes: u64) -> Self {
         let expanded = limits.expansion.saturating_mul(file_bytes);
         let (limit, name) =
@@ -30,7 +30,7 @@ impl<'a> MemoryBudget<'a> {
         Self { file, file_bytes, limit, name, used: AtomicU64::new(0) }
     }
 
-    /// Takes room for `count` things of `each` bytes, before they are allocated.
+    /// Takes `count` times `each` bytes before they are allocated.
     pub(crate) fn take(&self, count: usize, each: usize) -> Result<()> {
         let bytes = (count as u64).saturating_mul(each as u64);
         let used = self.used.load(Relaxed).saturating_add(bytes);
@@ -38,14 +38,14 @@ impl<'a> MemoryBudget<'a> {
         if used <= self.limit { Ok(()) } else { Err(self.error(used, "")) }
     }
 
-    /// [`Self::take`] where several threads take: whether there was budget.
+    /// [`Self::take`] for several threads at a time. Returns whether the budget was large enough.
     pub(crate) fn grow(&self, count: usize, each: usize) -> bool {
         let bytes = (count as u64).saturating_mul(each as u64);
         self.used.fetch_add(bytes, Relaxed).saturating_add(bytes) <= self.limit
     }
 
-    /// What to say after [`Self::grow`] found none. How much is missing is not known, and which thread notices
-    /// is chance; the text is always the same.
+    /// The error after [`Self::grow`] returned false. It does not depend on the thread that noticed first, so it
+    /// does not say how much is missing.
     pub(crate) fn full(&self) -> Error {
         self.error(self.limit.saturating_add(1), " (at least)")
     }

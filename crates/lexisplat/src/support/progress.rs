@@ -1,4 +1,4 @@
-//! How long work reports where it stands, and learns that it shall end.
+//! Progress reports of long work, and its cancellation.
 
 use crate::support::error::{Error, Result};
 
@@ -17,13 +17,13 @@ pub trait Progress: Sync {
     /// The current stage is over.
     fn end(&self) {}
 
-    /// Whether the work shall end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves
+    /// Whether the work is to end early. Work that finds `true` returns [`Error::Cancelled`] soon and leaves
     /// no output. The answer must not become `false` again.
     fn is_cancelled(&self) -> bool {
         false
     }
 
-    /// Returns [`Error::Cancelled`] if the work shall end early.
+    /// Returns [`Error::Cancelled`] if the work is to end early.
     ///
     /// # Errors
     /// [`Error::Cancelled`].
@@ -40,7 +40,7 @@ pub enum Stage {
     Read,
     /// Learns the dictionary, in rounds.
     Learn,
-    /// Measures the sensitivity of a scene that is looked at part by part, in Gaussians.
+    /// Measures the sensitivity of a scene part by part, in Gaussians.
     Look,
     /// Draws views, in views.
     Draw,

@@ -2,9 +2,10 @@
 //!
 //! Temporary files have no name where the system allows that, so nothing is left however the process ends.
 
-use std::fs::File;
-use std::io::{BufWriter, Read, Seek, SeekFrom, Write};
+use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+
+use tempfile::{SpooledData, SpooledTempFile};
 
 use crate::support::error::{Error, Result};
 
@@ -19,103 +20,80 @@ pub(crate) enum SpillTo<'a> {
     Folder(&'a Path),
 }
 
-/// A temporary file, and its folder for errors.
+/// Memory or a temporary file.
 #[derive(Debug)]
-pub(crate) struct TemporaryFile {
-    file: File,
-    folder: PathBuf,
+pub(crate) struct Temporary {
+    file: SpooledTempFile,
+    /// The folder, or `memory`.
+    name: PathBuf,
 }
 
-impl TemporaryFile {
-    pub(crate) fn new(folder: &Path) -> Result<Self> {
-        let file = tempfile::tempfile_in(folder).map_err(|e| Error::temporary_file(folder, e))?;
-        Ok(Self { file, folder: folder.to_owned() })
+impl Temporary {
+    pub(crate) fn new(to: SpillTo<'_>) -> Result<Self> {
+        let (mut file, name) = match to {
+            SpillTo::Memory => {
+                return Ok(Self { file: SpooledTempFile::new(usize::MAX), name: "memory".into() });
+            }
+            SpillTo::Folder(folder) => (SpooledTempFile::new_in(0, folder), folder.to_owned()),
+        };
+        file.roll().map_err(|e| Error::temporary_file(&name, e))?;
+        Ok(Self { file, name })
     }
 
     /// Appends `bytes`, and returns where they start.
     pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<u64> {
-        let append = |file: &mut File| {
-            let start = file.seek(SeekFrom::End(0))?;
-            file.write_all(bytes)?;
-            Ok(start)
-        };
-        append(&mut self.file).map_err(|e| Error::temporary_file(&self.folder, e))
+        let start = self.file.seek(SeekFrom::End(0));
+        let start = start.and_then(|start| self.file.write_all(bytes).map(|()| start));
+        start.map_err(|e| Error::temporary_file(&self.name, e))
     }
 
     /// Fills `bytes` from `start` on.
     pub(crate) fn read_at(&mut self, start: u64, bytes: &mut [u8]) -> Result<()> {
         let read = self.file.seek(SeekFrom::Start(start)).and_then(|_| self.file.read_exact(bytes));
-        read.map_err(|e| Error::temporary_file(&self.folder, e))
+        read.map_err(|e| Error::temporary_file(&self.name, e))
     }
 }
 
 /// Bytes being spilled, and their checksum.
 #[derive(Debug)]
 pub(crate) struct Spill {
-    kept: Kept<BufWriter<File>>,
+    file: BufWriter<SpooledTempFile>,
+    name: PathBuf,
     checksum: crc32fast::Hasher,
-    len: u64,
-}
-
-#[derive(Debug)]
-enum Kept<F> {
-    Memory(Vec<u8>),
-    File { file: F, folder: PathBuf },
 }
 
 impl Spill {
     /// An empty one.
     pub(crate) fn new(to: SpillTo<'_>) -> Result<Self> {
-        let kept = match to {
-            SpillTo::Memory => Kept::Memory(Vec::new()),
-            SpillTo::Folder(folder) => {
-                let TemporaryFile { file, folder } = TemporaryFile::new(folder)?;
-                Kept::File { file: BufWriter::with_capacity(BUFFER, file), folder }
-            }
-        };
-        Ok(Self { kept, checksum: crc32fast::Hasher::new(), len: 0 })
+        let Temporary { file, name } = Temporary::new(to)?;
+        let file = BufWriter::with_capacity(BUFFER, file);
+        Ok(Self { file, name, checksum: crc32fast::Hasher::new() })
     }
 
     /// Appends `values` as they lie in memory.
     pub(crate) fn push<T: bytemuck::NoUninit>(&mut self, values: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(values);
         self.checksum.update(bytes);
-        self.len += bytes.len() as u64;
-        match &mut self.kept {
-            Kept::Memory(kept) => {
-                kept.extend_from_slice(bytes);
-                Ok(())
-            }
-            Kept::File { file, folder } => {
-                file.write_all(bytes).map_err(|e| Error::temporary_file(folder, e))
-            }
-        }
+        self.file.write_all(bytes).map_err(|e| Error::temporary_file(&self.name, e))
     }
 
     /// All of it, to be read from the start.
     pub(crate) fn finish(self) -> Result<Spilled> {
-        let kept = match self.kept {
-            Kept::Memory(bytes) => Kept::Memory(bytes),
-            Kept::File { file, folder } => {
-                let io = |e| Error::temporary_file(&folder, e);
-                let mut file = file.into_inner().map_err(|e| io(e.into_error()))?;
-                file.rewind().map_err(io)?;
-                Kept::File { file, folder }
-            }
-        };
-        Ok(Spilled { kept, taken: 0, checksum: self.checksum.finalize(), len: self.len })
+        let Self { file, name, checksum } = self;
+        let file = file.into_inner().map_err(|e| e.into_error());
+        let file = file
+            .and_then(|mut file| file.rewind().map(|()| file))
+            .map_err(|e| Error::temporary_file(&name, e))?;
+        Ok(Spilled { file: Temporary { file, name }, checksum: checksum.finalize() })
     }
 }
 
 /// Bytes that were spilled.
 #[derive(Debug)]
 pub(crate) struct Spilled {
-    kept: Kept<File>,
-    /// Bytes of memory that were taken.
-    taken: usize,
+    file: Temporary,
     /// CRC-32.
     pub(crate) checksum: u32,
-    pub(crate) len: u64,
 }
 
 impl Spilled {
@@ -125,44 +103,34 @@ impl Spilled {
         count: usize,
     ) -> Result<Vec<T>> {
         let mut values = vec![T::zeroed(); count];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
-        match &mut self.kept {
-            Kept::Memory(kept) => {
-                let mut rest = &kept[self.taken.min(kept.len())..];
-                rest.read_exact(bytes).map_err(|e| Error::io("memory", e))?;
-                self.taken += bytes.len();
-            }
-            Kept::File { file, folder } => {
-                file.read_exact(bytes).map_err(|e| Error::temporary_file(folder, e))?;
-            }
-        }
+        let read = self.file.file.read_exact(bytemuck::cast_slice_mut(&mut values));
+        read.map_err(|e| Error::temporary_file(&self.file.name, e))?;
         Ok(values)
     }
 
     /// All bytes.
-    pub(crate) fn into_bytes(mut self) -> Result<Vec<u8>> {
-        match self.kept {
-            Kept::Memory(bytes) => Ok(bytes),
-            Kept::File { .. } => {
-                let len = usize::try_from(self.len).unwrap_or(usize::MAX);
-                self.take(len)
+    pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        match self.file.file.into_inner() {
+            SpooledData::InMemory(memory) => return Ok(memory.into_inner()),
+            SpooledData::OnDisk(mut file) => {
+                file.read_to_end(&mut bytes).map_err(|e| Error::temporary_file(&self.file.name, e))?;
             }
         }
+        Ok(bytes)
     }
 
     /// Copies them to `writer`.
-    pub(crate) fn copy_to(self, writer: &mut dyn Write) -> std::io::Result<()> {
-        let (mut file, folder) = match self.kept {
-            Kept::Memory(bytes) => return writer.write_all(&bytes),
-            Kept::File { file, folder } => (file, folder),
-        };
+    pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
+        let Temporary { mut file, name } = self.file;
         let mut block = vec![0; BUFFER];
         loop {
-            let read = file.read(&mut block);
-            match read.map_err(|e| std::io::Error::other(Error::temporary_file(&folder, e)))? {
-                0 => return Ok(()),
-                read => writer.write_all(&block[..read])?,
+            let read =
+                file.read(&mut block).map_err(|e| io::Error::other(Error::temporary_file(&name, e)))?;
+            if read == 0 {
+                return Ok(());
             }
+            writer.write_all(&block[..read])?;
         }
     }
 }
@@ -183,7 +151,6 @@ mod tests {
                 spill.finish().unwrap()
             };
             assert_eq!(spilled().checksum, crc32fast::hash(expected));
-            assert_eq!(spilled().len, expected.len() as u64);
             let mut found = Vec::new();
             spilled().copy_to(&mut found).unwrap();
             assert!(found == expected && spilled().into_bytes().unwrap() == expected);

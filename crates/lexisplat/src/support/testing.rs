@@ -4,11 +4,11 @@ use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::support::rng::SplitMix64;
 
-/// Values of a Gaussian at SH degree 3, SH-rest excluded.
+/// Values of a Gaussian without SH-rest.
 const VALUES: usize = 14;
 /// Directions in which SH-rest vectors lie, so that a dictionary has something to find.
 const DIRECTIONS: usize = 12;
-/// Numbers below which [`SplitMix64::below`] is asked to be.
+/// Number of different random values.
 const FINE: usize = 1 << 20;
 
 /// `gaussians` Gaussians of SH degree 3 in a cube of side 2, the same for the same `seed`.

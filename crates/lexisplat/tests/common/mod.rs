@@ -7,10 +7,11 @@
 )]
 
 use half::f16;
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::{LexiReader, LexiWriter};
+use lexisplat::pursuit::ValueType;
 use lexisplat::{
-    Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Limits, Model, Pursuit, Record,
-    Result, SceneMeta, ShDegree, SparseCodes, Splats, Values,
+    CodeLayout, Dictionary, Escapes, Extra, ExtraValues, Geometry, Indices, Limits, Model, Pursuit, Record,
+    Result, SceneMeta, ShDegree, Silent, SparseCodes, Splats, Values,
 };
 use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
@@ -49,14 +50,19 @@ fn dictionary(degree: ShDegree, atoms: usize) -> Dictionary {
     Dictionary::new(degree, values).unwrap()
 }
 
-fn model(degree: u8, atoms: usize, layout: Layout, escape: bool) -> Model {
+fn model(
+    degree: u8,
+    atoms: usize,
+    values: ValueType,
+    escape: bool,
+    change: impl FnOnce(&mut Geometry, &mut Record),
+) -> Model {
     let (n, degree) = (5, ShDegree::new(degree).unwrap());
-    let record = Record {
+    let mut record = Record {
         tolerance: Some(0.1),
         max_nonzeros: None,
-        pursuit: Pursuit::Ols,
+        pursuit: Some(Pursuit::Ols),
         seed: 7,
-        layout,
         max_residual: 0.0625,
         rms_residual: 0.03125,
         over_tolerance: 0,
@@ -71,9 +77,9 @@ fn model(degree: u8, atoms: usize, layout: Layout, escape: bool) -> Model {
         Indices::U16(_) => Indices::U16(picks.iter().map(|&p| u16::try_from(p).unwrap()).collect()),
     };
     let numbers: Vec<f32> = (0..nonzeros).map(|k| plain(k + 11)).collect();
-    let values = match layout {
-        Layout::F16 => Values::F16(numbers.iter().map(|&v| f16::from_f32(v)).collect()),
-        _ => Values::F32(numbers),
+    let values = match values {
+        ValueType::F16 => Values::F16(numbers.iter().map(|&v| f16::from_f32(v)).collect()),
+        ValueType::F32 => Values::F32(numbers),
     };
     let escapes = if escape {
         Escapes { gaussians: vec![3], rows: (0..degree.rest()).map(|d| plain(d + 23)).collect() }
@@ -82,33 +88,37 @@ fn model(degree: u8, atoms: usize, layout: Layout, escape: bool) -> Model {
     };
     let codes = SparseCodes::new(&dictionary, counts, indices, values, escapes).unwrap();
     let meta = SceneMeta { comments: vec!["made by \"hand\"".to_owned()], antialiased: escape };
-    Model { geometry: geometry(n), meta, dictionary, codes, record }
+    let mut geometry = geometry(n);
+    change(&mut geometry, &mut record);
+    Model::new(geometry, meta, dictionary, codes, record).unwrap()
 }
 
 /// Every kind of file, by the name of its golden copy.
-pub fn models() -> Vec<(&'static str, Model)> {
-    let mut rich = model(1, 300, Layout::F32, true);
-    rich.geometry.normals = rows(5, 9);
-    rich.geometry.extras = vec![
-        Extra { name: "label".to_owned(), values: ExtraValues::U8(vec![1, 2, 3, 4, 255]) },
-        Extra { name: "time".to_owned(), values: ExtraValues::F64(vec![0.5, -1.0, f64::MAX, 0.0, 3.25]) },
-    ];
-    rich.record.tolerance = None;
-    rich.record.max_nonzeros = Some(3);
+pub fn models() -> Vec<(&'static str, CodeLayout, Model)> {
+    use ValueType::{F16, F32};
+    let rich = |geometry: &mut Geometry, record: &mut Record| {
+        geometry.normals = rows(5, 9);
+        geometry.extras = vec![
+            Extra { name: "label".to_owned(), values: ExtraValues::U8(vec![1, 2, 3, 4, 255]) },
+            Extra { name: "time".to_owned(), values: ExtraValues::F64(vec![0.5, -1.0, f64::MAX, 0.0, 3.25]) },
+        ];
+        record.tolerance = None;
+        record.max_nonzeros = Some(3);
+    };
     vec![
-        ("f32", model(3, 8, Layout::F32, false)),
-        ("f16", model(3, 8, Layout::F16, false)),
-        ("paper", model(2, 8, Layout::Paper, false)),
-        ("degree0", model(0, 0, Layout::F16, false)),
-        ("degree4", model(4, 5, Layout::F16, true)),
-        ("degree1_u16_escapes", rich),
+        ("f32", CodeLayout::Compact, model(3, 8, F32, false, |_, _| ())),
+        ("f16", CodeLayout::Compact, model(3, 8, F16, false, |_, _| ())),
+        ("paper", CodeLayout::Paper, model(2, 8, F32, false, |_, _| ())),
+        ("degree0", CodeLayout::Compact, model(0, 0, F16, false, |_, _| ())),
+        ("degree4", CodeLayout::Compact, model(4, 5, F16, true, |_, _| ())),
+        ("degree1_u16_escapes", CodeLayout::Compact, model(1, 300, F32, true, rich)),
     ]
 }
 
 /// The bytes of `model` as written today.
-pub fn written(model: &Model) -> Vec<u8> {
+pub fn written(model: &Model, codes: CodeLayout) -> Vec<u8> {
     let mut bytes = Vec::new();
-    lexisplat::lexi::write(&mut bytes, model).unwrap();
+    LexiWriter::exact(model, codes).unwrap().write(&mut bytes, &Silent).unwrap();
     bytes
 }
 
@@ -151,7 +161,7 @@ pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
 /// How many Gaussians a file read part by part has.
 pub fn count_in_parts(bytes: &[u8]) -> Result<usize> {
     let mut gaussians = 0;
-    LexiChunks::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
+    LexiReader::open("mutated.lexi", bytes, &Limits::default())?.each(&mut |_, part| {
         gaussians += part.len();
         Ok(())
     })?;

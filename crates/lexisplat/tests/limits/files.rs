@@ -1,9 +1,10 @@
 //! Files of every kind, and what a scene made of each takes in memory.
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{CHUNK, PackOptions, Packer};
 use lexisplat::{
     CompressOptions, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Sensitivity, ShDegree,
-    Silent, Splats, Values, compress, lexi, ply,
+    Silent, Splats, Values, compress, ply,
 };
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -49,9 +50,10 @@ pub(crate) fn as_ascii(splats: &Splats) -> Vec<u8> {
 
 pub(crate) fn exact(splats: &Splats, layout: Layout) -> Vec<u8> {
     let mut options = CompressOptions::default();
-    (options.layout, options.atoms, options.sample) = (layout, Some(12), 500);
+    (options.values, options.atoms, options.sample) = (layout.values(), Some(12), 500);
     let mut bytes = Vec::new();
-    lexi::write(&mut bytes, &compress(splats.clone(), &options, &Silent).unwrap().0).unwrap();
+    let (model, _) = compress(splats.clone(), &options, &Silent).unwrap();
+    LexiWriter::exact(&model, layout.codes()).unwrap().write(&mut bytes, &Silent).unwrap();
     bytes
 }
 
@@ -61,7 +63,7 @@ pub(crate) fn packed(splats: &Splats, step: f64, keep_order: bool) -> Vec<u8> {
     let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let mut bytes = Vec::new();
-    lexi::write_packed(&mut bytes, &packer.pack(step, &Silent).unwrap().0).unwrap();
+    LexiWriter::packed(&packer.pack(step, &Silent).unwrap().0).write(&mut bytes, &Silent).unwrap();
     bytes
 }
 
@@ -88,7 +90,7 @@ pub(crate) fn splats_bytes(splats: &Splats) -> u64 {
 }
 
 pub(crate) fn model_bytes(model: &Model) -> u64 {
-    let codes = &model.codes;
+    let codes = model.codes();
     let indices = match codes.indices() {
         Indices::U8(v) => v.len(),
         Indices::U16(v) => 2 * v.len(),
@@ -99,10 +101,10 @@ pub(crate) fn model_bytes(model: &Model) -> u64 {
     };
     let Escapes { gaussians, rows } = codes.escapes();
     let escapes = size_of_val(gaussians.as_slice()) + size_of_val(rows.as_slice());
-    (geometry_bytes(&model.geometry) + codes.counts().len() + indices + values + escapes) as u64
+    (geometry_bytes(model.geometry()) + codes.counts().len() + indices + values + escapes) as u64
 }
 
 /// Bytes of the tensors of a packed file.
 pub(crate) fn packed_bytes(packed: &lexisplat::packed::Packed) -> u64 {
-    lexi::packed_tensor_bytes(packed).iter().filter(|t| t.0 != "header").map(|t| t.1).sum()
+    LexiWriter::packed(packed).attribute_bytes().iter().filter(|t| t.0 != "header").map(|t| t.1).sum()
 }

@@ -10,7 +10,8 @@ use crate::common::copies;
 use files::{
     HUGE, LARGE, as_ascii, as_ply, exact, model_bytes, packed, packed_bytes, rich, splats_bytes, two_chunks,
 };
-use lexisplat::lexi::{self, Contents, LexiChunks};
+use lexisplat::lexi::{self, LexiReader};
+use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlySource, ReadOptions};
 use lexisplat::{Error, Input, Layout, Limits, Result, Silent, SplatSource, stream};
 
@@ -39,19 +40,20 @@ fn lexi_whole(bytes: &[u8], limits: &Limits) -> Result<()> {
 }
 
 fn lexi_opened(bytes: &[u8], limits: &Limits) -> Result<()> {
-    lexi::open_bytes(NAME, bytes, limits).map(drop)
+    let reader = LexiReader::open(NAME, bytes, limits)?;
+    if reader.packed()?.is_none() { reader.model().map(drop) } else { Ok(()) }
 }
 
 fn lexi_parts(bytes: &[u8], limits: &Limits) -> Result<()> {
-    LexiChunks::open(NAME, bytes, limits)?.each(&mut |_, _| Ok(()))
+    LexiReader::open(NAME, bytes, limits)?.each(&mut |_, _| Ok(()))
 }
 
 fn lexi_surveyed(bytes: &[u8], limits: &Limits) -> Result<()> {
-    stream::survey(&LexiChunks::open(NAME, bytes, limits)?, &std::env::temp_dir()).map(drop)
+    stream::survey(&LexiReader::open(NAME, bytes, limits)?, &std::env::temp_dir()).map(drop)
 }
 
 fn lexi_decompressed(bytes: &[u8], limits: &Limits) -> Result<()> {
-    stream::decompress(&LexiChunks::open(NAME, bytes, limits)?, &mut std::io::sink(), &Silent).map(drop)
+    stream::decompress(&LexiReader::open(NAME, bytes, limits)?, &mut std::io::sink(), &Silent).map(drop)
 }
 
 fn dictionary(bytes: &[u8], limits: &Limits) -> Result<()> {
@@ -103,9 +105,9 @@ fn exact_layouts() {
     for layout in [Layout::F32, Layout::F16, Layout::Paper] {
         let bytes = exact(&rich(500, HUGE), layout);
         let model = lexi::read_bytes(NAME, &bytes, &Limits::default()).unwrap();
-        let (escapes, nonzeros) = (model.codes.escapes().gaussians.len(), model.codes.nonzeros());
+        let (escapes, nonzeros) = (model.codes().escapes().gaussians.len(), model.codes().nonzeros());
         assert!(escapes > 0 && nonzeros > 100, "{layout}: {escapes} escapes, {nonzeros} nonzeros");
-        let most = model.codes.counts().iter().copied().max().unwrap();
+        let most = model.codes().counts().iter().copied().max().unwrap();
         let header = u64::from_le_bytes(*bytes.first_chunk().unwrap());
         for reader in LEXI.into_iter().chain([(".lexi, opened", lexi_opened as Reader)]) {
             at_least(500, "gaussians", reader, &bytes);
@@ -120,14 +122,16 @@ fn exact_layouts() {
     }
 }
 
+fn opened(bytes: &[u8]) -> Packed {
+    LexiReader::open(NAME, bytes, &Limits::default()).unwrap().packed().unwrap().unwrap()
+}
+
 fn packed_layout(bytes: &[u8]) {
-    let Contents::Packed(opened) = lexi::open_bytes(NAME, bytes, &Limits::default()).unwrap() else {
-        panic!("not packed")
-    };
+    let opened = opened(bytes);
     let model = opened.unpack().unwrap();
-    assert!(!model.codes.escapes().gaussians.is_empty() && model.codes.nonzeros() > model.len() / 2);
+    assert!(!model.codes().escapes().gaussians.is_empty() && model.codes().nonzeros() > model.len() / 2);
     let (n, own, held) = (model.len() as u64, packed_bytes(&opened), model_bytes(&model));
-    let most = model.codes.counts().iter().copied().max().unwrap();
+    let most = model.codes().counts().iter().copied().max().unwrap();
     let header = u64::from_le_bytes(*bytes.first_chunk().unwrap());
     for reader in LEXI {
         // A whole scene is held beside what it is made of.
@@ -152,20 +156,13 @@ fn packed_layout(bytes: &[u8]) {
 fn opened_before(bytes: &[u8]) {
     for (name, enough) in [("gaussians", 500), ("atoms", 8), ("nonzeros", 9), ("bytes", 1 << 20)] {
         let read = |limit| {
-            let mut limits = Limits::default();
-            let Contents::Packed(mut packed) = lexi::open_bytes(NAME, bytes, &limits).unwrap() else {
-                panic!("not packed")
-            };
-            assert_eq!(packed.limits, limits);
-            limits = limits.with(name, limit).unwrap();
-            packed.limits = limits;
-            (lexi::unpack(NAME, &packed), packed.unpack(), packed.stream_bits().map(drop))
+            let packed = opened(bytes).with_limits(Limits::default().with(name, limit).unwrap());
+            (packed.unpack(), packed.stream_bits().map(drop))
         };
-        let (named, unnamed, bits) = read(enough);
-        assert!(named.is_ok() && unnamed.is_ok() && bits.is_ok(), "{name}");
-        let (named, unnamed, bits) = read(0);
-        assert!(named.unwrap_err().to_string().contains(NAME), "{name}");
-        assert!(unnamed.unwrap_err().to_string().contains("the packed scene"), "{name}");
+        let (model, bits) = read(enough);
+        assert!(model.is_ok() && bits.is_ok(), "{name}");
+        let (model, bits) = read(0);
+        assert!(model.unwrap_err().to_string().contains(NAME), "{name}");
         assert!(matches!(bits, Err(Error::Limit { .. })), "{name}");
     }
 }
@@ -237,7 +234,7 @@ fn limits_hold_for_every_reader() {
     opened_before(&small);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("d.lexi");
-    lexi::write_dictionary(&path, &lexi::read_bytes(NAME, &small, &Limits::default()).unwrap().dictionary)
+    lexi::write_dictionary(&path, lexi::read_bytes(NAME, &small, &Limits::default()).unwrap().dictionary())
         .unwrap();
     at_least(8, "atoms", ("dictionary", dictionary), &std::fs::read(&path).unwrap());
     refused_before_allocation();

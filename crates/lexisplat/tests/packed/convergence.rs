@@ -1,6 +1,7 @@
 //! The finer the steps, the nearer the scene and the larger the file.
 
-use lexisplat::{Geometry, lexi};
+use lexisplat::Geometry;
+use lexisplat::lexi::LexiWriter;
 
 use super::support::{
     distance, options, pack, returned, root_mean_square, row_errors, sample, size, with_extras,
@@ -76,9 +77,12 @@ fn finer_steps_mean_smaller_errors_and_larger_files() {
                 all.map(|i| distance_of(&covariance(a, i), &covariance(b, i)) / size(&splats, i).powi(2)),
             ),
             root_mean_square(row_errors(&splats, &back).into_iter()),
-            -(lexi::packed_bytes(&packed) as f64),
+            -(LexiWriter::packed(&packed).file_bytes() as f64),
         ];
-        assert!((now[4] - packed.record.rms_residual).abs() < 1e-9 * now[4], "the file says so itself");
+        assert!(
+            (now[4] - packed.head().record().rms_residual).abs() < 1e-9 * now[4],
+            "the file says so itself"
+        );
         assert!(report.escapes == 0 && report.mean_nonzeros <= 45.0);
         if let Some(last) = last {
             let falls = now.iter().zip(&last).all(|(now, last)| now < last);

@@ -23,7 +23,7 @@ fn copies_of_one_gaussian_come_back_alike() {
     // Predictions differ in their last bits, so the copies do too.
     assert!(g.scales.iter().all(|s| distance(s, &g.scales[0]) < 1e-3));
     let (packed, _) = pack(&splats, STEP, &PackOptions::default());
-    let each = packed.data.len() as f64 / 1000.0;
+    let each = packed.data().len() as f64 / 1000.0;
     assert!(each < 6.0, "{each} bytes for each copy, which says nothing new but a rotation");
 }
 
@@ -43,7 +43,10 @@ fn no_view_dependence_takes_no_codes() {
     let (splats, back) = changed(500, |s| s.sh_rest.fill(0.0));
     assert!(back.sh_rest.iter().all(|&v| v == 0.0));
     let (packed, report) = pack(&splats, STEP, &PackOptions::default());
-    assert_eq!((packed.atoms, report.mean_nonzeros, packed.record.max_residual), (1, 0.0, 0.0));
+    assert_eq!(
+        (packed.head().atoms(), report.mean_nonzeros, packed.head().record().max_residual),
+        (1, 0.0, 0.0)
+    );
 }
 
 /// 0.9999 is the most that is kept apart from opaque; what is too faint to see is as good as 1e-9.

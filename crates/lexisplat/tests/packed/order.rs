@@ -36,7 +36,7 @@ fn a_kept_order_is_that_of_the_source() {
     }
     let worst = row_errors(&splats, &back).into_iter().fold(0.0, f64::max);
     assert!(worst < 0.5, "{worst}: codes belong to others");
-    assert!(!packed.order.unwrap().is_sorted(), "a scene already sorted would prove nothing");
+    assert!(!packed.order().unwrap().is_sorted(), "a scene already sorted would prove nothing");
 }
 
 #[test]
@@ -44,8 +44,8 @@ fn without_the_order_the_same_gaussians_come_back() {
     let splats = scene();
     let (kept, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
     let (free, _) = pack(&splats, STEP, &options(|_| ()));
-    assert_eq!((&kept.data, &kept.tables), (&free.data, &free.tables), "the order is beside the streams");
-    let order = kept.order.clone().unwrap();
+    assert_eq!((kept.data(), kept.head()), (free.data(), free.head()), "the order is beside the streams");
+    let order = kept.order().unwrap().to_vec();
     let (kept, free) = (kept.unpack().unwrap().into_splats(), free.unpack().unwrap().into_splats());
     let mut seen = vec![false; splats.len()];
     for (k, &source) in order.iter().enumerate() {

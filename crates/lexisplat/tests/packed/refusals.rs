@@ -1,9 +1,11 @@
 //! What cannot be packed or unpacked is refused, and the error names it.
 
+use lexisplat::lexi::{self, LexiReader};
 use lexisplat::packed::{PackOptions, Packed, Packer};
-use lexisplat::{Error, Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat::{Error, Limits, Sensitivity, Silent, Splats};
 
 use super::support::{STEP, bytes, options, pack, sample, with_extras};
+use crate::parts::Parts;
 
 fn refused(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> String {
     let error = Packer::new(splats, sensitivity, options).unwrap_err();
@@ -42,8 +44,8 @@ fn the_most_atoms_there_may_be_work() {
     let splats = sample(600, 53, 1);
     for atoms in [1, 256, 257, 1024] {
         let (packed, _) = pack(&splats, STEP, &options(|o| o.atoms = Some(atoms)));
-        assert!((1..=atoms).contains(&packed.atoms));
-        assert_eq!(packed.unpack().unwrap().dictionary.len(), packed.atoms);
+        assert!((1..=atoms).contains(&packed.head().atoms()));
+        assert_eq!(packed.unpack().unwrap().dictionary().len(), packed.head().atoms());
     }
 }
 
@@ -109,40 +111,59 @@ fn values_too_large_to_decode_are_refused() {
     run(|s| s.geometry.dc[3] = [1e30; 3]).unwrap();
 }
 
+fn set(parts: &mut Parts, key: &str, value: &str) {
+    parts.metadata.insert(key.to_owned(), value.into());
+}
+
+fn cut(parts: &mut Parts, name: &str, bytes: usize) {
+    let tensor = parts.tensor(name).unwrap();
+    tensor.truncate(tensor.len() - bytes);
+}
+
+fn words<'a>(parts: &'a mut Parts, name: &str) -> &'a mut [[u8; 4]] {
+    parts.tensor(name).unwrap().as_chunks_mut().0
+}
+
 #[test]
 fn a_packed_scene_changed_by_hand_is_refused() {
-    let splats = with_extras(sample(200, 57, 2));
-    let (good, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
-    type Change = fn(&mut Packed);
-    let changes: [(&str, Change); 14] = [
-        ("order", |p| _ = p.order.as_mut().unwrap().pop()),
-        ("order", |p| p.order.as_mut().unwrap().push(200)),
-        ("order", |p| p.order.as_mut().unwrap()[3] = 200),
-        ("order", |p| p.order.as_mut().unwrap()[3] = p.order.as_ref().unwrap()[4]),
-        ("parameters", |p| _ = p.parameters.pop()),
-        ("parameters", |p| p.parameters[0] = f32::NAN),
-        ("tables", |p| _ = p.tables.pop()),
-        ("lengths", |p| p.lengths[0] += 1),
-        ("lengths", |p| _ = p.data.pop()),
-        ("lengths", |p| p.gaussians = 0),
-        ("chunk 0", |p| p.gaussians -= 1),
-        ("dictionary", |p| p.atoms = 0),
-        ("dictionary", |p| p.degree = ShDegree::ZERO),
-        ("extra", |p| p.extras[0].values = lexisplat::ExtraValues::U8(vec![0; 199])),
+    let splats = sample(200, 57, 2);
+    let (good, _) = pack(&with_extras(splats.clone()), STEP, &options(|o| o.keep_order = true));
+    let (plain, _) = pack(&splats, STEP, &options(|_| ()));
+    type Change = fn(&mut Parts);
+    let changes: [(&Packed, &str, Change); 14] = [
+        (&good, "order", |p| cut(p, "packed.order", 4)),
+        (&good, "order", |p| p.tensor("packed.order").unwrap().extend([200, 0, 0, 0])),
+        (&good, "order", |p| words(p, "packed.order")[3] = [200, 0, 0, 0]),
+        (&good, "order", |p| words(p, "packed.order")[3] = words(p, "packed.order")[4]),
+        (&good, "parameters", |p| cut(p, "packed.parameters", 4)),
+        (&good, "parameters", |p| words(p, "packed.parameters")[0] = f32::NAN.to_le_bytes()),
+        (&good, "tables", |p| cut(p, "packed.tables", 1)),
+        (&good, "lengths", |p| words(p, "packed.lengths")[0][0] ^= 1),
+        (&good, "lengths", |p| cut(p, "packed.data", 1)),
+        (&plain, "lengths", |p| set(p, "gaussians", "0")),
+        (&plain, "chunk 0", |p| set(p, "gaussians", "199")),
+        (&plain, "dictionary", |p| set(p, "atoms", "0")),
+        (&plain, "dictionary", |p| set(p, "degree", "0")),
+        (&good, "extra", |p| cut(p, "extra.label", 1)),
     ];
-    for (name, change) in changes {
-        let mut packed = good.clone();
-        change(&mut packed);
-        let error = packed.unpack().unwrap_err();
-        assert!(error.to_string().contains(name), "{name}: {error}");
+    for (packed, name, change) in changes {
+        let mut parts = Parts::of(&bytes(packed));
+        change(&mut parts);
+        parts.fit_shapes();
+        let error = lexi::read_bytes("p.lexi", &parts.sealed(), &Limits::default()).unwrap_err();
+        let said = error.to_string();
+        assert!(matches!(error, Error::Format { .. }) && said.starts_with("p.lexi: "), "{name}: {said}");
+        assert!(said.contains(name), "{name}: {said}");
     }
-    assert_eq!(good.unpack().unwrap().len(), 200);
+    let unchanged = Parts::of(&bytes(&good)).sealed();
+    assert_eq!(lexi::read_bytes("p.lexi", &unchanged, &Limits::default()).unwrap(), good.unpack().unwrap());
 }
 
 #[test]
 fn more_gaussians_than_a_file_can_hold_are_refused_before_decoding() {
-    let (mut packed, _) = pack(&sample(50, 58, 1), STEP, &PackOptions::default());
-    packed.gaussians = 4 * bytes(&packed).len();
-    let error = lexi::open_bytes("p.lexi", &bytes(&packed), &Limits::default()).unwrap_err();
+    let (packed, _) = pack(&sample(50, 58, 1), STEP, &PackOptions::default());
+    let mut parts = Parts::of(&bytes(&packed));
+    set(&mut parts, "gaussians", &(4 * bytes(&packed).len()).to_string());
+    let error = LexiReader::open("p.lexi", parts.sealed(), &Limits::default()).unwrap_err();
     assert!(matches!(error, Error::Limit { .. }), "{error}");
 }

@@ -1,7 +1,8 @@
 //! Small packed files of every kind.
 
+use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, TargetRecord};
-use lexisplat::{Extra, ExtraValues, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat::{Extra, ExtraValues, Sensitivity, ShDegree, Silent, Splats};
 use lexisplat_sample::{SampleOptions, scene};
 
 use crate::common;
@@ -16,10 +17,9 @@ fn packed(
     change(&mut options);
     let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
-    let (mut packed, _) = packer.pack(step, &Silent).unwrap();
-    packed.target = promise;
+    let (packed, _) = packer.pack(step, &Silent).unwrap();
     let mut bytes = Vec::new();
-    lexi::write_packed(&mut bytes, &packed).unwrap();
+    LexiWriter::packed(&packed.with_target(promise)).write(&mut bytes, &Silent).unwrap();
     bytes
 }
 

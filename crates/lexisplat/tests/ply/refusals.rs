@@ -255,7 +255,7 @@ fn names_that_cannot_be_written_are_not_read() {
 fn a_scene_of_the_other_kind_is_named() {
     let mut lexi = Vec::new();
     let (model, _) = lexisplat::compress(scene(1, 10, 0), &CompressOptions::default(), &Silent).unwrap();
-    lexi::write_to(&mut lexi, &model).unwrap();
+    lexi::write(&mut lexi, &model).unwrap();
     assert_eq!(refuse(&lexi), "t.ply: this is a .lexi, not a PLY");
     let said = lexi::read_bytes("t.lexi", &good().bytes(), &Limits::default()).unwrap_err();
     assert_eq!(said.to_string(), "t.lexi: this is a PLY, not a .lexi");

@@ -4,10 +4,10 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::lexi::{self, LexiChunks};
+use lexisplat::Record;
+use lexisplat::lexi::{self, LexiReader};
 use lexisplat::packed::{StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
-use lexisplat::{Layout, Record};
 use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use lexisplat_eval::text;
 use serde::Serialize;
@@ -26,6 +26,7 @@ const TOP_ATOMS: usize = 8;
 #[derive(Serialize)]
 pub(super) struct LexiFacts<'a> {
     version: u64,
+    layout: &'static str,
     #[serde(flatten)]
     made: RecordReport,
     atoms: usize,
@@ -61,24 +62,25 @@ struct PackedFacts<'a> {
 }
 
 /// Bytes of each part of the file by name.
-pub(super) fn parts(lexi: &LexiChunks<'_>, survey: &Survey) -> Vec<(String, f64)> {
+pub(super) fn parts(lexi: &LexiReader<'_>, survey: &Survey) -> Vec<(String, f64)> {
     part_bytes(lexi.attribute_bytes(), &survey.stream_bits)
 }
 
 impl<'a> LexiFacts<'a> {
-    pub(super) fn new(lexi: &'a LexiChunks<'_>, survey: &'a Survey, parts: &'a [(String, f64)]) -> Self {
+    pub(super) fn new(lexi: &'a LexiReader<'_>, survey: &'a Survey, parts: &'a [(String, f64)]) -> Self {
         let (record, gaussians) = (lexi.record(), lexi.len());
         let each = |value: f64| value / gaussians.max(1) as f64;
         let streams = &survey.stream_bits;
-        let packed = (record.layout == Layout::Packed).then(|| PackedFacts {
-            promise: lexi.target(),
-            device: lexi.device().unwrap_or(CPU),
+        let packed = lexi.packed_head().map(|head| PackedFacts {
+            promise: head.target(),
+            device: head.device().unwrap_or(CPU),
             order_kept: lexi.order_kept(),
             stream_bits_per_gaussian: streams.iter().map(|s| (s.name.as_str(), each(s.bits))).collect(),
             streams,
         });
         Self {
             version: if packed.is_some() { lexi::PACKED_VERSION } else { lexi::VERSION },
+            layout: lexi.layout().name(),
             made: record.into(),
             atoms: lexi.dictionary().len(),
             nonzeros: survey.nonzeros,
@@ -102,8 +104,7 @@ impl<'a> LexiFacts<'a> {
     }
 
     pub(super) fn text(&self, out: &mut String) -> Result<()> {
-        let Self { version, made, atoms, packed, escapes, .. } = self;
-        let layout = made.layout;
+        let Self { version, layout, made, atoms, packed, escapes, .. } = self;
         let how = match (packed, made.pursuit) {
             (Some(packed), _) if packed.order_kept => ", order of the source kept".to_owned(),
             (Some(_), _) => ", order of the source not kept".to_owned(),

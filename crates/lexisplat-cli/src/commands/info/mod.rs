@@ -5,7 +5,7 @@ mod codes;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::lexi::LexiChunks;
+use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::{FileKind, SplatSource as _, Splats, stream};
@@ -26,11 +26,12 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
     if FileKind::of(&name, &bytes) == FileKind::Lexi {
-        let lexi = LexiChunks::open(&name, &bytes, &limits)?;
+        let lexi = LexiReader::open(&name, &bytes, &limits)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let parts = codes::parts(&lexi, &survey);
         let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
-        return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: lexi_facts }).print(common);
+        return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: Box::new(lexi_facts) })
+            .print(common);
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let ply = PlySource::open(&name, &bytes, &read, &bars)?;
@@ -60,7 +61,7 @@ struct Facts<'a> {
 #[serde(tag = "kind", rename_all = "lowercase")]
 enum Kind<'a> {
     Ply { ply: &'a PlySummary, warnings: &'a [String] },
-    Lexi { lexi: LexiFacts<'a> },
+    Lexi { lexi: Box<LexiFacts<'a>> },
 }
 
 impl<'a> Facts<'a> {

@@ -68,7 +68,7 @@ fn chunks_are_whole_blocks_within_the_limit() {
 fn a_later_block_that_fits_nowhere_is_refused() {
     let block = GROUP as usize;
     let splats = made::scene(5, 2 * block, ShDegree::THREE, false);
-    let mut model = made::model_of(splats, 20, true);
+    let (geometry, meta, dictionary, _, record) = made::model_of(splats, 20, true).into_parts();
     // All of the second block escapes.
     let mut escapes = lexisplat::Escapes::default();
     for i in block..2 * block {
@@ -77,7 +77,8 @@ fn a_later_block_that_fits_nowhere_is_refused() {
     }
     let none = (lexisplat::Indices::U8(Vec::new()), lexisplat::Values::F16(Vec::new()));
     let counts = vec![0; 2 * block];
-    model.codes = lexisplat::SparseCodes::new(&model.dictionary, counts, none.0, none.1, escapes).unwrap();
+    let codes = lexisplat::SparseCodes::new(&dictionary, counts, none.0, none.1, escapes).unwrap();
+    let model = lexisplat::Model::new(geometry, meta, dictionary, codes, record).unwrap();
     let source = ShData::Codes(&model);
     let escaped = (block + 20) as u64 * ROW;
     assert_eq!(source.chunks(2 * block, escaped).unwrap().len(), 1);

@@ -37,7 +37,7 @@ fn compare(gpu: &Gpu, model: &Model, path: ShPath, degree: ShDegree) -> (f32, us
     let mut escaped = 0;
     for (&i, found) in gaussians.iter().zip(colours.chunks_exact(3)).take(stats.visible as usize) {
         let i = i as usize;
-        let offset: [f32; 3] = std::array::from_fn(|k| model.geometry.positions[i][k] - camera.position[k]);
+        let offset: [f32; 3] = std::array::from_fn(|k| model.geometry().positions[i][k] - camera.position[k]);
         let length = offset.iter().map(|v| v * v).sum::<f32>().sqrt();
         let expected = radiance.colour(i, offset.map(|v| v / length));
         for (found, expected) in found.iter().zip(expected) {
@@ -64,7 +64,7 @@ fn every_path_colours_as_the_processor() {
             let model = made::model(degree, atoms, half);
             for path in ShPath::ALL {
                 if path == ShPath::SparseShared
-                    && size_of_val(model.dictionary.as_slice()) + 64
+                    && size_of_val(model.dictionary().as_slice()) + 64
                         > gpu.limits().max_compute_workgroup_storage_size as usize
                 {
                     let refused = GpuScene::new(&gpu, &Scene::from(&model), path);

@@ -83,7 +83,7 @@ fn every_radiance_is_portable() {
             let model = made::model(degree, atoms, half);
             for path in ShPath::ALL.into_iter().filter(|path| path.is_sparse()) {
                 let text = radiance_text(&ShData::Codes(&model), path);
-                let own = size_of_val(model.dictionary.as_slice()).max(4).next_multiple_of(16) as u32;
+                let own = size_of_val(model.dictionary().as_slice()).max(4).next_multiple_of(16) as u32;
                 let most = if path == ShPath::SparseShared { own } else { MOST_SHARED };
                 let name = format!("{}, {degree}, {atoms} atoms, half {half}", path.name());
                 assert_eq!(check(&name, &text, most), ["radiance"]);

@@ -4,14 +4,16 @@ use std::path::Path;
 
 use safetensors::Dtype;
 
+use super::checked::Checked;
 use super::exact::refuse_unknown;
-use super::read;
+use super::fields;
+use super::layout::Layout;
 use super::schema::{DICTIONARY_FORMAT, FORMAT, IGNORED_PREFIX, VERSION, key, tensor};
-use super::tensors::{Checked, Draft, Tensor, preamble};
+use super::tensors::{Source, Tensor, preamble};
+use super::write::LexiWriter;
 use crate::packed::Decoder;
 use crate::scene::sh::ShDegree;
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::Layout;
 use crate::support::error::{Error, Result};
 use crate::support::input::Input;
 use crate::support::limits::Limits;
@@ -32,18 +34,16 @@ pub fn read_dictionary(path: &Path, limits: &Limits) -> Result<Dictionary> {
 /// # Errors
 /// As [`read_dictionary`].
 pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Dictionary> {
-    let checked = Checked::open(file, bytes, &[DICTIONARY_FORMAT, FORMAT], limits)?;
-    let degree = ShDegree::new(checked.number(key::DEGREE)?)
-        .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))?;
+    let checked = Checked::open(file.to_owned(), Box::new(bytes), &[DICTIONARY_FORMAT, FORMAT], limits)?;
+    let degree = fields::degree(&checked)?;
     if degree == ShDegree::ZERO {
         return Err(checked.malformed("a scene of SH degree 0 has no dictionary"));
     }
     if checked.text(key::FORMAT)? == FORMAT {
-        let layout = read::layout(&checked)?;
+        let layout = fields::layout(&checked)?;
         if layout == Layout::Packed {
-            let head = super::packed::head(&checked, bytes.len() as u64, limits)?;
-            let decoder = Decoder::new(&head, file, super::packed::data(&checked)?);
-            return Ok(decoder.map_err(|e| e.of_file(file))?.dictionary);
+            let head = super::packed::head(&checked, limits)?;
+            return Ok(Decoder::new(&head, super::packed::data(&checked)?)?.dictionary);
         }
         refuse_unknown(&checked, layout, degree)?;
     } else {
@@ -54,7 +54,7 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
             return Err(checked.malformed(format!("tensor '{name}' is not known in a dictionary")));
         }
     }
-    read::dictionary(&checked, degree, limits)
+    fields::dictionary(&checked, degree, limits)
 }
 
 /// Writes `dictionary`. Returns the number of bytes.
@@ -68,6 +68,7 @@ pub fn write_dictionary<'a>(sink: impl Into<Sink<'a>>, dictionary: &Dictionary) 
     let mut metadata = preamble(DICTIONARY_FORMAT, VERSION);
     metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
-    let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());
-    Draft::new(metadata, vec![tensor]).save(sink.into(), &Silent)
+    let atoms = Source::of(dictionary.as_slice());
+    let tensor = Tensor::new(tensor::DICTIONARY, Dtype::F32, &shape, atoms);
+    LexiWriter::new(metadata, vec![tensor]).write(sink, &Silent)
 }

@@ -1,54 +1,56 @@
-//! The layouts `f32`, `f16` and `paper`, read whole or a part at a time.
+//! Reading the layouts `f32`, `f16` and `paper`, whole or a part at a time.
 
 use std::ops::Range;
 
 use half::f16;
 use safetensors::Dtype;
 
-use super::read::{degree, dictionary, extras, meta, record};
+use super::checked::Checked;
+use super::fields::{degree, dictionary, extras, layout, meta, record};
+use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, tensor};
-use super::tensors::Checked;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Layout, Record};
+use crate::sparse::model::{Model, Record};
+use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 
-/// Gaussians between two offsets into the codes that are kept, and looked at together when a file is opened.
+/// Gaussians between two offsets into the codes that are kept. Opening a file reads as many at a time.
 const BLOCK: usize = 65_536;
 
-/// A file of which everything was looked at but the codes themselves.
+/// An exact file in which everything is checked except the codes themselves.
 #[derive(Debug)]
 pub(super) struct Exact<'a> {
-    checked: Checked<'a>,
+    pub(super) checked: Checked<'a>,
     gaussians: usize,
+    layout: Layout,
     pub(super) record: Record,
     pub(super) meta: SceneMeta,
     pub(super) dictionary: Dictionary,
-    pub(super) normals: bool,
-    pub(super) nonzeros: usize,
-    pub(super) escapes: usize,
+    normals: bool,
+    nonzeros: usize,
+    escapes: usize,
     /// Nonzeros before each [`BLOCK`] of Gaussians.
     offsets: Vec<usize>,
-    file_bytes: u64,
     limits: Limits,
 }
 
 impl<'a> Exact<'a> {
-    /// `checked` is a file of `file_bytes`.
-    pub(super) fn open(checked: Checked<'a>, file_bytes: u64, limits: &Limits) -> Result<Self> {
-        let n = match checked.view(tensor::POSITION)?.shape() {
+    /// Checks everything in `checked` except the codes themselves.
+    pub(super) fn open(checked: Checked<'a>, limits: &Limits) -> Result<Self> {
+        let n = match checked.view(tensor::POSITION)?.shape {
             [n, 3] => *n,
             shape => {
                 return Err(checked.malformed(format!("tensor 'position' has shape {shape:?}, not [N, 3]")));
             }
         };
-        limits.check_gaussians(checked.file, n as u64)?;
-        let (degree, record) = (degree(&checked)?, record(&checked)?);
-        refuse_unknown(&checked, record.layout, degree)?;
+        limits.check_gaussians(&checked.file, n as u64)?;
+        let (degree, layout, record) = (degree(&checked)?, layout(&checked)?, record(&checked)?);
+        refuse_unknown(&checked, layout, degree)?;
         let normals = checked.has(tensor::NORMAL);
         all_finite(&checked, n, normals)?;
         extras(&checked, n, &(0..0))?;
@@ -60,8 +62,8 @@ impl<'a> Exact<'a> {
             nonzeros: 0,
             escapes: 0,
             offsets: Vec::new(),
-            file_bytes,
             limits: *limits,
+            layout,
             record,
             checked,
         };
@@ -71,16 +73,16 @@ impl<'a> Exact<'a> {
         Ok(exact)
     }
 
-    /// Reads the dictionary and whatever says where codes are.
+    /// Reads the dictionary and checks everything that says where codes are.
     fn validate_codes(&mut self, degree: ShDegree) -> Result<()> {
         let n = self.gaussians;
         let checked = &self.checked;
         self.dictionary = dictionary(checked, degree, &self.limits)?;
-        self.nonzeros = match checked.view(tensor::VALUES)?.shape() {
+        self.nonzeros = match checked.view(tensor::VALUES)?.shape {
             [nonzeros] => *nonzeros,
             shape => return Err(checked.malformed(format!("tensor 'codes.values' has shape {shape:?}"))),
         };
-        let paper = self.record.layout == Layout::Paper;
+        let paper = self.layout == Layout::Paper;
         if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
         }
@@ -90,12 +92,12 @@ impl<'a> Exact<'a> {
             offsets.push(total);
             let counts = self.counts(start..n.min(start + BLOCK))?;
             if let Some(k) = counts.iter().position(|&c| u64::from(c) > self.limits.nonzeros) {
-                self.limits.check_nonzeros(checked.file, start + k, counts[k].into())?;
+                self.limits.check_nonzeros(&checked.file, start + k, counts[k].into())?;
             }
             total = counts.iter().fold(total, |sum, &c| sum.saturating_add(usize::from(c)));
         }
         self.offsets = offsets;
-        // Types and shapes too are as they should be, also where there is nothing to read.
+        // Types and shapes must be right even if there is nothing to read.
         self.counts(0..0)?;
         self.read_codes(0..0)?;
         let checked = &self.checked;
@@ -107,7 +109,7 @@ impl<'a> Exact<'a> {
         if !checked.has(tensor::ESCAPED) {
             return Ok(());
         }
-        self.escapes = match checked.view(tensor::ESCAPED)?.shape() {
+        self.escapes = match checked.view(tensor::ESCAPED)?.shape {
             [count] => *count,
             shape => return Err(checked.malformed(format!("tensor 'escapes.gaussians' has shape {shape:?}"))),
         };
@@ -132,18 +134,18 @@ impl<'a> Exact<'a> {
         self.gaussians
     }
 
-    /// Names and types of extras, without values.
-    pub(super) fn extras(&self) -> Result<Vec<crate::scene::splats::Extra>> {
-        extras(&self.checked, self.gaussians, &(0..0))
+    /// Whether the file holds normals.
+    pub(super) fn has_normals(&self) -> bool {
+        self.normals
     }
 
-    /// What to say when the order of the source is asked for.
-    pub(super) fn no_order(&self) -> Error {
-        self.checked.malformed("only packed files keep an order; this one is in that of its source")
+    /// Gaussians `range`. Escapes are numbered from its start.
+    pub(super) fn part(&self, range: Range<usize>) -> Result<Model> {
+        let (geometry, codes) = self.geometry_and_codes(range)?;
+        Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
     }
 
-    /// Geometry and codes of Gaussians `range`; escapes are numbered from its start.
-    pub(super) fn part(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
+    fn geometry_and_codes(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
         let (checked, n) = (&self.checked, self.gaussians);
         let budget = self.budget_for_geometry(range.len())?;
         let geometry = Geometry {
@@ -159,10 +161,7 @@ impl<'a> Exact<'a> {
             extras: extras(checked, n, &range)?,
         };
         if self.dictionary.is_empty() {
-            let none = match self.record.layout {
-                Layout::F16 => Values::F16(Vec::new()),
-                _ => Values::F32(Vec::new()),
-            };
+            let none = Values::empty(self.layout.values());
             let (counts, indices) = (vec![0; range.len()], Indices::for_atoms(0));
             let codes = SparseCodes::new(&self.dictionary, counts, indices, none, Escapes::default())?;
             return Ok((geometry, codes));
@@ -183,24 +182,25 @@ impl<'a> Exact<'a> {
         Ok((geometry, codes))
     }
 
-    /// What is left once there is room for all of `count` Gaussians but their codes.
+    /// What the limits leave for codes after everything else of `count` Gaussians.
     fn budget_for_geometry(&self, count: usize) -> Result<MemoryBudget<'_>> {
         let normals = if self.normals { 3 * size_of::<f32>() } else { 0 };
-        let extras = self.extras()?.iter().map(|e| e.values.width()).sum::<usize>();
-        let budget = MemoryBudget::new(&self.limits, self.checked.file, self.file_bytes);
+        let extras = extras(&self.checked, self.gaussians, &(0..0))?;
+        let extras = extras.iter().map(|e| e.values.width()).sum::<usize>();
+        let budget = MemoryBudget::new(&self.limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(count, GEOMETRY_BYTES + COUNT_BYTES + normals + extras)?;
         Ok(budget)
     }
 
     /// Bytes of a value in memory.
     fn value_width(&self) -> usize {
-        if self.record.layout == Layout::F16 { size_of::<f16>() } else { size_of::<f32>() }
+        if self.layout.values() == ValueType::F16 { size_of::<f16>() } else { size_of::<f32>() }
     }
 
     /// Nonzeros of Gaussians `range`.
     fn counts(&self, range: Range<usize>) -> Result<Vec<u8>> {
         let (checked, n) = (&self.checked, self.gaussians);
-        if self.record.layout != Layout::Paper {
+        if self.layout != Layout::Paper {
             return checked.part(tensor::COUNTS, Dtype::U8, &[n], &range);
         }
         let ends = range.start..range.end + 1;
@@ -214,7 +214,7 @@ impl<'a> Exact<'a> {
     /// Nonzeros `range` of all.
     fn read_codes(&self, range: Range<usize>) -> Result<(Indices, Values)> {
         let (checked, all) = (&self.checked, [self.nonzeros]);
-        let values = if self.record.layout == Layout::F16 {
+        let values = if self.layout.values() == ValueType::F16 {
             let bits: Vec<u16> = checked.part(tensor::VALUES, Dtype::F16, &all, &range)?;
             Values::F16(bits.into_iter().map(f16::from_bits).collect())
         } else {
@@ -222,7 +222,7 @@ impl<'a> Exact<'a> {
         };
         let small = matches!(Indices::for_atoms(self.dictionary.len()), Indices::U8(_));
         let bad = |i: i32| checked.malformed(format!("tensor 'codes.indices' holds {i}"));
-        let indices = match (self.record.layout, small) {
+        let indices = match (self.layout, small) {
             (Layout::Paper, _) => {
                 let wide: Vec<i32> = checked.part(tensor::INDICES, Dtype::I32, &all, &range)?;
                 let wide = wide.into_iter();
@@ -238,12 +238,12 @@ impl<'a> Exact<'a> {
         Ok((indices, values))
     }
 
-    /// Which Gaussians the escapes `range` are.
+    /// The Gaussians of escapes `range`.
     fn escaped(&self, range: Range<usize>) -> Result<Vec<u32>> {
         self.checked.part(tensor::ESCAPED, Dtype::U32, &[self.escapes], &range)
     }
 
-    /// Which of all escapes are of Gaussians `range`.
+    /// The escapes of Gaussians `range`.
     fn escaped_of(&self, range: &Range<usize>) -> Result<Range<usize>> {
         if self.escapes == 0 {
             return Ok(0..0);
@@ -273,7 +273,7 @@ impl<'a> Exact<'a> {
     }
 }
 
-/// Names and widths of what is drawn, in the order errors name them.
+/// Names and widths of the tensors of geometry, in the order in which errors name them.
 const GEOMETRY: [(&str, usize); 6] = [
     (tensor::POSITION, 3),
     (tensor::NORMAL, 3),
@@ -285,7 +285,7 @@ const GEOMETRY: [(&str, usize); 6] = [
 const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
 const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
 
-/// Refuses tensors that are not of this layout and may change what is drawn.
+/// Refuses tensors that this layout does not define and a reader must not ignore.
 pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDegree) -> Result<()> {
     let counts = if layout == Layout::Paper { tensor::POINTERS } else { tensor::COUNTS };
     let coded = degree != ShDegree::ZERO;
@@ -306,7 +306,7 @@ pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDe
     }
 }
 
-/// Refuses NaN and infinity in what is drawn. Extras may hold anything.
+/// Refuses NaN and infinity in geometry. Extras may hold anything.
 fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
     for (name, width) in GEOMETRY {
         if name == tensor::NORMAL && !normals {
@@ -333,7 +333,7 @@ fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
         }
         if let Some(first) = first {
             let problem = FormatError::NotFinite { count, first, property: name.to_owned() };
-            return Err(Error::format(checked.file, problem));
+            return Err(Error::format(&checked.file, problem));
         }
     }
     Ok(())

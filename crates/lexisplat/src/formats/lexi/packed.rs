@@ -1,52 +1,24 @@
-//! Packed scenes in the container: four tensors instead of one for each attribute.
-
-use std::collections::BTreeMap;
+//! Packed scenes in the container: a few tensors instead of one for each attribute.
 
 use safetensors::Dtype;
 
-use super::read::{degree, extras, meta, record};
-use super::schema::{EXTRA_PREFIX, FORMAT, IGNORED_PREFIX, PACKED_VERSION, key, tensor};
-use super::spilled::{Extras, write_tensors};
-use super::tensors::{Checked, Draft, Tensor, preamble};
-use super::write::{extra_tensors, put_record};
-use crate::packed::{CHUNK, Packed, TargetRecord};
+use super::checked::Checked;
+use super::fields::{degree, extras, meta, record};
+use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, key, tensor};
+use crate::packed::{CHUNK, Packed, PackedHead, TargetRecord};
 use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
-use crate::support::progress::{Progress, Silent};
-use crate::support::sink::Sink;
-use crate::support::spill::Spilled;
 
-/// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
-/// header is refused before anything is allocated.
+/// Largest number of Gaussians that a byte of a packed file can stand for: a rotation takes at least 3 raw
+/// bits. A header that claims more is refused before anything is allocated.
 const GAUSSIANS_PER_BYTE: u64 = 3;
 
-/// Writes `packed`. Returns the number of bytes.
-///
-/// # Errors
-/// [`crate::Error::Io`] for the sink.
-pub fn write_packed<'a>(sink: impl Into<Sink<'a>>, packed: &Packed) -> Result<u64> {
-    draft(packed).save(sink.into(), &Silent)
-}
-
-/// Bytes of the whole file as written.
-#[must_use]
-pub fn packed_bytes(packed: &Packed) -> u64 {
-    packed_tensor_bytes(packed).iter().map(|t| t.1).sum()
-}
-
-/// Bytes of each tensor as written, and of the header under `header`. They sum to the file's size.
-#[must_use]
-pub fn packed_tensor_bytes(packed: &Packed) -> Vec<(String, u64)> {
-    let (metadata, tensors) = contents(packed);
-    Draft::sizes(metadata, tensors)
-}
-
 /// The packed scene of a file whose checksums hold.
-pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
-    let head = head(checked, file_bytes, limits)?;
-    let n = head.gaussians;
-    let budget = MemoryBudget::new(limits, checked.file, file_bytes);
+pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
+    let head = head(checked, limits)?;
+    let n = head.len();
+    let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
     let lists = (head.parameters.len() + head.lengths.len(), size_of::<u32>());
     for (count, each) in [lists, (head.tables.len(), 1), (data(checked)?.len(), 1)] {
         budget.take(count, each)?;
@@ -60,29 +32,31 @@ pub(super) fn from_checked(checked: &Checked<'_>, file_bytes: u64, limits: &Limi
     } else {
         None
     };
-    Ok(Packed { extras: extras(checked, n, &(0..n))?, order, data: data(checked)?.to_vec(), ..head })
+    Ok(Packed::new(head, extras(checked, n, &(0..n))?, order, data(checked)?.to_vec()))
 }
 
 /// The data of a packed file.
-pub(super) fn data<'a>(checked: &Checked<'a>) -> Result<&'a [u8]> {
+pub(super) fn data<'a>(checked: &'a Checked<'_>) -> Result<&'a [u8]> {
     checked.data(tensor::DATA, Dtype::U8, &length(checked, tensor::DATA, Dtype::U8)?)
 }
 
 fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]> {
-    match checked.view(name)?.shape() {
+    match checked.view(name)?.shape {
         [len] => Ok([*len]),
         shape => Err(checked.malformed(format!("tensor '{name}' is {dtype:?} {shape:?}, not a list"))),
     }
 }
 
-/// Everything of a packed scene that is not as long as the scene; all is looked at.
-pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> Result<Packed> {
+/// Everything of a packed scene that is not as long as the scene. Everything is checked except what only
+/// decoding finds.
+pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead> {
+    let file_bytes = checked.bytes().len() as u64;
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
-    limits.check_gaussians(checked.file, gaussians)?;
+    limits.check_gaussians(&checked.file, gaussians)?;
     let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
     Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
     let atoms = checked.number(key::ATOMS)?;
-    limits.check_atoms(checked.file, atoms)?;
+    limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
     let mut known =
         vec![tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::HEADER_CHECKSUM];
@@ -106,27 +80,30 @@ pub(super) fn head(checked: &Checked<'_>, file_bytes: u64, limits: &Limits) -> R
     };
     extras(checked, gaussians, &(0..0))?;
     data(checked)?;
-    Ok(Packed {
+    Ok(PackedHead {
+        file: checked.file.clone(),
         degree: degree(checked)?,
         gaussians,
         atoms: usize::try_from(atoms).map_err(|_| checked.malformed("too many atoms"))?,
         atom_bits: checked.number(key::ATOM_BITS)?,
         record: record(checked)?,
         meta: meta(checked)?,
-        extras: Vec::new(),
-        order: None,
         target,
         device: checked.optional(key::DRAWN_ON)?,
-        parameters: checked.values(
-            tensor::PARAMETERS,
-            Dtype::F32,
-            &length(checked, tensor::PARAMETERS, Dtype::F32)?,
-        )?,
+        parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
-        tables: checked.values(tensor::TABLES, Dtype::U8, &length(checked, tensor::TABLES, Dtype::U8)?)?,
-        data: Vec::new(),
+        tables: list(checked, tensor::TABLES, Dtype::U8)?,
         limits: *limits,
     })
+}
+
+/// A tensor that is a list of any length.
+fn list<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+    checked: &Checked<'_>,
+    name: &str,
+    dtype: Dtype,
+) -> Result<Vec<T>> {
+    checked.values(name, dtype, &length(checked, name, dtype)?)
 }
 
 /// Whether the order names each of `n` Gaussians once.
@@ -143,69 +120,4 @@ fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
         *word |= bit;
     }
     Ok(true)
-}
-
-/// What of a packed scene is as long as the scene, set aside.
-#[derive(Debug)]
-pub(crate) struct SpilledPacked {
-    pub(crate) data: Spilled,
-    pub(crate) order: Option<Spilled>,
-    pub(crate) extras: Extras,
-}
-
-/// Writes the file of `head`, which lacks what is in `spilled`. Returns what [`packed_tensor_bytes`] does of
-/// the whole.
-pub(crate) fn write_spilled_packed(
-    head: &Packed,
-    spilled: SpilledPacked,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<Vec<(String, u64)>> {
-    let (metadata, mut tensors) = contents(head);
-    let n = head.gaussians;
-    let bytes = head.lengths.iter().map(|&l| l as usize).sum();
-    let data = Tensor::spilled(tensor::DATA, Dtype::U8, &[bytes], spilled.data);
-    tensors.retain(|t| t.name != tensor::DATA);
-    tensors.push(data);
-    if let Some(order) = spilled.order {
-        tensors.push(Tensor::spilled(tensor::ORDER, Dtype::U32, &[n], order));
-    }
-    tensors.extend(spilled.extras.tensors(n)?);
-    write_tensors(metadata, tensors, sink, progress)
-}
-
-fn draft(packed: &Packed) -> Draft<'_> {
-    let (metadata, tensors) = contents(packed);
-    Draft::new(metadata, tensors)
-}
-
-fn contents(packed: &Packed) -> (BTreeMap<String, String>, Vec<Tensor<'_>>) {
-    let mut metadata = preamble(FORMAT, PACKED_VERSION);
-    put_record(&mut metadata, packed.degree, &packed.record, &packed.meta);
-    let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
-    put(key::GAUSSIANS, packed.gaussians.to_string());
-    put(key::ATOMS, packed.atoms.to_string());
-    put(key::ATOM_BITS, packed.atom_bits.to_string());
-    if let Some(target) = &packed.target {
-        put(key::PROMISE, serde_json::to_string(target).unwrap_or_default());
-    }
-    if let Some(device) = &packed.device {
-        put(key::DRAWN_ON, device.clone());
-    }
-    (metadata, tensors(packed))
-}
-
-fn tensors(packed: &Packed) -> Vec<Tensor<'_>> {
-    let n = packed.gaussians;
-    let mut out = vec![
-        Tensor::plain(tensor::PARAMETERS, Dtype::F32, &[packed.parameters.len()], &packed.parameters),
-        Tensor::plain(tensor::LENGTHS, Dtype::U32, &[packed.lengths.len()], &packed.lengths),
-        Tensor::plain(tensor::TABLES, Dtype::U8, &[packed.tables.len()], &packed.tables),
-        Tensor::plain(tensor::DATA, Dtype::U8, &[packed.data.len()], &packed.data),
-    ];
-    if let Some(order) = &packed.order {
-        out.push(Tensor::plain(tensor::ORDER, Dtype::U32, &[n], order));
-    }
-    out.extend(extra_tensors(&packed.extras, n));
-    out
 }

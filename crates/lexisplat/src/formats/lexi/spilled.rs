@@ -1,27 +1,23 @@
-//! The file of an exact layout made part after part: its tensors are set aside until all sizes are known.
+//! An exact file made part after part: its arrays are spilled until all sizes are known.
 
-use std::collections::BTreeMap;
-
-use safetensors::Dtype;
-
-use super::schema::{EXTRA_PREFIX, FORMAT, VERSION, tensor};
-use super::tensors::{Draft, Tensor, preamble};
-use super::write::put_record;
-use crate::scene::splats::{ExtraValues, Geometry, SceneMeta, Splats, for_extra};
+use super::layout::{CodeLayout, Layout};
+use super::tensors::Source;
+use super::write::{
+    ExactTensors, as_bits, check_pointers, extra_tensor, paper_indices, paper_pointers, paper_values,
+};
+use crate::scene::source::SplatSource;
+use crate::scene::spilled::SpilledExtras;
+use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Indices, Values};
 use crate::sparse::compress::Coded;
-use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Layout, Record};
+use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
-use crate::support::limits::Limits;
-use crate::support::progress::Progress;
-use crate::support::sink::Sink;
 use crate::support::spill::{Spill, SpillTo};
 
-/// Geometry and codes set aside; byte for byte what [`write`](super::write()) makes of the whole model.
+/// Spilled geometry and codes.
 #[derive(Debug)]
 pub(crate) struct SpilledModel {
-    layout: Layout,
+    pub(super) layout: Layout,
     gaussians: usize,
     nonzeros: u64,
     escapes: usize,
@@ -31,8 +27,8 @@ pub(crate) struct SpilledModel {
     scale: Spill,
     rotation: Spill,
     normal: Option<Spill>,
-    extras: Extras,
-    /// Counts, or pointers in layout `paper`.
+    extras: SpilledExtras,
+    /// Counts, or the pointers of layout `paper`.
     counts: Spill,
     indices: Spill,
     values: Spill,
@@ -41,15 +37,20 @@ pub(crate) struct SpilledModel {
 }
 
 impl SpilledModel {
-    /// Nothing yet of a scene that is like `splats`.
-    pub(crate) fn new(to: SpillTo<'_>, splats: &Splats, normals: bool, layout: Layout) -> Result<Self> {
+    /// An empty one for the Gaussians of `source` and codes with `values`.
+    pub(crate) fn new(
+        to: SpillTo<'_>,
+        source: &dyn SplatSource,
+        codes: CodeLayout,
+        values: ValueType,
+    ) -> Result<Self> {
         let spill = || Spill::new(to);
         let mut counts = spill()?;
-        if layout == Layout::Paper {
+        if codes == CodeLayout::Paper {
             counts.push(&[0_i32])?;
         }
         Ok(Self {
-            layout,
+            layout: Layout::of(codes, values),
             gaussians: 0,
             nonzeros: 0,
             escapes: 0,
@@ -58,8 +59,8 @@ impl SpilledModel {
             opacity: spill()?,
             scale: spill()?,
             rotation: spill()?,
-            normal: if normals { Some(spill()?) } else { None },
-            extras: Extras::new(to, &splats.geometry)?,
+            normal: if source.has_normals() { Some(spill()?) } else { None },
+            extras: SpilledExtras::new(to, source.empty().geometry)?,
             counts,
             indices: spill()?,
             values: spill()?,
@@ -87,151 +88,48 @@ impl SpilledModel {
         let before = self.nonzeros;
         self.nonzeros += coded.indices.len() as u64;
         self.escapes += coded.escapes.gaussians.len();
-        match &coded.values {
-            Values::F16(v) => self.values.push(super::write::as_bits(v))?,
-            Values::F32(v) => self.values.push(v)?,
-        }
         self.escaped.push(&coded.escapes.gaussians)?;
         self.escape_rows.push(&coded.escapes.rows)?;
-        if self.layout != Layout::Paper {
-            match &coded.indices {
-                Indices::U8(v) => self.indices.push(v)?,
-                Indices::U16(v) => self.indices.push(v)?,
-            }
-            return self.counts.push(&coded.counts);
-        }
-        check_pointers(self.nonzeros)?;
-        let mut end = i32::try_from(before).unwrap_or(i32::MAX);
-        let pointers = coded.counts.iter().map(|&count| {
-            end += i32::from(count);
-            end
-        });
-        self.counts.push(&pointers.collect::<Vec<i32>>())?;
-        let indices: Vec<i32> = match &coded.indices {
-            Indices::U8(v) => v.iter().map(|&i| i32::from(i)).collect(),
-            Indices::U16(v) => v.iter().map(|&i| i32::from(i)).collect(),
-        };
-        self.indices.push(&indices)
-    }
-
-    /// Writes the file. Returns the bytes of each tensor and of the header, as
-    /// [`attribute_bytes`](super::attribute_bytes).
-    pub(crate) fn finish(
-        self,
-        dictionary: &Dictionary,
-        record: &Record,
-        meta: &SceneMeta,
-        sink: Sink<'_>,
-        progress: &dyn Progress,
-    ) -> Result<Vec<(String, u64)>> {
-        let mut metadata = preamble(FORMAT, VERSION);
-        put_record(&mut metadata, dictionary.degree(), record, meta);
-        let tensors = self.tensors(dictionary)?;
-        write_tensors(metadata, tensors, sink, progress)
-    }
-
-    fn tensors(self, dictionary: &Dictionary) -> Result<Vec<Tensor<'_>>> {
-        let n = self.gaussians;
-        let f32s = |name: &str, shape: &[usize], spill: Spill| -> Result<Tensor<'_>> {
-            Ok(Tensor::spilled(name, Dtype::F32, shape, spill.finish()?))
-        };
-        let mut out = vec![
-            f32s(tensor::POSITION, &[n, 3], self.position)?,
-            f32s(tensor::DC, &[n, 3], self.dc)?,
-            f32s(tensor::OPACITY, &[n], self.opacity)?,
-            f32s(tensor::SCALE, &[n, 3], self.scale)?,
-            f32s(tensor::ROTATION, &[n, 4], self.rotation)?,
-        ];
-        if let Some(normal) = self.normal {
-            out.push(f32s(tensor::NORMAL, &[n, 3], normal)?);
-        }
-        out.extend(self.extras.tensors(n)?);
-        let dim = dictionary.dim();
-        if dim == 0 {
-            return Ok(out);
-        }
-        let shape = [dictionary.len(), dim];
-        out.push(Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice()));
-        let nonzeros = usize::try_from(self.nonzeros)
-            .map_err(|_| Error::parameter("codes", self.nonzeros, "as many nonzeros as memory counts"))?;
-        let half = self.layout == Layout::F16;
-        let value = if half { Dtype::F16 } else { Dtype::F32 };
-        out.push(Tensor::spilled(tensor::VALUES, value, &[nonzeros], self.values.finish()?));
-        let (counts, indices) = (self.counts.finish()?, self.indices.finish()?);
         if self.layout == Layout::Paper {
-            out.push(Tensor::spilled(tensor::POINTERS, Dtype::I32, &[n + 1], counts));
-            out.push(Tensor::spilled(tensor::INDICES, Dtype::I32, &[nonzeros], indices));
-        } else {
-            let small = matches!(Indices::for_atoms(dictionary.len()), Indices::U8(_));
-            let index = if small { Dtype::U8 } else { Dtype::U16 };
-            out.push(Tensor::spilled(tensor::INDICES, index, &[nonzeros], indices));
-            out.push(Tensor::spilled(tensor::COUNTS, Dtype::U8, &[n], counts));
+            check_pointers(self.nonzeros)?;
+            let before = i32::try_from(before).unwrap_or(i32::MAX);
+            self.counts.push(&paper_pointers(&coded.counts, before).collect::<Vec<u32>>())?;
+            self.indices.push(&paper_indices(&coded.indices).collect::<Vec<u32>>())?;
+            return self.values.push(&paper_values(&coded.values).collect::<Vec<u32>>());
         }
-        if self.escapes > 0 {
-            let escaped = self.escaped.finish()?;
-            out.push(Tensor::spilled(tensor::ESCAPED, Dtype::U32, &[self.escapes], escaped));
-            out.push(f32s(tensor::ESCAPE_ROWS, &[self.escapes, dim], self.escape_rows)?);
+        match &coded.indices {
+            Indices::U8(v) => self.indices.push(v)?,
+            Indices::U16(v) => self.indices.push(v)?,
         }
-        Ok(out)
-    }
-}
-
-/// Writes a file. Returns the bytes of each tensor and of the header.
-pub(super) fn write_tensors(
-    metadata: BTreeMap<String, String>,
-    tensors: Vec<Tensor<'_>>,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<Vec<(String, u64)>> {
-    let mut sizes: Vec<(String, u64)> = tensors.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
-    let draft = Draft::new(metadata, tensors);
-    sizes.push(("header".to_owned(), draft.header_bytes()));
-    draft.save(sink, progress)?;
-    Ok(sizes)
-}
-
-/// Properties 3DGS does not define, set aside.
-#[derive(Debug)]
-pub(crate) struct Extras(Vec<(String, Dtype, Spill)>);
-
-impl Extras {
-    /// None yet of a scene with those of `like`.
-    pub(crate) fn new(to: SpillTo<'_>, like: &Geometry) -> Result<Self> {
-        let extra = |extra: &crate::scene::splats::Extra| {
-            let dtype = match extra.values {
-                ExtraValues::I8(_) => Dtype::I8,
-                ExtraValues::U8(_) => Dtype::U8,
-                ExtraValues::I16(_) => Dtype::I16,
-                ExtraValues::U16(_) => Dtype::U16,
-                ExtraValues::I32(_) => Dtype::I32,
-                ExtraValues::U32(_) => Dtype::U32,
-                ExtraValues::F32(_) => Dtype::F32,
-                ExtraValues::F64(_) => Dtype::F64,
-            };
-            Ok((format!("{EXTRA_PREFIX}{}", extra.name), dtype, Spill::new(to)?))
-        };
-        like.extras.iter().map(extra).collect::<Result<_>>().map(Self)
-    }
-
-    /// Appends those of the next Gaussians.
-    pub(crate) fn push(&mut self, geometry: &Geometry) -> Result<()> {
-        for (extra, (_, _, spill)) in geometry.extras.iter().zip(&mut self.0) {
-            for_extra!(&extra.values, v => spill.push(v)?);
+        match &coded.values {
+            Values::F16(v) => self.values.push(as_bits(v))?,
+            Values::F32(v) => self.values.push(v)?,
         }
-        Ok(())
+        self.counts.push(&coded.counts)
     }
 
-    /// Those of all `n` Gaussians.
-    pub(super) fn tensors(self, n: usize) -> Result<Vec<Tensor<'static>>> {
-        let tensor = |(name, dtype, spill): (String, Dtype, Spill)| {
-            Ok(Tensor::spilled(&name, dtype, &[n], spill.finish()?))
-        };
-        self.0.into_iter().map(tensor).collect()
+    /// All arrays, to be written.
+    pub(super) fn finish<'a>(self) -> Result<ExactTensors<'a>> {
+        let n = self.gaussians;
+        let source = |spill: Spill| spill.finish().map(Source::Spilled);
+        let extras = self.extras.finish()?.into_iter();
+        Ok(ExactTensors {
+            gaussians: n,
+            nonzeros: usize::try_from(self.nonzeros)
+                .map_err(|_| Error::parameter("codes", self.nonzeros, "as many nonzeros as memory counts"))?,
+            escapes: self.escapes,
+            position: source(self.position)?,
+            dc: source(self.dc)?,
+            opacity: source(self.opacity)?,
+            scale: source(self.scale)?,
+            rotation: source(self.rotation)?,
+            normal: self.normal.map(source).transpose()?,
+            extras: extras.map(|(extra, v)| extra_tensor(&extra, n, Source::Spilled(v))).collect(),
+            counts: source(self.counts)?,
+            indices: source(self.indices)?,
+            values: source(self.values)?,
+            escaped: source(self.escaped)?,
+            escape_rows: source(self.escape_rows)?,
+        })
     }
-}
-
-/// Refuses more nonzeros than the pointers of layout `paper` count.
-pub(super) fn check_pointers(nonzeros: u64) -> Result<()> {
-    let largest = i32::MAX.unsigned_abs().into();
-    Limits::check("nonzeros in layout 'paper', whose pointers are i32", nonzeros, largest)
 }

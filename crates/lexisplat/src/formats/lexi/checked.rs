@@ -1,0 +1,214 @@
+//! A safetensors file whose checksums hold, and its tensors.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
+use safetensors::{Dtype, SafeTensors};
+
+use super::schema::{LENGTH_BYTES, MAX_VERSION, key, tensor};
+use crate::formats::kind::FileKind;
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+use crate::support::parallel::map_chunks;
+
+/// The bytes of a file, borrowed or owned.
+pub(super) type FileBytes<'a> = Box<dyn AsRef<[u8]> + Send + Sync + 'a>;
+
+/// A safetensors file whose header is parsed and whose checksums hold.
+pub(super) struct Checked<'a> {
+    /// The file, as the caller named it.
+    pub(super) file: String,
+    bytes: FileBytes<'a>,
+    /// Where the data of tensors start.
+    data_start: usize,
+    tensors: Metadata,
+    /// Names of all tensors, sorted.
+    names: Vec<String>,
+    metadata: BTreeMap<String, String>,
+}
+
+impl std::fmt::Debug for Checked<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Checked")
+            .field("file", &self.file)
+            .field("names", &self.names)
+            .finish_non_exhaustive()
+    }
+}
+
+impl<'a> Checked<'a> {
+    /// Parses `shared` and verifies everything that does not depend on the meaning of tensors. The value of
+    /// the metadata key `format` is one of `formats`.
+    pub(super) fn open(
+        file: String,
+        shared: FileBytes<'a>,
+        formats: &[&str],
+        limits: &Limits,
+    ) -> Result<Self> {
+        let bytes: &[u8] = (*shared).as_ref();
+        FileKind::Lexi.expect(&file, bytes)?;
+        let format = |problem| Error::format(file.as_str(), problem);
+        let malformed = |text: String| Error::malformed(file.as_str(), text);
+        let Some(length) = bytes.first_chunk::<LENGTH_BYTES>() else {
+            let what = "the header's length".to_owned();
+            let problem =
+                FormatError::Truncated { what, expected: LENGTH_BYTES as u64, found: bytes.len() as u64 };
+            return Err(format(problem));
+        };
+        let length = u64::from_le_bytes(*length);
+        limits.check_header(&file, length)?;
+        let end = length + LENGTH_BYTES as u64;
+        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end)).ok_or_else(|| {
+            let found = bytes.len() as u64;
+            format(FormatError::Truncated { what: "the header".to_owned(), expected: end, found })
+        })?;
+        let explain = |error: SafeTensorError| match error {
+            SafeTensorError::MetadataIncompleteBuffer => {
+                malformed(format!("truncated or too long: {} bytes do not match the header", bytes.len()))
+            }
+            other => malformed(format!("not a valid safetensors file: {other}")),
+        };
+        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(explain)?;
+        let header_checksum = crc32fast::hash(header);
+        let data_start = header.len();
+        let metadata: BTreeMap<String, String> =
+            tensors.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
+        let mut names = tensors.offset_keys();
+        names.sort_unstable();
+        let checked = Self { file, bytes: shared, data_start, tensors, names, metadata };
+        let format = |problem| Error::format(&checked.file, problem);
+        let malformed = |text: String| checked.malformed(text);
+
+        let found = checked.text(key::FORMAT)?;
+        if !formats.contains(&found) {
+            let wanted = formats.join("' or '");
+            let text = format!("metadata 'format' is '{found}', not '{wanted}': not this kind of file");
+            return Err(malformed(text));
+        }
+        let version: u64 = checked.number(key::VERSION)?;
+        if version > MAX_VERSION {
+            return Err(format(FormatError::Version { found: version, supported: MAX_VERSION }));
+        }
+        if version == 0 {
+            return Err(malformed("metadata 'version' is 0".to_owned()));
+        }
+        let stored = checked.values::<u32>(tensor::HEADER_CHECKSUM, Dtype::U32, &[1])?;
+        if stored != [header_checksum] {
+            return Err(format(FormatError::Checksum { part: "header".to_owned() }));
+        }
+        checked.verify_tensors()?;
+        Ok(checked)
+    }
+
+    fn verify_tensors(&self) -> Result<()> {
+        let sums: BTreeMap<String, String> = serde_json::from_str(self.text(key::CHECKSUMS)?)
+            .map_err(|e| self.malformed(format!("metadata 'checksums': {e}")))?;
+        let mut names = self.names();
+        names.retain(|&name| name != tensor::HEADER_CHECKSUM);
+        if let Some(name) = sums.keys().find(|name| names.binary_search(&name.as_str()).is_err()) {
+            return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
+        }
+        let found = map_chunks(names.len(), 1, |range| {
+            let name = names[range.start];
+            self.view(name).map(|t| format!("{:08x}", crc32fast::hash(t.data)))
+        });
+        for (name, sum) in names.iter().zip(found) {
+            let expected = sums
+                .get(*name)
+                .ok_or_else(|| self.malformed(format!("metadata 'checksums' lacks tensor '{name}'")))?;
+            if sum.ok().as_ref() != Some(expected) {
+                return Err(Error::format(&self.file, FormatError::Checksum { part: (*name).to_owned() }));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn malformed(&self, text: impl Into<String>) -> Error {
+        Error::malformed(&self.file, text)
+    }
+
+    /// Names of all tensors, sorted.
+    pub(super) fn names(&self) -> Vec<&str> {
+        self.names.iter().map(String::as_str).collect()
+    }
+
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.tensors.info(name).is_some()
+    }
+
+    /// The metadata entry `key`.
+    pub(super) fn text(&self, key: &str) -> Result<&str> {
+        self.metadata
+            .get(key)
+            .map(String::as_str)
+            .ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
+    }
+
+    /// The metadata entry `key` as a number or a name.
+    pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T> {
+        let text = self.text(key)?;
+        text.parse().map_err(|_| self.malformed(format!("metadata '{key}' is '{text}'")))
+    }
+
+    /// The metadata entry `key`, if it is there.
+    pub(super) fn optional<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>> {
+        if self.metadata.contains_key(key) { self.number(key).map(Some) } else { Ok(None) }
+    }
+
+    /// All bytes of the file.
+    pub(super) fn bytes(&self) -> &[u8] {
+        (*self.bytes).as_ref()
+    }
+
+    pub(super) fn view(&self, name: &str) -> Result<View<'_>> {
+        let missing = || self.malformed(format!("tensor '{name}' is missing"));
+        let TensorInfo { dtype, shape, data_offsets: (start, end) } =
+            self.tensors.info(name).ok_or_else(missing)?;
+        let data = self.bytes().get(self.data_start + start..self.data_start + end).ok_or_else(missing)?;
+        Ok(View { dtype: *dtype, shape, data })
+    }
+
+    /// The bytes of the tensor `name`, which must have this type and shape.
+    pub(super) fn data(&self, name: &str, dtype: Dtype, shape: &[usize]) -> Result<&[u8]> {
+        let view = self.view(name)?;
+        if view.dtype != dtype || view.shape != shape {
+            let text =
+                format!("tensor '{name}' is {:?} {:?}, expected {dtype:?} {shape:?}", view.dtype, view.shape);
+            return Err(self.malformed(text));
+        }
+        Ok(view.data)
+    }
+
+    /// A copy of the tensor `name`, which must have this type and shape.
+    pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        shape: &[usize],
+    ) -> Result<Vec<T>> {
+        Ok(bytemuck::allocation::pod_collect_to_vec(self.data(name, dtype, shape)?))
+    }
+
+    /// A copy of rows `range` of the tensor `name`, which must have this type and shape.
+    pub(super) fn part<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
+        &self,
+        name: &str,
+        dtype: Dtype,
+        shape: &[usize],
+        range: &Range<usize>,
+    ) -> Result<Vec<T>> {
+        let row = shape.iter().skip(1).product::<usize>() * (dtype.bitsize() / 8);
+        let data = self.data(name, dtype, shape)?.get(range.start * row..range.end * row);
+        let data = data.ok_or_else(|| self.malformed(format!("tensor '{name}' is too short")))?;
+        Ok(bytemuck::allocation::pod_collect_to_vec(data))
+    }
+}
+
+/// One tensor of a file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct View<'a> {
+    pub(super) dtype: Dtype,
+    pub(super) shape: &'a [usize],
+    pub(super) data: &'a [u8],
+}

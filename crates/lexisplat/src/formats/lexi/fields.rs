@@ -1,0 +1,106 @@
+//! Metadata and tensors that several layouts share, checked.
+
+use std::ops::Range;
+
+use safetensors::Dtype;
+
+use super::checked::Checked;
+use super::layout::Layout;
+use super::schema::{EXTRA_PREFIX, PACKED_VERSION, key, tensor};
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::{Extra, ExtraValues, SceneMeta};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Pursuit, Record};
+use crate::support::error::Result;
+use crate::support::limits::{Limits, MAX_ATOMS};
+
+fn file_layout(checked: &Checked<'_>) -> Result<Layout> {
+    checked.text(key::LAYOUT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))
+}
+
+/// The layout of a scene, which must belong to the version of the file.
+pub(super) fn layout(checked: &Checked<'_>) -> Result<Layout> {
+    record(checked)?;
+    let layout = file_layout(checked)?;
+    let version: u64 = checked.number(key::VERSION)?;
+    if (layout == Layout::Packed) != (version == PACKED_VERSION) {
+        let text = format!("metadata 'version' is {version}, which has no layout '{layout}'");
+        return Err(checked.malformed(text));
+    }
+    Ok(layout)
+}
+
+pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
+    ShDegree::new(checked.number(key::DEGREE)?)
+        .map_err(|e| checked.malformed(format!("metadata 'degree': {e}")))
+}
+
+pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
+    let comments = serde_json::from_str(checked.text(key::COMMENTS)?)
+        .map_err(|e| checked.malformed(format!("metadata 'comments': {e}")))?;
+    Ok(SceneMeta { comments, antialiased: checked.number(key::ANTIALIASED)? })
+}
+
+/// The dictionary of a scene or of a dictionary file.
+pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limits) -> Result<Dictionary> {
+    let dim = degree.rest();
+    let atoms = match checked.view(tensor::DICTIONARY)?.shape {
+        [atoms, width] if *width == dim && (1..=MAX_ATOMS).contains(atoms) => *atoms,
+        shape => {
+            let text = format!("tensor 'dictionary' has shape {shape:?}, not [1 to {MAX_ATOMS}, {dim}]");
+            return Err(checked.malformed(text));
+        }
+    };
+    limits.check_atoms(&checked.file, atoms as u64)?;
+    let values = checked.values(tensor::DICTIONARY, Dtype::F32, &[atoms, dim])?;
+    Dictionary::new(degree, values).map_err(|e| checked.malformed(format!("tensor 'dictionary': {e}")))
+}
+
+pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
+    let pursuit: Pursuit =
+        checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?;
+    let packed = file_layout(checked)? == Layout::Packed;
+    let record = Record {
+        tolerance: checked.optional(key::TOLERANCE)?,
+        max_nonzeros: checked.optional(key::MAX_NONZEROS)?,
+        pursuit: (!packed).then_some(pursuit),
+        seed: checked.number(key::SEED)?,
+        max_residual: checked.number(key::MAX_RESIDUAL)?,
+        rms_residual: checked.number(key::RMS_RESIDUAL)?,
+        over_tolerance: checked.number(key::OVER_TOLERANCE)?,
+    };
+    let sizes = [
+        (key::TOLERANCE, record.tolerance.unwrap_or(1.0)),
+        (key::MAX_RESIDUAL, record.max_residual),
+        (key::RMS_RESIDUAL, record.rms_residual),
+    ];
+    for (key, value) in sizes {
+        if !value.is_finite() || value < 0.0 {
+            return Err(checked.malformed(format!("metadata '{key}' is {value}, not a finite size")));
+        }
+    }
+    Ok(record)
+}
+
+/// Properties that 3DGS does not define, of Gaussians `range` of `n`.
+pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
+    let mut out = Vec::new();
+    for full in checked.names() {
+        let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
+        let dtype = checked.view(full)?.dtype;
+        let shape = [n];
+        let values: ExtraValues = match dtype {
+            Dtype::I8 => checked.part::<i8>(full, dtype, &shape, range)?.into(),
+            Dtype::U8 => checked.part::<u8>(full, dtype, &shape, range)?.into(),
+            Dtype::I16 => checked.part::<i16>(full, dtype, &shape, range)?.into(),
+            Dtype::U16 => checked.part::<u16>(full, dtype, &shape, range)?.into(),
+            Dtype::I32 => checked.part::<i32>(full, dtype, &shape, range)?.into(),
+            Dtype::U32 => checked.part::<u32>(full, dtype, &shape, range)?.into(),
+            Dtype::F32 => checked.part::<f32>(full, dtype, &shape, range)?.into(),
+            Dtype::F64 => checked.part::<f64>(full, dtype, &shape, range)?.into(),
+            other => return Err(checked.malformed(format!("tensor '{full}' has type {other:?}"))),
+        };
+        out.push(Extra { name: name.to_owned(), values });
+    }
+    Ok(out)
+}

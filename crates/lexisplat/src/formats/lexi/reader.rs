@@ -1,0 +1,384 @@
+//! Reading .lexi files of every layout, whole or a part at a time.
+
+use std::ops::Range;
+use std::path::Path;
+
+use safetensors::Dtype;
+
+use super::checked::{Checked, FileBytes};
+use super::exact::Exact;
+use super::fields::{extras, layout};
+use super::layout::Layout;
+use super::schema::{EXTRA_PREFIX, FORMAT, LENGTH_BYTES, tensor};
+use crate::packed::{CHUNK, Decoder, Packed, PackedHead, StreamBits};
+use crate::scene::sh::ShDegree;
+use crate::scene::source::{SplatSource, check_range};
+use crate::scene::splats::{Extra, Geometry, SceneMeta, Splats};
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::model::{Model, Record};
+use crate::support::error::Result;
+use crate::support::input::Input;
+use crate::support::limits::Limits;
+use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
+use crate::support::parallel::map_chunks;
+
+/// Gaussians of a part of an exact layout: a multiple of a packed chunk.
+const PART: usize = 2 * CHUNK;
+/// Packed chunks decoded before they are handed on.
+const CHUNKS_AT_ONCE: usize = 16;
+
+/// Reads a .lexi file.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be opened, [`crate::Error::Format`] if it is damaged,
+/// [`crate::Error::Limit`] if it asks for more than `limits` allow.
+pub fn read(path: &Path, limits: &Limits) -> Result<Model> {
+    let bytes = Input::open_within(path, limits)?;
+    read_bytes(&path.display().to_string(), &bytes, limits)
+}
+
+/// Reads a .lexi file that is in memory. Errors call it `file`.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Model> {
+    LexiReader::open(file, bytes, limits)?.model()
+}
+
+/// A .lexi file in which everything is checked except the codes themselves. It is decoded whole or a part at
+/// a time.
+///
+/// As a [`SplatSource`] it gives the dense scene in the order of the file.
+#[derive(Debug)]
+pub struct LexiReader<'a> {
+    kind: Kind<'a>,
+    layout: Layout,
+    limits: Limits,
+    /// Names and types of extras, without values.
+    extras: Vec<Extra>,
+    attribute_bytes: Vec<(String, u64)>,
+}
+
+#[derive(Debug)]
+enum Kind<'a> {
+    Exact(Box<Exact<'a>>),
+    Packed(Box<PackedFile<'a>>),
+}
+
+/// A packed scene whose chunks stay in the file.
+#[derive(Debug)]
+struct PackedFile<'a> {
+    checked: Checked<'a>,
+    head: PackedHead,
+    decoder: Decoder,
+}
+
+impl<'a> LexiReader<'a> {
+    /// Checks the .lexi file in `bytes`, which are borrowed or owned. Errors call it `file`.
+    ///
+    /// # Errors
+    /// As [`read`]. Damage in the codes themselves, and what is over [`Limits::bytes`] and
+    /// [`Limits::expansion`], is only found by decoding.
+    pub fn open(
+        file: impl Into<String>,
+        bytes: impl AsRef<[u8]> + Send + Sync + 'a,
+        limits: &Limits,
+    ) -> Result<Self> {
+        let bytes: FileBytes<'a> = Box::new(bytes);
+        let checked = Checked::open(file.into(), bytes, &[FORMAT], limits)?;
+        let layout = layout(&checked)?;
+        let attribute_bytes = sizes(&checked)?;
+        let (kind, extras) = if layout == Layout::Packed {
+            let head = super::packed::head(&checked, limits)?;
+            let decoder = Decoder::new(&head, super::packed::data(&checked)?)?;
+            let extras = extras(&checked, head.len(), &(0..0))?;
+            (Kind::Packed(Box::new(PackedFile { checked, head, decoder })), extras)
+        } else {
+            let exact = Exact::open(checked, limits)?;
+            let extras = extras(&exact.checked, exact.len(), &(0..0))?;
+            (Kind::Exact(Box::new(exact)), extras)
+        };
+        Ok(Self { kind, layout, limits: *limits, extras, attribute_bytes })
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        match &self.kind {
+            Kind::Exact(exact) => exact.len(),
+            Kind::Packed(packed) => packed.head.len(),
+        }
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Layout of the file.
+    #[must_use]
+    pub fn layout(&self) -> Layout {
+        self.layout
+    }
+
+    /// SH degree.
+    #[must_use]
+    pub fn degree(&self) -> ShDegree {
+        self.dictionary().degree()
+    }
+
+    /// Comments and marks of the source.
+    #[must_use]
+    pub fn meta(&self) -> &SceneMeta {
+        match &self.kind {
+            Kind::Exact(exact) => &exact.meta,
+            Kind::Packed(packed) => packed.head.meta(),
+        }
+    }
+
+    /// How it was made and what it promises.
+    #[must_use]
+    pub fn record(&self) -> &Record {
+        match &self.kind {
+            Kind::Exact(exact) => &exact.record,
+            Kind::Packed(packed) => packed.head.record(),
+        }
+    }
+
+    /// The atoms.
+    #[must_use]
+    pub fn dictionary(&self) -> &Dictionary {
+        match &self.kind {
+            Kind::Exact(exact) => &exact.dictionary,
+            Kind::Packed(packed) => &packed.decoder.dictionary,
+        }
+    }
+
+    /// What a packed file says of itself; `None` for exact layouts.
+    #[must_use]
+    pub fn packed_head(&self) -> Option<&PackedHead> {
+        match &self.kind {
+            Kind::Exact(_) => None,
+            Kind::Packed(packed) => Some(&packed.head),
+        }
+    }
+
+    /// Whether a packed file holds the order of its source.
+    #[must_use]
+    pub fn order_kept(&self) -> bool {
+        matches!(&self.kind, Kind::Packed(packed) if packed.checked.has(tensor::ORDER))
+    }
+
+    /// Bytes of each tensor in the file, and of the header under `header`, as
+    /// [`LexiWriter::attribute_bytes`](super::LexiWriter::attribute_bytes).
+    #[must_use]
+    pub fn attribute_bytes(&self) -> &[(String, u64)] {
+        &self.attribute_bytes
+    }
+
+    /// Bytes that stand for SH-rest in an exact layout, as
+    /// [`LexiWriter::sh_bytes`](super::LexiWriter::sh_bytes).
+    #[must_use]
+    pub fn sh_bytes(&self) -> u64 {
+        super::write::sh_bytes(&self.attribute_bytes)
+    }
+
+    /// For Gaussians `range` of a packed file that holds the order of its source, their places in the source.
+    ///
+    /// # Errors
+    /// [`crate::Error::Format`] if the file does not hold the order or the range ends after [`Self::len`].
+    pub fn order(&self, range: Range<usize>) -> Result<Vec<u32>> {
+        match &self.kind {
+            Kind::Packed(packed) => {
+                packed.checked.part(tensor::ORDER, Dtype::U32, &[packed.head.len()], &range)
+            }
+            Kind::Exact(exact) => {
+                let text = "only packed files hold an order; this one is in the order of its source";
+                Err(exact.checked.malformed(text))
+            }
+        }
+    }
+
+    /// Decodes the whole scene.
+    ///
+    /// # Errors
+    /// As [`read`].
+    pub fn model(&self) -> Result<Model> {
+        match &self.kind {
+            Kind::Exact(exact) => exact.part(0..exact.len()),
+            Kind::Packed(packed) => super::packed::packed(&packed.checked, &self.limits)?.unpack(),
+        }
+    }
+
+    /// The packed scene, not decoded; `None` for exact layouts.
+    ///
+    /// # Errors
+    /// [`crate::Error::Format`] for damage, [`crate::Error::Limit`] for a scene too large to hold.
+    pub fn packed(&self) -> Result<Option<Packed>> {
+        match &self.kind {
+            Kind::Exact(_) => Ok(None),
+            Kind::Packed(packed) => super::packed::packed(&packed.checked, &self.limits).map(Some),
+        }
+    }
+
+    /// Hands all Gaussians to `take`, part after part in the order of the file: the number of the first one,
+    /// and the part. Every part but the last is a multiple of [`CHUNK`] Gaussians long.
+    ///
+    /// # Errors
+    /// As [`read`], and what `take` returns.
+    pub fn each(&self, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
+        self.parts(false, take)?;
+        Ok(())
+    }
+
+    /// [`Self::each`] with parts of `at_once` Gaussians for exact layouts, for the fuzz targets.
+    #[cfg(feature = "fuzzing")]
+    #[doc(hidden)]
+    pub fn each_of(&self, at_once: usize, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
+        match &self.kind {
+            Kind::Exact(exact) => exact_parts(exact, at_once.max(1), take),
+            Kind::Packed(_) => self.each(take),
+        }
+    }
+
+    /// [`Self::each`]; returns the bits of each stream of a packed file if `count_bits`.
+    pub(crate) fn parts(
+        &self,
+        count_bits: bool,
+        take: &mut dyn FnMut(usize, Model) -> Result<()>,
+    ) -> Result<Vec<StreamBits>> {
+        match &self.kind {
+            Kind::Exact(exact) => {
+                exact_parts(exact, PART, take)?;
+                Ok(Vec::new())
+            }
+            Kind::Packed(packed) => {
+                let mut bit_counts = packed.decoder.dictionary_bits();
+                let chunks = packed.head.len().div_ceil(CHUNK);
+                for first in (0..chunks).step_by(CHUNKS_AT_ONCE) {
+                    let at_once = first..chunks.min(first + CHUNKS_AT_ONCE);
+                    bit_counts.add(&packed.chunks(at_once, &self.extras, &self.limits, count_bits, take)?);
+                }
+                Ok(bit_counts.named())
+            }
+        }
+    }
+}
+
+fn exact_parts(
+    exact: &Exact<'_>,
+    at_once: usize,
+    take: &mut dyn FnMut(usize, Model) -> Result<()>,
+) -> Result<()> {
+    for start in (0..exact.len()).step_by(at_once) {
+        take(start, exact.part(start..exact.len().min(start + at_once))?)?;
+    }
+    Ok(())
+}
+
+impl PackedFile<'_> {
+    /// Decodes `chunks` together, hands them to `take` one after the other, and returns the bits they took.
+    fn chunks(
+        &self,
+        chunks: Range<usize>,
+        like: &[Extra],
+        limits: &Limits,
+        count_bits: bool,
+        take: &mut dyn FnMut(usize, Model) -> Result<()>,
+    ) -> Result<crate::packed::BitCounts> {
+        let n = self.head.len();
+        let extra_bytes = like.iter().map(|e| e.values.width()).sum::<usize>();
+        let held = n.min(chunks.end * CHUNK) - chunks.start * CHUNK;
+        let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
+        budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
+        let data = super::packed::data(&self.checked)?;
+        let parts = map_chunks(chunks.len(), 1, |c| {
+            self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
+        });
+        let mut bit_counts = crate::packed::BitCounts::default();
+        for (c, part) in chunks.zip(parts) {
+            let (mut geometry, codes, bits) = part?;
+            bit_counts.add(&bits);
+            let range = c * CHUNK..n.min((c + 1) * CHUNK);
+            let start = range.start;
+            geometry.extras = extras(&self.checked, n, &range)?;
+            let (meta, dictionary) = (self.head.meta().clone(), self.decoder.dictionary.clone());
+            take(start, Model::new(geometry, meta, dictionary, codes, self.head.record().clone())?)?;
+        }
+        Ok(bit_counts)
+    }
+}
+
+impl SplatSource for LexiReader<'_> {
+    fn len(&self) -> usize {
+        LexiReader::len(self)
+    }
+
+    fn empty(&self) -> Splats {
+        let geometry = Geometry { extras: self.extras.clone(), ..Geometry::default() };
+        Splats { geometry, degree: self.degree(), sh_rest: Vec::new(), meta: self.meta().clone() }
+    }
+
+    fn has_normals(&self) -> bool {
+        matches!(&self.kind, Kind::Exact(exact) if exact.has_normals())
+    }
+
+    fn row_bytes(&self) -> u64 {
+        let bytes: u64 = self.attribute_bytes.iter().map(|a| a.1).sum();
+        bytes / LexiReader::len(self).max(1) as u64
+    }
+
+    fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()> {
+        check_range(&range, LexiReader::len(self))?;
+        let packed = match &self.kind {
+            Kind::Exact(exact) => {
+                *part = exact.part(range)?.into_splats();
+                return Ok(());
+            }
+            Kind::Packed(packed) => packed,
+        };
+        // Chunks are decoded whole, and the Gaussians around the range left out.
+        let chunks = range.start / CHUNK..range.end.div_ceil(CHUNK);
+        *part = self.empty();
+        packed.chunks(chunks, &self.extras, &self.limits, false, &mut |start, model| {
+            let chunk = model.into_splats();
+            let end = start + chunk.len();
+            let inside = range.start.clamp(start, end) - start..range.end.clamp(start, end) - start;
+            let mut piece = self.empty();
+            chunk.read(inside, &mut piece)?;
+            part.append(piece);
+            Ok(())
+        })?;
+        Ok(())
+    }
+}
+
+/// Bytes of all tensors that are not to be ignored, in the order in which writers list them, and of the
+/// header.
+fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
+    const FIRST: [&str; 6] =
+        [tensor::POSITION, tensor::DC, tensor::OPACITY, tensor::SCALE, tensor::ROTATION, tensor::NORMAL];
+    const PACKED: [&str; 5] =
+        [tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
+    const LAST: [&str; 7] = [
+        tensor::DICTIONARY,
+        tensor::VALUES,
+        tensor::POINTERS,
+        tensor::INDICES,
+        tensor::COUNTS,
+        tensor::ESCAPED,
+        tensor::ESCAPE_ROWS,
+    ];
+    let names = checked.names();
+    let extras = names.iter().copied().filter(|name| name.starts_with(EXTRA_PREFIX));
+    let order = FIRST.into_iter().chain(PACKED).chain(extras).chain(LAST);
+    let mut out = Vec::new();
+    for name in order.filter(|name| names.contains(name)) {
+        out.push((name.to_owned(), checked.view(name)?.data.len() as u64));
+    }
+    let length = checked.bytes().first_chunk::<LENGTH_BYTES>().map_or(0, |l| u64::from_le_bytes(*l));
+    let checksum = checked.view(tensor::HEADER_CHECKSUM)?.data.len();
+    out.push(("header".to_owned(), length + (LENGTH_BYTES + checksum) as u64));
+    Ok(out)
+}

@@ -1,0 +1,214 @@
+//! Packed scenes.
+
+use serde::{Deserialize, Serialize};
+
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::{Extra, SceneMeta};
+use crate::sparse::model::Record;
+use crate::support::limits::Limits;
+use crate::support::spill::Spilled;
+
+/// What errors call a packed scene that was not read from a file.
+const UNNAMED: &str = "the packed scene";
+
+/// Everything of a packed scene that is not as long as the scene.
+#[derive(Debug, Clone)]
+pub struct PackedHead {
+    /// The file, as the caller named it.
+    pub(crate) file: String,
+    pub(crate) degree: ShDegree,
+    pub(crate) gaussians: usize,
+    pub(crate) atoms: usize,
+    /// Coefficients of atoms are multiples of 2 to the power of minus this.
+    pub(crate) atom_bits: u32,
+    pub(crate) record: Record,
+    pub(crate) meta: SceneMeta,
+    pub(crate) target: Option<TargetRecord>,
+    pub(crate) device: Option<String>,
+    /// Steps and predictors.
+    pub(crate) parameters: Vec<f32>,
+    /// Probabilities of all symbols.
+    pub(crate) tables: Vec<u8>,
+    /// Bytes of each part of the data: modelled symbols and raw bits, of the dictionary first and then of each
+    /// chunk of [`CHUNK`](super::CHUNK) Gaussians.
+    pub(crate) lengths: Vec<u32>,
+    /// What may be made of it: the limits of the reader, or the default ones.
+    pub(crate) limits: Limits,
+}
+
+impl PartialEq for PackedHead {
+    /// Compares what is written to a file, and neither the name of the file nor the limits of its reader.
+    fn eq(&self, other: &Self) -> bool {
+        (self.degree, self.gaussians, self.atoms, self.atom_bits)
+            == (other.degree, other.gaussians, other.atoms, other.atom_bits)
+            && (&self.record, &self.meta, &self.target, &self.device)
+                == (&other.record, &other.meta, &other.target, &other.device)
+            && (&self.parameters, &self.tables, &self.lengths)
+                == (&other.parameters, &other.tables, &other.lengths)
+    }
+}
+
+impl PackedHead {
+    /// The name of scenes that were not read from a file.
+    pub(super) fn unnamed() -> String {
+        UNNAMED.to_owned()
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.gaussians
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.gaussians == 0
+    }
+
+    /// SH degree.
+    #[must_use]
+    pub fn degree(&self) -> ShDegree {
+        self.degree
+    }
+
+    /// Number of atoms; 0 for degree 0.
+    #[must_use]
+    pub fn atoms(&self) -> usize {
+        self.atoms
+    }
+
+    /// How it was made and what it promises.
+    #[must_use]
+    pub fn record(&self) -> &Record {
+        &self.record
+    }
+
+    /// Comments and marks of the source.
+    #[must_use]
+    pub fn meta(&self) -> &SceneMeta {
+        &self.meta
+    }
+
+    /// What a search for a quality or a size asked for and reached, if there was one.
+    #[must_use]
+    pub fn target(&self) -> Option<&TargetRecord> {
+        self.target.as_ref()
+    }
+
+    /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
+    /// everywhere.
+    #[must_use]
+    pub fn device(&self) -> Option<&str> {
+        self.device.as_deref()
+    }
+}
+
+/// A packed scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Packed {
+    head: PackedHead,
+    extras: Vec<Extra>,
+    order: Option<Vec<u32>>,
+    data: Vec<u8>,
+}
+
+impl Packed {
+    /// `extras` are in the order of the file, and `order` holds the place of each Gaussian in the source.
+    pub(crate) fn new(head: PackedHead, extras: Vec<Extra>, order: Option<Vec<u32>>, data: Vec<u8>) -> Self {
+        Self { head, extras, order, data }
+    }
+
+    /// Everything that is not as long as the scene.
+    #[must_use]
+    pub fn head(&self) -> &PackedHead {
+        &self.head
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.head.gaussians
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.head.gaussians == 0
+    }
+
+    /// Properties that 3DGS does not define, in the order of the file.
+    #[must_use]
+    pub fn extras(&self) -> &[Extra] {
+        &self.extras
+    }
+
+    /// For each Gaussian its place in the source, if the order was kept.
+    #[must_use]
+    pub fn order(&self) -> Option<&[u32]> {
+        self.order.as_deref()
+    }
+
+    /// The entropy-coded dictionary and chunks.
+    #[must_use]
+    pub fn data(&self) -> &[u8] {
+        &self.data
+    }
+
+    /// The same with what a search asked for and reached.
+    #[must_use]
+    pub fn with_target(mut self, target: impl Into<Option<TargetRecord>>) -> Self {
+        self.head.target = target.into();
+        self
+    }
+
+    /// The same with the GPU that measured the sensitivity; see [`PackedHead::device`].
+    #[must_use]
+    pub fn with_device(mut self, device: Option<String>) -> Self {
+        self.head.device = device;
+        self
+    }
+
+    /// The same with other limits on what may be made of it.
+    #[must_use]
+    pub fn with_limits(mut self, limits: Limits) -> Self {
+        self.head.limits = limits;
+        self
+    }
+}
+
+/// What of a packed scene is as long as the scene, spilled.
+#[derive(Debug)]
+pub(crate) struct SpilledPacked {
+    pub(crate) data: Spilled,
+    pub(crate) order: Option<Spilled>,
+    /// Names and types, and values.
+    pub(crate) extras: Vec<(Extra, Spilled)>,
+}
+
+/// What a search for a quality or a size asked for and reached.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct TargetRecord {
+    /// `psnr`, `min-psnr` or `size`.
+    pub target: String,
+    /// Decibels or bytes asked for.
+    pub asked: f64,
+    /// Mean PSNR over the views searched with, in decibels.
+    pub mean_psnr: f64,
+    /// Least PSNR of a view, in decibels.
+    pub min_psnr: f64,
+    /// Number of views.
+    pub views: u32,
+    /// Whether the views were given. Otherwise they were generated.
+    pub cameras: bool,
+}
+
+impl TargetRecord {
+    /// Puts a record together. `reached` is the mean and the least PSNR.
+    #[must_use]
+    pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
+        let [mean_psnr, min_psnr] = reached;
+        Self { target: target.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
+    }
+}
