@@ -125,13 +125,21 @@ fn eval(error: &lexisplat_eval::Error) -> Blame {
 }
 
 fn codec(error: &lexisplat::Error) -> Blame {
-    use lexisplat::{Error, FormatError};
+    use lexisplat::{Error, FileKind, FormatError};
     match error {
         Error::Io { source, .. } | Error::Writer { source } => io(source),
         Error::TemporaryFile { source, .. } if is_full(source) => (Kind::Io, Some(TEMPORARY_FILES.into())),
         Error::TemporaryFile { source, .. } => io(source),
         Error::Format { problem: FormatError::NotFinite { .. }, .. } => {
             (Kind::Format, Some("--drop-invalid leaves such Gaussians out".into()))
+        }
+        Error::Format { problem: FormatError::OtherKind { found, .. }, .. } => {
+            let advice = match found {
+                FileKind::Ply => Some("`lexisplat compress` makes a .lexi of a PLY".into()),
+                FileKind::Lexi => Some("`lexisplat decompress` makes a PLY of a .lexi".into()),
+                _ => None,
+            };
+            (Kind::Format, advice)
         }
         Error::Format { .. } => (Kind::Format, None),
         Error::Parameter { .. } => (Kind::Parameter, None),

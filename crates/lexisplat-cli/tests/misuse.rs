@@ -4,6 +4,8 @@ use crate::folder::{Folder, lexisplat};
 
 /// Exit code of an argument out of range.
 const RANGE: i32 = 5;
+/// Exit code of a file of an unsupported kind.
+const FORMAT: i32 = 4;
 /// Exit code of wrong usage.
 const USAGE: i32 = 2;
 
@@ -54,6 +56,20 @@ fn an_input_that_is_done_already_is_named() {
     let error = folder.fail(&["decompress", "scene.ply", "--overwrite"], RANGE);
     assert!(error.contains("scene.ply is already a PLY file"), "{error}");
     assert!(error.contains("help: `lexisplat compress scene.ply` makes a .lexi"), "{error}");
+}
+
+#[test]
+fn an_input_of_the_other_kind_is_named_by_its_content() {
+    let folder = Folder::new();
+    folder.run(&["compress", "scene.ply", "-q"]);
+    for (arguments, kind, help) in [
+        (["decompress", "scene.ply", "-o", "other.ply"], "a PLY", "`lexisplat compress` makes a .lexi"),
+        (["compress", "scene.lexi", "-o", "other.lexi"], "a .lexi", "`lexisplat decompress` makes a PLY"),
+    ] {
+        let error = folder.fail(&arguments, FORMAT);
+        assert!(error.contains(&format!("this is {kind}, not")) && error.contains(help), "{error}");
+        assert!(!error.contains("limit"), "{error}");
+    }
 }
 
 #[test]

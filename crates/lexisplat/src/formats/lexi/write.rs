@@ -53,7 +53,7 @@ impl<'a> LexiWriter<'a> {
     #[must_use]
     pub fn packed(packed: &'a Packed) -> Self {
         let extras = packed.extras().iter().map(|extra| extra_tensor(extra, packed.len(), bytes_of(extra)));
-        let order = packed.order().map(|order| Source::of(order));
+        let order = packed.order().map(Source::of);
         Self::of_packed(packed.head(), Source::Bytes(packed.data()), order, extras.collect())
     }
 
