@@ -33,6 +33,7 @@ mod bench;
 mod compare;
 mod drawing;
 mod error;
+pub mod format;
 pub mod metrics;
 pub mod montage;
 mod png;
@@ -40,7 +41,6 @@ mod prune;
 mod scene_file;
 mod scorer;
 mod target;
-pub mod text;
 pub mod views;
 
 pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};

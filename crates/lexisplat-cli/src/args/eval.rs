@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
 use lexisplat_sweep::Method;
@@ -66,9 +67,12 @@ pub(crate) struct Sweep {
     /// Models, PLY files.
     #[arg(value_name = "MODEL", required_unless_present = "manifest")]
     pub(crate) models: Vec<PathBuf>,
+    /// Name of a scene, for tables; may be given for each model, in their order [default: from the path].
+    #[arg(long = "name", value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    pub(crate) names: Vec<String>,
     /// Models with their methods, cameras and photos: a TOML file with a table `scene` for each
-    /// (docs/EVALUATION.md). Those that are not there are skipped and listed.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["models", "cameras", "images", "method"])]
+    /// (docs/EVALUATION.md). Models that do not exist are skipped and listed.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["models", "names", "cameras", "images", "method"])]
     pub(crate) manifest: Option<PathBuf>,
     /// Where relative paths in the manifest start [default: its folder].
     #[arg(long, value_name = "DIR", requires = "manifest")]

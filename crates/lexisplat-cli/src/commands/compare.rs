@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{CompareOptions, Comparison, SceneFile, compare, montage, png, text};
+use lexisplat_eval::{CompareOptions, Comparison, SceneFile, compare, format, montage, png};
 use lexisplat_render::Renderer;
 use serde_json::json;
 
@@ -88,7 +88,7 @@ fn table(
             out,
             "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
             view.name,
-            text::decibels(view.psnr),
+            format::decibels(view.psnr),
             view.ssim
         )?;
     }
@@ -102,14 +102,14 @@ fn table(
             ("maximum", psnr.max, ssim.max),
         ];
         for (label, psnr, ssim) in rows {
-            let (psnr, ssim) = (text::decibels(psnr), ssim.unwrap_or(1.0));
+            let (psnr, ssim) = (format::decibels(psnr), ssim.unwrap_or(1.0));
             writeln!(out, "{label:<width$}  {:>11}  {psnr:>10}  {ssim:>8.5}", "")?;
         }
     }
     for input in [a, b] {
-        writeln!(out, "{:>10}  {}", text::bytes(input.bytes), input.name)?;
+        writeln!(out, "{:>10}  {}", format::bytes(input.bytes), input.name)?;
     }
-    writeln!(out, "{:>10}  first file over second, whole files", text::ratio(a.bytes, b.bytes))?;
+    writeln!(out, "{:>10}  first file over second, whole files", format::ratio(a.bytes, b.bytes))?;
     writeln!(out, "{:>10}  {device}", "drawn on")?;
     if let Some(folder) = &args.save_views {
         let times = montage::AMPLIFICATION;

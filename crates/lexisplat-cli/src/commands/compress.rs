@@ -10,7 +10,7 @@ use lexisplat::stream::Compressed;
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
 use serde_json::json;
 
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
 use crate::args::{Common, Compress};
 use crate::files::{check_output, existing, input, is_pipe, output_path, tell, warn, write_output};
@@ -149,7 +149,7 @@ impl Outcome<'_> {
         let dim = done.dictionary.dim();
         let mut out = String::new();
         let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-        let gaussians = text::count(done.gaussians as u64);
+        let gaussians = format::count(done.gaussians as u64);
         line(
             "wrote",
             format!(
@@ -160,7 +160,7 @@ impl Outcome<'_> {
         )?;
         match &report.learned {
             Some(l) if dim > 0 => {
-                let sample = text::count(l.sample as u64);
+                let sample = format::count(l.sample as u64);
                 let atoms = done.dictionary.len();
                 line(
                     "dictionary",
@@ -176,7 +176,7 @@ impl Outcome<'_> {
         if let Some(ratio) = report.coefficient_ratio() {
             let rate = done.gaussians as f64 / report.code_seconds.max(1e-9);
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rate to look at")]
-            let rate = text::count(rate as u64);
+            let rate = format::count(rate as u64);
             line(
                 "codes",
                 format!(
@@ -187,7 +187,7 @@ impl Outcome<'_> {
         }
         line("error", error_line(record))?;
         if report.escapes > 0 {
-            line("escapes", format!("{} Gaussians stored exactly", text::count(report.escapes)))?;
+            line("escapes", format!("{} Gaussians stored exactly", format::count(report.escapes)))?;
         }
         let sh = done.sh_bytes();
         if dim > 0 {
@@ -196,9 +196,9 @@ impl Outcome<'_> {
                 "SH bytes",
                 format!(
                     "{} of {}: {} smaller (dictionary, codes, escapes; against dense f32)",
-                    text::bytes(sh),
-                    text::bytes(dense),
-                    text::ratio(dense, sh)
+                    format::bytes(sh),
+                    format::bytes(dense),
+                    format::ratio(dense, sh)
                 ),
             )?;
         }
@@ -206,15 +206,15 @@ impl Outcome<'_> {
             "file bytes",
             format!(
                 "{} of {}: {} smaller (whole file against the PLY)",
-                text::bytes(done.file_bytes()),
-                text::bytes(self.ply_bytes),
-                text::ratio(self.ply_bytes, done.file_bytes())
+                format::bytes(done.file_bytes()),
+                format::bytes(self.ply_bytes),
+                format::ratio(self.ply_bytes, done.file_bytes())
             ),
         )?;
         let parts: Vec<String> = done
             .attribute_bytes
             .iter()
-            .map(|(name, bytes)| format!("{name} {}", text::bytes(*bytes)))
+            .map(|(name, bytes)| format!("{name} {}", format::bytes(*bytes)))
             .collect();
         line("of which", parts.join(", "))?;
         Ok(out)
@@ -228,7 +228,7 @@ pub(crate) fn error_line(record: &lexisplat::Record) -> String {
         (Some(tol), None) => format!("{realised}; promised: at most {tol} for every Gaussian"),
         (Some(tol), Some(cap)) => format!(
             "{realised}; {} Gaussians are over {tol} (at most {cap} nonzeros were allowed, so nothing is promised)",
-            text::count(record.over_tolerance)
+            format::count(record.over_tolerance)
         ),
         (None, _) => format!("{realised}; nothing is promised without --tol"),
     }

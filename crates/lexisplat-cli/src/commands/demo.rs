@@ -6,7 +6,7 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::output::Output;
 use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
-use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, montage, png, text};
+use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, format, montage, png};
 use lexisplat_render::{Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_sweep::report::{Picture, Report, html};
@@ -148,14 +148,14 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let report_name = report_path.display();
     print(&format!(
         "\nscene.ply    {}, {} Gaussians\nscene.lexi   {}: {} smaller (whole file), {:.2} of 45 nonzeros a Gaussian\nerror        {}\npictures     {} on average, {} at worst, over {} views\n\nOpen {report_name} in a browser ({seconds:.0} s in all).\n",
-        text::bytes(ply_bytes),
-        text::count(model.len() as u64),
-        text::bytes(file_bytes),
-        text::ratio(ply_bytes, file_bytes),
+        format::bytes(ply_bytes),
+        format::count(model.len() as u64),
+        format::bytes(file_bytes),
+        format::ratio(ply_bytes, file_bytes),
         report.mean_nonzeros,
         error_line(&model.record),
-        text::decibels(comparison.psnr.mean),
-        text::decibels(comparison.psnr.min),
+        format::decibels(comparison.psnr.mean),
+        format::decibels(comparison.psnr.min),
         comparison.views.len(),
     ))
 }

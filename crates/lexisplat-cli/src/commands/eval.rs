@@ -8,7 +8,7 @@ use lexisplat::Progress;
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::views::{ChosenViews, View, photo};
 use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, montage, png, score_views, text,
+    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, format, montage, png, score_views,
 };
 use lexisplat_render::{Camera, Image, Renderer};
 use serde_json::{Value, json};
@@ -205,9 +205,9 @@ fn table(args: &Eval, scored: &[Scored], found: &ChosenViews, device: &str) -> R
         writeln!(
             out,
             "{:>10}  {}: {} Gaussians",
-            text::bytes(model.bytes),
+            format::bytes(model.bytes),
             model.file,
-            text::count(model.gaussians as u64)
+            format::count(model.gaussians as u64)
         )?;
     }
     writeln!(out, "{:>10}  {}", found.views.len(), views_line(found, args))?;

@@ -9,7 +9,7 @@ use lexisplat::packed::{PackOptions, PackReport, Packed, Packer, StreamBits};
 use lexisplat::ply::{PlyChunks, PlyRead};
 use lexisplat::stream::Importance;
 use lexisplat::{Error, Progress, Sensitivity, Splats, lexi, stream};
-use lexisplat_eval::{Goal, Judge, Pruned, Views, pack_to, prune, text};
+use lexisplat_eval::{Goal, Judge, Pruned, Views, format, pack_to, prune};
 use lexisplat_render::{Renderer, read_views};
 use serde_json::{Value, json};
 
@@ -290,7 +290,7 @@ impl Outcome<'_> {
         let (packed, report) = (self.packed, self.report);
         let mut out = String::new();
         let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-        let gaussians = text::count(packed.gaussians as u64);
+        let gaussians = format::count(packed.gaussians as u64);
         line(
             "wrote",
             format!("{}: {gaussians} Gaussians, SH degree {}", self.output.display(), packed.degree),
@@ -299,9 +299,9 @@ impl Outcome<'_> {
             "file bytes",
             format!(
                 "{} of {}: {} smaller (whole file against the PLY), {:.2} bytes a Gaussian",
-                text::bytes(self.file_bytes),
-                text::bytes(self.ply_bytes),
-                text::ratio(self.ply_bytes, self.file_bytes),
+                format::bytes(self.file_bytes),
+                format::bytes(self.ply_bytes),
+                format::ratio(self.ply_bytes, self.file_bytes),
                 self.file_bytes as f64 / packed.gaussians.max(1) as f64
             ),
         )?;
@@ -310,7 +310,7 @@ impl Outcome<'_> {
                 "pruned",
                 format!(
                     "{} Gaussians; no pixel of {} views changes by more than {:.2} of 255 levels for it",
-                    text::count(p.removed as u64),
+                    format::count(p.removed as u64),
                     p.views,
                     p.largest_change * LEVELS
                 ),
@@ -328,7 +328,7 @@ impl Outcome<'_> {
         if packed.record.tolerance.is_some() {
             line("error", error_line(&packed.record))?;
             if report.escapes > 0 {
-                line("escapes", format!("{} Gaussians' SH stored exactly", text::count(report.escapes)))?;
+                line("escapes", format!("{} Gaussians' SH stored exactly", format::count(report.escapes)))?;
             }
         }
         let bits = |(name, bytes): &(String, f64)| {

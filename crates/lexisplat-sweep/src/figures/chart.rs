@@ -52,9 +52,6 @@ pub(super) const DOTTED: &str = "2 5";
 /// What is drawn at points.
 pub(super) type Mark = MarkerShape;
 
-/// Pairs: x and y, or lowest and highest.
-pub(super) type Pairs = Vec<(f64, f64)>;
-
 /// One line of a chart.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
@@ -63,26 +60,29 @@ pub(super) struct Series {
     pub(super) mark: Option<Mark>,
     /// Whether points are joined.
     pub(super) joined: bool,
-    pub(super) points: Pairs,
+    /// Pairs of x and y.
+    pub(super) points: Vec<(f64, f64)>,
     /// Lowest and highest value at each point; empty for none.
-    pub(super) band: Pairs,
+    pub(super) band: Vec<(f64, f64)>,
 }
 
-/// One line of a legend.
-#[derive(Debug, Clone)]
-pub(super) struct Key {
-    pub(super) text: String,
-    pub(super) colour: &'static str,
-    pub(super) dash: &'static str,
-    /// A mark instead of a line.
-    pub(super) mark: Option<Mark>,
+/// A group of a legend: title and entries.
+pub(super) type Legend = (&'static str, Vec<LegendEntry>);
+
+/// One entry of a legend, shown with a mark, or else with a line.
+pub(super) fn key(text: &str, colour: &str, dash: &str, mark: Option<Mark>) -> LegendEntry {
+    LegendEntry {
+        label: literal(text),
+        color: colour.to_owned(),
+        shape: mark.map_or(LegendShape::Line, LegendShape::Marker),
+        dasharray: (!dash.is_empty()).then(|| dash.to_owned()),
+    }
 }
 
-/// Colour of keys that say what a dash or mark means for every colour.
+/// Colour of entries that explain a dash or mark of every colour.
 pub(super) const NEUTRAL: &str = SOFT;
 
 /// A chart with a logarithmic axis to base 2 along x.
-#[derive(Debug)]
 pub(super) struct Chart {
     pub(super) name: String,
     pub(super) title: String,
@@ -94,11 +94,10 @@ pub(super) struct Chart {
     /// Whether the range of values starts at 0.
     pub(super) from_zero: bool,
     pub(super) series: Vec<Series>,
-    /// Groups of the legend.
-    pub(super) keys: Vec<(&'static str, Vec<Key>)>,
+    pub(super) legends: Vec<Legend>,
 }
 
-/// `text` without what `kuva` takes for mathematics.
+/// `text` with what `kuva` takes for mathematics escaped.
 fn literal(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace('$', "\\$")
 }
@@ -127,7 +126,22 @@ fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
 }
 
 impl Chart {
-    /// The chart; `None` if it has no points.
+    /// A chart without a name over the paper's compression ratio.
+    pub(super) fn over_ratio(y: &str, series: Vec<Series>, legends: Vec<Legend>) -> Self {
+        Self {
+            name: String::new(),
+            title: String::new(),
+            caption: String::new(),
+            x: "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)",
+            x_unit: "\u{d7}",
+            y: y.to_owned(),
+            from_zero: false,
+            series,
+            legends,
+        }
+    }
+
+    /// Draws the chart. `None` if it has no points.
     pub(super) fn draw(mut self) -> Result<Option<Figure>> {
         for series in &mut self.series {
             // A logarithm has no place for others.
@@ -228,14 +242,8 @@ impl Chart {
             .with_y_tick_step(step)
             .with_x_tick_format(ticks)
             .with_legend_box(false);
-        for (title, keys) in self.keys.iter().filter(|group| !group.1.is_empty()) {
-            let entries = keys.iter().map(|key| LegendEntry {
-                label: literal(&key.text),
-                color: key.colour.to_owned(),
-                shape: key.mark.map_or(LegendShape::Line, LegendShape::Marker),
-                dasharray: (!key.dash.is_empty()).then(|| key.dash.to_owned()),
-            });
-            layout = layout.with_legend_group(*title, entries.collect());
+        for (title, keys) in self.legends.iter().filter(|legend| !legend.1.is_empty()) {
+            layout = layout.with_legend_group(*title, keys.clone());
         }
         layout
     }

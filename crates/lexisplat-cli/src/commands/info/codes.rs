@@ -10,7 +10,7 @@ use lexisplat::stream::Survey;
 use serde_json::{Map, Value, json};
 
 use super::bars;
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
 use crate::commands::compress::error_line;
 use crate::commands::pack::{attribute_bytes, promise_line, sh_bytes};
@@ -110,7 +110,7 @@ pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) 
         writeln!(out, "\nbytes")?;
         for (name, bytes) in lexi.attribute_bytes() {
             let one = each(*bytes as f64, lexi);
-            writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", text::bytes(*bytes))?;
+            writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", format::bytes(*bytes))?;
         }
     }
     if atoms > 0 {
@@ -129,7 +129,7 @@ fn packed_bytes(out: &mut String, lexi: &LexiChunks<'_>, streams: &[StreamBits])
     writeln!(out, "\n{:<14} {:>10} {:>16}   streams", "attribute", "bytes", "bits a Gaussian")?;
     for (name, bytes) in attribute_bytes(lexi.attribute_bytes(), streams) {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]
-        let size = text::bytes(bytes.round() as u64);
+        let size = format::bytes(bytes.round() as u64);
         let parts: Vec<&StreamBits> = streams.iter().filter(|s| s.attribute == name).collect();
         let parts = match parts.as_slice() {
             [] | [_] => String::new(),
@@ -163,7 +163,7 @@ fn usage_text(out: &mut String, usage: &[u64]) -> Result<()> {
     )?;
     for &j in order.iter().take(TOP_ATOMS) {
         let share = 100.0 * usage[j] as f64 / total as f64;
-        writeln!(out, "  atom {j:>4} {:>10} {share:>5.1} %", text::count(usage[j]))?;
+        writeln!(out, "  atom {j:>4} {:>10} {share:>5.1} %", format::count(usage[j]))?;
     }
     Ok(())
 }

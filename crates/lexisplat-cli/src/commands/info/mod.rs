@@ -10,7 +10,7 @@ use lexisplat::ply::{PlyChunks, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::stream::Survey;
 use lexisplat::{Splats, lexi, stream};
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 use serde_json::json;
 
 use crate::args::{Common, Info};
@@ -98,12 +98,12 @@ fn as_json(file: &File<'_>, lint: &Lint) -> Result<serde_json::Value> {
 fn as_text(file: &File<'_>, lint: &Lint) -> Result<String> {
     let mut out = String::new();
     let like = file.scene.empty();
-    let count = text::count(lint.gaussians);
+    let count = format::count(lint.gaussians);
     writeln!(
         out,
         "{}: {}, {count} Gaussians, SH degree {}",
         file.name,
-        text::bytes(file.bytes),
+        format::bytes(file.bytes),
         like.degree
     )?;
     if like.meta.antialiased {
@@ -145,7 +145,7 @@ pub(super) fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Resul
     for (label, &count) in labels.iter().zip(counts) {
         let length = (u128::from(count) * BAR as u128).div_ceil(u128::from(most));
         let length = usize::try_from(length).unwrap_or(BAR);
-        writeln!(out, "  {label:>12} {:>10} {}", text::count(count), "#".repeat(length))?;
+        writeln!(out, "  {label:>12} {:>10} {}", format::count(count), "#".repeat(length))?;
     }
     Ok(())
 }
