@@ -49,18 +49,17 @@ pub fn ratio(whole: u64, part: u64) -> String {
 /// change the direction of text, are written as escapes such as `\n` and `\u{1b}`.
 #[must_use]
 pub fn printable(text: &str) -> String {
-    let is_safe = |c: char| {
-        !c.is_control()
-            && !matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
-    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
-        if is_safe(c) {
-            out.push(c)
+    let turns =
+        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if c.is_control() || turns(c) {
+            out.extend(c.escape_default());
         } else {
-            out.extend(c.escape_default())
+            out.push(c);
         }
-        out
-    })
+    }
+    out
 }
 
 /// `name` as one part of a path that is safe on every system: letters, digits and `-_.` stay, other characters become

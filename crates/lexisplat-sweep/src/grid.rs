@@ -1,4 +1,4 @@
-//! Results as a grid: methods down, scenes across, settings in a sensible order.
+//! Results as a grid: one row for each method, one column for each scene, settings in order.
 
 use lexisplat_eval::metrics::Metric;
 
@@ -6,21 +6,21 @@ use super::measure::{IDENTICAL, Measure};
 use super::table::{Cell, Column};
 use super::{Method, Point, Results, SceneResult, Setting, paper};
 
-/// How methods, scenes and settings of a sweep stand to each other.
+/// The methods, scenes and settings of a sweep, in the order of tables.
 pub(super) struct Grid<'a> {
     /// Headings of the columns of scenes, in the manifest's order.
     pub(super) headings: Vec<String>,
     /// The scenes' own names, column by column.
     names: Vec<&'a str>,
-    /// Methods there are, in the paper's order.
+    /// Methods that have a model, in the paper's order.
     pub(super) methods: Vec<Method>,
-    /// Settings there are: tolerances from small to large, then caps from many to few nonzeros, then presets
+    /// Settings that have a point: tolerances from small to large, then caps from many to few nonzeros, then presets
     /// from large to small files.
     pub(super) settings: Vec<Setting>,
     cells: Vec<(usize, &'a SceneResult)>,
 }
 
-/// Sorts settings by kind, then from close to far from the original.
+/// A key that sorts settings by kind, then from close to the original to far from it.
 fn order(setting: Setting) -> (u8, f64) {
     match setting {
         Setting::Tolerance(tolerance) => (0, tolerance),
@@ -39,7 +39,7 @@ fn same_scene(a: &SceneResult, b: &SceneResult) -> bool {
 
 impl<'a> Grid<'a> {
     pub(super) fn new(results: &'a Results) -> Self {
-        // Each column is known by its first scene. A method has one scene in a column.
+        // The first scene of a column names it. A column has at most one scene of each method.
         let mut first: Vec<&SceneResult> = Vec::new();
         let mut cells: Vec<(usize, &SceneResult)> = Vec::new();
         for scene in &results.scenes {

@@ -72,7 +72,7 @@ impl SweepOptions {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are none, one is there twice, or out of range.
+    /// [`Error::Parameter`] if there are none, or if one is repeated or out of range.
     pub(super) fn check(&self) -> Result<()> {
         if self.settings.is_empty() {
             return Err(Error::parameter("settings", "none", "a tolerance, a cap on nonzeros or a preset"));

@@ -207,7 +207,7 @@ impl Evaluator<'_> {
         ))
     }
 
-    /// The stored part `name`, if it was made from the same and its pictures are still there.
+    /// The stored part `name`, if `key` is the same and its pictures still exist.
     fn find<T: DeserializeOwned>(&self, name: &str, key: &str, pictures: &[PathBuf]) -> Option<T> {
         let part = self.cache.find(name, key).filter(|_| pictures.iter().all(|path| path.is_file()))?;
         self.progress.done(1, true);

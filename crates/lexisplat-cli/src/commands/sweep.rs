@@ -197,11 +197,8 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
     for row in &rows {
         let mut line = String::new();
         for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
-            if i < TEXT_COLUMNS {
-                write!(line, "{cell:<width$}  ")?
-            } else {
-                write!(line, "{cell:>width$}  ")?
-            }
+            let cell = if i < TEXT_COLUMNS { format!("{cell:<width$}") } else { format!("{cell:>width$}") };
+            write!(line, "{cell}  ")?;
         }
         writeln!(out, "{}", line.trim_end())?;
     }

@@ -11,7 +11,7 @@ use maud::{PreEscaped, html};
 use super::grid::Grid;
 use super::{Figure, Results, SweepPicture};
 
-/// The style sheet of the other report, which that of this page extends.
+/// The style sheet of the report about one scene. [`STYLE`] extends it.
 const BASE_STYLE: &str = include_str!("../report/page.css");
 const STYLE: &str = include_str!("sweep.css");
 const SCRIPT: &str = include_str!("sweep.js");

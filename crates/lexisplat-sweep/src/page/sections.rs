@@ -27,7 +27,7 @@ fn plural(count: usize, one: &str) -> String {
     format!("{} {one}{s}", format::count(count as u64))
 }
 
-/// A section with a heading, under the page's id `id`.
+/// A section with a heading. `id` is the id of the heading.
 fn section(id: &str, heading: &str, content: &Markup) -> Markup {
     html! { section aria-labelledby=(id) { h2 id=(id) { (heading) } "\n" (content) } "\n" }
 }
