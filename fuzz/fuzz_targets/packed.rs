@@ -2,7 +2,7 @@
 //! again as they were.
 #![no_main]
 
-use lexisplat::lexi::{Contents, open_bytes, unpack, write_packed_to};
+use lexisplat::lexi::{Contents, open_bytes, unpack, write_packed};
 use lexisplat_fuzz::allocator::bounded;
 use lexisplat_fuzz::{container, invariants, limits, one_thread, parts};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
@@ -28,11 +28,11 @@ fuzz_target!(init: one_thread(), |data: &[u8]| {
         Ok(_) => return,
     };
     let mut bytes = Vec::new();
-    write_packed_to(&mut bytes, packed).expect("what was read can be written");
+    write_packed(&mut bytes, packed).expect("what was read can be written");
     let again = open_bytes("again.lexi", &bytes, &limits()).expect("what was written can be read");
     let mut second = Vec::new();
     let Contents::Packed(again) = again else { panic!("no longer packed") };
-    write_packed_to(&mut second, &again).expect("written again");
+    write_packed(&mut second, &again).expect("written again");
     assert!(bytes == second, "written, read and written again differs");
 
     let dictionary = packed.unpack_dictionary();

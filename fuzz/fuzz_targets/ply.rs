@@ -13,7 +13,7 @@ const PER_BYTE: usize = 128;
 const BASE: usize = 16 << 20;
 
 fuzz_target!(init: one_thread(), |data: &[u8]| {
-    let options = ReadOptions { drop_invalid: data.len() % 2 == 1, limits: limits() };
+    let options = ReadOptions::default().with_drop_invalid(data.len() % 2 == 1).with_limits(limits());
     let read = bounded(data, PER_BYTE, BASE, || read_bytes("fuzz.ply", data, &options));
     parts::ply(data, &options, read.as_ref(), [PER_BYTE, BASE]);
     let Ok(read) = read else { return };

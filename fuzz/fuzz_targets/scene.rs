@@ -3,7 +3,7 @@
 #![no_main]
 
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stream::Importance;
 use lexisplat::{
     CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
@@ -11,7 +11,7 @@ use lexisplat::{
 };
 use lexisplat_fuzz::made::{Bytes, scene};
 use lexisplat_fuzz::{invariants, limits, one_thread};
-use lexisplat_render::{RenderOptions, Scene, object, orbit, render, room, surround};
+use lexisplat_render::{RenderOptions, Scene, interior_views, object, orbit, render, surround};
 use libfuzzer_sys::fuzz_target;
 
 /// Pixels of the pictures drawn: a few tiles, one of them cut.
@@ -82,7 +82,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         Sensitivity::heuristic(&splats.geometry)
     } else {
         let cameras = orbit(&splats.geometry, 2, SIDES.0, SIDES.1);
-        lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &mut || ())
+        lexisplat_render::sensitivity(&Scene::from(splats), &cameras, &Silent).expect("measured")
     };
     let packer = match Packer::new(splats, &sensitivity, &options) {
         Ok(packer) => packer,
@@ -97,7 +97,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
         Err(error) => panic!("{error}"),
     };
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packed).expect("written");
+    lexi::write_packed(&mut bytes, &packed).expect("written");
     let model = lexi::read_bytes("packed.lexi", &bytes, &limits()).expect("what was packed can be read");
     assert_eq!(model.len(), splats.len());
     invariants::model(&model);
@@ -111,11 +111,11 @@ fn as_ply(splats: &Splats) -> Vec<u8> {
 
 fn exact_in_parts(splats: Splats, options: &CompressOptions) {
     let file = as_ply(&splats);
-    let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
+    let parts = PlySource::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let (mut streamed, mut whole) = (Vec::new(), Vec::new());
-    let done = stream::compress_to(&parts, options, &mut streamed, &Silent);
+    let done = stream::compress(&parts, options, &mut streamed, &Silent);
     match compress(Splats { meta: parts.meta().clone(), ..splats }, options, &Silent) {
-        Ok((model, _)) => drop(lexi::write_to(&mut whole, &model).expect("written")),
+        Ok((model, _)) => drop(lexi::write(&mut whole, &model).expect("written")),
         Err(Error::Parameter { .. }) => return assert!(done.is_err(), "refused when held whole only"),
         Err(error) => panic!("{error}"),
     }
@@ -125,9 +125,9 @@ fn exact_in_parts(splats: Splats, options: &CompressOptions) {
 
 fn packed_in_parts(splats: &Splats, options: &PackOptions, decibels: f64) {
     let file = as_ply(splats);
-    let parts = PlyChunks::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
+    let parts = PlySource::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let mut bytes = Vec::new();
-    match stream::pack_to(&parts, Importance::<Error>::Heuristic, options, decibels, &mut bytes, &Silent) {
+    match stream::pack(&parts, Importance::<Error>::Heuristic, options, decibels, &mut bytes, &Silent) {
         Ok(done) => assert_eq!(done.file_bytes(), bytes.len() as u64),
         Err(Error::Parameter { .. }) => return,
         Err(error) => panic!("{error}"),
@@ -143,7 +143,7 @@ fn drawn(splats: &Splats, how: u8) {
     let cameras = match how % 4 {
         0 => orbit(geometry, 2, width, height),
         1 => surround(geometry, 2, [width, height], [1.0, 2.0]),
-        2 => room(geometry, 2, width, height),
+        2 => interior_views(geometry, 2, width, height),
         _ => object(geometry, 2, width, height),
     };
     for camera in cameras {
@@ -151,7 +151,7 @@ fn drawn(splats: &Splats, how: u8) {
         if camera.validate().is_err() {
             continue;
         }
-        let image = render(&Scene::from(splats), &camera, &RenderOptions::default());
+        let image = render(&Scene::from(splats), &camera, &RenderOptions::default()).expect("drawn");
         assert!(image.pixels.iter().flatten().all(|v| v.is_finite()), "pixels not finite");
     }
 }

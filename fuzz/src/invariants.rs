@@ -89,10 +89,10 @@ fn may_mean_something_else(splats: &Splats) -> bool {
 /// If not.
 pub fn exact_round_trip(model: &Model) {
     let mut bytes = Vec::new();
-    lexi::write_to(&mut bytes, model).expect("what was read can be written");
+    lexi::write(&mut bytes, model).expect("what was read can be written");
     let again =
         lexi::read_bytes("again.lexi", &bytes, &crate::limits()).expect("what was written can be read");
     let mut second = Vec::new();
-    lexi::write_to(&mut second, &again).expect("written again");
+    lexi::write(&mut second, &again).expect("written again");
     assert!(bytes == second, "written, read and written again differs");
 }

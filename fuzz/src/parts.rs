@@ -2,8 +2,8 @@
 //! give the same Gaussians, bit by bit.
 
 use lexisplat::lexi::LexiChunks;
-use lexisplat::ply::{PlyChunks, PlyRead, ReadOptions};
-use lexisplat::{Error, ExtraValues, Geometry, Model, Row, Silent, Splats, ply, stream};
+use lexisplat::ply::{PlySource, PlyRead, ReadOptions};
+use lexisplat::{Error, ExtraValues, Geometry, Model, Row, Silent, SplatSource, Splats, ply, stream};
 
 use crate::allocator::bounded;
 
@@ -22,7 +22,7 @@ pub fn ply(
     [per_byte, base]: [usize; 2],
 ) {
     bounded(data, per_byte, base, || {
-        let opened = PlyChunks::open("fuzz.ply", data, options, &Silent);
+        let opened = PlySource::open("fuzz.ply", data, options, &Silent);
         let (chunks, read) = match (&opened, whole) {
             (Ok(chunks), Ok(read)) => (chunks, read),
             (Err(parts), Err(whole)) => return assert_eq!(parts.to_string(), whole.to_string()),
@@ -31,7 +31,7 @@ pub fn ply(
         };
         let splats = &read.splats;
         assert_eq!(chunks.warnings(), read.warnings);
-        assert_eq!(chunks.summary(), &read.source);
+        assert_eq!(chunks.summary(), &read.summary);
         assert_eq!(chunks.meta(), &splats.meta);
         assert_eq!((chunks.len(), chunks.degree()), (splats.len(), splats.degree));
         assert_eq!(chunks.has_normals() && !chunks.is_empty(), !splats.geometry.normals.is_empty());
@@ -98,7 +98,7 @@ pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byt
     }
     let (mut at_once, mut in_parts) = (Vec::new(), Vec::new());
     let written = ply::write_to(&mut at_once, &whole.to_splats()).map_err(|e| e.to_string());
-    let undone = stream::decompress_to(&chunks, &mut in_parts, &Silent).map_err(|e| e.to_string());
+    let undone = stream::decompress(&chunks, &mut in_parts, &Silent).map_err(|e| e.to_string());
     assert_eq!(written, undone);
     assert!(at_once == in_parts, "decompressed in parts differs");
 }

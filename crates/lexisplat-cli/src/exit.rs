@@ -1,51 +1,80 @@
-//! How the program ends: one line of error, one of help, and a code that says whose fault it was.
+//! How the program ends: what it says about a failure, and an exit code that tells whose fault it was.
 
+use std::borrow::Cow;
 use std::io::ErrorKind;
 use std::process::ExitCode;
 
-use crate::files::note;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::terminal::{note, print_json};
 
 /// Shown at the end of `--help`.
 pub(crate) const AFTER_HELP: &str = "Exit codes:
-  0  done
+  0  success
   1  unexpected failure
   2  wrong usage
   3  a file could not be read or written
-  4  a file is damaged, or not of a supported kind
+  4  a file is damaged or of an unsupported kind
   5  an option or argument is out of range
   6  a size is over a limit
   7  an output exists and --overwrite was not given
-  8  no GPU, or it failed; or no display to open a window on
+  8  there is no GPU, the GPU failed, or there is no display for a window
 
-Stopped by a signal, as a shell counts (the program ends by the signal itself, as its caller can tell):
-  129  SIGHUP, when its terminal is closed
-  130  SIGINT, which is Ctrl-C
-  143  SIGTERM, what `kill` sends
-With any code but 0 an output is whole or not there, and one that was to be replaced is as it was.
+A signal ends the program by the signal itself, for which a shell reports these codes:
+  129  SIGHUP: the terminal was closed
+  130  SIGINT: Ctrl-C was pressed
+  143  SIGTERM: `kill` was used
+After any code but 0 each output is either complete or missing. A file that was to be replaced is
+as it was before.
 
 Environment:
-  LEXISPLAT_SIMD  vector instructions: `plain`, `avx2` or `avx512` [default: the widest that the
-                  CPU has]; results do not depend on it";
+  LEXISPLAT_SIMD  The vector instructions to use: `plain`, `avx2` or `avx512` [default: the widest
+                  that the CPU has]. Results do not depend on it.";
 
-/// What to do about an output that is already there.
-const OVERWRITE: &str = "give --overwrite to replace it, or another name";
+/// Advice for an output that is already there.
+const OVERWRITE: &str = "give --overwrite to replace it, or name another output";
+/// Advice for work that a GPU cannot do.
+const USE_CPU: &str = "--device cpu draws without a GPU";
 
 /// An output that is already there.
-#[derive(Debug)]
+#[derive(Debug, thiserror::Error)]
+#[error("{0} exists")]
 pub(crate) struct OutputExists(pub(crate) String);
 
-impl std::fmt::Display for OutputExists {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} exists", self.0)
-    }
+/// Files on the command line that cannot be meant so.
+#[derive(Debug, thiserror::Error)]
+#[error("{problem}")]
+pub(crate) struct Misuse {
+    /// What is wrong, starting with the file.
+    pub(crate) problem: String,
+    /// What was probably meant, and how to say it.
+    pub(crate) help: String,
 }
 
-impl std::error::Error for OutputExists {}
+/// Whose fault a failure is. The number is the exit code, and JSON has the name.
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(rename_all = "lowercase")]
+enum Kind {
+    Unexpected = 1,
+    Usage,
+    Io,
+    Format,
+    Parameter,
+    Limit,
+    Exists,
+    Graphics,
+}
 
-/// Exit code of an error, and what to do about it.
-fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
+/// The kind of an error, and what to do about it.
+type Blame = (Kind, Option<Cow<'static, str>>);
+
+fn classify(error: &anyhow::Error) -> Blame {
     if error.is::<OutputExists>() {
-        return (7, Some(OVERWRITE));
+        return (Kind::Exists, Some(OVERWRITE.into()));
+    }
+    if let Some(misuse) = error.downcast_ref::<Misuse>() {
+        return (Kind::Parameter, Some(misuse.help.clone().into()));
     }
     #[cfg(feature = "view")]
     if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
@@ -57,112 +86,156 @@ fn classify(error: &anyhow::Error) -> (u8, Option<&'static str>) {
     if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
         return render(e);
     }
-    error.downcast_ref::<lexisplat::Error>().map_or((1, None), codec)
+    error.downcast_ref::<lexisplat::Error>().map_or((Kind::Unexpected, None), codec)
 }
 
 #[cfg(feature = "view")]
-fn view(error: &lexisplat_view::Error) -> (u8, Option<&'static str>) {
+fn view(error: &lexisplat_view::Error) -> Blame {
     use lexisplat_view::Error;
+    let advice = match error {
+        Error::Codec(e) => return codec(e),
+        Error::Render(e) => return render(e),
+        Error::Eval(e) => return eval(e),
+        Error::Exists(_) => return (Kind::Exists, Some(OVERWRITE.into())),
+        Error::NoDisplay => {
+            "a window needs X11 or Wayland (over ssh: `ssh -X`; without a display: `xvfb-run`); `lexisplat render` needs neither"
+        }
+        Error::NoAdapter => {
+            "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` needs none"
+        }
+        Error::Window(_) => {
+            "a window on X11 also needs libxkbcommon-x11-0; `lexisplat render` draws without a window"
+        }
+        Error::Device(_) => USE_CPU,
+        _ => return (Kind::Unexpected, None),
+    };
+    (Kind::Graphics, Some(advice.into()))
+}
+
+fn eval(error: &lexisplat_eval::Error) -> Blame {
+    use lexisplat_eval::Error;
     match error {
         Error::Codec(e) => codec(e),
         Error::Render(e) => render(e),
-        Error::Eval(e) => eval(e),
-        Error::Exists(_) => (7, Some(OVERWRITE)),
-        Error::NoDisplay => (
-            8,
-            Some(
-                "a window needs X11 or Wayland (over ssh: ssh -X; without any: xvfb-run); `lexisplat render` needs neither",
-            ),
-        ),
-        Error::NoAdapter => (
-            8,
-            Some(
-                "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` works without",
-            ),
-        ),
-        Error::Window(_) => {
-            (8, Some("a window on X11 needs libxkbcommon-x11-0 too; `lexisplat render` works without any"))
-        }
-        Error::Device(_) => (8, Some("--device cpu draws without a GPU")),
-        _ => (1, None),
+        Error::Io { source, .. } => io(source),
+        Error::Format { .. } => (Kind::Format, None),
+        Error::Limit { .. } => (Kind::Limit, None),
+        _ => (Kind::Parameter, None),
     }
 }
 
-fn eval(error: &lexisplat_eval::Error) -> (u8, Option<&'static str>) {
+fn codec(error: &lexisplat::Error) -> Blame {
+    use lexisplat::{Error, FormatError};
     match error {
-        lexisplat_eval::Error::Codec(e) => codec(e),
-        lexisplat_eval::Error::Render(e) => render(e),
-        lexisplat_eval::Error::Io { file, source } => (3, io(file, source)),
-        lexisplat_eval::Error::Format { .. } => (4, None),
-        lexisplat_eval::Error::Limit { .. } => (6, None),
-        _ => (5, None),
-    }
-}
-
-/// What to do where the system did not write.
-fn io(file: &str, source: &std::io::Error) -> Option<&'static str> {
-    match source.kind() {
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded if file.ends_with("(temporary file)") => Some(
-            "free space in that folder: temporary files lie beside the output, or in $TMPDIR if that is standard output",
+        Error::Io { source, .. } | Error::Writer { source } => io(source),
+        Error::TemporaryFile { source, .. } if is_full(source) => (Kind::Io, Some(TEMPORARY_FILES.into())),
+        Error::TemporaryFile { source, .. } => io(source),
+        Error::Format { problem: FormatError::NotFinite { .. }, .. } => {
+            (Kind::Format, Some("--drop-invalid leaves such Gaussians out".into()))
+        }
+        Error::Format { .. } => (Kind::Format, None),
+        Error::Parameter { .. } => (Kind::Parameter, None),
+        Error::Limit { name: Some(name), .. } => (
+            Kind::Limit,
+            Some(format!("if you trust the file, raise the limit with --limit {name}=N").into()),
         ),
-        ErrorKind::StorageFull | ErrorKind::QuotaExceeded => {
-            Some("free space there, or name an output on another disk with -o")
-        }
-        ErrorKind::FileTooLarge => Some(
-            "the file system or a limit (`ulimit -f`) allows no file so large; name an output elsewhere with -o",
-        ),
-        _ => None,
+        Error::Limit { .. } => (Kind::Limit, None),
+        _ => (Kind::Unexpected, None),
     }
 }
 
-fn codec(error: &lexisplat::Error) -> (u8, Option<&'static str>) {
+fn render(error: &lexisplat_render::Error) -> Blame {
+    use lexisplat_render::Error;
     match error {
-        // Outputs that came into being after they were looked for.
-        lexisplat::Error::Io { source, .. } if source.kind() == ErrorKind::AlreadyExists => {
-            (7, Some(OVERWRITE))
+        Error::Codec(e) => codec(e),
+        Error::Io { source, .. } => io(source),
+        Error::Format { .. } => (Kind::Format, None),
+        Error::Parameter { name: "device", .. } => {
+            (Kind::Parameter, Some("`lexisplat devices` lists the devices".into()))
         }
-        lexisplat::Error::Io { file, source } => (3, io(file, source)),
-        lexisplat::Error::Format { .. } => (4, Some("`lexisplat info FILE` says more about a file")),
-        lexisplat::Error::Parameter { .. } => (5, None),
-        lexisplat::Error::Limit { .. } => (6, None),
-        _ => (1, None),
+        Error::Parameter { .. } => (Kind::Parameter, None),
+        Error::Limit { .. } => (Kind::Limit, None),
+        Error::GpuLimit { .. } => {
+            (Kind::Limit, Some("--device cpu draws without the limits of a GPU".into()))
+        }
+        Error::Gpu { .. } => (Kind::Graphics, Some(USE_CPU.into())),
+        _ => (Kind::Unexpected, None),
     }
 }
 
-fn render(error: &lexisplat_render::Error) -> (u8, Option<&'static str>) {
-    match error {
-        lexisplat_render::Error::Io { file, source } => (3, io(file, source)),
-        lexisplat_render::Error::Format { .. } => (4, None),
-        lexisplat_render::Error::Parameter { name: "device", .. } => {
-            (5, Some("`lexisplat devices` lists what there is"))
-        }
-        lexisplat_render::Error::Parameter { .. } => (5, None),
-        lexisplat_render::Error::Limit { .. } => (6, None),
-        lexisplat_render::Error::GpuLimit { .. } => (6, Some("--device cpu draws without a GPU's limits")),
-        lexisplat_render::Error::Gpu { .. } => (8, Some("--device cpu draws without a GPU")),
-        _ => (1, None),
-    }
+/// The advice if there is no room for a temporary file.
+const TEMPORARY_FILES: &str = "free space in that folder; temporary files lie beside the output, or in $TMPDIR if the output is standard output";
+
+/// Whether the system found no room.
+fn is_full(error: &std::io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::StorageFull | ErrorKind::QuotaExceeded)
 }
 
-/// Prints `error` and gives its exit code.
-pub(crate) fn report(error: &anyhow::Error) -> ExitCode {
+/// What the system refused.
+fn io(source: &std::io::Error) -> Blame {
+    let advice = match source.kind() {
+        // An output that came into being after it was looked for.
+        ErrorKind::AlreadyExists => return (Kind::Exists, Some(OVERWRITE.into())),
+        _ if is_full(source) => "free space there, or name an output on another disk with -o",
+        ErrorKind::FileTooLarge => {
+            "the file system or a limit (`ulimit -f`) allows no file so large; name an output elsewhere with -o"
+        }
+        _ => return (Kind::Io, None),
+    };
+    (Kind::Io, Some(advice.into()))
+}
+
+/// Reports `error`, as a JSON object on standard output or as text on standard error. Returns its exit code.
+pub(crate) fn report(error: &anyhow::Error, json: bool) -> ExitCode {
     // A reader that closed the pipe has seen enough.
     if error.chain().any(|cause| {
         cause.downcast_ref::<std::io::Error>().is_some_and(|e| e.kind() == ErrorKind::BrokenPipe)
     }) {
         return ExitCode::SUCCESS;
     }
-    let (code, help) = classify(error);
-    let mut line = error.to_string();
+    let mut message = error.to_string();
     for cause in error.chain().skip(1).map(ToString::to_string) {
         // Most errors already say what their cause said.
-        if !line.contains(&cause) {
-            line = format!("{line}: {cause}");
+        if !message.contains(&cause) {
+            message = format!("{message}: {cause}");
         }
     }
-    note(&format!("error: {}", line.replace('\n', " ")));
-    if let Some(help) = help {
-        note(&format!("help: {help}"));
+    let message = message.replace('\n', " ");
+    let (kind, help) = classify(error);
+    let help = help.as_deref();
+    if !json || print_json(&object(kind, &message, help)).is_err() {
+        note(&format!("error: {message}"));
+        if let Some(help) = help {
+            note(&format!("help: {help}"));
+        }
     }
-    ExitCode::from(code)
+    ExitCode::from(kind as u8)
+}
+
+/// Reports what the parser of the command line refused, or prints the help that was asked for. Returns the exit
+/// code.
+pub(crate) fn report_usage(error: &clap::Error, json: bool) -> ExitCode {
+    if !error.use_stderr() {
+        let _ = error.print();
+        return ExitCode::SUCCESS;
+    }
+    let text = error.render().to_string();
+    // Paragraphs: what is wrong, what could be meant, and the usage.
+    let mut paragraphs = text.split("\n\n").map(|part| part.split_whitespace().collect::<Vec<_>>().join(" "));
+    let message = paragraphs.next().unwrap_or_default();
+    let message = message.strip_prefix("error: ").unwrap_or(&message);
+    let help = paragraphs.find_map(|part| part.strip_prefix("tip: ").map(str::to_owned));
+    let help = help.unwrap_or_else(|| "--help lists the options".to_owned());
+    if !json || print_json(&object(Kind::Usage, message, Some(&help))).is_err() {
+        let _ = error.print();
+    }
+    ExitCode::from(Kind::Usage as u8)
+}
+
+fn object(kind: Kind, message: &str, help: Option<&str>) -> Value {
+    let mut error = json!({ "code": kind as u8, "kind": kind, "message": message });
+    if let Some(help) = help {
+        error["help"] = help.into();
+    }
+    json!({ "error": error })
 }

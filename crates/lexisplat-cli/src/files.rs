@@ -1,47 +1,41 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
 use std::ffi::OsStr;
-use std::io::{BufWriter, ErrorKind, StdoutLock, Write};
+use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use anyhow::Result;
-use lexisplat::output::{Existing, Output};
+use lexisplat::output::{Existing, Output, OutputGroup};
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Error, Input};
+use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::SceneFile;
 
 use crate::args::Common;
-use crate::exit::OutputExists;
+use crate::exit::{Misuse, OutputExists};
+use crate::terminal::STANDARD_OUTPUT;
+pub(crate) use crate::terminal::{note, print, print_json, warn};
 
-/// What messages call it.
-const STANDARD_OUTPUT: &str = "standard output";
+/// What messages call standard input.
+const STANDARD_INPUT: &str = "standard input";
+/// Extensions of scene formats. An output of one kind under the extension of another would mislead.
+const SCENE_EXTENSIONS: [&str; 6] = ["lexi", "ply", "splat", "ksplat", "spz", "sog"];
+/// Extensions of pictures, which the names of cameras often end in.
+const PICTURE_EXTENSIONS: [&str; 9] = ["bmp", "exr", "heic", "jpeg", "jpg", "png", "tif", "tiff", "webp"];
+/// Longest part of a camera's name in the name of a picture, in characters.
+const CAMERA_NAME_LENGTH: usize = 80;
 
-/// Writes a line to standard error. A program whose standard error is full goes on.
-pub(crate) fn note(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{line}");
-}
-
-/// Prints warnings about `name`.
-pub(crate) fn warn(name: &str, warnings: &[String]) {
-    for warning in warnings {
-        note(&format!("warning: {name}: {warning}"));
-    }
-}
-
-/// Tells the user what is odd about a scene's file.
+/// Prints what is odd about a scene's file.
 pub(crate) fn warn_of(input: &SceneFile) {
     warn(&input.name, input.warnings());
 }
 
-/// Whether `path` means standard input or output.
+/// Returns whether `path` means standard input or output.
 pub(crate) fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == OsStr::new("-")
 }
 
-/// What messages call standard input.
-const STANDARD_INPUT: &str = "standard input";
-
-/// The bytes of a file, mapped where possible, or of standard input; and what messages call it.
+/// Reads a file, mapped where possible, or standard input. Returns what messages call it, and its bytes.
 pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     let limits = common.limits()?;
     if is_pipe(path) {
@@ -51,33 +45,81 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     Ok((path.display().to_string(), Input::open_within(path, &limits)?))
 }
 
-/// Reads a PLY or a .lexi, whichever the bytes say it is.
+/// Reads a scene of any kind, which its bytes tell.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
-    let limits = common.limits()?;
-    let options = ReadOptions { limits, ..ReadOptions::default() };
-    if is_pipe(path) {
-        let bytes = Input::read(STANDARD_INPUT, std::io::stdin().lock(), &limits)?;
-        return Ok(SceneFile::read_bytes(STANDARD_INPUT, &bytes, &options)?);
-    }
-    Ok(SceneFile::read(path, &options)?)
+    let (name, bytes) = input(path, common)?;
+    let options = ReadOptions::default().with_limits(common.limits()?);
+    Ok(SceneFile::read_bytes(&name, &bytes, &options)?)
 }
 
-/// The output: what was asked for, or the input with another extension.
+/// Returns the output of a command that turns the scene `input` into a file of the kind `extension`: `output` if
+/// it is given, otherwise the input's name with that extension.
 pub(crate) fn output_path(input: &Path, output: Option<&Path>, extension: &str) -> Result<PathBuf> {
-    match output {
-        Some(path) => Ok(path.to_owned()),
-        None if is_pipe(input) => Ok(PathBuf::from("-")),
-        None => Ok(input.with_extension(extension)),
+    let Some(path) = output else {
+        let path = if is_pipe(input) { input.to_owned() } else { input.with_extension(extension) };
+        return if path == input && !is_pipe(input) { Err(already(input, extension)) } else { Ok(path) };
+    };
+    if is_folder(path) {
+        let name = match input.file_stem() {
+            Some(stem) if !is_pipe(input) => stem.to_owned(),
+            _ => "scene".into(),
+        };
+        let file = path.join(name).with_extension(extension);
+        return Err(folder_for_file(path, &file));
+    }
+    match path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase) {
+        Some(other) if other != extension && SCENE_EXTENSIONS.contains(&other.as_str()) => {
+            let problem =
+                format!("{}: the output is a .{extension} file, not a .{other} file", path.display());
+            let advice = match (extension, other.as_str()) {
+                ("lexi", "ply") => "; `lexisplat decompress` makes a PLY of a .lexi",
+                ("ply", "lexi") => "; `lexisplat compress` makes a .lexi of a PLY",
+                _ => "",
+            };
+            let name = path.with_extension(extension);
+            Err(Misuse { problem, help: format!("give -o {}{advice}", name.display()) }.into())
+        }
+        _ => Ok(path.to_owned()),
     }
 }
 
-/// What becomes of outputs that are already there.
-pub(crate) fn existing(overwrite: bool) -> Existing {
-    if overwrite { Existing::Replace } else { Existing::Refuse }
+/// The error for an input that already is what the command makes, by its extension.
+fn already(input: &Path, extension: &str) -> anyhow::Error {
+    let name = input.display();
+    let (kind, made, command) =
+        if extension == "ply" { ("PLY", "a .lexi", "compress") } else { (".lexi", "a PLY", "decompress") };
+    Misuse {
+        problem: format!("{name} is already a {kind} file, by its name"),
+        help: format!("`lexisplat {command} {name}` makes {made} of it; if the name is wrong, give -o FILE"),
+    }
+    .into()
 }
 
-/// The file that `path` means, however it is written, whether it is there or not.
-fn meant(path: &Path) -> Option<PathBuf> {
+fn is_folder(path: &Path) -> bool {
+    path.is_dir()
+        || path.as_os_str().as_encoded_bytes().last().is_some_and(|&b| std::path::is_separator(b.into()))
+}
+
+/// The error for the folder `path` where a file is needed, such as `file`.
+fn folder_for_file(path: &Path, file: &Path) -> anyhow::Error {
+    let problem = format!("{}: the output must be a file, not a folder", path.display());
+    Misuse { problem, help: format!("name a file in it, such as {}", file.display()) }.into()
+}
+
+/// All outputs of the program, which a signal ends together.
+pub(crate) fn outputs() -> &'static OutputGroup {
+    static OUTPUTS: LazyLock<OutputGroup> = LazyLock::new(OutputGroup::default);
+    &OUTPUTS
+}
+
+/// The output `path`. An existing file is replaced if `overwrite` is set, else refused.
+pub(crate) fn new_output(path: &Path, overwrite: bool) -> Output<'_> {
+    let existing = if overwrite { Existing::Replace } else { Existing::Refuse };
+    Output::new(path, existing).within(outputs())
+}
+
+/// Returns the one path of the file that `path` leads to, whether there is such a file yet or not.
+fn resolved(path: &Path) -> Option<PathBuf> {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
@@ -86,26 +128,26 @@ fn meant(path: &Path) -> Option<PathBuf> {
     path.canonicalize().ok().or_else(beside)
 }
 
-/// Refuses outputs that are in the way, or where no file can be made, before any work is done.
-/// `others` are the other files of the command.
+/// Refuses, before any work is done, an output that is in the way or that cannot be made there. `others` are the
+/// other files of the command.
 pub(crate) fn check_output(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     check_free(path, others, overwrite)?;
-    if is_pipe(path) { Ok(()) } else { Ok(Output::new(path, existing(overwrite)).check()?) }
+    if is_pipe(path) { Ok(()) } else { Ok(new_output(path, overwrite).check()?) }
 }
 
-/// Refuses outputs that are in the way; their folder need not be there yet.
+/// Refuses an output that is in the way. Its folder need not exist yet.
 pub(crate) fn check_free(path: &Path, others: &[&Path], overwrite: bool) -> Result<()> {
     let is_special = |found: std::fs::Metadata| !found.is_file() && !found.is_dir();
     if is_pipe(path) || path.metadata().is_ok_and(is_special) {
         return Ok(());
     }
-    let this = meant(path);
-    if this.is_some() && others.iter().any(|other| meant(other) == this) {
+    let this = resolved(path);
+    if this.is_some() && others.iter().any(|other| resolved(other) == this) {
         let expected = "another file than the input and other outputs; name one with -o";
         return Err(Error::parameter("output", path.display(), expected).into());
     }
-    if path.is_dir() {
-        return Err(Error::parameter("output", path.display(), "a file, not a folder").into());
+    if is_folder(path) {
+        return Err(folder_for_file(path, &path.join("NAME")));
     }
     if path.exists() && !overwrite {
         return Err(OutputExists(path.display().to_string()).into());
@@ -113,10 +155,10 @@ pub(crate) fn check_free(path: &Path, others: &[&Path], overwrite: bool) -> Resu
     Ok(())
 }
 
-/// Makes the folder `path` if need be.
+/// Makes the folder `path` if it is not there.
 pub(crate) fn make_folder(path: &Path) -> Result<()> {
     Ok(std::fs::create_dir_all(path).map_err(|e| match e.kind() {
-        // A file has the name: that is not for --overwrite.
+        // A file has the name, which --overwrite does not help against.
         ErrorKind::AlreadyExists => Error::io(path, ErrorKind::NotADirectory.into()),
         _ => Error::io(path, e),
     })?)
@@ -124,25 +166,23 @@ pub(crate) fn make_folder(path: &Path) -> Result<()> {
 
 /// Writes `bytes` to `path`, whole or not at all.
 pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<()> {
-    Ok(lexisplat::output::write_whole(Output::new(path, existing(overwrite)), |writer| {
+    Ok(lexisplat::output::write_whole(new_output(path, overwrite), |writer| {
         writer.write_all(bytes).map_err(|e| Error::io(path, e))
     })?)
 }
 
-/// Writes an output: to its file by `save`, or by `stream` to standard output. Returns what they do.
+/// Lets `write` write an output: a file, or standard output. Returns what `write` does.
 pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
     overwrite: bool,
-    save: impl FnOnce(Output<'_>) -> Result<T, E>,
-    stream: impl FnOnce(&mut BufWriter<StdoutLock<'_>>) -> Result<T, E>,
+    write: impl FnOnce(Sink<'_>) -> Result<T, E>,
 ) -> Result<T> {
     if !is_pipe(output) {
-        return save(Output::new(output, existing(overwrite))).map_err(Into::into);
+        return write(new_output(output, overwrite).into()).map_err(Into::into);
     }
     let mut out = BufWriter::new(std::io::stdout().lock());
-    let done = stream(&mut out).map_err(|error| match error.into().downcast() {
-        // What the library calls a writer that has no name.
-        Ok(Error::Io { file, source }) if file == "output" => Error::io(STANDARD_OUTPUT, source).into(),
+    let done = write(Sink::from(&mut out)).map_err(|error| match error.into().downcast() {
+        Ok(Error::Writer { source }) => Error::io(STANDARD_OUTPUT, source).into(),
         Ok(other) => anyhow::Error::from(other),
         Err(other) => other,
     })?;
@@ -150,7 +190,7 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     Ok(done)
 }
 
-/// Tells what was done: as JSON or text on standard output, as text on standard error if that carries
+/// Tells what was done: as JSON or text on standard output, as text on standard error if standard output carries
 /// `output`, or not at all.
 pub(crate) fn tell(
     common: &Common,
@@ -163,33 +203,25 @@ pub(crate) fn tell(
     } else if common.quiet {
         Ok(())
     } else if is_pipe(output) {
-        note(text()?.trim_end());
+        text()?.lines().for_each(note);
         Ok(())
     } else {
         print(&text()?)
     }
 }
 
-/// Writes text to standard output, where a closed pipe is no reason to panic.
-pub(crate) fn print(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())
-        .and_then(|()| out.flush())
-        .map_err(|e| Error::io(STANDARD_OUTPUT, e).into())
-}
-
-/// Prints one JSON object.
-pub(crate) fn print_json(value: &serde_json::Value) -> Result<()> {
-    print(&format!("{value:#}\n"))
-}
-
-/// A file name for picture number `index` of `count`: names sort in the order of the cameras.
+/// Returns the file name of picture number `index` of `count`, seen from `camera`. Names sort in the order of the
+/// cameras, and differ by their numbers.
 pub(crate) fn view_name(index: usize, count: usize, camera: &str) -> String {
     let digits = count.saturating_sub(1).to_string().len().max(3);
-    let safe: String = camera
+    let name = match camera.rsplit_once('.') {
+        Some((name, end)) if PICTURE_EXTENSIONS.contains(&end.to_ascii_lowercase().as_str()) => name,
+        _ => camera,
+    };
+    let safe: String = name
         .chars()
         .map(|c| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '_' })
-        .take(80)
+        .take(CAMERA_NAME_LENGTH)
         .collect();
     format!("{index:0digits$}_{safe}.png")
 }
@@ -204,5 +236,12 @@ mod tests {
         assert!(names.is_sorted());
         assert_eq!(names[7], "0007_a_.._b_c.png");
         assert_eq!(view_name(7, 8, "x"), "007_x.png");
+    }
+
+    #[test]
+    fn names_of_photos_lose_their_extension() {
+        assert_eq!(view_name(0, 8, "frame_00001.jpg"), "000_frame_00001.png");
+        assert_eq!(view_name(1, 8, "frame_00001.JPEG"), "001_frame_00001.png");
+        assert_eq!(view_name(2, 8, "v1.5"), "002_v1.5.png");
     }
 }

@@ -2,22 +2,26 @@
 
 mod args;
 mod commands;
+mod device;
 mod exit;
 mod files;
 mod progress;
 mod stop;
+mod terminal;
 
 use std::process::ExitCode;
 
-use clap::Parser;
-
 fn main() -> ExitCode {
-    let cli = args::Cli::parse();
+    let cli = match args::parse() {
+        Ok(cli) => cli,
+        Err(error) => return exit::report_usage(&error, args::asks_for_json()),
+    };
+    let json = cli.common.json;
     stop::listen();
     let done = commands::run(cli);
     stop::wait_if_stopped();
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        Err(error) => exit::report(&error),
+        Err(error) => exit::report(&error, json),
     }
 }

@@ -1,20 +1,21 @@
-//! Ctrl-C and its like: remove what is unfinished, say so in a line, end by the signal.
+//! Ends the program when Ctrl-C or another signal asks for it: removes unfinished outputs, prints one line, and
+//! ends by that signal.
 
 use std::sync::{Mutex, PoisonError};
 
-use lexisplat::output;
-
-use crate::files::note;
+use crate::files::outputs;
 use crate::progress;
+use crate::terminal::note;
 
-/// What a command writes, which says what a signal finds.
+/// What a command writes. The line that is printed after a signal depends on it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Work {
-    /// Nothing.
+    /// No output.
     Nothing,
-    /// So many files; when all are whole a signal comes too late. `usize::MAX` if it never does.
+    /// This number of files. Once all of them are whole the program ignores the signal, and ends by itself.
+    /// `usize::MAX` if it must never ignore it.
     Files(usize),
-    /// Files that a second run goes on from.
+    /// Files that a second run of the same command continues from.
     Resumable,
     /// Standard output.
     Stream,
@@ -22,19 +23,19 @@ pub(crate) enum Work {
 
 static WORK: Mutex<Work> = Mutex::new(Work::Nothing);
 
-/// Says what the command writes from here on.
+/// Sets what the command writes from here on.
 pub(crate) fn while_writing(work: Work) {
     *WORK.lock().unwrap_or_else(PoisonError::into_inner) = work;
 }
 
-/// Keeps the program from saying how it ended, and from ending first, if a signal is ending it.
+/// Blocks if a signal is ending the program, so that its thread alone prints and chooses the exit code.
 pub(crate) fn wait_if_stopped() {
-    while output::is_stopped() {
+    while outputs().is_stopped() {
         std::thread::park();
     }
 }
 
-/// Ends what is being written and says so. `false` if nothing is left to end.
+/// Removes unfinished outputs and prints a line. Returns `false` if all outputs are whole already.
 #[cfg_attr(not(any(unix, windows)), expect(dead_code, reason = "there are no signals"))]
 fn stopped_by(name: &str) -> bool {
     let work = *WORK.lock().unwrap_or_else(PoisonError::into_inner);
@@ -42,14 +43,14 @@ fn stopped_by(name: &str) -> bool {
         Work::Files(count) => count,
         _ => usize::MAX,
     };
-    let Some(finished) = output::stop(expected) else { return false };
+    let Some(finished) = outputs().stop(expected) else { return false };
     let outcome = match (work, finished) {
         (Work::Nothing, _) => String::new(),
-        (Work::Stream, _) => "; what went to standard output is not whole".to_owned(),
-        (Work::Resumable, _) => "; the same command goes on from here".to_owned(),
+        (Work::Stream, _) => "; standard output is incomplete".to_owned(),
+        (Work::Resumable, _) => "; run the same command again to continue".to_owned(),
         (Work::Files(_), 0) => "; no output was written".to_owned(),
-        (Work::Files(_), 1) => "; 1 output is whole, no other was written".to_owned(),
-        (Work::Files(_), n) => format!("; {n} outputs are whole, no other was written"),
+        (Work::Files(_), 1) => "; 1 output is complete, no other was written".to_owned(),
+        (Work::Files(_), n) => format!("; {n} outputs are complete, no other was written"),
     };
     progress::clear();
     note(&format!("error: stopped by {name}{outcome}"));
@@ -68,25 +69,26 @@ mod unix {
     use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
     use signal_hook::{flag, iterator::Signals, low_level};
 
-    /// What a shell adds to a signal's number to make an exit code.
+    /// A shell adds this to the number of a signal to make an exit code (POSIX).
     const SHELL: c_int = 128;
 
-    /// Begins to watch for signals. Where that cannot be done they end the program as ever.
+    /// Starts to watch for signals. If that fails, signals end the program at once, as they do by default.
     ///
-    /// A hang-up stays ignored if it is, since `nohup` means that. An interrupt does not, although shells
-    /// start what scripts put in the background so: it would not end with its script.
+    /// SIGHUP stays ignored if it was ignored at the start, because `nohup` asks for that. SIGINT does not:
+    /// shells ignore it for the background jobs of a script, and such a job would outlive its script.
     pub(crate) fn listen() {
         let mut signals = vec![SIGINT, SIGTERM];
         if !is_ignored(SIGHUP) {
             signals.push(SIGHUP);
         }
-        // With any handler, a file over the limit of `ulimit -f` is an error like a full disk.
+        // With a handler, writing a file over the limit of `ulimit -f` fails like writing to a full disk.
         let _ = flag::register(SIGXFSZ, Arc::default());
         let _ = watch(&signals);
     }
 
     fn watch(signals: &[c_int]) -> std::io::Result<()> {
-        // The second signal ends the program at once. The order matters: the first must not find the flag set.
+        // The second signal ends the program at once. The handler that ends it is registered before the one that
+        // sets the flag, so that the first signal does not find the flag set.
         let once = Arc::new(AtomicBool::new(false));
         for &signal in signals {
             flag::register_conditional_default(signal, Arc::clone(&once))?;
@@ -111,16 +113,17 @@ mod unix {
         }
     }
 
-    /// Ends as the signal would have, so that the caller sees it: a loop of a shell ends too.
+    /// Ends the program as the signal does by default, so that the caller sees the signal: a shell then also ends
+    /// the loop that the program ran in.
     fn end(signal: c_int) {
-        // The system spares the first process of a container what a signal does.
+        // The kernel does not end the first process of a container by a signal.
         if std::process::id() != 1 {
             let _ = low_level::emulate_default_handler(signal);
         }
         low_level::exit(SHELL + signal);
     }
 
-    /// Whether `signal` was ignored when the program began: as far as `/proc` tells.
+    /// Returns whether `signal` was ignored when the program started; `false` where there is no `/proc`.
     fn is_ignored(signal: c_int) -> bool {
         let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
         let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
@@ -129,11 +132,11 @@ mod unix {
     }
 }
 
-/// Exit code after Ctrl-C: as on Unix.
+/// Exit code after Ctrl-C, the same as on Unix.
 #[cfg(windows)]
 const INTERRUPTED: i32 = 130;
 
-/// Begins to watch for Ctrl-C.
+/// Starts to watch for Ctrl-C.
 #[cfg(windows)]
 pub(crate) fn listen() {
     let _ = ctrlc::set_handler(|| {

@@ -1,9 +1,6 @@
 //! The program as a user runs it.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, GAUSSIANS, lexisplat, read};
+use crate::folder::{Folder, GAUSSIANS, lexisplat, read};
 use lexisplat::ply;
 use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
@@ -83,14 +80,19 @@ fn pictures_sort_as_the_cameras_do() {
             "position": [x, -0.5, -4.0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
         })
     };
-    let cameras =
-        Value::from(vec![camera("z", 0.0, "test"), camera("a/b", 0.3, "train"), camera("m", 0.5, "test")]);
+    let cameras = Value::from(vec![
+        camera("z", 0.0, "test"),
+        camera("a/b.jpg", 0.3, "train"),
+        camera("m", 0.5, "test"),
+    ]);
     std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
     let report = folder.json(&["render", "scene.ply", "--cameras", "cameras.json", "-o", "out"]);
     let files: Vec<&str> =
         report["views"].as_array().unwrap().iter().map(|v| v["file"].as_str().unwrap()).collect();
     assert_eq!(files.len(), 3);
     assert!(files.is_sorted(), "{files:?}");
+    // Not `a_b.jpg.png`.
+    assert!(files.iter().any(|file| file.ends_with("_a_b.png")), "{files:?}");
     let picture = image::open(folder.path(files[0])).unwrap();
     assert_eq!((picture.width(), picture.height()), (64, 48));
     assert!(picture.to_rgb8().pixels().any(|p| p.0 != [0, 0, 0]), "something is drawn");
@@ -168,6 +170,10 @@ fn info_lints() {
     assert_eq!(info["statistics"]["zero_quaternions"], 1);
     let text = folder.run(&["info", "scene.ply"]);
     assert!(text.contains("opacity") && text.contains("norm of a Gaussian's SH"), "{text}");
+    folder.run(&["compress", "scene.ply", "--tol", "0.1", "-q"]);
+    let text = folder.run(&["info", "scene.lexi"]);
+    assert!(text.contains("\nSH error: maximum"), "{text}");
+    assert!(!text.lines().any(|line| line.starts_with("error")), "the file is healthy: {text}");
 }
 
 #[test]

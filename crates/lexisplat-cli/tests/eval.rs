@@ -1,18 +1,17 @@
 //! `eval` and `sweep` as a user runs them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod folder;
 
 use std::time::{Duration, Instant};
 
+use crate::folder::{Folder, lexisplat, read};
 use assert_cmd::cargo::cargo_bin;
-use folder::{Folder, lexisplat};
+use lexisplat::ply;
 use serde_json::{Value, json};
 
 /// How long a point of a small sweep may take on a slow machine.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Nine cameras, so that two are test views by name, as a `cameras.json` and as a COLMAP model, and photos.
+/// Returns a folder with photos and their nine cameras, as a `cameras.json` and as a COLMAP model. Two of the cameras are
+/// test views, by the order of their names.
 fn with_photos() -> Folder {
     let folder = Folder::new();
     let mut cameras = Vec::new();
@@ -118,6 +117,27 @@ fn mistakes_in_evaluating_are_named() {
     assert!(error.contains("OPENCV") && error.contains("image_undistorter"), "{error}");
 }
 
+#[test]
+fn cameras_of_another_scene_are_told() {
+    let folder = with_photos();
+    let photos = ["--cameras", "cameras.json", "--images", "photos", "--device", "cpu", "--no-flip"];
+    let report = folder.json(&[&["eval", "scene.ply"][..], &photos].concat());
+    assert_eq!(report["warnings"], json!([]));
+    let mut elsewhere = read(&folder.path("scene.ply"));
+    elsewhere.geometry.positions.iter_mut().for_each(|p| p[0] += 1000.0);
+    ply::write(&folder.path("other.ply"), &elsewhere).unwrap();
+    let report = folder.json(&[&["eval", "other.ply"][..], &photos].concat());
+    let warnings: Vec<&str> =
+        report["warnings"].as_array().unwrap().iter().map(|w| w.as_str().unwrap()).collect();
+    let [nothing, far] = warnings[..] else { panic!("{warnings:?}") };
+    assert!(nothing.starts_with("2 of 2 views show almost nothing of other.ply"), "{nothing}");
+    assert!(far.contains("dB against the photos") && far.contains("one scene"), "{far}");
+    let quiet = [&["eval", "other.ply", "--quiet"][..], &photos].concat();
+    let output = lexisplat().current_dir(folder.0.path()).args(quiet).output().unwrap();
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(error.starts_with("warning: views: 2 of 2 views"), "{error}");
+}
+
 const SMALL: [&str; 8] = ["--tol", "0.1,0.3", "--presets", "small", "--max-nnz", "1", "--device", "cpu"];
 
 #[test]
@@ -192,7 +212,7 @@ fn models_given_by_path_can_be_named() {
     let named = ["sweep", "scene.ply", "copy.ply", "--name", "a\u{1b}[2Jb"];
     let output = lexisplat().current_dir(folder.0.path()).args(named).args(rest).output().unwrap();
     let text = String::from_utf8(output.stdout).unwrap();
-    assert!(text.contains("a\\u{1b}[2Jb") && !text.contains('\u{1b}'), "{text}");
+    assert!(text.contains("a\\u001b[2Jb") && !text.contains('\u{1b}'), "{text}");
     let report = folder.json(&[&named[..], &["--name", "second"], &rest].concat());
     let names = report["results"]["scenes"].as_array().unwrap().iter().map(|scene| &scene["name"]);
     assert_eq!(names.collect::<Vec<_>>(), [&json!("a\u{1b}[2Jb"), &json!("second")]);

@@ -1,9 +1,6 @@
 //! `--limit` with every command that reads a model.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, GAUSSIANS, lexisplat};
+use crate::folder::{Folder, GAUSSIANS, lexisplat};
 
 /// Exit code of a size over a limit.
 const LIMIT: i32 = 6;
@@ -50,7 +47,7 @@ fn every_command_keeps_to_the_limits_given() {
     assert!(wrong.contains("gaussians, atoms, nonzeros"), "{wrong}");
 }
 
-/// Whoever feeds a pipe may never stop.
+/// A pipe may never end, so the program must not read all of it before it checks the limit.
 #[test]
 #[cfg(unix)]
 fn a_pipe_is_read_no_further_than_its_limit() {
@@ -66,7 +63,7 @@ fn a_pipe_is_read_no_further_than_its_limit() {
     }
 }
 
-/// A file of cameras is no matter of a GPU.
+/// The limit on files of cameras is not one of the GPU's limits, for which the advice is to draw without a GPU.
 #[test]
 fn cameras_over_their_limit_are_said_without_a_word_on_gpus() {
     let folder = Folder::new();

@@ -1,9 +1,7 @@
 //! Packed files as a user makes and reads them.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod folder;
-
-use folder::{Folder, read};
+use crate::folder;
+use crate::folder::{Folder, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
@@ -78,6 +76,11 @@ fn a_size_is_never_exceeded() {
     let before = std::fs::read(folder.path("scene.lexi")).unwrap();
     let error = folder.fail(&["compress", "scene.ply", "--size", "300", "--overwrite"], 5);
     assert!(error.contains("nothing smaller can be made"), "{error}");
+    let error = folder.fail(&["compress", "scene.ply", "--ratio", "1000", "--overwrite"], 5);
+    assert!(
+        error.contains("ratio = 1000: at most") && !error.contains("bytes"),
+        "a ratio for a ratio: {error}"
+    );
     assert!(before == std::fs::read(folder.path("scene.lexi")).unwrap(), "the old file stays");
 }
 

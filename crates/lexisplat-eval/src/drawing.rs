@@ -1,64 +1,64 @@
-//! All pictures of a view set, and their scores.
+//! Pictures of a scene that are scored.
 
-use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
+use lexisplat::{Progress, Stage};
+use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
 
-use crate::compare::Comparison;
-use crate::error::{Error, Result};
-use crate::scorer::Scorer;
+use crate::error::Result;
 
-/// How to draw pictures that are scored.
+/// How to draw pictures that are scored. The default is black behind the scene, and no rounding.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct DrawOptions {
-    /// Colour behind the scene.
+    /// Colour behind the scene, 0 to 1 a channel.
     pub background: [f32; 3],
     /// Whether pictures are rounded to 8 bits, as when they are saved and read back.
     pub eight_bit: bool,
 }
 
-/// `scene` as every camera sees it. `on_view` is called after each.
+impl DrawOptions {
+    /// Options with the given background and rounding.
+    #[must_use]
+    pub fn new(background: [f32; 3], eight_bit: bool) -> Self {
+        Self { background, eight_bit }
+    }
+
+    /// Draws a view of `scene`, which `renderer` prepared.
+    pub(crate) fn draw(
+        &self,
+        renderer: &mut Renderer,
+        scene: &Prepared<'_>,
+        camera: &Camera,
+    ) -> Result<Image> {
+        let drawing = RenderOptions::default().with_background(self.background);
+        let image = renderer.render(scene, camera, &drawing)?;
+        if !self.eight_bit {
+            return Ok(image);
+        }
+        Ok(Image::from_8bit(image.width, image.height, &image.to_8bit())?)
+    }
+}
+
+/// Draws `scene` as every camera sees it. Reports [`Stage::Draw`] to `progress`, in views.
 ///
 /// # Errors
-/// What [`Renderer::prepare`] and [`Renderer::render`] say.
+/// [`crate::Error::Render`] as [`Renderer::prepare`] and [`Renderer::render`]. [`crate::Error::Codec`] if
+/// `progress` cancels.
 pub fn draw_views(
     renderer: &mut Renderer,
     scene: &Scene<'_>,
     cameras: &[Camera],
     options: &DrawOptions,
-    on_view: &mut dyn FnMut(),
+    progress: &dyn Progress,
 ) -> Result<Vec<Image>> {
-    let drawing = RenderOptions { background: options.background, ..RenderOptions::default() };
     let prepared = renderer.prepare(*scene)?;
+    progress.begin(Stage::Draw, cameras.len() as u64);
     let mut draw = |camera| {
-        let image = renderer.render(&prepared, camera, &drawing)?;
-        on_view();
-        if !options.eight_bit {
-            return Ok(image);
-        }
-        Ok(Image::from_8bit(image.width, image.height, &image.to_8bit())?)
+        progress.check()?;
+        let image = options.draw(renderer, &prepared, camera);
+        progress.advance(1);
+        image
     };
-    cameras.iter().map(&mut draw).collect()
-}
-
-/// Scores each of `pictures` against its reference; all three lists are in the same order.
-///
-/// # Errors
-/// [`Error::Parameter`] if the lists differ in length, or two pictures in size.
-pub fn score_views(
-    scorer: &Scorer,
-    cameras: &[Camera],
-    references: &[Image],
-    pictures: &[Image],
-) -> Result<Comparison> {
-    for found in [references.len(), pictures.len()] {
-        if found != cameras.len() {
-            return Err(Error::parameter(
-                "pictures",
-                found,
-                format!("one for each of {} cameras", cameras.len()),
-            ));
-        }
-    }
-    let views = cameras.iter().zip(references.iter().zip(pictures));
-    let scores = views.map(|(camera, (a, b))| scorer.score(&camera.name, a, b));
-    Ok(Comparison::of(scores.collect::<Result<Vec<_>>>()?))
+    let images = cameras.iter().map(&mut draw).collect();
+    progress.end();
+    images
 }

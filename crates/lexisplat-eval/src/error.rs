@@ -1,13 +1,13 @@
 //! What can go wrong, split by who is to blame.
 
 /// Result with this crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Any failure of evaluation.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused a read. Retry or fix permissions.
+    /// The operating system refused a read or a write. Retry or fix permissions.
     #[error("{file}: {source}")]
     Io {
         /// The file, as the caller named it.
@@ -36,19 +36,40 @@ pub enum Error {
     /// An argument is out of range. The caller is at fault.
     #[error("{name} = {value}: {expected}")]
     Parameter {
-        /// The parameter's name, as the command line spells it where it has one.
+        /// The parameter's name.
         name: &'static str,
         /// The value given.
         value: String,
         /// What would have been accepted.
         expected: String,
     },
-    /// A scene could not be read or written.
+    /// A choice needs the whole scene in memory, and memory does not allow it. Allow more, or choose a preset,
+    /// which needs only parts.
+    #[error("memory = {allowed}: at least {needed} bytes, because {choice} needs the whole scene at once")]
+    Memory {
+        /// The choice that needs the whole scene.
+        choice: &'static str,
+        /// Bytes that the whole scene needs.
+        needed: u64,
+        /// Bytes that are allowed.
+        allowed: u64,
+    },
+    /// A scene could not be read or written, or the caller's [`Progress`](lexisplat::Progress) cancelled the
+    /// work.
     #[error(transparent)]
     Codec(#[from] lexisplat::Error),
     /// A camera file could not be read, or a picture not be made.
     #[error(transparent)]
-    Render(#[from] lexisplat_render::Error),
+    Render(lexisplat_render::Error),
+}
+
+impl From<lexisplat_render::Error> for Error {
+    fn from(error: lexisplat_render::Error) -> Self {
+        match error {
+            lexisplat_render::Error::Codec(error) => Self::Codec(error),
+            error => Self::Render(error),
+        }
+    }
 }
 
 impl Error {

@@ -1,9 +1,49 @@
 //! Numbers and names as text, for people and for files.
 
+use std::borrow::Cow;
+
 /// Most bytes of a file name: file systems take 255, and a number and an extension may follow.
 const LONGEST_NAME: usize = 180;
 
-/// Bytes in the largest unit that keeps a digit before the point (powers of 1000).
+/// Returns `text` with every character that a terminal obeys instead of showing written as JSON writes it, such
+/// as `\u001b`.
+///
+/// These are the control characters, the line separators and the marks that change the direction of text. Text
+/// from files may hold any of them.
+#[must_use]
+pub fn escape(text: &str) -> Cow<'_, str> {
+    escape_all(text, is_obeyed)
+}
+
+/// [`escape`] for text of several lines: line feeds stay.
+#[must_use]
+pub fn escape_lines(text: &str) -> Cow<'_, str> {
+    escape_all(text, |c| c != '\n' && is_obeyed(c))
+}
+
+fn escape_all(text: &str, is_escaped: impl Fn(char) -> bool) -> Cow<'_, str> {
+    if !text.contains(&is_escaped) {
+        return Cow::Borrowed(text);
+    }
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_escaped(c) {
+            // All of them are in the basic plane, so that four digits are enough, as JSON requires.
+            out += &format!("\\u{:04x}", u32::from(c));
+        } else {
+            out.push(c);
+        }
+    }
+    Cow::Owned(out)
+}
+
+fn is_obeyed(c: char) -> bool {
+    let is_direction =
+        matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    c.is_control() || is_direction || matches!(c, '\u{2028}' | '\u{2029}')
+}
+
+/// Returns `count` bytes in the largest unit that keeps a digit before the point (powers of 1000).
 #[must_use]
 pub fn bytes(count: u64) -> String {
     let units = ["kB", "MB", "GB", "TB"];
@@ -19,7 +59,7 @@ pub fn bytes(count: u64) -> String {
     format!("{value:.1} {}", units[unit])
 }
 
-/// A whole number with commas.
+/// Returns a whole number with a comma between thousands.
 #[must_use]
 pub fn count(value: u64) -> String {
     let digits = value.to_string();
@@ -33,33 +73,16 @@ pub fn count(value: u64) -> String {
     out
 }
 
-/// Decibels, or `identical` without a number.
+/// Returns a PSNR in decibels, or `identical` for `None`.
 #[must_use]
 pub fn decibels(psnr: Option<f64>) -> String {
     psnr.map_or_else(|| "identical".to_owned(), |value| format!("{value:.2} dB"))
 }
 
-/// `whole / part` as `2.50x`, or `-` if `part` is 0.
+/// Returns how many times smaller `part` is than `whole`, such as `2.50x`, or a dash if `part` is 0.
 #[must_use]
 pub fn ratio(whole: u64, part: u64) -> String {
     if part == 0 { "-".to_owned() } else { format!("{:.2}x", whole as f64 / part as f64) }
-}
-
-/// Text from outside, such as a name in a file, made safe for a terminal: control characters, and those that
-/// change the direction of text, are written as escapes such as `\n` and `\u{1b}`.
-#[must_use]
-pub fn printable(text: &str) -> String {
-    let turns =
-        |c: char| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        if c.is_control() || turns(c) {
-            out.extend(c.escape_default());
-        } else {
-            out.push(c);
-        }
-    }
-    out
 }
 
 /// `name` as one part of a path that is safe on every system: letters, digits and `-_.` stay, other characters become
@@ -76,6 +99,24 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_a_terminal_obeys_is_written_out() {
+        assert_eq!(
+            escape("red \u{1b}[31m, C1 \u{9b}2J, DEL \u{7f}"),
+            r"red \u001b[31m, C1 \u009b2J, DEL \u007f"
+        );
+        assert_eq!(escape("two\nlines\r"), r"two\u000alines\u000d");
+        assert_eq!(escape("turned \u{202e}round\u{2028}"), r"turned \u202eround\u2028");
+        assert_eq!(escape_lines("two\nlines\t"), "two\nlines\\u0009");
+        for shown in ["C:\\scene.ply", "e\u{301}t\u{e9} \u{1f600} \u{5e9}", ""] {
+            assert!(matches!(escape(shown), Cow::Borrowed(same) if same == shown));
+        }
+        // JSON says the same with and without.
+        let value = serde_json::json!({ "name": "\u{9b}31m\n" });
+        let text = value.to_string();
+        assert_eq!(serde_json::from_str::<serde_json::Value>(&escape(&text)).unwrap(), value);
+    }
+
+    #[test]
     fn numbers_read_well() {
         assert_eq!([bytes(0), bytes(999), bytes(1000)], ["0 B", "999 B", "1.0 kB"]);
         assert_eq!([bytes(999_949), bytes(999_950), bytes(22_312_354)], ["999.9 kB", "1.0 MB", "22.3 MB"]);
@@ -84,15 +125,6 @@ mod tests {
             ["0", "999", "89,963", "1,000,000"]
         );
         assert_eq!([ratio(10, 4), ratio(1, 0)], ["2.50x", "-"]);
-    }
-
-    #[test]
-    fn text_from_files_cannot_drive_the_terminal() {
-        assert_eq!(printable("a\u{1b}[31mb\nc\u{7}\u{9b}2J"), r"a\u{1b}[31mb\nc\u{7}\u{9b}2J");
-        assert_eq!(printable("left\u{202e}right\u{2066}"), r"left\u{202e}right\u{2066}");
-        for plain in ["", "caf\u{e9} \u{4e2d}", r"C:\a b", "it's \"quoted\""] {
-            assert_eq!(printable(plain), plain);
-        }
     }
 
     #[test]

@@ -1,9 +1,10 @@
-//! Metrics, view sets and comparison of 3D Gaussian Splatting scenes, without photos or with them.
+//! Metrics, view sets and comparison of 3D Gaussian Splatting scenes, without photos or with them; and
+//! [`compression`] to a quality that views of the scene are judged by.
 //!
 //! ```
 //! use lexisplat::{CompressOptions, Silent, compress};
 //! # use lexisplat::{Geometry, ShDegree, Splats};
-//! use lexisplat_eval::{CompareOptions, compare};
+//! use lexisplat_eval::{DrawOptions, compare};
 //! use lexisplat_render::{Renderer, Scene, orbit};
 //!
 //! # let n = 50;
@@ -24,34 +25,37 @@
 //! let (model, _) = compress(splats.clone(), &CompressOptions::default(), &Silent)?;
 //! let cameras = orbit(&splats.geometry, 2, 64, 48);
 //! let (a, b) = (Scene::from(&splats), Scene::from(&model));
-//! let comparison = compare(&mut Renderer::cpu(), &a, &b, &cameras, &CompareOptions::default(), &mut |_, _, _| ())?;
+//! let comparison = compare(&mut Renderer::cpu(), &a, &b, &cameras, &DrawOptions::default(), &Silent, |_, _, _| Ok::<_, lexisplat_eval::Error>(()))?;
 //! assert!(comparison.psnr.min.is_none_or(|psnr| psnr > 30.0));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod bench;
 mod compare;
+pub mod compression;
 mod drawing;
 mod error;
 pub mod format;
 pub mod metrics;
+mod misfit;
 pub mod montage;
 mod png;
-mod prune;
 mod scene_file;
 mod scorer;
-mod target;
+mod scores;
+
 pub mod views;
 
 pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};
-pub use compare::{CompareOptions, Comparison, Summary, ViewScore, compare, score};
-pub use drawing::{DrawOptions, draw_views, score_views};
+pub use compare::{compare, score_views};
+pub use compression::{Compression, CompressionReport, Packing, Quality, Target};
+pub use drawing::{DrawOptions, draw_views};
 pub use error::{Error, Result};
+pub use misfit::misfit;
 pub use png::png;
-pub use prune::{Pruned, prune};
 pub use scene_file::{Loaded, SceneFile};
 pub use scorer::Scorer;
-pub use target::{Goal, Judge, Views, pack_to};
+pub use scores::{Comparison, Summary, ViewScore};
 pub use views::{
     ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SceneKind, SplitFilter, View,
     ViewOptions, choose_views, find_views, photo,

@@ -1,19 +1,19 @@
-//! Scenes of either kind from files, told apart by content.
+//! Scene files of any kind, recognised by their content.
 
 use std::path::Path;
 
 use lexisplat::lexi::{self, Contents};
 use lexisplat::packed::Packed;
 use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{Input, Model, Result};
+use lexisplat::{FileKind, Input, Model, Result};
 use lexisplat_render::Scene;
 
-/// A scene of either kind.
+/// A scene as its file holds it.
 #[derive(Debug)]
 pub enum Loaded {
     /// A PLY.
     Ply(Box<PlyRead>),
-    /// A .lexi, and before it was decoded if it is a packed one.
+    /// The model in a .lexi file, and the packed scene it was decoded from if the file is packed.
     Lexi(Box<Model>, Option<Box<Packed>>),
 }
 
@@ -28,34 +28,34 @@ impl Loaded {
     }
 }
 
-/// A scene, its name and its size.
+/// A scene file that was read, ready to be drawn.
 #[derive(Debug)]
 pub struct SceneFile {
     /// The scene.
     pub loaded: Loaded,
-    /// The file's name as the user gave it, or what stands for it.
+    /// Name of the file in messages.
     pub name: String,
     /// Size of the file in bytes.
     pub bytes: u64,
 }
 
 impl SceneFile {
-    /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
+    /// Reads a scene file, of the kind that its bytes say. Of the options, a .lexi file uses only the limits.
     ///
     /// # Errors
-    /// What [`Input::open_within`], [`ply::read_bytes`] and [`lexi::open_bytes`] say.
+    /// As [`Input::open_within`], [`ply::read_bytes`] and [`lexi::open_bytes`].
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
-        // Once, for a pipe gives its bytes once.
+        // The file is read once, because a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
         Self::read_bytes(&path.display().to_string(), &bytes, options)
     }
 
-    /// [`Self::read`] of a file in memory, called `name` in errors.
+    /// Reads a scene file in memory, as [`Self::read`] does. Errors call it `name`.
     ///
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
-        let loaded = if lexi::is_lexi(bytes) {
+        let loaded = if FileKind::of(name, bytes) == FileKind::Lexi {
             Loaded::lexi(lexi::open_bytes(name, bytes, &options.limits)?, name)?
         } else {
             Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))
@@ -63,7 +63,7 @@ impl SceneFile {
         Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
     }
 
-    /// The scene, to draw.
+    /// Returns the scene to draw.
     #[must_use]
     pub fn scene(&self) -> Scene<'_> {
         match &self.loaded {
@@ -72,7 +72,7 @@ impl SceneFile {
         }
     }
 
-    /// What is odd about the file.
+    /// Returns what is odd about the file, one sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
         match &self.loaded {

@@ -1,16 +1,16 @@
-//! Which metrics two pictures are scored by.
+//! The metrics that two pictures are scored by.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use lexisplat_render::Image;
 
-use crate::compare::ViewScore;
 use crate::error::Result;
 use crate::metrics::lpips::{Network, Range};
 use crate::metrics::{Lpips, Metric, flip, psnr, ssim};
+use crate::scores::ViewScore;
 
-/// Scores pictures by PSNR and SSIM, and by more if asked to. Cheap to clone: weights are shared.
+/// Scores pictures by PSNR and SSIM, and by more if asked to. Clones share the weights of networks.
 #[derive(Debug, Clone, Default)]
 pub struct Scorer {
     flip: bool,
@@ -18,20 +18,20 @@ pub struct Scorer {
 }
 
 impl Scorer {
-    /// PSNR and SSIM.
+    /// Returns a scorer by PSNR and SSIM.
     #[must_use]
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// FLIP too.
+    /// Adds FLIP.
     #[must_use]
     pub fn with_flip(mut self) -> Self {
         self.flip = true;
         self
     }
 
-    /// LPIPS by this network too, with pictures in both ranges. Takes the place of one with the same network.
+    /// Adds LPIPS by this network, with pictures in both ranges. It replaces one with the same network.
     #[must_use]
     pub fn with_lpips(mut self, lpips: Lpips) -> Self {
         self.lpips.retain(|other| other.network() != lpips.network());
@@ -39,7 +39,7 @@ impl Scorer {
         self
     }
 
-    /// What is measured, in the order of tables.
+    /// Returns what is measured, in the order of tables.
     #[must_use]
     pub fn metrics(&self) -> Vec<Metric> {
         let mut metrics = vec![Metric::Psnr, Metric::Ssim];
@@ -51,7 +51,7 @@ impl Scorer {
         metrics
     }
 
-    /// Scores picture `b` against `a`; the score goes by `name`.
+    /// Scores picture `b` against `a`. The score's name is `name`.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if their sizes differ, or are too small for a network.
@@ -67,19 +67,12 @@ impl Scorer {
                 more.insert(metric, if identical { 0.0 } else { lpips.distance(a, b, range)? });
             }
         }
-        Ok(ViewScore {
-            name: name.to_owned(),
-            width: a.width,
-            height: a.height,
-            psnr,
-            ssim: if identical { 1.0 } else { ssim(a, b)? },
-            identical,
-            more,
-        })
+        let ssim = if identical { 1.0 } else { ssim(a, b)? };
+        Ok(ViewScore::new(name, [a.width, a.height], psnr, ssim, more))
     }
 }
 
-/// What a network measures.
+/// Returns the metrics of a network, and the range of values that each gives it.
 fn lpips_metrics(network: Network) -> [(Metric, Range); 2] {
     match network {
         Network::Vgg => [(Metric::LpipsVgg, Range::Standard), (Metric::LpipsVggInria, Range::Inria)],
@@ -90,7 +83,6 @@ fn lpips_metrics(network: Network) -> [(Metric, Range); 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::score;
     use crate::metrics::lpips::testing::random;
     use crate::metrics::testing::picture;
 
@@ -99,8 +91,7 @@ mod tests {
         let (a, b) = (picture(40, 32, 1), picture(40, 32, 2));
         let basic = Scorer::new();
         assert_eq!(basic.metrics(), [Metric::Psnr, Metric::Ssim]);
-        assert_eq!(basic.score("view", &a, &b).unwrap(), score("view", &a, &b).unwrap());
-        assert!(score("view", &a, &b).unwrap().more.is_empty());
+        assert!(basic.score("view", &a, &b).unwrap().more.is_empty());
 
         let lpips = random(Network::Alex, 1);
         let expected = [Range::Standard, Range::Inria].map(|range| lpips.distance(&a, &b, range).unwrap());

@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 /// Largest width or height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 16_384;
 
-/// How far `rotation * rotation^T` may be from the identity in any entry. Files written by trainers are
-/// within 1e-6; more than this is a scaled or skewed view and no camera.
+/// Largest difference of an entry of `rotation * rotation^T` from that of the identity. Files that trainers wrote are
+/// within 1e-6. More than this is a scaled or skewed view, which is not a camera's.
 const ORTHONORMAL_TOLERANCE: f32 = 1e-2;
 
 /// Which part of a data set a camera belongs to.
@@ -42,8 +42,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// This camera with pictures at most `width` pixels wide, of the same field of view: a wider one is
-    /// scaled down, its height rounded to whole pixels.
+    /// Returns this camera with pictures at most `width` pixels wide and the same field of view. A wider picture is
+    /// scaled down, and its height rounded to whole pixels.
     #[must_use]
     pub fn with_max_width(&self, width: u32) -> Self {
         let width = width.max(1);
@@ -52,7 +52,7 @@ impl Camera {
         }
         let (from_width, from_height) = (u64::from(self.width), u64::from(self.height));
         let height = (from_height * u64::from(width) + from_width / 2) / from_width;
-        // Below the old height, which fits.
+        // The new height is below the old one, which fits.
         let height = u32::try_from(height).unwrap_or(self.height).max(1);
         let ratio = |new: u32, old: u32| f64::from(new) / f64::from(old);
         #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
@@ -66,7 +66,7 @@ impl Camera {
         }
     }
 
-    /// `point`, in world units, in this camera's view space: x right, y down, z forward.
+    /// Returns `point`, in world units, in this camera's view space: x right, y down, z forward.
     #[must_use]
     #[inline]
     pub fn to_view(&self, point: [f32; 3]) -> [f32; 3] {
@@ -75,8 +75,8 @@ impl Camera {
         std::array::from_fn(|i| r[0][i] * d[0] + r[1][i] * d[1] + r[2][i] * d[2])
     }
 
-    /// Checks the ranges the fields state, and that the rotation is orthonormal within 1e-2. Mirrored
-    /// rotations are accepted: some files in the wild have them.
+    /// Checks that the fields are in the ranges they state, and that the rotation is orthonormal within 1e-2.
+    /// Mirrored rotations are accepted, since some published files have them.
     ///
     /// # Errors
     /// [`Error::Parameter`] naming the field and its value.

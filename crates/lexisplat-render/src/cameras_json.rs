@@ -3,36 +3,20 @@
 //! `split` of `"train"` or `"test"` is this project's addition; other fields are ignored.
 
 use std::fmt;
-use std::fs::File;
-use std::io::Read;
-use std::path::Path;
 
 use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use crate::camera::{Camera, Split};
 use crate::error::{Error, Result};
+use crate::orbit::single;
+use crate::view_files::MAX_CAMERAS_BYTES;
 
-/// Largest file read: 40 times the largest scene of Mip-NeRF 360.
-pub const MAX_CAMERAS_BYTES: u64 = 16 << 20;
 /// Most cameras in a file.
 pub const MAX_CAMERAS: usize = 100_000;
 /// Longest name of a camera, in bytes.
 pub(crate) const MAX_NAME: usize = 1024;
 
-/// Reads the cameras of `path`, in the file's order.
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read, else as [`read_cameras_bytes`].
-pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<Camera>> {
-    let path = path.as_ref();
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_CAMERAS_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(|source| Error::io(path, source))?;
-    read_cameras_bytes(&path.display().to_string(), &bytes)
-}
-
-/// The cameras in `bytes`, in order; `file` names them in errors.
+/// Returns the cameras in `bytes`, in order. `file` names them in errors.
 ///
 /// # Errors
 /// [`Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
@@ -56,7 +40,7 @@ impl<'de> Visitor<'de> for CameraList {
         f.write_str("a list of cameras as INRIA's cameras.json")
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> std::result::Result<Self::Value, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
         let mut cameras = Vec::new();
         while let Some(camera) = list.next_element_seed(CameraAt(cameras.len()))? {
             if cameras.len() == MAX_CAMERAS {
@@ -74,7 +58,7 @@ struct CameraAt(usize);
 impl<'de> DeserializeSeed<'de> for CameraAt {
     type Value = Camera;
 
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> std::result::Result<Camera, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<Camera, D::Error> {
         json.deserialize_map(self)
     }
 }
@@ -86,7 +70,7 @@ impl<'de> Visitor<'de> for CameraAt {
         write!(f, "camera {} as an object", self.0)
     }
 
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Camera, A::Error> {
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Camera, A::Error> {
         let index = self.0;
         let mut name: Option<String> = None;
         let (mut width, mut height): (Option<f64>, Option<f64>) = (None, None);
@@ -148,19 +132,11 @@ impl<'de> Visitor<'de> for CameraAt {
     }
 }
 
-/// `value` as a whole number, if it is one; some writers print `400.0`.
+/// Returns `value` as a whole number, if it is one. Some writers print `400.0`.
 pub(crate) fn whole(value: f64) -> Option<u32> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "compared with the original")]
     let integer = value as u32;
     (f64::from(integer) == value).then_some(integer)
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "rounding is meant; what overflows is refused as infinite"
-)]
-fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]
@@ -220,7 +196,7 @@ mod tests {
         for text in ["", "{}", "[1]", "[", "[] x", "[{]"] {
             assert!(matches!(parse(text), Err(Error::Format { .. })), "{text}");
         }
-        let missing = read_cameras("no/such/cameras.json").unwrap_err();
+        let missing = crate::read_cameras("no/such/cameras.json").unwrap_err();
         assert!(matches!(missing, Error::Io { .. }));
         assert!(missing.to_string().starts_with("no/such/cameras.json"));
     }

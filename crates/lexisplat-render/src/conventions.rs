@@ -1,13 +1,13 @@
-//! Every number of the 3DGS authors' rasteriser, once.
+//! The numbers of the 3DGS authors' rasteriser, each in this one place.
 //!
 //! Sources are files of `graphdeco-inria/diff-gaussian-rasterization` at commit 59f5f77 unless stated
-//! otherwise. Changing any of them changes every picture.
+//! otherwise. A change of any of them changes every picture.
 //!
-//! Conventions that are no numbers: view space is that of `OpenCV` (x right, y down, z forward); pixel centres
-//! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`); Gaussians are blended in order of view-space
-//! z, ties in order of index; a pixel is `colour + transmittance * background`, not clamped.
+//! The other conventions are these. View space is that of `OpenCV`: x right, y down, z forward. Pixel centres
+//! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`). Gaussians are blended in order of view-space z, and
+//! those of equal z in order of index. A pixel is `colour + transmittance * background`, not clamped.
 
-/// Gaussians whose view-space z, in world units, is not above this are not drawn
+/// A Gaussian is drawn only if its view-space z, in world units, is above this
 /// (`auxiliary.h`, `in_frustum`).
 pub const NEAR_Z: f32 = 0.2;
 
@@ -36,11 +36,11 @@ pub const TILE: usize = 16;
 /// Largest opacity of one Gaussian in one pixel (`forward.cu`, `renderCUDA`).
 pub const ALPHA_MAX: f32 = 0.99;
 
-/// Gaussians below this opacity in a pixel are left out of it (`forward.cu`, `renderCUDA`).
+/// A Gaussian whose opacity in a pixel is below this is left out of the pixel (`forward.cu`, `renderCUDA`).
 pub const ALPHA_MIN: f32 = 1.0 / 255.0;
 
-/// A pixel is finished by the first Gaussian that would take its transmittance below this; that
-/// Gaussian is not added (`forward.cu`, `renderCUDA`).
+/// The first Gaussian that would take a pixel's transmittance below this finishes the pixel. That Gaussian is
+/// not added (`forward.cu`, `renderCUDA`).
 pub const TRANSMITTANCE_MIN: f32 = 1e-4;
 
 /// Least ratio of the determinants before and after the dilation, whose square root scales the opacity
@@ -52,6 +52,6 @@ pub const ANTIALIAS_FLOOR: f32 = 0.000_025;
 /// The zero quaternion stays zero, and its rotation matrix is then the identity.
 pub const QUATERNION_FLOOR: f32 = 1e-12;
 
-/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]: covers the error of `exp`
-/// and of the logarithm, 1e-6 together, many times over. Makes no difference to pictures.
+/// Slack on powers when deciding that a Gaussian cannot reach [`ALPHA_MIN`]. The errors of `exp` and of the
+/// logarithm are 1e-6 together, far below it. It makes no difference to pictures.
 pub const POWER_SLACK: f32 = 1e-4;

@@ -1,12 +1,9 @@
-//! What can go wrong, split by who is to blame.
+//! Errors, split by whose fault they are.
 
 use std::path::Path;
 
-/// Result with this crate's [`Error`].
-pub type Result<T> = std::result::Result<T, Error>;
-
-/// A value, or what is wrong with it where the file is not known.
-pub(crate) type Checked<T> = std::result::Result<T, String>;
+/// Result with this crate's [`Error`]. Functions that do not know the file return a text instead.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
 
 /// Any failure of this crate. The variant tells whose fault it is.
 #[derive(Debug, thiserror::Error)]
@@ -20,6 +17,10 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// The codec's error: the arrays of a scene do not fit one another, or the caller's
+    /// [`Progress`](lexisplat::Progress) cancelled the work.
+    #[error(transparent)]
+    Codec(#[from] lexisplat::Error),
     /// The bytes are not what they claim to be. The file is at fault; the text names the camera, the
     /// field and the value.
     #[error("{file}: {problem}")]
@@ -39,7 +40,7 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// A file has more than a limit allows. The text names what, how much, and the limit.
+    /// A file has more of something than a limit allows.
     #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
         /// What there is too much of.
@@ -49,7 +50,7 @@ pub enum Error {
         /// The most allowed.
         limit: u64,
     },
-    /// More than this GPU holds. The CPU renderer has no such limit.
+    /// Something is larger than this GPU can hold. The CPU renderer has no such limit.
     #[error("{what}: {found} is over the limit of {limit}")]
     GpuLimit {
         /// What there is too much of.
@@ -59,10 +60,10 @@ pub enum Error {
         /// The most that the GPU takes.
         limit: u64,
     },
-    /// The GPU or its driver refused, or there is none. The CPU renderer needs neither.
+    /// There is no GPU, or it or its driver refused something. The CPU renderer needs neither.
     #[error("{problem}")]
     Gpu {
-        /// What it said.
+        /// What the driver said, or what is missing.
         problem: String,
     },
 }

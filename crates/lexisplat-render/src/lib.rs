@@ -1,12 +1,15 @@
 //! Cameras and rasterisers that draw 3D Gaussian Splatting scenes.
 //!
-//! A [`Scene`] is a trained model with dense SH or a compressed one; [`render`] draws either through
-//! the same [`Radiance`] interface, the compressed one straight from its sparse codes. The rules are
-//! those of the 3DGS authors' rasteriser, number by number: see [`conventions`].
+//! A [`Scene`] is a trained model with dense SH, or a compressed one. [`render`] draws either through the same
+//! [`Radiance`] interface, and the compressed one straight from its sparse codes. The rules and numbers are those
+//! of the 3DGS authors' rasteriser: see [`conventions`].
 //!
-//! [`render`] draws on the processor, the same bits on every machine. With the feature `gpu` (on by default)
-//! the module `gpu` draws the same pictures through Vulkan, Metal or DX12; [`Renderer`] is one interface to
-//! both.
+//! [`render`] draws on the processor, with the same bits on every machine. With the feature `gpu` (on by default)
+//! the module `gpu` draws the same pictures through Vulkan, Metal, DX12 or, in a browser, WebGPU. [`Renderer`] is
+//! one interface to both. Its methods that may wait for a GPU are async, with twins that block outside of
+//! browsers.
+//!
+//! Without the feature `parallel` (on by default) everything runs on the calling thread.
 //!
 //! ```
 //! use lexisplat::{Geometry, ShDegree, Splats};
@@ -26,13 +29,13 @@
 //!     meta: Default::default(),
 //! };
 //! for camera in orbit(&splats.geometry, 3, 64, 48) {
-//!     let image = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+//!     let image = render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap();
 //!     let [red, _, blue] = image.pixels[24 * 64 + 32];
 //!     assert!(red > 0.7 && red > blue);
 //! }
 //! ```
 
-// Tests in here share helpers with those beside the crate, which know it by its name.
+// Tests in here share helpers with those in `tests/`, which use the crate by its name.
 #[cfg(all(test, feature = "gpu"))]
 extern crate self as lexisplat_render;
 
@@ -45,29 +48,38 @@ mod error;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod image;
+mod interior_views;
 mod object;
 mod orbit;
+mod parallel;
 mod radiance;
+mod read_views;
 mod renderer;
-mod room;
 mod scene;
-mod sight;
 mod surround;
 mod transforms;
+mod transmittance;
+mod view_files;
 mod view_set;
+#[cfg(any(feature = "gpu", not(target_family = "wasm")))]
+mod wait;
 
 pub use camera::{Camera, MAX_SIDE, Split};
-pub use cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES, read_cameras, read_cameras_bytes};
-pub use colmap::{MAX_COLMAP_BYTES, read_colmap, read_colmap_binary, read_colmap_text};
+pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
+pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
 pub use cpu::{Drawn, RenderOptions, render, render_measured, sensitivity};
 pub use error::{Error, Result};
 pub use image::Image;
+pub use interior_views::{interior_views, is_interior};
 pub use object::{object, subject};
 pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
+#[cfg(not(target_family = "wasm"))]
+pub use read_views::{read_cameras, read_colmap, read_nerf, read_transforms, read_views};
+pub use read_views::{read_view_files, read_views_bytes};
 pub use renderer::{Device, Prepared, Renderer};
-pub use room::{is_room, room};
 pub use scene::Scene;
 pub use surround::surround;
-pub use transforms::{read_nerf, read_transforms, read_transforms_bytes};
-pub use view_set::{SizeOf, ViewSet, read_views};
+pub use transforms::read_transforms_bytes;
+pub use view_files::{MAX_CAMERAS_BYTES, ReadSeek, ViewFile, ViewFiles};
+pub use view_set::{SizeOf, ViewSet};

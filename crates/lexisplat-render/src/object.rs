@@ -1,4 +1,4 @@
-//! Views of what there is to look at in a scene that comes without cameras.
+//! Views of the subject of a scene that comes without cameras.
 
 use lexisplat::Geometry;
 
@@ -6,22 +6,22 @@ use crate::camera::Camera;
 use crate::orbit::{bulk, ring};
 use crate::surround::detail;
 
-/// The detail is the subject of a scene whose bulk is this many times as large: an object before a
-/// background. Bonsai (11) and flowers (7) are such scenes; where the object is all there is, it is 1 to 2.
+/// The detail is the subject of a scene whose bulk is at least this many times as large, as it is for an object
+/// before a background: 11 for bonsai, 7 for flowers. Where the object is all there is, it is 1 to 2.
 const BACKGROUND: f64 = 4.0;
-/// Radius of what is looked at, in units of the half diagonal of the detail's box. Photos of a centrepiece
-/// are taken from 3 to 6 half diagonals; this makes it 4.
+/// Radius of the subject, in units of the half diagonal of the detail's box. Photos of a centrepiece are taken
+/// from 3 to 6 half diagonals; this makes it 4.
 const AIR: f64 = 1.8;
 
-/// `count` cameras on a swaying ring around the [`subject`] of `geometry`, as [`crate::orbit`] has them
-/// around the bulk, and named as those.
+/// Returns `count` cameras on a ring around the [`subject`] of `geometry`. Ring and names are those of
+/// [`crate::orbit`], which goes around the bulk.
 #[must_use]
 pub fn object(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     ring(subject(geometry), count, width, height)
 }
 
-/// Centre and radius, in world units, of what there is to look at: where most of the small opaque
-/// Gaussians are, if that is a small part of the scene, else the [`bulk`].
+/// Returns the centre and radius, in world units, of the subject: where most of the small opaque Gaussians are, if
+/// that is a small part of the scene; otherwise the [`bulk`].
 #[must_use]
 pub fn subject(geometry: &Geometry) -> ([f64; 3], f64) {
     let (centre, radius) = bulk(geometry);

@@ -5,42 +5,42 @@ use lexisplat::Geometry;
 
 use crate::camera::Camera;
 
-/// Share of the opacity, on each side and axis, that is left out when the bulk is measured: floaters
-/// and far backgrounds are many but thin.
+/// Share of the opacity at either end of each axis that does not count for the bulk. Floaters and far backgrounds
+/// are many, but have little opacity.
 pub(crate) const TRIM: f64 = 0.2;
 /// Field of view along the picture's shorter side, in degrees.
 const FIELD_OF_VIEW: f64 = 50.0;
-/// Height of the ring above the centre and how far it sways, in degrees of elevation.
+/// Mean elevation of the ring above the centre, in degrees.
 const ELEVATION: f64 = 20.0;
-/// See [`ELEVATION`].
+/// Largest difference from [`ELEVATION`], in degrees.
 const ELEVATION_SWAY: f64 = 10.0;
-/// Times the ring sways on one turn.
+/// Number of times that the elevation goes up and down on one turn.
 const SWAYS: f64 = 3.0;
-/// Radius of what is looked at, in units of the half diagonal of the trimmed box: a little air around.
+/// Radius of the bulk, in units of the half diagonal of the trimmed box. It leaves a little space around.
 const AIR: f64 = 1.2;
 /// Radius of a scene that has none, in world units.
 const MIN_RADIUS: f64 = 1e-3;
 /// Nearest distance to the centre, in world units: well beyond [`crate::conventions::NEAR_Z`].
 const MIN_DISTANCE: f64 = 0.5;
-/// Up in the world: scenes trained from COLMAP's cameras are about upright with y down.
+/// Up in the world. Scenes trained from COLMAP's cameras are about upright with y down.
 pub(crate) const UP: DVec3 = DVec3::NEG_Y;
 
-/// `count` cameras on a swaying ring around the bulk of `geometry`, all looking at its centre, named
-/// `orbit_000`, `orbit_001` and so on; the same for the same input.
+/// Returns `count` cameras on a ring around the bulk of `geometry`, named `orbit_000`, `orbit_001` and so on. The
+/// ring goes up and down, and all cameras look at its centre. The same input gives the same cameras.
 ///
-/// The bulk is where most of the opacity is, so floaters do not count; its radius fits the field of
-/// view. World y is taken to point down, as in scenes trained from COLMAP's cameras.
+/// The bulk is where most of the opacity is, so floaters do not count. Its radius fits the field of view. World y
+/// is taken to point down, as in scenes trained from COLMAP's cameras.
 #[must_use]
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
     ring(bulk(geometry), count, width, height)
 }
 
-/// [`orbit`] around a centre, at a distance from which a ball of a radius fits the field of view.
+/// [`orbit`] around a centre, at a distance from which a ball of the radius fits the field of view.
 pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, height: u32) -> Vec<Camera> {
-    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
+    let size = [width, height].map(|side| side.clamp(1, crate::MAX_SIDE));
     let centre = DVec3::from_array(centre);
     let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
-    let focal = f64::from(width.min(height)) / 2.0 / libm::tan(half_view);
+    let focal = f64::from(size[0].min(size[1])) / 2.0 / libm::tan(half_view);
     let distance = (radius / libm::sin(half_view)).max(MIN_DISTANCE);
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     (0..steps)
@@ -49,38 +49,47 @@ pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, 
             let elevation = (ELEVATION + ELEVATION_SWAY * libm::sin(SWAYS * turn)).to_radians();
             let around = DVec3::new(libm::sin(turn), 0.0, -libm::cos(turn));
             let out = around * libm::cos(elevation) + UP * libm::sin(elevation);
-            let forward = -out;
-            let right = forward.cross(UP).normalize();
-            let down = forward.cross(right);
-            let columns = [right, down, forward];
-            Camera {
-                name: format!("orbit_{i:03}"),
-                width,
-                height,
-                fx: single(focal),
-                fy: single(focal),
-                position: (centre + out * distance).to_array().map(single),
-                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
-                split: None,
-            }
+            pinhole(format!("orbit_{i:03}"), size, focal, centre + out * distance, axes(-out, UP))
         })
         .collect()
 }
 
-/// Centre and radius of where most of the opacity is, in world units; the radius is above 0.
+/// Returns right, down and forward of a camera that looks along `forward`. `up` is another direction, and points
+/// up in the picture.
+pub(crate) fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
+    let right = forward.cross(up).normalize();
+    [right, forward.cross(right), forward]
+}
+
+/// Returns the generated camera with this width and height and this focal length, in pixels. `axes` are its
+/// right, down and forward.
+pub(crate) fn pinhole(name: String, size: [u32; 2], focal: f64, position: DVec3, axes: [DVec3; 3]) -> Camera {
+    Camera {
+        name,
+        width: size[0],
+        height: size[1],
+        fx: single(focal),
+        fy: single(focal),
+        position: position.to_array().map(single),
+        rotation: std::array::from_fn(|row| axes.map(|axis| single(axis[row]))),
+        split: None,
+    }
+}
+
+/// Returns the centre and radius, in world units, of where most of the opacity is. The radius is above 0.
 #[must_use]
 pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     (centre.to_array(), (half.length() * AIR).max(MIN_RADIUS))
 }
 
-/// Opacities after the sigmoid.
+/// Returns the opacities after the sigmoid.
 pub(crate) fn opacity_weights(geometry: &Geometry) -> Vec<f64> {
     geometry.opacities.iter().map(|&o| 1.0 / (1.0 + libm::exp(f64::from(-o)))).collect()
 }
 
-/// Weighted median of the positions, and half the extent along each axis of what is left without the
-/// share `trim` of the weight at either end.
+/// Returns the weighted median of the positions, and half the extent along each axis. The share `trim` of the
+/// weight at either end does not count for the extent.
 pub(crate) fn middle(geometry: &Geometry, weights: &[f64], trim: f64) -> (DVec3, DVec3) {
     let spans: [[f64; 3]; 3] = std::array::from_fn(|axis| {
         let values = geometry.positions.iter().map(|p| f64::from(p[axis]));
@@ -90,8 +99,8 @@ pub(crate) fn middle(geometry: &Geometry, weights: &[f64], trim: f64) -> (DVec3,
     (centre, DVec3::from_array(spans.map(|[low, _, high]| (high - low) / 2.0)))
 }
 
-/// The values below which the given shares of the weight lie; 0 if there is none. Pairs that are not
-/// finite do not count.
+/// Returns the values below which the given shares of the weight lie; 0 if there are no values. Pairs of value and
+/// weight that are not finite do not count.
 fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [f64; N]) -> [f64; N] {
     let mut sorted: Vec<(f64, f64)> = values.filter(|(v, w)| v.is_finite() && w.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -106,6 +115,7 @@ fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [
     })
 }
 
+/// Rounds to f32; what overflows becomes infinite, which [`Camera::validate`] refuses.
 #[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
 pub(crate) fn single(value: f64) -> f32 {
     value as f32

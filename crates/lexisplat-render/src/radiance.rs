@@ -1,24 +1,24 @@
-//! Colour of a Gaussian seen from a direction, whatever its SH-rest is stored as.
+//! Works out the colour of a Gaussian seen from a direction, however its SH-rest is stored.
 
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, MAX_COEFFICIENTS, rest_basis};
-use lexisplat::{Dictionary, Row, ShDegree, SparseCodes};
+use lexisplat::{CodedRest, Dictionary, ShDegree, SparseCodes};
 
 use crate::scene::Scene;
 
-/// Independent sums of a dot product, so that additions need not wait for each other. Part of the
-/// rounding, so the same everywhere.
+/// Independent sums of a dot product, so that additions need not wait for each other. The number decides how the
+/// result is rounded, so it is the same everywhere.
 const LANES: usize = 4;
-/// Channels of an interleaved atom: red, green, blue and one zero, so that each fills a register.
+/// Channels of an interleaved atom: red, green, blue, and one zero that fills the register up.
 const PADDED: usize = 4;
 
 /// A scene's view-dependent colour.
 ///
-/// Sparse codes are never expanded: for each nonzero the atom's three channels are multiplied with the
-/// basis and only three sums are kept, which is `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
+/// Sparse codes are never expanded. For each nonzero the atom's three channels are multiplied with the basis, and
+/// only three sums are kept: `SH(sum_j a_j d_j) = sum_j a_j SH(d_j)`.
 #[derive(Debug)]
 pub struct Radiance<'a> {
     degree: ShDegree,
-    /// Highest degree that counts, at most `degree`.
+    /// The highest degree that counts; at most `degree`.
     shown: ShDegree,
     dc: &'a [[f32; 3]],
     rest: Rest<'a>,
@@ -33,7 +33,7 @@ enum Rest<'a> {
 type Basis = [f32; MAX_COEFFICIENTS - 1];
 
 impl<'a> Radiance<'a> {
-    /// The radiance of `scene`. Copies the dictionary, nothing else.
+    /// Returns the radiance of `scene`. Copies the dictionary and nothing else.
     #[must_use]
     pub fn new(scene: &Scene<'a>) -> Self {
         let rest = match scene {
@@ -46,15 +46,15 @@ impl<'a> Radiance<'a> {
         Self { degree, shown: degree, dc: &scene.geometry().dc, rest }
     }
 
-    /// The same with the bands above `degree` left out, if that is given and below the scene's own.
+    /// Leaves out the bands above `degree`, if that is given and below the scene's own.
     #[must_use]
     pub fn up_to(self, degree: Option<ShDegree>) -> Self {
         Self { shown: degree.map_or(self.degree, |most| most.min(self.degree)), ..self }
     }
 
-    /// Colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
-    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count. NaN where
-    /// the sum is not finite.
+    /// Returns the colour of Gaussian `i` for the unit vector `direction`, which points from the camera to it:
+    /// `max(0, 0.5 + C0 * dc + sum_k basis_k * rest_k)` in each channel, over the bands that count. It is NaN
+    /// where the sum is not finite.
     ///
     /// # Panics
     /// If the scene has no Gaussian `i`.
@@ -64,7 +64,7 @@ impl<'a> Radiance<'a> {
         let per_channel = self.degree.rest_per_channel();
         let mut rest = [0.0; CHANNELS];
         if self.shown.rest_per_channel() > 0 {
-            // Zero above the degree shown, which leaves those bands out.
+            // The basis is zero above the degree shown, which leaves those bands out.
             let basis = rest_basis(self.shown, direction);
             rest = match &self.rest {
                 Rest::Dense(all) => {
@@ -72,8 +72,8 @@ impl<'a> Radiance<'a> {
                     dense(&all[i * dim..(i + 1) * dim], per_channel, &basis)
                 }
                 Rest::Sparse { codes, atoms } => match codes.row(i) {
-                    Row::Exact(row) => dense(row, per_channel, &basis),
-                    Row::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
+                    CodedRest::Exact(row) => dense(row, per_channel, &basis),
+                    CodedRest::Code(column) => sparse(column.iter(), atoms, per_channel, &basis),
                 },
             };
         }
@@ -84,7 +84,7 @@ impl<'a> Radiance<'a> {
     }
 }
 
-/// Dot products of the three channels of a channel-major row with the basis.
+/// Returns the dot products of the three channels of a channel-major row with the basis.
 #[inline]
 fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];
@@ -100,7 +100,7 @@ fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
     sums
 }
 
-/// The same for a code: `sum_j value_j * (basis . atom_j)`.
+/// Returns the dot products for a code: `sum_j value_j * (basis . atom_j)`.
 #[inline]
 fn sparse(
     code: impl Iterator<Item = (usize, f32)>,
@@ -133,7 +133,7 @@ fn sparse(
     [sums[0], sums[1], sums[2]]
 }
 
-/// The atoms with the channels of each coefficient side by side.
+/// Returns the atoms with the channels of each coefficient side by side.
 fn interleave(dictionary: &Dictionary) -> Vec<[f32; PADDED]> {
     let per_channel = dictionary.degree().rest_per_channel();
     let mut atoms = Vec::with_capacity(dictionary.len() * per_channel);

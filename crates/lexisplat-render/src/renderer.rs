@@ -1,8 +1,8 @@
-//! One interface to drawing on the processor and on a GPU.
+//! One interface for drawing on the processor and on a GPU.
 
 use std::str::FromStr;
 
-use lexisplat::Sensitivity;
+use lexisplat::{Progress, Sensitivity};
 
 use crate::camera::Camera;
 use crate::cpu::{RenderOptions, render, sensitivity};
@@ -11,16 +11,18 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use crate::image::Image;
 use crate::scene::Scene;
+#[cfg(not(target_family = "wasm"))]
+use crate::wait::block_on;
 
-/// What to draw on.
+/// The device to draw on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Device {
-    /// The best GPU that is not software, or else the processor.
+    /// The best GPU that is not software; the processor if there is none.
     #[default]
     Auto,
-    /// The processor: the same bits on every machine.
+    /// The processor, which gives the same bits on every machine.
     Cpu,
-    /// The best GPU, software such as lavapipe if there is nothing else.
+    /// The best GPU, or software such as lavapipe if there is nothing else.
     Gpu,
     /// The GPU at this place in `gpu::adapters`.
     Index(usize),
@@ -28,17 +30,26 @@ pub enum Device {
 
 #[cfg(feature = "gpu")]
 impl Device {
-    /// The GPU that this means, or `None` if it means the processor.
+    /// Opens the GPU that this means; `None` if it means the processor.
     ///
     /// # Errors
-    /// As [`Renderer::open`].
-    pub fn open_gpu(self) -> Result<Option<Gpu>> {
+    /// As [`Renderer::open_async`].
+    pub async fn open_gpu_async(self) -> Result<Option<Gpu>> {
         match self {
             Self::Cpu => Ok(None),
-            Self::Auto => Gpu::find(GpuChoice::Hardware),
-            Self::Gpu => Gpu::open(GpuChoice::Best).map(Some),
-            Self::Index(index) => Gpu::open(GpuChoice::Index(index)).map(Some),
+            Self::Auto => Gpu::find_async(GpuChoice::Hardware).await,
+            Self::Gpu => Gpu::open_async(GpuChoice::Best).await.map(Some),
+            Self::Index(index) => Gpu::open_async(GpuChoice::Index(index)).await.map(Some),
         }
+    }
+
+    /// Blocks on [`Self::open_gpu_async`].
+    ///
+    /// # Errors
+    /// As [`Renderer::open_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn open_gpu(self) -> Result<Option<Gpu>> {
+        pollster::block_on(self.open_gpu_async())
     }
 }
 
@@ -57,7 +68,7 @@ impl FromStr for Device {
     }
 }
 
-/// Draws scenes on what it was opened for.
+/// Draws scenes on the device that it was opened for.
 #[derive(Debug)]
 pub struct Renderer {
     #[cfg(feature = "gpu")]
@@ -77,7 +88,7 @@ pub struct Prepared<'a> {
 const CPU: &str = "cpu";
 
 impl Renderer {
-    /// Draws on the processor.
+    /// Makes a renderer that draws on the processor.
     #[must_use]
     pub fn cpu() -> Self {
         Self {
@@ -87,17 +98,29 @@ impl Renderer {
         }
     }
 
-    /// Opens `device`. [`Device::Auto`] always succeeds where the processor will do.
+    /// Opens `device`. [`Device::Auto`] opens the processor where there is no GPU.
     ///
     /// # Errors
     /// [`Error::Gpu`] if a GPU was asked for and there is none, or it refuses; [`Error::Parameter`] for a
     /// number out of range.
     #[cfg(feature = "gpu")]
-    pub fn open(device: Device) -> Result<Self> {
-        device.open_gpu()?.map_or_else(|| Ok(Self::cpu()), |gpu| Self::on(&gpu))
+    pub async fn open_async(device: Device) -> Result<Self> {
+        match device.open_gpu_async().await? {
+            Some(gpu) => Self::on_async(&gpu).await,
+            None => Ok(Self::cpu()),
+        }
     }
 
-    /// Opens `device`, which can only be the processor: the GPU was left out when this was built.
+    /// Blocks on [`Self::open_async`].
+    ///
+    /// # Errors
+    /// As [`Self::open_async`].
+    #[cfg(all(feature = "gpu", not(target_family = "wasm")))]
+    pub fn open(device: Device) -> Result<Self> {
+        pollster::block_on(Self::open_async(device))
+    }
+
+    /// Opens `device`, which must be the processor: this was built without the feature `gpu`.
     ///
     /// # Errors
     /// [`Error::Gpu`] if a GPU was asked for.
@@ -111,17 +134,26 @@ impl Renderer {
         }
     }
 
-    /// Draws on `gpu`.
+    /// Makes a renderer that draws on `gpu`.
     ///
     /// # Errors
     /// [`Error::Gpu`] if its driver refuses a kernel.
     #[cfg(feature = "gpu")]
-    pub fn on(gpu: &Gpu) -> Result<Self> {
+    pub async fn on_async(gpu: &Gpu) -> Result<Self> {
         let name = gpu.summary().name.clone();
-        Ok(Self { gpu: Some((gpu.clone(), GpuRenderer::new(gpu)?)), name })
+        Ok(Self { gpu: Some((gpu.clone(), GpuRenderer::new_async(gpu).await?)), name })
     }
 
-    /// What it draws on: `cpu`, or the GPU's name.
+    /// Blocks on [`Self::on_async`].
+    ///
+    /// # Errors
+    /// As [`Self::on_async`].
+    #[cfg(all(feature = "gpu", not(target_family = "wasm")))]
+    pub fn on(gpu: &Gpu) -> Result<Self> {
+        gpu.block_on(Self::on_async(gpu))
+    }
+
+    /// The name of what it draws on: `cpu`, or that of the GPU.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -136,15 +168,17 @@ impl Renderer {
         false
     }
 
-    /// Makes `scene` ready: uploads it, as it is stored, to the GPU.
+    /// Makes `scene` ready to be drawn: uploads it to the GPU as it is stored.
     ///
     /// # Errors
-    /// [`Error::GpuLimit`] or [`Error::Gpu`] if it does not fit on the GPU.
-    pub fn prepare<'a>(&self, scene: Scene<'a>) -> Result<Prepared<'a>> {
+    /// [`Error::Codec`] if the scene's arrays do not fit one another; [`Error::GpuLimit`] or [`Error::Gpu`] if
+    /// it does not fit on the GPU.
+    pub async fn prepare_async<'a>(&self, scene: Scene<'a>) -> Result<Prepared<'a>> {
+        scene.validate()?;
         Ok(Prepared {
             #[cfg(feature = "gpu")]
             gpu: match &self.gpu {
-                Some((gpu, _)) => Some(GpuScene::new(gpu, &scene, ShPath::of(&scene))?),
+                Some((gpu, _)) => Some(GpuScene::new_async(gpu, &scene, ShPath::of(&scene)).await?),
                 None => None,
             },
             scene,
@@ -156,38 +190,88 @@ impl Renderer {
     /// # Errors
     /// [`Error::Parameter`] if the camera cannot be drawn with; on a GPU also [`Error::GpuLimit`] if the view
     /// needs more than it has, and [`Error::Gpu`] if it fails.
+    pub async fn render_async(
+        &mut self,
+        prepared: &Prepared<'_>,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<Image> {
+        #[cfg(feature = "gpu")]
+        if let (Some((_, renderer)), Some(scene)) = (&mut self.gpu, &prepared.gpu) {
+            return Ok(renderer.render_async(scene, camera, options).await?.0);
+        }
+        render(&prepared.scene, camera, options)
+    }
+
+    /// Returns how much the pictures of `scene` from `cameras` change with each value of each Gaussian: see
+    /// [`crate::sensitivity`]. Reports `Stage::Draw`, in views, to `progress`.
+    ///
+    /// # Errors
+    /// [`Error::Codec`] if `progress` cancelled the work; otherwise as [`Self::prepare_async`] and
+    /// [`Self::render_async`].
+    pub async fn sensitivity_async(
+        &mut self,
+        scene: &Scene<'_>,
+        cameras: &[Camera],
+        progress: &dyn Progress,
+    ) -> Result<Sensitivity> {
+        #[cfg(feature = "gpu")]
+        if let Some((gpu, renderer)) = &mut self.gpu {
+            let uploaded = GpuScene::new_async(gpu, scene, ShPath::of(scene)).await?;
+            return renderer.sensitivity_async(&uploaded, scene.geometry(), cameras, progress).await;
+        }
+        sensitivity(scene, cameras, progress)
+    }
+}
+
+/// The methods above for threads that may block.
+#[cfg(not(target_family = "wasm"))]
+impl Renderer {
+    /// Blocks on [`Self::prepare_async`].
+    ///
+    /// # Errors
+    /// As [`Self::prepare_async`].
+    pub fn prepare<'a>(&self, scene: Scene<'a>) -> Result<Prepared<'a>> {
+        block_on(self.poll(), self.prepare_async(scene))
+    }
+
+    /// Blocks on [`Self::render_async`].
+    ///
+    /// # Errors
+    /// As [`Self::render_async`].
     pub fn render(
         &mut self,
         prepared: &Prepared<'_>,
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<Image> {
-        camera.validate()?;
-        #[cfg(feature = "gpu")]
-        if let (Some((_, renderer)), Some(scene)) = (&mut self.gpu, &prepared.gpu) {
-            return Ok(renderer.render(scene, camera, options)?.0);
-        }
-        Ok(render(&prepared.scene, camera, options))
+        block_on(self.poll(), self.render_async(prepared, camera, options))
     }
 
-    /// How much the pictures of `scene` from `cameras` change with each value of each Gaussian: see
-    /// [`crate::sensitivity`].
+    /// Blocks on [`Self::sensitivity_async`].
     ///
     /// # Errors
-    /// As [`Self::prepare`] and [`Self::render`].
+    /// As [`Self::sensitivity_async`].
     pub fn sensitivity(
         &mut self,
         scene: &Scene<'_>,
         cameras: &[Camera],
-        on_view: &mut dyn FnMut(),
+        progress: &dyn Progress,
     ) -> Result<Sensitivity> {
-        cameras.iter().try_for_each(Camera::validate)?;
+        block_on(self.poll(), self.sensitivity_async(scene, cameras, progress))
+    }
+
+    /// Returns what lets the GPU go on while a thread blocks on it.
+    fn poll(&self) -> impl FnMut() -> Result<()> + use<> {
         #[cfg(feature = "gpu")]
-        if let Some((gpu, renderer)) = &mut self.gpu {
-            let uploaded = GpuScene::new(gpu, scene, ShPath::of(scene))?;
-            return renderer.sensitivity(&uploaded, scene.geometry(), cameras, on_view);
+        let gpu = self.gpu.as_ref().map(|(gpu, _)| gpu.clone());
+        move || {
+            #[cfg(feature = "gpu")]
+            if let Some(gpu) = &gpu {
+                gpu.poll()?;
+            }
+            Ok(())
         }
-        Ok(sensitivity(scene, cameras, on_view))
     }
 }
 

@@ -2,6 +2,8 @@
 
 use lexisplat::{Geometry, Model, SceneMeta, ShDegree, Splats};
 
+use crate::error::Result;
+
 /// A scene to draw, borrowed.
 #[derive(Debug, Clone, Copy)]
 pub enum Scene<'a> {
@@ -49,6 +51,25 @@ impl<'a> Scene<'a> {
             Self::Dense(splats) => splats.degree,
             Self::Sparse(model) => model.degree(),
         }
+    }
+
+    /// Checks that every array has an entry for each Gaussian.
+    ///
+    /// # Errors
+    /// [`Error::Codec`](crate::Error::Codec) naming the array and its length.
+    pub fn validate(&self) -> Result<()> {
+        match self {
+            Self::Dense(splats) => splats.validate()?,
+            Self::Sparse(model) => {
+                model.geometry.validate()?;
+                let (found, len) = (model.codes.len(), model.geometry.len());
+                if found != len {
+                    let expected = format!("{len} entries, one for each Gaussian");
+                    return Err(lexisplat::Error::parameter("codes", found, expected).into());
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Number of Gaussians.

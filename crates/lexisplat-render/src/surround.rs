@@ -4,13 +4,13 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
-use crate::orbit::{middle, single};
+use crate::orbit::{axes, middle, pinhole};
 
-/// Share of the detail, at either end of each axis, that does not count for its radius.
+/// Share of the detail at either end of each axis that does not count for its radius.
 const TRIM: f64 = 0.2;
 /// Angle between neighbouring points of a Fibonacci spiral: the golden angle.
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
-/// Steps of the low-discrepancy sequences that spread distances and the points looked at: powers of the
+/// Steps of the low-discrepancy sequences that spread distances and the points looked at. They are powers of the
 /// reciprocal plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences").
 pub(crate) const PLASTIC: [f64; 4] =
     [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.430_159_709_001_946_8, 0.324_717_957_244_746];
@@ -18,22 +18,21 @@ pub(crate) const PLASTIC: [f64; 4] =
 const FOCAL: f64 = 1.0;
 /// Radius of a scene without extent, in world units.
 const MIN_RADIUS: f64 = 1e-3;
-/// A direction this much along the world's y needs another up.
+/// A direction whose y is larger than this needs another up than the world's.
 const STEEP: f64 = 0.9;
 
-/// `count` cameras on all sides of the scene's detail, at `distances` (nearest and farthest, in radii of
-/// that detail), looking at points of it; the same for the same input. Named `surround_000` and so on.
+/// Returns `count` cameras of a `size` (width and height) on all sides of the scene's detail, named `surround_000`,
+/// `surround_001` and so on. They look at points of the detail from `distances`, nearest and farthest, in radii
+/// of it. The same input gives the same cameras.
 ///
-/// Detail is where small opaque Gaussians are: that is where training cameras looked. Some of the views
-/// are from where no photographer stood, behind walls or below the floor; that is the price of not
-/// knowing.
+/// The detail is where small opaque Gaussians are, for that is where training cameras looked. Where those stood is
+/// not known, so some views are from behind walls or below the floor.
 #[must_use]
 pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f64; 2]) -> Vec<Camera> {
-    let [width, height] = size;
-    let (width, height) = (width.clamp(1, crate::MAX_SIDE), height.clamp(1, crate::MAX_SIDE));
+    let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));
     let (centre, half) = detail(geometry);
     let radius = half.length().max(MIN_RADIUS);
-    let focal = single(f64::from(width) * FOCAL);
+    let focal = f64::from(size[0]) * FOCAL;
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     (0..steps)
         .map(|i| {
@@ -49,23 +48,12 @@ pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f
             let target = centre + offset * half.max_element();
             let forward = (target - position).normalize_or(-out);
             let up = if forward.y.abs() > STEEP { DVec3::X } else { DVec3::NEG_Y };
-            let right = forward.cross(up).normalize();
-            let columns = [right, forward.cross(right), forward];
-            Camera {
-                name: format!("surround_{i:03}"),
-                width,
-                height,
-                fx: focal,
-                fy: focal,
-                position: position.to_array().map(single),
-                rotation: std::array::from_fn(|row| columns.map(|column| single(column[row]))),
-                split: None,
-            }
+            pinhole(format!("surround_{i:03}"), size, focal, position, axes(forward, up))
         })
         .collect()
 }
 
-/// Centre of the detail and half its extent along each axis.
+/// Returns the centre of the detail, and half its extent along each axis.
 pub(crate) fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
     let weights: Vec<f64> = geometry
         .opacities
@@ -83,6 +71,7 @@ pub(crate) fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::orbit::single;
 
     #[test]
     fn views_surround_the_detail_and_look_at_it() {

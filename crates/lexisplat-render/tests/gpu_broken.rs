@@ -1,19 +1,7 @@
 //! Values that are not finite or huge, in every property: the GPU leaves out what the processor does.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{made, twins};
 use lexisplat::sh::rest_basis;
 use lexisplat::{ShDegree, Splats};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
@@ -36,10 +24,10 @@ const VALUES: [f32; 12] = [
 
 fn compare(gpu: &Gpu, renderer: &mut GpuRenderer, splats: &Splats, camera: &Camera, case: &str) {
     let scene = Scene::from(splats);
-    let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background([0.3, 0.6, 0.9]);
     let uploaded = GpuScene::new(gpu, &scene, ShPath::DenseF32).unwrap();
     let found = renderer.render(&uploaded, camera, &options).unwrap().0;
-    twins::check(&found, &render(&scene, camera, &options), case);
+    twins::check(&found, &render(&scene, camera, &options).unwrap(), case);
 }
 
 /// What puts one value into one property of a Gaussian.

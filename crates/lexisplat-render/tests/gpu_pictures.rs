@@ -1,19 +1,7 @@
 //! Whole pictures of the GPU against the processor's.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{adapter, common, made, twins};
 use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
 use lexisplat_render::gpu::{GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Image, RenderOptions, Scene, render};
@@ -33,7 +21,7 @@ fn wild(random: &mut made::Random, count: usize, degree: ShDegree) -> Splats {
         geometry.opacities.push(random.within(-6.0, 9.0));
     }
     let sh_rest = (0..count * degree.rest()).map(|_| random.within(-0.3, 0.3)).collect();
-    let meta = SceneMeta { antialiased: random.next() < 0.5, ..SceneMeta::default() };
+    let meta = SceneMeta { antialiased: random.unit() < 0.5, ..SceneMeta::default() };
     Splats { geometry, degree, sh_rest, meta }
 }
 
@@ -56,18 +44,18 @@ fn random_scenes_look_the_same() {
     for case in 0..60 {
         let mut random = made::Random::new(case);
         let degree = ShDegree::new((case % 5) as u8).unwrap();
-        let count = (random.next() * 400.0) as usize;
+        let count = (random.unit() * 400.0) as usize;
         let splats = wild(&mut random, count, degree);
         let scene = Scene::from(&splats);
         let (width, height) = sides[case as usize % sides.len()];
         let focal = random.within(2.0, 8.0).exp();
         let camera = Camera { fy: focal * random.within(0.8, 1.2), ..made::straight(width, height, focal) };
-        let background = std::array::from_fn(|_| random.next());
-        let max_degree = (case % 3 == 0).then(|| ShDegree::new((random.next() * 5.0) as u8).unwrap());
-        let options = RenderOptions { background, max_degree };
+        let background = std::array::from_fn(|_| random.unit());
+        let max_degree = (case % 3 == 0).then(|| ShDegree::new((random.unit() * 5.0) as u8).unwrap());
+        let options = RenderOptions::default().with_background(background).with_max_degree(max_degree);
         let uploaded = GpuScene::new(&gpu, &scene, ShPath::DenseF32).unwrap();
         let (found, stats) = renderer.render(&uploaded, &camera, &options).unwrap();
-        let expected = render(&scene, &camera, &options);
+        let expected = render(&scene, &camera, &options).unwrap();
         let antialiased = splats.meta.antialiased;
         let case =
             format!("case {case}: {count} of degree {degree}, {antialiased}, {width}x{height}, {stats:?}");
@@ -87,7 +75,7 @@ fn odd_gaussians_look_the_same() {
             let mut camera = made::camera(seed, 150, 110);
             camera.position = camera.position.map(|v| v * closer);
             let found = draw(&mut renderer, &gpu, &splats, &camera);
-            let expected = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+            let expected = render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap();
             twins::check(&found, &expected, &format!("seed {seed}, {closer} of the distance"));
         }
     }
@@ -99,7 +87,7 @@ fn the_comparison_would_notice() {
     let mut renderer = GpuRenderer::new(&gpu).unwrap();
     let splats = made::scene(1, 300, ShDegree::THREE, false);
     let camera = made::camera(1, 150, 110);
-    let expected = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+    let expected = render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap();
     let mut other = splats.clone();
     other.meta.antialiased = true;
     let mut darker = splats.clone();
@@ -116,7 +104,7 @@ fn the_comparison_would_notice() {
 fn nothing_in_view_is_background() {
     let Some(gpu) = gpu() else { return };
     let mut renderer = GpuRenderer::new(&gpu).unwrap();
-    let options = RenderOptions { background: [0.1, 0.2, 0.3], ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background([0.1, 0.2, 0.3]);
     let mut behind = made::scene(2, 300, ShDegree::ONE, false);
     for position in &mut behind.geometry.positions {
         position[2] = -1.0 - position[2].abs();

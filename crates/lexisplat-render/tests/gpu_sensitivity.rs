@@ -1,17 +1,10 @@
 //! Sensitivities measured on the GPU against those of the processor.
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
 
-mod adapter;
-mod made;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use adapter::{gpu, opened};
-use lexisplat::{Sensitivity, ShDegree, Splats};
+use crate::adapter::{gpu, opened};
+use crate::made;
+use lexisplat::{Progress, Sensitivity, ShDegree, Silent, Splats};
 use lexisplat_render::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Error, Scene, sensitivity, surround};
 use lexisplat_sample::{SampleOptions, scene};
@@ -21,12 +14,22 @@ const SUM_TOLERANCE: f32 = 2e-3;
 /// Largest difference of a change of colour, in units of colour.
 const REMOVAL_TOLERANCE: f32 = 1e-3;
 
+/// Counts views.
+#[derive(Default)]
+struct Views(AtomicU64);
+
+impl Progress for Views {
+    fn advance(&self, units: u64) {
+        self.0.fetch_add(units, Relaxed);
+    }
+}
+
 fn measure(gpu: &Gpu, splats: &Splats, cameras: &[Camera]) -> Sensitivity {
     let scene = GpuScene::new(gpu, &Scene::from(splats), ShPath::DenseF32).unwrap();
     let mut renderer = GpuRenderer::new(gpu).unwrap();
-    let mut views = 0;
-    let found = renderer.sensitivity(&scene, &splats.geometry, cameras, &mut || views += 1).unwrap();
-    assert_eq!(views, cameras.len());
+    let views = Views::default();
+    let found = renderer.sensitivity(&scene, &splats.geometry, cameras, &views).unwrap();
+    assert_eq!(views.0.load(Relaxed), cameras.len() as u64);
     found
 }
 
@@ -43,7 +46,7 @@ fn near(name: &str, found: &[f32], expected: &[f32], tolerance: f32) {
 
 fn compare(gpu: &Gpu, splats: &Splats, cameras: &[Camera]) {
     let found = measure(gpu, splats, cameras);
-    let expected = sensitivity(&Scene::from(splats), cameras, &mut || ());
+    let expected = sensitivity(&Scene::from(splats), cameras, &Silent).unwrap();
     near("colour", &found.colour, &expected.colour, SUM_TOLERANCE);
     near("opacity", &found.opacity, &expected.opacity, SUM_TOLERANCE);
     let [a, b] = [&found, &expected].map(|s| s.position.as_flattened());
@@ -126,10 +129,10 @@ fn buffers_are_given_back_and_other_geometry_is_refused() {
     let scene = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();
     let mut renderer = GpuRenderer::new(&gpu).unwrap();
     let before = gpu.bytes();
-    renderer.sensitivity(&scene, &splats.geometry, &cameras, &mut || ()).unwrap();
+    renderer.sensitivity(&scene, &splats.geometry, &cameras, &Silent).unwrap();
     assert_eq!(gpu.bytes(), before);
     assert!(gpu.most_bytes() > before);
     let other = made::scene(4, 299, ShDegree::ONE, false);
-    let refused = renderer.sensitivity(&scene, &other.geometry, &cameras, &mut || ());
+    let refused = renderer.sensitivity(&scene, &other.geometry, &cameras, &Silent);
     assert!(matches!(refused, Err(Error::Parameter { name: "geometry", .. })));
 }

@@ -1,19 +1,7 @@
 //! Drawing from codes on the GPU, made up and compressed for real.
 
-#![cfg(feature = "gpu")]
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod adapter;
-mod common;
-mod made;
-mod twins;
-
-use adapter::gpu;
+use crate::adapter::gpu;
+use crate::{common, made, twins};
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{CompressOptions, Layout, Model, Sensitivity, ShDegree, Silent, compress};
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
@@ -24,7 +12,7 @@ use lexisplat_sample::{SampleOptions, scene};
 fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
     let mut renderer = GpuRenderer::new(gpu).unwrap();
     let dense = model.to_splats();
-    let options = RenderOptions { background: [0.2, 0.5, 1.0], ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background([0.2, 0.5, 1.0]);
     for path in ShPath::ALL {
         let uploaded = match GpuScene::new(gpu, &Scene::from(model), path) {
             Ok(uploaded) => uploaded,
@@ -40,13 +28,13 @@ fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
             let (found, _) = renderer.render(&uploaded, camera, &options).unwrap();
             let name = format!("{case}, {}, {}", path.name(), camera.name);
             if path == ShPath::SparseTable {
-                let db = common::psnr(&found, &render(&Scene::from(model), camera, &options), true);
+                let db = common::psnr(&found, &render(&Scene::from(model), camera, &options).unwrap(), true);
                 assert!(db > TABLE_DB, "{name}: {db:.1} dB");
                 continue;
             }
             // The codes, and the same made dense: on the processor, and on the GPU by the path before.
-            twins::check(&found, &render(&Scene::from(model), camera, &options), &name);
-            twins::check(&found, &render(&Scene::from(&dense), camera, &options), &name);
+            twins::check(&found, &render(&Scene::from(model), camera, &options).unwrap(), &name);
+            twins::check(&found, &render(&Scene::from(&dense), camera, &options).unwrap(), &name);
         }
     }
 }

@@ -1,21 +1,11 @@
 //! Real models against the photos they were trained on, and against the twin. Skipped without the data
 //! folder.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-#[expect(clippy::cast_sign_loss, reason = "pixels are not negative")]
-mod naive;
-
+use crate::{common, naive};
 use lexisplat_render::{Camera, RenderOptions, Scene, Split, read_cameras, render};
 
 fn test_cameras(name: &str) -> Option<Vec<Camera>> {
-    let cameras = read_cameras(common::data(name)?).unwrap();
+    let cameras = read_cameras(lexisplat_testing::real_data(name)?).unwrap();
     Some(cameras.into_iter().filter(|camera| camera.split == Some(Split::Test)).collect())
 }
 
@@ -24,7 +14,7 @@ fn mean_against_photos(scene: &str, cameras: &str, photos: &str) -> Option<f64> 
     let (splats, cameras) = (common::load(scene)?, test_cameras(cameras)?);
     let mut sum = 0.0;
     for camera in &cameras {
-        let image = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let image = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         sum += common::psnr(&image, &common::photo(photos, &camera.name)?, true);
     }
     Some(sum / cameras.len() as f64)
@@ -55,7 +45,7 @@ fn bonsai_agrees_with_the_twin() {
     };
     for (k, camera) in cameras.iter().enumerate() {
         splats.meta.antialiased = k == 0;
-        let found = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let found = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         let db = common::psnr(&found, &naive::render(&splats, camera, [0.0; 3]), false);
         println!("{}: {db:.1} dB", camera.name);
         assert!(db >= 70.0, "{}: {db:.1} dB", camera.name);

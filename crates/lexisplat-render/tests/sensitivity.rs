@@ -1,8 +1,9 @@
 //! Sensitivities against finite differences of the rasteriser itself.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use lexisplat::{Splats, sh};
-use lexisplat_render::{Camera, Image, RenderOptions, Scene, render, sensitivity, surround};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+
+use lexisplat::{Progress, Silent, Splats, Stage, sh};
+use lexisplat_render::{Camera, Error, Image, RenderOptions, Scene, render, sensitivity, surround};
 use lexisplat_sample::{SampleOptions, scene};
 
 const GAUSSIANS: usize = 120;
@@ -14,7 +15,7 @@ const STEP: f32 = 2e-2;
 const LEAST_SHARE: f64 = 1e-3;
 
 fn draw(splats: &Splats, camera: &Camera) -> Image {
-    render(&Scene::from(splats), camera, &RenderOptions::default())
+    render(&Scene::from(splats), camera, &RenderOptions::default()).unwrap()
 }
 
 /// Squared derivative of the pictures, averaged over pixels, channels and cameras, by what `change` does
@@ -69,7 +70,7 @@ fn derivatives_are_those_of_the_pictures() {
         g.dc[i] = g.dc[i].map(|v| v + 2.0);
     }
     let cameras = surround(&splats.geometry, 3, [96, 64], [2.0, 4.0]);
-    let s = sensitivity(&Scene::from(&splats), &cameras, &mut || ());
+    let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     let of = |predicted: &dyn Fn(usize) -> f32, change: &dyn Fn(&mut Splats, usize, f32)| {
         (0..splats.len())
             .map(|i| (f64::from(predicted(i)), measured(&splats, &cameras, |s, h| change(s, i, h))))
@@ -107,7 +108,7 @@ fn moving_is_shifting_on_screen() {
         g.opacities[i] = g.opacities[i].min(1.0);
     }
     let cameras = surround(&splats.geometry, 3, [96, 64], [3.0, 5.0]);
-    let s = sensitivity(&Scene::from(&splats), &cameras, &mut || ());
+    let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     // Along a direction the change is the matrix's quadratic form.
     let pair = |i: usize| {
         let even = i.is_multiple_of(2);
@@ -135,7 +136,7 @@ fn long_thin_ones_do_not_drown_in_rounding() {
         g.dc[i] = g.dc[i].map(|v| v + 2.0);
     }
     let cameras = surround(&splats.geometry, 3, [96, 64], [2.0, 4.0]);
-    let s = sensitivity(&Scene::from(&splats), &cameras, &mut || ());
+    let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     let along = |i: usize| {
         let found = measured(&splats, &cameras, |s, h| s.geometry.scales[i][i % 3] += h);
         (f64::from(s.scale[i][i % 3]), found)
@@ -147,7 +148,7 @@ fn long_thin_ones_do_not_drown_in_rounding() {
 fn removal_is_what_the_pictures_lose() {
     let splats = scene(&SampleOptions::new(GAUSSIANS, 6));
     let cameras = surround(&splats.geometry, 2, [96, 64], [2.0, 4.0]);
-    let s = sensitivity(&Scene::from(&splats), &cameras, &mut || ());
+    let s = sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap();
     let mut seen = 0;
     for i in 0..splats.len() {
         let mut keep = vec![true; splats.len()];
@@ -175,8 +176,36 @@ fn threads_do_not_change_a_bit() {
     let cameras = surround(&splats.geometry, 3, [200, 150], [2.0, 6.0]);
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| sensitivity(&Scene::from(&splats), &cameras, &mut || ()))
+        pool.install(|| sensitivity(&Scene::from(&splats), &cameras, &Silent).unwrap())
     };
     let one = with(1);
     assert!(one == with(2) && one == with(7));
+}
+
+/// Cancels after one view.
+#[derive(Default)]
+struct OneView(AtomicU64);
+
+impl Progress for OneView {
+    fn begin(&self, stage: Stage, total: u64) {
+        assert_eq!((stage, total), (Stage::Draw, 3));
+    }
+
+    fn advance(&self, units: u64) {
+        self.0.fetch_add(units, Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.load(Relaxed) > 0
+    }
+}
+
+#[test]
+fn measuring_can_be_cancelled_between_views() {
+    let splats = scene(&SampleOptions::new(GAUSSIANS, 1));
+    let cameras = surround(&splats.geometry, 3, [32, 32], [1.0, 4.0]);
+    let progress = OneView::default();
+    let found = sensitivity(&Scene::from(&splats), &cameras, &progress);
+    assert!(matches!(found, Err(Error::Codec(lexisplat::Error::Cancelled))), "{found:?}");
+    assert_eq!(progress.0.load(Relaxed), 1);
 }

@@ -1,15 +1,6 @@
 //! Drawing from codes against drawing the same scene made dense.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-mod made;
-
+use crate::{common, made};
 use lexisplat::ShDegree;
 use lexisplat_render::{Radiance, RenderOptions, Scene, render};
 
@@ -31,7 +22,8 @@ fn codes_draw_as_their_dense_scene() {
         for seed in 0..3 {
             let camera = made::camera(seed, 150, 110);
             let options = RenderOptions::default();
-            let (a, b) = (render(&sparse, &camera, &options), render(&dense, &camera, &options));
+            let (a, b) =
+                (render(&sparse, &camera, &options).unwrap(), render(&dense, &camera, &options).unwrap());
             let db = common::psnr(&a, &b, false);
             // Only the order of additions differs.
             assert!(db > 120.0, "degree {degree}, {atoms} atoms, half {half}: {db:.1} dB");
@@ -85,6 +77,6 @@ fn bands_above_the_degree_asked_for_are_left_out() {
     }
     let camera = made::camera(0, 64, 48);
     let all = RenderOptions::default();
-    let none = RenderOptions { max_degree: Some(ShDegree::ZERO), ..all };
-    assert_ne!(render(&sparse, &camera, &all), render(&sparse, &camera, &none));
+    let none = all.with_max_degree(Some(ShDegree::ZERO));
+    assert_ne!(render(&sparse, &camera, &all).unwrap(), render(&sparse, &camera, &none).unwrap());
 }

@@ -1,17 +1,6 @@
 //! The tile rasteriser against its naive f64 twin, on scenes made to hit every rule.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::cast_possible_truncation,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-mod made;
-#[expect(clippy::cast_sign_loss, reason = "pixels are not negative")]
-mod naive;
-
+use crate::{common, made, naive};
 use lexisplat::ShDegree;
 use lexisplat_render::{RenderOptions, Scene, render};
 
@@ -30,8 +19,9 @@ fn agrees_on_every_degree_and_both_rules() {
                 let found = render(
                     &Scene::from(&splats),
                     &camera,
-                    &RenderOptions { background, ..RenderOptions::default() },
-                );
+                    &RenderOptions::default().with_background(background),
+                )
+                .unwrap();
                 let db = common::psnr(&found, &expected, false);
                 assert!(db >= TWIN_DB, "degree {degree}, antialiased {antialiased}, seed {seed}: {db:.1} dB");
             }
@@ -52,9 +42,9 @@ fn the_comparison_would_notice() {
     darker.sh_rest.iter_mut().for_each(|v| *v *= 0.98);
     let options = RenderOptions::default();
     for found in [
-        render(&Scene::from(&other), &camera, &options),
-        render(&Scene::from(&splats), &shifted, &options),
-        render(&Scene::from(&darker), &camera, &options),
+        render(&Scene::from(&other), &camera, &options).unwrap(),
+        render(&Scene::from(&splats), &shifted, &options).unwrap(),
+        render(&Scene::from(&darker), &camera, &options).unwrap(),
     ] {
         assert!(common::psnr(&found, &expected, false) < TWIN_DB);
     }
@@ -70,8 +60,8 @@ fn one_splat_and_the_background_add_up() {
     for (opacity, alpha) in [(0.0, 0.5), (30.0, 0.99)] {
         splats.geometry.opacities = vec![opacity];
         let camera = made::straight(33, 21, 30.0);
-        let options = RenderOptions { background: [0.0, 0.5, 1.0], ..RenderOptions::default() };
-        let image = render(&Scene::from(&splats), &camera, &options);
+        let options = RenderOptions::default().with_background([0.0, 0.5, 1.0]);
+        let image = render(&Scene::from(&splats), &camera, &options).unwrap();
         let [red, green, blue] = image.pixels[10 * 33 + 16];
         let expected = [
             alpha * (0.5 + 0.282_094_8),
@@ -94,7 +84,8 @@ fn a_pixel_closes_before_the_splat_that_would_fill_it() {
     splats.geometry.dc = vec![colour(2), colour(0), colour(1)];
     splats.geometry.scales = vec![[-1.0; 3]; 3];
     splats.geometry.opacities = vec![30.0; 3];
-    let image = render(&Scene::from(&splats), &made::straight(33, 21, 30.0), &RenderOptions::default());
+    let image =
+        render(&Scene::from(&splats), &made::straight(33, 21, 30.0), &RenderOptions::default()).unwrap();
     let [red, _, blue] = image.pixels[10 * 33 + 16];
     assert!((red - 0.99 * (0.5 + 2.820_948)).abs() < 1e-4);
     assert!(blue.abs() < 1e-9);
@@ -120,7 +111,8 @@ fn broken_gaussians_never_reach_a_pixel() {
         splats.meta.antialiased = antialiased;
         for seed in 0..4 {
             let image =
-                render(&Scene::from(&splats), &made::camera(seed, 150, 110), &RenderOptions::default());
+                render(&Scene::from(&splats), &made::camera(seed, 150, 110), &RenderOptions::default())
+                    .unwrap();
             let wrong = image.pixels.as_flattened().iter().filter(|v| v.is_nan() || **v < 0.0).count();
             assert_eq!(wrong, 0);
         }
@@ -130,8 +122,8 @@ fn broken_gaussians_never_reach_a_pixel() {
 #[test]
 fn an_empty_scene_is_background() {
     let splats = made::scene(0, 0, ShDegree::THREE, false);
-    let options = RenderOptions { background: [0.1, 0.2, 0.3], ..RenderOptions::default() };
-    let image = render(&Scene::from(&splats), &made::straight(17, 5, 10.0), &options);
+    let options = RenderOptions::default().with_background([0.1, 0.2, 0.3]);
+    let image = render(&Scene::from(&splats), &made::straight(17, 5, 10.0), &options).unwrap();
     assert_eq!(image.pixels, vec![[0.1, 0.2, 0.3]; 85]);
 }
 
@@ -141,7 +133,7 @@ fn the_picture_does_not_depend_on_threads() {
     let camera = made::camera(5, 200, 150);
     let draw = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| render(&Scene::from(&splats), &camera, &RenderOptions::default()))
+        pool.install(|| render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap())
     };
     let bits = |image: &lexisplat_render::Image| -> Vec<u32> {
         image.pixels.as_flattened().iter().map(|v| v.to_bits()).collect()

@@ -1,16 +1,9 @@
 //! Cameras from files and folders of each kind; with the data folder, those of a real COLMAP model.
 
-#![expect(
-    clippy::cast_precision_loss,
-    clippy::unwrap_used,
-    reason = "tests: small numbers, and failing is their way to tell"
-)]
-
-mod common;
-
 use std::fs;
 use std::path::Path;
 
+use crate::common;
 use lexisplat_render::{
     Camera, Error, RenderOptions, Scene, Split, ViewSet, read_cameras, read_colmap, read_views, render,
 };
@@ -75,9 +68,9 @@ fn sources_are_told_apart_by_content() {
 
 /// Bonsai's cameras by COLMAP at the width of its photos, and those of its `cameras.json`, by name.
 fn bonsai() -> Option<Vec<(Camera, Camera)>> {
-    let set = read_colmap(common::data("bonsai-sparse")?).unwrap();
+    let set = read_colmap(lexisplat_testing::real_data("bonsai-sparse")?).unwrap();
     assert_eq!(set.warnings, Vec::<String>::new());
-    let mut known = read_cameras(common::data("bonsai.cameras.json")?).unwrap();
+    let mut known = read_cameras(lexisplat_testing::real_data("bonsai.cameras.json")?).unwrap();
     known.sort_by(|a, b| a.name.cmp(&b.name));
     let found: Vec<Camera> = set.cameras.iter().map(|camera| camera.with_max_width(400)).collect();
     assert_eq!((found.len(), known.len()), (98, 98));
@@ -106,7 +99,7 @@ fn bonsai_looks_like_its_photos_through_colmaps_cameras() {
     let (Some(splats), Some(pairs)) = (common::load("bonsai-3dgs.ply"), bonsai()) else { return };
     let (mut sum, mut count) = (0.0, 0);
     for (camera, _) in pairs.iter().filter(|(_, known)| known.split == Some(Split::Test)) {
-        let image = render(&Scene::from(&splats), camera, &RenderOptions::default());
+        let image = render(&Scene::from(&splats), camera, &RenderOptions::default()).unwrap();
         let Some(photo) = common::photo("bonsai-photos", &camera.name) else { return };
         sum += common::psnr(&image, &photo, true);
         count += 1;

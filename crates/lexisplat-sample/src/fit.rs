@@ -1,24 +1,22 @@
-//! From colour over directions to SH coefficients, by least squares.
+//! SH coefficients of a colour that depends on the direction, by least squares.
 
-use crate::math::{Vec3, sin_cos_turns};
+use crate::math::{GOLDEN_TURN, Vec3, sin_cos_turns};
 use crate::random::Random;
 use lexisplat::ShDegree;
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, rest_basis};
 
-/// Directions the colour is evaluated in.
+/// Number of directions that the colour is evaluated in.
 const DIRECTIONS: u32 = 144;
 /// SH coefficients of a channel at degree 3.
 const COEFFICIENTS: usize = 16;
 /// SH-rest values of a Gaussian.
 pub(crate) const REST: usize = CHANNELS * (COEFFICIENTS - 1);
-/// The golden angle in turns.
-const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-/// The directions and the matrix that turns values there into coefficients.
+/// Directions, and the matrix from the values in them to coefficients.
 #[derive(Debug)]
 pub(crate) struct Fit {
     directions: Vec<Vec3>,
-    /// One row of weights a direction.
+    /// The weight of each direction in each coefficient.
     weights: Vec<[f64; COEFFICIENTS]>,
 }
 
@@ -44,7 +42,7 @@ impl Fit {
         Self { directions, weights }
     }
 
-    /// DC and channel-major SH-rest of `colour`, which gets the direction from viewer to Gaussian.
+    /// Returns DC and channel-major SH-rest of `colour`, a function of the direction from the viewer to the Gaussian.
     pub(crate) fn project(&self, colour: impl Fn(Vec3) -> Vec3) -> ([f64; CHANNELS], [f64; REST]) {
         let mut sums = [[0.0; COEFFICIENTS]; CHANNELS];
         for (direction, weights) in self.directions.iter().zip(&self.weights) {
@@ -64,7 +62,7 @@ impl Fit {
     }
 }
 
-/// `basis (basis^T basis)^-1`, row by row, by Cholesky.
+/// Returns `basis (basis^T basis)^-1`, row by row, by a Cholesky factorisation.
 fn pseudo_inverse(basis: &[[f64; COEFFICIENTS]]) -> Vec<[f64; COEFFICIENTS]> {
     let mut l = [[0.0; COEFFICIENTS]; COEFFICIENTS];
     for i in 0..COEFFICIENTS {
@@ -89,13 +87,13 @@ fn pseudo_inverse(basis: &[[f64; COEFFICIENTS]]) -> Vec<[f64; COEFFICIENTS]> {
 
 /// Standard deviation of the noise of a typical Gaussian's coefficients.
 const NOISE: f64 = 0.033;
-/// Share of the noise's variance that the channels have in common; trained models have about 0.75.
+/// Share of the noise's variance that all channels share; trained models have about 0.75.
 const SHARED: f64 = 0.75;
 
-/// Adds what training leaves in any model: noise, alike in all bands and mostly alike in all channels,
-/// stronger on some Gaussians than on others. `amount` 1 is the usual.
+/// Adds noise like that of training: equally strong in all bands, mostly shared by the channels, and stronger on some
+/// Gaussians than on others. `amount` is a factor on it, usually 1.
 pub(crate) fn add_training_noise(rest: &mut [f64; REST], amount: f64, random: &mut Random) {
-    // From 0.6 to about 3, mean 1.1: few views saw the Gaussians with the most of it.
+    // 0.6 to about 3, with a mean of 1.1. Gaussians that few training views see have the most noise.
     let u = random.uniform();
     let strength = amount * NOISE * (0.5 + 0.2 / (1.08 - u));
     let (common, own) = (SHARED.sqrt(), (1.0 - SHARED).sqrt());

@@ -1,16 +1,16 @@
-//! A procedural scene to try everything on: a still life on a chequered table.
+//! A procedural scene for demonstrations and tests: a still life on a chequered table.
 //!
-//! Glossy balls, a copper knot on a marble block, a mirror ball, an iced doughnut, clay, books and a
-//! dusky studio wall, all covered with flat Gaussians. World units and axes are those of scenes trained
-//! from COLMAP's cameras: y points down; the table top is at y = 0 and has a radius of 1.7.
+//! Flat Gaussians cover glossy balls, a copper knot on a marble block, a mirror ball, an iced doughnut, clay, books
+//! and the wall of a studio. Axes are those of scenes trained from COLMAP's cameras: y points down. The table top is
+//! at y = 0 and has a radius of 1.7 world units.
 //!
-//! The view-dependent colour of each Gaussian is that of its surface: the light that leaves it (diffuse
-//! and mirrored, with lamps, shadows, Fresnel reflection and reflections of the neighbours) is evaluated
-//! in directions all over the sphere and projected onto SH of degree 3 by least squares. Then comes
-//! seeded noise like that of training. Nothing about it is sparse in any dictionary by construction.
+//! Each Gaussian has the view-dependent colour of its surface. The light that leaves the surface is evaluated in
+//! directions all over the sphere: diffuse and mirrored light of lamps, with shadows, Fresnel reflection and
+//! reflections of other objects. Least squares projects it onto SH of degree 3. Seeded noise, like that of training,
+//! is added. By construction the SH are not sparse in any dictionary.
 //!
-//! Only operations that IEEE 754 rounds exactly are used, so the same options give the same bits on any
-//! platform and thread count.
+//! The code uses only operations that IEEE 754 rounds exactly. The same options give the same bits on every platform
+//! and with every number of threads.
 
 mod fit;
 mod light;

@@ -1,47 +1,43 @@
-//! The studio: its lamps, what blocks them, and the light that leaves a surface.
+//! The studio: its lamps, the bodies that block light, and the light that leaves a surface.
 
 use crate::material::{Material, Surface};
-use crate::math::{
-    Vec3, add, any_tangent, cross, dot, mix, mul, norm, scale, sin_cos_turns, smoothstep, sub, unit,
-};
+use crate::math::{Vec3, add, dot, frame, mix, mul, norm, scale, smoothstep, spiral, sub, unit};
 use crate::random::Random;
-use crate::shapes::{UP, reflect};
+use crate::shapes::{UP, block_axes, reflect};
 
-/// Rays from a surface to each lamp; more make softer shadows.
+/// Rays from a surface to each lamp. More rays make softer shadows.
 const SHADOW_RAYS: usize = 12;
-/// Rays that gather light from all around.
+/// Rays from a surface that gather indirect light.
 const GATHER_RAYS: usize = 32;
-/// How far off the surface rays start, in world units: beyond the gaps between beads and surface.
+/// Distance of the start of rays from the surface, in world units: more than the gaps between beads and surface.
 const LIFT: f64 = 0.012;
-/// Roughness from which reflections of other objects are not traced, only those of the studio.
+/// Surfaces of this roughness or more reflect only the studio, not other objects.
 const TRACED_ROUGHNESS: f64 = 0.5;
-/// Light to film, before the film's curve.
+/// Factor on light before the tone curve.
 const EXPOSURE: f64 = 0.45;
-/// Integral of [`Studio::surroundings`]'s profile of a lamp over its argument: pi / 4.
+/// Integral of a lamp's profile in [`Studio::surroundings`]: pi / 4.
 const PROFILE: f64 = std::f64::consts::FRAC_PI_4;
-/// Share of the guessed light of a neighbour that is really there; most guesses forget shadows.
+/// Factor on the estimated light of other objects, because the estimate ignores shadows.
 const BOUNCE: f64 = 0.45;
-/// The golden angle in turns.
-const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-/// A soft box far away.
+/// A soft box at infinity.
 #[derive(Debug, Clone, Copy)]
 struct Lamp {
-    /// To the lamp; unit length once the studio is built.
+    /// Direction to the lamp, of unit length.
     to: Vec3,
     colour: Vec3,
-    /// `1 - cos` of its half width as seen from the table.
+    /// `1 - cos` of half of the angle that it covers.
     width: f64,
 }
 
-/// Something that blocks light.
+/// A body that blocks light.
 #[derive(Debug, Clone)]
 pub(crate) enum Body {
     Ball {
         centre: Vec3,
         radius: f64,
     },
-    /// Balls of one radius inside a larger one.
+    /// Balls of one radius within `bound` of the centre.
     Beads {
         centre: Vec3,
         bound: f64,
@@ -59,25 +55,25 @@ pub(crate) enum Body {
     },
 }
 
-/// All bodies with the colour they show in reflections, and the lamps.
+/// All bodies with their colours in reflections, and the lamps.
 #[derive(Debug)]
 pub(crate) struct Studio {
     bodies: Vec<(Body, Vec3)>,
     lamps: [Lamp; 4],
 }
 
-/// Light that falls on a point, and what the point does with it.
+/// A lit point of a surface.
 #[derive(Debug)]
 pub(crate) struct Lit<'a> {
     studio: &'a Studio,
     position: Vec3,
     normal: Vec3,
     surface: Surface,
-    /// Diffuse light that leaves the point.
+    /// The diffuse light that leaves the point.
     diffuse: Vec3,
-    /// Share of each lamp that reaches it.
+    /// The visible share of each lamp.
     seen: [f64; 4],
-    /// Share of the surroundings it sees.
+    /// The share of the wall that is visible.
     open: f64,
 }
 
@@ -95,33 +91,34 @@ impl Studio {
         }
     }
 
-    /// The studio's wall: dusk colours by height.
+    /// Returns the light of the studio's wall in `direction`: the colours of dusk, by height.
     pub(crate) fn wall(direction: Vec3) -> Vec3 {
         let height = dot(direction, UP);
         let low = mix([0.012, 0.022, 0.045], [0.10, 0.15, 0.22], smoothstep(-0.9, -0.05, height));
         let high = mix(low, [0.52, 0.40, 0.34], smoothstep(-0.25, 0.18, height));
         let top = mix(high, [0.09, 0.17, 0.34], smoothstep(0.1, 0.75, height));
-        // One side is warmer, so that the turn is felt.
+        // One side is warmer, so that a turn of the camera shows.
         let warm = smoothstep(-0.4, 1.0, direction[0] * 0.8 - direction[2] * 0.6);
         mul(top, mix([0.8, 0.95, 1.15], [1.25, 1.0, 0.85], warm))
     }
 
-    /// Light from `direction`, blurred as a surface of `roughness` would, without what is in the way.
+    /// Returns the light of lamps and wall from `direction`, blurred by `roughness`. `seen` and `open` are the visible
+    /// shares.
     fn surroundings(&self, direction: Vec3, roughness: f64, seen: &[f64; 4], open: f64) -> Vec3 {
         let spread = roughness * roughness;
         let mut light = scale(Self::wall(direction), open);
         for (lamp, &seen) in self.lamps.iter().zip(seen) {
             let width = lamp.width + 0.5 * spread;
             let off = (1.0 - dot(direction, lamp.to)) / width;
-            // A lamp that lights a white surface facing it to 1 sends pi into a solid angle of
-            // 2 pi width PROFILE, however wide roughness spreads it.
+            // A lamp that lights a white surface facing it to 1 sends pi into a solid angle of 2 pi width PROFILE.
+            // Roughness widens the lamp and does not change its light.
             let strength = 0.5 / (PROFILE * width);
             light = add(light, scale(lamp.colour, seen * strength / ((1.0 + off * off) * (1.0 + off))));
         }
         light
     }
 
-    /// The nearest thing a ray meets: distance, outward normal, colour.
+    /// Returns the nearest body on a ray: distance, outward normal, colour.
     fn hit(&self, origin: Vec3, direction: Vec3) -> Option<(f64, Vec3, Vec3)> {
         let mut nearest: Option<(f64, Vec3, Vec3)> = None;
         for (body, colour) in &self.bodies {
@@ -138,7 +135,7 @@ impl Studio {
         self.bodies.iter().any(|(body, _)| body.hit(origin, direction).is_some())
     }
 
-    /// Diffuse light from the lamps and the wall, nothing in the way, times `albedo`.
+    /// Estimates the diffuse light that leaves a surface, as if nothing blocked the lamps and the wall.
     fn rough_guess(&self, normal: Vec3, albedo: Vec3) -> Vec3 {
         let mut light = scale(Self::wall(normal), 0.5);
         for lamp in &self.lamps {
@@ -147,7 +144,7 @@ impl Studio {
         mul(light, albedo)
     }
 
-    /// What a point of `surface` at `position` sends out.
+    /// Lights the point of `surface` at `position`.
     pub(crate) fn light(
         &self,
         position: Vec3,
@@ -160,10 +157,8 @@ impl Studio {
         let mut light = [0.0; 3];
         let mut open = 0.0;
         let turn = random.uniform();
-        for k in 0..GATHER_RAYS {
-            // Cosine-weighted directions on a turned spiral.
-            let share = (k as f64 + 0.5) / GATHER_RAYS as f64;
-            let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
+        // The directions are cosine-weighted.
+        for (share, sin, cos) in spiral(turn, GATHER_RAYS) {
             let flat = share.sqrt();
             let direction = add(
                 add(scale(side, flat * cos), scale(other, flat * sin)),
@@ -185,9 +180,7 @@ impl Studio {
             let (side, other) = frame(lamp.to);
             let turn = random.uniform();
             let mut sum = 0.0;
-            for k in 0..SHADOW_RAYS {
-                let share = (k as f64 + 0.5) / SHADOW_RAYS as f64;
-                let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
+            for (share, sin, cos) in spiral(turn, SHADOW_RAYS) {
                 let flat = (2.0 * lamp.width * share).sqrt();
                 let to = add(lamp.to, add(scale(side, flat * cos), scale(other, flat * sin)));
                 let facing = dot(normal, to);
@@ -204,15 +197,15 @@ impl Studio {
 }
 
 impl Lit<'_> {
-    /// Display colour, 0 to 1, seen by a viewer in the unit direction `to_viewer`. From behind the
-    /// surface shows the mirror image of its front, so that colour has no jump.
+    /// Returns the display colour, 0 to 1, seen by a viewer in the unit direction `to_viewer`. The back of the surface
+    /// shows the mirror image of its front, so that the colour is continuous.
     pub(crate) fn colour(&self, to_viewer: Vec3) -> Vec3 {
         let facing = dot(to_viewer, self.normal);
         let to_viewer =
             if facing < 0.0 { sub(to_viewer, scale(self.normal, 2.0 * facing)) } else { to_viewer };
         let facing = facing.abs();
         let Surface { mirror, roughness, .. } = self.surface;
-        // Schlick's Fresnel term, held back on rough surfaces.
+        // Schlick's Fresnel term, reduced on rough surfaces.
         let grazing = (1.0 - facing) * (1.0 - facing);
         let grazing = grazing * grazing * (1.0 - facing) * (1.0 - roughness) * (1.0 - roughness);
         let strength = mix(mirror, [1.0; 3], grazing);
@@ -230,8 +223,7 @@ impl Lit<'_> {
     }
 }
 
-/// From light to display values: a film-like curve (Narkowicz's fit of ACES), then a square root for
-/// the display's gamma.
+/// Returns the display values of `light`: Narkowicz's fit of the ACES tone curve, then a square root for gamma.
 pub(crate) fn tone(light: Vec3) -> Vec3 {
     light.map(|v| {
         let x = v.max(0.0) * EXPOSURE;
@@ -240,13 +232,7 @@ pub(crate) fn tone(light: Vec3) -> Vec3 {
     })
 }
 
-/// Two unit vectors perpendicular to the unit vector `n` and each other.
-fn frame(n: Vec3) -> (Vec3, Vec3) {
-    let side = any_tangent(n);
-    (side, cross(n, side))
-}
-
-/// Distance to a ball in front, and the normal there.
+/// Returns the distance to a ball on a ray, and the normal there.
 fn hit_ball(origin: Vec3, direction: Vec3, centre: Vec3, radius: f64) -> Option<(f64, Vec3)> {
     let to = sub(centre, origin);
     let along = dot(to, direction);
@@ -266,7 +252,7 @@ impl Body {
                 let to = sub(*centre, origin);
                 let along = dot(to, direction);
                 let apart = dot(to, to) - bound * bound;
-                // Outside the bound and passing or leaving it.
+                // The ray starts outside of the bound and does not enter it.
                 if apart > 0.0 && (along < 0.0 || dot(to, to) - along * along > bound * bound) {
                     return None;
                 }
@@ -280,7 +266,7 @@ impl Body {
                 inside.then_some((t, UP))
             }
             Self::Block { centre, half, right } => {
-                let axes = [*right, UP, cross(*right, UP)];
+                let axes = block_axes(*right);
                 let from = sub(origin, *centre);
                 let (mut near, mut far, mut face) = (0.0, f64::INFINITY, None);
                 for (axis, half) in axes.iter().zip(half) {

@@ -1,12 +1,12 @@
-//! What the surfaces are made of.
+//! The materials of the surfaces.
 
 use crate::math::{Vec3, dot, mix, scale, sin_cos_turns, smoothstep};
 use crate::random::value_noise;
 use crate::shapes::Edge;
 
-/// Reflectance of anything that is no metal, seen head-on.
+/// Reflectance at normal incidence of everything that is not a metal.
 const DIELECTRIC: f64 = 0.04;
-/// Squares of the table top, in world units a side.
+/// Side of the squares of the table top, in world units.
 const SQUARE: f64 = 0.25;
 /// Radius of the chequered part of the table top.
 const CHEQUERED: f64 = 1.5;
@@ -17,7 +17,7 @@ const ICING: Vec3 = [0.80, 0.22, 0.36];
 const PAPER: Vec3 = [0.72, 0.66, 0.52];
 const SPRINKLES: [Vec3; 4] = [[0.9, 0.75, 0.1], [0.1, 0.45, 0.8], [0.95, 0.92, 0.9], [0.15, 0.6, 0.25]];
 
-/// How a surface looks, as a function of the place on it.
+/// The look of a surface as a function of the position on it.
 #[derive(Debug, Clone)]
 pub(crate) enum Material {
     /// A lacquered table top of light and dark squares.
@@ -26,33 +26,33 @@ pub(crate) enum Material {
     DarkWood,
     /// One colour under a clear coat; roughness 0 to 1.
     Paint { colour: Vec3, roughness: f64 },
-    /// Colour without any gloss, with fine grain.
+    /// One colour with fine grain and without gloss.
     Clay { colour: Vec3 },
-    /// Colour is that of the reflection.
+    /// Reflection with this colour.
     Metal { colour: Vec3, roughness: f64 },
     /// White stone with grey veins.
     Marble,
     /// Iced on its upper half, with sprinkles.
     Doughnut,
-    /// A bound book: cover above, pages on the sides.
+    /// A book with its cover above and its pages at the sides.
     Book { colour: Vec3 },
-    /// The studio's wall, which only shines.
+    /// The studio's wall, which emits light and reflects none.
     Backdrop,
 }
 
-/// Optical properties at one place.
+/// Optical properties at one position.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Surface {
     /// Diffuse reflectance, linear.
     pub(crate) albedo: Vec3,
-    /// Mirror reflectance head-on, linear.
+    /// Mirror reflectance at normal incidence, linear.
     pub(crate) mirror: Vec3,
-    /// 0 is a mirror, 1 is dull.
+    /// 0 is a mirror, 1 is matt.
     pub(crate) roughness: f64,
 }
 
 impl Material {
-    /// The properties at `local`, a position relative to the shape, with outward `normal`.
+    /// Returns the properties at `local`, a position relative to the shape, with the outward `normal`.
     pub(crate) fn at(&self, local: Vec3, normal: Vec3, up: Vec3) -> Surface {
         let coated = |albedo, roughness| Surface { albedo, mirror: [DIELECTRIC; 3], roughness };
         match self {
@@ -89,7 +89,7 @@ impl Material {
         }
     }
 
-    /// The nearest line of the pattern at `local`, if colours meet along straight lines.
+    /// Returns the nearest line of the pattern at `local`, if it has lines.
     pub(crate) fn edge(&self, local: Vec3) -> Option<Edge> {
         if !matches!(self, Self::Chequered) {
             return None;
@@ -110,7 +110,7 @@ impl Material {
         Edge::nearer(grid, Some(round))
     }
 
-    /// One colour that stands for the whole where it is seen in a reflection.
+    /// Returns the mean colour, which reflections show.
     pub(crate) fn mean(&self) -> Vec3 {
         match self {
             Self::Chequered => mix(MAPLE, WALNUT, 0.5),
@@ -124,7 +124,7 @@ impl Material {
     }
 }
 
-/// Wood whose grain runs along x.
+/// Returns the colour of wood with its grain along x.
 fn wood(p: Vec3, colour: Vec3) -> Vec3 {
     let wander = value_noise([p[0] * 1.7, p[1], p[2] * 4.0]);
     let rings = (p[2] * 9.0 + wander * 2.5).rem_euclid(1.0);
@@ -143,7 +143,7 @@ fn marble(p: Vec3) -> Vec3 {
 }
 
 fn doughnut(p: Vec3, upward: f64) -> Surface {
-    // The icing's edge runs in waves.
+    // The edge of the icing is wavy.
     let edge = -0.05 + 0.55 * (value_noise([p[0] * 7.0, 0.5, p[2] * 7.0]) - 0.5);
     if upward < edge {
         let baked = smoothstep(-1.0, edge, upward);

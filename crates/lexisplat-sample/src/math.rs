@@ -1,13 +1,15 @@
-//! Small vectors, and the few transcendental functions the scene needs.
+//! Vectors of three numbers, and the transcendental functions that the scene needs.
 //!
-//! `f64::sin`, `cos` and `ln` may differ in the last bit from one platform's library to the next. The
-//! ones here use only operations IEEE 754 rounds exactly, so the scene is the same everywhere.
+//! The last bit of `f64::sin`, `cos` and `ln` depends on the platform's library. The functions here use only operations
+//! that IEEE 754 rounds exactly, so that the scene is the same everywhere.
 
 /// A point or direction in world units.
 pub(crate) type Vec3 = [f64; 3];
 
 /// Terms of each Taylor series; the last one is below 1e-17 on the reduced range.
 const TERMS: u32 = 10;
+/// The golden angle in turns. Its multiples spread directions evenly.
+pub(crate) const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
 pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
@@ -41,31 +43,46 @@ pub(crate) fn unit(a: Vec3) -> Vec3 {
     scale(a, 1.0 / norm(a))
 }
 
-/// `a` at 0, `b` at 1.
+/// Returns the linear interpolation from `a` at 0 to `b` at 1.
 pub(crate) fn mix(a: Vec3, b: Vec3, t: f64) -> Vec3 {
     add(a, scale(sub(b, a), t))
 }
 
-/// 0 below `low`, 1 above `high`, smooth between.
+/// Returns 0 below `low`, 1 above `high`, and a smooth transition between.
 pub(crate) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// `a` without its part along the unit vector `n`, at unit length.
+/// Returns the part of `a` perpendicular to the unit vector `n`, scaled to unit length.
 pub(crate) fn tangent(a: Vec3, n: Vec3) -> Vec3 {
     unit(sub(a, scale(n, dot(a, n))))
 }
 
-/// Some unit vector perpendicular to the unit vector `n`.
+/// Returns a unit vector perpendicular to the unit vector `n`.
 pub(crate) fn any_tangent(n: Vec3) -> Vec3 {
     let axis = if n[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
     tangent(axis, n)
 }
 
-/// Sine and cosine of `turns` full turns, within 1e-15.
+/// Returns two unit vectors perpendicular to the unit vector `n` and to each other.
+pub(crate) fn frame(n: Vec3) -> (Vec3, Vec3) {
+    let side = any_tangent(n);
+    (side, cross(n, side))
+}
+
+/// Returns `count` points of a spiral that starts at the angle `turn`: the share of the points so far, 0 to 1, and sine
+/// and cosine of the angle. With the share's root as radius they cover a disc evenly.
+pub(crate) fn spiral(turn: f64, count: usize) -> impl Iterator<Item = (f64, f64, f64)> {
+    (0..count).map(move |k| {
+        let (sin, cos) = sin_cos_turns(turn + k as f64 * GOLDEN_TURN);
+        ((k as f64 + 0.5) / count as f64, sin, cos)
+    })
+}
+
+/// Returns sine and cosine of `turns` full turns, with an error below 1e-15.
 pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
-    // An eighth of a turn at most on either side of a multiple of a quarter.
+    // The rest after the nearest quarter turn is at most an eighth of a turn.
     let quarters = (turns * 4.0).round();
     let x = (turns - quarters / 4.0) * std::f64::consts::TAU;
     let (mut sin, mut cos) = (0.0, 0.0);
@@ -85,7 +102,7 @@ pub(crate) fn sin_cos_turns(turns: f64) -> (f64, f64) {
     }
 }
 
-/// Natural logarithm of a positive, normal `x`, within 1e-14.
+/// Returns the natural logarithm of a positive, normal `x`, with an error below 1e-14.
 pub(crate) fn ln(x: f64) -> f64 {
     let (mut mantissa, mut exponent) = (x, 0.0);
     while mantissa > std::f64::consts::SQRT_2 {

@@ -1,50 +1,50 @@
-//! Seeded numbers: one independent stream a Gaussian, so that threads cannot change them.
+//! Seeded random numbers. Each Gaussian has a stream of its own, so that they do not depend on threads.
 
 /// Step of the `SplitMix64` state (Steele, Lea, Flood 2014): 2^64 over the golden ratio.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Uniform numbers added up for one that is nearly normal; their variance is then 1.
+/// Number of uniform numbers that add up to a nearly normal one of variance 1.
 const UNIFORMS: u32 = 12;
 
 /// A `SplitMix64` stream.
 #[derive(Debug, Clone)]
 pub(crate) struct Random(u64);
 
-/// `SplitMix64`'s output function.
+/// The output function of `SplitMix64`.
 fn scramble(mut z: u64) -> u64 {
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     z ^ (z >> 31)
 }
 
-/// The top 53 bits as a number in \[0, 1).
+/// Returns the top 53 bits as a number in \[0, 1).
 fn to_unit(bits: u64) -> f64 {
     (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 impl Random {
-    /// Stream number `stream` of `seed`.
+    /// Returns stream number `stream` of `seed`.
     pub(crate) fn new(seed: u64, stream: u64) -> Self {
         Self(scramble(scramble(seed).wrapping_add(stream.wrapping_mul(GAMMA))))
     }
 
-    /// Uniform in \[0, 1).
+    /// Returns a uniform number in \[0, 1).
     pub(crate) fn uniform(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(GAMMA);
         to_unit(scramble(self.0))
     }
 
-    /// Uniform in \[-1, 1).
+    /// Returns a uniform number in \[-1, 1).
     pub(crate) fn signed(&mut self) -> f64 {
         2.0 * self.uniform() - 1.0
     }
 
-    /// Nearly normal, mean 0, variance 1, within 6.
+    /// Returns a nearly normal number of mean 0 and variance 1. Its magnitude is at most 6.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..UNIFORMS).map(|_| self.uniform()).sum::<f64>() - f64::from(UNIFORMS) / 2.0
     }
 }
 
-/// Smooth noise in \[0, 1) with features of unit size: random values on the integer lattice, blended.
+/// Returns smooth noise in \[0, 1) with features of unit size, which interpolates random values on the integer lattice.
 pub(crate) fn value_noise(p: [f64; 3]) -> f64 {
     let cell = p.map(f64::floor);
     let blend: [f64; 3] = std::array::from_fn(|i| {

@@ -1,4 +1,4 @@
-//! The scene, Gaussian by Gaussian.
+//! Making the scene's Gaussians.
 
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
@@ -14,33 +14,33 @@ use crate::still_life::{self, Thing};
 
 /// Gaussians of the default scene.
 pub const DEFAULT_GAUSSIANS: usize = 60_000;
-/// Standard deviation along the surface, in units of the mean distance between neighbours: enough that
-/// the surface is closed, not so much that it blurs.
+/// Standard deviation along the surface, in units of the mean distance between neighbours. Smaller values leave holes
+/// in the surface, larger ones blur it.
 const SPREAD: f64 = 0.60;
-/// Thickness in units of the spread.
+/// Standard deviation across the surface, in units of that along it.
 const THICKNESS: f64 = 0.12;
-/// Largest factor by which one axis is longer, and the other shorter.
+/// Largest stretch: one axis is multiplied by 1 plus this, the other divided.
 const STRETCH: f64 = 0.35;
-/// Standard deviations between a Gaussian's centre and an edge of the surface or its pattern, at least.
+/// Smallest distance between a Gaussian's centre and an edge of the surface or of its pattern, in standard deviations.
 const REACH: f64 = 1.3;
-/// Shortest axis at an edge, in units of the spread.
+/// Smallest axis at an edge, in units of the standard deviation elsewhere.
 const MIN_SHORT: f64 = 0.2;
-/// How far centres stray from the even pattern, in units of the distance between neighbours.
+/// Largest random offset of centres along each axis, in units of the distance between neighbours.
 const STRAY: f64 = 0.12;
-/// How far normals stray, as a tangent: training never finds them exactly.
+/// Standard deviation of the tilt of normals, as a tangent. Training does not find normals exactly.
 const TILT: f64 = 0.03;
-/// Noise on the wall in units of that elsewhere: seen from few directions, it is learnt well for those.
+/// Factor on the noise of the wall. Training sees it from few directions and learns those well.
 const WALL_NOISE: f64 = 0.5;
-/// Relative variation of roughness from Gaussian to Gaussian.
+/// Largest relative variation of roughness between Gaussians.
 const UNEVEN: f64 = 0.35;
 
-/// What [`scene`] makes.
+/// Options of [`scene`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct SampleOptions {
-    /// Gaussians, exactly. Default [`DEFAULT_GAUSSIANS`].
+    /// Number of Gaussians. Default [`DEFAULT_GAUSSIANS`].
     pub gaussians: usize,
-    /// Seed of everything random. Default 0.
+    /// Seed of all random numbers. Default 0.
     pub seed: u64,
 }
 
@@ -51,7 +51,7 @@ impl Default for SampleOptions {
 }
 
 impl SampleOptions {
-    /// `gaussians` Gaussians from `seed`.
+    /// Returns options for `gaussians` Gaussians with `seed`.
     #[must_use]
     pub fn new(gaussians: usize, seed: u64) -> Self {
         Self { gaussians, seed }
@@ -68,22 +68,15 @@ struct Gaussian {
     rest: [f32; REST],
 }
 
-/// The sample scene, of SH degree 3.
+/// Makes the sample scene, of SH degree 3.
 #[must_use]
 pub fn scene(options: &SampleOptions) -> Splats {
     let things = still_life::things();
     let studio = still_life::studio(&things);
     let fit = Fit::new();
     let counts = shares(&things, options.gaussians);
-    // First Gaussian of each thing, and the end.
-    let starts: Vec<usize> = std::iter::once(0)
-        .chain(counts.iter().scan(0, |sum, n| {
-            Some({
-                *sum += n;
-                *sum
-            })
-        }))
-        .collect();
+    // Index of the first Gaussian of each thing.
+    let starts: Vec<usize> = (0..things.len()).map(|i| counts[..i].iter().sum()).collect();
     let make = |i: usize| {
         let which = starts.partition_point(|&start| start <= i) - 1;
         gaussian(&things[which], i - starts[which], counts[which], &studio, &fit, options.seed, i)
@@ -103,7 +96,7 @@ pub fn scene(options: &SampleOptions) -> Splats {
     Splats { geometry, degree: ShDegree::THREE, sh_rest, meta: SceneMeta { comments, antialiased: false } }
 }
 
-/// Gaussians of each thing, `total` in all.
+/// Returns the number of Gaussians of each thing; they sum to `total`.
 fn shares(things: &[Thing], total: usize) -> Vec<usize> {
     let weights: Vec<f64> = things.iter().map(|t| t.shape.area() * t.density).collect();
     let sum: f64 = weights.iter().sum();
@@ -151,15 +144,15 @@ fn gaussian(
 
     let mut surface = thing.material.at(add(point.local, stray), point.normal, shapes::UP);
     surface.roughness = (surface.roughness * (1.0 + UNEVEN * random.signed())).clamp(0.02, 1.0);
-    let (dc, mut rest) = if matches!(thing.material, Material::Backdrop) {
+    let is_wall = matches!(thing.material, Material::Backdrop);
+    let (dc, mut rest) = if is_wall {
         let colour = tone(Studio::wall(unit(position)));
         fit.project(|_| colour)
     } else {
         let lit = studio.light(position, normal, surface, &mut random);
         fit.project(|direction| lit.colour(scale(direction, -1.0)))
     };
-    let noise = if matches!(thing.material, Material::Backdrop) { WALL_NOISE } else { 1.0 };
-    fit::add_training_noise(&mut rest, noise, &mut random);
+    fit::add_training_noise(&mut rest, if is_wall { WALL_NOISE } else { 1.0 }, &mut random);
 
     let spread = SPREAD * spacing;
     let (sin, cos) = sin_cos_turns(random.uniform());
@@ -168,7 +161,7 @@ fn gaussian(
     let (mut long, mut short) = (spread * stretch, spread / stretch);
     let edge = Edge::nearer(point.edge, thing.material.edge(point.local));
     if let Some(edge) = edge.filter(|edge| edge.distance < REACH * short) {
-        // As training does: long along the edge, short across it.
+        // Gaussians at an edge are long along it and short across it, as training makes them.
         x = edge.along;
         long = spread * (1.0 + STRETCH);
         short = (edge.distance / REACH).max(spread * MIN_SHORT);
@@ -186,7 +179,7 @@ fn gaussian(
     }
 }
 
-/// Mostly near 1, some a good deal below, as trained models have them.
+/// Returns an opacity: mostly near 1, sometimes well below, as in trained models.
 fn opacity(random: &mut Random) -> f64 {
     let u = random.uniform();
     let solid = 0.90 + 0.095 * random.uniform();
@@ -230,7 +223,7 @@ mod tests {
         assert_eq!(make(7).meta.comments, ["lexisplat sample scene, seed 7"]);
     }
 
-    /// No thread count and no platform may change a bit of it.
+    /// Every platform and every number of threads gives the same bits.
     #[test]
     fn bits_are_frozen() {
         let make = || scene(&SampleOptions::new(2500, 0));

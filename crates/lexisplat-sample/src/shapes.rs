@@ -1,21 +1,21 @@
-//! Surfaces, covered evenly with points.
+//! Surfaces, and points that cover them evenly.
 
 use crate::math::{Vec3, add, any_tangent, cross, dot, norm, scale, sin_cos_turns, sub, tangent, unit};
 
 /// Up in the world: y points down, as in scenes trained from COLMAP's cameras.
 pub(crate) const UP: Vec3 = [0.0, -1.0, 0.0];
-/// The fractional part of the golden ratio. Multiples of it fill the unit interval most evenly, and a
-/// lattice built on it stays even however it is stretched.
+/// The fractional part of the golden ratio. Its multiples fill the unit interval most evenly, and a lattice made with
+/// them stays even if it is stretched.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
-/// Newton steps that spread points evenly by area round a torus tube; far more than needed.
+/// Newton steps for points of a torus tube; fewer would do.
 const NEWTON: usize = 8;
-/// Pieces of the knot's curve in its table of lengths.
+/// Number of straight pieces that the knot's curve is measured with.
 const KNOT_PIECES: u32 = 512;
 
 /// A surface in world units.
 #[derive(Debug, Clone)]
 pub(crate) enum Shape {
-    /// A whole sphere; `inward` turns its normals to the centre.
+    /// A sphere. Its normals point to the centre if it is `inward`.
     Sphere { centre: Vec3, radius: f64, inward: bool },
     /// A level disc that faces up.
     Disc { centre: Vec3, radius: f64 },
@@ -23,9 +23,10 @@ pub(crate) enum Shape {
     Rim { centre: Vec3, radius: f64, thickness: f64 },
     /// A level torus.
     Torus { centre: Vec3, ring: f64, tube: f64 },
-    /// A trefoil knot that stands upright; `size` is the radius of its tube's tube.
+    /// An upright trefoil knot on a torus with a ring of `2 * size` and a tube of `size`. `tube` is the radius of the
+    /// knot's own tube.
     Knot { centre: Vec3, size: f64, tube: f64 },
-    /// A level box turned about the vertical; half sides along its own right, up and far.
+    /// A level box. `half` are its half sides along `right`, up, and the direction perpendicular to both.
     Block { centre: Vec3, half: Vec3, right: Vec3 },
 }
 
@@ -37,23 +38,23 @@ pub(crate) struct Point {
     pub(crate) normal: Vec3,
     /// Along the surface, unit length.
     pub(crate) tangent: Vec3,
-    /// Position relative to the shape, in its own axes where it has some; patterns use it.
+    /// Position relative to the shape, in the axes of a block; patterns depend on it.
     pub(crate) local: Vec3,
-    /// The nearest end of the surface, where it has one.
+    /// The nearest edge of the surface, if it has edges.
     pub(crate) edge: Option<Edge>,
 }
 
 /// A line that Gaussians should not reach across.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Edge {
-    /// How far it is, in world units.
+    /// Distance of the line, in world units.
     pub(crate) distance: f64,
-    /// Unit vector along it.
+    /// Unit vector along the line.
     pub(crate) along: Vec3,
 }
 
 impl Edge {
-    /// The nearer of two.
+    /// Returns the nearer of two edges.
     pub(crate) fn nearer(a: Option<Self>, b: Option<Self>) -> Option<Self> {
         match (a, b) {
             (Some(a), Some(b)) => Some(if b.distance < a.distance { b } else { a }),
@@ -62,19 +63,19 @@ impl Edge {
     }
 }
 
-/// The share of the way through `count` points at point `index`, 0 to 1.
+/// Returns the share of `count` points up to the middle of point `index`, 0 to 1.
 fn share(index: usize, count: usize) -> f64 {
     (index as f64 + 0.5) / count as f64
 }
 
-/// Golden multiple of `index`, in \[0, 1).
+/// Returns the fractional part of `index` times the golden ratio, in \[0, 1).
 fn golden(index: usize) -> f64 {
     let turns = index as f64 * GOLDEN;
     turns - turns.floor()
 }
 
 impl Shape {
-    /// Area in square world units.
+    /// Returns the area in square world units.
     pub(crate) fn area(&self) -> f64 {
         use std::f64::consts::{PI, TAU};
         match self {
@@ -87,7 +88,7 @@ impl Shape {
         }
     }
 
-    /// Point `index` of `count` that cover the surface evenly.
+    /// Returns point `index` of `count` points that cover the surface evenly.
     pub(crate) fn point(&self, index: usize, count: usize) -> Point {
         let (u, v) = (share(index, count), golden(index));
         match self {
@@ -127,7 +128,7 @@ impl Shape {
                 on(*centre, add(curve, scale(normal, *tube)), normal, along)
             }
             Self::Block { centre, half, right } => {
-                let axes = [*right, UP, cross(*right, UP)];
+                let axes = block_axes(*right);
                 let mut start = 0.0;
                 let total = self.area();
                 let sides = faces(half);
@@ -156,11 +157,12 @@ impl Shape {
     }
 }
 
+/// Returns a point without an edge.
 fn on(centre: Vec3, local: Vec3, normal: Vec3, tangent: Vec3) -> Point {
     Point { position: add(centre, local), normal, tangent, local, edge: None }
 }
 
-/// A face of a box: which axis it faces, which way, and its own two axes.
+/// A face of a box: the axis and sign of its normal, its own two axes, and its area.
 struct Face {
     axis: usize,
     sign: f64,
@@ -169,7 +171,12 @@ struct Face {
     area: f64,
 }
 
-/// All but the bottom one, which stands on something.
+/// Returns the axes of a block with this direction to the right.
+pub(crate) fn block_axes(right: Vec3) -> [Vec3; 3] {
+    [right, UP, cross(right, UP)]
+}
+
+/// Returns all faces except the bottom, which is never visible.
 fn faces(half: &Vec3) -> [Face; 5] {
     [(1, 1.0), (0, 1.0), (0, -1.0), (2, 1.0), (2, -1.0)].map(|(axis, sign)| {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
@@ -177,8 +184,8 @@ fn faces(half: &Vec3) -> [Face; 5] {
     })
 }
 
-/// Turns round the tube below which the share `v` of a torus's area lies, starting at the outside;
-/// `ratio` is tube over ring radius. Solves `t + ratio sin(2 pi t) / 2 pi = v`.
+/// Returns the angle around the tube of a torus, in turns from the outside, up to which the share `v` of its area lies.
+/// `ratio` is the radius of the tube over that of the ring. Solves `t + ratio sin(2 pi t) / 2 pi = v`.
 fn even_round_tube(v: f64, ratio: f64) -> f64 {
     let mut t = v;
     for _ in 0..NEWTON {
@@ -188,11 +195,11 @@ fn even_round_tube(v: f64, ratio: f64) -> f64 {
     t
 }
 
-/// The trefoil at `t` turns: point, unit tangent, and the normal of the torus it winds on.
+/// Returns the trefoil at `t` turns: point, unit tangent, and the unit normal towards the outside of its torus.
 fn knot(t: f64, size: f64) -> (Vec3, Vec3, Vec3) {
     let (sin2, cos2) = sin_cos_turns(2.0 * t);
     let (sin3, cos3) = sin_cos_turns(3.0 * t);
-    // In a plane that stands upright: x to the right, y up and down, z to the viewer.
+    // The knot is upright: x to the right, y vertical, z to the viewer.
     let point = [(2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3];
     let along = [
         -3.0 * sin3 * cos2 - 2.0 * (2.0 + cos3) * sin2,
@@ -204,12 +211,12 @@ fn knot(t: f64, size: f64) -> (Vec3, Vec3, Vec3) {
     (scale(point, size), along, side)
 }
 
-/// Length of the knot's curve.
+/// Returns the length of the knot's curve.
 fn knot_length(size: f64) -> f64 {
     knot_lengths().last().map_or(0.0, |last| last * size)
 }
 
-/// Length of the unit knot's curve up to each piece's end.
+/// Returns the length of the curve of a knot of size 1 up to the end of each piece.
 fn knot_lengths() -> Vec<f64> {
     let at = |i: u32| knot(f64::from(i) / f64::from(KNOT_PIECES), 1.0).0;
     let mut sum = 0.0;
@@ -221,7 +228,7 @@ fn knot_lengths() -> Vec<f64> {
         .collect()
 }
 
-/// Turns at which the share `u` of the knot's length is behind.
+/// Returns the turns of the trefoil after the share `u` of its length.
 fn knot_at_length(u: f64) -> f64 {
     static LENGTHS: std::sync::OnceLock<Vec<f64>> = std::sync::OnceLock::new();
     let lengths = LENGTHS.get_or_init(knot_lengths);
@@ -232,12 +239,12 @@ fn knot_at_length(u: f64) -> f64 {
     (piece as f64 + inside) / f64::from(KNOT_PIECES)
 }
 
-/// Centres of `count` balls along the knot.
+/// Returns the centres of `count` balls along the knot.
 pub(crate) fn knot_beads(centre: Vec3, size: f64, count: usize) -> Vec<Vec3> {
     (0..count).map(|i| add(centre, knot(knot_at_length(share(i, count)), size).0)).collect()
 }
 
-/// Centres of `count` balls round the torus.
+/// Returns the centres of `count` balls around the torus.
 pub(crate) fn torus_beads(centre: Vec3, ring: f64, count: usize) -> Vec<Vec3> {
     (0..count)
         .map(|i| {
@@ -247,9 +254,9 @@ pub(crate) fn torus_beads(centre: Vec3, ring: f64, count: usize) -> Vec<Vec3> {
         .collect()
 }
 
-/// The unit quaternion (w, x, y, z) of the rotation with these columns.
+/// Returns the unit quaternion (w, x, y, z) of the rotation with these columns.
 pub(crate) fn quaternion(x: Vec3, y: Vec3, z: Vec3) -> [f64; 4] {
-    // Shepperd's method: divide by the largest component.
+    // Shepperd's method divides by the largest component.
     let trace = x[0] + y[1] + z[2];
     let of = |diagonal: f64| 1.0 + 2.0 * diagonal - trace;
     let squares = [1.0 + trace, of(x[0]), of(y[1]), of(z[2])];
@@ -266,7 +273,7 @@ pub(crate) fn quaternion(x: Vec3, y: Vec3, z: Vec3) -> [f64; 4] {
     raw.map(|v| v / length)
 }
 
-/// The mirror image of `v` in the direction `n`.
+/// Returns `v` mirrored at the axis `n`.
 pub(crate) fn reflect(v: Vec3, n: Vec3) -> Vec3 {
     sub(scale(n, 2.0 * dot(v, n)), v)
 }

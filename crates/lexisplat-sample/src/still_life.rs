@@ -1,4 +1,4 @@
-//! What stands on the table.
+//! The objects of the scene.
 
 use crate::light::{Body, Studio};
 use crate::material::Material;
@@ -7,9 +7,9 @@ use crate::shapes::{Shape, knot_beads, torus_beads};
 
 /// Radius of the table.
 const TABLE: f64 = 1.7;
-/// Radius of the studio's wall: well outside a camera that shows the whole table.
+/// Radius of the studio's wall. Cameras that show the whole table are well inside of it.
 const WALL: f64 = 12.0;
-/// Balls that stand for a torus or knot where it blocks light.
+/// Number of balls that block light in place of a torus or a knot.
 const BEADS: usize = 48;
 
 /// An object of the scene.
@@ -17,16 +17,16 @@ const BEADS: usize = 48;
 pub(crate) struct Thing {
     pub(crate) shape: Shape,
     pub(crate) material: Material,
-    /// Gaussians per area in units of the table's: fine patterns need more.
+    /// Gaussians per area, in units of those of the table. Fine patterns need more.
     pub(crate) density: f64,
 }
 
-/// The place at `x` to the right, `height` above the table and `z` away from the first viewer.
+/// Returns the position `x` to the right, `height` above the table and `z` away from the first viewer.
 fn at(x: f64, height: f64, z: f64) -> Vec3 {
     [x, -height, z]
 }
 
-/// The level direction `turns` from the x axis.
+/// Returns the level direction at `turns` from the x axis.
 fn level(turns: f64) -> Vec3 {
     let (sin, cos) = sin_cos_turns(turns);
     [cos, 0.0, sin]
@@ -45,24 +45,24 @@ fn block(centre: Vec3, half: Vec3, turns: f64, material: Material) -> Thing {
     Thing { shape: Shape::Block { centre, half, right: level(turns) }, material, density: 0.9 }
 }
 
-/// All objects, the wall last.
+/// Returns all objects; the wall is the last.
 pub(crate) fn things() -> Vec<Thing> {
     let paint = |colour, roughness| Material::Paint { colour, roughness };
-    let wood = |shape, material, density| Thing { shape, material, density };
+    let thing = |shape, material, density| Thing { shape, material, density };
     let metal = |colour, roughness| Material::Metal { colour, roughness };
     vec![
-        wood(Shape::Disc { centre: at(0.0, 0.0, 0.0), radius: TABLE }, Material::Chequered, 1.0),
-        wood(
+        thing(Shape::Disc { centre: at(0.0, 0.0, 0.0), radius: TABLE }, Material::Chequered, 1.0),
+        thing(
             Shape::Rim { centre: at(0.0, 0.0, 0.0), radius: TABLE, thickness: 0.12 },
             Material::DarkWood,
             0.7,
         ),
         block(at(0.0, 0.15, 0.1), [0.36, 0.15, 0.36], 0.06, Material::Marble),
-        Thing {
-            shape: Shape::Knot { centre: at(0.0, 0.80, 0.1), size: 0.14, tube: 0.08 },
-            material: metal([0.95, 0.55, 0.28], 0.22),
-            density: 0.85,
-        },
+        thing(
+            Shape::Knot { centre: at(0.0, 0.80, 0.1), size: 0.14, tube: 0.08 },
+            metal([0.95, 0.55, 0.28], 0.22),
+            0.85,
+        ),
         ball(-0.92, -0.42, 0.40, paint([0.62, 0.015, 0.02], 0.06)),
         ball(-0.34, -0.92, 0.27, paint([0.01, 0.05, 0.42], 0.1)),
         ball(0.36, -1.12, 0.17, paint([0.72, 0.40, 0.01], 0.3)),
@@ -70,11 +70,11 @@ pub(crate) fn things() -> Vec<Thing> {
         ball(0.62, 1.10, 0.22, paint([0.01, 0.28, 0.08], 0.08)),
         ball(-1.02, 0.62, 0.30, Material::Clay { colour: [0.56, 0.21, 0.11] }),
         ball(-0.62, 1.12, 0.15, paint([0.55, 0.53, 0.50], 0.15)),
-        Thing {
-            shape: Shape::Torus { centre: at(0.82, 0.155, -0.52), ring: 0.30, tube: 0.155 },
-            material: Material::Doughnut,
-            density: 1.1,
-        },
+        thing(
+            Shape::Torus { centre: at(0.82, 0.155, -0.52), ring: 0.30, tube: 0.155 },
+            Material::Doughnut,
+            1.1,
+        ),
         block(at(-0.12, 0.06, 1.05), [0.36, 0.06, 0.27], 0.03, Material::Book { colour: [0.02, 0.22, 0.24] }),
         block(
             at(-0.08, 0.17, 1.03),
@@ -83,15 +83,15 @@ pub(crate) fn things() -> Vec<Thing> {
             Material::Book { colour: [0.60, 0.32, 0.03] },
         ),
         raised_ball(-0.08, 0.22 + 0.13, 1.03, 0.13, paint([0.30, 0.03, 0.30], 0.05)),
-        Thing {
-            shape: Shape::Sphere { centre: at(0.0, 0.0, 0.0), radius: WALL, inward: true },
-            material: Material::Backdrop,
-            density: 0.0012,
-        },
+        thing(
+            Shape::Sphere { centre: at(0.0, 0.0, 0.0), radius: WALL, inward: true },
+            Material::Backdrop,
+            0.0012,
+        ),
     ]
 }
 
-/// The studio with everything in it that blocks light.
+/// Returns the studio with all bodies that block light.
 pub(crate) fn studio(things: &[Thing]) -> Studio {
     let bodies = things.iter().filter_map(|thing| {
         let body = match thing.shape.clone() {

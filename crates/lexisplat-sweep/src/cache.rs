@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
+use lexisplat::output::{self, Output, OutputGroup};
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::{Error, Result};
 
@@ -22,6 +23,7 @@ pub(super) struct Cache {
     folder: PathBuf,
     /// Whether parts from earlier runs are used.
     reuse: bool,
+    outputs: OutputGroup,
 }
 
 /// The content of a part's file.
@@ -33,9 +35,9 @@ struct Stored<K, T> {
 }
 
 impl Cache {
-    pub(super) fn new(folder: PathBuf, reuse: bool) -> Result<Self> {
+    pub(super) fn new(folder: PathBuf, reuse: bool, outputs: &OutputGroup) -> Result<Self> {
         std::fs::create_dir_all(&folder).map_err(|e| Error::io(&folder, e))?;
-        Ok(Self { folder, reuse })
+        Ok(Self { folder, reuse, outputs: outputs.clone() })
     }
 
     /// The part `name` made from exactly what `key` describes, if it is stored and whole.
@@ -57,7 +59,7 @@ impl Cache {
         let path = self.path(name, key);
         let stored = Stored { version: VERSION, key, value };
         let text = serde_json::to_vec_pretty(&stored).map_err(|e| Error::format(&path, e.to_string()))?;
-        write_whole(&path, &text)
+        write_whole(&self.outputs, &path, &text)
     }
 
     fn path(&self, name: &str, key: &str) -> PathBuf {
@@ -65,9 +67,9 @@ impl Cache {
     }
 }
 
-/// Writes `bytes` to `path` completely, or not at all.
-pub(super) fn write_whole(path: &Path, bytes: &[u8]) -> Result<()> {
-    Ok(lexisplat::output::write_whole(path, |writer| {
+/// Writes `bytes` to `path` completely, or not at all. The file is one of `outputs`.
+pub(super) fn write_whole(outputs: &OutputGroup, path: &Path, bytes: &[u8]) -> Result<()> {
+    Ok(output::write_whole(Output::from(path).within(outputs), |writer| {
         std::io::Write::write_all(writer, bytes).map_err(|e| lexisplat::Error::io(path, e))
     })?)
 }
@@ -84,18 +86,19 @@ mod tests {
     fn parts_are_found_by_their_key_alone() {
         let folder = tempfile::tempdir().unwrap();
         let at = folder.path().join("points");
-        let cache = Cache::new(at.clone(), true).unwrap();
+        let open = |reuse| Cache::new(at.clone(), reuse, &OutputGroup::default()).unwrap();
+        let cache = open(true);
         assert_eq!(cache.find::<Vec<f64>>("a b/c", "key 1"), None);
         cache.store("a b/c", "key 1", &vec![1.5, 0.1]).unwrap();
         assert_eq!(cache.find::<Vec<f64>>("a b/c", "key 1"), Some(vec![1.5, 0.1]));
         assert_eq!(cache.find::<Vec<f64>>("a b/c", "key 2"), None);
-        assert_eq!(Cache::new(at, false).unwrap().find::<Vec<f64>>("a b/c", "key 1"), None);
+        assert_eq!(open(false).find::<Vec<f64>>("a b/c", "key 1"), None);
     }
 
     #[test]
     fn damaged_parts_are_made_again() {
         let folder = tempfile::tempdir().unwrap();
-        let cache = Cache::new(folder.path().to_owned(), true).unwrap();
+        let cache = Cache::new(folder.path().to_owned(), true, &OutputGroup::default()).unwrap();
         cache.store("a", "key", &7_u32).unwrap();
         let path = cache.path("a", "key");
         let whole = std::fs::read(&path).unwrap();

@@ -1,13 +1,14 @@
 //! One model compressed in one way.
 
+use std::sync::Arc;
 use std::time::Instant;
 
-use lexisplat::packed::{PackOptions, Packed, Packer};
-use lexisplat::{CompressOptions, Model, Progress, Sensitivity, Splats, compress, lexi};
-use lexisplat_eval::{Comparison, Result, Views};
+use lexisplat::packed::PackOptions;
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, Sensitivity, Splats, lexi};
+use lexisplat_eval::compression::PackingViews;
+use lexisplat_eval::{Comparison, Compression, Packing, Result};
 use lexisplat_render::Renderer;
 
-use super::measure::quotient;
 use super::options::SweepOptions;
 use super::results::{Point, Setting};
 
@@ -18,60 +19,56 @@ pub(super) fn compress_scene(
     setting: Setting,
     options: &SweepOptions,
     renderer: &mut Renderer,
-    sensitivity: &mut Option<Sensitivity>,
+    sensitivity: &mut Option<Arc<Sensitivity>>,
     progress: &dyn Progress,
 ) -> Result<(Model, Point)> {
     let clock = Instant::now();
-    let seconds: f64;
-    let (model, mean_nonzeros, file_bytes, sh_bytes) = if let Setting::Preset(preset) = setting {
+    let mut exact = CompressOptions::default();
+    (exact.pursuit, exact.layout, exact.seed) = (options.pursuit, options.layout, options.seed);
+    let compression: Compression = match setting {
+        Setting::Tolerance(tolerance) => {
+            exact.tolerance = Some(tolerance);
+            exact.into()
+        }
+        Setting::MaxNonzeros(most) => {
+            (exact.tolerance, exact.max_nonzeros) = (None, Some(most));
+            exact.into()
+        }
         // As `lexisplat compress --preset` does without cameras.
-        let sensitivity = match sensitivity {
-            Some(sensitivity) => sensitivity,
-            None => sensitivity.insert(Views::generated(splats).sensitivity(renderer, splats, &mut || ())?),
-        };
-        let mut packing = PackOptions::default();
-        packing.seed = options.seed;
-        let packer = Packer::new(splats, sensitivity, &packing)?;
-        let (packed, report) = packer.pack(packer.step_for(preset.decibels()), progress)?;
-        seconds = clock.elapsed().as_secs_f64();
-        let model = lexi::unpack(preset.name(), &packed)?;
-        (model, report.mean_nonzeros, lexi::packed_bytes(&packed), packed_sh_bytes(&packed)?)
-    } else {
-        let mut exact = CompressOptions::default();
-        (exact.pursuit, exact.layout, exact.seed) = (options.pursuit, options.layout, options.seed);
-        (exact.tolerance, exact.max_nonzeros) = match setting {
-            Setting::Tolerance(tolerance) => (Some(tolerance), None),
-            Setting::MaxNonzeros(most) => (None, Some(most)),
-            Setting::Preset(_) => (None, None),
-        };
-        let (model, report) = compress(splats.clone(), &exact, progress)?;
-        seconds = clock.elapsed().as_secs_f64();
-        let (file_bytes, sh_bytes) = (lexi::file_bytes(&model)?, lexi::sh_bytes(&model)?);
-        (model, report.mean_nonzeros, file_bytes, sh_bytes)
+        Setting::Preset(preset) => {
+            let measured = match sensitivity {
+                Some(measured) => measured,
+                None => {
+                    let views = PackingViews::generated(splats);
+                    sensitivity.insert(Arc::new(views.sensitivity(renderer, splats, progress)?))
+                }
+            };
+            let mut packing = PackOptions::default();
+            packing.seed = options.seed;
+            Packing::new(preset).with_options(packing).with_sensitivity(Arc::clone(measured)).into()
+        }
     };
+    let look_seconds = clock.elapsed().as_secs_f64();
+    let mut file = Vec::new();
+    let report = compression.run(splats, &mut file, progress)?;
+    let model = lexi::read_bytes("the compressed model", &file, &Limits::default())?;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the file's size")]
+    let sh_bytes = report.sh_bytes.round() as u64;
+    let is_exact = report.record.layout != Layout::Packed;
     let point = Point {
         setting,
-        file_bytes,
+        file_bytes: report.file_bytes,
         sh_bytes,
         resident_sh_bytes: model.resident_sh_bytes() as u64,
         atoms: model.dictionary.len(),
-        mean_nonzeros,
-        coefficient_ratio: quotient(splats.degree.rest() as f64, mean_nonzeros),
-        max_residual: (!matches!(setting, Setting::Preset(_))).then_some(model.record.max_residual),
-        over_tolerance: model.record.over_tolerance,
+        mean_nonzeros: report.mean_nonzeros,
+        coefficient_ratio: report.coefficient_ratio,
+        max_residual: is_exact.then_some(report.record.max_residual),
+        over_tolerance: report.record.over_tolerance,
         to_original: Comparison::of(Vec::new()),
         to_photos: None,
         fps: None,
-        seconds,
+        seconds: look_seconds + report.pack_seconds,
     };
     Ok((model, point))
-}
-
-/// Bytes of view-dependent colour in a packed file.
-fn packed_sh_bytes(packed: &Packed) -> Result<u64> {
-    let is_sh = |name: &str| name == "dictionary" || name.starts_with("codes.");
-    let bits: f64 = packed.stream_bits()?.iter().filter(|s| is_sh(s.attribute)).map(|s| s.bits).sum();
-    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the file's size")]
-    let bytes = (bits / 8.0).round() as u64;
-    Ok(bytes)
 }

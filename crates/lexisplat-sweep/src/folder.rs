@@ -7,6 +7,7 @@ use super::{
     PictureFiles, Results, Setting, SweepPicture, figures, long_csv, paper, survey, sweep_html,
     sweep_markdown, tables,
 };
+use lexisplat::output::OutputGroup;
 use lexisplat_eval::{Error, Result};
 
 /// Most bytes of pictures on the page; browsers grow slow with more. All pictures stay in their folder.
@@ -14,7 +15,7 @@ const PICTURE_BYTES: usize = 24 << 20;
 
 /// Writes everything that follows from `results` into `folder`: `report.html`, `report.md`, `results.json`,
 /// `all.csv`, `tables/`, `figures/`, and `survey/` if there were photos. `pictures` are those to show. `date` is
-/// printed as it is. Returns the paths of the files.
+/// printed as it is. The files are members of `outputs`. Returns their paths.
 ///
 /// # Errors
 /// If a figure cannot be drawn, a picture cannot be read, or a file cannot be written.
@@ -23,6 +24,7 @@ pub fn write_report(
     results: &Results,
     pictures: &[PictureFiles],
     date: Option<&str>,
+    outputs: &OutputGroup,
 ) -> Result<Vec<PathBuf>> {
     let json = serde_json::to_string_pretty(results)
         .map_err(|e| Error::format(folder.join("results.json"), e.to_string()))?;
@@ -53,7 +55,7 @@ pub fn write_report(
         let path = folder.join(name);
         let parent = path.parent().unwrap_or(folder);
         std::fs::create_dir_all(parent).map_err(|e| Error::io(parent, e))?;
-        write_whole(&path, &bytes)?;
+        write_whole(outputs, &path, &bytes)?;
         Ok(path)
     };
     files.into_iter().map(write).collect()

@@ -1,7 +1,8 @@
 //! Options and progress of a sweep.
 
+use lexisplat::output::OutputGroup;
 use lexisplat::{Layout, Limits, Progress, Pursuit};
-use lexisplat_render::Device;
+use lexisplat_render::gpu::Gpu;
 
 use super::results::Setting;
 use lexisplat_eval::views::{DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, SceneKind};
@@ -33,8 +34,8 @@ pub struct SweepOptions {
     pub kind: SceneKind,
     /// Number of generated views.
     pub generated: u16,
-    /// The device that draws.
-    pub device: Device,
+    /// The GPU that draws. `None` stands for the processor.
+    pub gpu: Option<Gpu>,
     /// Limits on the size of models.
     pub limits: Limits,
     /// Number of views of each model whose pictures are saved.
@@ -43,6 +44,8 @@ pub struct SweepOptions {
     pub resume: bool,
     /// Describes what changes scores but is not among these options, such as the weights of LPIPS.
     pub fingerprint: String,
+    /// The group of all files that the sweep writes.
+    pub outputs: OutputGroup,
 }
 
 impl Default for SweepOptions {
@@ -59,11 +62,12 @@ impl Default for SweepOptions {
             hold: DEFAULT_HOLD,
             kind: SceneKind::Auto,
             generated: DEFAULT_ORBIT,
-            device: Device::Auto,
+            gpu: None,
             limits: Limits::default(),
             pictures: 1,
             resume: true,
             fingerprint: String::new(),
+            outputs: OutputGroup::default(),
         }
     }
 }

@@ -3,9 +3,10 @@
 use std::fs::File;
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use lexisplat::ply::{self, ReadOptions};
-use lexisplat::{Progress, Sensitivity, Splats};
+use lexisplat::{Sensitivity, Splats};
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
@@ -13,7 +14,7 @@ use lexisplat_eval::{
     BenchOptions, Comparison, DrawOptions, Error, Result, Scorer, bench_cpu, bench_gpu, draw_views, png,
     score_views,
 };
-use lexisplat_render::gpu::{Gpu, ShPath};
+use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -87,7 +88,7 @@ struct Subject {
     shown: Vec<usize>,
     /// Pictures of the original and photos, made when the first part needs them.
     references: Option<References>,
-    sensitivity: Option<Sensitivity>,
+    sensitivity: Option<Arc<Sensitivity>>,
 }
 
 /// Pictures that others are compared with, one for each view.
@@ -100,7 +101,6 @@ struct References {
 pub(super) struct Evaluator<'a> {
     pub(super) options: &'a SweepOptions,
     pub(super) scorer: &'a Scorer,
-    pub(super) gpu: Option<Gpu>,
     pub(super) renderer: Renderer,
     pub(super) cache: Cache,
     pub(super) pictures: PathBuf,
@@ -113,7 +113,7 @@ impl Evaluator<'_> {
             return Err(Failure::Scene(format!("{} does not exist", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
-        let options = ReadOptions { limits: self.options.limits, ..ReadOptions::default() };
+        let options = ReadOptions::default().with_limits(self.options.limits);
         let read = ply::read(&entry.model, &options)?;
         for warning in &read.warnings {
             self.progress.warn(&entry.name, warning);
@@ -157,7 +157,7 @@ impl Evaluator<'_> {
             model: entry.model.display().to_string(),
             gaussians,
             sh_degree,
-            ply_bytes: read.source.file_bytes,
+            ply_bytes: read.summary.file_bytes,
             shipped_bytes,
             views_from: found.from,
             views: count,
@@ -252,9 +252,8 @@ impl Evaluator<'_> {
         }
         let References { originals, photos } = self.references(subject)?;
         let Subject { splats, sensitivity, .. } = subject;
-        let progress: &dyn Progress = self.progress;
         let (model, compressed) =
-            compress_scene(splats, setting, self.options, &mut self.renderer, sensitivity, progress)?;
+            compress_scene(splats, setting, self.options, &mut self.renderer, sensitivity, self.progress)?;
         let scene = Scene::from(&model);
         let drawn = self.draw(&scene, &subject.cameras)?;
         for (&view, path) in subject.shown.iter().zip(&shown) {
@@ -301,20 +300,20 @@ impl Evaluator<'_> {
     }
 
     fn draw(&mut self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Vec<Image>> {
-        let options = DrawOptions { background: self.options.background, eight_bit: self.options.eight_bit };
-        draw_views(&mut self.renderer, scene, cameras, &options, &mut || ())
+        let options = DrawOptions::new(self.options.background, self.options.eight_bit);
+        draw_views(&mut self.renderer, scene, cameras, &options, self.progress)
     }
 
     fn fps(&self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Option<f64>> {
         if !self.options.fps {
             return Ok(None);
         }
-        let repeat = if self.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
+        let repeat = if self.options.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
         let mut options = BenchOptions::new(WARMUP, repeat);
         options.background = self.options.background;
-        let times = match &self.gpu {
-            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, &mut || ())?,
-            None => bench_cpu(scene, cameras, &options, &mut || ())?,
+        let times = match &self.options.gpu {
+            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, self.progress)?,
+            None => bench_cpu(scene, cameras, &options, self.progress)?,
         };
         Ok(Some(times.fps))
     }
@@ -325,7 +324,8 @@ impl Evaluator<'_> {
     }
 
     fn save(&self, path: &Path, image: &Image) -> Part<()> {
-        write_whole(path, &png(image.width, image.height, &image.to_8bit())?).map_err(Failure::Sweep)
+        let bytes = png(image.width, image.height, &image.to_8bit())?;
+        write_whole(&self.options.outputs, path, &bytes).map_err(Failure::Sweep)
     }
 
     fn files(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> PictureFiles {

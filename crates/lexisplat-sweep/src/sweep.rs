@@ -18,7 +18,7 @@ use super::scene::{Evaluator, Failure, file_start, settings};
 ///
 /// # Errors
 /// [`Error::Parameter`] for settings out of range, for two models of one name, or if no model can be evaluated.
-/// Errors of opening the device and of writing to `folder`, and [`lexisplat::Error::Cancelled`].
+/// Errors of preparing the GPU and of writing to `folder`, and [`lexisplat::Error::Cancelled`].
 pub fn sweep(
     entries: &[Entry],
     options: &SweepOptions,
@@ -33,15 +33,14 @@ pub fn sweep(
             return Err(Error::parameter("models", format!("{} by {}", entry.name, entry.method), expected));
         }
     }
-    let gpu = options.device.open_gpu()?;
-    let renderer = match &gpu {
+    let renderer = match &options.gpu {
         Some(gpu) => Renderer::on(gpu)?,
         None => Renderer::cpu(),
     };
     let pictures = folder.join("pictures");
     std::fs::create_dir_all(&pictures).map_err(|e| Error::io(&pictures, e))?;
-    let cache = Cache::new(folder.join("points"), options.resume)?;
-    let mut evaluator = Evaluator { options, scorer, gpu, renderer, cache, pictures, progress };
+    let cache = Cache::new(folder.join("points"), options.resume, &options.outputs)?;
+    let mut evaluator = Evaluator { options, scorer, renderer, cache, pictures, progress };
     let parts = |entry: &Entry| 1 + settings(entry, options).len() as u64;
     progress.start(entries.iter().map(parts).sum());
     let mut results = Results {

@@ -8,7 +8,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use lexisplat::packed::Preset;
 use lexisplat::{Progress, ply};
 use lexisplat_eval::Scorer;
-use lexisplat_render::Device;
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_sweep::{
     Entry, Method, PictureFiles, Point, Results, Setting, SweepOptions, SweepProgress, parse_manifest, sweep,
@@ -59,7 +58,6 @@ fn options() -> SweepOptions {
     options.settings = vec![Setting::Tolerance(0.1), Setting::MaxNonzeros(1), Setting::Preset(Preset::Small)];
     options.max_width = 96;
     options.generated = 3;
-    options.device = Device::Cpu;
     options.fps = false;
     options
 }

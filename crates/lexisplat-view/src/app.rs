@@ -1,4 +1,4 @@
-//! The window's life: hears from its threads, takes keys, shows its parts, and goes on with the script.
+//! The window: takes events of its threads and keys, shows its parts, and continues the script.
 
 use std::collections::VecDeque;
 use std::sync::mpsc::{Receiver, channel};
@@ -12,86 +12,86 @@ use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device};
 
 use crate::Options;
-use crate::command::{Command, Which};
+use crate::camera_controller::SceneBounds;
+use crate::command::{Command, Slot};
 use crate::error::{Error, Result};
-use crate::eye::Surroundings;
 use crate::keys;
-use crate::models::{Bell, Finished, Open, OrbitSize, Work};
-use crate::painter::{Cpu, OnGpu, Painter};
-use crate::painting::{Ask, Painting, Score, Shot, Told, View};
+use crate::models::{FinishedJob, Job, Notifier, OpenModel, OrbitSize};
 use crate::panel;
 use crate::present::Presenter;
+use crate::render_thread::{Frame, RenderEvent, RenderRequest, RenderThread, Score, View};
+use crate::scene_renderer::{CpuSceneRenderer, GpuSceneRenderer, SceneRenderer};
 use crate::script::Script;
 use crate::state::State;
 
-/// After this long without a move, the picture is drawn in full.
+/// The picture is drawn in full resolution after this long without motion.
 const REST: Duration = Duration::from_millis(200);
-/// Time that a picture may take while moving, in milliseconds.
+/// Time that a picture may take during motion, in milliseconds.
 const MOVING_BUDGET: f64 = 80.0;
-/// Least share of its size on each side that a picture is drawn at while moving.
+/// Smallest scale of pictures during motion: a factor on each side.
 const LEAST_SCALE: f64 = 0.2;
 /// Longest step of a flight, in seconds, however long the last frame took.
 const LONGEST_STEP: f32 = 0.1;
-/// Scene radii a second, and times that with shift.
+/// Speed of a flight in scene radii a second, and the factor on it while shift is held.
 const SPEED: f64 = 0.6;
 const FAST: f64 = 4.0;
-/// Messages kept.
+/// Messages that the panel keeps.
 const MESSAGES: usize = 5;
 
-/// Something the user should know.
+/// A line for the panel.
 #[derive(Debug, Clone)]
 pub(crate) struct Message {
     pub(crate) text: String,
     pub(crate) is_error: bool,
 }
 
-/// Errors that graphics drivers report at any time, on any thread.
+/// Errors that graphics drivers report. They may come at any time and on any thread.
 pub(crate) type DriverErrors = Arc<Mutex<VecDeque<String>>>;
 
 /// The window.
 pub(crate) struct App {
     pub(crate) options: Options,
     pub(crate) state: State,
-    /// Cameras from a file.
+    /// The cameras of a file, if one was read.
     pub(crate) given: Option<Vec<Camera>>,
-    pub(crate) models: [Option<Arc<Open>>; 2],
-    pub(crate) works: [Option<Work>; 2],
-    /// Jobs numbered up to this one open what the command line names: the program fails if they do.
+    pub(crate) models: [Option<Arc<OpenModel>>; 2],
+    pub(crate) jobs: [Option<Job>; 2],
+    /// Jobs with an id up to this one open files that the command line names. The program fails if they fail.
     pub(crate) required: u64,
-    /// Numbers jobs and models.
+    /// The last id given to a job and to the model that it makes.
     pub(crate) last_id: u64,
-    pub(crate) bell: Bell,
-    finished: Receiver<Finished>,
+    pub(crate) notifier: Notifier,
+    finished: Receiver<FinishedJob>,
     driver: DriverErrors,
-    pub(crate) painting: Painting,
+    pub(crate) render_thread: RenderThread,
     pub(crate) presenter: Arc<Presenter>,
-    pub(crate) shot: Option<Shot>,
-    /// How far the models' pictures were apart when they were last compared.
+    pub(crate) frame: Option<Frame>,
+    /// The result of the last comparison of the models' pictures.
     pub(crate) score: Option<Score>,
-    /// Whether a view is being drawn.
+    /// Whether the render thread is drawing a view.
     drawing: bool,
-    /// The last view that could not be drawn: not to be tried again.
+    /// The last view that could not be drawn. It is not requested again.
     failed: Option<View>,
-    /// Screenshots not saved yet.
+    /// Number of screenshots requested and not saved yet.
     pub(crate) saving: usize,
-    /// Share of its size on each side that a picture is drawn at while moving.
+    /// Scale of pictures during motion: a factor on each side.
     scale: f64,
     last_move: Option<Instant>,
-    /// Pixels of the screen that the picture may take.
+    /// Width and height of the area for the picture, in pixels.
     pub(crate) area: (u32, u32),
     /// Whether the wipe's line is being dragged.
     pub(crate) dragging_split: bool,
     pub(crate) messages: VecDeque<Message>,
     script: Script,
-    /// Whether the script still runs.
+    /// Whether the script is still running.
     scripted: bool,
-    /// Whether the window is to close.
+    /// Whether the window closes after this frame.
     pub(crate) quit: bool,
     outcome: Arc<Mutex<Option<Error>>>,
 }
 
 impl App {
-    /// Starts the threads, and opens what the command line names.
+    /// Starts the threads and opens the files that the command line names.
     pub(crate) fn new(
         creation: &eframe::CreationContext<'_>,
         options: Options,
@@ -103,29 +103,34 @@ impl App {
         let context = creation.egui_ctx.clone();
         let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(move || context.request_repaint());
         let driver = DriverErrors::default();
-        let (errors, ring) = (Arc::clone(&driver), Arc::clone(&wake));
+        let (errors, wake_window) = (Arc::clone(&driver), Arc::clone(&wake));
         graphics.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
             errors.lock().unwrap_or_else(PoisonError::into_inner).push_back(error.to_string());
-            ring();
+            wake_window();
         }));
-        let (painter, refused) = painter(options.device, graphics)?;
-        let ring = Arc::clone(&wake);
-        let painting =
-            Painting::start(painter, graphics.device.clone(), graphics.queue.clone(), move || ring())?;
+        let (renderer, gpu_error) = renderer(options.device, graphics)?;
+        let wake_window = Arc::clone(&wake);
+        let render_thread = RenderThread::start(
+            renderer,
+            graphics.device.clone(),
+            graphics.queue.clone(),
+            options.outputs.clone(),
+            move || wake_window(),
+        )?;
         let (sender, finished) = channel();
         let mut app = Self {
             state: State::new(options.background),
             given,
             models: [None, None],
-            works: [None, None],
+            jobs: [None, None],
             required: 0,
             last_id: 0,
-            bell: Bell { sender, wake },
+            notifier: Notifier { sender, wake },
             finished,
             driver,
-            painting,
+            render_thread,
             presenter: Arc::new(Presenter::new(&graphics.device, graphics.target_format)),
-            shot: None,
+            frame: None,
             score: None,
             drawing: false,
             failed: None,
@@ -141,11 +146,11 @@ impl App {
             outcome,
             options,
         };
-        if let Some(error) = refused {
-            app.say(format!("drawing on the processor: {error}"));
+        if let Some(error) = gpu_error {
+            app.show_message(format!("drawing on the CPU, because the GPU failed: {error}"));
         }
-        for (path, which) in app.options.files.clone().into_iter().zip(Which::BOTH) {
-            app.perform(Command::Open(path, which));
+        for (path, slot) in app.options.files.clone().into_iter().zip(Slot::BOTH) {
+            app.handle(Command::Open(path, slot));
         }
         app.required = app.last_id;
         Ok(app)
@@ -155,13 +160,13 @@ impl App {
         OrbitSize { views: self.options.orbit.max(1), max_width: self.options.max_width.max(1) }
     }
 
-    /// Says something in the panel.
-    pub(crate) fn say(&mut self, text: impl Into<String>) {
+    /// Shows a message in the panel.
+    pub(crate) fn show_message(&mut self, text: impl Into<String>) {
         self.message(text.into(), false);
     }
 
-    /// Says what went wrong; ends the program if a script is running.
-    pub(crate) fn complain(&mut self, error: Error) {
+    /// Shows an error in the panel, or ends the program with it if a script is running.
+    pub(crate) fn show_error(&mut self, error: Error) {
         if self.scripted {
             self.fail(error);
         } else {
@@ -183,35 +188,35 @@ impl App {
         self.quit = true;
     }
 
-    /// Puts a model in place.
-    pub(crate) fn put(&mut self, which: Which, model: Option<Arc<Open>>) {
-        self.models[which.index()].clone_from(&model);
+    /// Replaces the model of `slot`.
+    pub(crate) fn set_model(&mut self, slot: Slot, model: Option<Arc<OpenModel>>) {
+        self.models[slot.index()].clone_from(&model);
         self.score = None;
-        if let Err(error) = self.painting.ask(Ask::Model(which, model)) {
-            self.complain(error);
+        if let Err(error) = self.render_thread.request(RenderRequest::Model(slot, model)) {
+            self.show_error(error);
         }
         self.state.set_open([0, 1].map(|i| self.models[i].is_some()));
     }
 
-    /// Stands where the cameras of a file are, or around the first model.
-    pub(crate) fn surround(&mut self) {
+    /// Moves to the first camera of the camera file, or of an orbit around the first model.
+    pub(crate) fn reset_cameras(&mut self) {
         let Some(model) = self.models.iter().flatten().next() else { return };
         let (centre, radius) = model.bulk;
         let (cameras, given) = match &self.given {
             Some(cameras) => (cameras.clone(), true),
             None => (model.orbit.clone(), false),
         };
-        let up = if given { Surroundings::up_of(&cameras) } else { DVec3::NEG_Y };
-        let around = Surroundings { centre: DVec3::from_array(centre), radius, up };
-        self.state.set_cameras(cameras, given, around);
+        let up = if given { SceneBounds::up_of(&cameras) } else { DVec3::NEG_Y };
+        let bounds = SceneBounds { centre: DVec3::from_array(centre), radius, up };
+        self.state.set_cameras(cameras, given, bounds);
     }
 
-    /// Takes in what the threads have done.
-    fn hear(&mut self) {
-        while let Ok(Finished { id, which, result }) = self.finished.try_recv() {
-            let place = &mut self.works[which.index()];
-            if place.as_ref().is_none_or(|work| work.id != id) {
-                continue; // Another one was started since.
+    /// Handles finished jobs, events of the render thread and errors of the driver.
+    fn process_events(&mut self) {
+        while let Ok(FinishedJob { id, slot, result }) = self.finished.try_recv() {
+            let place = &mut self.jobs[slot.index()];
+            if place.as_ref().is_none_or(|job| job.id != id) {
+                continue; // A later job has replaced this one.
             }
             *place = None;
             match result {
@@ -219,64 +224,64 @@ impl App {
                     for warning in model.scene.warnings() {
                         self.message(format!("{}: {warning}", model.short_name()), false);
                     }
-                    let anew = self.models.iter().all(Option::is_none)
-                        || (which == Which::First && self.given.is_none());
-                    self.put(which, Some(Arc::new(model)));
-                    if anew {
-                        self.surround();
+                    let is_first = self.models.iter().all(Option::is_none)
+                        || (slot == Slot::First && self.given.is_none());
+                    self.set_model(slot, Some(Arc::new(model)));
+                    if is_first {
+                        self.reset_cameras();
                     }
                 }
                 Err(error) if id <= self.required => self.fail(error),
-                Err(error) => self.complain(error),
+                Err(error) => self.show_error(error),
             }
         }
-        let told: Vec<Told> = self.painting.hear().collect();
-        for told in told {
-            match told {
-                Told::Shot(shot) => {
+        let events: Vec<RenderEvent> = self.render_thread.events().collect();
+        for event in events {
+            match event {
+                RenderEvent::Frame(frame) => {
                     self.drawing = false;
-                    self.keep_pace(&shot);
-                    self.score = shot.score.or(self.score);
-                    self.shot = Some(*shot);
+                    self.adapt_scale(&frame);
+                    self.score = frame.score.or(self.score);
+                    self.frame = Some(*frame);
                 }
-                Told::Saved(file) => {
+                RenderEvent::Saved(file) => {
                     self.saving = self.saving.saturating_sub(1);
                     let file = file.canonicalize().unwrap_or(file);
-                    self.say(format!("saved {}", file.display()));
+                    self.show_message(format!("saved {}", file.display()));
                 }
-                Told::NotSaved(error) => {
+                RenderEvent::SaveFailed(error) => {
                     self.saving = self.saving.saturating_sub(1);
-                    self.complain(error);
+                    self.show_error(error);
                 }
-                Told::Refused(which, error) => {
-                    self.put(which, None);
-                    self.complain(error);
+                RenderEvent::ModelFailed(slot, error) => {
+                    self.set_model(slot, None);
+                    self.show_error(error);
                 }
-                Told::Failed(error) => {
+                RenderEvent::FrameFailed(error) => {
                     self.drawing = false;
-                    self.failed = self.wanted();
-                    self.complain(error);
+                    self.failed = self.wanted_view();
+                    self.show_error(error);
                 }
             }
         }
-        if !self.painting.is_alive() && !self.quit {
-            self.fail(Error::Device("drawing has stopped".to_owned()));
+        if !self.render_thread.is_alive() && !self.quit {
+            self.fail(Error::Device("the render thread has stopped".to_owned()));
         }
         loop {
             let error = self.driver.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
             let Some(error) = error else { break };
-            self.complain(Error::Device(error));
+            self.show_error(Error::Device(error));
         }
     }
 
-    /// Draws smaller pictures while moving if they take long, and larger ones if they do not.
-    fn keep_pace(&mut self, shot: &Shot) {
-        let by = (MOVING_BUDGET / shot.milliseconds.max(1.0)).sqrt();
-        self.scale = (shot.scale * by).clamp(LEAST_SCALE, 1.0);
+    /// Adapts the scale of pictures during motion to the time that `frame` took.
+    fn adapt_scale(&mut self, frame: &Frame) {
+        let by = (MOVING_BUDGET / frame.milliseconds.max(1.0)).sqrt();
+        self.scale = (frame.scale * by).clamp(LEAST_SCALE, 1.0);
     }
 
-    /// Remembers that the view moves under the user's hand.
-    pub(crate) fn moved(&mut self) {
+    /// Records that the user moves the view now.
+    pub(crate) fn note_motion(&mut self) {
         self.last_move = Some(Instant::now());
     }
 
@@ -284,43 +289,43 @@ impl App {
         self.last_move.is_some_and(|last| last.elapsed() < REST)
     }
 
-    /// The view that should be on screen.
-    pub(crate) fn wanted(&self) -> Option<View> {
+    /// Returns the view that should be on screen.
+    pub(crate) fn wanted_view(&self) -> Option<View> {
         let camera = self.state.camera(self.area.0, self.area.1)?;
-        // At rest both are drawn, so that they can be compared, and exchanged at once.
+        // Without motion both models are drawn, so that they can be compared and switched at once.
         let needs = if self.is_moving() { self.state.arrangement.mode.needs() } else { [true; 2] };
         let models = [0, 1].map(|i| self.models[i].as_ref().filter(|_| needs[i]).map(|m| m.id));
         models.iter().any(Option::is_some).then_some(View { camera, options: self.state.options, models })
     }
 
-    /// Whether the picture on screen is `view`, complete.
+    /// Returns whether the frame on screen is `view` in full resolution.
     fn shows(&self, view: &View) -> bool {
-        self.shot.as_ref().is_some_and(|shot| shot.scale >= 1.0 && shot.view.covers(view))
+        self.frame.as_ref().is_some_and(|frame| frame.scale >= 1.0 && frame.view.covers(view))
     }
 
-    /// Asks for the wanted view if it is not there.
-    fn draw(&mut self, context: &egui::Context) {
+    /// Requests the wanted view if the frame on screen is another one.
+    fn request_frame(&mut self, context: &egui::Context) {
         let moving = self.is_moving();
         if moving {
-            // To see that it stopped.
+            // A frame after the motion has ended draws in full resolution.
             context.request_repaint_after(REST);
         }
-        let Some(view) = self.wanted() else { return };
-        let there = self.shot.as_ref().is_some_and(|shot| shot.view.covers(&view));
+        let Some(view) = self.wanted_view() else { return };
+        let there = self.frame.as_ref().is_some_and(|frame| frame.view.covers(&view));
         if self.drawing || self.failed.as_ref() == Some(&view) || (there && moving) || self.shows(&view) {
             return;
         }
         let scale = if moving { self.scale } else { 1.0 };
-        match self.painting.ask(Ask::View(view, scale)) {
+        match self.render_thread.request(RenderRequest::View(view, scale)) {
             Ok(()) => self.drawing = true,
-            Err(error) => self.complain(error),
+            Err(error) => self.show_error(error),
         }
     }
 
-    /// Whether nothing is under way.
+    /// Returns whether everything requested is done.
     fn is_settled(&self) -> bool {
-        let drawn = self.wanted().is_none_or(|view| self.shows(&view));
-        drawn && !self.drawing && self.saving == 0 && self.works.iter().all(Option::is_none)
+        let drawn = self.wanted_view().is_none_or(|view| self.shows(&view));
+        drawn && !self.drawing && self.saving == 0 && self.jobs.iter().all(Option::is_none)
     }
 
     fn keys(&mut self, context: &egui::Context) {
@@ -342,14 +347,14 @@ impl App {
             (pressed, flight, input.stable_dt.min(LONGEST_STEP), input.modifiers.shift)
         });
         for command in pressed.into_iter().filter_map(keys::command) {
-            self.perform(command);
+            self.handle(command);
         }
         if flight != DVec3::ZERO {
             let speed = SPEED * if fast { FAST } else { 1.0 };
-            if let Some(eye) = self.state.eye() {
-                eye.fly(flight * speed * f64::from(seconds));
+            if let Some(controller) = self.state.free_camera() {
+                controller.fly(flight * speed * f64::from(seconds));
             }
-            self.moved();
+            self.note_motion();
             context.request_repaint();
         }
     }
@@ -360,46 +365,46 @@ impl App {
             (paths, input.modifiers.shift)
         });
         if !paths.is_empty() {
-            self.perform(Command::Drop { paths, first });
+            self.handle(Command::Drop { paths, first });
         }
     }
 }
 
-/// What draws, and why not the GPU if that was tried in vain.
-fn painter(device: Device, graphics: &RenderState) -> Result<(Box<dyn Painter>, Option<Error>)> {
+/// Returns what draws, and the error of the GPU if the CPU draws because the GPU failed.
+fn renderer(device: Device, graphics: &RenderState) -> Result<(Box<dyn SceneRenderer>, Option<Error>)> {
     let on_gpu = || {
         let (device, queue) = (graphics.device.clone(), graphics.queue.clone());
-        OnGpu::new(Gpu::from_device(&graphics.adapter, device, queue))
+        GpuSceneRenderer::new(Gpu::from_device(&graphics.adapter, device, queue))
     };
     let software = graphics.adapter.get_info().device_type == wgpu::DeviceType::Cpu;
-    let refused = match device {
+    let gpu_error = match device {
         Device::Gpu | Device::Index(_) => return Ok((Box::new(on_gpu()?), None)),
         Device::Auto if !software => match on_gpu() {
-            Ok(painter) => return Ok((Box::new(painter), None)),
+            Ok(renderer) => return Ok((Box::new(renderer), None)),
             Err(error) => Some(error),
         },
         Device::Auto | Device::Cpu => None,
     };
-    Ok((Box::new(Cpu::new(graphics.device.clone())), refused))
+    Ok((Box::new(CpuSceneRenderer::new(graphics.device.clone())), gpu_error))
 }
 
 impl eframe::App for App {
     fn ui(&mut self, ui: &mut egui::Ui, _: &mut eframe::Frame) {
         let context = ui.ctx().clone();
-        self.hear();
+        self.process_events();
         self.keys(&context);
         self.dropped(&context);
         if self.state.panel {
             for command in panel::show(self, ui) {
-                self.perform(command);
+                self.handle(command);
             }
         }
-        self.stage(ui);
-        self.draw(&context);
+        self.viewport(ui);
+        self.request_frame(&context);
         if self.scripted && !self.quit && self.is_settled() {
             match self.script.pop_front() {
-                Some(command) => self.perform(command),
-                // From here on the user is in charge.
+                Some(command) => self.handle(command),
+                // The script has ended; later errors are shown instead of ending the program.
                 None => self.scripted = false,
             }
             context.request_repaint();

@@ -1,22 +1,22 @@
-//! Everything that can be asked of the viewer: by a key, a button, a dropped file or a script.
+//! All commands of the viewer. Keys, buttons, dropped files and scripts give them.
 
 use std::path::PathBuf;
 
 use lexisplat::ShDegree;
 use lexisplat::packed::Preset;
 
-/// One of the two models.
+/// The place of one of the two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Which {
+pub(crate) enum Slot {
     First,
     Second,
 }
 
-impl Which {
+impl Slot {
     /// Both, in order.
     pub(crate) const BOTH: [Self; 2] = [Self::First, Self::Second];
 
-    /// Its place in arrays of two.
+    /// Returns the index in arrays of two.
     pub(crate) fn index(self) -> usize {
         match self {
             Self::First => 0,
@@ -35,58 +35,58 @@ impl Which {
 /// How the models are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Mode {
-    /// One of them.
-    One(Which),
-    /// Both, the first on the left.
+    /// One of the models.
+    One(Slot),
+    /// Both models, the first on the left.
     SideBySide,
-    /// The first left of a line, the second right of it.
+    /// The first model left of a line, the second right of it.
     Wipe,
-    /// The absolute difference, amplified.
+    /// The amplified absolute difference.
     Difference,
 }
 
 impl Mode {
-    /// All of them, in the order of their keys.
+    /// All modes, in the order of their keys.
     pub(crate) const ALL: [Self; 5] =
-        [Self::One(Which::First), Self::One(Which::Second), Self::SideBySide, Self::Wipe, Self::Difference];
+        [Self::One(Slot::First), Self::One(Slot::Second), Self::SideBySide, Self::Wipe, Self::Difference];
 
-    /// Its name in scripts and file names.
+    /// Returns the name in scripts and file names.
     pub(crate) fn name(self) -> &'static str {
         match self {
-            Self::One(Which::First) => "first",
-            Self::One(Which::Second) => "second",
+            Self::One(Slot::First) => "first",
+            Self::One(Slot::Second) => "second",
             Self::SideBySide => "side",
             Self::Wipe => "wipe",
             Self::Difference => "difference",
         }
     }
 
-    /// Its name on a button.
+    /// Returns the name on a button.
     pub(crate) fn label(self) -> &'static str {
         match self {
-            Self::One(Which::First) => "First",
-            Self::One(Which::Second) => "Second",
+            Self::One(Slot::First) => "First",
+            Self::One(Slot::Second) => "Second",
             Self::SideBySide => "Side",
             Self::Wipe => "Wipe",
             Self::Difference => "Diff",
         }
     }
 
-    /// Which models it needs a picture of.
+    /// Returns which models the mode needs a picture of.
     pub(crate) fn needs(self) -> [bool; 2] {
         match self {
-            Self::One(which) => [which == Which::First, which == Which::Second],
+            Self::One(slot) => [slot == Slot::First, slot == Slot::Second],
             _ => [true; 2],
         }
     }
 }
 
-/// What to compress to.
+/// The quality to compress to.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Quality {
-    /// A packed file.
+    /// The packed layout with a preset.
     Preset(Preset),
-    /// Geometry exact, SH within this L2 norm.
+    /// Exact geometry, with each Gaussian's SH error at most this L2 norm.
     Tolerance(f64),
 }
 
@@ -99,45 +99,45 @@ impl std::fmt::Display for Quality {
     }
 }
 
-/// Something to do.
+/// A command.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum Command {
-    /// Look through the camera of this index, from 0.
+    /// Chooses the camera with this index, from 0.
     Camera(usize),
-    /// Look through the camera so many further on, around the end.
+    /// Chooses the camera this many places after the current one; the first follows the last.
     StepCamera(isize),
-    /// Go back to where it began.
+    /// Returns to the initial view.
     Reset,
-    /// Orbit to the right and down, in degrees.
+    /// Orbits to the right and down, in degrees.
     Orbit([f64; 2]),
-    /// Show the models so.
+    /// Sets the mode.
     Mode(Mode),
-    /// Show the other one.
+    /// Shows the other model alone.
     Flip,
-    /// Wipe here, 0 for the left edge to 1 for the right.
+    /// Moves the wipe's line: 0 is the left edge, 1 the right.
     Split(f32),
-    /// Amplify differences so many times.
+    /// Sets the factor on differences.
     Gain(f32),
-    /// Amplify differences so many times more.
+    /// Multiplies the factor on differences.
     ScaleGain(f32),
-    /// Draw with SH up to this degree; `None` for all.
+    /// Draws with SH up to this degree; `None` means all degrees.
     Degree(Option<ShDegree>),
-    /// The colour behind the scenes.
+    /// Sets the colour behind the scenes.
     Background([f32; 3]),
-    /// Open a file as one of the models.
-    Open(PathBuf, Which),
-    /// Take files that were dropped; `first` as the first model.
+    /// Opens a file as one of the models.
+    Open(PathBuf, Slot),
+    /// Opens dropped files; a single scene becomes the first model if `first`.
     Drop { paths: Vec<PathBuf>, first: bool },
-    /// Make the second model by compressing the first.
+    /// Makes the second model by compressing the first.
     Compress(Quality),
-    /// Exchange the models.
+    /// Exchanges the models.
     Swap,
-    /// Save the picture, to this file or to one with a name of its own.
+    /// Saves the picture to this file, or to one with a generated name.
     Screenshot(Option<PathBuf>),
-    /// Show or hide the panel.
+    /// Shows or hides the panel.
     Panel,
-    /// Print what is shown as a JSON object.
+    /// Prints what is shown as a JSON object.
     Report,
-    /// Close the window.
+    /// Closes the window.
     Quit,
 }

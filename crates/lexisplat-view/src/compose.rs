@@ -1,20 +1,21 @@
-//! What is on screen, as a picture of its own.
+//! Drawing an arrangement of pictures to memory instead of the screen.
+
+use lexisplat_render::gpu::readback;
 
 use crate::error::{Error, Result};
-use crate::present::{Presenter, Showing};
-use crate::readback;
+use crate::present::{Composition, Presenter};
 
 /// Bytes that rows of a texture are padded to when copied to a buffer.
 const ROW: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT;
 /// Bytes of a pixel.
 const PIXEL: u32 = 4;
-/// Not encoded again: pictures already are sRGB.
+/// A format without sRGB encoding, because the pictures are sRGB already.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// An 8-bit picture: width, height, pixels row by row.
-pub(crate) type Picture = (u32, u32, Vec<[u8; 3]>);
+/// Width, height and pixels row by row.
+pub(crate) type Rgb8Image = (u32, u32, Vec<[u8; 3]>);
 
-/// Draws arrangements off screen, with the shader of the screen.
+/// Draws arrangements off screen with the shader of the window.
 #[derive(Debug)]
 pub(crate) struct Composer {
     device: wgpu::Device,
@@ -28,14 +29,14 @@ impl Composer {
         Self { device, queue, presenter }
     }
 
-    /// The picture that `showing` gives at its own size.
+    /// Draws `composition` at its own size.
     ///
     /// # Errors
     /// [`Error::Device`] if a picture is missing, or too large for the device.
-    pub(crate) fn compose(&self, showing: &Showing) -> Result<Picture> {
+    pub(crate) fn compose(&self, composition: &Composition) -> Result<Rgb8Image> {
         let device = &self.device;
-        let bound = self.presenter.bind(device, showing);
-        let (Some(bound), Some((width, height))) = (bound, showing.size()) else {
+        let bound = self.presenter.bind(device, composition);
+        let (Some(bound), Some((width, height))) = (bound, composition.size()) else {
             return Err(Error::Device("there is no picture to save".to_owned()));
         };
         let most = device.limits().max_texture_dimension_2d;
@@ -86,7 +87,7 @@ impl Composer {
             extent,
         );
         self.queue.submit([encoder.finish()]);
-        let bytes = readback::read(device, &target)?;
+        let bytes: Vec<u8> = readback::read(device, &target)?;
         let pixels = bytes
             .chunks_exact(row as usize)
             .flat_map(|line| line[..(width * PIXEL) as usize].chunks_exact(PIXEL as usize))

@@ -1,14 +1,14 @@
-//! Which key asks for what.
+//! The effects of keys.
 
 use eframe::egui::{Key, Modifiers};
 use glam::DVec3;
 
 use crate::command::{Command, Mode};
 
-/// Factor of one press on the difference's amplification.
+/// Factor of one press on the amplification of differences.
 const GAIN_STEP: f32 = 1.5;
 
-/// Keys and what they do, for the panel.
+/// Keys and their effects, for the panel.
 pub(crate) const HELP: [(&str, &str); 12] = [
     ("drag", "orbit"),
     ("right or shift drag", "pan"),
@@ -24,7 +24,7 @@ pub(crate) const HELP: [(&str, &str); 12] = [
     ("P, H", "screenshot, hide this panel"),
 ];
 
-/// What pressing `key` asks for.
+/// Returns the command of `key`, if it has one.
 pub(crate) fn command(key: Key) -> Option<Command> {
     Some(match key {
         Key::OpenBracket => Command::StepCamera(-1),
@@ -44,7 +44,7 @@ pub(crate) fn command(key: Key) -> Option<Command> {
     })
 }
 
-/// The direction that held keys fly in: right, up, forward, each -1 to 1.
+/// Returns the direction of a flight by the keys that are held: right, up and forward, each -1 to 1.
 pub(crate) fn flight(held: impl Fn(Key) -> bool, modifiers: Modifiers) -> DVec3 {
     if modifiers.command || modifiers.alt {
         return DVec3::ZERO;
@@ -65,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn fly_keys_ask_for_nothing_else() {
+    fn fly_keys_have_no_other_command() {
         for key in [Key::W, Key::A, Key::S, Key::D, Key::Q, Key::E] {
             assert_eq!(command(key), None);
         }

@@ -1,70 +1,72 @@
 //! A window that shows one or two 3D Gaussian Splatting scenes.
 //!
-//! [`run`] opens it and returns when it is closed. Everything a key, a button, a dropped file or a script
-//! does is a command to one state, which knows no window and is tested without; drawing happens on a
-//! thread of its own behind a trait, so that the window stays alive however long a picture takes.
+//! [`run`] opens the window and returns when it is closed. Keys, buttons, dropped files and scripts give commands
+//! to one state, which is independent of the window and tested without it. A thread of its own draws the pictures,
+//! so that the window responds however long a picture takes.
 //!
-//! | module | one idea |
+//! | module | purpose |
 //! |---|---|
-//! | `command`, `keys`, `script` | what can be asked for; by which key; in which words |
+//! | `command`, `keys`, `script` | all commands; their keys; their words in scripts |
 //! | `state` | what is shown and from where |
-//! | `eye` | orbiting, panning and flying |
-//! | `models` | reading and compressing on worker threads |
-//! | `painter`, `painting` | pictures of scenes; the thread that makes them |
-//! | `present`, `compose` | one or two pictures on screen, or in a file |
-//! | `app`, `deeds`, `stage`, `panel` | the window's life, what commands do to it, its picture, its controls |
+//! | `camera_controller` | orbiting, panning and flying |
+//! | `models` | reading and compressing on threads of their own |
+//! | `scene_renderer`, `render_thread` | drawing by the GPU or the CPU; the thread that does it |
+//! | `present`, `compose` | one or two pictures on screen, or in memory |
+//! | `app`, `command_handlers`, `viewport`, `panel` | the window, its commands, its picture, its controls |
 
 mod app;
+mod camera_controller;
 mod command;
+mod command_handlers;
 mod compose;
-mod deeds;
 mod error;
-mod eye;
 mod keys;
 mod models;
-mod painter;
-mod painting;
 mod panel;
 mod present;
-mod readback;
+mod render_thread;
+mod scene_renderer;
 mod script;
-mod stage;
 mod state;
+mod viewport;
 mod window;
 
 use std::path::PathBuf;
 
 use lexisplat::Limits;
+use lexisplat::output::OutputGroup;
 use lexisplat_eval::SplitFilter;
 use lexisplat_render::Device;
 
 pub use error::{Error, Result};
 pub use window::run;
 
-/// What the words of a script mean; for `--help`.
+/// The words of a script and their meanings, for `--help`.
 pub use script::WORDS as SCRIPT_WORDS;
 
-/// What to show, and how to begin.
+/// What to show, and the initial settings.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
     /// One or two scenes: PLY or .lexi.
     pub files: Vec<PathBuf>,
-    /// Cameras from an INRIA `cameras.json`; without, an orbit fitted to the first scene.
+    /// A file or folder of cameras. Without it the cameras are an orbit around the first scene.
     pub cameras: Option<PathBuf>,
-    /// Which of those cameras.
+    /// Which cameras of the file to take.
     pub split: SplitFilter,
-    /// Views of the orbit, at least 1.
+    /// Number of views of the orbit; 0 counts as 1.
     pub orbit: u16,
-    /// Widest picture of a camera's screenshot, in pixels, at least 1.
+    /// Largest width of a screenshot, in pixels; 0 counts as 1.
     pub max_width: u32,
     /// Colour behind the scenes, 0 to 1 in each channel.
     pub background: [f32; 3],
-    /// What draws. The window itself always needs an adapter, if only one in software.
+    /// The device that draws the scenes. The window itself always needs a graphics adapter, which may be software.
     pub device: Device,
-    /// Whether a screenshot asked for by name may replace a file.
+    /// Whether a screenshot with a given name may replace a file.
     pub overwrite: bool,
-    /// What files may ask for, those dropped on the window too.
+    /// Limits on what files may make the program allocate, including files dropped on the window.
     pub limits: Limits,
-    /// What to do without being asked: see [`SCRIPT_WORDS`]. Empty for nothing.
+    /// Commands to carry out at the start, as [`SCRIPT_WORDS`] describes; may be empty.
     pub script: String,
+    /// The group of all pictures that are saved.
+    pub outputs: OutputGroup,
 }

@@ -1,62 +1,64 @@
-//! The two models: read and compressed on worker threads.
+//! The two models, which are read and compressed on threads of their own.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::Sender;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use lexisplat::packed::{PackOptions, Packed, Packer};
+use lexisplat::packed::Packed;
 use lexisplat::ply::{Dialect, ReadOptions};
-use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage, compress, lexi};
-use lexisplat_eval::{Loaded, SceneFile, SplitFilter, Views, choose_views};
-use lexisplat_render::{Camera, Renderer, bulk};
+use lexisplat::simd::Simd;
+use lexisplat::{CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
+use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
+use lexisplat_render::{Camera, bulk};
 
-use crate::command::{Quality, Which};
+use crate::command::{Quality, Slot};
 use crate::error::{Error, Result};
 
-/// Bytes of a value in a PLY, and values of a Gaussian in INRIA's layout besides SH-rest: position,
-/// normal, base colour, opacity, scales, rotation.
+/// Bytes of a value in a PLY.
 const PLY_VALUE: u64 = 4;
+/// Values of a Gaussian in INRIA's layout besides SH-rest: position, normal, base colour, opacity, scales,
+/// rotation.
 const PLY_VALUES: u64 = 3 + 3 + 3 + 1 + 3 + 4;
 
-/// An open model, with what the panel says about it.
+/// An open model, with what the panel shows about it.
 #[derive(Debug)]
-pub(crate) struct Open {
-    /// Different for every model opened.
+pub(crate) struct OpenModel {
+    /// Unique among all models opened.
     pub(crate) id: u64,
     pub(crate) scene: SceneFile,
-    /// Where it came from, if it is a file.
+    /// The file that the model was read from, if there is one.
     pub(crate) path: Option<PathBuf>,
     pub(crate) layout: String,
-    /// What the file promises, if anything.
-    pub(crate) promise: Option<String>,
-    /// Cameras around it, for scenes without their own.
+    /// What the file guarantees, if anything.
+    pub(crate) guarantee: Option<String>,
+    /// An orbit of generated cameras, for scenes without a camera file.
     pub(crate) orbit: Vec<Camera>,
-    /// Centre and radius of where most of it is, in world units.
+    /// Centre and radius of a ball that holds most Gaussians, in world units.
     pub(crate) bulk: ([f64; 3], f64),
 }
 
-/// How many views an orbit has, and how wide they are at most, in pixels.
+/// Number of views of a generated orbit, and their largest width in pixels.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct OrbitSize {
     pub(crate) views: u16,
     pub(crate) max_width: u32,
 }
 
-impl Open {
+impl OpenModel {
     fn new(id: u64, scene: SceneFile, path: Option<PathBuf>, size: OrbitSize) -> Result<Self> {
         let geometry = scene.scene().geometry();
         let orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
         let bulk = bulk(geometry);
-        let (layout, promise) = match &scene.loaded {
-            Loaded::Ply(read) => (dialect(read.source.dialect), None),
+        let (layout, guarantee) = match &scene.loaded {
+            Loaded::Ply(read) => (dialect(read.summary.dialect), None),
             Loaded::Lexi(model, packed) => {
-                (model.record.layout.to_string(), promise(model, packed.as_deref()))
+                (model.record.layout.to_string(), guarantee(model, packed.as_deref()))
             }
         };
-        Ok(Self { id, scene, path, layout, promise, orbit, bulk })
+        Ok(Self { id, scene, path, layout, guarantee, orbit, bulk })
     }
 
-    /// The name without folders.
+    /// Returns the name without folders.
     pub(crate) fn short_name(&self) -> String {
         let name = Path::new(&self.scene.name).file_name();
         name.map_or_else(|| self.scene.name.clone(), |n| n.to_string_lossy().into_owned())
@@ -70,7 +72,7 @@ impl Open {
         self.scene.scene().len()
     }
 
-    /// The scene with dense SH, if it is a PLY.
+    /// Returns the scene with dense SH, if it is a PLY.
     pub(crate) fn splats(&self) -> Option<&Splats> {
         match &self.scene.loaded {
             Loaded::Ply(read) => Some(&read.splats),
@@ -78,12 +80,13 @@ impl Open {
         }
     }
 
-    /// How many times smaller it is than `original`, or than itself as a PLY in INRIA's layout.
+    /// Returns how many times smaller a compressed model is than `original`, or than its own PLY in INRIA's layout
+    /// if `original` cannot be its source; and a text that says which.
     pub(crate) fn ratio(&self, original: Option<&Self>) -> Option<(f64, &'static str)> {
         if matches!(self.scene.loaded, Loaded::Ply(_)) || self.scene.bytes == 0 {
             return None;
         }
-        // Of another scene, that is of many fewer or more Gaussians, the size says nothing.
+        // Pruning may halve the number of Gaussians; beyond that `original` is taken for another scene.
         let count = self.gaussians();
         let is_source = |other: &Self| {
             other.splats().is_some() && (count..=count.saturating_mul(2)).contains(&other.gaussians())
@@ -99,7 +102,7 @@ impl Open {
     }
 }
 
-/// A PLY by its probable writer.
+/// Returns the name of a PLY's dialect, for the panel.
 fn dialect(dialect: Dialect) -> String {
     match dialect {
         Dialect::Other => "PLY".to_owned(),
@@ -107,8 +110,8 @@ fn dialect(dialect: Dialect) -> String {
     }
 }
 
-/// What a compressed file says it keeps, in a line.
-fn promise(model: &Model, packed: Option<&Packed>) -> Option<String> {
+/// Returns what a compressed file guarantees, in one line.
+fn guarantee(model: &Model, packed: Option<&Packed>) -> Option<String> {
     let record = &model.record;
     let mut parts = Vec::new();
     if let Some(p) = packed.and_then(|packed| packed.target.as_ref()) {
@@ -127,29 +130,29 @@ fn promise(model: &Model, packed: Option<&Packed>) -> Option<String> {
     (!parts.is_empty()).then(|| parts.join("; "))
 }
 
-/// How far work on a model is.
+/// The current step of a job.
 #[derive(Debug, Default)]
-pub(crate) struct Step {
+pub(crate) struct JobStep {
     label: String,
     done: u64,
     total: u64,
 }
 
-/// Progress of one job, told by its thread and shown by the panel.
+/// Progress of a job: its thread writes it, the panel reads it.
 #[derive(Debug, Default)]
-pub(crate) struct Gauge(Mutex<Step>);
+pub(crate) struct JobProgress(Mutex<JobStep>);
 
-impl Gauge {
+impl JobProgress {
     fn start(&self, label: &str, total: u64) {
-        *self.lock() = Step { label: label.to_owned(), done: 0, total };
+        *self.lock() = JobStep { label: label.to_owned(), done: 0, total };
     }
 
-    fn lock(&self) -> std::sync::MutexGuard<'_, Step> {
-        // A thread that panicked while it held this left at worst an old number.
+    fn lock(&self) -> std::sync::MutexGuard<'_, JobStep> {
+        // A thread that panicked while it held the lock leaves at worst an old number.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What is being done, and the share that is, 0 to 1, if known.
+    /// Returns the name of the step, and the share of it that is done, 0 to 1, if known.
     pub(crate) fn read(&self) -> (String, Option<f32>) {
         let step = self.lock();
         #[expect(clippy::cast_possible_truncation, reason = "0 to 1")]
@@ -158,9 +161,10 @@ impl Gauge {
     }
 }
 
-impl Progress for Gauge {
+impl Progress for JobProgress {
     fn begin(&self, stage: Stage, total: u64) {
         let label = match stage {
+            Stage::Draw => "looking",
             Stage::Learn => "learning",
             Stage::Code => "coding",
             Stage::Read => "reading",
@@ -176,115 +180,108 @@ impl Progress for Gauge {
     }
 }
 
-/// Work on one model.
+/// A job that makes a model.
 #[derive(Debug)]
-pub(crate) struct Work {
-    /// Different for every job; a model that comes from another one is out of date.
+pub(crate) struct Job {
+    /// Unique among all jobs. A model from another job than the slot's current one is outdated.
     pub(crate) id: u64,
     pub(crate) name: String,
-    pub(crate) gauge: Arc<Gauge>,
+    pub(crate) progress: Arc<JobProgress>,
 }
 
-/// What became of a job.
+/// The result of a job.
 #[derive(Debug)]
-pub(crate) struct Finished {
+pub(crate) struct FinishedJob {
     pub(crate) id: u64,
-    pub(crate) which: Which,
-    pub(crate) result: Result<Open>,
+    pub(crate) slot: Slot,
+    pub(crate) result: Result<OpenModel>,
 }
 
-/// Tells about finished jobs, and wakes the window for it.
+/// Sends finished jobs to the window and wakes it.
 #[derive(Clone)]
-pub(crate) struct Bell {
-    pub(crate) sender: Sender<Finished>,
+pub(crate) struct Notifier {
+    pub(crate) sender: Sender<FinishedJob>,
     pub(crate) wake: Arc<dyn Fn() + Send + Sync>,
 }
 
-/// Starts reading `path`, which may ask for `limits`, as `which`.
+/// Starts a job that reads `path` within `limits` as the model of `slot`.
 pub(crate) fn open(
     id: u64,
-    which: Which,
+    slot: Slot,
     path: PathBuf,
     limits: Limits,
     size: OrbitSize,
-    bell: Bell,
-) -> Work {
-    let gauge = Arc::new(Gauge::default());
-    gauge.start("reading", 0);
+    notifier: Notifier,
+) -> Job {
+    let progress = Arc::new(JobProgress::default());
+    progress.start("reading", 0);
     let name = path.display().to_string();
-    spawn(id, which, bell, move || {
-        let scene = SceneFile::read(&path, &ReadOptions { limits, ..ReadOptions::default() })?;
-        Open::new(id, scene, Some(path), size)
+    spawn(id, slot, notifier, move || {
+        let scene = SceneFile::read(&path, &ReadOptions::default().with_limits(limits))?;
+        OpenModel::new(id, scene, Some(path), size)
     });
-    Work { id, name, gauge }
+    Job { id, name, progress }
 }
 
-/// Starts compressing `original`, which has dense SH, to the second model. `cameras` say what shows, if
-/// there are at least two.
+/// Starts a job that makes the second model by compressing `original`, which must be a PLY. Sensitivity is
+/// measured from `cameras` if there are any, else from generated views.
 pub(crate) fn compress_to(
     id: u64,
-    original: Arc<Open>,
+    original: Arc<OpenModel>,
     quality: Quality,
     cameras: Option<Vec<Camera>>,
     size: OrbitSize,
-    bell: Bell,
-) -> Work {
-    let gauge = Arc::new(Gauge::default());
+    notifier: Notifier,
+) -> Job {
+    let progress = Arc::new(JobProgress::default());
     let name = format!("{} ({quality})", original.short_name());
-    let (told, title) = (Arc::clone(&gauge), name.clone());
-    spawn(id, Which::Second, bell, move || {
+    let (reported, title) = (Arc::clone(&progress), name.clone());
+    spawn(id, Slot::Second, notifier, move || {
         let Some(splats) = original.splats() else {
-            let expected = "a PLY: compressed scenes are not compressed again";
+            let expected = "a PLY; a compressed scene cannot be compressed again";
             return Err(lexisplat::Error::parameter("scene", &original.scene.name, expected).into());
         };
-        let scene = compressed(splats, title, quality, cameras.as_deref(), &told)?;
-        Open::new(id, scene, None, size)
+        let scene = compressed(splats, &title, quality, cameras.as_deref(), &reported)?;
+        OpenModel::new(id, scene, None, size)
     });
-    Work { id, name, gauge }
+    Job { id, name, progress }
 }
 
-/// `splats` as `lexisplat compress` makes them with this preset or tolerance.
+/// Compresses `splats` as `lexisplat compress` does with this preset or tolerance.
 fn compressed(
     splats: &Splats,
-    name: String,
+    name: &str,
     quality: Quality,
     cameras: Option<&[Camera]>,
-    gauge: &Gauge,
+    progress: &JobProgress,
 ) -> Result<SceneFile> {
-    match quality {
-        Quality::Preset(preset) => {
-            let views = match cameras {
-                Some(cameras) => Views::given(cameras)?,
-                None => Views::generated(splats),
-            };
-            gauge.start("looking", views.len() as u64);
-            // By the processor, as the command does unless told otherwise: the same bytes everywhere.
-            let mut renderer = Renderer::cpu();
-            let sensitivity = views.sensitivity(&mut renderer, splats, &mut || gauge.advance(1))?;
-            let packer = Packer::new(splats, &sensitivity, &PackOptions::default())?;
-            let (packed, _) = packer.pack(packer.step_for(preset.decibels()), gauge)?;
-            gauge.start("unpacking", 0);
-            let (model, bytes) = (packed.unpack()?, lexi::packed_bytes(&packed));
-            Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), Some(Box::new(packed))), name, bytes })
+    let compression: Compression = match (quality, cameras) {
+        (Quality::Preset(preset), Some(cameras)) => {
+            Packing::new(preset).with_cameras(cameras.to_vec()).into()
         }
-        Quality::Tolerance(tolerance) => {
+        (Quality::Preset(preset), None) => Packing::new(preset).into(),
+        (Quality::Tolerance(tolerance), _) => {
             let mut options = CompressOptions::default();
             options.tolerance = Some(tolerance);
-            let (model, _) = compress(splats.clone(), &options, gauge)?;
-            let bytes = lexi::attribute_bytes(&model)?.iter().map(|part| part.1).sum();
-            Ok(SceneFile { loaded: Loaded::Lexi(Box::new(model), None), name, bytes })
+            options.into()
         }
-    }
+    };
+    let mut file = Vec::new();
+    compression.run(splats, &mut file, progress)?;
+    progress.start("unpacking", 0);
+    Ok(SceneFile::read_bytes(name, &file, &ReadOptions::default())?)
 }
 
-fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> + Send + 'static) {
-    let again = bell.clone();
-    let tell = move |bell: &Bell, result| {
-        // Nobody listens when the window is gone.
-        let _ = bell.sender.send(Finished { id, which, result });
-        (bell.wake)();
+fn spawn(id: u64, slot: Slot, notifier: Notifier, work: impl FnOnce() -> Result<OpenModel> + Send + 'static) {
+    let again = notifier.clone();
+    let tell = move |notifier: &Notifier, result| {
+        // There is no receiver after the window has closed.
+        let _ = notifier.sender.send(FinishedJob { id, slot, result });
+        (notifier.wake)();
     };
-    let started = std::thread::Builder::new().name("model".into()).spawn(move || tell(&bell, work()));
+    let simd = Simd::current();
+    let started =
+        std::thread::Builder::new().name("model".into()).spawn(move || tell(&notifier, simd.scope(work)));
     if let Err(error) = started {
         tell(&again, Err(Error::Window(format!("cannot start a thread: {error}"))));
     }
@@ -293,7 +290,7 @@ fn spawn(id: u64, which: Which, bell: Bell, work: impl FnOnce() -> Result<Open> 
 #[cfg(test)]
 mod tests {
     use lexisplat::packed::Preset;
-    use lexisplat::ply;
+    use lexisplat::{lexi, ply};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -304,39 +301,39 @@ mod tests {
     fn compressing_makes_what_a_file_would_hold() {
         let splats = scene(&SampleOptions::new(600, 0));
         for quality in [Quality::Preset(Preset::Small), Quality::Tolerance(0.2)] {
-            let made = compressed(&splats, "made".into(), quality, None, &Gauge::default()).unwrap();
+            let made = compressed(&splats, "made", quality, None, &JobProgress::default()).unwrap();
             let Loaded::Lexi(model, packed) = &made.loaded else { panic!("a model") };
             let mut bytes = Vec::new();
             match packed {
-                Some(packed) => lexi::write_packed_to(&mut bytes, packed).unwrap(),
-                None => lexi::write_to(&mut bytes, model).unwrap(),
+                Some(packed) => lexi::write_packed(&mut bytes, packed).unwrap(),
+                None => lexi::write(&mut bytes, model).unwrap(),
             };
             assert_eq!(made.bytes, bytes.len() as u64, "{quality}");
-            let open = Open::new(1, made, None, SIZE).unwrap();
-            assert_eq!(open.promise.is_some(), matches!(quality, Quality::Tolerance(_)), "{quality}");
+            let open = OpenModel::new(1, made, None, SIZE).unwrap();
+            assert_eq!(open.guarantee.is_some(), matches!(quality, Quality::Tolerance(_)), "{quality}");
             assert!(open.ratio(None).is_some_and(|(ratio, _)| ratio > 2.0));
         }
     }
 
     #[test]
-    fn files_are_opened_and_failures_told() {
+    fn files_are_opened_and_failures_are_reported() {
         let folder = tempfile::tempdir().unwrap();
         let (good, bad) = (folder.path().join("good.ply"), folder.path().join("bad.ply"));
         ply::write(&good, &scene(&SampleOptions::new(20, 0))).unwrap();
         std::fs::write(&bad, "nonsense").unwrap();
         let (sender, finished) = std::sync::mpsc::channel();
-        let bell = Bell { sender, wake: Arc::new(|| ()) };
-        open(7, Which::Second, good, Limits::default(), SIZE, bell.clone());
-        let told = finished.recv().unwrap();
-        let model = told.result.unwrap();
-        assert_eq!((told.id, told.which, model.gaussians()), (7, Which::Second, 20));
+        let notifier = Notifier { sender, wake: Arc::new(|| ()) };
+        open(7, Slot::Second, good, Limits::default(), SIZE, notifier.clone());
+        let done = finished.recv().unwrap();
+        let model = done.result.unwrap();
+        assert_eq!((done.id, done.slot, model.gaussians()), (7, Slot::Second, 20));
         assert_eq!(model.short_name(), "good.ply");
         assert!(model.ratio(None).is_none());
         assert_eq!((model.orbit.len(), model.orbit[0].width), (3, 100));
-        open(8, Which::First, bad, Limits::default(), SIZE, bell.clone());
+        open(8, Slot::First, bad, Limits::default(), SIZE, notifier.clone());
         assert!(finished.recv().unwrap().result.is_err());
         let original = Arc::new(model);
-        compress_to(9, original, Quality::Tolerance(-1.0), None, SIZE, bell);
+        compress_to(9, original, Quality::Tolerance(-1.0), None, SIZE, notifier);
         assert!(finished.recv().unwrap().result.is_err(), "a tolerance out of range");
     }
 }

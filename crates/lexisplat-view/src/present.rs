@@ -1,15 +1,15 @@
-//! One or two pictures on a target: one triangle and a shader.
+//! Drawing one or two pictures to the window or a texture, with one triangle and a shader.
 
 use std::sync::Arc;
 
 use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
 use wgpu::util::DeviceExt;
 
-use crate::command::{Mode, Which};
-use crate::painter::Painted;
+use crate::command::{Mode, Slot};
+use crate::scene_renderer::Picture;
 use crate::state::Arrangement;
 
-/// The shader's `Arrangement`.
+/// The uniform `Arrangement` of the shader.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 struct Uniform {
@@ -21,20 +21,21 @@ struct Uniform {
     padding: [f32; 2],
 }
 
-/// Pictures to show, of one size, in an arrangement that needs no other.
+/// Pictures of one size, and their arrangement.
 #[derive(Debug, Clone)]
-pub(crate) struct Showing {
+pub(crate) struct Composition {
     pub(crate) arrangement: Arrangement,
-    /// The picture of each model, at least one of them.
-    pub(crate) pictures: [Option<Arc<Painted>>; 2],
+    /// The picture of each model.
+    pub(crate) pictures: [Option<Arc<Picture>>; 2],
 }
 
-impl Showing {
-    /// The pictures on the left and on the right; the same twice if there is only one.
-    pub(crate) fn sides(&self) -> Option<[&Painted; 2]> {
+impl Composition {
+    /// Returns the pictures on the left and on the right, which are the same if one model is shown. Returns `None`
+    /// if the arrangement needs a picture that is missing.
+    pub(crate) fn sides(&self) -> Option<[&Picture; 2]> {
         let [first, second] = [0, 1].map(|i| self.pictures[i].as_deref());
         match (self.arrangement.mode, first, second) {
-            (Mode::One(Which::First), Some(one), _) | (Mode::One(Which::Second), _, Some(one)) => {
+            (Mode::One(Slot::First), Some(one), _) | (Mode::One(Slot::Second), _, Some(one)) => {
                 Some([one; 2])
             }
             (Mode::One(_), ..) => None,
@@ -43,14 +44,14 @@ impl Showing {
         }
     }
 
-    /// Size in pixels of what is shown.
+    /// Returns the width and height of the arrangement in pixels.
     pub(crate) fn size(&self) -> Option<(u32, u32)> {
         let [picture, _] = self.sides()?;
         Some((picture.width * self.arrangement.columns(), picture.height))
     }
 }
 
-/// The pipeline for one format of target.
+/// The pipeline for one texture format.
 #[derive(Debug)]
 pub(crate) struct Presenter {
     pipeline: wgpu::RenderPipeline,
@@ -101,20 +102,20 @@ impl Presenter {
         Self { pipeline, layout, encodes: format.is_srgb() }
     }
 
-    /// What the shader needs to show `showing`; `None` if a picture is missing.
-    pub(crate) fn bind(&self, device: &wgpu::Device, showing: &Showing) -> Option<wgpu::BindGroup> {
-        let [left, right] = showing.sides()?;
+    /// Returns the bind group that shows `composition`, or `None` if a picture is missing.
+    pub(crate) fn bind(&self, device: &wgpu::Device, composition: &Composition) -> Option<wgpu::BindGroup> {
+        let [left, right] = composition.sides()?;
         let uniform = Uniform {
             size: [left.width, left.height],
-            mode: match showing.arrangement.mode {
+            mode: match composition.arrangement.mode {
                 Mode::One(_) => 0,
                 Mode::SideBySide => 1,
                 Mode::Wipe => 2,
                 Mode::Difference => 3,
             },
             encodes: u32::from(self.encodes),
-            split: showing.arrangement.split,
-            gain: showing.arrangement.gain,
+            split: composition.arrangement.split,
+            gain: composition.arrangement.gain,
             padding: [0.0; 2],
         };
         let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
@@ -133,7 +134,7 @@ impl Presenter {
         }))
     }
 
-    /// Draws over the whole viewport of `pass`.
+    /// Draws a bind group of [`Self::bind`] over the whole viewport of `pass`.
     pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bound: &wgpu::BindGroup) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bound, &[]);
@@ -141,16 +142,16 @@ impl Presenter {
     }
 }
 
-/// Shows pictures inside egui.
-pub(crate) struct OnScreen {
+/// Shows a composition inside egui.
+pub(crate) struct PresentCallback {
     pub(crate) presenter: Arc<Presenter>,
-    pub(crate) showing: Showing,
+    pub(crate) composition: Composition,
 }
 
-/// The pictures of this frame; there is one place for them on screen.
-struct Bound(Option<wgpu::BindGroup>);
+/// The bind group of the current frame. One is enough, because one composition is shown.
+struct CurrentBindGroup(Option<wgpu::BindGroup>);
 
-impl CallbackTrait for OnScreen {
+impl CallbackTrait for PresentCallback {
     fn prepare(
         &self,
         device: &wgpu::Device,
@@ -159,7 +160,7 @@ impl CallbackTrait for OnScreen {
         _: &mut wgpu::CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<wgpu::CommandBuffer> {
-        resources.insert(Bound(self.presenter.bind(device, &self.showing)));
+        resources.insert(CurrentBindGroup(self.presenter.bind(device, &self.composition)));
         Vec::new()
     }
 
@@ -169,7 +170,7 @@ impl CallbackTrait for OnScreen {
         pass: &mut wgpu::RenderPass<'static>,
         resources: &CallbackResources,
     ) {
-        if let Some(Bound(Some(bound))) = resources.get() {
+        if let Some(CurrentBindGroup(Some(bound))) = resources.get() {
             self.presenter.draw(pass, bound);
         }
     }

@@ -1,4 +1,4 @@
-//! Commands in words, to be done one after another.
+//! Scripts: commands as text, carried out one after another.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -7,36 +7,36 @@ use std::str::FromStr;
 use eframe::egui::Key;
 use lexisplat::{Error, Result, ShDegree};
 
-use crate::command::{Command, Mode, Quality, Which};
+use crate::command::{Command, Mode, Quality, Slot};
 use crate::keys;
 
-/// What the words mean.
+/// The words of a script and their meanings, for `--help`.
 pub const WORDS: &str = "\
-Words of a script, with commas between them. Each is done when the picture of the one before is complete:
-  camera=N              look through camera N, from 0
+Words of a script, separated by commas. Each is carried out when the picture of the one before is complete:
+  camera=N              choose camera N, from 0
   orbit=RIGHT:DOWN      orbit by degrees
   mode=NAME             first, second, side, wipe or difference
-  split=F               wipe at F, 0 to 1
-  gain=F                amplify differences F times
+  split=F               move the wipe's line to F: 0 is the left edge, 1 the right
+  gain=F                multiply differences by F
   degree=N              draw with SH up to degree N
   background=R:G:B      colour behind the scene, each 0 to 1
   key=K                 press a key, such as ] or P
   open=FILE, open2=FILE open a file as the first or second model
   drop=FILE             drop a file on the window
-  compress=NAME         make the second model by compressing the first: small, balanced, high, archive
-  tolerance=F           the same with geometry exact, SH within F
-  screenshot=FILE       save the picture; without =FILE under a name of its own
+  compress=NAME         make the second model from the first with a preset: small, balanced, high, archive
+  tolerance=F           the same with exact geometry and SH errors of at most F
+  screenshot=FILE       save the picture; without =FILE under a generated name
   report                print what is shown as a JSON object on standard output
   quit                  close the window
 An error ends the script and the program.";
 
-/// Commands to do.
+/// The commands still to be carried out.
 pub(crate) type Script = VecDeque<Command>;
 
-/// The commands of `text`.
+/// Parses the commands of `text`.
 ///
 /// # Errors
-/// [`Error::Parameter`] naming the word that is none.
+/// [`Error::Parameter`] with the word that is not valid.
 pub(crate) fn parse(text: &str) -> Result<Script> {
     text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(word).collect()
 }
@@ -63,10 +63,10 @@ fn word(word: &str) -> Result<Command> {
         }
         "key" => {
             let key = value.and_then(Key::from_name);
-            key.and_then(keys::command).ok_or_else(|| wrong("a key that does something"))?
+            key.and_then(keys::command).ok_or_else(|| wrong("a key that has a command"))?
         }
-        "open" => Command::Open(file()?, Which::First),
-        "open2" => Command::Open(file()?, Which::Second),
+        "open" => Command::Open(file()?, Slot::First),
+        "open2" => Command::Open(file()?, Slot::Second),
         "drop" => Command::Drop { paths: vec![file()?], first: false },
         "compress" => {
             let preset = value.unwrap_or_default().parse();

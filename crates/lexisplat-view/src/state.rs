@@ -1,26 +1,26 @@
-//! What is shown and from where, whatever window shows it.
+//! What is shown and from where, independent of any window.
 
 use lexisplat_render::{Camera, RenderOptions};
 
-use crate::command::{Command, Mode, Which};
-use crate::eye::{Eye, Surroundings, fitted, resized};
+use crate::camera_controller::{CameraController, SceneBounds, fitted, resized};
+use crate::command::{Command, Mode, Slot};
 
-/// Amplification of differences, to begin with and at most.
+/// Amplification of differences: the initial value, and the range.
 const GAIN: f32 = lexisplat_eval::montage::AMPLIFICATION;
 const GAINS: std::ops::RangeInclusive<f32> = 1.0..=100.0;
 
-/// How a view is arranged: all that its picture depends on besides what is drawn.
+/// How the models' pictures are arranged on screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Arrangement {
     pub(crate) mode: Mode,
-    /// Where the wipe's line is, 0 to 1.
+    /// Position of the wipe's line: 0 is the left edge, 1 the right.
     pub(crate) split: f32,
-    /// How much differences are amplified.
+    /// Factor on differences.
     pub(crate) gain: f32,
 }
 
 impl Arrangement {
-    /// Pictures next to each other.
+    /// Returns the number of pictures next to each other.
     pub(crate) fn columns(&self) -> u32 {
         if self.mode == Mode::SideBySide { 2 } else { 1 }
     }
@@ -31,15 +31,15 @@ impl Arrangement {
 pub(crate) struct State {
     /// Cameras to step through.
     cameras: Vec<Camera>,
-    /// Whether they come from a file; else they are an orbit, whose size means nothing.
+    /// Whether the cameras come from a file. Else they are a generated orbit, whose picture size is arbitrary.
     given: bool,
-    around: Surroundings,
-    /// The camera stepped to last.
+    bounds: SceneBounds,
+    /// Index of the camera chosen last.
     pub(crate) index: usize,
-    /// Whether any camera was looked through since the beginning.
+    /// Whether one of the cameras was chosen since the last reset.
     visited: bool,
-    /// The free camera; `None` while looking through one of the others.
-    eye: Option<Eye>,
+    /// The free camera, or `None` while one of the cameras is chosen.
+    free_camera: Option<CameraController>,
     pub(crate) arrangement: Arrangement,
     pub(crate) options: RenderOptions,
     /// Which models are open.
@@ -49,27 +49,27 @@ pub(crate) struct State {
 
 impl State {
     pub(crate) fn new(background: [f32; 3]) -> Self {
-        let around = Surroundings { centre: glam::DVec3::ZERO, radius: 1.0, up: glam::DVec3::NEG_Y };
+        let bounds = SceneBounds { centre: glam::DVec3::ZERO, radius: 1.0, up: glam::DVec3::NEG_Y };
         Self {
             cameras: Vec::new(),
             given: false,
-            around,
+            bounds,
             index: 0,
             visited: false,
-            eye: None,
-            arrangement: Arrangement { mode: Mode::One(Which::First), split: 0.5, gain: GAIN },
-            options: RenderOptions { background, ..RenderOptions::default() },
+            free_camera: None,
+            arrangement: Arrangement { mode: Mode::One(Slot::First), split: 0.5, gain: GAIN },
+            options: RenderOptions::default().with_background(background),
             open: [false; 2],
             panel: true,
         }
     }
 
-    /// Steps through `cameras` from now on, from the first. If they were generated, the first is only
-    /// where the free camera starts, so that the picture fills the window.
-    pub(crate) fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, around: Surroundings) {
+    /// Replaces the cameras and resets the view. With `given` cameras the view is that of the first. Else it is
+    /// that of a free camera in its place, whose picture fills the window.
+    pub(crate) fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, bounds: SceneBounds) {
         self.cameras = cameras;
         self.given = given;
-        self.around = around;
+        self.bounds = bounds;
         self.reset();
     }
 
@@ -77,7 +77,7 @@ impl State {
         &self.cameras
     }
 
-    /// Says which models are open. When there come to be two, both are shown.
+    /// Sets which models are open. The mode becomes a wipe when the second of them is opened.
     pub(crate) fn set_open(&mut self, open: [bool; 2]) {
         if open == [true; 2] && self.open != open {
             self.arrangement.mode = Mode::Wipe;
@@ -86,67 +86,68 @@ impl State {
         self.arrangement.mode = self.possible(self.arrangement.mode);
     }
 
-    /// `mode`, or one that shows what is open.
+    /// Returns `mode`, or a mode that is possible with the open models.
     fn possible(&self, mode: Mode) -> Mode {
         match (self.open, mode) {
             ([true, true], mode) => mode,
-            ([false, true], _) => Mode::One(Which::Second),
-            _ => Mode::One(Which::First),
+            ([false, true], _) => Mode::One(Slot::Second),
+            _ => Mode::One(Slot::First),
         }
     }
 
     fn reset(&mut self) {
         self.index = 0;
         self.visited = self.given;
-        self.eye = match self.cameras.first() {
-            Some(camera) if !self.given => Some(Eye::at(camera, self.around)),
+        self.free_camera = match self.cameras.first() {
+            Some(camera) if !self.given => Some(CameraController::at(camera, self.bounds)),
             _ => None,
         };
     }
 
-    /// Whether the free camera is in use.
+    /// Returns whether the free camera is in use.
     pub(crate) fn is_free(&self) -> bool {
-        self.eye.is_some()
+        self.free_camera.is_some()
     }
 
-    /// The free camera, which takes over from where the view is. `None` before there is any view.
-    pub(crate) fn eye(&mut self) -> Option<&mut Eye> {
-        if self.eye.is_none() {
-            self.eye = Some(Eye::at(self.cameras.get(self.index)?, self.around));
+    /// Returns the free camera, which starts at the present view if it was not in use. Returns `None` if there is no
+    /// camera yet.
+    pub(crate) fn free_camera(&mut self) -> Option<&mut CameraController> {
+        if self.free_camera.is_none() {
+            self.free_camera = Some(CameraController::at(self.cameras.get(self.index)?, self.bounds));
         }
-        self.eye.as_mut()
+        self.free_camera.as_mut()
     }
 
-    /// Does what `command` asks, if it concerns the state at all.
+    /// Carries out `command`. Commands that do not concern the state are ignored.
     pub(crate) fn apply(&mut self, command: &Command) {
         let count = self.cameras.len();
         match *command {
             Command::Camera(index) if index < count => {
                 self.index = index;
                 self.visited = true;
-                self.eye = None;
+                self.free_camera = None;
             }
             Command::StepCamera(by) if count > 0 => {
-                // From a view that never was at a camera, the first step forward leads to the first one.
+                // The first step forward after a reset to the free camera chooses the first camera.
                 if self.visited || by < 0 {
                     self.index = wrapped(self.index, by, count);
                 }
                 self.visited = true;
-                self.eye = None;
+                self.free_camera = None;
             }
             Command::Reset => self.reset(),
             Command::Orbit([right, down]) => {
-                if let Some(eye) = self.eye() {
-                    eye.orbit(right.to_radians(), down.to_radians());
+                if let Some(controller) = self.free_camera() {
+                    controller.orbit(right.to_radians(), down.to_radians());
                 }
             }
             Command::Mode(mode) => self.arrangement.mode = self.possible(mode),
             Command::Flip => {
-                let which = match self.arrangement.mode {
-                    Mode::One(which) => which.other(),
-                    _ => Which::First,
+                let slot = match self.arrangement.mode {
+                    Mode::One(slot) => slot.other(),
+                    _ => Slot::First,
                 };
-                self.arrangement.mode = self.possible(Mode::One(which));
+                self.arrangement.mode = self.possible(Mode::One(slot));
             }
             Command::Split(split) if split.is_finite() => self.arrangement.split = split.clamp(0.0, 1.0),
             Command::Gain(gain) if gain.is_finite() => {
@@ -162,13 +163,13 @@ impl State {
         }
     }
 
-    /// The camera that fills or fits an area of `width * height` pixels, in the present arrangement.
-    /// `None` before there is any.
+    /// Returns the camera for an area of `width * height` pixels in the present arrangement: the free camera fills
+    /// it, the others keep their aspect within it. Returns `None` if there is no camera yet.
     pub(crate) fn camera(&self, width: u32, height: u32) -> Option<Camera> {
         let width = (width / self.arrangement.columns()).clamp(1, lexisplat_render::MAX_SIDE);
         let height = height.clamp(1, lexisplat_render::MAX_SIDE);
-        if let Some(eye) = &self.eye {
-            return Some(eye.camera(width, height));
+        if let Some(controller) = &self.free_camera {
+            return Some(controller.camera(width, height));
         }
         let camera = self.cameras.get(self.index)?;
         let aspect = f64::from(camera.width) / f64::from(camera.height.max(1));
@@ -176,17 +177,16 @@ impl State {
         Some(resized(camera, width, height))
     }
 
-    /// The camera of a screenshot: the one looked through at its own size, or the free one at the size it
-    /// has on screen.
+    /// Returns the camera of a screenshot: the chosen one at its own size, or the free one at its size on screen.
     pub(crate) fn screenshot_camera(&self, width: u32, height: u32, max_width: u32) -> Option<Camera> {
-        if self.eye.is_none() {
+        if self.free_camera.is_none() {
             return Some(self.cameras.get(self.index)?.with_max_width(max_width));
         }
         Some(self.camera(width, height)?.with_max_width(max_width))
     }
 }
 
-/// `index + by` around a ring of `count`, which is not 0.
+/// Returns `index + by` modulo `count`, which must not be 0.
 fn wrapped(index: usize, by: isize, count: usize) -> usize {
     let turn = by.unsigned_abs() % count;
     (index + if by < 0 { count - turn } else { turn }) % count
@@ -198,7 +198,7 @@ mod tests {
 
     use super::*;
 
-    const AROUND: Surroundings = Surroundings { centre: DVec3::ZERO, radius: 1.0, up: DVec3::NEG_Y };
+    const BOUNDS: SceneBounds = SceneBounds { centre: DVec3::ZERO, radius: 1.0, up: DVec3::NEG_Y };
 
     fn cameras() -> Vec<Camera> {
         let at = |x: f32| Camera {
@@ -217,7 +217,7 @@ mod tests {
     fn state(given: bool) -> State {
         let mut state = State::new([0.0; 3]);
         state.set_open([true, false]);
-        state.set_cameras(cameras(), given, AROUND);
+        state.set_cameras(cameras(), given, BOUNDS);
         state
     }
 
@@ -277,17 +277,17 @@ mod tests {
         let mut state = state(true);
         for mode in Mode::ALL {
             state.apply(&Command::Mode(mode));
-            assert_eq!(state.arrangement.mode, Mode::One(Which::First));
+            assert_eq!(state.arrangement.mode, Mode::One(Slot::First));
         }
         state.set_open([true, true]);
         assert_eq!(state.arrangement.mode, Mode::Wipe, "the second appears");
         state.apply(&Command::Flip);
-        assert_eq!(state.arrangement.mode, Mode::One(Which::First));
+        assert_eq!(state.arrangement.mode, Mode::One(Slot::First));
         state.apply(&Command::Flip);
-        assert_eq!(state.arrangement.mode, Mode::One(Which::Second));
+        assert_eq!(state.arrangement.mode, Mode::One(Slot::Second));
         state.apply(&Command::Mode(Mode::Difference));
         state.set_open([false, true]);
-        assert_eq!(state.arrangement.mode, Mode::One(Which::Second));
+        assert_eq!(state.arrangement.mode, Mode::One(Slot::Second));
     }
 
     #[test]

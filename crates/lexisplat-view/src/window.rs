@@ -1,4 +1,4 @@
-//! Opening the window, and saying why it cannot be opened.
+//! Opening the window.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -13,18 +13,18 @@ use crate::app::App;
 use crate::error::{Error, Result};
 use crate::script;
 
-/// Size of the window to begin with and at least, in points.
+/// Initial size of the window, in points.
 const SIZE: [f32; 2] = [1280.0, 800.0];
+/// Smallest size of the window, in points.
 const LEAST_SIZE: [f32; 2] = [640.0, 400.0];
-/// Drivers that draw with all the precision pictures need.
+/// Graphics interfaces with the precision that the renderer's kernels need; OpenGL lacks it.
 const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// [`Error::NoDisplay`] and [`Error::NoAdapter`] where there is nothing to open a window on or to draw it
-/// with; what reading the files named in `options` says, and while a script runs anything else that goes
-/// wrong.
+/// [`Error::NoDisplay`] and [`Error::NoAdapter`] if there is no display or no graphics adapter; errors of reading
+/// the files named in `options`; and while a script runs, every other error.
 pub fn run(options: Options) -> Result<()> {
     let script = script::parse(&options.script)?;
     let given = given_cameras(&options)?;
@@ -46,7 +46,7 @@ pub fn run(options: Options) -> Result<()> {
     };
     let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
     setup.instance_descriptor.backends = backends;
-    // The arguments of indirect dispatches come from the renderer's own kernels, clamped there.
+    // The renderer's kernels compute the arguments of indirect dispatches and clamp them.
     setup.instance_descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     setup.native_adapter_selector = Some(Arc::new(move |adapters, surface| {
         best(adapters, surface, chosen)
@@ -81,7 +81,7 @@ pub fn run(options: Options) -> Result<()> {
     }
 }
 
-/// The cameras of the file named in `options`.
+/// Reads the camera file named in `options`, if there is one.
 fn given_cameras(options: &Options) -> Result<Option<Vec<Camera>>> {
     let Some(path) = &options.cameras else { return Ok(None) };
     let nothing = Geometry::default();
@@ -92,14 +92,14 @@ fn given_cameras(options: &Options) -> Result<Option<Vec<Camera>>> {
     Ok(Some(cameras))
 }
 
-/// Whether there may be a display. Elsewhere than on free desktops there always is.
+/// Returns whether there may be a display. Systems without X11 and Wayland always have one.
 fn has_display() -> bool {
     let set = |name: &str| std::env::var_os(name).is_some_and(|value| !value.is_empty());
     !cfg!(all(unix, not(target_vendor = "apple")))
         || ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(set)
 }
 
-/// How many adapters there are.
+/// Returns the number of adapters.
 fn adapters(backends: wgpu::Backends) -> usize {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
@@ -107,8 +107,8 @@ fn adapters(backends: wgpu::Backends) -> usize {
     pollster::block_on(instance.enumerate_adapters(backends)).len()
 }
 
-/// The best adapter that can draw on `surface`: a real one if there is any. Or the one chosen by its place
-/// among all, best first.
+/// Returns the best adapter that can draw on `surface`; software adapters come last. If `chosen` is an index into
+/// all adapters, best first, returns that one or nothing.
 fn best(
     adapters: &[wgpu::Adapter],
     surface: Option<&wgpu::Surface<'_>>,

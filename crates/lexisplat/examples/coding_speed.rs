@@ -1,8 +1,8 @@
-//! Times the coding step alone: pursuit, rounding of values, and verification of the bound.
+//! Measures the coding step alone: pursuit, rounding of values, and verification of the bound.
 //!
 //! `cargo run --release -p lexisplat --example coding_speed -- SCENE.ply DICTIONARY.lexi TOL PURSUIT THREADS REPEATS`
-//! prints one JSON object. The dictionary may be a dictionary file or a compressed scene;
-//! `benches/coding_beside_spams.py` runs this beside SPAMS.
+//! prints one JSON object. The dictionary may be a dictionary file or a compressed scene.
+//! `benches/coding_beside_spams.py` compares this program with SPAMS.
 
 use std::error::Error;
 use std::path::Path;
@@ -12,8 +12,8 @@ use lexisplat::pursuit::{Coder, Encoded, StopRule, ValueType};
 use lexisplat::{Limits, lexi, ply};
 use rayon::prelude::*;
 
-/// Gaussians a thread takes at a time.
-const CHUNK: usize = 2048;
+/// Gaussians that one task codes.
+const GAUSSIANS_PER_TASK: usize = 2048;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let coder = Coder::new(&dictionary, pursuit.parse()?, stop, ValueType::F32);
         let parts = pool.install(|| {
             signals
-                .par_chunks(CHUNK * dictionary.dim())
+                .par_chunks(GAUSSIANS_PER_TASK * dictionary.dim())
                 .map(|chunk| {
                     let (mut codes, mut escapes, mut worst) = (Vec::new(), 0_usize, 0.0_f64);
                     coder.encode(chunk, |visit| match visit.outcome {

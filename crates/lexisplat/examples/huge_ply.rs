@@ -1,9 +1,9 @@
-//! A scene of any size made of copies of a model, to measure time and memory:
+//! Makes a scene of any size from copies of a model, to measure time and memory:
 //!
 //! `cargo run --release -p lexisplat --example huge_ply -- MODEL.ply GAUSSIANS OUT.ply [SEED]`
 //!
-//! Copies lie on a square grid in x and z, as far apart as nine tenths of the model are wide. Every value
-//! gets seeded noise, so that no two Gaussians are alike. Memory: a few times the model.
+//! Copies lie on a square grid in x and z. Their distance is the width of nine tenths of the model's Gaussians. Every
+//! value gets seeded noise, so that no two Gaussians are alike. Memory: a few times the model.
 
 use std::fs::File;
 use std::io::{BufWriter, Write};
@@ -12,13 +12,13 @@ use std::path::Path;
 use lexisplat::{Splats, ply};
 use rayon::prelude::*;
 
-/// Standard deviation of the noise: on SH-rest as a share of the value, on base colour, and on the
-/// logarithms of opacity and scales.
+/// Standard deviations of the noise: on SH-rest as a share of the value; on base colour; on opacity before the sigmoid
+/// and on the logarithms of scales.
 const NOISE: [f32; 3] = [0.05, 0.02, 0.03];
-/// Share of the noise that positions get, in standard deviations of the Gaussian's longest axis.
-const STRAY: f32 = 0.3;
-/// Gaussians that one thread changes at a time.
-const CHUNK: usize = 4096;
+/// Standard deviation of the noise on positions, in standard deviations of the Gaussian's longest axis.
+const POSITION_NOISE: f32 = 0.3;
+/// Gaussians that one task changes.
+const GAUSSIANS_PER_TASK: usize = 4096;
 
 /// `splitmix64` (Vigna).
 struct Random(u64);
@@ -32,7 +32,7 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// About normal: the sum of four uniform numbers, of variance 1.
+    /// An approximately normal number of variance 1: a sum of four uniform numbers.
     #[expect(clippy::cast_precision_loss, reason = "16 bits")]
     fn normal(&mut self) -> f32 {
         let bits = self.bits();
@@ -76,7 +76,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-/// How wide nine tenths of the model are along an axis.
+/// The width along `axis` of the middle nine tenths of the model's Gaussians.
 fn width(model: &Splats, axis: usize) -> f32 {
     let mut values: Vec<f32> = model.geometry.positions.iter().map(|p| p[axis]).collect();
     values.sort_by(f32::total_cmp);
@@ -84,12 +84,12 @@ fn width(model: &Splats, axis: usize) -> f32 {
     at(19) - at(1)
 }
 
-/// `model` with noise on all its values.
+/// Returns `model` with noise on all its values.
 fn noisy(model: &Splats, seed: u64) -> Splats {
     let mut out = model.clone();
     let dim = model.degree.rest().max(1);
     let random = |chunk: usize, stream: u64| Random(seed ^ stream << 56 ^ chunk as u64);
-    out.sh_rest.par_chunks_mut(CHUNK * dim).enumerate().for_each(|(chunk, values)| {
+    out.sh_rest.par_chunks_mut(GAUSSIANS_PER_TASK * dim).enumerate().for_each(|(chunk, values)| {
         let mut random = random(chunk, 1);
         values.iter_mut().for_each(|v| *v *= 1.0 + NOISE[0] * random.normal());
     });
@@ -97,7 +97,7 @@ fn noisy(model: &Splats, seed: u64) -> Splats {
     let mut random = random(0, 2);
     for i in 0..g.positions.len() {
         let longest = g.scales[i].iter().copied().fold(f32::NEG_INFINITY, f32::max).exp().min(1.0);
-        g.positions[i].iter_mut().for_each(|v| *v += STRAY * longest * random.normal());
+        g.positions[i].iter_mut().for_each(|v| *v += POSITION_NOISE * longest * random.normal());
         g.dc[i].iter_mut().for_each(|v| *v += NOISE[1] * random.normal());
         g.opacities[i] += NOISE[2] * random.normal();
         g.scales[i].iter_mut().for_each(|v| *v += NOISE[2] * random.normal());

@@ -1,4 +1,4 @@
-//! What learning options do to mean nonzeros, the figure learning minimises.
+//! Measures the effect of learning options on mean nonzeros, which learning minimises.
 //!
 //! `cargo run --release -p lexisplat --example learning -- SCENE.ply [tol=0.1] [pursuit=ols] [atoms=90]
 //! [sample=65536] [momentum=0.9] [seed=0]` prints one line.

@@ -1,5 +1,5 @@
-//! How fast a packed file is decoded: `unpacking_speed FILE.lexi [ROUNDS]`, one core with
-//! `RAYON_NUM_THREADS=1`.
+//! Measures how fast a packed file is decoded: `unpacking_speed FILE.lexi [ROUNDS]`. `RAYON_NUM_THREADS=1` restricts
+//! it to one core.
 
 use std::path::Path;
 use std::time::Instant;

@@ -37,7 +37,7 @@
 //! let (packed, _) = packer.pack(packer.step_for(40.0), &Silent)?; // about 40 dB
 //!
 //! let mut file = Vec::new();
-//! lexi::write_packed_to(&mut file, &packed)?;
+//! lexi::write_packed(&mut file, &packed)?;
 //! let model = lexi::read_bytes("scene.lexi", &file, &Limits::default())?; // drawn as it is
 //! assert_eq!(model.len(), splats.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
@@ -57,12 +57,14 @@ mod sparse;
 pub mod stream;
 mod support;
 
+pub use formats::kind::{FileKind, Unsupported};
 pub use formats::{lexi, ply};
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
+pub use scene::source::SplatSource;
 pub use scene::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats};
 pub use scene::{sh, stats};
-pub use sparse::codes::{Column, Escapes, Indices, Row, SparseCodes, Values, reconstruct};
+pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 pub use sparse::compress::{CompressOptions, CompressReport, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;
 pub use sparse::model::{Layout, Model, Pursuit, Record};
@@ -71,4 +73,6 @@ pub use support::error::{Error, FormatError, Result};
 pub use support::input::Input;
 pub use support::limits::{Limits, MAX_ATOMS};
 pub use support::progress::{Progress, Silent, Stage};
+pub use support::sink::Sink;
+pub use support::stopwatch::Stopwatch;
 pub use support::{output, simd};

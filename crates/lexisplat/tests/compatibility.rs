@@ -1,17 +1,12 @@
 //! What docs/FORMAT.md says of versions and of names that a reader does not know, of every layout and every
 //! reader.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test may panic")]
-
-mod common;
-#[path = "common/parts.rs"]
-mod parts;
-
 use std::path::PathBuf;
 
+use crate::common;
+use crate::parts::Parts;
 use lexisplat::lexi::{self, LexiChunks};
 use lexisplat::{Error, FormatError, Limits, Model, Result, Splats};
-use parts::Parts;
 use serde_json::Value;
 
 /// Golden files: scenes of version 1 in each of its layouts, then of version 2.

@@ -1,51 +1,39 @@
 //! The encoder as a whole: the promise, every degree, odd scenes, and bytes that depend on nothing but
 //! the input.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-mod common;
-
-use common::written;
+use crate::common::written;
 use lexisplat::{
     CompressOptions, Dictionary, Error, Geometry, Layout, Limits, Pursuit, SceneMeta, ShDegree, Silent,
     Splats, compress, lexi,
 };
+use lexisplat_testing::Random;
 
-struct Random(u64);
-
-impl Random {
-    /// Uniform in -1..1.
-    fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        f32::from(u16::try_from(self.0 >> 48).unwrap()) / 32_768.0 - 1.0
-    }
-
-    fn row<const W: usize>(&mut self) -> [f32; W] {
-        std::array::from_fn(|_| self.next())
-    }
+fn row<const W: usize>(random: &mut Random) -> [f32; W] {
+    std::array::from_fn(|_| random.signed())
 }
 
 /// A scene whose SH-rest is a few common directions and noise, with norms spread over decades.
 fn scene(count: usize, degree: u8, seed: u64) -> Splats {
     let degree = ShDegree::new(degree).unwrap();
     let dim = degree.rest();
-    let mut random = Random(seed);
-    let shapes: Vec<Vec<f32>> = (0..6).map(|_| (0..dim).map(|_| random.next()).collect()).collect();
+    let mut random = Random::new(seed);
+    let shapes: Vec<Vec<f32>> = (0..6).map(|_| (0..dim).map(|_| random.signed()).collect()).collect();
     let mut sh_rest = Vec::new();
     for i in 0..count {
         let strength = [0.0, 0.01, 0.05, 0.1, 0.2][i % 5];
-        let weights: Vec<f32> = shapes.iter().map(|_| strength * random.next()).collect();
+        let weights: Vec<f32> = shapes.iter().map(|_| strength * random.signed()).collect();
         for d in 0..dim {
             let signal: f32 = shapes.iter().zip(&weights).map(|(s, w)| s[d] * w).sum();
-            sh_rest.push(signal + 0.02 * random.next());
+            sh_rest.push(signal + 0.02 * random.signed());
         }
     }
     let geometry = Geometry {
-        positions: (0..count).map(|_| random.row()).collect(),
+        positions: (0..count).map(|_| row(&mut random)).collect(),
         normals: Vec::new(),
-        dc: (0..count).map(|_| random.row()).collect(),
-        opacities: (0..count).map(|_| random.next()).collect(),
-        scales: (0..count).map(|_| random.row()).collect(),
-        rotations: (0..count).map(|_| random.row()).collect(),
+        dc: (0..count).map(|_| row(&mut random)).collect(),
+        opacities: (0..count).map(|_| random.signed()).collect(),
+        scales: (0..count).map(|_| row(&mut random)).collect(),
+        rotations: (0..count).map(|_| row(&mut random)).collect(),
         extras: Vec::new(),
     };
     Splats { geometry, degree, sh_rest, meta: SceneMeta::default() }
@@ -209,9 +197,9 @@ fn wrong_options_are_named() {
         assert!(matches!(error, Error::Parameter { .. }), "{error}");
         error.to_string()
     };
-    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tol = 0"));
-    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tol = NaN"));
-    assert!(run(|o| o.tolerance = None).starts_with("tol = none"));
+    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tolerance = 0"));
+    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tolerance = NaN"));
+    assert!(run(|o| o.tolerance = None).starts_with("tolerance = none"));
     assert!(run(|o| o.atoms = Some(0)).starts_with("atoms = 0"));
     assert!(run(|o| o.atoms = Some(1025)).contains("1 to 1024"));
     assert!(run(|o| o.dictionary = Some(Dictionary::empty())).contains("degree 3"));

@@ -1,13 +1,10 @@
 //! Files written by released versions stay readable, and today's bytes are theirs.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-mod common;
-
 use std::path::PathBuf;
 
-use common::{models, written};
+use crate::common::{models, written};
 use lexisplat::{Error, FormatError, Limits, Splats, lexi};
+use lexisplat_testing::repository_file;
 
 fn golden(name: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect()
@@ -120,8 +117,8 @@ fn newer_versions_are_refused_by_number() {
 /// docs/FORMAT.md shows a file byte by byte; it must be this one.
 #[test]
 fn the_documented_example_is_true() {
-    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "..", "docs", "FORMAT.md"].iter().collect();
-    let Ok(document) = std::fs::read_to_string(path) else { return };
+    let Some(document) = repository_file("docs/FORMAT.md") else { return };
+    let document = std::fs::read_to_string(document).unwrap();
     let bytes = std::fs::read(golden("degree0")).unwrap();
     for (row, chunk) in bytes.chunks(16).enumerate() {
         let hex: Vec<String> = chunk.iter().map(|b| format!("{b:02x}")).collect();

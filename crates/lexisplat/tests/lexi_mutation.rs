@@ -1,14 +1,9 @@
 //! Damaged and hostile .lexi files, read whole and a part at a time: refused, without panic, within memory.
 
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
-
-#[path = "common/allocator.rs"]
-mod allocator;
-mod common;
-
-use allocator::counted;
-use common::{count_in_parts, models, reseal, written};
+use crate::allocator::{alone, counted};
+use crate::common::{count_in_parts, models, reseal, written};
 use lexisplat::{Limits, Model, lexi};
+use lexisplat_testing::Random;
 use serde_json::Value;
 
 /// A reader may hold this many bytes per byte of input, plus [`ALLOWED_BASE`]: the tensors once, and the
@@ -37,15 +32,6 @@ fn accepted(bytes: &[u8]) -> bool {
             assert!(!error.to_string().is_empty());
             false
         }
-    }
-}
-
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).unwrap() % bound
     }
 }
 
@@ -95,9 +81,9 @@ fn change_header(header: &mut Value, random: &mut Random) {
     }
 }
 
-/// One test, since the allocator counts for the whole process.
 #[test]
 fn damage_is_refused_within_memory() {
+    let _alone = alone();
     let files: Vec<(&str, Vec<u8>)> = models().into_iter().map(|(name, m)| (name, written(&m))).collect();
     for (name, bytes) in &files {
         assert!(accepted(bytes), "{name}");
@@ -116,7 +102,7 @@ fn damage_is_refused_within_memory() {
         }
     }
 
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let (mut taken, mut refused) = (0, 0);
     for _ in 0..MUTATIONS {
         let (_, bytes) = &files[random.below(files.len())];

@@ -1,16 +1,12 @@
 //! Ten thousand damaged PLY files, read whole and a part at a time: no panic, no memory beyond a multiple of the
 //! file, and one answer.
 
-use lexisplat::Silent;
-use lexisplat::ply::{self, Format, PlyChunks, ReadOptions};
+use lexisplat::ply::{self, Format, PlySource, ReadOptions};
+use lexisplat::{Silent, SplatSource};
 
-#[path = "common/allocator.rs"]
-mod allocator;
-#[path = "ply/support.rs"]
-mod support;
-
-use allocator::counted;
-use support::{File, Random, columns, scene};
+use crate::allocator::{alone, counted};
+use crate::ply_support::{File, columns, scene};
+use lexisplat_testing::Random;
 
 /// Damaged files read.
 const INPUTS: usize = 10_000;
@@ -104,10 +100,10 @@ fn flip_bits(bytes: &[u8], random: &mut Random) -> Vec<u8> {
 
 /// Reads damaged bytes; the reader must answer, in one line, within its memory.
 fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
-    let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
+    let options = ReadOptions::default().with_drop_invalid(drop_invalid);
     let (result, used) = counted(|| ply::read_bytes("t.ply", bytes, &options));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input", bytes.len());
-    let (opened, used) = counted(|| PlyChunks::open("t.ply", bytes, &options, &Silent));
+    let (opened, used) = counted(|| PlySource::open("t.ply", bytes, &options, &Silent));
     assert!(used <= FACTOR * bytes.len() + CONSTANT, "{used} bytes for {} of input, in parts", bytes.len());
     match result {
         Ok(read) => {
@@ -135,6 +131,7 @@ fn survive(bytes: &[u8], drop_invalid: bool) -> bool {
 /// One test only: the counters are the whole process's.
 #[test]
 fn damaged_files_are_refused_quietly() {
+    let _alone = alone();
     let seeds = seeds();
     // Starts the thread pool, whose own memory is not the reader's.
     let warm = File::new(columns(&scene(3, 5000, 1))).bytes();
@@ -160,7 +157,7 @@ fn damaged_files_are_refused_quietly() {
     let wide = format!("element e 0\n{}", "property char a\n".repeat(4000)).repeat(12);
     survive(format!("ply\nformat ascii 1.0\n{wide}end_header\n").as_bytes(), false);
 
-    let mut random = Random(0x1e15);
+    let mut random = Random::new(0x1e15);
     let (mut read, mut accepted) = (0, 0);
     for bytes in &seeds[..3] {
         for length in 0..bytes.len() {

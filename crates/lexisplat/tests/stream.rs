@@ -1,14 +1,13 @@
 //! Streams give what whole scenes give, from and to files, on any number of threads.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::path::Path;
 
 use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{
-    CompressOptions, Error, Extra, ExtraValues, Input, Layout, Limits, Sensitivity, Silent, Splats, compress,
-    lexi, ply, stats, stream,
+    CompressOptions, Error, Extra, ExtraValues, Input, Layout, Limits, Sensitivity, Silent, SplatSource,
+    Splats, compress, lexi, ply, stats, stream,
 };
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -49,14 +48,14 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     let whole = splats(GAUSSIANS);
     ply::write(&path("in.ply"), &whole).unwrap();
     let bytes = Input::open(&path("in.ply")).unwrap();
-    let chunks = PlyChunks::open("in.ply", &bytes, &ReadOptions::default(), &Silent).unwrap();
+    let chunks = PlySource::open("in.ply", &bytes, &ReadOptions::default(), &Silent).unwrap();
     assert_eq!(chunks.len(), GAUSSIANS);
     let (model, _) = compress(whole.clone(), &options(Layout::F16), &Silent).unwrap();
     let mut expected = Vec::new();
-    lexi::write_to(&mut expected, &model).unwrap();
+    lexi::write(&mut expected, &model).unwrap();
     for threads in [1, 3] {
         let done = on_threads(threads, || {
-            stream::compress_file(&chunks, &options(Layout::F16), &path("out.lexi"), &Silent).unwrap()
+            stream::compress(&chunks, &options(Layout::F16), &path("out.lexi"), &Silent).unwrap()
         });
         assert!(std::fs::read(path("out.lexi")).unwrap() == expected, "{threads} threads");
         assert_eq!(done.record, model.record);
@@ -67,7 +66,7 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     let chunks = LexiChunks::open("out.lexi", &bytes, &Limits::default()).unwrap();
     let mut expected = Vec::new();
     ply::write_to(&mut expected, &model.to_splats()).unwrap();
-    let written = stream::decompress_file(&chunks, &path("back.ply"), &Silent).unwrap();
+    let written = stream::decompress(&chunks, &path("back.ply"), &Silent).unwrap();
     assert_eq!(written, expected.len() as u64);
     assert!(std::fs::read(path("back.ply")).unwrap() == expected);
     let survey = stream::survey(&chunks, folder.path()).unwrap();
@@ -90,10 +89,10 @@ fn escapes_and_pointers_are_found_in_every_part() {
         let (model, report) = compress(whole.clone(), &options(layout), &Silent).unwrap();
         assert_eq!(report.escapes, 6);
         let (mut bytes, mut expected, mut found) = (Vec::new(), Vec::new(), Vec::new());
-        lexi::write_to(&mut bytes, &model).unwrap();
+        lexi::write(&mut bytes, &model).unwrap();
         ply::write_to(&mut expected, &model.into_splats()).unwrap();
         let chunks = LexiChunks::open("t.lexi", &bytes, &Limits::default()).unwrap();
-        assert_eq!(stream::decompress_to(&chunks, &mut found, &Silent).unwrap(), expected.len() as u64);
+        assert_eq!(stream::decompress(&chunks, &mut found, &Silent).unwrap(), expected.len() as u64);
         assert!(found == expected, "{layout}");
     }
 }
@@ -109,14 +108,14 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
         let packer = Packer::new(&whole, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_packed_to(&mut bytes, &packed).unwrap();
+        lexi::write_packed(&mut bytes, &packed).unwrap();
         let model = lexi::read_bytes("t.lexi", &bytes, &Limits::default()).unwrap();
         let chunks = LexiChunks::open("t.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(chunks.order_kept(), keep_order);
         assert_eq!(chunks.attribute_bytes(), lexi::packed_tensor_bytes(&packed));
         let (mut expected, mut found) = (Vec::new(), Vec::new());
         ply::write_to(&mut expected, &model.to_splats()).unwrap();
-        stream::decompress_to(&chunks, &mut found, &Silent).unwrap();
+        stream::decompress(&chunks, &mut found, &Silent).unwrap();
         assert!(found == expected, "{keep_order}");
         let survey = stream::survey(&chunks, folder.path()).unwrap();
         assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
@@ -136,14 +135,14 @@ fn a_ply_is_refused_left_out_and_looked_over_as_when_read_whole() {
     ply::write_to(&mut bytes, &whole).unwrap();
     let strict = ReadOptions::default();
     let expected = ply::read_bytes("t.ply", &bytes, &strict).unwrap_err();
-    let found = PlyChunks::open("t.ply", &bytes, &strict, &Silent).unwrap_err();
+    let found = PlySource::open("t.ply", &bytes, &strict, &Silent).unwrap_err();
     assert_eq!(found.to_string(), expected.to_string());
     assert!(found.to_string().contains("4 Gaussians"), "{found}");
-    let lenient = ReadOptions { drop_invalid: true, ..strict };
+    let lenient = strict.with_drop_invalid(true);
     let read = ply::read_bytes("t.ply", &bytes, &lenient).unwrap();
-    let chunks = PlyChunks::open("t.ply", &bytes, &lenient, &Silent).unwrap();
-    assert_eq!((chunks.warnings(), chunks.summary()), (read.warnings.as_slice(), &read.source));
-    assert_eq!(stream::lint_ply(&chunks, &Silent).unwrap(), stats::lint(&read.splats).unwrap());
+    let chunks = PlySource::open("t.ply", &bytes, &lenient, &Silent).unwrap();
+    assert_eq!((chunks.warnings(), chunks.summary()), (read.warnings.as_slice(), &read.summary));
+    assert_eq!(stream::lint(&chunks, &Silent).unwrap(), stats::lint(&read.splats).unwrap());
     let mut part = chunks.empty();
     let mut start = 0;
     // Parts of every length, borders at rows left out among them.
@@ -171,16 +170,16 @@ fn ascii_rows_are_found_at_any_place() {
         ascii.push_str(&words.collect::<Vec<_>>().join(" "));
         ascii.push('\n');
     }
-    let chunks = PlyChunks::open("t.ply", ascii.as_bytes(), &ReadOptions::default(), &Silent).unwrap();
+    let chunks = PlySource::open("t.ply", ascii.as_bytes(), &ReadOptions::default(), &Silent).unwrap();
     let mut part = chunks.empty();
     for range in [0..2500, 1023..1025, 1500..2049, 2499..2500] {
         chunks.read(range.clone(), &mut part).unwrap();
         assert_eq!(part.geometry.positions, whole.geometry.positions[range]);
     }
     let (mut from_ascii, mut from_binary) = (Vec::new(), Vec::new());
-    stream::compress_to(&chunks, &options(Layout::F16), &mut from_ascii, &Silent).unwrap();
-    let chunks = PlyChunks::open("t.ply", &binary, &ReadOptions::default(), &Silent).unwrap();
-    stream::compress_to(&chunks, &options(Layout::F16), &mut from_binary, &Silent).unwrap();
+    stream::compress(&chunks, &options(Layout::F16), &mut from_ascii, &Silent).unwrap();
+    let chunks = PlySource::open("t.ply", &binary, &ReadOptions::default(), &Silent).unwrap();
+    stream::compress(&chunks, &options(Layout::F16), &mut from_binary, &Silent).unwrap();
     assert!(from_ascii == from_binary);
 }
 
@@ -189,7 +188,7 @@ fn a_damaged_file_leaves_no_output_behind() {
     let whole = scene(&SampleOptions::new(3000, 1));
     let (model, _) = compress(whole, &options(Layout::F16), &Silent).unwrap();
     let mut bytes = Vec::new();
-    lexi::write_to(&mut bytes, &model).unwrap();
+    lexi::write(&mut bytes, &model).unwrap();
     let last = bytes.len() - 1;
     bytes[last] ^= 1;
     let expected = lexi::read_bytes("t.lexi", &bytes, &Limits::default()).unwrap_err().to_string();

@@ -1,13 +1,12 @@
 //! Odd scenes go through the streams as they go through memory: none, one, the same again and again, rows left out at
 //! the borders of parts, properties of every type, normals, text.
-#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use lexisplat::lexi::LexiChunks;
 use lexisplat::packed::PackOptions;
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{
-    CompressOptions, Extra, ExtraValues, Layout, Limits, ShDegree, Silent, Splats, compress, lexi, ply,
-    stats, stream,
+    CompressOptions, Extra, ExtraValues, Layout, Limits, ShDegree, Silent, SplatSource, Splats, compress,
+    lexi, ply, stats, stream,
 };
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -118,7 +117,7 @@ fn unpacked(bytes: &[u8]) -> Splats {
 fn comes_out_as(name: &str, bytes: &[u8], whole: &Splats) {
     let chunks = LexiChunks::open("t.lexi", bytes, &Limits::default()).unwrap();
     let mut found = Vec::new();
-    let written = stream::decompress_to(&chunks, &mut found, &Silent).unwrap();
+    let written = stream::decompress(&chunks, &mut found, &Silent).unwrap();
     assert!(found == file(whole), "{name}");
     assert_eq!(written, found.len() as u64);
     let folder = tempfile::tempdir().unwrap();
@@ -129,22 +128,22 @@ fn comes_out_as(name: &str, bytes: &[u8], whole: &Splats) {
 
 #[test]
 fn exact_layouts_give_the_bytes_of_the_whole_scene() {
-    let read = ReadOptions { drop_invalid: true, ..ReadOptions::default() };
+    let read = ReadOptions::default().with_drop_invalid(true);
     for (name, bytes) in plys() {
         let whole = ply::read_bytes("t.ply", &bytes, &read).unwrap();
-        let chunks = PlyChunks::open("t.ply", &bytes, &read, &Silent).unwrap();
+        let chunks = PlySource::open("t.ply", &bytes, &read, &Silent).unwrap();
         assert_eq!(
             (chunks.len(), chunks.warnings()),
             (whole.splats.len(), whole.warnings.as_slice()),
             "{name}"
         );
-        let lint = stream::lint_ply(&chunks, &Silent).unwrap();
+        let lint = stream::lint(&chunks, &Silent).unwrap();
         assert_eq!(format!("{lint:?}"), format!("{:?}", stats::lint(&whole.splats).unwrap()), "{name}");
         for layout in [Layout::F16, Layout::F32, Layout::Paper] {
             let (model, _) = compress(whole.splats.clone(), &options(layout), &Silent).unwrap();
             let (mut expected, mut found) = (Vec::new(), Vec::new());
-            lexi::write_to(&mut expected, &model).unwrap();
-            let done = stream::compress_to(&chunks, &options(layout), &mut found, &Silent).unwrap();
+            lexi::write(&mut expected, &model).unwrap();
+            let done = stream::compress(&chunks, &options(layout), &mut found, &Silent).unwrap();
             assert!(found == expected, "{name}, {layout}");
             assert_eq!(
                 (done.gaussians, done.record),
@@ -158,16 +157,16 @@ fn exact_layouts_give_the_bytes_of_the_whole_scene() {
 
 #[test]
 fn packing_keeps_every_gaussian_and_comes_out_as_if_read_whole() {
-    let read = ReadOptions { drop_invalid: true, ..ReadOptions::default() };
+    let read = ReadOptions::default().with_drop_invalid(true);
     for (name, bytes) in plys() {
         let whole = ply::read_bytes("t.ply", &bytes, &read).unwrap().splats;
-        let chunks = PlyChunks::open("t.ply", &bytes, &read, &Silent).unwrap();
+        let chunks = PlySource::open("t.ply", &bytes, &read, &Silent).unwrap();
         for keep_order in [false, true] {
             let mut options = PackOptions::default();
             options.keep_order = keep_order;
             options.atoms = (chunks.degree() != ShDegree::ZERO).then_some(6);
             let mut packed = Vec::new();
-            let done = stream::pack_to(
+            let done = stream::pack(
                 &chunks,
                 stream::Importance::<lexisplat::Error>::Heuristic,
                 &options,

@@ -150,7 +150,7 @@ fn exact(root: &Path) -> Done {
             options.atoms = Some(if layout == Layout::F32 && degree == ShDegree::ONE { 300 } else { ATOMS });
             let (model, _) = compress(splats, &options, &Silent)?;
             let mut bytes = Vec::new();
-            lexi::write_to(&mut bytes, &model)?;
+            lexi::write(&mut bytes, &model)?;
             let name = format!("{layout}-{degree}");
             save(root, "lexi", &name, &bytes)?;
             save(root, "dictionary", &name, &bytes)?;
@@ -182,7 +182,7 @@ fn packed(root: &Path) -> Done {
             let (mut packed, _) = packer.pack(1e-3, &Silent)?;
             packed.target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
             let mut bytes = Vec::new();
-            lexi::write_packed_to(&mut bytes, &packed)?;
+            lexi::write_packed(&mut bytes, &packed)?;
             let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });
             save(root, "packed", &name, &bytes)?;
             if gaussians == 2 {

@@ -1,22 +1,23 @@
-//! `--limit`: what files may ask for.
+//! `--limit`: the most that files may ask for.
 
 use lexisplat::Limits;
 
-use super::{Common, size};
+use super::values::size;
 
-impl Common {
-    /// What files may ask for.
-    ///
-    /// # Errors
-    /// A name that is none, which the command line has refused already.
-    pub(crate) fn limits(&self) -> Result<Limits, lexisplat::Error> {
-        self.limits.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
-    }
+/// A limit that was given: its name and its value.
+pub(super) type Limit = (String, u64);
+
+/// Returns the default limits with those of `given` in their place.
+///
+/// # Errors
+/// An unknown name, which [`limit`] refuses too.
+pub(super) fn all(given: &[Limit]) -> Result<Limits, lexisplat::Error> {
+    given.iter().try_fold(Limits::default(), |limits, (name, value)| limits.with(name, *value))
 }
 
-/// A limit as `NAME=N`, N as [`size`].
-pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
-    let (name, value) = text.split_once('=').ok_or("NAME=N, such as gaussians=1000000")?;
+/// Parses a limit: `NAME=N`, where N is a [`size`] or 0.
+pub(super) fn limit(text: &str) -> Result<Limit, String> {
+    let (name, value) = text.split_once('=').ok_or("expected NAME=N, such as gaussians=1000000")?;
     let value = if value == "0" { 0 } else { size(value)? };
     Limits::default().with(name, value).map_err(|e| e.to_string())?;
     Ok((name.to_owned(), value))
@@ -24,10 +25,8 @@ pub(super) fn limit(text: &str) -> Result<(String, u64), String> {
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory;
-
     use super::*;
-    use crate::args::Cli;
+    use crate::args::command;
 
     #[test]
     fn limits_have_names_and_numbers() {
@@ -38,16 +37,16 @@ mod tests {
             assert!(limit(bad).is_err(), "{bad}");
         }
         // The help names the defaults.
-        let help = Cli::command().render_long_help().to_string();
+        let help = command().render_long_help().to_string();
         let help = help.split_whitespace().collect::<Vec<_>>().join(" ");
         let Limits { gaussians, atoms, nonzeros, expansion, header_bytes, properties, .. } =
             Limits::default();
         assert_eq!((Limits::default().bytes, header_bytes), (u64::MAX, 4 << 20));
         for part in [
             format!(
-                "`gaussians` (by default {gaussians}), `atoms` ({atoms}), `nonzeros` of a Gaussian ({nonzeros})"
+                "`gaussians` ({gaussians}), `atoms` of a dictionary ({atoms}), `nonzeros` of one Gaussian ({nonzeros})"
             ),
-            format!("each byte of the file ({expansion}), `header_bytes` (4MiB)"),
+            format!("each byte of a file ({expansion}), `header_bytes` (4MiB)"),
             format!("element of a PLY ({properties})"),
         ] {
             assert!(help.contains(&part), "{part}: {help}");

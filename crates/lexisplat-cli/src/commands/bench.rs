@@ -3,21 +3,21 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Progress;
 use lexisplat_eval::{
     BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, format,
 };
-use lexisplat_render::gpu::{Gpu, ShPath, Speed, Stage, measure_speed};
+use lexisplat_render::gpu::{DrawStage, Gpu, ShPath, Speed, measure_speed};
 use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
 use crate::args::{Bench, Common};
+use crate::device::open_gpu;
 use crate::files::{load, note, print, print_json, warn_of};
 use crate::progress::Bars;
 
-/// Lanes that run in step on most GPUs.
+/// Number of lanes that run in lockstep on most GPUs.
 const LANES: usize = 32;
-/// Gaussians within which codes could be ordered without tearing neighbours apart.
+/// Number of Gaussians in a block. Codes are ordered only within a block, so that neighbours stay together.
 const ORDER_BLOCK: usize = 1024;
 
 pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
@@ -25,10 +25,12 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = views.choose(scene.geometry())?;
-    let gpu = views.device.open_gpu()?;
+    let cameras = super::cameras(views, scene.geometry())?;
+    let gpu = open_gpu(views.device)?;
     if gpu.is_none() && views.device == Device::Auto {
-        note("warning: no GPU but software: only the processor is measured (--device gpu takes it)");
+        note(
+            "warning: the only GPU is emulated in software, so only the CPU is measured; --device gpu measures it too",
+        );
     }
     let bars = Bars::new(common.quiet);
     let paths = paths(&args.paths, &scene);
@@ -39,10 +41,9 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     if let Some(gpu) = &gpu {
         speed = Some(measure_speed(gpu)?);
         for &path in &paths {
-            bars.start(path.name(), "views", cameras.len() as u64);
-            match bench_gpu(gpu, &scene, path, &cameras, &options, &mut || bars.advance(1)) {
+            match bench_gpu(gpu, &scene, path, &cameras, &options, &bars) {
                 Ok(times) => results.push(times),
-                // A dictionary that this path has no room for leaves the others to measure.
+                // A path that has no room for this dictionary does not stop the others from being measured.
                 Err(lexisplat_eval::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
                     if args.paths.is_empty() =>
                 {
@@ -50,14 +51,11 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
                 }
                 Err(error) => return Err(error.into()),
             }
-            bars.end();
         }
     }
     if args.cpu_repeat > 0 {
         options.repeat = args.cpu_repeat;
-        bars.start("cpu", "views", cameras.len() as u64);
-        results.push(bench_cpu(&scene, &cameras, &options, &mut || bars.advance(1))?);
-        bars.end();
+        results.push(bench_cpu(&scene, &cameras, &options, &bars)?);
     }
     let report = Report {
         args,
@@ -75,7 +73,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     print(&report.text()?)
 }
 
-/// The paths asked for, or all that the scene has.
+/// Returns the paths asked for, or all that the scene has.
 fn paths(asked: &[ShPath], scene: &Scene<'_>) -> Vec<ShPath> {
     if !asked.is_empty() {
         return asked.to_vec();
@@ -89,7 +87,7 @@ struct Report<'a> {
     name: &'a str,
     scene: Scene<'a>,
     cameras: &'a [Camera],
-    /// Name and driver.
+    /// Name and driver of the GPU.
     device: Option<(String, String)>,
     most_bytes: Option<u64>,
     speed: Option<Speed>,
@@ -108,7 +106,7 @@ impl Report<'_> {
         self.results.iter().find(|times| times.path == path.name())
     }
 
-    /// The paper's model beside what was measured, for every path on the GPU.
+    /// Returns the paper's model for every path measured on the GPU.
     fn models(&self) -> Vec<(&PathTimes, RadianceModel)> {
         let Some(speed) = &self.speed else { return Vec::new() };
         let on_gpu = |times: &&PathTimes| ShPath::ALL.iter().any(|path| path.name() == times.path);
@@ -165,8 +163,8 @@ impl Report<'_> {
         })
     }
 
-    /// For each sparse path: how many times faster than dense f32 the radiance stage and the frame are, and
-    /// how many the frame could be if radiance took no time at all.
+    /// Returns three speedups over dense f32 for each sparse path: of the radiance stage, of the frame, and of a frame
+    /// whose radiance takes no time.
     fn speedups(&self) -> Vec<(String, [f64; 3])> {
         let Some(dense) = self.find(ShPath::DenseF32) else { return Vec::new() };
         let (frame, radiance) = (dense.frame.median, dense.stage("radiance"));
@@ -202,13 +200,13 @@ impl Report<'_> {
         if let (Some((name, driver)), Some(speed)) = (&self.device, self.speed) {
             writeln!(
                 out,
-                "{name} ({driver}): copies {:.0} GB/s, {:.2} Tflop/s; at most {} of its memory used",
+                "{name} ({driver}): copies {:.0} GB/s, {:.2} Tflop/s; at most {} of its memory was used",
                 speed.copy / 1e9,
                 speed.arithmetic / 1e12,
                 format::bytes(self.most_bytes.unwrap_or(0))
             )?;
         }
-        let stages = Stage::ALL.map(Stage::name);
+        let stages = DrawStage::ALL.map(DrawStage::name);
         write!(out, "\n{:<14} {:>9} {:>19} {:>8}", "path", "ms/frame", "10 % - 90 %", "fps")?;
         for stage in stages {
             write!(out, " {stage:>9}")?;
@@ -230,14 +228,14 @@ impl Report<'_> {
         if let Some(times) = self.results.first() {
             writeln!(
                 out,
-                "\n{:.0} Gaussians shaded a view on average, {:.0} entries in tiles' lists; times are medians",
+                "\n{:.0} Gaussians shaded per view and {:.0} entries in the lists of tiles, on average; times are medians",
                 times.visible, times.entries
             )?;
         }
         for times in self.results.iter().filter(|times| times.shading_bytes_per_frame > 0.0) {
             writeln!(
                 out,
-                "{:<14} a frame moves {:.2} MB to shade, and reads {:.2} MB of geometry",
+                "{:<14} shading moves {:.2} MB per frame; {:.2} MB of geometry are read per frame",
                 times.path,
                 times.shading_bytes_per_frame / 1e6,
                 times.geometry_bytes_per_frame / 1e6
@@ -260,19 +258,19 @@ impl Report<'_> {
         }
         writeln!(
             out,
-            "model: the slower of moving the bytes at the copy rate and the paper's count of operations"
+            "model: the longer of the times for the bytes, at the copy rate, and for the paper's count of operations"
         )?;
         for (path, [radiance, frame, limit]) in self.speedups() {
             writeln!(
                 out,
-                "{path} over dense-f32: radiance {radiance:.2}x, frame {frame:.3}x (at most {limit:.3}x were shading free)"
+                "{path} is faster than dense-f32: radiance {radiance:.2}x, frame {frame:.3}x (with radiance in no time {limit:.3}x)"
             )?;
         }
         if let Scene::Sparse(model) = self.scene {
             let [stored, ordered] = busy_lanes(model, LANES, ORDER_BLOCK).map(|v| 100.0 * v);
             writeln!(
                 out,
-                "lanes busy while codes are summed, {LANES} in step: {stored:.0} % as stored, {ordered:.0} % ordered by nonzeros within {ORDER_BLOCK}"
+                "busy lanes of {LANES} while codes are summed: {stored:.0} % as stored, {ordered:.0} % if ordered by nonzeros in blocks of {ORDER_BLOCK}"
             )?;
         }
         Ok(())

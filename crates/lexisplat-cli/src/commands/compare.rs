@@ -3,12 +3,11 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Progress;
-use lexisplat_eval::{CompareOptions, Comparison, SceneFile, compare, format, montage, png};
-use lexisplat_render::Renderer;
+use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, format, montage, png};
 use serde_json::json;
 
 use crate::args::{Common, Compare};
+use crate::device::open_renderer;
 use crate::files::{check_free, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
@@ -19,8 +18,8 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
-    let cameras = views.choose(scene_a.geometry())?;
-    let mut renderer = Renderer::open(views.device)?;
+    let cameras = super::cameras(views, scene_a.geometry())?;
+    let mut renderer = open_renderer(views.device)?;
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
         for (i, camera) in cameras.iter().enumerate() {
@@ -28,30 +27,19 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             check_free(&path, &[], common.overwrite)?;
             saved.push(path);
         }
-        // Numbers follow the pictures.
+        // The scores follow the pictures.
         stop::while_writing(Work::Files(usize::MAX));
         make_folder(folder)?;
     }
     let bars = Bars::new(common.quiet);
-    bars.start("comparing", "views", cameras.len() as u64);
     let mut paths = saved.iter();
-    let mut failure = None;
-    let options = CompareOptions::new(views.background, args.eight_bit);
+    let options = DrawOptions::new(views.background, args.eight_bit);
     let comparison =
-        compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &mut |_, image_a, image_b| {
-            bars.advance(1);
-            if let Some(path) = paths.next() {
-                let (width, height, pixels) = montage::montage(image_a, image_b);
-                let written = png(width, height, &pixels)
-                    .map_err(Into::into)
-                    .and_then(|bytes| write_bytes(path, &bytes, common.overwrite));
-                failure = failure.take().or(written.err());
-            }
+        compare(&mut renderer, &scene_a, &scene_b, &cameras, &options, &bars, |_, image_a, image_b| {
+            let Some(path) = paths.next() else { return Ok(()) };
+            let (width, height, pixels) = montage::montage(image_a, image_b);
+            write_bytes(path, &png(width, height, &pixels)?, common.overwrite)
         })?;
-    bars.end();
-    if let Some(error) = failure {
-        return Err(error);
-    }
     if common.json {
         return print_json(&json!({
             "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
@@ -87,7 +75,7 @@ fn table(
         writeln!(
             out,
             "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
-            view.name,
+            format::escape(&view.name),
             format::decibels(view.psnr),
             view.ssim
         )?;

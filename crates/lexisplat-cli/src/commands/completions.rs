@@ -1,13 +1,12 @@
 //! `lexisplat completions`.
 
 use anyhow::Result;
-use clap::CommandFactory;
 
-use crate::args::{Cli, Completions};
-use crate::files::print;
+use crate::args::{Completions, command};
+use crate::terminal::print_unescaped;
 
 pub(crate) fn run(args: &Completions) -> Result<()> {
     let mut script = Vec::new();
-    clap_complete::generate(args.shell, &mut Cli::command(), "lexisplat", &mut script);
-    print(&String::from_utf8_lossy(&script))
+    clap_complete::generate(args.shell, &mut command(), "lexisplat", &mut script);
+    print_unescaped(&String::from_utf8_lossy(&script))
 }

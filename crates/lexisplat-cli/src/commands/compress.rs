@@ -1,24 +1,24 @@
 //! `lexisplat compress`.
 
+use std::fmt::Write as _;
 use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::output::Output;
-use lexisplat::ply::{PlyChunks, ReadOptions};
-use lexisplat::stream::Compressed;
-use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, lexi, ply, stream};
-use serde_json::json;
-
-use lexisplat_eval::format;
+use lexisplat::packed::{PackOptions, TargetRecord};
+use lexisplat::ply::{PlySource, ReadOptions};
+use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, Record, lexi};
+use lexisplat_eval::compression::SensitivitySource;
+use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
+use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
-use crate::files::{check_output, existing, input, is_pipe, output_path, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, new_output, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// Bytes of SH-rest a coefficient takes in a PLY.
-const COEFFICIENT_BYTES: u64 = 4;
+/// Largest value of an 8-bit channel.
+const LEVELS: f32 = 255.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let start = Instant::now();
@@ -39,8 +39,72 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         None => Work::Files(1),
         Some(_) => Work::Files(2),
     });
-    let layout = args.chosen_layout()?;
     let limits = common.limits()?;
+    let compression = compression(args, &limits)?;
+
+    let (name, bytes) = input(&args.input, common)?;
+    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
+    let bars = Bars::new(common.quiet);
+    let source = PlySource::open(&name, &bytes, &read, &bars)?;
+    warn(&name, source.warnings());
+    let opened = start.elapsed().as_secs_f64();
+    let mut report = write_output(&output, common.overwrite, |sink| {
+        compression.run(&source, sink, &bars).map_err(|error| match error {
+            lexisplat_eval::Error::Codec(error) => anyhow::Error::from(error),
+            error => error.into(),
+        })
+    })?;
+    if let (Some(path), Some(dictionary)) = (&args.save_dictionary, &report.dictionary) {
+        lexi::write_dictionary(new_output(path, common.overwrite), dictionary)?;
+    }
+    report.read_seconds += opened;
+    report.total_seconds = start.elapsed().as_secs_f64();
+    let json = || {
+        let mut value = serde_json::to_value(&report)?;
+        value["output"] = output.display().to_string().into();
+        Ok(value)
+    };
+    tell(common, &output, json, || text(&report, &output))
+}
+
+/// The choices of the library that the options mean.
+fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
+    let layout = args.chosen_layout()?;
+    if layout != Layout::Packed {
+        return Ok(exact(args, layout, limits)?.into());
+    }
+    let mut options = PackOptions::default();
+    options.tolerance = args.tol;
+    options.atoms = args.atoms;
+    options.keep_order = args.keep_order;
+    options.seed = args.seed;
+    let preset = args.preset.unwrap_or_default();
+    if args.guess {
+        return Ok(Compression::Heuristic(preset, options));
+    }
+    let targets = [
+        args.psnr.map(Target::MeanPsnr),
+        args.min_psnr.map(Target::MinPsnr),
+        args.size.map(Target::Size),
+        args.ratio.map(Target::Ratio),
+    ];
+    let target = targets.into_iter().flatten().next();
+    let mut packing = Packing::new(target.map_or(Quality::Preset(preset), Quality::Target))
+        .with_options(options)
+        .with_device(args.device)
+        .with_memory(args.memory);
+    if let Some(path) = &args.cameras {
+        let set = read_views(path, &mut |_| None)?;
+        warn("cameras", &set.warnings);
+        packing = packing.with_cameras(set.cameras);
+    }
+    if let Some(levels) = args.prune {
+        packing = packing.with_prune(levels);
+    }
+    Ok(packing.into())
+}
+
+fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOptions> {
     let mut options = CompressOptions::default();
     options.tolerance = match (args.tol, args.max_nnz) {
         (None, Some(_)) => None,
@@ -53,183 +117,121 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
     if let Some(path) = &args.dictionary {
-        options.dictionary = Some(lexi::read_dictionary(path, &limits)?);
+        options.dictionary = Some(lexi::read_dictionary(path, limits)?);
     }
+    Ok(options)
+}
 
-    let (name, bytes) = input(&args.input, common)?;
-    let read = ReadOptions { drop_invalid: args.drop_invalid, limits };
-    if layout == Layout::Packed && super::pack::is_large(args, bytes.len())? {
-        let bars = Bars::new(common.quiet);
-        let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
-        warn(&name, chunks.warnings());
-        return super::pack::run_in_parts(args, common, &output, &chunks, &bars, start);
-    }
-    if layout == Layout::Packed {
-        let read = ply::read_bytes(&name, &bytes, &read)?;
-        warn(&name, &read.warnings);
-        return super::pack::run(args, common, &output, read, start);
-    }
-    let bars = Bars::new(common.quiet);
-    let chunks = PlyChunks::open(&name, &bytes, &read, &bars)?;
-    warn(&name, chunks.warnings());
-    let read_seconds = start.elapsed().as_secs_f64();
-    let done = write_output(
-        &output,
-        common.overwrite,
-        |path| stream::compress_file(&chunks, &options, path, &bars),
-        |out| stream::compress_to(&chunks, &options, out, &bars),
+fn text(report: &CompressionReport, output: &Path) -> Result<String> {
+    let CompressionReport { gaussians, atoms, record, learn_seconds, code_seconds, .. } = report;
+    let dim = report.nonzero_histogram.len().saturating_sub(1);
+    let each = |bytes: f64| bytes / (*gaussians).max(1) as f64;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "numbers to look at")]
+    let whole = |number: f64| number.round() as u64;
+    let mut out = String::new();
+    let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
+    let count = format::count(*gaussians as u64);
+    line("wrote", format!("{}: {count} Gaussians, SH degree {}", output.display(), report.sh_degree))?;
+    line(
+        "file bytes",
+        format!(
+            "{} of {}: {} smaller (whole file against the PLY), {:.2} bytes a Gaussian",
+            format::bytes(report.file_bytes),
+            format::bytes(report.source_bytes),
+            format::ratio(report.source_bytes, report.file_bytes),
+            each(report.file_bytes as f64)
+        ),
     )?;
-    if let Some(path) = &args.save_dictionary {
-        lexi::write_dictionary(Output::new(path, existing(common.overwrite)), &done.dictionary)?;
-    }
-    let outcome = Outcome {
-        output: &output,
-        done: &done,
-        ply_bytes: chunks.summary().file_bytes,
-        seconds: [read_seconds, start.elapsed().as_secs_f64()],
-    };
-    tell(common, &output, || Ok(outcome.json(chunks.warnings())), || outcome.text())
-}
-
-/// What was done, to be told in text or JSON.
-struct Outcome<'a> {
-    output: &'a Path,
-    done: &'a Compressed,
-    ply_bytes: u64,
-    /// Reading, everything.
-    seconds: [f64; 2],
-}
-
-impl Outcome<'_> {
-    fn dense_sh_bytes(&self) -> u64 {
-        (self.done.gaussians * self.done.dictionary.dim()) as u64 * COEFFICIENT_BYTES
-    }
-
-    fn json(&self, warnings: &[String]) -> serde_json::Value {
-        let (done, report, record) = (self.done, &self.done.report, &self.done.record);
-        let attributes: serde_json::Map<String, serde_json::Value> =
-            done.attribute_bytes.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect();
-        json!({
-            "output": self.output.display().to_string(),
-            "gaussians": done.gaussians,
-            "sh_degree": done.dictionary.degree().get(),
-            "atoms": done.dictionary.len(),
-            "pursuit": record.pursuit.name(),
-            "layout": record.layout.name(),
-            "tol": record.tolerance,
-            "max_nnz": record.max_nonzeros,
-            "seed": record.seed,
-            "mean_nonzeros": report.mean_nonzeros,
-            "coefficient_ratio": report.coefficient_ratio(),
-            "nonzero_histogram": report.nonzero_histogram,
-            "escapes": report.escapes,
-            "over_tolerance": record.over_tolerance,
-            "max_residual": record.max_residual,
-            "rms_residual": record.rms_residual,
-            "ply_bytes": self.ply_bytes,
-            "file_bytes": done.file_bytes(),
-            "sh_bytes": done.sh_bytes(),
-            "dense_sh_bytes": self.dense_sh_bytes(),
-            "attribute_bytes": attributes,
-            "learn_rounds": report.learned.as_ref().map(|l| l.rounds),
-            "learn_sample": report.learned.as_ref().map(|l| l.sample),
-            "held_out_nonzeros": report.learned.as_ref().map(|l| l.held_out_nonzeros),
-            "read_seconds": self.seconds[0],
-            "learn_seconds": report.learn_seconds,
-            "code_seconds": report.code_seconds,
-            "write_seconds": done.write_seconds,
-            "total_seconds": self.seconds[1],
-            "warnings": warnings,
-        })
-    }
-
-    fn text(&self) -> Result<String> {
-        use std::fmt::Write as _;
-        let (done, report, record) = (self.done, &self.done.report, &self.done.record);
-        let dim = done.dictionary.dim();
-        let mut out = String::new();
-        let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-        let gaussians = format::count(done.gaussians as u64);
+    if dim > 0 {
+        let (sh, dense) = (whole(report.sh_bytes), report.dense_sh_bytes);
+        let ratio = format::ratio(dense, sh);
+        let (sh, dense) = (format::bytes(sh), format::bytes(dense));
         line(
-            "wrote",
+            "SH bytes",
+            format!("{sh} of {dense}: {ratio} smaller (dictionary, codes, escapes; against dense f32)"),
+        )?;
+    }
+    let bits: Vec<String> = report
+        .attribute_bytes
+        .iter()
+        .map(|(name, bytes)| format!("{name} {:.1}", each(8.0 * bytes)))
+        .collect();
+    line("bits each", bits.join(", "))?;
+    if let Some(pruned) = report.pruned {
+        line(
+            "pruned",
             format!(
-                "{}: {gaussians} Gaussians, SH degree {}",
-                self.output.display(),
-                done.dictionary.degree()
+                "{} Gaussians; no pixel of {} views changes by more than {:.2} of 255 levels without them",
+                format::count(pruned.removed as u64),
+                pruned.views,
+                pruned.largest_change * LEVELS
             ),
         )?;
-        match &report.learned {
-            Some(l) if dim > 0 => {
-                let sample = format::count(l.sample as u64);
-                let atoms = done.dictionary.len();
-                line(
-                    "dictionary",
-                    format!(
-                        "{atoms} atoms from {sample} Gaussians in {} rounds, {:.1} s",
-                        l.rounds, report.learn_seconds
-                    ),
-                )?;
-            }
-            Some(_) => line("dictionary", "none: no view-dependent colour".to_owned())?,
-            None => line("dictionary", format!("{} atoms, given", done.dictionary.len()))?,
+    }
+    if let Some(target) = &report.target {
+        line("pictures", target_line(target))?;
+    }
+    let dictionary = match (report.learn_sample, report.learn_rounds) {
+        _ if dim == 0 => "none: the scene has no view-dependent colour".to_owned(),
+        (Some(sample), Some(rounds)) => {
+            let sample = format::count(sample as u64);
+            format!("{atoms} atoms from {sample} Gaussians in {rounds} rounds, {learn_seconds:.1} s")
         }
-        if let Some(ratio) = report.coefficient_ratio() {
-            let rate = done.gaussians as f64 / report.code_seconds.max(1e-9);
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a rate to look at")]
-            let rate = format::count(rate as u64);
-            line(
-                "codes",
-                format!(
-                    "{:.2} of {dim} nonzeros a Gaussian: {ratio:.2}x fewer coefficients (the paper's ratio), {:.1} s, {rate} a second",
-                    report.mean_nonzeros, report.code_seconds
-                ),
-            )?;
-        }
+        _ if record.layout == Layout::Packed => format!("{atoms} atoms, {learn_seconds:.1} s"),
+        _ => format!("{atoms} atoms, given"),
+    };
+    line("dictionary", dictionary)?;
+    if let Some(ratio) = report.coefficient_ratio {
+        let rate = format::count(whole(*gaussians as f64 / code_seconds.max(1e-9)));
+        let nonzeros = report.mean_nonzeros;
+        line(
+            "codes",
+            format!(
+                "{nonzeros:.2} of {dim} nonzeros a Gaussian: {ratio:.2}x fewer coefficients (the paper's ratio), {code_seconds:.1} s, {rate} a second"
+            ),
+        )?;
+    }
+    if record.layout != Layout::Packed || record.tolerance.is_some() {
         line("error", error_line(record))?;
         if report.escapes > 0 {
-            line("escapes", format!("{} Gaussians stored exactly", format::count(report.escapes)))?;
+            line("escapes", format!("{} Gaussians' SH stored exactly", format::count(report.escapes)))?;
         }
-        let sh = done.sh_bytes();
-        if dim > 0 {
-            let dense = self.dense_sh_bytes();
-            line(
-                "SH bytes",
-                format!(
-                    "{} of {}: {} smaller (dictionary, codes, escapes; against dense f32)",
-                    format::bytes(sh),
-                    format::bytes(dense),
-                    format::ratio(dense, sh)
-                ),
-            )?;
-        }
-        line(
-            "file bytes",
-            format!(
-                "{} of {}: {} smaller (whole file against the PLY)",
-                format::bytes(done.file_bytes()),
-                format::bytes(self.ply_bytes),
-                format::ratio(self.ply_bytes, done.file_bytes())
-            ),
-        )?;
-        let parts: Vec<String> = done
-            .attribute_bytes
-            .iter()
-            .map(|(name, bytes)| format!("{name} {}", format::bytes(*bytes)))
-            .collect();
-        line("of which", parts.join(", "))?;
-        Ok(out)
+    }
+    if report.importance == Some(SensitivitySource::Heuristic) {
+        line("scene", "what shows was guessed from each Gaussian alone".to_owned())?;
+    } else if report.in_parts {
+        line("scene", "larger than --memory, so it was measured and packed part by part".to_owned())?;
+    }
+    line(
+        "seconds",
+        format!(
+            "{:.1}: reading {:.1}, looking {:.1}, packing {:.1}, writing {:.1}",
+            report.total_seconds,
+            report.read_seconds,
+            report.look_seconds,
+            report.pack_seconds,
+            report.write_seconds
+        ),
+    )?;
+    Ok(out)
+}
+
+/// The largest errors, and what was promised.
+pub(crate) fn error_line(record: &Record) -> String {
+    let found = format!("maximum {:.6}, RMS {:.6}", record.max_residual, record.rms_residual);
+    match (record.tolerance, record.max_nonzeros) {
+        (Some(tol), None) => format!("{found}; promised: at most {tol} for every Gaussian"),
+        (Some(tol), Some(cap)) => format!(
+            "{found}; {} Gaussians are over {tol}, because no more than {cap} nonzeros were allowed",
+            format::count(record.over_tolerance)
+        ),
+        (None, _) => format!("{found}; nothing was promised"),
     }
 }
 
-/// The realised error beside what was promised.
-pub(crate) fn error_line(record: &lexisplat::Record) -> String {
-    let realised = format!("maximum {:.6}, RMS {:.6}", record.max_residual, record.rms_residual);
-    match (record.tolerance, record.max_nonzeros) {
-        (Some(tol), None) => format!("{realised}; promised: at most {tol} for every Gaussian"),
-        (Some(tol), Some(cap)) => format!(
-            "{realised}; {} Gaussians are over {tol} (at most {cap} nonzeros were allowed, so nothing is promised)",
-            format::count(record.over_tolerance)
-        ),
-        (None, _) => format!("{realised}; nothing is promised without --tol"),
-    }
+/// What a file of a given quality or size reached.
+pub(crate) fn target_line(target: &TargetRecord) -> String {
+    let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
+    let kind = if *cameras { "given cameras" } else { "generated views" };
+    format!("{mean_psnr:.2} dB on average, {min_psnr:.2} dB at worst, over {views} {kind}")
 }

@@ -26,12 +26,7 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.input, common)?;
     let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
     let bars = Bars::new(common.quiet);
-    let bytes = write_output(
-        &output,
-        common.overwrite,
-        |path| stream::decompress_file(&lexi, path, &bars),
-        |out| stream::decompress_to(&lexi, out, &bars),
-    )?;
+    let bytes = write_output(&output, common.overwrite, |sink| stream::decompress(&lexi, sink, &bars))?;
     let seconds = start.elapsed().as_secs_f64();
     let name = output.display();
     if common.json {

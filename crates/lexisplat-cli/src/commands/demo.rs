@@ -4,46 +4,50 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::output::Output;
-use lexisplat::{CompressOptions, Progress, compress, lexi, ply};
-use lexisplat_eval::{CompareOptions, ORBIT_SIZE, compare, format, montage, png};
-use lexisplat_render::{Image, Renderer, Scene, orbit};
+use lexisplat::packed::PackOptions;
+use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, lexi, ply};
+use lexisplat_eval::{
+    Comparison, Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing, compare, format, montage,
+    png,
+};
+use lexisplat_render::{Camera, Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
-use lexisplat_sweep::report::{Picture, Report, html};
+use lexisplat_sweep::report::{CompressedFile, Picture, Report, jpeg, page};
 use serde_json::json;
 
 use super::compress::error_line;
 use crate::args::{Common, Demo};
-use crate::files::{check_free, existing, make_folder, note, print, print_json, view_name, write_bytes};
+use crate::files::{check_free, make_folder, new_output, note, print, print_json, view_name, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
 /// Views drawn and compared.
 const VIEWS: usize = 6;
-/// What the demo makes beside the pictures.
-const FILES: [&str; 3] = ["scene.ply", "scene.lexi", "report.html"];
+/// What the demo makes beside the pictures: the scene, the packed file, the exact file, the page.
+const FILES: [&str; 4] = ["scene.ply", "scene.lexi", "scene-exact.lexi", "report.html"];
+/// The pictures of a view.
+const PARTS: [&str; 3] = ["original", "compressed", "difference"];
 
-/// One view as PNG files.
+/// One view: the JPEG files of its pictures, in the order of [`PARTS`].
 struct Drawn {
     name: String,
-    original: Vec<u8>,
-    compressed: Vec<u8>,
-    difference: Vec<u8>,
+    jpegs: [Vec<u8>; PARTS.len()],
 }
 
 impl Drawn {
-    fn new(name: &str, original: &Image, compressed: &Image) -> Result<Self> {
-        let encode = |image: &Image| png(image.width, image.height, &image.to_8bit());
-        Ok(Self {
-            name: name.to_owned(),
-            original: encode(original)?,
-            compressed: encode(compressed)?,
-            difference: encode(&montage::difference(original, compressed))?,
-        })
-    }
-
-    fn parts(&self) -> [(&str, &[u8]); 3] {
-        [("original", &self.original), ("compressed", &self.compressed), ("difference", &self.difference)]
+    /// Writes the pictures of a view as PNG files to `folder`.
+    fn save(folder: &Path, index: usize, name: &str, original: &Image, compressed: &Image) -> Result<Self> {
+        let difference = montage::difference(original, compressed);
+        let mut jpegs = [const { Vec::new() }; PARTS.len()];
+        for ((image, part), bytes) in
+            [original, compressed, &difference].into_iter().zip(PARTS).zip(&mut jpegs)
+        {
+            let file = folder.join(view_name(index, VIEWS, &format!("{name}_{part}")));
+            // The folder belongs to the demo, whose other files were free or may be replaced.
+            write_bytes(&file, &png(image.width, image.height, &image.to_8bit())?, true)?;
+            *bytes = jpeg(image)?;
+        }
+        Ok(Self { name: name.to_owned(), jpegs })
     }
 }
 
@@ -53,7 +57,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     for name in FILES {
         check_free(&folder.join(name), &[], common.overwrite)?;
     }
-    stop::while_writing(Work::Files(FILES.len() + 3 * VIEWS));
+    stop::while_writing(Work::Files(FILES.len() + PARTS.len() * VIEWS));
     let views_folder = folder.join("views");
     make_folder(&views_folder)?;
     let say = |text: &str| {
@@ -61,113 +65,125 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
             note(text);
         }
     };
-    let [ply_path, lexi_path, report_path] = FILES.map(|name| folder.join(name));
-
-    say("1. making a scene: a still life of glossy and matte things, as a trainer would leave it");
-    let splats = scene(&SampleOptions::new(args.gaussians, args.seed));
-    let ply_bytes = ply::write(Output::new(&ply_path, existing(common.overwrite)), &splats)?;
-
-    say("2. compressing it: learning a dictionary, coding every Gaussian, checking every error");
+    let [ply_path, packed_path, exact_path, page_path] = FILES.map(|name| folder.join(name));
     let bars = Bars::new(common.quiet);
+
+    say("1. making a scene: a still life of glossy and matt things, as a trainer would leave it");
+    let splats = scene(&SampleOptions::new(args.gaussians, args.seed));
+    let ply_bytes = ply::write(new_output(&ply_path, common.overwrite), &splats)?;
+
+    say("2. packing it: measuring what pictures depend on, rounding everything to that, entropy coding");
+    let mut packing = PackOptions::default();
+    packing.seed = args.seed;
+    let write = |compression: Compression, path: &Path| -> Result<(CompressionReport, Model)> {
+        let report = compression.run(&splats, new_output(path, common.overwrite), &bars)?;
+        Ok((report, lexi::read(path, &Limits::default())?))
+    };
+    let (packed_report, packed) = write(Packing::default().with_options(packing).into(), &packed_path)?;
+
+    say("3. compressing it with exact geometry: learning a dictionary, coding, checking every error");
     let mut options = CompressOptions::default();
     options.seed = args.seed;
-    let (model, report) = compress(splats.clone(), &options, &bars)?;
-    let file_bytes = lexi::write(Output::new(&lexi_path, existing(common.overwrite)), &model)?;
+    let (report, exact) = write(options.into(), &exact_path)?;
 
-    say("3. drawing both, the compressed one straight from its codes, and comparing");
+    say("4. drawing all three, the compressed ones straight from their codes, and comparing");
     let cameras = orbit(&splats.geometry, VIEWS, ORBIT_SIZE.0, ORBIT_SIZE.1);
-    bars.start("drawing", "views", cameras.len() as u64);
-    let mut drawn = Vec::new();
-    let mut failure = None;
-    let (a, b) = (Scene::from(&splats), Scene::from(&model));
-    let comparison = compare(
-        &mut Renderer::cpu(),
-        &a,
-        &b,
-        &cameras,
-        &CompareOptions::default(),
-        &mut |view, original, compressed| {
-            match Drawn::new(&view.name, original, compressed) {
-                Ok(view) => drawn.push(view),
-                Err(error) => failure = failure.take().or(Some(error)),
-            }
-            bars.advance(1);
-        },
-    )?;
-    bars.end();
-    if let Some(error) = failure {
-        return Err(error);
-    }
-    save(&views_folder, &drawn)?;
+    let mut drawn: Vec<Drawn> = Vec::new();
+    let packed_scores = compared(&splats, &packed, &cameras, &bars, |name, original, compressed| {
+        drawn.push(Drawn::save(&views_folder, drawn.len(), name, original, compressed)?);
+        Ok(())
+    })?;
+    let exact_scores = compared(&splats, &exact, &cameras, &bars, |_, _, _| Ok(()))?;
 
-    say("4. writing the report");
+    say("5. writing the report");
     let pictures: Vec<Picture<'_>> = drawn
         .iter()
-        .map(|d| Picture {
-            name: &d.name,
-            original: &d.original,
-            compressed: &d.compressed,
-            difference: &d.difference,
+        .map(|Drawn { name, jpegs: [original, compressed, difference] }| Picture {
+            name,
+            original,
+            compressed,
+            difference,
         })
         .collect();
-    let page = html(&Report {
+    let page = page(&Report {
         title: "lexisplat demo",
         command: "lexisplat demo",
-        model: &model,
         ply_bytes,
-        file_bytes,
-        attributes: &lexi::attribute_bytes(&model)?,
+        packed: CompressedFile {
+            name: FILES[1],
+            bytes: packed_report.file_bytes,
+            attributes: &packed_report.attribute_bytes,
+            comparison: &packed_scores,
+        },
+        exact: CompressedFile {
+            name: FILES[2],
+            bytes: report.file_bytes,
+            attributes: &report.attribute_bytes,
+            comparison: &exact_scores,
+        },
+        model: &exact,
         learn_seconds: report.learn_seconds,
         code_seconds: report.code_seconds,
-        comparison: &comparison,
         pictures: &pictures,
         amplification: montage::AMPLIFICATION,
     });
-    write_bytes(&report_path, page.as_bytes(), common.overwrite)?;
+    write_bytes(&page_path, page.as_bytes(), common.overwrite)?;
 
     let seconds = start.elapsed().as_secs_f64();
     if common.json {
+        let file = |name: &str, bytes: u64, scores: &Comparison| json!({ "file": name, "bytes": bytes, "psnr": scores.psnr, "ssim": scores.ssim });
+        let mut exact_file = file(FILES[2], report.file_bytes, &exact_scores);
+        exact_file["mean_nonzeros"] = json!(report.mean_nonzeros);
+        exact_file["coefficient_ratio"] = json!(report.coefficient_ratio);
+        exact_file["sh_bytes"] = json!(report.sh_bytes);
+        exact_file["max_residual"] = json!(exact.record.max_residual);
+        exact_file["rms_residual"] = json!(exact.record.rms_residual);
         return print_json(&json!({
             "folder": folder.display().to_string(),
-            "gaussians": model.len(),
-            "mean_nonzeros": report.mean_nonzeros,
-            "coefficient_ratio": report.coefficient_ratio(),
+            "gaussians": exact.len(),
             "ply_bytes": ply_bytes,
-            "file_bytes": file_bytes,
-            "sh_bytes": lexi::sh_bytes(&model)?,
-            "max_residual": model.record.max_residual,
-            "rms_residual": model.record.rms_residual,
-            "psnr": comparison.psnr,
-            "ssim": comparison.ssim,
+            "packed": file(FILES[1], packed_report.file_bytes, &packed_scores),
+            "exact": exact_file,
             "total_seconds": seconds,
         }));
     }
     if common.quiet {
         return Ok(());
     }
-    let report_name = report_path.display();
+    let line = |name: &str, bytes: u64, what: &str, scores: &Comparison| {
+        format!(
+            "{name:<17} {}, {} smaller, {what}: pictures {} on average, {} at worst, over {} views\n",
+            format::bytes(bytes),
+            format::ratio(ply_bytes, bytes),
+            format::decibels(scores.psnr.mean),
+            format::decibels(scores.psnr.min),
+            scores.views.len(),
+        )
+    };
     print(&format!(
-        "\nscene.ply    {}, {} Gaussians\nscene.lexi   {}: {} smaller (whole file), {:.2} of 45 nonzeros a Gaussian\nerror        {}\npictures     {} on average, {} at worst, over {} views\n\nOpen {report_name} in a browser ({seconds:.0} s in all).\n",
+        "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser ({seconds:.0} s in all).\n",
+        FILES[0],
         format::bytes(ply_bytes),
-        format::count(model.len() as u64),
-        format::bytes(file_bytes),
-        format::ratio(ply_bytes, file_bytes),
-        report.mean_nonzeros,
-        error_line(&model.record),
-        format::decibels(comparison.psnr.mean),
-        format::decibels(comparison.psnr.min),
-        comparison.views.len(),
+        format::count(exact.len() as u64),
+        line(FILES[1], packed_report.file_bytes, "packed", &packed_scores),
+        line(FILES[2], report.file_bytes, "geometry exact", &exact_scores),
+        "",
+        error_line(&exact.record),
+        page_path.display(),
     ))
 }
 
-/// Writes the pictures of all views, three a view.
-fn save(folder: &Path, drawn: &[Drawn]) -> Result<()> {
-    for (i, view) in drawn.iter().enumerate() {
-        for (part, bytes) in view.parts() {
-            let name = view_name(i, drawn.len(), &format!("{}_{part}", view.name));
-            // Names of pictures follow from those of the files, which were free or may be replaced.
-            write_bytes(&folder.join(name), bytes, true)?;
-        }
-    }
-    Ok(())
+/// Compares `compressed` with `original`. `draw` gets the name and both pictures of each view.
+fn compared(
+    original: &Splats,
+    compressed: &Model,
+    cameras: &[Camera],
+    progress: &dyn Progress,
+    mut draw: impl FnMut(&str, &Image, &Image) -> Result<()>,
+) -> Result<Comparison> {
+    let (original, compressed) = (Scene::from(original), Scene::from(compressed));
+    let (mut renderer, options) = (Renderer::cpu(), DrawOptions::default());
+    compare(&mut renderer, &original, &compressed, cameras, &options, progress, |view, a, b| {
+        draw(&view.name, a, b)
+    })
 }

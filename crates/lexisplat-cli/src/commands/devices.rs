@@ -3,10 +3,11 @@
 use anyhow::Result;
 use lexisplat::simd::Simd;
 use lexisplat_eval::format;
-use lexisplat_render::gpu::{AdapterSummary, adapters};
+use lexisplat_render::gpu::AdapterSummary;
 use serde_json::json;
 
 use crate::args::Common;
+use crate::device::adapters;
 use crate::files::{print, print_json};
 
 pub(crate) fn run(common: &Common) -> Result<()> {
@@ -27,23 +28,23 @@ pub(crate) fn run(common: &Common) -> Result<()> {
             })
             .collect();
         let available: Vec<_> = Simd::available().into_iter().map(Simd::name).collect();
-        let processor = json!({ "simd": Simd::detect().name(), "available": available });
+        let processor = json!({ "simd": Simd::current().name(), "available": available });
         return print_json(&json!({ "devices": list, "processor": processor }));
     }
-    let simd = Simd::detect().name();
+    let simd = Simd::current().name();
     if found.is_empty() {
         return print(&format!(
-            "no GPU was found: everything is drawn on the processor (cpu, {simd})\n\
-             A Vulkan, Metal or DX12 driver is needed; on Debian and Ubuntu, mesa-vulkan-drivers and libvulkan1\n\
-             bring one for many GPUs, and a software one.\n"
+            "no GPU was found: everything is drawn on the CPU (cpu, {simd})\n\
+             A GPU needs a Vulkan, Metal or DX12 driver. On Debian and Ubuntu the packages mesa-vulkan-drivers\n\
+             and libvulkan1 have drivers for many GPUs, and one that emulates a GPU in software.\n"
         ));
     }
     let lines: String = found.iter().map(line).collect();
-    print(&format!("{lines}cpu  the processor ({simd}); the same pictures bit for bit on every machine\n"))
+    print(&format!("{lines}cpu  the CPU ({simd}); it draws the same pictures bit for bit on every machine\n"))
 }
 
 fn line(a: &AdapterSummary) -> String {
-    let kind = if a.software { "software: not taken by `auto`" } else { "GPU" };
+    let kind = if a.software { "emulated in software, never chosen by `auto`" } else { "GPU" };
     let times = if a.timestamps { "" } else { ", without stage times" };
     let largest = format::bytes(a.max_binding);
     format!(

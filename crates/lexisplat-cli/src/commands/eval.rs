@@ -1,26 +1,41 @@
 //! `lexisplat eval`.
 
 use std::fmt::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use lexisplat::Progress;
 use lexisplat_eval::metrics::Metric;
-use lexisplat_eval::views::{ChosenViews, View, photo};
+use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
 use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, format, montage, png, score_views,
+    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, format, misfit, montage, png,
+    score_views,
 };
-use lexisplat_render::{Camera, Image, Renderer};
-use serde_json::{Value, json};
+use lexisplat_render::{Camera, Image};
+use serde::Serialize;
 
 use crate::args::{Common, Eval, Measures};
+use crate::device::open_renderer;
 use crate::files::{
     check_free, check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
 };
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// What was found out about a model.
+/// The scores of models.
+#[derive(Serialize)]
+struct Report<'a> {
+    original: Option<String>,
+    images: Option<String>,
+    views_from: &'a str,
+    views: usize,
+    device: &'a str,
+    eight_bit: bool,
+    models: Vec<Scored>,
+    warnings: Vec<String>,
+}
+
+/// The scores of a model.
+#[derive(Serialize)]
 struct Scored {
     file: String,
     bytes: u64,
@@ -30,7 +45,7 @@ struct Scored {
 }
 
 impl Scored {
-    /// The comparisons there are, with names.
+    /// The comparisons there are, and what they are with.
     fn comparisons(&self) -> impl Iterator<Item = (&'static str, &Comparison)> {
         [("photos", &self.to_photos), ("original", &self.to_original)]
             .into_iter()
@@ -50,30 +65,29 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         stop::while_writing(Work::Files(usize::MAX));
     }
     let scorer = scorer(&args.measures)?;
-    let mut renderer = Renderer::open(args.views.device)?;
-    let drawing = DrawOptions { background: args.views.background, eight_bit: args.measures.eight_bit };
-    // Views that are generated fit the original; all models are seen from the same.
+    let mut renderer = open_renderer(args.views.device)?;
+    let drawing = DrawOptions::new(args.views.background, args.measures.eight_bit);
+    // Generated views fit the original, and all models are drawn from the same views.
     let original = args.original.as_deref().map(|path| load(path, common)).transpose()?;
     let first = match &original {
         Some(_) => None,
         None => Some(load(&args.models[0], common)?),
     };
     let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
-    let found = args.views.find(reference.scene().geometry(), Some(&args.photos))?;
+    let found = find_views(&args.views.options(Some(&args.photos)), reference.scene().geometry())?;
     warn("views", &found.warnings);
     let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
     let photos = photos(&found, args.views.background)?;
     let bars = Bars::new(common.quiet);
-    let pictures = args.models.len() + usize::from(original.is_some());
-    bars.start("drawing", "views", (pictures * cameras.len()) as u64);
     let originals = match &original {
         Some(original) => {
             warn_of(original);
-            draw_views(&mut renderer, &original.scene(), &cameras, &drawing, &mut || bars.advance(1))?
+            draw_views(&mut renderer, &original.scene(), &cameras, &drawing, &bars)?
         }
         None => Vec::new(),
     };
-    let mut scored = Vec::new();
+    let mut models = Vec::new();
+    let mut warnings = found.warnings;
     let mut first = first;
     for path in &args.models {
         let model = match first.take() {
@@ -81,34 +95,44 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
             None => load(path, common)?,
         };
         warn_of(&model);
-        let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &mut || bars.advance(1))?;
+        let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &bars)?;
         let against = |references: &[Image]| {
             let given = !references.is_empty();
             given.then(|| score_views(&scorer, &cameras, references, &drawn)).transpose()
         };
         let (to_photos, to_original) = (against(&photos)?, against(&originals)?);
+        let misfits = misfit(&model.name, &drawn, drawing.background, to_photos.as_ref());
+        warn("views", &misfits);
+        warnings.extend(misfits);
         if let Some(folder) = &args.save_views {
             let references = if photos.is_empty() { &originals } else { &photos };
             save(&folder.join(path.file_name().unwrap_or_default()), &cameras, references, &drawn, common)?;
         }
         let SceneFile { name, bytes, .. } = &model;
         let gaussians = model.scene().len();
-        scored.push(Scored { file: name.clone(), bytes: *bytes, gaussians, to_photos, to_original });
+        models.push(Scored { file: name.clone(), bytes: *bytes, gaussians, to_photos, to_original });
     }
-    bars.end();
     if let Some(path) = &args.csv {
-        write_bytes(path, csv(&scored)?.as_bytes(), common.overwrite)?;
+        write_bytes(path, csv(&models)?.as_bytes(), common.overwrite)?;
     }
+    let name = |path: &Option<PathBuf>| path.as_ref().map(|path| path.display().to_string());
+    let report = Report {
+        original: name(&args.original),
+        images: name(&args.photos.images),
+        views_from: &found.from,
+        views: cameras.len(),
+        device: renderer.name(),
+        eight_bit: args.measures.eight_bit,
+        models,
+        warnings,
+    };
     if common.json {
-        return print_json(&report(args, &scored, &found, renderer.name()));
+        return print_json(&serde_json::to_value(&report)?);
     }
-    if common.quiet {
-        return Ok(());
-    }
-    print(&table(args, &scored, &found, renderer.name())?)
+    if common.quiet { Ok(()) } else { print(&table(&report)?) }
 }
 
-/// What measures as the options say.
+/// Returns the scorer that the options mean.
 pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
     let mut scorer = Scorer::new();
     if !measures.no_flip {
@@ -120,7 +144,7 @@ pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
     Ok(scorer)
 }
 
-/// The photos of views, in order; none if they have none.
+/// Reads the photos of views, in order. There are none if the views have none.
 fn photos(found: &ChosenViews, background: [f32; 3]) -> Result<Vec<Image>> {
     let with_photos = found.views.iter().filter(|view| view.photo.is_some());
     Ok(with_photos.map(|view: &View| photo(view, background)).collect::<Result<_, _>>()?)
@@ -169,60 +193,26 @@ fn quoted(text: &str) -> String {
     }
 }
 
-fn report(args: &Eval, scored: &[Scored], found: &ChosenViews, device: &str) -> Value {
-    let models: Vec<Value> = scored
-        .iter()
-        .map(|model| {
-            json!({
-                "file": model.file,
-                "bytes": model.bytes,
-                "gaussians": model.gaussians,
-                "to_photos": model.to_photos,
-                "to_original": model.to_original,
-            })
-        })
-        .collect();
-    json!({
-        "original": args.original.as_ref().map(|path| path.display().to_string()),
-        "images": args.photos.images.as_ref().map(|path| path.display().to_string()),
-        "views_from": found.from,
-        "views": found.views.len(),
-        "device": device,
-        "eight_bit": args.measures.eight_bit,
-        "models": models,
-        "warnings": found.warnings,
-    })
-}
-
-fn table(args: &Eval, scored: &[Scored], found: &ChosenViews, device: &str) -> Result<String> {
+fn table(report: &Report<'_>) -> Result<String> {
     let mut out = String::new();
-    for model in scored {
+    for model in &report.models {
         for (against, comparison) in model.comparisons() {
             writeln!(out, "{} against {against}", model.file)?;
             one(&mut out, comparison)?;
             writeln!(out)?;
         }
-        writeln!(
-            out,
-            "{:>10}  {}: {} Gaussians",
-            format::bytes(model.bytes),
-            model.file,
-            format::count(model.gaussians as u64)
-        )?;
+        let (bytes, count) = (format::bytes(model.bytes), format::count(model.gaussians as u64));
+        writeln!(out, "{bytes:>10}  {}: {count} Gaussians", model.file)?;
     }
-    writeln!(out, "{:>10}  {}", found.views.len(), views_line(found, args))?;
-    writeln!(out, "{:>10}  {device}", "drawn on")?;
-    let rounded = if args.measures.eight_bit { "rounded to 8 bits" } else { "not rounded" };
+    let photos = if report.images.is_some() { ", each with a photo" } else { "" };
+    writeln!(out, "{:>10}  views from {}{photos}", report.views, report.views_from)?;
+    writeln!(out, "{:>10}  {}", "drawn on", report.device)?;
+    let rounded = if report.eight_bit { "rounded to 8 bits" } else { "not rounded" };
     writeln!(out, "{:>10}  {rounded} before scoring", "pictures")?;
     Ok(out)
 }
 
-fn views_line(found: &ChosenViews, args: &Eval) -> String {
-    let photos = if args.photos.images.is_some() { ", each with a photo" } else { "" };
-    format!("views from {}{photos}", found.from)
-}
-
-/// A line for every view, and mean, minimum and maximum.
+/// Writes a line for each view, and the mean, minimum and maximum.
 fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
     let metrics: Vec<Metric> = comparison.metrics().collect();
     let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
@@ -234,7 +224,7 @@ fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
     writeln!(out)?;
     for view in &comparison.views {
         let size = format!("{}x{}", view.width, view.height);
-        write!(out, "{:<width$}  {size:>11}", view.name)?;
+        write!(out, "{:<width$}  {size:>11}", format::escape(&view.name))?;
         for (&metric, column) in metrics.iter().zip(&columns) {
             write!(out, "  {:>column$}", number(metric, view.get(metric)))?;
         }

@@ -1,4 +1,5 @@
-//! One file a command, glue only.
+//! The commands, each in a file of its own. They parse nothing and compute nothing: they call the libraries and
+//! print.
 
 mod bench;
 mod compare;
@@ -9,7 +10,6 @@ mod demo;
 mod devices;
 mod eval;
 mod info;
-mod pack;
 mod render;
 mod sweep;
 #[cfg(feature = "view")]
@@ -18,18 +18,32 @@ mod view;
 use anyhow::{Context, Result};
 
 use lexisplat::simd::Simd;
+use lexisplat::{Error, Geometry};
+use lexisplat_eval::views::find_views;
+use lexisplat_render::Camera;
 
-use crate::args::{Cli, Command};
+use crate::args::{Cli, Command, Views};
+use crate::progress;
+use crate::terminal::{note, warn};
+
+/// Most worker threads for each core. More only wait for each other, and very many of them bring a machine to a halt.
+const THREADS_PER_CORE: usize = 4;
+
+/// The environment variable that chooses vector instructions by name.
+const SIMD_VARIABLE: &str = "LEXISPLAT_SIMD";
 
 /// Sets up threads and runs the command.
 pub(crate) fn run(cli: Cli) -> Result<()> {
     let Cli { common, command } = cli;
-    Simd::chosen()?;
+    let simd = instructions()?;
     rayon::ThreadPoolBuilder::new()
-        .num_threads(common.threads)
+        .num_threads(allowed_threads(common.threads))
         .build_global()
         .context("cannot start the worker threads")?;
-    match command {
+    if !common.quiet && !command.is_interactive() {
+        progress::start_lines();
+    }
+    simd.scope(|| match command {
         Command::Compress(args) => compress::run(&args, &common),
         Command::Decompress(args) => decompress::run(&args, &common),
         Command::Info(args) => info::run(&args, &common),
@@ -43,5 +57,40 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Devices(_) => devices::run(&common),
         Command::Demo(args) => demo::run(&args, &common),
         Command::Completions(args) => completions::run(&args),
+    })
+}
+
+/// The vector instructions that the environment asks for, by default the widest.
+fn instructions() -> Result<Simd> {
+    match std::env::var_os(SIMD_VARIABLE) {
+        Some(name) if !name.is_empty() => {
+            let name = name.to_string_lossy();
+            let refusal = || {
+                let names: Vec<&str> = Simd::available().into_iter().map(Simd::name).collect();
+                let expected = format!("{}: this CPU has no other", names.join(" or "));
+                Error::parameter(SIMD_VARIABLE, &name, expected)
+            };
+            Ok(Simd::named(&name).ok_or_else(refusal)?)
+        }
+        _ => Ok(Simd::widest()),
     }
+}
+
+/// Returns the number of worker threads to start when `asked` are wanted, and notes it if that is less.
+fn allowed_threads(asked: usize) -> usize {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let most = cores.saturating_mul(THREADS_PER_CORE);
+    if asked > most {
+        note(&format!(
+            "warning: --threads {asked}: only {most} threads are started, {THREADS_PER_CORE} for each of {cores} cores"
+        ));
+    }
+    asked.min(most)
+}
+
+/// Returns the cameras that `views` mean for a scene, and prints what is odd about them.
+fn cameras(views: &Views, geometry: &Geometry) -> lexisplat_eval::Result<Vec<Camera>> {
+    let found = find_views(&views.options(None), geometry)?;
+    warn("views", &found.warnings);
+    Ok(found.views.into_iter().map(|view| view.camera).collect())
 }

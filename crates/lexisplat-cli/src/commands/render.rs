@@ -1,47 +1,42 @@
 //! `lexisplat render`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::Progress;
 use lexisplat_eval::png;
-use lexisplat_render::{RenderOptions, Renderer};
+use lexisplat_render::RenderOptions;
 use serde_json::json;
 
 use crate::args::{Common, Render};
+use crate::device::open_renderer;
 use crate::files::{
     check_free, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
 };
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
+/// The folder of pictures of standard input.
+const STANDARD_INPUT_VIEWS: &str = "stdin-views";
+
 pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
-    let folder = args.output.clone().unwrap_or_else(|| {
-        let stem = if is_pipe(&args.file) {
-            "stdin".into()
-        } else {
-            args.file.file_stem().unwrap_or_default().to_owned()
-        };
-        let mut name = stem;
-        name.push("-views");
-        args.file.with_file_name(name)
-    });
+    let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
     let input = load(&args.file, common)?;
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = views.choose(scene.geometry())?;
+    let cameras = super::cameras(views, scene.geometry())?;
     let paths: Vec<PathBuf> =
         cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
     for path in &paths {
         check_free(path, &[], common.overwrite)?;
     }
-    let mut renderer = Renderer::open(views.device)?;
+    let mut renderer = open_renderer(views.device)?;
     let prepared = renderer.prepare(scene)?;
     stop::while_writing(Work::Files(paths.len()));
     make_folder(&folder)?;
-    let options = RenderOptions { background: views.background, ..RenderOptions::default() };
+    let options = RenderOptions::default().with_background(views.background);
     let bars = Bars::new(common.quiet);
     bars.start("drawing", "views", cameras.len() as u64);
     let mut done = Vec::new();
@@ -70,9 +65,19 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     }
     let each = drawing * 1000.0 / cameras.len() as f64;
     print(&format!(
-        "wrote {} pictures to {}, {each:.0} ms each to draw ({})\n",
+        "wrote {} pictures to {}, each drawn in {each:.0} ms on average ({})\n",
         cameras.len(),
         folder.display(),
         renderer.name()
     ))
+}
+
+/// Returns the folder for the pictures of the scene `file` if none is given.
+fn folder_for(file: &Path) -> PathBuf {
+    if is_pipe(file) {
+        return PathBuf::from(STANDARD_INPUT_VIEWS);
+    }
+    let mut name = file.file_stem().unwrap_or_default().to_owned();
+    name.push("-views");
+    file.with_file_name(name)
 }

@@ -6,7 +6,6 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::format::printable;
 use lexisplat_eval::{Comparison, Error, SplitFilter, format};
 use lexisplat_sweep::{
     Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, sweep, write_report,
@@ -15,8 +14,9 @@ use serde_json::json;
 
 use super::eval::scorer;
 use crate::args::{Common, Sweep};
+use crate::device::open_gpu;
 use crate::exit::OutputExists;
-use crate::files::{make_folder, print, print_json};
+use crate::files::{make_folder, outputs, print, print_json};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     progress.bars.end();
     let (mut results, pictures) = outcome?;
     results.command = command();
-    let files = write_report(folder, &results, &pictures, args.date.as_deref())?;
+    let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
     if common.json {
         return print_json(&json!({
             "output": folder.display().to_string(),
@@ -83,7 +83,7 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
         entry.cameras.clone_from(&args.views.cameras);
         entry.images.clone_from(&args.photos.images);
         entry.resolution = args.photos.resolution;
-        entry.split = args.views.split.map_or(SplitFilter::Test, Into::into);
+        entry.split = args.views.split.unwrap_or(SplitFilter::Test);
     }
     Ok(entries)
 }
@@ -105,11 +105,12 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.background = args.views.background;
     options.max_width = args.views.width;
     options.generated = args.views.orbit;
-    options.kind = args.views.scene.into();
+    options.kind = args.views.scene;
     options.hold = args.views.hold;
-    options.device = args.views.device;
+    options.gpu = open_gpu(args.views.device)?;
     options.pictures = args.pictures;
     options.resume = !args.fresh;
+    options.outputs = outputs().clone();
     for path in &args.measures.lpips {
         let bytes = std::fs::metadata(path).map_err(|e| lexisplat::Error::io(path, e))?.len();
         write!(options.fingerprint, "{} {bytes}; ", path.display())?;
@@ -140,11 +141,7 @@ struct Shown {
     made: AtomicU64,
 }
 
-impl Progress for Shown {
-    fn is_cancelled(&self) -> bool {
-        self.bars.is_cancelled()
-    }
-}
+impl Progress for Shown {}
 
 impl SweepProgress for Shown {
     fn start(&self, parts: u64) {
@@ -152,7 +149,7 @@ impl SweepProgress for Shown {
     }
 
     fn part(&self, what: &str) {
-        self.bars.say(&printable(what));
+        self.bars.say(what);
     }
 
     fn done(&self, parts: u64, reused: bool) {
@@ -162,7 +159,7 @@ impl SweepProgress for Shown {
     }
 
     fn warn(&self, model: &str, warning: &str) {
-        self.bars.aside(&format!("warning: {}: {}", printable(model), printable(warning)));
+        self.bars.aside(&format!("warning: {model}: {warning}"));
     }
 }
 
@@ -174,7 +171,7 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
         let mut add =
             |setting: &str, bytes: u64, psnr: String, photos: &Option<Comparison>, fps: Option<f64>| {
                 rows.push([
-                    printable(&scene.name),
+                    format::escape(&scene.name).into_owned(),
                     scene.method.to_string(),
                     setting.to_owned(),
                     format::ratio(scene.ply_bytes, bytes),
@@ -208,7 +205,7 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
     )?;
     if let Some(scene) = results.scenes.first() {
         let kind = if scene.on_gpu { "frames a second of" } else { "frames a second on the processor," };
-        writeln!(out, "fps: {kind} {}", printable(&scene.device))?;
+        writeln!(out, "fps: {kind} {}", format::escape(&scene.device))?;
     }
     if !results.skipped.is_empty() {
         writeln!(out, "skipped: {} models, listed in the report", results.skipped.len())?;

@@ -4,13 +4,14 @@ use anyhow::Result;
 use lexisplat_view::Options;
 
 use crate::args::{Common, View};
+use crate::files::outputs;
 
 pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
     let views = &args.views;
     let options = Options {
         files: args.files.clone(),
         cameras: views.cameras.clone(),
-        split: views.split.map_or(lexisplat_eval::SplitFilter::All, Into::into),
+        split: views.split.unwrap_or_default(),
         orbit: views.orbit,
         max_width: views.width,
         background: views.background,
@@ -18,6 +19,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
         overwrite: common.overwrite,
         limits: common.limits()?,
         script: args.actions.clone(),
+        outputs: outputs().clone(),
     };
     Ok(lexisplat_view::run(options)?)
 }

@@ -2,8 +2,10 @@
 
 use std::process::{Command, Output, Stdio};
 
+use lexisplat_testing::{Need, missing};
+
+use super::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready};
 use crate::folder::Folder;
-use crate::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready};
 
 /// Mounts a disk of `$SIZE` on `disk`, puts an output there, runs the command, and shows what is left.
 const ON_A_DISK: &str = r#"
@@ -32,7 +34,7 @@ pub(crate) fn on_a_disk(
     };
     let mut can = unshare(&["mount", "-t", "tmpfs", "none", "disk"]);
     if !can.output().is_ok_and(|ended| ended.status.success()) {
-        eprintln!("skipped: `unshare -rm` cannot mount here");
+        missing(Need::Mounts, "`unshare -rm` cannot mount here");
         return None;
     }
     let old = String::from_utf8(old.unwrap_or(b"no").to_vec()).unwrap();

@@ -1,6 +1,8 @@
 //! `kill -9` at any moment.
 
-use crate::runs::{JOBS, OLD, OUTPUT, Random, assert_old_or_new, program, ready, undisturbed};
+use lexisplat_testing::Random;
+
+use super::runs::{JOBS, OLD, OUTPUT, assert_old_or_new, program, ready, undisturbed};
 
 /// Kills of each job, with and without an output to replace.
 const KILLS: usize = 4;
@@ -11,7 +13,7 @@ const SLACK: f64 = 1.1;
 fn killed_runs_leave_the_output_as_it_was_or_whole() {
     let folder = ready();
     let before = folder.names();
-    let mut random = Random(6);
+    let mut random = Random::new(6);
     let mut killed = 0;
     for job in JOBS {
         let (whole, duration) = undisturbed(&folder, job);
@@ -24,7 +26,7 @@ fn killed_runs_leave_the_output_as_it_was_or_whole() {
                     arguments.push("--overwrite");
                 }
                 let mut child = program(&folder, &arguments).spawn().unwrap();
-                std::thread::sleep(duration.mul_f64(SLACK * random.next()));
+                std::thread::sleep(duration.mul_f64(SLACK * f64::from(random.unit())));
                 child.kill().unwrap();
                 let ended = child.wait().unwrap();
                 killed += usize::from(!ended.success());

@@ -3,13 +3,13 @@
 use std::os::unix::fs::{FileTypeExt, symlink};
 use std::process::Command;
 
+use super::runs::{JOBS, OLD, OUTPUT, program, ready};
 use crate::folder::Folder;
-use crate::runs::{JOBS, OLD, OUTPUT, program, ready};
 
-/// A folder with a PLY that nobody could read: what is refused before it is read is refused for the output.
+/// Returns a folder with a PLY that cannot be read. What is refused before it is read is refused for its output.
 fn unread() -> Folder {
     let folder = Folder::new();
-    std::fs::write(folder.path("bad.ply"), "nonsense").unwrap();
+    std::fs::write(folder.path("bad"), "nonsense").unwrap();
     std::fs::write(folder.path("old"), OLD).unwrap();
     std::fs::create_dir(folder.path("sub")).unwrap();
     folder
@@ -25,11 +25,11 @@ fn bad_outputs_are_refused_before_any_work() {
         ("missing/a", false, 3, "missing/a: no file can be made in the folder missing: No such file"),
         ("old/a", true, 3, "old/a: no file can be made in the folder old: Not a directory"),
         ("/proc/a", true, 3, "/proc/a: no file can be made in the folder /proc: "),
-        ("bad.ply", true, 5, "another file than the input"),
-        ("sub/../bad.ply", true, 5, "another file than the input"),
+        ("bad", true, 5, "another file than the input"),
+        ("sub/../bad", true, 5, "another file than the input"),
     ] {
         for command in ["compress", "decompress"] {
-            let mut arguments = vec![command, "bad.ply", "-o", output];
+            let mut arguments = vec![command, "bad", "-o", output];
             if overwrite {
                 arguments.push("--overwrite");
             }
@@ -39,15 +39,15 @@ fn bad_outputs_are_refused_before_any_work() {
     }
     assert_eq!(folder.names(), before);
     assert_eq!(std::fs::read(folder.path("old")).unwrap(), OLD);
-    // And what is not refused for its output is for its input.
-    folder.fail(&["compress", "bad.ply", "-o", "old", "--overwrite"], 4);
+    // An output that is not refused leaves the input to be refused.
+    folder.fail(&["compress", "bad", "-o", "old", "--overwrite"], 4);
 }
 
 #[test]
 fn two_outputs_are_two_files() {
     let folder = unread();
     for other in ["new", "./new", "sub/../new"] {
-        let arguments = ["compress", "bad.ply", "--tol", "0.1", "-o", "new", "--save-dictionary", other];
+        let arguments = ["compress", "bad", "--tol", "0.1", "-o", "new", "--save-dictionary", other];
         let error = folder.fail(&arguments, 5);
         assert!(error.contains("other outputs"), "{error}");
     }

@@ -6,12 +6,13 @@ use std::time::{Duration, Instant};
 
 use lexisplat::ply;
 use lexisplat_sample::{SampleOptions, scene};
+use lexisplat_testing::{Need, missing};
 
-use crate::folder::Folder;
-use crate::runs::{
+use super::runs::{
     JOBS, OLD, OUTPUT, PATIENCE, PROGRAM, assert_old_or_new, code, program, ready, send, undisturbed,
     wait_until_watching,
 };
+use crate::folder::Folder;
 
 /// Signals with their numbers and exit codes.
 const SIGNALS: [(&str, i32, i32); 3] = [("HUP", 1, 129), ("INT", 2, 130), ("TERM", 15, 143)];
@@ -70,7 +71,7 @@ fn what_is_said_fits_what_was_written() {
     for (arguments, expected) in [
         (&["compress", "-", "-o", OUTPUT][..], "error: stopped by SIGTERM; no output was written\n"),
         (&["compress", "-", "-o", OUTPUT, "--quiet"], "error: stopped by SIGTERM; no output was written\n"),
-        (&["decompress", "-"], "error: stopped by SIGTERM; what went to standard output is not whole\n"),
+        (&["decompress", "-"], "error: stopped by SIGTERM; standard output is incomplete\n"),
         (&["info", "-"], "error: stopped by SIGTERM\n"),
     ] {
         let mut child = waiting(&folder, arguments);
@@ -134,7 +135,7 @@ fn pictures_that_were_written_are_whole() {
     let text = String::from_utf8(ended.stderr).unwrap();
     let found = pictures();
     assert_eq!(code(ended.status), 130, "{text}");
-    let outcome = format!("; {} outputs are whole, no other was written\n", found.len());
+    let outcome = format!("; {} outputs are complete, no other was written\n", found.len());
     assert!((2..60).contains(&found.len()) && text.ends_with(&outcome), "{text}");
     for path in found {
         assert!(image::open(&path).is_ok(), "{}", path.display());
@@ -151,7 +152,7 @@ fn temporary_files_that_have_a_name_are_removed() {
         command
     };
     if !in_namespace().arg("true").status().is_ok_and(|status| status.success()) {
-        eprintln!("skipped: `unshare -rm` cannot mount here");
+        missing(Need::Mounts, "`unshare -rm` cannot mount here");
         return;
     }
     let folder = Folder::new();

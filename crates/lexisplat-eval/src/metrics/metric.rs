@@ -1,10 +1,10 @@
-//! The names of what can be measured.
+//! The metrics by name.
 
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-/// Something measured between two pictures.
+/// A metric of two pictures.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -17,8 +17,8 @@ pub enum Metric {
     Flip,
     /// LPIPS with VGG16, as the `lpips` package computes it: pictures scaled to -1..1 first.
     LpipsVgg,
-    /// LPIPS with VGG16, as the 3DGS repository's `metrics.py` computes it: pictures left in 0..1. Not the
-    /// standard value; tables of 3DGS papers print this one.
+    /// LPIPS with VGG16, as `metrics.py` of the 3DGS repository computes it: pictures left in 0..1. This is not the
+    /// standard value, but tables of 3DGS papers print it.
     LpipsVggInria,
     /// LPIPS with `AlexNet`, as the `lpips` package computes it.
     LpipsAlex,
@@ -38,7 +38,7 @@ impl Metric {
         Self::LpipsAlexInria,
     ];
 
-    /// Name in files: `psnr`, `lpips_vgg_inria` and so on.
+    /// Returns the name in files, such as `lpips_vgg_inria`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -52,7 +52,7 @@ impl Metric {
         }
     }
 
-    /// Name for people.
+    /// Returns the name for people.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
@@ -66,13 +66,13 @@ impl Metric {
         }
     }
 
-    /// Digits after the point that tables print.
+    /// Returns the number of digits after the point in tables.
     #[must_use]
     pub fn digits(self) -> usize {
         if self == Self::Psnr { 2 } else { 4 }
     }
 
-    /// Whether more is better.
+    /// Returns whether larger values are better.
     #[must_use]
     pub fn more_is_better(self) -> bool {
         matches!(self, Self::Psnr | Self::Ssim)

@@ -1,5 +1,5 @@
-//! How far two pictures are apart. Pixels are clipped to 0..1 first, NaN counts as 0, and nothing is
-//! rounded to 8 bits unless the caller did so.
+//! Differences between two pictures. Pixels are clipped to 0..1 first, and NaN counts as 0. Nothing is rounded to 8
+//! bits.
 
 mod flip;
 pub mod lpips;
@@ -18,19 +18,19 @@ use lexisplat_render::Image;
 
 use crate::error::{Error, Result};
 
-/// A colour value as the metrics see it.
+/// Returns a colour value within 0..1, in `f64`.
 #[inline]
 fn clipped(value: f32) -> f64 {
     f64::from(clip(value))
 }
 
-/// `value` within 0..1; NaN is 0.
+/// Returns `value` within 0..1. NaN becomes 0.
 #[inline]
 pub(crate) fn clip(value: f32) -> f32 {
     if value > 0.0 { value.min(1.0) } else { 0.0 }
 }
 
-/// `Ok` if both pictures have the same size and their pixels fill it.
+/// Refuses two pictures of different sizes, and pictures whose pixels do not fill them.
 fn same_size(a: &Image, b: &Image) -> Result<()> {
     let describe = |image: &Image| format!("{} x {}", image.width, image.height);
     if (a.width, a.height) != (b.width, b.height) {

@@ -5,8 +5,8 @@ use lexisplat_render::Image;
 use super::{clipped, same_size};
 use crate::error::Result;
 
-/// PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
-/// `None` if the clipped pictures are identical, where it would be infinite.
+/// Returns the PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
+/// Returns `None` if the clipped pictures are identical: their PSNR is infinite.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] if the sizes differ or a picture is empty.

@@ -1,11 +1,11 @@
-//! Separable filters over pictures, one output row at a time: down the columns first, then across.
-//! Everything is in `f64` and in a fixed order, so rows can go to any thread.
+//! Separable filters over pictures, one output row at a time: first along columns, then along the row. All sums are in
+//! `f64` and in a fixed order, so any thread may compute a row.
 
 use lexisplat_render::Image;
 use rayon::prelude::*;
 
-/// The mean of `width` pixels times `height` rows of sums. Rows run in parallel, each with scratch memory of
-/// its thread, and are added from the top.
+/// Returns the sum of `row` over `rows`. Rows run in parallel, each with scratch memory of its thread, and are added
+/// from the first on.
 pub(super) fn sum_rows<S>(
     rows: std::ops::Range<usize>,
     scratch: impl Fn() -> S + Sync + Send,
@@ -15,7 +15,7 @@ pub(super) fn sum_rows<S>(
     sums.iter().sum()
 }
 
-/// Three planes of what `convert` makes of each pixel.
+/// Returns the three planes of the converted pixels.
 pub(super) fn planes<T: Copy + Default + Send + Sync>(
     image: &Image,
     convert: impl Fn([f32; 3]) -> [T; 3] + Sync,
@@ -45,8 +45,8 @@ pub(super) fn add_scaled(sums: &mut [f64], weight: f64, row: &[f64]) {
     }
 }
 
-/// Adds to `sums` the correlation of `padded` with `weights`; `padded` is longer than `sums` by one less than
-/// there are weights.
+/// Adds the correlation of `padded` with `weights` to `sums`. `padded` is longer than `sums` by the number of weights
+/// less one.
 pub(super) fn add_across(sums: &mut [f64], weights: &[f64], padded: &[f64]) {
     for (&weight, shifted) in weights.iter().zip(padded.windows(sums.len())) {
         add_scaled(sums, weight, shifted);

@@ -16,20 +16,20 @@ const C1: f64 = 0.01 * 0.01;
 const C2: f64 = 0.03 * 0.03;
 /// Pixels the window reaches to each side.
 const REACH: usize = WINDOW / 2;
-/// Blurred quantities: both means, the sum of both squares, the product. No formula needs the squares apart.
+/// Number of blurred quantities: both means, the sum of both squares, the product. No formula needs each square.
 const MAPS: usize = 4;
 
-/// What is done with pixels whose window leaves the picture.
+/// Treatment of pixels whose window leaves the picture.
 #[derive(Clone, Copy, PartialEq)]
 enum Border {
     /// Outside the picture everything is 0.
     Zero,
-    /// They are not counted.
+    /// Such pixels do not count.
     Cut,
 }
 
-/// SSIM, averaged over all pixels and channels: window of 11 x 11, sigma 1.5, zero padding.
-/// At most 1, which it is for identical pictures.
+/// Returns the SSIM, averaged over all pixels and channels: window of 11 x 11, sigma 1.5, zero padding. Identical
+/// pictures have 1, the largest value.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the sizes differ or a picture is empty.
@@ -38,8 +38,8 @@ pub fn ssim(a: &Image, b: &Image) -> Result<f64> {
     Ok(mean(a, b, Border::Zero))
 }
 
-/// [`ssim`] over the pixels whose window lies within the picture only, as the paper of Wang et al. (2004) and
-/// scikit-image with `gaussian_weights` have it. 3DGS tables print [`ssim`].
+/// Returns the SSIM over the pixels whose window lies within the picture, as in the paper of Wang et al. (2004) and
+/// scikit-image with `gaussian_weights`. Tables of 3DGS papers print [`ssim`].
 ///
 /// # Errors
 /// [`Error::Parameter`] if the sizes differ or a picture is smaller than 11 pixels either way.
@@ -82,7 +82,7 @@ fn mean(a: &Image, b: &Image, border: Border) -> f64 {
 struct Scratch {
     /// Blurred down the columns; [`REACH`] zeros lie to each side.
     down: [Vec<f64>; MAPS],
-    /// Blurred both ways.
+    /// Blurred along columns and rows.
     across: [Vec<f64>; MAPS],
 }
 
@@ -120,14 +120,14 @@ impl Scratch {
     }
 }
 
-/// SSIM at one pixel of one channel from its blurred quantities.
+/// Returns the SSIM at one pixel of one channel from its blurred quantities.
 fn similarity([mean_a, mean_b, squares, product]: [f64; MAPS]) -> f64 {
     let (means, cross) = (mean_a * mean_a + mean_b * mean_b, mean_a * mean_b);
     let (variances, covariance) = (squares - means, product - cross);
     ((2.0 * cross + C1) * (2.0 * covariance + C2)) / ((means + C1) * (variances + C2))
 }
 
-/// The window's weights along one axis; they sum to 1.
+/// Returns the weights of the window along one axis. Their sum is 1.
 fn window() -> [f64; WINDOW] {
     let mut weights: [f64; WINDOW] = std::array::from_fn(|k| {
         let distance = k as f64 - REACH as f64;

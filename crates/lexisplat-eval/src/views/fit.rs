@@ -6,18 +6,18 @@ use lexisplat_render::Camera;
 
 use crate::error::{Error, Result};
 
-/// How far the heights of a camera and its photo may be apart when both are as wide as the narrower one, in
-/// pixels: sizes are rounded, some down and some up.
+/// Largest difference between the heights of a camera and its photo, in pixels, when both are scaled to the smaller
+/// width. Sizes are rounded, some down and some up.
 const SHAPE_SLACK: f64 = 2.0;
 
-/// `camera` with pictures of the size of its photo and of the same fields of view along both axes, as the
-/// 3DGS authors' loader has it (`scene/cameras.py`).
+/// Returns `camera` with the size of its photo and the same fields of view along both axes, as in the loader of the
+/// 3DGS authors (`scene/cameras.py`).
 pub(super) fn to_photo(camera: &Camera, (width, height): (u32, u32), photo: &Path) -> Result<Camera> {
     let narrow = f64::from(width.min(camera.width));
     let high = |w: u32, h: u32| narrow / f64::from(w) * f64::from(h);
     if (high(width, height) - high(camera.width, camera.height)).abs() > SHAPE_SLACK {
         let problem = format!(
-            "is {width} x {height} pixels, another shape than the {} x {} of camera '{}'; these are not the photos that the cameras were found for, or they are turned",
+            "is {width} x {height} pixels, and camera '{2}' is {0} x {1}; the photos belong to other cameras, or they are turned",
             camera.width, camera.height, camera.name
         );
         return Err(Error::format(photo, problem));
@@ -25,7 +25,7 @@ pub(super) fn to_photo(camera: &Camera, (width, height): (u32, u32), photo: &Pat
     Ok(resized(camera, width, height))
 }
 
-/// `camera` with pictures smaller by `divisor`, rounded half to even as Python does.
+/// Returns `camera` with sides smaller by `divisor`, rounded half to even as in Python.
 pub(super) fn divided(camera: &Camera, divisor: u32) -> Camera {
     #[expect(
         clippy::cast_possible_truncation,

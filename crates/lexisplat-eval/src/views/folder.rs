@@ -1,4 +1,4 @@
-//! A folder of photos, and which of them a camera's name means.
+//! A folder of photos, and the photo that the name of a camera means.
 
 use std::collections::HashMap;
 use std::fs;
@@ -10,24 +10,24 @@ use crate::error::{Error, Result};
 
 /// Endings of photos, in lower case.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
-/// Sub-folders within each other that are looked into; links could go round for ever.
+/// Depth of folders that are searched. Links could make a circle.
 const MAX_DEPTH: usize = 8;
-/// Most files and folders looked at.
+/// Number of files and folders that are searched at most.
 const MAX_ENTRIES: usize = 1_000_000;
-/// Folder of full-size photos in a data set's folder.
+/// Name of the folder of full-size photos in the folder of a data set.
 const IMAGES: &str = "images";
 
-/// Photos of a folder and its sub-folders.
+/// The photos of a folder and its sub-folders.
 #[derive(Debug)]
 pub(super) struct PhotoFolder {
     folder: PathBuf,
-    /// What the photos' size is still to be divided by.
+    /// Divisor that the photos' size has yet to be divided by.
     pub(super) divisor: u32,
-    /// In order of paths.
+    /// Paths in ascending order.
     photos: Vec<PathBuf>,
-    /// By path in the folder without ending.
+    /// Indices by path in the folder, without extension.
     by_path: HashMap<String, Vec<usize>>,
-    /// By name without ending.
+    /// Indices by name, without extension.
     by_stem: HashMap<String, Vec<usize>>,
 }
 
@@ -49,8 +49,8 @@ impl<'a> Found<'a> {
 }
 
 impl PhotoFolder {
-    /// Photos of `images`, or of its folder `images` if it has one. For a divisor above 1 those of the folder
-    /// of smaller photos beside or in it, if there is one.
+    /// Opens `images`, or the folder `images` in it if there is one. For a divisor above 1, opens the folder of
+    /// smaller photos beside it or in it, if there is one.
     pub(super) fn open(images: &Path, divisor: u32) -> Result<Self> {
         let inner = images.join(IMAGES);
         let base = if inner.is_dir() { inner } else { images.to_path_buf() };
@@ -75,8 +75,8 @@ impl PhotoFolder {
         Ok(Self { folder, divisor, photos, by_path, by_stem })
     }
 
-    /// The photo of a camera of this name: by its path without ending, then by ever shorter ends of that path,
-    /// then by its bare name wherever it is. Several are told apart by their ending if that is given.
+    /// Finds the photo of the camera `name`: by the path without extension, then by ever shorter ends of that path,
+    /// then by the bare name in any folder. The extension of `name`, if any, tells several photos apart.
     pub(super) fn find(&self, name: &str) -> Found<'_> {
         let name = plain(name);
         let (stem, ending) = without_ending(&name);
@@ -109,7 +109,8 @@ impl PhotoFolder {
         }
     }
 
-    /// The cameras that have a photo of their own, with it; at least one. What is left out is told.
+    /// Returns the cameras that have a photo of their own, at least one, with the photos. Adds warnings about the
+    /// others.
     pub(super) fn matched(
         &self,
         cameras: Vec<Camera>,
@@ -157,7 +158,7 @@ impl PhotoFolder {
     }
 }
 
-/// How many cameras were left out for a reason, and the first.
+/// The number of cameras left out for one reason, and the first of them.
 #[derive(Default)]
 struct Left {
     count: usize,
@@ -178,7 +179,7 @@ impl Left {
     }
 }
 
-/// The photo that a cameras file means by `name`: beside it, with an ending if the name has none.
+/// Finds the photo that a cameras file calls `name`: beside the file, with an extension if the name has none.
 pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
     let folder = if source.is_dir() { source } else { source.parent()? };
     let path = folder.join(name);
@@ -189,8 +190,8 @@ pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
     ENDINGS.iter().flat_map(|ending| [ended(ending), ended(&ending.to_uppercase())]).find(|p| p.is_file())
 }
 
-/// The folder of photos smaller by `divisor`: `images_4` in the folder given, or beside the one with the
-/// photos.
+/// Finds the folder of photos smaller by `divisor`, such as `images_4`: beside the folder with the photos, or in the
+/// given folder.
 fn smaller(given: &Path, base: &Path, divisor: u32) -> Option<PathBuf> {
     if divisor == 1 {
         return None;
@@ -211,12 +212,12 @@ fn collect(folder: &Path, depth: usize, seen: &mut usize, photos: &mut Vec<PathB
                 format!("over the limit of {MAX_ENTRIES} files and folders; name the photos' folder");
             return Err(Error::format(folder, problem));
         }
-        // Dot files are the system's, such as the twins that macOS leaves of photos.
+        // Names that begin with a dot are the system's: macOS leaves one for each photo.
         if entry.file_name().to_string_lossy().starts_with('.') {
             continue;
         }
         let path = entry.path();
-        // Follows links; those that lead nowhere are no photos.
+        // This follows links. A link that leads nowhere is not a photo.
         let Ok(metadata) = fs::metadata(&path) else { continue };
         if metadata.is_dir() && depth < MAX_DEPTH {
             collect(&path, depth + 1, seen, photos)?;
@@ -231,7 +232,7 @@ fn is_photo(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ENDINGS.iter().any(|known| ending.eq_ignore_ascii_case(known)))
 }
 
-/// A path with slashes only and without `./` or a slash before it.
+/// Returns a path with forward slashes, without `./` or a slash at its start.
 fn plain(path: &str) -> String {
     let path = path.replace('\\', "/");
     let mut rest = path.as_str();
@@ -241,7 +242,7 @@ fn plain(path: &str) -> String {
     rest.to_owned()
 }
 
-/// A path without its ending, and the ending.
+/// Returns a path without its extension, and the extension.
 fn without_ending(path: &str) -> (&str, Option<&str>) {
     match path.rsplit_once('.') {
         Some((stem, ending)) if !ending.contains('/') => (stem, Some(ending)),

@@ -1,4 +1,4 @@
-//! Which views to draw, and the photos that belong to them.
+//! The views to draw, and the photos that belong to them.
 
 mod fit;
 mod folder;
@@ -10,53 +10,54 @@ mod tests;
 use std::path::{Path, PathBuf};
 
 use lexisplat::Geometry;
-use lexisplat_render::{Camera, ViewSet, is_room, object, orbit, read_views, room};
+use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orbit, read_views};
 
 use crate::error::{Error, Result};
 use folder::PhotoFolder;
 pub use photo::photo;
 pub use split::{DEFAULT_HOLD, SplitFilter};
 
-/// Widest picture drawn unless asked otherwise, as the field does (INRIA `utils/camera_utils.py`).
+/// Default of the largest width of a picture, in pixels, as in the field (INRIA `utils/camera_utils.py`).
 pub const DEFAULT_MAX_WIDTH: u32 = 1600;
-/// Views of an automatic orbit.
+/// Default number of generated views.
 pub const DEFAULT_ORBIT: u16 = 8;
-/// Size of an orbit's pictures before the width cap, in pixels.
+/// Width and height of generated views, in pixels, before the width is limited.
 pub const ORBIT_SIZE: (u32, u32) = (960, 640);
-/// Divisors of photos that data sets come in, as folders `images_2` and so on.
+/// Divisors of photos that data sets have, in folders such as `images_2`.
 const DIVISORS: [u32; 4] = [1, 2, 4, 8];
 
 /// Where generated views are taken from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SceneKind {
-    /// What [`is_room`] says.
+    /// From where [`is_interior`] says.
     #[default]
     Auto,
-    /// From around what there is to look at ([`object`]).
+    /// From around the scene ([`object`]).
     Object,
-    /// From inside, outwards ([`room`]).
+    /// From inside the scene ([`room`]).
     Room,
 }
 
-/// What [`find_views`] goes by.
+/// The views that [`find_views`] returns.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ViewOptions {
-    /// Cameras of any kind that [`read_views`] reads; generated ones without.
+    /// Cameras of any kind that [`read_views`] reads. Views are generated without them.
     pub cameras: Option<PathBuf>,
-    /// Which of the cameras. Generated ones have no split.
+    /// The cameras to use. Generated views have no split.
     pub split: SplitFilter,
-    /// Where no camera is marked with a split, every so many-th is a test view, the first included; above 0.
+    /// If no camera is marked with a split, every `hold`-th by name is a test view, beginning with the first. Above
+    /// 0.
     pub hold: usize,
     /// Where generated views are taken from.
     pub kind: SceneKind,
-    /// How many views to generate.
+    /// Number of views to generate.
     pub count: u16,
-    /// Widest picture in pixels; wider cameras are scaled down.
+    /// Largest width of a picture, in pixels. Wider cameras are scaled down.
     pub max_width: u32,
     /// Folder of photos. Cameras without one are left out.
     pub images: Option<PathBuf>,
-    /// What to divide the photos' size by: 1, 2, 4 or 8. Photos are taken from the folder's sibling of this
-    /// divisor (`images_4`) if there is one, else scaled on reading. Without photos the cameras are scaled.
+    /// Divisor of the photos' size: 1, 2, 4 or 8. The photos come from the folder of this divisor beside the given
+    /// one (`images_4`), or are scaled when they are read. Without photos the cameras are scaled.
     pub resolution: Option<u32>,
 }
 
@@ -78,29 +79,29 @@ impl Default for ViewOptions {
 /// A camera and its photo.
 #[derive(Debug, Clone, PartialEq)]
 pub struct View {
-    /// The camera, of the size to draw and to read the photo at.
+    /// The camera, which has the size to draw and to read the photo at.
     pub camera: Camera,
-    /// The photo's file.
+    /// The file of the photo.
     pub photo: Option<PathBuf>,
 }
 
-/// Views to draw.
+/// The views to draw.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChosenViews {
-    /// The views, in the source's order; at least one.
+    /// The views in the order of their source. At least one.
     pub views: Vec<View>,
-    /// Where they come from: the file or folder as given, `orbit` or `room`.
+    /// Where the views come from: the file or folder as given, `orbit` or `room`.
     pub from: String,
-    /// What was ignored or looks wrong, one sentence each.
+    /// What was left out or looks wrong, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// The views that `options` mean for a scene of `geometry`.
+/// Returns the views that `options` mean for a scene of `geometry`.
 ///
 /// # Errors
-/// [`Error::Parameter`] if the resolution is no divisor, the split leaves no camera or the folder has no
-/// photo of any; [`Error::Io`] if the folder or a photo cannot be read; [`Error::Format`] if a photo is none
-/// or has another shape than its camera; what [`read_views`] says.
+/// [`Error::Parameter`] if the resolution is not one of the divisors, the split leaves no camera, or the folder has
+/// no photo of any camera. [`Error::Io`] if the folder or a photo cannot be read. [`Error::Format`] if a photo
+/// cannot be decoded or has another shape than its camera. Errors of [`read_views`].
 pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenViews> {
     let divisor = options.resolution.unwrap_or(1);
     if !DIVISORS.contains(&divisor) {
@@ -130,8 +131,8 @@ pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenVi
     Ok(ChosenViews { views: capped(views, options.max_width), from: source.display().to_string(), warnings })
 }
 
-/// The cameras of `source`; sizes that it does not state are those of the photos, in the folder or where
-/// the source itself says they are.
+/// Reads the cameras of `source`. A size that it does not state is that of the photo, in the folder or where the
+/// source says it is.
 fn read(source: &Path, photos: Option<&PhotoFolder>) -> Result<ViewSet> {
     let mut failed = None;
     let set = read_views(source, &mut |name| {
@@ -149,16 +150,16 @@ fn read(source: &Path, photos: Option<&PhotoFolder>) -> Result<ViewSet> {
 
 fn generated(options: &ViewOptions, divisor: u32, geometry: &Geometry) -> Result<ChosenViews> {
     if options.images.is_some() {
-        return Err(Error::parameter("images", "a folder", "photos need the cameras they were taken with"));
+        return Err(Error::parameter("images", "a folder", "a folder only with the cameras of the photos"));
     }
     let inside = match options.kind {
-        SceneKind::Auto => is_room(geometry),
+        SceneKind::Auto => is_interior(geometry),
         SceneKind::Object => false,
         SceneKind::Room => true,
     };
     let (count, (width, height)) = (usize::from(options.count), ORBIT_SIZE);
     let (cameras, from) = if inside {
-        (room(geometry, count, width, height), "room")
+        (interior_views(geometry, count, width, height), "room")
     } else {
         (object(geometry, count, width, height), "orbit")
     };
@@ -172,11 +173,11 @@ fn capped(views: Vec<View>, max_width: u32) -> Vec<View> {
     views.into_iter().map(cap).collect()
 }
 
-/// Cameras of any kind that [`read_views`] reads, or an [`orbit`] of `orbit_views` around all of `geometry`.
-/// Where no camera is marked with a split, every [`DEFAULT_HOLD`]th is a test view.
+/// Reads cameras of any kind that [`read_views`] reads, or generates an [`orbit`] of `orbit_views` around all of
+/// `geometry`. If no camera is marked with a split, every [`DEFAULT_HOLD`]th is a test view.
 ///
 /// # Errors
-/// What [`read_views`] says; [`Error::Parameter`] if the filter leaves no camera.
+/// [`Error::Parameter`] if the filter leaves no camera. Errors of [`read_views`].
 pub fn choose_views(
     cameras: Option<&Path>,
     filter: SplitFilter,

@@ -57,7 +57,7 @@ fn refused(path: &Path, error: &ImageError) -> Error {
     Error::format(path, problem)
 }
 
-/// Width and height of a photo in pixels, from its header. A turn that EXIF asks for is not made.
+/// Reads the width and height of a photo, in pixels, from its header. The orientation in EXIF is ignored.
 pub(super) fn size(path: &Path) -> Result<(u32, u32)> {
     let head = start(path, HEADER)?;
     let whole = (head.len() as u64) < HEADER;
@@ -77,15 +77,15 @@ fn all(path: &Path) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The photo of `view`, of its camera's size, in 8 bits a channel divided by 255.
+/// Reads the photo of `view` in the size of its camera. Values are 8-bit levels divided by 255.
 ///
-/// Where it is transparent `background` (0 to 1 a channel) shows. It is resized after that if it has
-/// another size, by the cubic convolution that the 3DGS authors' loader uses (a = -0.5, widened where
-/// it shrinks: `PIL`'s bicubic). A turn that EXIF asks for is not made, as in that loader.
+/// `background` (0 to 1 a channel) shows through transparent pixels. A photo of another size is then resized by the
+/// cubic convolution of the 3DGS authors' loader (`PIL`'s bicubic: a = -0.5, widened where it shrinks). The
+/// orientation in EXIF is ignored, as in that loader.
 ///
 /// # Errors
-/// [`Error::Parameter`] if the view has no photo; [`Error::Io`] if it cannot be read; [`Error::Format`] if
-/// it is damaged, neither PNG nor JPEG, or over 16,384 pixels a side.
+/// [`Error::Parameter`] if the view has no photo. [`Error::Io`] if it cannot be read. [`Error::Format`] if it is
+/// damaged, neither PNG nor JPEG, or over 16,384 pixels a side.
 pub fn photo(view: &View, background: [f32; 3]) -> Result<Image> {
     let Some(path) = &view.photo else {
         return Err(Error::parameter("view", &view.camera.name, "a view with a photo"));
@@ -104,14 +104,14 @@ pub fn photo(view: &View, background: [f32; 3]) -> Result<Image> {
     Ok(Image::from_8bit(width, height, &pixels)?)
 }
 
-/// Whether these are the bytes of a JPEG without an end after its last scan, which the decoder would fill up
-/// with grey. Neither marker occurs within a scan.
+/// Returns whether `bytes` are a JPEG without an end after its last scan. The decoder would fill the rest with grey.
+/// Neither marker occurs within a scan.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
     let last = |marker: [u8; 2]| bytes.windows(2).rposition(|pair| pair == marker);
     bytes.starts_with(&JPEG_START) && last(JPEG_END) <= last(JPEG_SCAN)
 }
 
-/// The picture before a background.
+/// Returns the picture in front of `background`.
 fn opaque(picture: DynamicImage, background: [f32; 3]) -> RgbImage {
     if !picture.color().has_alpha() {
         return picture.into_rgb8();

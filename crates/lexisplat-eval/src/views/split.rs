@@ -4,19 +4,19 @@ use lexisplat_render::{Camera, Split};
 
 use crate::error::{Error, Result};
 
-/// Every so many-th camera, in order of names, is a test view, the first included: the field's convention
-/// for sources without a split (INRIA `scene/dataset_readers.py`, `llffhold`).
+/// For sources without a split, every 8th camera in the order of names is a test view, beginning with the first:
+/// the convention of the field (INRIA `scene/dataset_readers.py`, `llffhold`).
 pub const DEFAULT_HOLD: usize = 8;
 
-/// Which views of a cameras file to use.
+/// The views of a source that are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SplitFilter {
-    /// All of them.
+    /// All views.
     #[default]
     All,
-    /// Those marked `train`; if none is marked with a split, those that are not held out.
+    /// Views marked `train`. If no view is marked with a split, views that are not held out.
     Train,
-    /// Those marked `test`; if none is marked with a split, those that are held out.
+    /// Views marked `test`. If no view is marked with a split, views that are held out.
     Test,
 }
 
@@ -46,8 +46,8 @@ impl SplitFilter {
     }
 }
 
-/// The cameras that `filter` lets through, in their order; at least one. If no camera is marked, every
-/// `hold`-th in order of names counts as marked for testing and the others for training.
+/// Returns the cameras that `filter` lets through, at least one, in their order. If no camera is marked, every
+/// `hold`-th in the order of names counts as a test camera and the others as training cameras.
 pub(super) fn filter(mut cameras: Vec<Camera>, filter: SplitFilter, hold: usize) -> Result<Vec<Camera>> {
     if hold == 0 {
         return Err(Error::parameter("hold", hold, "1 or more"));
@@ -62,7 +62,7 @@ pub(super) fn filter(mut cameras: Vec<Camera>, filter: SplitFilter, hold: usize)
     if cameras.is_empty() { Err(filter.none_left(count)) } else { Ok(cameras) }
 }
 
-/// [`filter`] for generated cameras, which have no split.
+/// Returns generated cameras if `filter` lets all through. They have no split.
 pub(super) fn unmarked(cameras: Vec<Camera>, filter: SplitFilter) -> Result<Vec<Camera>> {
     if cameras.is_empty() || filter != SplitFilter::All {
         return Err(filter.none_left(cameras.len()));

@@ -326,22 +326,11 @@ fn generated_views_are_of_the_kind_asked_for() {
     assert!(find_views(&none, &geometry).is_err());
 }
 
-/// `name` in the data folder: `LEXISPLAT_DATA`, else `../shared/data` beside the workspace.
-fn data(name: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os("LEXISPLAT_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    let path = folder.join(name);
-    path.exists().then_some(path)
-}
-
 #[test]
 fn bonsai_is_evaluated_as_the_field_does() {
     let [Some(model), cameras @ Some(_), images @ Some(_)] =
-        ["bonsai-3dgs.ply", "bonsai-sparse", "bonsai-photos"].map(data)
+        ["bonsai-3dgs.ply", "bonsai-sparse", "bonsai-photos"].map(lexisplat_testing::real_data)
     else {
-        eprintln!("skipped: the data folder is not there");
         return;
     };
     let splats = ply::read(&model, &ply::ReadOptions::default()).unwrap().splats;
@@ -350,7 +339,7 @@ fn bonsai_is_evaluated_as_the_field_does() {
     assert_eq!((chosen.views.len(), chosen.warnings.len()), (13, 0), "{:?}", chosen.warnings);
     let mut sum = 0.0;
     for view in &chosen.views {
-        let picture = render(&Scene::from(&splats), &view.camera, &RenderOptions::default());
+        let picture = render(&Scene::from(&splats), &view.camera, &RenderOptions::default()).unwrap();
         sum += psnr(&picture, &photo(view, [0.0; 3]).unwrap()).unwrap().unwrap();
     }
     let mean = sum / 13.0;

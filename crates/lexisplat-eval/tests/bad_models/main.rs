@@ -7,7 +7,7 @@ mod support;
 
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{CompressOptions, Error, FormatError, Sensitivity, Silent, Splats, compress, stats};
-use lexisplat_render::{Camera, RenderOptions, Scene, object, orbit, render, room, surround};
+use lexisplat_render::{Camera, RenderOptions, Scene, interior_views, object, orbit, render, surround};
 use support::{cameras, copies, everything, sample, through_ply};
 
 /// What puts a value into one property of a Gaussian.
@@ -43,7 +43,7 @@ fn refused(value: f32, property: &str, array: &str, change: Change) {
     let keep: Vec<bool> = (0..60).map(|i| i != 7 && i != 20).collect();
     let mut kept = good;
     kept.retain(&keep);
-    assert_eq!((read.source.dropped, &read.splats), (2, &kept));
+    assert_eq!((read.summary.dropped, &read.splats), (2, &kept));
 
     let error = compress(bad.clone(), &CompressOptions::default(), &Silent).unwrap_err();
     assert!(matches!(error, Error::Parameter { .. }), "{error}");
@@ -54,13 +54,13 @@ fn refused(value: f32, property: &str, array: &str, change: Change) {
     assert_eq!(packer.is_err(), array != "normals", "{packer:?}");
     for camera in cameras() {
         let options = RenderOptions::default();
-        let image = render(&Scene::from(&bad), &camera, &options);
+        let image = render(&Scene::from(&bad), &camera, &options).unwrap();
         assert!(image.pixels.iter().flatten().all(|v| v.is_finite()));
         // Normals are not drawn, a standard deviation of 0 is one, and opacities have a test of their own.
         let left_out =
             !["normals", "opacities"].contains(&array) && (array, value) != ("scales", f32::NEG_INFINITY);
         if left_out || value.is_nan() && array == "opacities" {
-            assert!(image == render(&Scene::from(&kept), &camera, &options), "{value} in {array}");
+            assert!(image == render(&Scene::from(&kept), &camera, &options).unwrap(), "{value} in {array}");
         }
     }
     let found = stats::lint(&bad).unwrap();
@@ -96,8 +96,8 @@ fn infinite_opacities_are_opaque_or_invisible() {
     assert_eq!(finite.geometry.opacities[..2], [100.0, -100.0]);
     for camera in cameras() {
         let options = RenderOptions::default();
-        let image = render(&Scene::from(&finite), &camera, &options);
-        assert!(image == render(&Scene::from(&splats), &camera, &options));
+        let image = render(&Scene::from(&finite), &camera, &options).unwrap();
+        assert!(image == render(&Scene::from(&splats), &camera, &options).unwrap());
     }
     let outcome = everything(&finite);
     assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
@@ -144,8 +144,8 @@ fn zero_quaternions_are_the_identity() {
     turned.geometry.rotations.fill([1.0, 0.0, 0.0, 0.0]);
     for camera in cameras() {
         let options = RenderOptions::default();
-        let image = render(&Scene::from(&splats), &camera, &options);
-        assert!(image == render(&Scene::from(&turned), &camera, &options));
+        let image = render(&Scene::from(&splats), &camera, &options).unwrap();
+        assert!(image == render(&Scene::from(&turned), &camera, &options).unwrap());
     }
     let outcome = everything(&splats);
     assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
@@ -272,7 +272,7 @@ fn scenes_as_wide_as_numbers_have_a_result() {
         for camera in generated(&splats) {
             match camera.validate() {
                 Ok(()) => {
-                    let image = render(&Scene::from(&splats), &camera, &RenderOptions::default());
+                    let image = render(&Scene::from(&splats), &camera, &RenderOptions::default()).unwrap();
                     assert!(image.pixels.iter().flatten().all(|v| v.is_finite()));
                 }
                 Err(error) => assert!(error.to_string().starts_with("position = "), "{error}"),
@@ -284,6 +284,11 @@ fn scenes_as_wide_as_numbers_have_a_result() {
 /// Views of every kind that are made up for scenes without cameras.
 fn generated(splats: &Splats) -> Vec<Camera> {
     let g = &splats.geometry;
-    [orbit(g, 2, 48, 32), object(g, 2, 48, 32), room(g, 2, 48, 32), surround(g, 2, [48, 32], [2.0, 10.0])]
-        .concat()
+    [
+        orbit(g, 2, 48, 32),
+        object(g, 2, 48, 32),
+        interior_views(g, 2, 48, 32),
+        surround(g, 2, [48, 32], [2.0, 10.0]),
+    ]
+    .concat()
 }

@@ -7,13 +7,12 @@ use lexisplat::stats::{Lint, lint};
 use lexisplat::{
     CompressOptions, Geometry, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
-use lexisplat_eval::{CompareOptions, compare};
+use lexisplat_eval::{DrawOptions, Scorer, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
 use lexisplat_sample::{SampleOptions, scene};
+use lexisplat_testing::{Need, missing};
 
-/// Set where GPU tests may not be skipped.
-const REQUIRE: &str = "LEXISPLAT_REQUIRE_GPU";
 /// Quality that packing aims at, in dB.
 const PACKED_DB: f64 = 50.0;
 /// Least PSNR of a GPU's picture against the processor's, in dB: what an 8-bit picture cannot show.
@@ -44,16 +43,15 @@ pub(crate) fn cameras() -> Vec<Camera> {
 pub(crate) fn through_ply(splats: &Splats, drop_invalid: bool) -> lexisplat::Result<ply::PlyRead> {
     let mut bytes = Vec::new();
     ply::write_to(&mut bytes, splats).unwrap();
-    ply::read_bytes("bad.ply", &bytes, &ply::ReadOptions { drop_invalid, ..Default::default() })
+    ply::read_bytes("bad.ply", &bytes, &ply::ReadOptions::default().with_drop_invalid(drop_invalid))
 }
 
 fn renderers() -> Vec<Renderer> {
     static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
     let gpu = GPU.get_or_init(|| match Device::Gpu.open_gpu() {
         Ok(gpu) => gpu,
-        Err(error) if std::env::var_os(REQUIRE).is_some() => panic!("{REQUIRE} is set, but {error}"),
         Err(error) => {
-            eprintln!("only the processor: {error}");
+            missing(Need::Gpu, &format!("only the processor draws, since {error}"));
             None
         }
     });
@@ -85,7 +83,7 @@ pub(crate) fn everything(splats: &Splats) -> Outcome {
 
     let [exact, escapes] = exact(splats);
     let guessed = packed(splats, &Sensitivity::heuristic(&splats.geometry));
-    let seen = sensitivity(&Scene::from(splats), &cameras(), &mut || ());
+    let seen = sensitivity(&Scene::from(splats), &cameras(), &Silent).unwrap();
     let packed = packed(splats, &seen);
     assert_eq!(guessed.is_some(), packed.is_some());
 
@@ -101,7 +99,7 @@ fn exact(splats: &Splats) -> [(Splats, u64); 2] {
         options.layout = layout;
         let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_to(&mut bytes, &model).unwrap();
+        lexi::write(&mut bytes, &model).unwrap();
         let read = lexi::read_bytes("exact.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(read, model, "{layout}");
         let decoded = read.into_splats();
@@ -128,7 +126,7 @@ fn packed(splats: &Splats, sensitivity: &Sensitivity) -> Option<Splats> {
         }
     };
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packed).unwrap();
+    lexi::write_packed(&mut bytes, &packed).unwrap();
     let back = lexi::read_bytes("packed.lexi", &bytes, &Limits::default()).unwrap().into_splats();
     assert_eq!(back.len(), splats.len());
     assert_finite(&back);
@@ -142,20 +140,21 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
     for mut renderer in renderers() {
         for (other, db) in [(Some(exact), &mut exact_db), (packed, &mut packed_db)] {
             let Some(other) = other else { continue };
-            let mut on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
+            let on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
                 assert!(a.pixels.iter().chain(&b.pixels).flatten().all(|v| v.is_finite() && *v >= 0.0));
+                Ok::<_, lexisplat_eval::Error>(())
             };
             let (a, b) = (Scene::from(original), Scene::from(other));
-            let options = CompareOptions::default();
-            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &mut on_view).unwrap();
+            let options = DrawOptions::default();
+            let found = compare(&mut renderer, &a, &b, &cameras(), &options, &Silent, on_view).unwrap();
             *db = least(*db, found.psnr.min);
         }
         let prepared = renderer.prepare(Scene::from(original)).unwrap();
         for camera in cameras() {
             let options = RenderOptions::default();
             let image = renderer.render(&prepared, &camera, &options).unwrap();
-            let truth = lexisplat_render::render(&Scene::from(original), &camera, &options);
-            let view = lexisplat_eval::score("twin", &truth, &image).unwrap();
+            let truth = lexisplat_render::render(&Scene::from(original), &camera, &options).unwrap();
+            let view = Scorer::new().score("twin", &truth, &image).unwrap();
             assert!(view.psnr.is_none_or(|db| db > TWIN_DB), "{} draws {:?}", renderer.name(), view.psnr);
             drawn += image.pixels.iter().filter(|p| **p != options.background).count();
         }

@@ -1,9 +1,9 @@
-//! What a COLMAP camera is: size, model and parameters.
+//! A COLMAP camera: size, model and parameters.
 
 use std::collections::BTreeMap;
 
 use crate::camera::MAX_SIDE;
-use crate::error::Checked;
+use crate::error::Result;
 
 /// Cameras by their number.
 pub(super) type Cameras = BTreeMap<u32, Intrinsics>;
@@ -34,8 +34,8 @@ pub(super) enum Pinhole {
 }
 
 impl Pinhole {
-    /// The model of this name, or what to do about another one.
-    pub(super) fn named(name: &str) -> Checked<Self> {
+    /// Returns the model of this name. The error for another model says what to do.
+    pub(super) fn named(name: &str) -> Result<Self, String> {
         match name {
             "SIMPLE_PINHOLE" => Ok(Self::Simple),
             "PINHOLE" => Ok(Self::Two),
@@ -45,8 +45,8 @@ impl Pinhole {
         }
     }
 
-    /// The model of this number in binary files.
-    pub(super) fn numbered(number: u32) -> Checked<Self> {
+    /// Returns the model of this number in binary files.
+    pub(super) fn numbered(number: u32) -> Result<Self, String> {
         let name = usize::try_from(number).ok().and_then(|n| MODELS.get(n));
         name.map_or_else(|| Self::named(&format!("number {number}")), |name| Self::named(name))
     }
@@ -63,7 +63,7 @@ pub(super) struct Intrinsics {
 
 impl Intrinsics {
     /// Checks the ranges that a camera has.
-    pub(super) fn new(width: u64, height: u64, focal: [f64; 2], centre: [f64; 2]) -> Checked<Self> {
+    pub(super) fn new(width: u64, height: u64, focal: [f64; 2], centre: [f64; 2]) -> Result<Self, String> {
         let side = |name: &str, value: u64| match u32::try_from(value) {
             Ok(side) if (1..=MAX_SIDE).contains(&side) => Ok(side),
             _ => Err(format!("{name} is {value}, expected 1 to {MAX_SIDE} pixels")),

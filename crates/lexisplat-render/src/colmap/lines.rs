@@ -1,11 +1,11 @@
-//! Lines of a text file, of which long ones are never held.
+//! Reads the lines of a text file. Of a long line no more than a limit is held in memory.
 
 use std::fmt::Display;
 use std::io::BufRead;
 
 use crate::error::{Error, Result};
 
-/// Longest line that is kept, in bytes: a name at its limit and ten numbers.
+/// Longest line that is read as text, in bytes. A name at its limit and ten numbers fit.
 const MAX_LINE: usize = 4096;
 
 /// Lines of a reader.
@@ -22,17 +22,17 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Self { file, reader, number: 0, bytes: Vec::new() }
     }
 
-    /// An error about the line read last.
+    /// Returns an error about the line read last.
     pub(super) fn wrong(&self, problem: impl Display) -> Error {
         Error::format(self.file, format!("line {}: {problem}", self.number))
     }
 
-    /// An [`Error::Limit`] on the number of `what`.
+    /// Returns an [`Error::Limit`] on the number of `what`.
     pub(super) fn too_many(&self, what: &str, limit: usize) -> Error {
         Error::Limit { what: format!("{}: {what}", self.file), found: limit as u64 + 1, limit: limit as u64 }
     }
 
-    /// The next line without white space at its ends; `None` after the last.
+    /// Reads the next line, without white space at its ends; `None` after the last.
     pub(super) fn line(&mut self) -> Result<Option<String>> {
         self.bytes.clear();
         let mut long = false;
@@ -55,7 +55,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
         }
     }
 
-    /// Passes over the next line, however long, and counts its words.
+    /// Counts the words of the next line, however long it is.
     pub(super) fn words_of_next(&mut self) -> Result<u64> {
         let (mut words, mut inside) = (0_u64, false);
         let any = each_piece(&mut self.reader, |piece| {
@@ -70,7 +70,7 @@ impl<'a, R: BufRead> Lines<'a, R> {
     }
 }
 
-/// Calls `f` with the pieces of the next line, without its end; whether there was one.
+/// Calls `f` with the pieces of the next line, without its end. Returns whether there was a line.
 fn each_piece(reader: &mut impl BufRead, mut f: impl FnMut(&[u8])) -> std::io::Result<bool> {
     let mut any = false;
     loop {

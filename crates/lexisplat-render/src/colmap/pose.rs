@@ -4,7 +4,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::intrinsics::Intrinsics;
 use crate::camera::Camera;
-use crate::error::Checked;
+use crate::error::Result;
 use crate::orbit::single;
 
 /// An image: its name, its camera's number, and where it was taken.
@@ -19,14 +19,14 @@ pub(super) struct Posed {
 }
 
 impl Posed {
-    /// The image as a camera with `intrinsics`.
-    pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Checked<Camera> {
+    /// Returns the image as a camera with `intrinsics`.
+    pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Result<Camera, String> {
         let [w, x, y, z] = self.quaternion;
         let quaternion = DQuat::from_xyzw(x, y, z, w);
         let squares = quaternion.length_squared();
         if !(squares.is_normal() && DVec3::from_array(self.translation).is_finite()) {
             return Err(format!(
-                "its pose is no pose: quaternion {:?}, translation {:?}",
+                "not a pose: quaternion {:?}, translation {:?}",
                 self.quaternion, self.translation
             ));
         }

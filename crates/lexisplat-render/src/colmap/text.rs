@@ -6,7 +6,7 @@ use super::intrinsics::{Cameras, Intrinsics, Pinhole};
 use super::lines::Lines;
 use super::pose::Posed;
 use crate::cameras_json::{MAX_CAMERAS, MAX_NAME};
-use crate::error::{Checked, Result};
+use crate::error::Result;
 
 /// What COLMAP writes before the number of images in a comment.
 const COUNT_MARK: &str = "# Number of images:";
@@ -15,7 +15,7 @@ const WORDS_BEFORE_NAME: usize = 9;
 /// Words of a point of an image: x, y, and the number of the point it shows.
 const POINT_WORDS: u64 = 3;
 
-pub(super) fn cameras<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<Cameras> {
+pub(super) fn cameras<R: BufRead>(mut lines: Lines<'_, R>) -> Result<Cameras> {
     let mut cameras = Cameras::new();
     while let Some(line) = lines.line()? {
         if line.is_empty() || line.starts_with('#') {
@@ -32,17 +32,20 @@ pub(super) fn cameras<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<Cameras> {
     Ok(cameras)
 }
 
-fn camera(line: &str) -> Checked<(u32, Intrinsics)> {
+fn camera(line: &str) -> Result<(u32, Intrinsics), String> {
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let [number, model, width, height, parameters @ ..] = words.as_slice() else {
-        return Err("no camera: expected number, model, width, height and parameters".into());
+        return Err("not a camera: expected number, model, width, height and parameters".into());
     };
     let number: u32 = parsed("number of the camera", number)?;
     let about = |problem: String| format!("camera {number}: {problem}");
     let model = Pinhole::named(model).map_err(about)?;
     let (width, height) = (parsed("width", width).map_err(about)?, parsed("height", height).map_err(about)?);
-    let numbers: Vec<f64> =
-        parameters.iter().map(|word| parsed("parameter", word)).collect::<Checked<_>>().map_err(about)?;
+    let numbers: Vec<f64> = parameters
+        .iter()
+        .map(|word| parsed("parameter", word))
+        .collect::<Result<_, String>>()
+        .map_err(about)?;
     let (focal, centre) = match (model, numbers.as_slice()) {
         (Pinhole::Simple, &[f, cx, cy]) => ([f; 2], [cx, cy]),
         (Pinhole::Two, &[fx, fy, cx, cy]) => ([fx, fy], [cx, cy]),
@@ -57,7 +60,7 @@ fn camera(line: &str) -> Checked<(u32, Intrinsics)> {
 }
 
 /// The images, and a warning if the file says that there are more or fewer.
-pub(super) fn images<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<(Vec<Posed>, Vec<String>)> {
+pub(super) fn images<R: BufRead>(mut lines: Lines<'_, R>) -> Result<(Vec<Posed>, Vec<String>)> {
     let mut images = Vec::new();
     let mut said: Option<u64> = None;
     while let Some(line) = lines.line()? {
@@ -86,13 +89,13 @@ pub(super) fn images<R: BufRead>(lines: &mut Lines<'_, R>) -> Result<(Vec<Posed>
     Ok((images, warnings.into_iter().collect()))
 }
 
-fn image(line: &str) -> Checked<Posed> {
+fn image(line: &str) -> Result<Posed, String> {
     let mut rest = line;
     let mut words = [""; WORDS_BEFORE_NAME];
     for word in &mut words {
-        let (next, after) = rest
-            .split_once(|c: char| c.is_ascii_whitespace())
-            .ok_or_else(|| "no image: expected number, rotation, translation, camera and name".to_owned())?;
+        let (next, after) = rest.split_once(|c: char| c.is_ascii_whitespace()).ok_or_else(|| {
+            "not an image: expected number, rotation, translation, camera and name".to_owned()
+        })?;
         (*word, rest) = (next, after.trim_ascii_start());
     }
     let [number, qw, qx, qy, qz, tx, ty, tz, camera] = words;
@@ -110,6 +113,6 @@ fn image(line: &str) -> Checked<Posed> {
     })
 }
 
-fn parsed<T: std::str::FromStr>(what: &str, word: &str) -> Checked<T> {
-    word.parse().map_err(|_| format!("{what} is '{word}', which is no such number"))
+fn parsed<T: std::str::FromStr>(what: &str, word: &str) -> Result<T, String> {
+    word.parse().map_err(|_| format!("{what} is '{word}', which is not a number of this kind"))
 }

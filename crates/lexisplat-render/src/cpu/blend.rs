@@ -1,4 +1,4 @@
-//! Drawing one tile: its splats from front to back, a row of 16 pixels at a time.
+//! Draws one tile: its splats from front to back, a row of 16 pixels at a time.
 
 use lexisplat::simd::Simd;
 
@@ -16,9 +16,9 @@ struct Row {
     red: Lanes,
     green: Lanes,
     blue: Lanes,
-    /// What is left for splats further back; 0 once the pixel is finished.
+    /// The share of light that splats further back can add; 0 once the pixel is finished.
     open: Lanes,
-    /// What is left for the background.
+    /// The share of light that the background adds.
     transmittance: Lanes,
 }
 
@@ -42,12 +42,13 @@ impl TilePixels {
 
 /// Draws the tile at `[column, row]` from the splats in `list`, sorted from front to back.
 pub(super) fn tile(
+    simd: Simd,
     splats: &[Visible],
     list: impl Iterator<Item = u32>,
     at: [usize; 2],
     background: [f32; 3],
 ) -> TilePixels {
-    Simd::detect().dispatch(
+    simd.dispatch(
         #[inline(always)]
         || draw(splats, list, at, background),
     )
@@ -95,9 +96,10 @@ fn draw(
     }))
 }
 
-/// Adds `splat` to the pixels of a row; whether all of them are finished then.
+/// Adds `splat` to the pixels of a row. Returns whether all of them are finished then.
 ///
-/// Loops are short and their conditions selections, so that each becomes a few vector instructions.
+/// Loops are short, and their conditions select values instead of branching, so that each loop becomes a few
+/// vector instructions.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
@@ -105,7 +107,7 @@ fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
     let Some(alpha) = alphas(splat, x, y) else { return false };
     let mut still_open = 0;
     for lane in 0..TILE {
-        // An open pixel is never below the minimum, so where alpha is 0 it stays as it is; a finished one
+        // Where alpha is 0 an open pixel stays as it is, since it is never below the minimum. A finished one
         // stays 0.
         let left = row.open[lane] * (1.0 - alpha[lane]);
         let add = left >= TRANSMITTANCE_MIN;
@@ -122,7 +124,8 @@ fn blend(row: &mut Row, splat: &Splat, x: &Lanes, y: f32) -> bool {
     still_open == 0
 }
 
-/// Opacities of `splat` at the pixels of a row, 0 where it does not count; `None` if it counts nowhere.
+/// Returns the opacities of `splat` at the pixels of a row, 0 where it does not count; `None` if it counts
+/// nowhere.
 #[inline(always)]
 pub(super) fn alphas(splat: &Splat, x: &Lanes, y: f32) -> Option<Lanes> {
     let Splat { conic: [a, b, c], opacity, cutoff, .. } = *splat;
@@ -179,7 +182,7 @@ mod tests {
                 #[inline(always)]
                 || draw(&splats, 0..300, at, background),
             );
-            let chosen = tile(&splats, 0..300, at, background);
+            let chosen = tile(simd, &splats, 0..300, at, background);
             for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
                 let bits = plain.pixel(x, y).map(f32::to_bits);
                 assert_eq!(wide.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");

@@ -1,12 +1,12 @@
-//! Functions whose system versions differ between machines.
+//! Mathematical functions that give the same bits on every machine. Those of the system do not.
 
-/// Below this `exp` is 0, above [`EXP_MAX`] infinite: there the result leaves the normal f32 range.
+/// Below this `exp` is 0, and above [`EXP_MAX`] it is infinite: there the result leaves the normal f32 range.
 const EXP_MIN: f32 = -87.0;
 /// See [`EXP_MIN`].
 const EXP_MAX: f32 = 88.0;
 /// 1.5 * 2^23: adding and subtracting it rounds to the nearest integer.
 const ROUND: f32 = 12_582_912.0;
-/// ln 2 in two parts; the first has few enough bits that its multiples are exact (Cephes `expf`).
+/// ln 2 in two parts. The first has so few bits that its multiples are exact (Cephes `expf`).
 const LN2_HIGH: f32 = 0.693_359_4;
 const LN2_LOW: f32 = -2.121_944_4e-4;
 /// exp(r) = 1 + r + r^2 P(r) on [-ln 2 / 2, ln 2 / 2], highest power first (Cephes `expf`).
@@ -15,7 +15,7 @@ const POLYNOMIAL: [f32; 6] = [1.987_569_2e-4, 1.398_2e-3, 8.333_452e-3, 4.166_57
 const BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;
 
-/// e to the power `x`, within 2e-7 of it relatively, with the same bits on every machine.
+/// Returns e to the power `x`, with a relative error of at most 2e-7.
 #[inline]
 pub(super) fn exp(x: f32) -> f32 {
     match x {
@@ -25,9 +25,9 @@ pub(super) fn exp(x: f32) -> f32 {
     }
 }
 
-/// [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`]; elsewhere any number.
+/// [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`]; any number for other `x`.
 ///
-/// Free of branches and calls so that loops over it become vector instructions.
+/// It has no branches and no calls, so that loops over it become vector instructions.
 #[inline(always)]
 pub(super) fn exp_in_range(x: f32) -> f32 {
     let shifted = x * std::f32::consts::LOG2_E + ROUND;

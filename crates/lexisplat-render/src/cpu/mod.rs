@@ -1,11 +1,12 @@
 //! The reference rasteriser: 3DGS's rules on the processor.
 //!
 //! `project` turns Gaussians into ellipses on screen, `order` sorts them by depth, `tiles` lists for
-//! every tile what may touch it, and `blend` draws the tiles. Every step works in parallel on pieces
-//! whose borders and order do not depend on the number of threads, and uses only operations that round
-//! the same everywhere, so a picture is the same bit for bit on any machine.
+//! every tile the splats that may touch it, and `blend` draws the tiles. Every step works in parallel on pieces
+//! whose borders and order do not depend on the number of threads. It uses only operations that round the same
+//! everywhere. A picture therefore has the same bits on any machine.
 
 mod blend;
+mod grid;
 mod math;
 mod moments;
 mod order;
@@ -15,14 +16,15 @@ mod tiles;
 #[cfg(all(test, feature = "gpu"))]
 pub(crate) mod twin;
 
-use std::time::Instant;
-
 use lexisplat::ShDegree;
-use rayon::prelude::*;
+use lexisplat::simd::Simd;
+use web_time::Instant;
 
 use crate::camera::Camera;
 use crate::conventions::TILE;
+use crate::error::Result;
 use crate::image::Image;
+use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
@@ -33,61 +35,76 @@ pub(crate) use project::Projection;
 pub(crate) use sensitivity::carry;
 pub use sensitivity::sensitivity;
 
-/// How to draw. Whether the anti-aliased rules apply is the scene's own mark.
+/// How to draw. Whether the anti-aliased rules apply is a mark of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
 pub struct RenderOptions {
-    /// Colour behind the scene, 0 to 1 in each channel. Default black.
+    /// Colour behind the scene, 0 to 1 in each channel. Black by default.
     pub background: [f32; 3],
-    /// Highest SH degree to draw with; bands above it are left out. Default all that the scene has.
+    /// Highest SH degree to draw with; bands above it are left out. By default all that the scene has count.
     pub max_degree: Option<ShDegree>,
 }
 
-/// A picture and what drawing it took.
+impl RenderOptions {
+    /// These options with another background.
+    #[must_use]
+    pub fn with_background(self, background: [f32; 3]) -> Self {
+        Self { background, ..self }
+    }
+
+    /// These options with another highest SH degree; `None` draws all that the scene has.
+    #[must_use]
+    pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {
+        Self { max_degree, ..self }
+    }
+}
+
+/// A picture, and measurements of drawing it.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Drawn {
     /// The picture.
     pub image: Image,
-    /// Gaussians that may touch it.
+    /// Number of Gaussians that may touch it.
     pub gaussians: usize,
-    /// What was done in order, each with its time in milliseconds.
+    /// The stages in order, each with its time in milliseconds.
     pub stage_times: Vec<(&'static str, f64)>,
 }
 
 /// Draws `scene` as `camera` sees it.
 ///
-/// Gaussians with values that are not finite, or that overflow on the way to the screen, are left out.
+/// Leaves out Gaussians with values that are not finite, or that overflow on the way to the screen.
 ///
-/// # Panics
-/// If the scene's arrays differ in length (see `Splats::validate`) or the picture does not fit in
-/// memory (see [`Camera::validate`]).
-#[must_use]
-pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Image {
-    render_measured(scene, camera, options).image
+/// # Errors
+/// [`Error::Codec`](crate::Error::Codec) if the scene's arrays do not fit one another;
+/// [`Error::Parameter`](crate::Error::Parameter) if the camera cannot be drawn with.
+pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Result<Image> {
+    Ok(render_measured(scene, camera, options)?.image)
 }
 
-/// [`render`], and what it took.
+/// Draws as [`render`] does, and measures it.
 ///
-/// # Panics
+/// # Errors
 /// As [`render`].
-#[must_use]
-pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Drawn {
+pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Result<Drawn> {
+    scene.validate()?;
+    camera.validate()?;
     let projection = Projection::new(camera, scene.meta().antialiased);
-    draw(scene, &projection, options, tiles::MAX_ENTRIES)
+    Ok(draw(scene, &projection, options, tiles::MAX_ENTRIES))
 }
 
 /// Times the stages of a picture.
-struct Stages {
+struct StageTimer {
     start: Instant,
     times: Vec<(&'static str, f64)>,
 }
 
-impl Stages {
+impl StageTimer {
     fn start() -> Self {
         Self { start: Instant::now(), times: Vec::new() }
     }
 
-    /// The time since the last call belongs to `stage`, which may come more than once.
+    /// Adds the time since the last call to that of `stage`.
     fn end(&mut self, stage: &'static str) {
         let now = Instant::now();
         let milliseconds = now.duration_since(self.start).as_secs_f64() * 1e3;
@@ -99,9 +116,10 @@ impl Stages {
     }
 }
 
-/// [`render`] with at most `max_entries` in the tiles' lists at once.
+/// Draws with at most `max_entries` in the tiles' lists at once.
 fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max_entries: u64) -> Drawn {
-    let mut stages = Stages::start();
+    let mut stages = StageTimer::start();
+    let simd = Simd::current();
     let (camera, grid) = (&projection.camera, projection.grid);
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut pixels = vec![options.background; width * height];
@@ -118,7 +136,7 @@ fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max
             .into_par_iter()
             .map(|tile| {
                 let (column, row) = (tile % grid.columns, band.start + tile / grid.columns);
-                blend::tile(&splats, lists.of(tile), [column, row], options.background)
+                blend::tile(simd, &splats, lists.of(tile), [column, row], options.background)
             })
             .collect();
         let rows = &mut pixels[band.start * TILE * width..(band.end * TILE).min(height) * width];

@@ -1,4 +1,4 @@
-//! How a tile's pixels change with its splats: sums over pixels of products of derivatives.
+//! Sums over a tile's pixels of products of derivatives: how the pixels change with the tile's splats.
 
 use lexisplat::simd::Simd;
 
@@ -7,28 +7,28 @@ use crate::conventions::{TILE, TRANSMITTANCE_MIN};
 use super::blend::{Lanes, TilePixels, alphas};
 use super::project::{Root, Splat, Visible};
 
-/// Number of sums a splat has.
+/// Number of sums that a splat has.
 pub(crate) const SUMS: usize = 10;
 
-/// Sums over pixels, for one splat. With alpha its opacity at a pixel, T what was open before it, C the
-/// pixel's colour and u = R (centre - pixel), where R is the conic's [`Root`]:
+/// Sums over pixels, for one splat. Alpha is its opacity at a pixel, T the light that the splats before it let
+/// through, C the pixel's colour, and u = R (centre - pixel), where R is the conic's [`Root`]:
 ///
 /// - `[0]`: (T alpha)^2, the squared derivative by one colour channel;
 /// - `[1]`: g = |dC / d ln alpha|^2;
-/// - `[2..5]`: g ux^2, g ux uy, g uy^2: those by the centre, since d ln alpha / d (R centre) = -u;
-/// - `[5..10]`: g ux^4, g ux^3 uy, g ux^2 uy^2, g ux uy^3, g uy^4: those by the shape.
+/// - `[2..5]`: g ux^2, g ux uy, g uy^2: the derivatives by the centre, since d ln alpha / d (R centre) = -u;
+/// - `[5..10]`: g ux^4, g ux^3 uy, g ux^2 uy^2, g ux uy^3, g uy^4: the derivatives by the shape.
 #[derive(Debug, Clone, Copy, Default)]
 #[cfg_attr(feature = "gpu", derive(bytemuck::Pod, bytemuck::Zeroable))]
 #[repr(C)]
 pub(crate) struct Moments {
     pub(super) sums: [f32; SUMS],
-    /// Largest change of any channel of any pixel when the splat is left out: dC / d ln alpha happens to
-    /// be just that, since what it adds goes and what it covers comes back.
+    /// The largest change of any channel of any pixel when the splat is left out. That change is dC / d ln alpha:
+    /// the light that the splat adds is lost, and the light that it covers comes back.
     pub(super) removal: f32,
 }
 
 impl Moments {
-    /// Adds those of other pixels.
+    /// Adds the moments of other pixels.
     pub(super) fn add(&mut self, other: &Self) {
         for (sum, value) in self.sums.iter_mut().zip(other.sums) {
             *sum += value;
@@ -37,9 +37,10 @@ impl Moments {
     }
 }
 
-/// Moments of the splats that show in the tile at `[column, row]`, whose finished picture is `picture`.
-/// `roots` are those of the splats.
+/// Returns the moments of the splats that show in the tile at `[column, row]`. `picture` is the finished tile,
+/// `roots` are the roots of the splats, and `size` is that of the whole picture in pixels.
 pub(super) fn tile(
+    simd: Simd,
     splats: &[Visible],
     roots: &[Root],
     list: impl Iterator<Item = u32>,
@@ -47,13 +48,13 @@ pub(super) fn tile(
     size: [usize; 2],
     picture: &TilePixels,
 ) -> Vec<(u32, Moments)> {
-    Simd::detect().dispatch(
+    simd.dispatch(
         #[inline(always)]
-        || walk(splats, roots, list, at, size, picture),
+        || sum(splats, roots, list, at, size, picture),
     )
 }
 
-/// Where a row of pixels is, and how it looks when finished.
+/// A row of pixels: its coordinates, and its finished colours.
 #[derive(Clone, Copy)]
 struct Pixels<'a> {
     x: &'a Lanes,
@@ -61,7 +62,7 @@ struct Pixels<'a> {
     picture: &'a [Lanes; 3],
 }
 
-/// What has been drawn of a row so far.
+/// A row of pixels as far as it has been drawn.
 #[derive(Clone, Copy)]
 struct Row {
     colour: [Lanes; 3],
@@ -70,7 +71,7 @@ struct Row {
 
 #[inline(always)]
 #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
-fn walk(
+fn sum(
     splats: &[Visible],
     roots: &[Root],
     list: impl Iterator<Item = u32>,
@@ -81,7 +82,7 @@ fn walk(
     let mut out = Vec::new();
     let (left, top) = (column * TILE, row * TILE);
     let x: Lanes = std::array::from_fn(|lane| (left + lane) as f32);
-    // Pixels beyond the picture's border are drawn but not looked at.
+    // Pixels beyond the picture's border are drawn but do not count.
     let open = std::array::from_fn(|lane| if left + lane < width { 1.0 } else { 0.0 });
     let mut rows = [Row { colour: [[0.0; TILE]; 3], open }; TILE];
     let mut row_open: [bool; TILE] = std::array::from_fn(|y| top + y < height);
@@ -111,7 +112,7 @@ fn walk(
     out
 }
 
-/// Draws `splat` on a row as `blend` does and adds to its sums; whether it may show there.
+/// Draws `splat` on a row as `blend` does, and adds to its sums. Returns whether it may show there.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn add(
@@ -130,7 +131,7 @@ fn add(
         let shows = left >= TRANSMITTANCE_MIN;
         let weight = if shows { alpha * row.open[lane] } else { 0.0 };
         row.open[lane] = if shows { left } else { 0.0 };
-        // alpha / (1 - alpha): what of the light behind one more unit of ln alpha takes away.
+        // alpha / (1 - alpha) is the share of the light behind that one more unit of ln alpha takes away.
         let taken = if weight > 0.0 { alpha / (1.0 - alpha) } else { 0.0 };
         let mut g = 0.0;
         let mut largest = removal[lane];

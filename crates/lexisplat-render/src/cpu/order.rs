@@ -1,4 +1,4 @@
-//! Sorting by depth: once per picture, so that every tile's list comes out sorted.
+//! Sorts splats by depth. That happens once for each picture, so that every tile's list comes out sorted.
 
 use super::project::{Projected, Visible};
 
@@ -6,12 +6,12 @@ use super::project::{Projected, Visible};
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
-/// The splats nearest first; at equal depth, in order of index.
+/// Returns the splats with the nearest first; those of equal depth are in order of index.
 pub(super) fn by_depth(visible: Projected) -> Vec<Visible> {
     let mut splats = visible.into_splats();
     let mut order = sorted(splats.iter().map(|v| v.depth).zip(0..).collect());
-    // In place, cycle by cycle, since a copy of millions of splats is worth avoiding. Places that are done
-    // name themselves.
+    // The splats are moved in place, cycle by cycle, since a copy of millions of them would take memory. A place
+    // that is done holds its own number.
     for start in 0..order.len() {
         let mut place = start;
         loop {
@@ -27,7 +27,7 @@ pub(super) fn by_depth(visible: Projected) -> Vec<Visible> {
     splats
 }
 
-/// The second of (key, name) in ascending order of key, ties as they come: a stable radix sort.
+/// Returns the second of each (key, index) in ascending order of key. A stable radix sort: ties stay in order.
 fn sorted(mut pairs: Vec<(u32, u32)>) -> Vec<u32> {
     let mut other = vec![(0, 0); pairs.len()];
     for shift in (0..u32::BITS).step_by(DIGIT_BITS as usize) {

@@ -1,23 +1,23 @@
-//! From Gaussians in the world to ellipses on screen.
+//! Projects Gaussians in the world to ellipses on screen.
 
 use lexisplat::Geometry;
-use rayon::prelude::*;
 
 use crate::camera::Camera;
 use crate::conventions::{
     ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, POWER_SLACK, QUATERNION_FLOOR, RADIUS_SIGMAS,
     TAN_LIMIT, W_EPSILON,
 };
+use crate::parallel::*;
 use crate::radiance::Radiance;
 
+use super::grid::{Grid, Rect};
 use super::math::{exp, sigmoid};
-use super::tiles::{Grid, Rect};
 
-/// Gaussians in one unit of work.
-const CHUNK: usize = 1024;
+/// Gaussians that one task projects.
+const GAUSSIANS_PER_TASK: usize = 1024;
 
-/// Bound on the relative rounding error of each term of a power, and of the distances in it: 16 units
-/// in the last place, where at most six roundings happen.
+/// Bound on the relative rounding error of each term of a power, and of the distances in it. It is 16 units in
+/// the last place; at most six roundings happen.
 const TERM_ERROR: f64 = 1e-6;
 
 /// A Gaussian on screen.
@@ -31,9 +31,9 @@ pub(super) struct Splat {
     pub(super) opacity: f32,
     /// Colour towards the camera, not below 0.
     pub(super) colour: [f32; 3],
-    /// Powers below this surely give an opacity below [`ALPHA_MIN`].
+    /// Powers below this give an opacity below [`ALPHA_MIN`] for sure.
     pub(super) cutoff: f32,
-    /// First pixel row that it may touch, and the first below that it surely does not.
+    /// The first pixel row that it may touch, and the first row below all that it may touch.
     pub(super) rows: [u16; 2],
 }
 
@@ -41,15 +41,15 @@ pub(super) struct Splat {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Visible {
     pub(super) splat: Splat,
-    /// Bits of the view-space z, which is positive: ordered as the number is.
+    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
     pub(super) depth: u32,
-    /// Tiles it may touch.
+    /// Tiles that it may touch.
     pub(super) rect: Rect,
     /// Its index in the scene.
     pub(super) gaussian: u32,
 }
 
-/// What is the same for all Gaussians of a picture.
+/// The values that all Gaussians of a picture are projected with.
 #[derive(Debug, Clone)]
 pub(crate) struct Projection {
     pub(super) camera: Camera,
@@ -58,12 +58,12 @@ pub(crate) struct Projection {
     size: [f32; 2],
     pub(super) grid: Grid,
     antialiased: bool,
-    /// Whether to leave out what cannot reach [`ALPHA_MIN`]. Makes no difference to the picture, which
-    /// tests check by drawing without.
+    /// Whether to leave out what cannot reach [`ALPHA_MIN`]. It makes no difference to the picture; tests check
+    /// that by drawing without it.
     tighten: bool,
 }
 
-/// Stands for no [`Splat::cutoff`]: far below any that could matter, and within the range of `exp`.
+/// A [`Splat::cutoff`] that leaves nothing out: far below any that could matter, and within the range of `exp`.
 const NO_CUTOFF: f32 = -80.0;
 
 impl Projection {
@@ -77,13 +77,13 @@ impl Projection {
         Self { camera: camera.clone(), tan, focal, size, grid, antialiased, tighten: true }
     }
 
-    /// The same without leaving anything out.
+    /// This projection, without leaving anything out.
     #[cfg(test)]
     pub(super) fn untightened(self) -> Self {
         Self { tighten: false, ..self }
     }
 
-    /// Gaussian `i` on screen, if any of it may be seen.
+    /// Projects Gaussian `i`; `None` if none of it is visible.
     fn project(&self, geometry: &Geometry, radiance: &Radiance<'_>, i: usize) -> Option<Visible> {
         let position = geometry.positions[i];
         let view = self.camera.to_view(position);
@@ -125,14 +125,15 @@ impl Projection {
         Some(Visible { splat, depth: z.to_bits(), rect, gaussian })
     }
 
-    /// The root of the conic of Gaussian `i` on screen, if it has one.
+    /// Returns the root of the conic of Gaussian `i` on screen, if it has one.
     pub(super) fn root(&self, geometry: &Geometry, i: usize) -> Option<Root> {
         let view = self.camera.to_view(geometry.positions[i]);
         let on_screen = self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i]));
         self.ellipse(&on_screen).map(|ellipse| ellipse.root())
     }
 
-    /// What carries changes of Gaussian `i` on screen over to the world, if it has an ellipse there.
+    /// Returns the derivatives that carry changes of Gaussian `i` on screen over to the world; `None` if it has no
+    /// ellipse on screen.
     pub(super) fn derivatives(&self, geometry: &Geometry, i: usize) -> Option<Derivatives> {
         let view = self.camera.to_view(geometry.positions[i]);
         let [x, y, z] = view;
@@ -151,7 +152,7 @@ impl Projection {
         })
     }
 
-    /// Each standard deviation's axis on screen, by the approximation at `view`.
+    /// Returns the axis of each standard deviation on screen, by the linear approximation at `view`.
     #[inline]
     fn on_screen(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
         let z = view[2];
@@ -175,13 +176,13 @@ impl Projection {
         })
     }
 
-    /// The dilated covariance on screen of a Gaussian with these axes there.
+    /// Returns the dilated ellipse of a Gaussian with these axes on screen.
     fn ellipse(&self, on_screen: &[[f32; 2]; 3]) -> Option<Ellipse> {
-        // The covariance is the sum of the squares of the axes on screen. INRIA multiplies the covariance
-        // through instead, which is the same sum but loses thin Gaussians to cancellation.
+        // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance of the
+        // world instead. That is the same sum, but loses thin Gaussians to cancellation.
         let sum = |f: fn([f32; 2]) -> f32| f(on_screen[0]) + f(on_screen[1]) + f(on_screen[2]);
         let (a, b, c) = (sum(|v| v[0] * v[0]), sum(|v| v[0] * v[1]), sum(|v| v[1] * v[1]));
-        // The determinant as a sum of squares (Cauchy-Binet): never negative.
+        // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
         let cross = |p: [f32; 2], q: [f32; 2]| {
             let w = p[0] * q[1] - p[1] * q[0];
             w * w
@@ -202,11 +203,11 @@ impl Projection {
         Some(Ellipse { conic: [c / det, -b / det, a / det], variance_y: c, radius, shrink })
     }
 
-    /// Distances from the centre in x and y, in pixels, beyond which no power, as `blend` computes it,
-    /// reaches `cutoff`. Infinite where that cannot be bounded.
+    /// Returns the distances from the centre in x and y, in pixels, beyond which no power, as `blend` computes it,
+    /// reaches `cutoff`. They are infinite where there is no such bound.
     fn extent(&self, centre: [f32; 2], conic: [f32; 3], cutoff: f32) -> [f64; 2] {
         let [a, b, c] = conic.map(f64::from);
-        // How far a pixel can be: terms, and with them rounding errors, are largest there.
+        // The largest distance of a pixel, where terms, and with them rounding errors, are largest.
         let far: [f64; 2] = std::array::from_fn(|k| {
             let (centre, size) = (f64::from(centre[k]), f64::from(self.size[k]));
             centre.abs().max((size - 1.0 - centre).abs())
@@ -215,7 +216,7 @@ impl Projection {
         // Pixels that count satisfy a dx^2 + 2 b dx dy + c dy^2 <= level.
         let level = 2.0 * (-f64::from(cutoff) + TERM_ERROR * terms).max(0.0);
         let det = a * c - b * b;
-        // A determinant lost to rounding says nothing.
+        // A determinant that is lost to rounding gives no bound.
         if det.is_nan() || det <= TERM_ERROR * a * c || a <= 0.0 {
             return [f64::INFINITY; 2];
         }
@@ -224,9 +225,9 @@ impl Projection {
     }
 }
 
-/// How a Gaussian on screen moves with one in the world, in the coordinates of its [`Root`].
+/// How a Gaussian on screen changes with its values in the world, in the coordinates of its [`Root`].
 pub(super) struct Derivatives {
-    /// The centre with each world coordinate.
+    /// The change of the centre with each world coordinate.
     pub(super) by_position: [[f32; 2]; 3],
     /// The three standard deviations as vectors.
     pub(super) axes: [[f32; 2]; 3],
@@ -248,9 +249,9 @@ impl Root {
 
 struct Ellipse {
     conic: [f32; 3],
-    /// Of the covariance.
+    /// The yy of the dilated covariance, in square pixels.
     variance_y: f32,
-    /// In whole pixels.
+    /// In pixels, a whole number.
     radius: f32,
     /// Factor of the opacity in anti-aliased scenes.
     shrink: f32,
@@ -260,12 +261,12 @@ impl Ellipse {
     fn root(&self) -> Root {
         let [xx, xy, _] = self.conic;
         let root = xx.sqrt();
-        // What is left of yy is the determinant over xx, without its cancellation.
+        // The last element squared is the determinant over xx. The variance gives it without cancellation.
         Root([root, xy / root, 1.0 / self.variance_y.sqrt()])
     }
 }
 
-/// The three standard deviations as vectors in the world: columns of rotation * scale.
+/// Returns the three standard deviations as vectors in the world: the columns of rotation * scale.
 fn axes(scales: [f32; 3], rotation: [f32; 4]) -> [[f32; 3]; 3] {
     let length = rotation.iter().map(|v| v * v).sum::<f32>().sqrt().max(QUATERNION_FLOOR);
     let [w, x, y, z] = rotation.map(|v| v / length);
@@ -277,20 +278,21 @@ fn axes(scales: [f32; 3], rotation: [f32; 4]) -> [[f32; 3]; 3] {
     ]
 }
 
-/// All Gaussians that may be seen: the first `counts[k]` of each [`CHUNK`] slots, in order.
+/// The Gaussians that may be visible, in order: the first `counts[k]` of each [`GAUSSIANS_PER_TASK`] slots.
 pub(super) struct Projected {
-    /// One allocation for all, since many small ones from many threads would not go back to the system.
+    /// One allocation for all. Many small ones from many threads would not be returned to the system.
     slots: Vec<Visible>,
     counts: Vec<usize>,
 }
 
 impl Projected {
-    /// The splats alone, in order.
+    /// Returns the splats alone, in order.
     pub(super) fn into_splats(self) -> Vec<Visible> {
         let Self { mut slots, counts } = self;
         let mut len = 0;
         for (piece, count) in counts.into_iter().enumerate() {
-            slots.copy_within(piece * CHUNK..piece * CHUNK + count, len);
+            let first = piece * GAUSSIANS_PER_TASK;
+            slots.copy_within(first..first + count, len);
             len += count;
         }
         slots.truncate(len);
@@ -302,12 +304,13 @@ impl Projected {
 pub(super) fn project(geometry: &Geometry, radiance: &Radiance<'_>, projection: &Projection) -> Projected {
     let mut slots = vec![Visible::default(); geometry.len()];
     let counts = slots
-        .par_chunks_mut(CHUNK)
+        .par_chunks_mut(GAUSSIANS_PER_TASK)
         .enumerate()
         .map(|(chunk, slots)| {
-            let range = chunk * CHUNK..chunk * CHUNK + slots.len();
+            let first = chunk * GAUSSIANS_PER_TASK;
+            let range = first..first + slots.len();
             let seen = range.filter_map(|i| projection.project(geometry, radiance, i));
-            // As many slots as Gaussians: the slots never run out first.
+            // There are as many slots as Gaussians, so the slots never run out first.
             slots.iter_mut().zip(seen).map(|(slot, splat)| *slot = splat).count()
         })
         .collect();

@@ -1,9 +1,11 @@
-//! How much pictures change with every parameter of every Gaussian.
+//! Measures how much pictures change with every value of every Gaussian.
 
-use lexisplat::{Geometry, Sensitivity};
-use rayon::prelude::*;
+use lexisplat::simd::Simd;
+use lexisplat::{Geometry, Progress, Sensitivity, Stage};
 
 use crate::camera::Camera;
+use crate::error::Result;
+use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
@@ -12,25 +14,32 @@ use super::moments::{self, Moments, SUMS};
 use super::project::{self, Derivatives, Projection, Root, Visible};
 use super::{blend, order, tiles};
 
-/// How much the pictures of `scene` from `cameras`, over black, change with each value of each Gaussian,
-/// averaged over views. Views count alike, whatever their size. `on_view` is called after each.
+/// Returns how much the pictures of `scene` from `cameras`, over black, change with each value of each
+/// Gaussian, averaged over the views. Every view has the same weight, whatever its size.
 ///
-/// If every value is off by an independent small error, the expected mean squared error of the pictures
-/// is the sum of these times the squared errors.
+/// If every value has an independent small error, the expected mean squared error of the pictures is the
+/// sum of the sensitivities times the squared errors.
 ///
-/// # Panics
-/// As [`crate::render`].
-#[must_use]
-pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], on_view: &mut dyn FnMut()) -> Sensitivity {
+/// Reports the stage [`Stage::Draw`], in views, to `progress`, and asks it before each view whether to stop.
+///
+/// # Errors
+/// [`Error::Codec`](crate::Error::Codec) if `progress` cancelled the work; otherwise as [`crate::render`].
+pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progress) -> Result<Sensitivity> {
+    scene.validate()?;
+    cameras.iter().try_for_each(Camera::validate)?;
     let mut total = Sensitivity::zeros(scene.len());
+    progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {
+        progress.check()?;
         add_view(&mut total, scene, camera, cameras.len());
-        on_view();
+        progress.advance(1);
     }
-    total
+    progress.end();
+    Ok(total)
 }
 
 fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: usize) {
+    let simd = Simd::current();
     let projection = Projection::new(camera, scene.meta().antialiased);
     let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
     let grid = projection.grid;
@@ -41,16 +50,16 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     let mut sums = vec![Moments::default(); splats.len()];
     for band in tiles::bands(&splats, grid, tiles::MAX_ENTRIES) {
         let lists = tiles::TileLists::new(&splats, grid, band.clone());
-        // Tiles are summed in order, so that results do not depend on the number of threads; a few at a
-        // time, since what they hold until then is large.
+        // Tiles are summed in order, so that results do not depend on the number of threads. A few are measured
+        // at a time, since their moments take much memory.
         let tiles = band.len() * grid.columns;
         for first in (0..tiles).step_by(TILES) {
             let parts: Vec<Vec<(u32, Moments)>> = (first..(first + TILES).min(tiles))
                 .into_par_iter()
                 .map(|tile| {
                     let at = [tile % grid.columns, band.start + tile / grid.columns];
-                    let picture = blend::tile(&splats, lists.of(tile), at, [0.0; 3]);
-                    moments::tile(&splats, &roots, lists.of(tile), at, size, &picture)
+                    let picture = blend::tile(simd, &splats, lists.of(tile), at, [0.0; 3]);
+                    moments::tile(simd, &splats, &roots, lists.of(tile), at, size, &picture)
                 })
                 .collect();
             for (splat, part) in parts.into_iter().flatten() {
@@ -61,8 +70,8 @@ fn add_view(total: &mut Sensitivity, scene: &Scene<'_>, camera: &Camera, views: 
     carry(total, &projection, scene.geometry(), views, &sums, |k| splats[k].gaussian as usize);
 }
 
-/// Carries one view's moments over to the world and adds its share to the `total` over `views`. The `k`-th
-/// moments are those of Gaussian `gaussian(k)`.
+/// Carries one view's moments over to the world, and adds its share to the `total` over `views`. Moments `k` are
+/// those of Gaussian `gaussian(k)`.
 pub(crate) fn carry(
     total: &mut Sensitivity,
     projection: &Projection,
@@ -74,7 +83,7 @@ pub(crate) fn carry(
     let camera = &projection.camera;
     #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
     let share = 1.0 / (camera.width as f32 * camera.height as f32 * CHANNELS * views as f32);
-    for (first, moments) in (0..).step_by(CHUNK).zip(moments.chunks(CHUNK)) {
+    for (first, moments) in (0..).step_by(SPLATS).zip(moments.chunks(SPLATS)) {
         let changes: Vec<Option<Change>> = moments
             .par_iter()
             .enumerate()
@@ -101,14 +110,14 @@ pub(crate) fn carry(
     }
 }
 
-/// Tiles looked at together.
+/// Tiles measured at a time.
 const TILES: usize = 16;
 /// Splats carried over to the world at a time.
-const CHUNK: usize = 1 << 16;
+const SPLATS: usize = 1 << 16;
 /// Colour channels of a picture.
 const CHANNELS: f32 = 3.0;
 
-/// Squared derivatives of one picture by one Gaussian's shape.
+/// Squared derivatives of one picture by one Gaussian's position and shape.
 struct Change {
     position: [f32; 6],
     scale: [f32; 3],
@@ -129,7 +138,7 @@ impl Change {
         // and a rotation in the plane of j and k by one radian makes
         // (u . R a_j) (u . R a_k) (s_j^2 - s_k^2) / (s_j s_k).
         let fourth = |p: [f32; 2], q: [f32; 2]| {
-            // (u . p)^2 (u . q)^2 as a polynomial in u.
+            // This is (u . p)^2 (u . q)^2 as a polynomial in u.
             let square = |a: [f32; 2]| [a[0] * a[0], 2.0 * a[0] * a[1], a[1] * a[1]];
             let (p, q) = (square(p), square(q));
             p[0] * q[0] * m[5]

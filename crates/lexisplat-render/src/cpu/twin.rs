@@ -1,9 +1,10 @@
-//! What tests of the GPU compare with: this renderer's steps, one by one.
+//! The steps of this renderer, one by one, for tests of the GPU to compare with.
 
 use crate::camera::Camera;
 use crate::conventions::TILE;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
+use lexisplat::simd::Simd;
 
 use super::project::{Projection, Splat, Visible};
 use super::{blend, order, project};
@@ -18,14 +19,14 @@ pub(crate) struct Seen {
     pub(crate) colour: [f32; 3],
     /// Bits of the view-space z.
     pub(crate) depth: u32,
-    /// INRIA's tiles: first and end, as (column, row).
+    /// INRIA's tiles: the first, and the first after the last, as (column, row).
     pub(crate) tiles: [[u16; 2]; 2],
 }
 
 /// Powers above this are within the range of `exp`.
 const CUTOFF: f32 = -80.0;
 
-/// What INRIA's rules draw, nearest first.
+/// Returns what INRIA's rules draw, with the nearest first.
 pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
     let projection = Projection::new(camera, scene.meta().antialiased).untightened();
     let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
@@ -43,7 +44,7 @@ pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
         .collect()
 }
 
-/// The pixels of the tile at `[column, row]`, row by row, with `splats` from front to back.
+/// Returns the pixels of the tile at `[column, row]`, row by row, drawn with `splats` from front to back.
 pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec<[f32; 3]> {
     let rows = [0, u16::MAX];
     let visible: Vec<Visible> = splats
@@ -54,6 +55,6 @@ pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec
         })
         .collect();
     let list = (0..).take(visible.len());
-    let pixels = blend::tile(&visible, list, at, background);
+    let pixels = blend::tile(Simd::current(), &visible, list, at, background);
     (0..TILE * TILE).map(|k| pixels.pixel(k % TILE, k / TILE)).collect()
 }

@@ -1,9 +1,10 @@
 //! Sparse codes as kernels read them.
 //!
-//! For every [`COLUMN_GROUP`] Gaussians `columns` holds where their nonzeros begin, in words of `nonzeros`,
-//! and a byte each: the count, or [`ESCAPED`]. There stand the group's atom numbers, one or two bytes each,
-//! then its values, two or four bytes each, both filled up to whole words. Neighbouring Gaussians so share
-//! cache lines, and offsets cost a quarter of a byte a Gaussian.
+//! For every group of [`COLUMN_GROUP`] Gaussians, `columns` holds the word of `nonzeros` at which the group's
+//! codes begin, and a byte for each Gaussian: its number of nonzeros, or [`ESCAPED`]. From that word on,
+//! `nonzeros` holds the group's atom numbers, of one or two bytes each, then its values, of two or four bytes
+//! each. Both are filled up to whole words. Neighbouring Gaussians share cache lines this way, and offsets cost
+//! a quarter of a byte for each Gaussian.
 
 use std::ops::Range;
 
@@ -14,27 +15,27 @@ use super::constants::{COLUMN_GROUP, ESCAPED};
 /// The codes of a run of Gaussians.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// Places and counts, then the escaped Gaussians' numbers in the run.
+    /// Places and counts, then the numbers of the escaped Gaussians within the run.
     pub(super) columns: Vec<u32>,
-    /// Where in `columns` the escaped Gaussians' numbers begin.
+    /// Where in `columns` the numbers of the escaped Gaussians begin.
     pub(super) escapes_at: usize,
     pub(super) nonzeros: Vec<u32>,
 }
 
-/// Words that `counts`, of one group, take in `nonzeros`.
+/// Returns the number of words that a group with these `counts` takes in `nonzeros`.
 pub(super) fn group_words(codes: &SparseCodes, counts: &[u8]) -> usize {
     let total: usize = counts.iter().map(|&c| usize::from(c)).sum();
     (total * codes.indices().width()).div_ceil(4) + (total * codes.values().width()).div_ceil(4)
 }
 
-/// Which of the escapes lie in `range`.
+/// Returns which of the escapes are of Gaussians in `range`.
 pub(super) fn escapes_in(codes: &SparseCodes, range: &Range<usize>) -> Range<usize> {
     let before = |end: usize| codes.escapes().gaussians.partition_point(|&g| (g as usize) < end);
     before(range.start)..before(range.end)
 }
 
 impl Columns {
-    /// The codes of the Gaussians in `range`, which begin at nonzero `first`.
+    /// Lays out the codes of the Gaussians in `range`, which begin at nonzero `first`.
     pub(super) fn new(codes: &SparseCodes, range: Range<usize>, first: usize) -> Self {
         // Chunks are smaller than 2^32.
         let first_gaussian = u32::try_from(range.start).unwrap_or(u32::MAX);
@@ -76,7 +77,7 @@ impl Columns {
     }
 }
 
-/// Appends elements to `words`, filling the last with zeros.
+/// Appends elements to `words`, and fills the last word up with zeros.
 fn pack<const N: usize>(words: &mut Vec<u32>, elements: impl Iterator<Item = [u8; N]>) {
     let mut word = 0;
     let mut filled = 0;

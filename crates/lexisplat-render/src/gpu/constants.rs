@@ -1,4 +1,4 @@
-//! Numbers that kernels and host share: written down here or in `conventions`, and put in front of every
+//! Numbers that kernels and host share. They stand here or in `conventions`, and are put in front of every
 //! kernel's text.
 
 use std::fmt::Write as _;
@@ -11,38 +11,39 @@ use crate::conventions::{
 };
 use crate::cpu::SUMS;
 
-/// Lanes of a group, and Gaussians of a block: what every adapter offers (WebGPU's
+/// Lanes of a workgroup, and Gaussians of a block. Every adapter offers as many (WebGPU's
 /// `maxComputeInvocationsPerWorkgroup`).
 pub(super) const GROUP: u32 = 256;
-/// Groups in one dimension of a dispatch (WebGPU's `maxComputeWorkgroupsPerDimension`).
+/// Most workgroups in one dimension of a dispatch (WebGPU's `maxComputeWorkgroupsPerDimension`).
 pub(super) const MAX_GROUPS: u32 = 65_535;
-/// Numbers a lane adds up in a scan.
+/// Numbers that a lane adds up in a scan.
 const SCAN_ITEMS: u32 = 8;
-/// Numbers a group scans.
+/// Numbers that a workgroup scans.
 pub(super) const SCAN_BLOCK: u32 = GROUP * SCAN_ITEMS;
 /// Bits of a key sorted in one pass.
 pub(super) const DIGIT_BITS: u32 = 4;
 /// Values of a digit.
 pub(super) const DIGITS: u32 = 1 << DIGIT_BITS;
-/// Keys a lane sorts. With [`GROUP`] lanes, counts fit in 16 bits.
+/// Keys that a lane sorts. With [`GROUP`] lanes, counts fit in 16 bits.
 const SORT_ITEMS: u32 = 8;
-/// Keys a group sorts.
+/// Keys that a workgroup sorts.
 pub(super) const SORT_BLOCK: u32 = GROUP * SORT_ITEMS;
-/// Splats whose moments a group sums together.
+/// Splats whose moments a workgroup sums together.
 const MOMENT_SPLATS: u32 = 4;
-/// Splats it reads at once. With the sums this just fits in workgroup memory.
+/// Splats that a workgroup reads at once for that. With the sums this just fits in workgroup memory.
 const MOMENT_BATCH: u32 = 64;
-/// Gaussians whose codes begin at a stored place.
+/// Gaussians whose codes share one stored place.
 pub(super) const COLUMN_GROUP: u32 = 16;
-/// Words for them: the place, and a byte each.
+/// Words for these Gaussians: the place, and a byte for each.
 pub(super) const COLUMN_WORDS: u32 = 1 + COLUMN_GROUP / 4;
-/// In the byte of a Gaussian: it is stored exactly. Counts are at most 72.
+/// Stands in the byte of a Gaussian that is stored exactly. Other bytes are counts, which are at most 72.
 pub(super) const ESCAPED: u32 = 0x80;
-/// Bins for counts of nonzeros, which are at most 72: a power of two.
+/// Bins for counts of nonzeros: a power of two above the largest count, 72.
 const COUNT_BINS: u32 = 128;
-/// Texels along a side of a face of the table of atom radiance. `gpu::table` measures the error.
+/// Texels along a side of a face of the table of atom radiance. Tests of `gpu::radiance_table` measure the
+/// error.
 pub(super) const TABLE_SIDE: u32 = 32;
-/// The depth key of a Gaussian at the near limit; keys are bits of z above it.
+/// The bits of z at the near limit. A depth key is what the bits of z are above this.
 pub(super) const KEY_FIRST: u32 = NEAR_Z.to_bits();
 /// Relative slack of the coarse test in `cull`, far above its rounding errors.
 const CULL_SLACK: f32 = 1e-3;
@@ -50,46 +51,46 @@ const CULL_SLACK: f32 = 1e-3;
 const REACH_SLACK: f32 = 1e-3;
 /// The same in pixels.
 const REACH_MARGIN: f32 = 0.05;
-/// Rounds of a measurement of arithmetic.
+/// Rounds in one measurement of arithmetic.
 pub(super) const MULTIPLY_ADDS: u32 = 1024;
-/// Numbers beyond this count as overflown.
+/// Larger numbers count as overflown.
 const FAR_LIMIT: f32 = 3e38;
 
-/// Stands for a colour that overflows; others are not negative.
+/// Stands for a colour that overflows. Other colours are not negative.
 const NO_COLOUR: f32 = -1.0;
 
-/// What the GPU counts. Places in the buffer of counters.
+/// Numbers that the GPU counts, as places in the buffer of counters.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Counter {
-    /// Gaussians that may be seen, of the fullest band if bands see for themselves.
+    /// Gaussians that may be visible; those of the fullest band if bands look for their own.
     Found,
-    /// Those that have slots: all, but for room.
+    /// Those that have slots: all that the buffers hold.
     Slots,
-    /// One more.
+    /// [`Self::Slots`] plus one.
     SlotsAndEnd,
-    /// Blocks in which they are sorted.
+    /// Blocks in which slots are sorted.
     SlotBlocks,
-    /// Numbers in the sort's histogram.
+    /// Numbers in the histogram of that sort.
     SlotDigits,
-    /// Entries of the band's tile lists that have room.
+    /// Entries of the band's tile lists, as far as the buffers hold them.
     Entries,
-    /// Blocks in which they are sorted.
+    /// Blocks in which entries are sorted.
     EntryBlocks,
-    /// Numbers in the sort's histogram.
+    /// Numbers in the histogram of that sort.
     EntryDigits,
-    /// Entries of the fullest band, room or not.
+    /// Entries of the fullest band, whether the buffers hold them or not.
     EntriesMost,
     /// Entries of all bands.
     EntriesAll,
 }
 
-/// Number of counters.
+/// Words of the buffer of counters.
 pub(super) const COUNTERS: usize = 16;
 
-/// Dispatches whose sizes the GPU works out. Places in the buffer of their arguments.
+/// Dispatches whose sizes the GPU works out, as places in the buffer of their arguments.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Dispatch {
-    /// Lanes for every slot and one more.
+    /// One lane for each slot, and one more.
     SlotsAndEnd,
     /// Groups that sort slots.
     SlotBlocks,
@@ -97,13 +98,13 @@ pub(super) enum Dispatch {
     SlotDigits,
     /// Groups that scan numbers of slots.
     SlotScan,
-    /// Lanes for every entry.
+    /// One lane for each entry.
     Entries,
     /// Groups that sort entries.
     EntryBlocks,
     /// Groups that scan that sort's histogram.
     EntryDigits,
-    /// Lanes for the slots of the first chunk; those of the others follow.
+    /// One lane for each slot of the first chunk. The dispatches of the other chunks follow.
     Chunks,
 }
 
@@ -137,7 +138,7 @@ pub(super) fn declarations() -> String {
         ("COUNT_BINS", COUNT_BINS),
         ("TABLE_SIDE", TABLE_SIDE),
         ("MOMENT_SUMS", sums),
-        // And a maximum.
+        // The sums, and a maximum.
         ("MOMENTS", sums + 1),
         ("MOMENT_SPLATS", MOMENT_SPLATS),
         ("MOMENT_BATCH", MOMENT_BATCH),
@@ -199,17 +200,16 @@ pub(super) fn declarations() -> String {
     out
 }
 
-/// Coefficients of three channels in three vectors of four floats.
+/// Coefficients, of three channels each, that three vectors of four floats hold.
 const QUAD: usize = 4;
 
-/// Vectors of four floats that hold `coefficients` of three channels each.
+/// Returns the number of vectors of four floats that hold `coefficients` of three channels each.
 pub(super) fn vectors(coefficients: usize) -> usize {
     3 * coefficients.div_ceil(QUAD)
 }
 
-/// Statements that read `coefficients` of three channels from vectors of four floats, and do `each` with
-/// them. `load` makes an expression from a vector's place; `each` a statement from a coefficient's number
-/// and expression.
+/// Returns statements that read `coefficients` of three channels from vectors of four floats. `load` makes an
+/// expression from a vector's place; `each` makes a statement from a coefficient's number and expression.
 fn for_each_coefficient(
     coefficients: usize,
     load: impl Fn(usize) -> String,
@@ -235,7 +235,7 @@ fn for_each_coefficient(
     out
 }
 
-/// Statements that add the products of a dense row with the basis to `rest`, and read `dc`.
+/// Returns statements that read `dc` from a dense row and add the products of the rest with the basis to `rest`.
 pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
     for_each_coefficient(per_channel + 1, load, |k, coefficient| match k {
         0 => format!("let dc = {coefficient};"),
@@ -243,17 +243,17 @@ pub(super) fn dense_terms(per_channel: usize, load: impl Fn(usize) -> String) ->
     })
 }
 
-/// Statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
+/// Returns statements that add the products of the atom at `atoms[at]` with the basis to `sum`.
 pub(super) fn atom_terms(per_channel: usize) -> String {
     if per_channel == 0 {
-        // The array is bound all the same, so the kernel must name it.
+        // The array is bound even so, and a kernel must name what is bound.
         return "_ = atoms[at];".to_owned();
     }
     let load = |v: usize| format!("atoms[at + {v}u]");
     for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
 }
 
-/// The same for the atom whose floats begin at `atoms_here[at]`.
+/// Returns the statements of [`atom_terms`] for the atom whose floats begin at `atoms_here[at]`.
 pub(super) fn shared_atom_terms(per_channel: usize) -> String {
     let mut out = String::new();
     for k in 0..per_channel {

@@ -4,24 +4,27 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::wait::answer;
+
+use super::buffer::Counted;
 
 /// What to install or use where no adapter is found.
-const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer (--device cpu)";
+const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer";
 
 /// An adapter that this machine offers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AdapterSummary {
-    /// Its place in the list, best first: what `--device N` takes.
+    /// Its place in the list, best first: the number that [`GpuChoice::Index`] takes.
     pub index: usize,
-    /// Its name, as the driver says it.
+    /// The name that the driver gives it.
     pub name: String,
     /// Driver and version.
     pub driver: String,
-    /// `Vulkan`, `Metal` or `Dx12`.
+    /// `Vulkan`, `Metal`, `Dx12` or `BrowserWebGpu`.
     pub backend: String,
     /// Whether it is software on the processor, such as lavapipe.
     pub software: bool,
-    /// Largest part of a buffer a kernel can see at once, in bytes.
+    /// Largest part of a buffer that a kernel can see at once, in bytes.
     pub max_binding: u64,
     /// Whether stages can be timed.
     pub timestamps: bool,
@@ -35,7 +38,7 @@ pub enum GpuChoice {
     /// The best one of any kind.
     #[default]
     Best,
-    /// The one at this place in [`adapters`].
+    /// The one at this place in the list of [`adapters_async`].
     Index(usize),
 }
 
@@ -58,20 +61,22 @@ struct Shared {
     failure: Arc<Mutex<Option<String>>>,
 }
 
-/// Drivers that are looked at. Without OpenGL: it lacks what the kernels need, and its loaders print on
-/// start.
-const BACKENDS: wgpu::Backends =
-    wgpu::Backends::VULKAN.union(wgpu::Backends::METAL).union(wgpu::Backends::DX12);
+/// Drivers that are looked for. OpenGL is not among them: it lacks what the kernels need, and its loaders
+/// print on start.
+const BACKENDS: wgpu::Backends = wgpu::Backends::VULKAN
+    .union(wgpu::Backends::METAL)
+    .union(wgpu::Backends::DX12)
+    .union(wgpu::Backends::BROWSER_WEBGPU);
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = BACKENDS;
-    // The arguments of indirect dispatches come from this crate's own kernels, clamped there.
+    // The arguments of indirect dispatches come from this crate's own kernels, which clamp them.
     descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     wgpu::Instance::new(descriptor)
 }
 
-/// How good an adapter is, best first: discrete, integrated, virtual, other, software.
+/// Returns how good an adapter is, 0 for the best: discrete, integrated, virtual, other, software.
 #[must_use]
 pub fn rank(adapter: &wgpu::Adapter) -> u8 {
     match adapter.get_info().device_type {
@@ -84,8 +89,8 @@ pub fn rank(adapter: &wgpu::Adapter) -> u8 {
 }
 
 /// All adapters of the machine, best first.
-fn sorted_adapters() -> Vec<wgpu::Adapter> {
-    let mut found = pollster::block_on(instance().enumerate_adapters(BACKENDS));
+async fn sorted_adapters() -> Vec<wgpu::Adapter> {
+    let mut found = instance().enumerate_adapters(BACKENDS).await;
     found.sort_by_key(rank);
     found
 }
@@ -103,10 +108,16 @@ fn summarise(index: usize, adapter: &wgpu::Adapter) -> AdapterSummary {
     }
 }
 
-/// The machine's adapters, best first; none where there is no driver.
+/// Returns the machine's adapters, best first; none where there is no driver.
+pub async fn adapters_async() -> Vec<AdapterSummary> {
+    sorted_adapters().await.iter().enumerate().map(|(i, adapter)| summarise(i, adapter)).collect()
+}
+
+/// Blocks on [`adapters_async`].
+#[cfg(not(target_family = "wasm"))]
 #[must_use]
 pub fn adapters() -> Vec<AdapterSummary> {
-    sorted_adapters().iter().enumerate().map(|(i, adapter)| summarise(i, adapter)).collect()
+    pollster::block_on(adapters_async())
 }
 
 impl Gpu {
@@ -114,33 +125,41 @@ impl Gpu {
     ///
     /// # Errors
     /// [`Error::Gpu`] if there is none or it refuses; [`Error::Parameter`] for an index out of range.
-    pub fn open(choice: GpuChoice) -> Result<Self> {
-        Self::open_with(choice, |_| {})
+    pub async fn open_async(choice: GpuChoice) -> Result<Self> {
+        Self::find_async(choice).await?.ok_or_else(|| Error::Gpu { problem: NO_ADAPTER.to_owned() })
     }
 
-    /// [`Self::open`], asking the device for what `reduce` leaves of the limits.
-    pub(super) fn open_with(choice: GpuChoice, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Self> {
-        Self::find_with(choice, reduce)?.ok_or_else(|| Error::Gpu { problem: NO_ADAPTER.to_owned() })
-    }
-
-    /// [`Self::open`], or `None` if there is no such adapter.
+    /// Opens an adapter as [`Self::open_async`] does; returns `None` if there is no such adapter.
     ///
     /// # Errors
     /// [`Error::Gpu`] if there is one but it refuses; [`Error::Parameter`] for an index out of range, where
-    /// there are any.
-    pub fn find(choice: GpuChoice) -> Result<Option<Self>> {
-        Self::find_with(choice, |_| {})
+    /// there are any adapters.
+    pub async fn find_async(choice: GpuChoice) -> Result<Option<Self>> {
+        Self::find_with(choice, |_| {}).await
     }
 
-    fn find_with(choice: GpuChoice, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Option<Self>> {
-        let found = sorted_adapters();
+    /// Blocks on [`Self::open_async`].
+    ///
+    /// # Errors
+    /// As [`Self::open_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn open(choice: GpuChoice) -> Result<Self> {
+        pollster::block_on(Self::open_async(choice))
+    }
+
+    /// [`Self::find_async`] that asks the device for what `reduce` leaves of the limits.
+    pub(super) async fn find_with(
+        choice: GpuChoice,
+        reduce: impl FnOnce(&mut wgpu::Limits),
+    ) -> Result<Option<Self>> {
+        let found = sorted_adapters().await;
         let index = match choice {
             GpuChoice::Index(index) if index < found.len() => Some(index),
             GpuChoice::Index(index) if !found.is_empty() => {
                 let expected = format!("an adapter's number, 0 to {}", found.len() - 1);
                 return Err(Error::parameter("device", index, expected));
             }
-            GpuChoice::Best | GpuChoice::Index(_) => (!found.is_empty()).then_some(0),
+            GpuChoice::Best | GpuChoice::Index(_) => Some(0),
             GpuChoice::Hardware => {
                 found.iter().position(|adapter| adapter.get_info().device_type != wgpu::DeviceType::Cpu)
             }
@@ -150,14 +169,15 @@ impl Gpu {
         };
         let mut descriptor = Self::descriptor(adapter);
         reduce(&mut descriptor.required_limits);
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor))
+        let opened = adapter.request_device(&descriptor).await;
+        let (device, queue) = opened
             .map_err(|error| Error::Gpu { problem: format!("{}: {error}", adapter.get_info().name) })?;
         Ok(Some(Self::new(summarise(index, adapter), device, queue)))
     }
 
-    /// What this renderer asks of a device that is made elsewhere, such as by a window.
+    /// Returns what this renderer asks of a device that is made elsewhere, such as by a window.
     ///
-    /// Limits are WebGPU's defaults, which every adapter has, but for sizes: those are the adapter's own.
+    /// The limits are WebGPU's defaults, which every adapter has, except sizes, which are the adapter's own.
     #[must_use]
     pub fn descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let most = adapter.limits();
@@ -177,7 +197,7 @@ impl Gpu {
         }
     }
 
-    /// A GPU on a device made with [`Self::descriptor`].
+    /// Makes a GPU of a device that was made with [`Self::descriptor`].
     #[must_use]
     pub fn from_device(adapter: &wgpu::Adapter, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self::new(summarise(0, adapter), device, queue)
@@ -190,16 +210,8 @@ impl Gpu {
             slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert_with(|| error.to_string());
         }));
         let limits = device.limits();
-        let shared = Shared {
-            device,
-            queue,
-            summary,
-            limits,
-            bytes: Arc::default(),
-            most_bytes: AtomicU64::new(0),
-            failure,
-        };
-        Self { shared: Arc::new(shared) }
+        let (bytes, most_bytes) = (Arc::default(), AtomicU64::new(0));
+        Self { shared: Arc::new(Shared { device, queue, summary, limits, bytes, most_bytes, failure }) }
     }
 
     /// Whether `other` is a clone of this. Devices of two instances can compare as equal.
@@ -207,7 +219,7 @@ impl Gpu {
         Arc::ptr_eq(&self.shared, &other.shared)
     }
 
-    /// What was opened.
+    /// The adapter that was opened.
     #[must_use]
     pub fn summary(&self) -> &AdapterSummary {
         &self.shared.summary
@@ -219,7 +231,7 @@ impl Gpu {
         self.shared.bytes.load(Relaxed)
     }
 
-    /// The most [`Self::bytes`] has been.
+    /// The largest value that [`Self::bytes`] has had.
     #[must_use]
     pub fn most_bytes(&self) -> u64 {
         self.shared.most_bytes.load(Relaxed)
@@ -246,154 +258,67 @@ impl Gpu {
         self.shared.limits.max_storage_buffer_binding_size.min(self.shared.limits.max_buffer_size)
     }
 
-    /// A counted buffer.
-    pub(super) fn buffer(&self, label: &str, size: u64, usage: wgpu::BufferUsages) -> Result<Buffer> {
-        // Empty bindings are refused, and sizes of copies are in words.
-        let size = size.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT).max(MIN_BUFFER);
-        let limit = self.shared.limits.max_buffer_size;
-        if size > limit {
-            return Err(Error::GpuLimit { what: format!("bytes of GPU buffer {label}"), found: size, limit });
-        }
-        let raw = self.checked(label, || {
-            let descriptor =
-                wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
-            self.shared.device.create_buffer(&descriptor)
-        })?;
-        Ok(Buffer { raw, bytes: self.count(size) })
-    }
-
-    /// A counted buffer that kernels read and write, and that can be copied from and to.
-    pub(super) fn storage(&self, label: &str, size: u64) -> Result<Buffer> {
-        use wgpu::BufferUsages as U;
-        self.buffer(label, size, U::STORAGE | U::COPY_DST | U::COPY_SRC)
-    }
-
-    /// A counted buffer with `words` in it, for kernels to read.
-    pub(super) fn upload<T: bytemuck::Pod>(&self, label: &str, words: &[T]) -> Result<Buffer> {
-        let bytes: &[u8] = bytemuck::cast_slice(words);
-        let buffer = self.storage(label, bytes.len() as u64)?;
-        self.write(&buffer, bytes);
-        Ok(buffer)
-    }
-
-    /// A small counted buffer of uniforms.
-    pub(super) fn uniform<T: bytemuck::Pod>(&self, label: &str, value: &T) -> Result<Buffer> {
-        use wgpu::BufferUsages as U;
-        let buffer = self.buffer(label, size_of::<T>() as u64, U::UNIFORM | U::COPY_DST)?;
-        self.write(&buffer, bytemuck::bytes_of(value));
-        Ok(buffer)
-    }
-
-    /// Copies `bytes`, of whole words, to the start of `buffer`, in pieces so that the staging copies do
-    /// not pile up.
-    pub(super) fn write(&self, buffer: &Buffer, bytes: &[u8]) {
-        for (piece, at) in bytes.chunks(UPLOAD_PIECE).zip((0_u64..).step_by(UPLOAD_PIECE)) {
-            self.shared.queue.write_buffer(&buffer.raw, at, piece);
-            if bytes.len() > UPLOAD_PIECE {
-                self.shared.queue.submit([]);
-                let _ = self.shared.device.poll(wgpu::PollType::wait_indefinitely());
-            }
-        }
-    }
-
-    /// Adds `size` to the bytes alive until what is returned is dropped.
+    /// Adds `size` to the bytes alive until the result is dropped.
     pub(super) fn count(&self, size: u64) -> Counted {
-        let now = self.shared.bytes.fetch_add(size, Relaxed) + size;
-        self.shared.most_bytes.fetch_max(now, Relaxed);
-        Counted { size, total: Arc::clone(&self.shared.bytes) }
+        let counted = Counted::new(size, &self.shared.bytes);
+        self.shared.most_bytes.fetch_max(self.bytes(), Relaxed);
+        counted
     }
 
-    /// Runs `make`; what the device has against it is an error about `what`.
-    pub(super) fn checked<T>(&self, what: &str, make: impl FnOnce() -> T) -> Result<T> {
-        let validation = self.shared.device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let memory = self.shared.device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
+    /// Runs `make`, which submits nothing. What the device has against its calls becomes an error about `what`.
+    pub(super) async fn checked<T>(&self, what: &str, make: impl FnOnce() -> Result<T>) -> Result<T> {
+        let validation = self.device().push_error_scope(wgpu::ErrorFilter::Validation);
+        let memory = self.device().push_error_scope(wgpu::ErrorFilter::OutOfMemory);
         let made = make();
-        let memory = pollster::block_on(memory.pop());
-        let validation = pollster::block_on(validation.pop());
+        // Scopes belong to the thread, so both are closed before anything is awaited.
+        let (memory, validation) = (memory.pop(), validation.pop());
+        let (memory, validation) = (memory.await, validation.await);
         match memory.or(validation) {
-            None => Ok(made),
-            Some(error) => Err(Error::Gpu { problem: format!("{}: {what}: {error}", self.summary().name) }),
+            None => made,
+            Some(error) => Err(self.failed(format!("{what}: {error}"))),
         }
     }
 
-    /// Waits until all work is done.
+    /// Waits until all submitted work is done. Outside of a browser something must poll the device meanwhile,
+    /// as [`Self::wait`] does.
+    ///
+    /// # Errors
+    /// [`Error::Gpu`] if some work was refused.
+    pub async fn wait_async(&self) -> Result<()> {
+        let (give, done) = answer();
+        self.queue().on_submitted_work_done(move || give(()));
+        done.await;
+        self.take_failure()
+    }
+
+    /// Blocks until all submitted work is done.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the device was lost or some work was refused.
+    #[cfg(not(target_family = "wasm"))]
     pub fn wait(&self) -> Result<()> {
-        let waited = self.shared.device.poll(wgpu::PollType::wait_indefinitely());
+        self.block_on(self.wait_async())
+    }
+
+    /// Runs `future` to its end on this thread, and waits for this GPU whenever the future does.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn block_on<T>(&self, future: impl Future<Output = Result<T>>) -> Result<T> {
+        crate::wait::block_on(|| self.poll(), future)
+    }
+
+    /// Waits until the device has done all its work and called the callbacks.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn poll(&self) -> Result<()> {
+        super::readback::poll(self.device())
+    }
+
+    /// The first error that no scope caught, once.
+    pub(super) fn take_failure(&self) -> Result<()> {
         let failure = self.shared.failure.lock().unwrap_or_else(PoisonError::into_inner).take();
-        match (failure, waited) {
-            (Some(problem), _) => Err(Error::Gpu { problem: format!("{}: {problem}", self.summary().name) }),
-            (None, Err(error)) => Err(Error::Gpu { problem: format!("{}: {error}", self.summary().name) }),
-            (None, Ok(_)) => Ok(()),
-        }
+        failure.map_or(Ok(()), |problem| Err(self.failed(problem)))
     }
 
-    /// All of a buffer made by [`Self::storage`].
-    #[cfg(test)]
-    pub(super) fn read_back<T: bytemuck::Pod>(&self, buffer: &Buffer) -> Vec<T> {
-        use wgpu::BufferUsages as U;
-        let size = buffer.bytes();
-        let back = self.buffer("back", size, U::MAP_READ | U::COPY_DST).unwrap();
-        let mut encoder = self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&buffer.raw, 0, &back.raw, 0, size);
-        self.queue().submit([encoder.finish()]);
-        self.read(&back, size).unwrap()
-    }
-
-    /// The first `size` bytes of `buffer`, which must be `MAP_READ`.
-    pub(super) fn read<T: bytemuck::Pod>(&self, buffer: &Buffer, size: u64) -> Result<Vec<T>> {
-        if size == 0 {
-            return Ok(Vec::new());
-        }
-        let slice = buffer.raw.slice(..size);
-        slice.map_async(wgpu::MapMode::Read, |_| {});
-        self.wait()?;
-        let refused = |error: &dyn std::fmt::Display| Error::Gpu {
-            problem: format!("{}: reading back: {error}", self.summary().name),
-        };
-        let view = slice.get_mapped_range().map_err(|error| refused(&error))?;
-        let words = bytemuck::pod_collect_to_vec(&view);
-        drop(view);
-        buffer.raw.unmap();
-        Ok(words)
-    }
-}
-
-/// Least size of a buffer in bytes: that of the largest type in a binding.
-const MIN_BUFFER: u64 = 256;
-/// Bytes uploaded at once.
-const UPLOAD_PIECE: usize = 32 << 20;
-
-/// A buffer that counts while it lives.
-#[derive(Debug)]
-pub(super) struct Buffer {
-    pub(super) raw: wgpu::Buffer,
-    bytes: Counted,
-}
-
-impl Buffer {
-    pub(super) fn bytes(&self) -> u64 {
-        self.bytes.size
-    }
-}
-
-/// Bytes alive on the GPU.
-#[derive(Debug)]
-pub(super) struct Counted {
-    size: u64,
-    total: Arc<AtomicU64>,
-}
-
-impl Counted {
-    pub(super) fn size(&self) -> u64 {
-        self.size
-    }
-}
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        self.total.fetch_sub(self.size, Relaxed);
+    fn failed(&self, problem: String) -> Error {
+        Error::Gpu { problem: format!("{}: {problem}", self.summary().name) }
     }
 }

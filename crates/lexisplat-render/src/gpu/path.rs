@@ -1,9 +1,9 @@
-//! The ways SH can be held on the GPU.
+//! The ways in which a GPU can hold SH.
 
 use crate::error::{Error, Result};
 use crate::scene::Scene;
 
-/// How SH is held and evaluated.
+/// How SH is held on the GPU, and evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum ShPath {
@@ -11,18 +11,18 @@ pub enum ShPath {
     DenseF32,
     /// Every coefficient in 16 bits.
     DenseF16,
-    /// Sparse codes, the dictionary read through the cache.
+    /// Sparse codes, with the dictionary read through the cache.
     Sparse,
-    /// As [`Self::Sparse`], each group's Gaussians ordered by nonzeros before they are shaded.
+    /// As [`Self::Sparse`], with the Gaussians of each workgroup ordered by nonzeros before they are coloured.
     SparseOrdered,
-    /// Sparse codes, the dictionary in workgroup memory. For dictionaries that fit there.
+    /// Sparse codes, with the dictionary in workgroup memory. Only for dictionaries that fit there.
     SparseShared,
-    /// Sparse codes, each atom's radiance from a table over directions: an approximation.
+    /// Sparse codes, with each atom's radiance from a table over directions. This is an approximation.
     SparseTable,
 }
 
 impl ShPath {
-    /// All of them.
+    /// All paths.
     pub const ALL: [Self; 6] = [
         Self::DenseF32,
         Self::DenseF16,
@@ -51,7 +51,7 @@ impl ShPath {
         !matches!(self, Self::DenseF32 | Self::DenseF16)
     }
 
-    /// What draws `scene` as it is stored, exactly.
+    /// Returns the path that draws `scene` as it is stored, exactly.
     #[must_use]
     pub fn of(scene: &Scene<'_>) -> Self {
         match scene {

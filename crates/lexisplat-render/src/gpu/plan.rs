@@ -1,11 +1,12 @@
-//! Which kernels run on what, in which order.
+//! Plans a picture: which kernels run, in which order, and on which buffers.
 
 use std::sync::{Arc, Weak};
 
 use crate::error::Result;
 
+use super::buffer::Buffer;
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::scene::GpuScene;
 use super::shaders::{Bound, Kernels, bind};
 use super::uniforms::{Band, Pass, Scan};
@@ -16,23 +17,23 @@ use crate::conventions::TILE;
 /// A part of drawing that is timed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[non_exhaustive]
-pub enum Stage {
-    /// Which Gaussians may be seen.
+pub enum DrawStage {
+    /// Finds the Gaussians that may be visible.
     Cull,
-    /// Ellipses on screen.
+    /// Projects them to ellipses on screen.
     Project,
-    /// Colours.
+    /// Works out their colours.
     Radiance,
-    /// Order by depth.
+    /// Orders them by depth.
     Sort,
-    /// Lists of the tiles.
+    /// Lists for each tile what may touch it.
     Tiles,
-    /// Pixels.
+    /// Draws the pixels.
     Blend,
 }
 
-impl Stage {
-    /// All, in the order they run.
+impl DrawStage {
+    /// All stages, in the order they run.
     pub const ALL: [Self; 6] =
         [Self::Cull, Self::Project, Self::Radiance, Self::Sort, Self::Tiles, Self::Blend];
 
@@ -53,9 +54,13 @@ impl Stage {
 /// What a plan depends on besides the scene and the buffers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
+    /// Columns of tiles.
     pub(super) columns: u32,
+    /// Rows of tiles.
     pub(super) rows: u32,
+    /// Width in pixels.
     pub(super) width: u32,
+    /// Height in pixels.
     pub(super) height: u32,
     /// Rows of tiles drawn at once.
     pub(super) band_rows: u32,
@@ -65,50 +70,48 @@ pub(super) struct Shape {
     pub(super) depth_bits: u32,
 }
 
-/// Everything to run for one picture.
+/// All the kernels that one picture needs, in order, with their bindings.
 pub(super) struct Plan {
     pub(super) shape: Shape,
     pub(super) scene: u64,
     scene_lives: Weak<()>,
     pub(super) passes: Vec<StagePass>,
-    /// Alive as long as the bindings.
+    /// The bindings refer to these.
     _uniforms: Vec<Buffer>,
 }
 
-/// Steps of one stage, in one compute pass.
+/// The steps of one stage, in one compute pass.
 pub(super) struct StagePass {
-    pub(super) stage: Stage,
+    pub(super) stage: DrawStage,
     pub(super) steps: Vec<Step>,
 }
 
+/// One dispatch of a kernel.
 pub(super) struct Step {
     pub(super) pipeline: wgpu::ComputePipeline,
     pub(super) bindings: wgpu::BindGroup,
     pub(super) size: Size,
 }
 
-/// How many groups.
+/// The number of workgroups of a dispatch.
 pub(super) enum Size {
+    /// This many.
     Groups(u32),
-    /// As the GPU works out: where in the buffer of arguments.
+    /// As many as the GPU works out. The number is the place in the buffer of dispatches, in bytes.
     Indirect(u64),
 }
 
-/// Bytes of a dispatch's arguments.
+/// Bytes of a dispatch's arguments: three words.
 const ARGUMENTS: u64 = 12;
 
 impl Size {
-    /// Lanes for the slots of chunk `k`.
+    /// One lane for each slot of chunk `k`.
     fn chunk(k: u64) -> Self {
-        Self::place(Dispatch::Chunks as u64 + k)
-    }
-
-    fn place(dispatch: u64) -> Self {
-        Self::Indirect(dispatch * ARGUMENTS)
+        Self::Indirect((Dispatch::Chunks as u64 + k) * ARGUMENTS)
     }
 
     fn of(dispatch: Dispatch) -> Self {
-        Self::place(dispatch as u64)
+        Self::Indirect(dispatch as u64 * ARGUMENTS)
     }
 }
 
@@ -116,17 +119,18 @@ impl Size {
 #[path = "tests/scan_sort.rs"]
 mod tests;
 
-/// What a sort works on.
+/// The buffers that a sort works on, and the places of the numbers it needs.
 struct Sorting<'a> {
     keys: [&'a Buffer; 2],
     values: [&'a Buffer; 2],
+    /// Significant bits of the keys.
     bits: u32,
     length: Counter,
     blocks: Counter,
     digits: Counter,
     groups: Dispatch,
     scan_groups: Dispatch,
-    /// Whether values are the keys' own places at first.
+    /// Whether the values are at first the places of their keys. The buffer of values need not hold them.
     identity: bool,
 }
 
@@ -140,7 +144,8 @@ struct Planner<'a> {
 }
 
 impl Plan {
-    pub(super) fn new(
+    /// Plans pictures of `shape` of `scene`, drawn with the buffers in `work`.
+    pub(super) async fn new(
         gpu: &Gpu,
         kernels: &Kernels,
         scene: &GpuScene,
@@ -149,7 +154,7 @@ impl Plan {
     ) -> Result<Self> {
         let planner =
             Planner { gpu, kernels, work, uniforms: Vec::new(), steps: Vec::new(), passes: Vec::new() };
-        planner.plan(scene, shape)
+        gpu.checked("bindings", || planner.plan(scene, shape)).await
     }
 
     /// Whether its scene is still there.
@@ -158,15 +163,18 @@ impl Plan {
     }
 }
 
-fn all(buffer: &Buffer) -> Bound<'_> {
-    Bound::All(&buffer.raw)
+/// Binds all of each buffer, the first at binding `first`, the others after it.
+fn all_from<'a>(
+    first: u32,
+    buffers: impl IntoIterator<Item = &'a Buffer>,
+) -> impl Iterator<Item = (u32, Bound<'a>)> {
+    (first..).zip(buffers).map(|(binding, buffer)| (binding, Bound::All(&buffer.raw)))
 }
 
 impl Planner<'_> {
     fn plan(mut self, scene: &GpuScene, shape: Shape) -> Result<Plan> {
         let mut by_depth = 0;
-        let mut first = 0;
-        while first < shape.rows {
+        for first in (0..shape.rows).step_by(shape.band_rows as usize) {
             let rows = shape.band_rows.min(shape.rows - first);
             if shape.bands_see {
                 by_depth = self.see(scene, shape, first, rows)?;
@@ -174,76 +182,48 @@ impl Planner<'_> {
                 by_depth = self.see(scene, shape, 0, shape.rows)?;
             }
             self.band(shape, &self.work.slot_values[by_depth], first, rows)?;
-            first += rows;
         }
         let scene_lives = Arc::downgrade(&scene.lives);
         Ok(Plan { shape, scene: scene.id, scene_lives, passes: self.passes, _uniforms: self.uniforms })
     }
 
-    /// Projects, shades and orders what may be seen in some rows of tiles; in which of the two buffers the
-    /// slots then are.
+    /// Finds, projects, colours and orders the Gaussians that may be visible in some rows of tiles. Returns in
+    /// which of the two buffers the ordered slots are.
     fn see(&mut self, scene: &GpuScene, shape: Shape, first: u32, rows: u32) -> Result<usize> {
         let (work, kernels) = (self.work, self.kernels);
         let tiles = rows * shape.columns;
         let band = self.gpu.uniform("rows in view", &Band { first, rows, tiles, padding: 0 })?;
         for chunk in &scene.chunks {
-            let bound = [
-                (0, all(&work.frame)),
-                (1, all(&chunk.uniform)),
-                (2, all(&chunk.bodies)),
-                (3, all(&work.masks)),
-                (4, all(&work.starts)),
-                (5, all(&band)),
-            ];
-            self.step(&kernels.cull, &bound, Size::Groups(chunk.blocks))?;
+            let bound = [&work.frame, &chunk.uniform, &chunk.bodies, &work.masks, &work.starts, &band];
+            self.step(&kernels.cull, all_from(0, bound), Size::Groups(chunk.blocks));
         }
         self.scan(&work.starts, Counter::Found, Some(scene.blocks() + 1), None)?;
-        let bound =
-            [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
-        self.step(&kernels.compact, &bound, Size::Groups(scene.blocks()))?;
-        let bound = [
-            (0, all(&work.frame)),
-            (1, all(&work.starts)),
-            (2, all(&scene.chunk_blocks)),
-            (3, all(&work.counters)),
-            (4, all(&work.dispatches)),
-        ];
-        self.step(&kernels.plan_slots, &bound, Size::Groups(1))?;
-        self.end(Stage::Cull);
+        let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
+        self.step(&kernels.compact, all_from(0, bound), Size::Groups(scene.blocks()));
+        let bound = [&work.frame, &work.starts, &scene.chunk_blocks, &work.counters, &work.dispatches];
+        self.step(&kernels.plan_slots, all_from(0, bound), Size::Groups(1));
+        self.end(DrawStage::Cull);
 
-        for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
-            let bound = [
-                (0, all(&work.frame)),
-                (1, all(&chunk.uniform)),
-                (2, all(&work.starts)),
-                (3, all(&work.gaussians)),
-                (4, all(&chunk.bodies)),
-                (5, all(&chunk.shapes)),
-                (6, all(&work.centres)),
-                (7, all(&work.conics)),
-                (8, all(&work.slot_keys[0])),
-                (9, all(&work.rects)),
-            ];
-            let size = Size::chunk(k);
-            self.step(&kernels.project, &bound, size)?;
+        for (chunk, k) in scene.chunks.iter().zip(0..) {
+            let read = [&work.frame, &chunk.uniform, &work.starts, &work.gaussians];
+            let shape = [&chunk.bodies, &chunk.shapes];
+            let written = [&work.centres, &work.conics, &work.slot_keys[0], &work.rects];
+            let bound = all_from(0, read.into_iter().chain(shape).chain(written));
+            self.step(&kernels.project, bound, Size::chunk(k));
         }
-        self.end(Stage::Project);
+        self.end(DrawStage::Project);
 
-        for (chunk, k) in scene.chunks.iter().zip(0_u64..) {
-            let mut bound = vec![
-                (0, all(&work.frame)),
-                (1, all(&chunk.uniform)),
-                (2, all(&work.starts)),
-                (3, all(&work.gaussians)),
-                (4, all(&chunk.bodies)),
-                (5, all(&work.colours)),
-            ];
-            bound.extend(chunk.sh.iter().zip(6..).map(|(buffer, binding)| (binding, all(buffer))));
-            bound.extend(scene.table.iter().flat_map(|table| table.bound()));
-            let size = Size::chunk(k);
-            self.step(&scene.radiance, &bound, size)?;
+        for (chunk, k) in scene.chunks.iter().zip(0..) {
+            let bound =
+                [&work.frame, &chunk.uniform, &work.starts, &work.gaussians, &chunk.bodies, &work.colours];
+            let table = scene.table.iter().flat_map(|table| table.bound());
+            self.step(
+                &scene.radiance,
+                all_from(0, bound.into_iter().chain(&chunk.sh)).chain(table),
+                Size::chunk(k),
+            );
         }
-        self.end(Stage::Radiance);
+        self.end(DrawStage::Radiance);
 
         let by_depth = self.sort(&Sorting {
             keys: work.slot_keys.each_ref(),
@@ -256,47 +236,40 @@ impl Planner<'_> {
             scan_groups: Dispatch::SlotDigits,
             identity: true,
         })?;
-        self.end(Stage::Sort);
+        self.end(DrawStage::Sort);
 
         self.uniforms.push(band);
         Ok(by_depth)
     }
 
-    /// Lists and draws some rows of tiles.
+    /// Makes the lists of some rows of tiles and draws them. `order` holds the slots by depth.
     fn band(&mut self, shape: Shape, order: &Buffer, first: u32, rows: u32) -> Result<()> {
         let (work, kernels) = (self.work, self.kernels);
         let tiles = rows * shape.columns;
         let band = self.gpu.uniform("band", &Band { first, rows, tiles, padding: 0 })?;
-        let common = || {
-            [
-                (0, all(&work.frame)),
-                (1, all(&band)),
-                (2, all(&work.counters)),
-                (3, all(order)),
-                (4, all(&work.rects)),
-                (5, all(&work.centres)),
-                (6, all(&work.conics)),
-                (7, all(&work.offsets)),
-            ]
-        };
-        self.step(&kernels.count_tiles, &common(), Size::of(Dispatch::SlotsAndEnd))?;
-        self.scan(&work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))?;
-        let bound = [
-            (0, all(&work.frame)),
-            (3, all(&work.counters)),
-            (4, all(&work.dispatches)),
-            (5, all(&work.offsets)),
+        let common = [
+            &work.frame,
+            &band,
+            &work.counters,
+            order,
+            &work.rects,
+            &work.centres,
+            &work.conics,
+            &work.offsets,
         ];
-        self.step(&kernels.plan_entries, &bound, Size::Groups(1))?;
+        self.step(&kernels.count_tiles, all_from(0, common), Size::of(Dispatch::SlotsAndEnd));
+        self.scan(&work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))?;
+        let bound =
+            all_from(0, [&work.frame]).chain(all_from(3, [&work.counters, &work.dispatches, &work.offsets]));
+        self.step(&kernels.plan_entries, bound, Size::Groups(1));
         let measuring = kernels.moments.as_ref().zip(work.moments.as_ref());
         let listed_slots = measuring.map_or(&work.entry_values[0], |(_, moments)| &moments.listed_slots);
-        let lists = [(8, all(&work.entry_keys[0])), (9, all(listed_slots))];
-        let bound: Vec<_> = common().into_iter().chain(lists).collect();
-        self.step(&kernels.list_tiles, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+        let bound = all_from(0, common).chain(all_from(8, [&work.entry_keys[0], listed_slots]));
+        self.step(&kernels.list_tiles, bound, Size::of(Dispatch::SlotsAndEnd));
         let by_tile = self.sort(&Sorting {
             keys: work.entry_keys.each_ref(),
             values: work.entry_values.each_ref(),
-            // Tiles and what belongs to none.
+            // Entries that belong to no tile have the key after the last tile's.
             bits: u32::BITS - tiles.leading_zeros(),
             length: Counter::Entries,
             blocks: Counter::EntryBlocks,
@@ -305,82 +278,56 @@ impl Planner<'_> {
             scan_groups: Dispatch::EntryDigits,
             identity: measuring.is_some(),
         })?;
-        let mut entry_slots = &work.entry_values[by_tile];
+        let sorted = &work.entry_values[by_tile];
+        let mut entry_slots = sorted;
         if let Some((kernels, moments)) = measuring {
-            // The sort is done with the other buffer.
+            // The sort no longer needs the other buffer.
             entry_slots = &work.entry_values[1 - by_tile];
-            let bound = [
-                (0, all(&work.counters)),
-                (1, all(&work.entry_values[by_tile])),
-                (2, all(&moments.listed_slots)),
-                (3, all(entry_slots)),
-            ];
-            self.step(&kernels.slots_of_entries, &bound, Size::of(Dispatch::Entries))?;
+            let bound = all_from(0, [&work.counters, sorted, &moments.listed_slots, entry_slots]);
+            self.step(&kernels.slots_of_entries, bound, Size::of(Dispatch::Entries));
         }
-        let bound = [
-            (0, all(&band)),
-            (1, all(&work.counters)),
-            (2, all(&work.entry_keys[by_tile])),
-            (3, all(&work.ranges)),
-        ];
-        self.step(&kernels.find_ranges, &bound, Size::of(Dispatch::Entries))?;
-        self.end(Stage::Tiles);
+        let bound = all_from(0, [&band, &work.counters, &work.entry_keys[by_tile], &work.ranges]);
+        self.step(&kernels.find_ranges, bound, Size::of(Dispatch::Entries));
+        self.end(DrawStage::Tiles);
 
         let tile = u64::try_from(TILE).unwrap_or(u64::MAX);
         let line = u64::from(shape.width) * PIXEL;
         let top = u64::from(first) * tile;
         let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
-        // A row of tiles is a multiple of 256 bytes, as offsets must be.
-        let pixels = || Bound::Part(&work.pixels.raw, top * line, lines * line);
-        let tile = || {
-            [
-                (0, all(&work.frame)),
-                (1, all(&band)),
-                (2, all(&work.ranges)),
-                (3, all(entry_slots)),
-                (4, all(&work.centres)),
-                (5, all(&work.conics)),
-                (6, all(&work.colours)),
-            ]
-        };
-        let bound: Vec<_> = tile().into_iter().chain([(7, pixels())]).collect();
-        self.step(&kernels.blend, &bound, Size::Groups(tiles))?;
+        // WebGPU wants offsets that are multiples of 256 bytes; a row of tiles is one.
+        let pixels = |binding| [(binding, Bound::Part(&work.pixels.raw, top * line, lines * line))];
+        let tile =
+            [&work.frame, &band, &work.ranges, entry_slots, &work.centres, &work.conics, &work.colours];
+        self.step(&kernels.blend, all_from(0, tile).chain(pixels(7)), Size::Groups(tiles));
         if let Some((kernels, moments)) = measuring {
-            let measured =
-                [(7, all(&work.entry_values[by_tile])), (8, pixels()), (9, all(&moments.of_entries))];
-            let bound: Vec<_> = tile().into_iter().chain(measured).collect();
-            self.step(&kernels.tile_moments, &bound, Size::Groups(tiles))?;
-            let bound = [
-                (0, all(&work.frame)),
-                (1, all(&work.counters)),
-                (2, all(order)),
-                (3, all(&work.offsets)),
-                (4, all(&moments.of_entries)),
-                (5, all(&moments.of_slots)),
-            ];
-            self.step(&kernels.gather_moments, &bound, Size::of(Dispatch::SlotsAndEnd))?;
+            let bound = all_from(0, tile.into_iter().chain([sorted])).chain(pixels(8));
+            let bound = bound.chain(all_from(9, [&moments.of_entries]));
+            self.step(&kernels.tile_moments, bound, Size::Groups(tiles));
+            let read = [&work.frame, &work.counters, order, &work.offsets];
+            let bound = all_from(0, read.into_iter().chain([&moments.of_entries, &moments.of_slots]));
+            self.step(&kernels.gather_moments, bound, Size::of(Dispatch::SlotsAndEnd));
         }
-        self.end(Stage::Blend);
+        self.end(DrawStage::Blend);
         self.uniforms.push(band);
         Ok(())
     }
 
-    fn step(
+    fn step<'b>(
         &mut self,
         pipeline: &wgpu::ComputePipeline,
-        bound: &[(u32, Bound<'_>)],
+        bound: impl IntoIterator<Item = (u32, Bound<'b>)>,
         size: Size,
-    ) -> Result<()> {
-        let bindings = bind(self.gpu, pipeline, bound)?;
+    ) {
+        let bindings = bind(self.gpu, pipeline, bound);
         self.steps.push(Step { pipeline: pipeline.clone(), bindings, size });
-        Ok(())
     }
 
-    fn end(&mut self, stage: Stage) {
+    fn end(&mut self, stage: DrawStage) {
         self.passes.push(StagePass { stage, steps: std::mem::take(&mut self.steps) });
     }
 
-    /// Exclusive sums of `data` in place: of `fixed` numbers, or as many as `counter` says.
+    /// Replaces the numbers in `data` by the sums of those before them: the first `fixed`, or as many as
+    /// `counter` says.
     fn scan(
         &mut self,
         data: &Buffer,
@@ -391,25 +338,25 @@ impl Planner<'_> {
         let (work, kernels) = (self.work, self.kernels);
         let scan = Scan { counter: counter as u32, fixed_length: fixed.unwrap_or(0), padding: [0; 2] };
         let uniform = self.gpu.uniform("scan", &scan)?;
-        let bound = || [(0, all(&uniform)), (1, all(&work.counters)), (2, all(data)), (3, all(&work.sums))];
+        let bound = [&uniform, &work.counters, data, &work.sums];
         let size = || match groups {
             Some(dispatch) => Size::of(dispatch),
             None => Size::Groups(fixed.unwrap_or(0).div_ceil(SCAN_BLOCK)),
         };
-        self.step(&kernels.scan_reduce, &bound(), size())?;
-        let spine = [(0, all(&uniform)), (1, all(&work.counters)), (3, all(&work.sums))];
-        self.step(&kernels.scan_spine, &spine, Size::Groups(1))?;
-        self.step(&kernels.scan_spread, &bound(), size())?;
+        self.step(&kernels.scan_reduce, all_from(0, bound), size());
+        let spine = all_from(0, [&uniform, &work.counters]).chain(all_from(3, [&work.sums]));
+        self.step(&kernels.scan_spine, spine, Size::Groups(1));
+        self.step(&kernels.scan_spread, all_from(0, bound), size());
         self.uniforms.push(uniform);
         Ok(())
     }
 
-    /// Sorts; in which of the two buffers the result is.
+    /// Sorts. Returns in which of the two buffers the result is.
     fn sort(&mut self, sorting: &Sorting<'_>) -> Result<usize> {
         let (work, kernels) = (self.work, self.kernels);
         let passes = sorting.bits.div_ceil(DIGIT_BITS).max(1);
         for k in 0..passes {
-            let (from, to) = if k % 2 == 0 { (0, 1) } else { (1, 0) };
+            let (from_buffer, to) = if k % 2 == 0 { (0, 1) } else { (1, 0) };
             let pass = Pass {
                 shift: k * DIGIT_BITS,
                 length: sorting.length as u32,
@@ -417,27 +364,19 @@ impl Planner<'_> {
                 identity: u32::from(sorting.identity && k == 0),
             };
             let uniform = self.gpu.uniform("pass", &pass)?;
-            let common = || {
-                [
-                    (0, all(&uniform)),
-                    (1, all(&work.counters)),
-                    (2, all(sorting.keys[from])),
-                    (3, all(&work.histogram)),
-                ]
-            };
-            self.step(&kernels.sort_count, &common(), Size::of(sorting.groups))?;
+            let common = [&uniform, &work.counters, sorting.keys[from_buffer], &work.histogram];
+            self.step(&kernels.sort_count, all_from(0, common), Size::of(sorting.groups));
             self.scan(&work.histogram, sorting.digits, None, Some(sorting.scan_groups))?;
-            let moved =
-                [(4, all(sorting.values[from])), (5, all(sorting.keys[to])), (6, all(sorting.values[to]))];
-            let bound: Vec<_> = common().into_iter().chain(moved).collect();
-            self.step(&kernels.sort_scatter, &bound, Size::of(sorting.groups))?;
+            let moved = [sorting.values[from_buffer], sorting.keys[to], sorting.values[to]];
+            let bound = all_from(0, common.into_iter().chain(moved));
+            self.step(&kernels.sort_scatter, bound, Size::of(sorting.groups));
             self.uniforms.push(uniform);
         }
         Ok((passes % 2) as usize)
     }
 }
 
-/// `groups` as two dimensions of a dispatch.
+/// Returns two dimensions of a dispatch that has at least `groups` workgroups.
 pub(super) fn dimensions(groups: u32) -> (u32, u32) {
     (groups.min(MAX_GROUPS), groups.div_ceil(MAX_GROUPS))
 }

@@ -1,22 +1,23 @@
-//! The radiance kernel of a scene: its text depends on how SH is held, on the degree and the dictionary.
+//! The radiance kernel of a scene. Its text depends on how SH is held, on the degree and on the dictionary.
 
 use crate::error::{Error, Result};
 
 use super::constants::{atom_terms, dense_terms, shared_atom_terms, vectors};
 use super::device::Gpu;
 use super::path::ShPath;
+use super::sh_data::ShData;
 use super::shaders::{compile, pipeline};
-use super::source::Source;
 
-/// Bytes that the shared path leaves of workgroup memory for the compiler's own use.
+/// Bytes of workgroup memory that the shared path leaves for the compiler's own use.
 const SHARED_RESERVE: usize = 64;
 
-pub(super) fn radiance_pipeline(
+/// Compiles the kernel that colours the Gaussians of `sh`.
+pub(super) async fn radiance_pipeline(
     gpu: &Gpu,
-    source: &Source<'_>,
+    sh: &ShData<'_>,
     path: ShPath,
 ) -> Result<wgpu::ComputePipeline> {
-    if let (Source::Codes(model), ShPath::SparseShared) = (source, path) {
+    if let (ShData::Codes(model), ShPath::SparseShared) = (sh, path) {
         let shared = size_of_val(model.dictionary.as_slice());
         let most = gpu.limits().max_compute_workgroup_storage_size as usize;
         if shared + SHARED_RESERVE > most {
@@ -24,15 +25,16 @@ pub(super) fn radiance_pipeline(
             return Err(Error::parameter("dictionary", format!("{shared} bytes"), expected));
         }
     }
-    pipeline(gpu, &compile(gpu, path.name(), &radiance_text(source, path))?, "radiance")
+    let make = || Ok(pipeline(gpu, &compile(gpu, path.name(), &radiance_text(sh, path)), "radiance"));
+    gpu.checked("radiance", make).await
 }
 
-/// The kernel that colours scenes like `source`.
-pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
+/// The text of the kernel that colours the Gaussians of `sh`.
+pub(super) fn radiance_text(sh: &ShData<'_>, path: ShPath) -> String {
     let common = concat!(include_str!("kernels/frame.wgsl"), include_str!("kernels/radiance.wgsl"));
     let codes = include_str!("kernels/radiance_sparse.wgsl");
-    match source {
-        Source::Dense { scene, half } => {
+    match sh {
+        ShData::Dense { scene, half } => {
             let per_channel = scene.degree().rest_per_channel();
             let load = |v: usize| {
                 let at = format!("rows[row + {v}u]");
@@ -50,7 +52,7 @@ pub(super) fn radiance_text(source: &Source<'_>, path: ShPath) -> String {
                 .replace("// DENSE_TERMS", &terms);
             format!("const ROW_VECTORS: u32 = {vectors}u;\n{common}{dense}")
         }
-        Source::Codes(model) => {
+        ShData::Codes(model) => {
             let dictionary = &model.dictionary;
             let entry = match path {
                 ShPath::SparseOrdered => concat!(

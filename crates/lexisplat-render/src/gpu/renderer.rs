@@ -1,4 +1,4 @@
-//! Drawing a scene.
+//! Draws scenes on the GPU, and draws again with larger buffers where a view needs them.
 
 use std::collections::HashMap;
 
@@ -13,24 +13,24 @@ use crate::image::Image;
 use super::constants::{COUNTERS, Counter, KEY_FIRST};
 use super::device::Gpu;
 use super::path::ShPath;
-use super::plan::{Plan, Shape, Size, Stage, dimensions};
+use super::plan::{DrawStage, Plan, Shape, Size, dimensions};
 use super::scene::GpuScene;
 use super::shaders::Kernels;
-use super::stamps::Stamps;
-use super::uniforms::Frame as FrameUniform;
-use super::work::{ENTRY_ELEMENT, PIXEL, Room, SLOT_ELEMENT, Work};
+use super::timestamps::Timestamps;
+use super::uniforms::FrameUniform;
+use super::work::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT, Work};
 
-/// Slots and entries there is room for at first.
+/// Slots and entries that the first buffers hold.
 const FIRST_ROOM: u32 = 1 << 18;
-/// Room is made for this share more than was missing, so that moving a little costs no second try.
+/// New buffers hold this many times what a view needed, so that moving the camera a little needs no others.
 const SPARE: f64 = 1.125;
-/// Most entries in the tiles' lists at once, unless one row of tiles needs more: 1 GiB of lists.
+/// Most entries in the tiles' lists at once: 1 GiB of lists.
 const MAX_ENTRIES: u64 = 1 << 26;
-/// Passes timed at most; a view drawn in more bands than that is timed no further.
+/// Most passes that are timed. The passes of a view in many bands beyond these are not.
 const MAX_TIMED: u32 = 1024;
-/// Plans kept: two scenes in turn, from cameras whose depths need a bit more or less.
+/// Plans kept. They serve two scenes in turn, from cameras whose depths need one bit more or less.
 const MAX_PLANS: usize = 4;
-/// Cuts remembered before all are forgotten.
+/// Most cuts remembered. One more, and all are forgotten.
 const MAX_CUTS: usize = 64;
 
 /// A drawn picture, still on the GPU.
@@ -44,43 +44,43 @@ pub struct Frame {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// What it took.
+    /// Measurements of drawing it.
     pub stats: FrameStats,
 }
 
 /// Milliseconds of each stage.
-pub type StageTimes = Vec<(Stage, f64)>;
+pub type StageTimes = Vec<(DrawStage, f64)>;
 
-/// What a picture took.
+/// Measurements of drawing a picture.
 #[derive(Debug, Clone, PartialEq, Default)]
 #[non_exhaustive]
 pub struct FrameStats {
-    /// Gaussians that passed the coarse test and were projected and shaded; those of the fullest band where
-    /// bands had to look for their own.
+    /// Gaussians that passed the coarse test and were projected and coloured. Where bands looked for their own,
+    /// those of the fullest band.
     pub visible: u32,
-    /// Pairs of a Gaussian and a tile it may touch.
+    /// Pairs of a Gaussian and a tile that it may touch.
     pub entries: u32,
-    /// Runs of rows of tiles it was drawn in: more than one where the lists do not fit at once.
+    /// Bands of rows of tiles that it was drawn in. There is more than one where the lists do not fit at once.
     pub bands: u32,
-    /// How often it was tried again with more room. Not 0 only where a view is fuller than all before.
+    /// How often it was drawn again with larger buffers. Above 0 only where a view is fuller than all before.
     pub retries: u32,
-    /// Milliseconds on the GPU of each stage; empty where time stamps are not to be had.
+    /// Milliseconds of each stage on the GPU; empty where the GPU has no timestamps.
     pub stages: StageTimes,
     /// Milliseconds from the first stage's start to the last one's end.
     pub total: Option<f64>,
 }
 
-/// Draws scenes on one GPU, keeping its buffers from picture to picture.
+/// Draws scenes on one GPU. Keeps its buffers from picture to picture.
 pub struct GpuRenderer {
     pub(super) gpu: Gpu,
     pub(super) kernels: Kernels,
     pub(super) work: Option<Work>,
-    /// Of the last scenes and sizes, the latest last.
+    /// The plans of the last scenes and sizes, the latest last.
     pub(super) plans: Vec<Plan>,
-    pub(super) stamps: Option<Stamps>,
-    /// How scenes' pictures of a size are cut, once they were found not to fit as they are.
-    pub(super) cuts: HashMap<Subject, Cut>,
-    pub(super) limits: RoomLimits,
+    pub(super) timestamps: Option<Timestamps>,
+    /// The cuts of pictures that were found not to fit at once.
+    pub(super) cuts: HashMap<PictureKey, Cut>,
+    pub(super) limits: CapacityLimits,
 }
 
 impl std::fmt::Debug for GpuRenderer {
@@ -89,21 +89,21 @@ impl std::fmt::Debug for GpuRenderer {
     }
 }
 
-/// A scene, by its number, and a picture's width and height.
-pub(super) type Subject = (u64, u32, u32);
+/// The number of a scene, and the width and height of a picture of it.
+pub(super) type PictureKey = (u64, u32, u32);
 
 /// How a picture is cut into bands.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cut {
     /// Rows of tiles drawn at once.
     rows: u32,
-    /// Whether bands look for their own Gaussians.
+    /// Whether each band looks for its own Gaussians.
     see: bool,
 }
 
-/// Largest arrays.
+/// The largest arrays that a kernel can work on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct RoomLimits {
+pub(super) struct CapacityLimits {
     pub(super) slots: u64,
     pub(super) entries: u64,
     /// Bytes of pixels a kernel sees at once.
@@ -111,31 +111,40 @@ pub(super) struct RoomLimits {
 }
 
 impl GpuRenderer {
-    /// A renderer on `gpu`. Compiles the kernels.
+    /// Blocks on [`Self::new_async`].
+    ///
+    /// # Errors
+    /// As [`Self::new_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        gpu.block_on(Self::new_async(gpu))
+    }
+
+    /// Makes a renderer on `gpu`. Compiles the kernels.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the driver refuses a kernel.
-    pub fn new(gpu: &Gpu) -> Result<Self> {
+    pub async fn new_async(gpu: &Gpu) -> Result<Self> {
         let binding = gpu.max_binding();
-        let limits = RoomLimits {
+        let limits = CapacityLimits {
             slots: binding / SLOT_ELEMENT,
             entries: (binding / ENTRY_ELEMENT).min(MAX_ENTRIES),
             pixels: binding,
         };
         Ok(Self {
             gpu: gpu.clone(),
-            kernels: Kernels::new(gpu)?,
+            kernels: Kernels::new(gpu).await?,
             work: None,
             plans: Vec::new(),
-            stamps: Stamps::new(gpu, MAX_TIMED)?,
+            timestamps: Timestamps::new(gpu, MAX_TIMED).await?,
             cuts: HashMap::new(),
             limits,
         })
     }
 
-    /// The same with smaller arrays than the GPU allows.
+    /// This renderer with smaller arrays than the GPU allows.
     #[cfg(test)]
-    pub(super) fn with_limits(mut self, limits: RoomLimits) -> Self {
+    pub(super) fn with_limits(mut self, limits: CapacityLimits) -> Self {
         self.limits = limits;
         self
     }
@@ -146,45 +155,74 @@ impl GpuRenderer {
         (self.work.as_ref().unwrap(), self.plans.last().unwrap().shape)
     }
 
-    /// Draws `scene` as `camera` sees it and brings the picture back.
+    /// Blocks on [`Self::render_async`].
     ///
     /// # Errors
-    /// As [`Self::draw`].
+    /// As [`Self::draw_async`].
+    #[cfg(not(target_family = "wasm"))]
     pub fn render(
         &mut self,
         scene: &GpuScene,
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<(Image, FrameStats)> {
-        let frame = self.draw(scene, camera, options)?;
-        let image = self.read(&frame)?;
+        let gpu = self.gpu.clone();
+        gpu.block_on(self.render_async(scene, camera, options))
+    }
+
+    /// Draws `scene` as `camera` sees it and brings the picture back.
+    ///
+    /// # Errors
+    /// As [`Self::draw_async`].
+    pub async fn render_async(
+        &mut self,
+        scene: &GpuScene,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<(Image, FrameStats)> {
+        let frame = self.draw_async(scene, camera, options).await?;
+        let image = self.read_async(&frame).await?;
         Ok((image, frame.stats))
     }
 
-    /// The pixels of a frame of this renderer.
+    /// Brings back the pixels of a frame of this renderer.
     ///
     /// # Errors
     /// [`Error::Gpu`] if the device fails.
-    pub fn read(&self, frame: &Frame) -> Result<Image> {
-        use wgpu::BufferUsages as U;
+    pub async fn read_async(&self, frame: &Frame) -> Result<Image> {
         let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL;
-        let back = self.gpu.buffer("pixels back", size, U::MAP_READ | U::COPY_DST)?;
+        let back = self.gpu.checked("pixels back", || self.gpu.readable("pixels back", size)).await?;
         let mut encoder =
             self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.copy_buffer_to_buffer(&frame.pixels, 0, &back.raw, 0, size);
         self.gpu.queue().submit([encoder.finish()]);
-        let pixels: Vec<[f32; 4]> = self.gpu.read(&back, size)?;
+        let pixels: Vec<[f32; 4]> = self.gpu.read(&back, size).await?;
         let pixels = pixels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
         Ok(Image { width: frame.width, height: frame.height, pixels })
     }
 
-    /// Draws `scene` as `camera` sees it, and waits until it is done.
+    /// Blocks on [`Self::draw_async`].
+    ///
+    /// # Errors
+    /// As [`Self::draw_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
+        let gpu = self.gpu.clone();
+        gpu.block_on(self.draw_async(scene, camera, options))
+    }
+
+    /// Draws `scene` as `camera` sees it. The picture stays on the GPU.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the scene is on another GPU or the camera cannot be drawn with, or for a
     /// lower degree than the scene's where radiance comes from a table; [`Error::GpuLimit`] if the view needs
     /// larger buffers than this GPU has; [`Error::Gpu`] if the device fails.
-    pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
+    pub async fn draw_async(
+        &mut self,
+        scene: &GpuScene,
+        camera: &Camera,
+        options: &RenderOptions,
+    ) -> Result<Frame> {
         camera.validate()?;
         if !scene.gpu().is(&self.gpu) {
             return Err(Error::parameter("scene", "on another GPU", "a scene on the renderer's GPU"));
@@ -197,26 +235,26 @@ impl GpuRenderer {
         let mut retries = 0;
         loop {
             let shape = self.shape(scene, camera)?;
-            self.make_room(scene, shape, None)?;
-            let (frame, found) = self.attempt(scene, camera, options, degree, shape)?;
+            self.make_room(scene, shape, None).await?;
+            let (frame, found) = self.attempt(scene, camera, options, degree, shape).await?;
             match self.missing(found, shape)? {
                 None => {
                     let stats = FrameStats { retries, ..frame.stats };
                     return Ok(Frame { stats, ..frame });
                 }
-                Some(Missing::Room { slots, entries }) => {
-                    self.make_room(scene, shape, Some([slots, entries]))?;
+                Some(Missing::Capacity { slots, entries }) => {
+                    self.make_room(scene, shape, Some([slots, entries])).await?;
                 }
                 Some(Missing::Bands { see }) => {
                     let cut = Cut { rows: (shape.band_rows / 2).max(1), see: see || shape.bands_see };
-                    self.cuts.insert(subject(scene, camera), cut);
+                    self.cuts.insert(picture_key(scene, camera), cut);
                 }
             }
             retries += 1;
         }
     }
 
-    /// Sizes of the picture, and how it is cut into bands.
+    /// Returns the sizes of the picture, and how it is cut into bands.
     fn shape(&mut self, scene: &GpuScene, camera: &Camera) -> Result<Shape> {
         // Sides are at most 16384.
         let tile = u32::try_from(TILE).unwrap_or(u32::MAX);
@@ -231,19 +269,19 @@ impl GpuRenderer {
             self.cuts.clear();
         }
         let whole = Cut { rows, see: false };
-        let cut = self.cuts.get(&subject(scene, camera)).copied().unwrap_or(whole);
+        let cut = self.cuts.get(&picture_key(scene, camera)).copied().unwrap_or(whole);
         let (band_rows, bands_see) = (cut.rows.min(rows).min(fit), cut.see);
         let depth_bits = depth_bits(scene, camera);
         let (width, height) = (camera.width, camera.height);
         Ok(Shape { columns, rows, width, height, band_rows, bands_see, depth_bits })
     }
 
-    /// Makes sure that buffers are large enough for the scene and the picture, and for as many slots and
-    /// entries as `wanted`.
-    fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
+    /// Makes sure that the buffers are large enough for the scene and the picture, and for `wanted` slots and
+    /// entries.
+    async fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
         let chunks = u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX);
         let limit = |value: u32, most: u64| value.min(u32::try_from(most).unwrap_or(u32::MAX));
-        let least = Room {
+        let least = Capacity {
             blocks: scene.blocks(),
             chunks,
             slots: limit(FIRST_ROOM.min(scene.len()), self.limits.slots).max(1),
@@ -251,9 +289,9 @@ impl GpuRenderer {
             tiles: shape.columns * shape.band_rows,
             pixels: u64::from(shape.width) * u64::from(shape.height),
         };
-        let now = self.work.as_ref().map_or(least, |work| work.room);
+        let now = self.work.as_ref().map_or(least, |work| work.capacity);
         let [slots, entries] = wanted.unwrap_or([0, 0]);
-        let room = Room {
+        let capacity = Capacity {
             blocks: now.blocks.max(least.blocks),
             chunks: now.chunks.max(least.chunks),
             slots: now.slots.max(least.slots).max(slots),
@@ -261,17 +299,18 @@ impl GpuRenderer {
             tiles: now.tiles.max(least.tiles),
             pixels: now.pixels.max(least.pixels),
         };
-        if self.work.as_ref().is_none_or(|work| work.room != room) {
-            // The old buffers go first: both together may not fit.
+        if self.work.as_ref().is_none_or(|work| work.capacity != capacity) {
+            // The old buffers are freed first, since both together may not fit.
             self.plans.clear();
             self.work = None;
-            self.work = Some(Work::new(&self.gpu, room, self.kernels.moments.is_some())?);
+            self.work = Some(Work::new(&self.gpu, capacity, self.kernels.moments.is_some()).await?);
         }
         Ok(())
     }
 
-    /// Draws once; whatever does not fit in the buffers is left out. Also the counters.
-    fn attempt(
+    /// Draws once, and leaves out what does not fit in the buffers. Also returns the counters, which tell
+    /// whether something was left out.
+    async fn attempt(
         &mut self,
         scene: &GpuScene,
         camera: &Camera,
@@ -283,12 +322,12 @@ impl GpuRenderer {
         let Some(work) = &self.work else {
             return Err(Error::Gpu { problem: "no buffers".to_owned() });
         };
-        // A plan holds on to its scene's buffers.
+        // A plan keeps its scene's buffers alive.
         self.plans.retain(Plan::is_of_use);
         let known = self.plans.iter().position(|plan| plan.scene == scene.id && plan.shape == shape);
         let plan = match known {
             Some(place) => self.plans.remove(place),
-            None => Plan::new(gpu, &self.kernels, scene, work, shape)?,
+            None => Plan::new(gpu, &self.kernels, scene, work, shape).await?,
         };
         if self.plans.len() >= MAX_PLANS {
             self.plans.remove(0);
@@ -297,7 +336,7 @@ impl GpuRenderer {
         let Some(plan) = self.plans.last() else {
             return Err(Error::Gpu { problem: "no plan".to_owned() });
         };
-        let uniform = frame_uniform(scene, camera, options, degree, shape, work.room);
+        let uniform = frame_uniform(scene, camera, options, degree, shape, work.capacity);
         gpu.queue().write_buffer(&work.frame.raw, 0, bytemuck::bytes_of(&uniform));
 
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -308,15 +347,15 @@ impl GpuRenderer {
         let mut timed = Vec::new();
         for stage in &plan.passes {
             let query = u32::try_from(timed.len()).unwrap_or(u32::MAX);
-            let timestamp_writes = self.stamps.as_ref().and_then(|stamps| stamps.writes(query));
+            let timestamp_writes = self.timestamps.as_ref().and_then(|timestamps| timestamps.writes(query));
             if timestamp_writes.is_some() {
                 timed.push(stage.stage);
             }
-            if stage.stage == Stage::Cull {
-                // The place after the last block's, which `cull` does not write.
+            if stage.stage == DrawStage::Cull {
+                // `cull` does not write the place after that of the last block.
                 encoder.clear_buffer(&work.starts.raw, 4 * u64::from(scene.blocks()), Some(4));
             }
-            if stage.stage == Stage::Tiles {
+            if stage.stage == DrawStage::Tiles {
                 encoder.clear_buffer(&work.ranges.raw, 0, None);
                 if let Some(moments) = &work.moments {
                     encoder.clear_buffer(&moments.of_entries.raw, 0, None);
@@ -339,16 +378,16 @@ impl GpuRenderer {
                 }
             }
         }
-        if let Some(stamps) = &self.stamps {
-            stamps.resolve(&mut encoder, u32::try_from(timed.len()).unwrap_or(0));
+        if let Some(timestamps) = &self.timestamps {
+            timestamps.resolve(&mut encoder, u32::try_from(timed.len()).unwrap_or(0));
         }
         let bytes = work.counters_back.bytes();
         encoder.copy_buffer_to_buffer(&work.counters.raw, 0, &work.counters_back.raw, 0, bytes);
         gpu.queue().submit([encoder.finish()]);
 
-        let counters: Vec<u32> = gpu.read(&work.counters_back, bytes)?;
+        let counters: Vec<u32> = gpu.read(&work.counters_back, bytes).await?;
         let found: [u32; COUNTERS] = std::array::from_fn(|k| counters.get(k).copied().unwrap_or(0));
-        let (stages, total) = self.times(&timed)?;
+        let (stages, total) = self.times(&timed).await?;
         let stats = FrameStats {
             visible: found[Counter::Found as usize],
             entries: found[Counter::EntriesAll as usize],
@@ -361,11 +400,11 @@ impl GpuRenderer {
         Ok((Frame { pixels, width: shape.width, height: shape.height, stats }, found))
     }
 
-    /// Milliseconds of each stage, bands together, and of everything.
-    fn times(&self, timed: &[Stage]) -> Result<(StageTimes, Option<f64>)> {
-        let Some(stamps) = &self.stamps else { return Ok((Vec::new(), None)) };
-        let passes = stamps.read(&self.gpu, u32::try_from(timed.len()).unwrap_or(0))?;
-        let stages = Stage::ALL.map(|stage| {
+    /// Returns the milliseconds of each stage, of all bands together, and those of the whole picture.
+    async fn times(&self, timed: &[DrawStage]) -> Result<(StageTimes, Option<f64>)> {
+        let Some(timestamps) = &self.timestamps else { return Ok((Vec::new(), None)) };
+        let passes = timestamps.read(&self.gpu, u32::try_from(timed.len()).unwrap_or(0)).await?;
+        let stages = DrawStage::ALL.map(|stage| {
             let own = passes.iter().zip(timed).filter(|(_, s)| **s == stage);
             (stage, own.map(|([start, end], _)| end - start).sum())
         });
@@ -373,20 +412,20 @@ impl GpuRenderer {
         Ok((stages.to_vec(), total))
     }
 
-    /// What to make larger before trying again, if anything.
+    /// Returns what the view lacked, if anything.
     fn missing(&self, found: [u32; COUNTERS], shape: Shape) -> Result<Option<Missing>> {
-        let Some(room) = self.work.as_ref().map(|work| work.room) else { return Ok(None) };
+        let Some(capacity) = self.work.as_ref().map(|work| work.capacity) else { return Ok(None) };
         let spare = |found: u32, most: u64| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the limit")]
             let wanted = (f64::from(found) * SPARE).min(most as f64).min(f64::from(u32::MAX)) as u32;
             wanted
         };
         let slots = found[Counter::Found as usize];
-        if slots > room.slots {
+        if slots > capacity.slots {
             if u64::from(slots) <= self.limits.slots {
-                return Ok(Some(Missing::Room { slots: spare(slots, self.limits.slots), entries: 0 }));
+                return Ok(Some(Missing::Capacity { slots: spare(slots, self.limits.slots), entries: 0 }));
             }
-            // Moments are summed over bands in slots, which must stay the same.
+            // Moments are summed over bands by slot, so slots must be the same in all bands.
             let one = shape.bands_see && shape.band_rows == 1;
             if one || self.kernels.moments.is_some() {
                 let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" }.to_owned();
@@ -395,9 +434,12 @@ impl GpuRenderer {
             return Ok(Some(Missing::Bands { see: true }));
         }
         let entries = found[Counter::EntriesMost as usize];
-        if entries > room.entries {
+        if entries > capacity.entries {
             if u64::from(entries) <= self.limits.entries {
-                return Ok(Some(Missing::Room { slots: 0, entries: spare(entries, self.limits.entries) }));
+                return Ok(Some(Missing::Capacity {
+                    slots: 0,
+                    entries: spare(entries, self.limits.entries),
+                }));
             }
             if shape.band_rows == 1 {
                 let what = "pairs of a Gaussian and a tile in one row of tiles".to_owned();
@@ -409,23 +451,23 @@ impl GpuRenderer {
     }
 }
 
-fn subject(scene: &GpuScene, camera: &Camera) -> Subject {
+fn picture_key(scene: &GpuScene, camera: &Camera) -> PictureKey {
     (scene.id, camera.width, camera.height)
 }
 
 /// What a view lacked.
 enum Missing {
-    Room {
+    Capacity {
         slots: u32,
         entries: u32,
     },
-    /// Bands of half as many rows; whether each must look for its own Gaussians.
+    /// Bands of half as many rows. `see` tells whether each must look for its own Gaussians.
     Bands {
         see: bool,
     },
 }
 
-/// Significant bits of depth keys: those of the farthest corner of what can be seen.
+/// Returns the number of significant bits of depth keys: those of the farthest corner of the scene.
 fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
     let Some(bounds) = scene.bounds else { return 1 };
     let farthest = (0..8)
@@ -434,10 +476,10 @@ fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
             camera.to_view(at)[2]
         })
         .fold(0.0, f32::max);
-    // The corner's depth is rounded otherwise than a Gaussian's there.
+    // The depth of a corner may round differently than that of a Gaussian there.
     const ROUNDING: f32 = 1.0001;
     let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(KEY_FIRST);
-    // One more, so that what comes last is behind everything.
+    // One bit more, so that the key of slots that come last is above all others.
     (u32::BITS - key.leading_zeros() + 1).min(u32::BITS)
 }
 
@@ -447,7 +489,7 @@ fn frame_uniform(
     options: &RenderOptions,
     degree: ShDegree,
     shape: Shape,
-    room: Room,
+    capacity: Capacity,
 ) -> FrameUniform {
     let r = &camera.rotation;
     let column = |k: usize| [r[0][k], r[1][k], r[2][k]];
@@ -463,7 +505,7 @@ fn frame_uniform(
         position: camera.position,
         antialiased: scene.antialiased().into(),
         background: options.background,
-        slots: room.slots,
+        slots: capacity.slots,
         tangents: [size[0] / (2.0 * camera.fx), size[1] / (2.0 * camera.fy)],
         focal: [camera.fx, camera.fy],
         size,
@@ -471,7 +513,7 @@ fn frame_uniform(
         height: camera.height,
         blocks: scene.blocks(),
         chunks: u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX),
-        entries: room.entries,
+        entries: capacity.entries,
         padding: 0,
     }
 }

@@ -5,40 +5,41 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use lexisplat::{Geometry, ShDegree};
-use rayon::prelude::*;
 
 use crate::error::{Error, Result};
+use crate::parallel::*;
 use crate::scene::Scene;
 
+use super::buffer::Buffer;
 use super::columns::Columns;
 use super::constants::GROUP;
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::path::ShPath;
 use super::radiance::radiance_pipeline;
-use super::source::{Source, atoms, body, dense_rows, shape};
-use super::table::Table;
-use super::uniforms::Chunk;
+use super::radiance_table::RadianceTable;
+use super::sh_data::{ShData, atoms, body, dense_rows, shape};
+use super::uniforms::ChunkUniform;
 
 /// Bytes of a scene on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SceneBytes {
     /// Positions, shapes and opacities.
     pub geometry: u64,
-    /// Everything colour needs: base colours, coefficients or codes, dictionary, table.
+    /// Everything that colours need: base colours, coefficients or codes, dictionary, table.
     pub sh: u64,
 }
 
-/// A scene uploaded for one [`ShPath`]. Of its own size on the GPU; the source may be dropped.
+/// A scene uploaded for one [`ShPath`]. The scene that it was made from may be dropped.
 #[derive(Debug)]
 pub struct GpuScene {
     pub(super) id: u64,
-    /// Gone when the scene is.
+    /// Plans hold weak references to this, and so know whether the scene still lives.
     pub(super) lives: Arc<()>,
     pub(super) chunks: Vec<ChunkBuffers>,
     pub(super) chunk_blocks: Buffer,
     pub(super) radiance: wgpu::ComputePipeline,
-    pub(super) table: Option<Table>,
-    /// Corners of what can be seen, if anything.
+    pub(super) table: Option<RadianceTable>,
+    /// The corners of a box around all positions that can be drawn; `None` if there are none.
     pub(super) bounds: Option<[[f32; 3]; 2]>,
     gpu: Gpu,
     path: ShPath,
@@ -46,30 +47,42 @@ pub struct GpuScene {
     degree: ShDegree,
     antialiased: bool,
     bytes: SceneBytes,
-    /// Of those for SH, what all Gaussians share.
+    /// Those of the bytes for SH that all Gaussians share: dictionary and table.
     shared_bytes: u64,
 }
 
-/// Buffers of a part of the scene.
+/// The buffers of a part of the scene.
 #[derive(Debug)]
 pub(super) struct ChunkBuffers {
     pub(super) blocks: u32,
     pub(super) uniform: Buffer,
     pub(super) bodies: Buffer,
     pub(super) shapes: Buffer,
-    /// From binding 6 of radiance: dense rows; or base colours, columns, nonzeros, atoms.
+    /// What the radiance kernel has from binding 6 on: dense rows; or base colours, columns, nonzeros and atoms.
     pub(super) sh: Vec<Buffer>,
 }
 
-/// Numbers scenes, so that bindings made for one are not used for another.
+/// The number of the next scene. Numbers keep bindings made for one scene from being used for another.
 static NEXT_ID: AtomicU64 = AtomicU64::new(0);
+
 impl GpuScene {
+    /// Blocks on [`Self::new_async`].
+    ///
+    /// # Errors
+    /// As [`Self::new_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn new(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
+        gpu.block_on(Self::new_async(gpu, scene, path))
+    }
+
     /// Uploads `scene`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a sparse path of a dense scene, or a dictionary too large for the path;
-    /// [`Error::GpuLimit`] for more Gaussians than 2^32 - 2; [`Error::Gpu`] if memory runs out.
-    pub fn new(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
+    /// [`Error::Codec`] if the scene's arrays do not fit one another; [`Error::Parameter`] for a sparse path
+    /// of a dense scene, or a dictionary too large for the path; [`Error::GpuLimit`] for more Gaussians than
+    /// 2^32 - 2; [`Error::Gpu`] if memory runs out.
+    pub async fn new_async(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
+        scene.validate()?;
         let len =
             u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| Error::GpuLimit {
                 what: "Gaussians of a scene on the GPU".to_owned(),
@@ -80,23 +93,23 @@ impl GpuScene {
             Scene::Sparse(model) => Some(*model),
             Scene::Dense(_) => None,
         };
-        let source = match (path.is_sparse(), model) {
-            (false, _) => Source::Dense { scene, half: path == ShPath::DenseF16 },
-            (true, Some(model)) => Source::Codes(model),
+        let sh = match (path.is_sparse(), model) {
+            (false, _) => ShData::Dense { scene, half: path == ShPath::DenseF16 },
+            (true, Some(model)) => ShData::Codes(model),
             (true, None) => {
                 return Err(Error::parameter("path", path.name(), "a compressed scene for a sparse path"));
             }
         };
         let table = match (path, model) {
-            (ShPath::SparseTable, Some(model)) => Some(Table::new(gpu, &model.dictionary)?),
+            (ShPath::SparseTable, Some(model)) => Some(RadianceTable::new(gpu, &model.dictionary).await?),
             _ => None,
         };
-        let radiance = radiance_pipeline(gpu, &source, path)?;
+        let radiance = radiance_pipeline(gpu, &sh, path).await?;
         let mut this = Self {
             id: NEXT_ID.fetch_add(1, Relaxed),
             lives: Arc::default(),
             chunks: Vec::new(),
-            chunk_blocks: gpu.upload::<u32>("chunk blocks", &[0])?,
+            chunk_blocks: gpu.upload::<u32>("chunk blocks", &[0]).await?,
             radiance,
             bounds: None,
             gpu: gpu.clone(),
@@ -110,29 +123,29 @@ impl GpuScene {
         };
         let mut chunk_blocks = vec![0];
         let mut nonzero = 0;
-        for range in source.chunks(scene.len(), gpu.max_binding())? {
-            this.add(scene.geometry(), &source, range.clone(), nonzero)?;
-            if let Source::Codes(model) = source {
+        for range in sh.chunks(scene.len(), gpu.max_binding())? {
+            this.add(scene.geometry(), &sh, range.clone(), nonzero).await?;
+            if let ShData::Codes(model) = sh {
                 nonzero += model.codes.counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
             }
             chunk_blocks.push(u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
         }
-        this.chunk_blocks = gpu.upload("chunk blocks", &chunk_blocks)?;
-        gpu.wait()?;
+        this.chunk_blocks = gpu.upload("chunk blocks", &chunk_blocks).await?;
+        gpu.wait_async().await?;
         Ok(this)
     }
 
-    /// Uploads one chunk.
-    fn add(
+    /// Uploads one chunk, whose codes begin at nonzero `nonzero`.
+    async fn add(
         &mut self,
         geometry: &Geometry,
-        source: &Source<'_>,
+        data: &ShData<'_>,
         range: Range<usize>,
         nonzero: usize,
     ) -> Result<()> {
         let gpu = self.gpu.clone();
         let bodies: Vec<[f32; 4]> =
-            range.clone().into_par_iter().map(|i| body(geometry, source.finite(i), i)).collect();
+            range.clone().into_par_iter().map(|i| body(geometry, data.finite(i), i)).collect();
         for body in bodies.iter().filter(|body| body[3] >= 0.0) {
             let at = [body[0], body[1], body[2]];
             let [low, high] = self.bounds.get_or_insert([at, at]);
@@ -142,19 +155,19 @@ impl GpuScene {
             }
         }
         let shapes: Vec<[f32; 8]> = range.clone().into_par_iter().map(|i| shape(geometry, i)).collect();
-        let (bodies, shapes) = (gpu.upload("bodies", &bodies)?, gpu.upload("shapes", &shapes)?);
+        let (bodies, shapes) = (gpu.upload("bodies", &bodies).await?, gpu.upload("shapes", &shapes).await?);
         let mut escapes = [0, 0];
-        let sh = match source {
-            Source::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half)?],
-            Source::Codes(model) => {
+        let sh = match data {
+            ShData::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half).await?],
+            ShData::Codes(model) => {
                 let columns = Columns::new(&model.codes, range.clone(), nonzero);
                 escapes =
                     [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
                 vec![
-                    gpu.upload("base colours", &geometry.dc[range.clone()])?,
-                    gpu.upload("columns", &columns.columns)?,
-                    gpu.upload("nonzeros", &columns.nonzeros)?,
-                    gpu.upload("atoms", &atoms(model, &range))?,
+                    gpu.upload("base colours", &geometry.dc[range.clone()]).await?,
+                    gpu.upload("columns", &columns.columns).await?,
+                    gpu.upload("nonzeros", &columns.nonzeros).await?,
+                    gpu.upload("atoms", &atoms(model, &range)).await?,
                 ]
             }
         };
@@ -162,19 +175,17 @@ impl GpuScene {
         let number = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
         let first = number(range.start);
         let blocks = number(range.len().div_ceil(GROUP as usize));
-        let uniform = gpu.uniform(
-            "chunk",
-            &Chunk {
-                first,
-                count: number(range.len()),
-                first_block: first / GROUP,
-                blocks,
-                escapes_at: escapes[0],
-                escapes: escapes[1],
-                padding: [0; 2],
-            },
-        )?;
-        // Of codes, the last buffer is the atoms.
+        let uniform = ChunkUniform {
+            first,
+            count: number(range.len()),
+            first_block: first / GROUP,
+            blocks,
+            escapes_at: escapes[0],
+            escapes: escapes[1],
+            padding: [0; 2],
+        };
+        let uniform = gpu.checked("chunk", || gpu.uniform("chunk", &uniform)).await?;
+        // Where there are codes, the last buffer has the atoms.
         self.shared_bytes += sh.get(3).map_or(0, Buffer::bytes);
         self.bytes.geometry += bodies.bytes() + shapes.bytes();
         self.bytes.sh += sh.iter().map(Buffer::bytes).sum::<u64>();
@@ -212,18 +223,17 @@ impl GpuScene {
         self.bytes
     }
 
-    /// Bytes that shading one visible Gaussian moves on average: its slot, position, SH and colour. The
-    /// dictionary or table, which caches hold, is not counted.
+    /// Bytes that colouring one visible Gaussian moves on average: its slot, position, SH and colour. The
+    /// dictionary or table is not counted, since caches hold it.
     #[must_use]
     pub fn shading_bytes(&self) -> f64 {
-        let shared: u64 = self.shared_bytes;
-        let own = self.bytes.sh.saturating_sub(shared) as f64 / f64::from(self.len.max(1));
+        let own = self.bytes.sh.saturating_sub(self.shared_bytes) as f64 / f64::from(self.len.max(1));
         let (slot, body, colour) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 3]>());
         own + (slot + body + colour) as f64
     }
 
-    /// Bytes of geometry read to look for and project `visible` Gaussians: the positions of all, and slot,
-    /// position and shape of those.
+    /// Bytes of geometry that finding and projecting `visible` Gaussians reads: the positions of all, and the slots,
+    /// positions and shapes of those.
     #[must_use]
     pub fn looking_bytes(&self, visible: f64) -> f64 {
         let (slot, body, shape) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 8]>());

@@ -1,57 +1,80 @@
-//! Sensitivities measured on the GPU. Twin: `cpu::sensitivity`.
+//! Sensitivities measured on the GPU, as `cpu::sensitivity` measures them on the processor.
 
 use std::collections::HashMap;
 
-use lexisplat::{Geometry, Sensitivity};
+use lexisplat::{Geometry, Progress, Sensitivity, Stage};
 
 use crate::camera::Camera;
 use crate::cpu::{Moments, Projection, RenderOptions, carry};
 use crate::error::{Error, Result};
 
 use super::moments::{MOMENTS_BYTES, MomentKernels, most_entries, most_slots};
-use super::renderer::{GpuRenderer, RoomLimits};
+use super::renderer::{CapacityLimits, GpuRenderer};
 use super::scene::GpuScene;
 use super::work::WORD;
 
 impl GpuRenderer {
-    /// What [`crate::sensitivity`] measures, measured on the GPU: `scene` is that of `geometry`. The same
-    /// bits each time on the same GPU and driver; within rounding of the processor's, but for what lies
-    /// within rounding of a threshold of the rasteriser. `on_view` is called after each view.
-    ///
-    /// Gives back the memory that pictures took; the next one takes its own again.
+    /// Blocks on [`Self::sensitivity_async`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; else as [`Self::draw`].
+    /// As [`Self::sensitivity_async`].
+    #[cfg(not(target_family = "wasm"))]
     pub fn sensitivity(
         &mut self,
         scene: &GpuScene,
         geometry: &Geometry,
         cameras: &[Camera],
-        on_view: &mut dyn FnMut(),
+        progress: &dyn Progress,
+    ) -> Result<Sensitivity> {
+        let gpu = self.gpu.clone();
+        gpu.block_on(self.sensitivity_async(scene, geometry, cameras, progress))
+    }
+
+    /// Measures on the GPU what [`crate::sensitivity`] measures on the processor. `scene` was made of a scene
+    /// with this `geometry`. Reports [`Stage::Draw`], in views, to `progress`.
+    ///
+    /// The result has the same bits each time on the same GPU and driver. It is within rounding of the
+    /// processor's, except where a value lies within rounding of a threshold of the rasteriser.
+    ///
+    /// Frees the buffers that pictures were drawn with; the next picture makes its own again.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `scene` and `geometry` differ in length; [`Error::Codec`] if `progress`
+    /// cancelled the work; otherwise as [`Self::draw_async`].
+    pub async fn sensitivity_async(
+        &mut self,
+        scene: &GpuScene,
+        geometry: &Geometry,
+        cameras: &[Camera],
+        progress: &dyn Progress,
     ) -> Result<Sensitivity> {
         if scene.len() as usize != geometry.len() {
             let expected = format!("{} Gaussians, as the scene has", scene.len());
             return Err(Error::parameter("geometry", geometry.len(), expected));
         }
-        let mut measuring = self.measuring()?;
+        let mut measuring = self.measuring().await?;
         let mut total = Sensitivity::zeros(geometry.len());
+        progress.begin(Stage::Draw, cameras.len() as u64);
         for camera in cameras {
-            let frame = measuring.draw(scene, camera, &RenderOptions::default())?;
-            let (gaussians, moments) = measuring.read_moments(frame.stats.visible)?;
+            progress.check()?;
+            let frame = measuring.draw_async(scene, camera, &RenderOptions::default()).await?;
+            let (gaussians, moments) = measuring.read_moments(frame.stats.visible).await?;
             let projection = Projection::new(camera, scene.antialiased());
             carry(&mut total, &projection, geometry, cameras.len(), &moments, |k| gaussians[k] as usize);
-            on_view();
+            progress.advance(1);
         }
+        progress.end();
         Ok(total)
     }
 
-    /// A renderer that also works out moments. This one gives up its buffers: both together may not fit.
-    fn measuring(&mut self) -> Result<Self> {
+    /// Makes a renderer that also works out moments. This one frees its buffers, since both together may not
+    /// fit.
+    async fn measuring(&mut self) -> Result<Self> {
         self.plans.clear();
         self.work = None;
         let mut kernels = self.kernels.clone();
-        kernels.moments = Some(MomentKernels::new(&self.gpu)?);
-        let limits = RoomLimits {
+        kernels.moments = Some(MomentKernels::new(&self.gpu).await?);
+        let limits = CapacityLimits {
             slots: self.limits.slots.min(most_slots(&self.gpu)),
             entries: self.limits.entries.min(most_entries(&self.gpu)),
             ..self.limits
@@ -61,14 +84,14 @@ impl GpuRenderer {
             kernels,
             work: None,
             plans: Vec::new(),
-            stamps: None,
+            timestamps: None,
             cuts: HashMap::new(),
             limits,
         })
     }
 
-    /// The last view's Gaussians, of `slots` slots, and their moments.
-    fn read_moments(&self, slots: u32) -> Result<(Vec<u32>, Vec<Moments>)> {
+    /// Returns the Gaussians in the `slots` slots of the last view, and their moments.
+    async fn read_moments(&self, slots: u32) -> Result<(Vec<u32>, Vec<Moments>)> {
         let Some((work, moments)) = self.work.as_ref().and_then(|work| Some((work, work.moments.as_ref()?)))
         else {
             return Ok((Vec::new(), Vec::new()));
@@ -81,13 +104,14 @@ impl GpuRenderer {
         let (from, to) = (&moments.of_slots.raw, &moments.of_slots_back.raw);
         encoder.copy_buffer_to_buffer(from, 0, to, 0, sizes[1]);
         self.gpu.queue().submit([encoder.finish()]);
-        let gaussians = self.gpu.read(&moments.gaussians_back, sizes[0])?;
-        Ok((gaussians, self.gpu.read(&moments.of_slots_back, sizes[1])?))
+        let gaussians = self.gpu.read(&moments.gaussians_back, sizes[0]).await?;
+        Ok((gaussians, self.gpu.read(&moments.of_slots_back, sizes[1]).await?))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use lexisplat::Silent;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::super::path::ShPath;
@@ -104,14 +128,15 @@ mod tests {
         let cameras = surround(&splats.geometry, 2, [130, 100], [1.0, 4.0]);
         let on_gpu = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();
         let measure =
-            |mut renderer: GpuRenderer| renderer.sensitivity(&on_gpu, &splats.geometry, &cameras, &mut || ());
+            |mut renderer: GpuRenderer| renderer.sensitivity(&on_gpu, &splats.geometry, &cameras, &Silent);
         let mut whole = GpuRenderer::new(&gpu).unwrap();
         let limits = whole.limits;
         // Less than a view has, more than any row of tiles.
         let few = 4000;
         let frame = whole.draw(&on_gpu, &cameras[0], &RenderOptions::default()).unwrap();
         assert!(frame.stats.bands == 1 && frame.stats.entries > few, "{:?}", frame.stats);
-        let banded = |entries| GpuRenderer::new(&gpu).unwrap().with_limits(RoomLimits { entries, ..limits });
+        let banded =
+            |entries| GpuRenderer::new(&gpu).unwrap().with_limits(CapacityLimits { entries, ..limits });
         let whole = measure(whole).unwrap();
         assert!(whole.colour.iter().any(|&v| v > 0.0));
         assert!(whole == measure(banded(few.into())).unwrap());

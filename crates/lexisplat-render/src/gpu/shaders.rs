@@ -1,4 +1,4 @@
-//! Kernels, compiled.
+//! Compiles kernels and binds buffers to them.
 
 use crate::error::Result;
 
@@ -23,14 +23,14 @@ pub(super) struct Kernels {
     pub(super) list_tiles: wgpu::ComputePipeline,
     pub(super) find_ranges: wgpu::ComputePipeline,
     pub(super) blend: wgpu::ComputePipeline,
-    /// Only while measuring.
+    /// There only while sensitivities are measured.
     pub(super) moments: Option<MomentKernels>,
 }
 
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 const TILE: &str = include_str!("kernels/tile.wgsl");
 
-/// The texts of all kernels, by name: what a test validates.
+/// The texts of all kernels but radiance, by name.
 pub(super) const TEXTS: [(&str, &[&str]); 12] = [
     ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
@@ -47,103 +47,102 @@ pub(super) const TEXTS: [(&str, &[&str]); 12] = [
 ];
 
 impl Kernels {
-    pub(super) fn new(gpu: &Gpu) -> Result<Self> {
-        let module = |name: &str| kernel(gpu, name);
-        let (plan, scan, sort, tiles) = (module("plan")?, module("scan")?, module("sort")?, module("tiles")?);
-        Ok(Self {
-            cull: pipeline(gpu, &module("cull")?, "cull")?,
-            compact: pipeline(gpu, &module("compact")?, "compact")?,
-            plan_slots: pipeline(gpu, &plan, "plan_slots")?,
-            plan_entries: pipeline(gpu, &plan, "plan_entries")?,
-            scan_reduce: pipeline(gpu, &scan, "scan_reduce")?,
-            scan_spine: pipeline(gpu, &scan, "scan_spine")?,
-            scan_spread: pipeline(gpu, &scan, "scan_spread")?,
-            project: pipeline(gpu, &module("project")?, "project")?,
-            sort_count: pipeline(gpu, &sort, "sort_count")?,
-            sort_scatter: pipeline(gpu, &sort, "sort_scatter")?,
-            count_tiles: pipeline(gpu, &tiles, "count_tiles")?,
-            list_tiles: pipeline(gpu, &tiles, "list_tiles")?,
-            find_ranges: pipeline(gpu, &module("ranges")?, "find_ranges")?,
-            blend: pipeline(gpu, &module("blend")?, "blend")?,
-            moments: None,
-        })
+    /// Compiles them.
+    pub(super) async fn new(gpu: &Gpu) -> Result<Self> {
+        let alone = |name: &str, entry: &str| pipeline(gpu, &kernel(gpu, name), entry);
+        let make = || {
+            let [plan, scan, sort, tiles] = ["plan", "scan", "sort", "tiles"].map(|name| kernel(gpu, name));
+            Ok(Self {
+                cull: alone("cull", "cull"),
+                compact: alone("compact", "compact"),
+                plan_slots: pipeline(gpu, &plan, "plan_slots"),
+                plan_entries: pipeline(gpu, &plan, "plan_entries"),
+                scan_reduce: pipeline(gpu, &scan, "scan_reduce"),
+                scan_spine: pipeline(gpu, &scan, "scan_spine"),
+                scan_spread: pipeline(gpu, &scan, "scan_spread"),
+                project: alone("project", "project"),
+                sort_count: pipeline(gpu, &sort, "sort_count"),
+                sort_scatter: pipeline(gpu, &sort, "sort_scatter"),
+                count_tiles: pipeline(gpu, &tiles, "count_tiles"),
+                list_tiles: pipeline(gpu, &tiles, "list_tiles"),
+                find_ranges: alone("ranges", "find_ranges"),
+                blend: alone("blend", "blend"),
+                moments: None,
+            })
+        };
+        gpu.checked("kernels", make).await
     }
 }
 
-/// The module of the kernel called `name`.
-pub(super) fn kernel(gpu: &Gpu, name: &str) -> Result<wgpu::ShaderModule> {
+/// The module of the kernel called `name`. What the device has against it is reported by the
+/// [`checked`](Gpu::checked) around it, as for [`compile`], [`pipeline`] and [`bind`].
+pub(super) fn kernel(gpu: &Gpu, name: &str) -> wgpu::ShaderModule {
     let parts = TEXTS.iter().find(|(found, _)| *found == name).map_or(&[][..], |(_, parts)| parts);
     compile(gpu, name, &parts.concat())
 }
 
 /// A module of `text` after the shared declarations.
-pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> Result<wgpu::ShaderModule> {
+pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> wgpu::ShaderModule {
     let source = format!("{}\n{text}", declarations());
-    gpu.checked(name, || {
-        gpu.device().create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(source.into()),
-        })
+    gpu.device().create_shader_module(wgpu::ShaderModuleDescriptor {
+        label: Some(name),
+        source: wgpu::ShaderSource::Wgsl(source.into()),
     })
 }
 
 /// The pipeline of one entry point.
-pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> Result<wgpu::ComputePipeline> {
-    gpu.checked(entry, || {
-        gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(entry),
-            layout: None,
-            module,
-            entry_point: Some(entry),
-            // Every kernel writes its workgroup memory before it reads it.
-            compilation_options: wgpu::PipelineCompilationOptions {
-                zero_initialize_workgroup_memory: false,
-                ..wgpu::PipelineCompilationOptions::default()
-            },
-            cache: None,
-        })
+pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> wgpu::ComputePipeline {
+    gpu.device().create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+        label: Some(entry),
+        layout: None,
+        module,
+        entry_point: Some(entry),
+        // Every kernel writes its workgroup memory before it reads it.
+        compilation_options: wgpu::PipelineCompilationOptions {
+            zero_initialize_workgroup_memory: false,
+            ..wgpu::PipelineCompilationOptions::default()
+        },
+        cache: None,
     })
 }
 
-/// What a kernel is given at one binding.
+/// What is bound to a kernel at one binding.
 pub(super) enum Bound<'a> {
     /// All of a buffer.
     All(&'a wgpu::Buffer),
-    /// Bytes of a buffer: first, and how many.
+    /// A part of a buffer: its first byte, and the number of bytes.
     Part(&'a wgpu::Buffer, u64, u64),
     /// A texture.
     Texture(&'a wgpu::TextureView),
-    /// How a texture is read.
+    /// A sampler for a texture.
     Sampler(&'a wgpu::Sampler),
 }
 
 /// Binds `entries` to the one group of `pipeline`.
-pub(super) fn bind(
+pub(super) fn bind<'a>(
     gpu: &Gpu,
     pipeline: &wgpu::ComputePipeline,
-    entries: &[(u32, Bound<'_>)],
-) -> Result<wgpu::BindGroup> {
+    entries: impl IntoIterator<Item = (u32, Bound<'a>)>,
+) -> wgpu::BindGroup {
     let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
-        .iter()
+        .into_iter()
         .map(|(binding, bound)| wgpu::BindGroupEntry {
-            binding: *binding,
+            binding,
             resource: match bound {
                 Bound::All(buffer) => buffer.as_entire_binding(),
                 Bound::Part(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
                     buffer,
-                    offset: *offset,
-                    size: std::num::NonZeroU64::new(*size),
+                    offset,
+                    size: std::num::NonZeroU64::new(size),
                 }),
                 Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
                 Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
             },
         })
         .collect();
-    gpu.checked("bindings", || {
-        gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
-            label: None,
-            layout: &pipeline.get_bind_group_layout(0),
-            entries: &entries,
-        })
+    gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
+        label: None,
+        layout: &pipeline.get_bind_group_layout(0),
+        entries: &entries,
     })
 }

@@ -1,6 +1,6 @@
-//! What the card can do at best: how fast it copies, and how fast it multiplies and adds.
+//! Measures how fast a GPU copies, and how fast it multiplies and adds.
 
-use std::time::Instant;
+use web_time::Instant;
 
 use crate::error::Result;
 
@@ -8,7 +8,7 @@ use super::constants::{GROUP, MULTIPLY_ADDS};
 use super::device::Gpu;
 use super::plan::dimensions;
 use super::shaders::{Bound, bind, compile, pipeline};
-use super::stamps::Stamps;
+use super::timestamps::Timestamps;
 
 /// Measured rates of a GPU.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -20,40 +20,51 @@ pub struct Speed {
     pub arithmetic: f64,
 }
 
-/// Bytes copied, if a binding can be as large.
+/// Bytes copied, or as many as a binding holds if those are fewer.
 const COPIED: u64 = 256 << 20;
 /// Bytes of a vector.
 const VECTOR: u64 = 16;
 /// Operations of a lane in a round: four chains, four numbers, two operations.
 const OPERATIONS: f64 = 32.0;
-/// Lanes at first and at most: as many as it takes for [`LONG_ENOUGH`].
+/// Lanes of the first and of the last measurement; there are more each time until one takes [`LONG_ENOUGH`].
 const LANES: std::ops::RangeInclusive<u32> = (1 << 16)..=(1 << 22);
 /// Seconds that a measurement should take.
 const LONG_ENOUGH: f64 = 2e-3;
-/// The best of so many.
+/// Runs of a measurement, of which the fastest counts.
 const TIMES: usize = 5;
+
+/// Blocks on [`measure_speed_async`].
+///
+/// # Errors
+/// As [`measure_speed_async`].
+#[cfg(not(target_family = "wasm"))]
+pub fn measure_speed(gpu: &Gpu) -> Result<Speed> {
+    gpu.block_on(measure_speed_async(gpu))
+}
 
 /// Measures `gpu`. Takes a fraction of a second on hardware.
 ///
 /// # Errors
-/// [`crate::Error::Gpu`] if it fails.
-pub fn measure_speed(gpu: &Gpu) -> Result<Speed> {
-    let module = compile(gpu, "speed", include_str!("kernels/speed.wgsl"))?;
+/// [`crate::Error::Gpu`] if the device fails.
+pub async fn measure_speed_async(gpu: &Gpu) -> Result<Speed> {
     let size = COPIED.min(gpu.max_binding()) / VECTOR * VECTOR;
-    let (from, to) = (gpu.storage("from", size)?, gpu.storage("to", size)?);
-    let stopwatch = Stopwatch::new(gpu)?;
-
-    let copy = pipeline(gpu, &module, "copy_vectors")?;
-    let bound = bind(gpu, &copy, &[(0, Bound::All(&from.raw)), (1, Bound::All(&to.raw))])?;
+    let make = || {
+        let module = compile(gpu, "speed", include_str!("kernels/speed.wgsl"));
+        let (from, to) = (gpu.storage("from", size)?, gpu.storage("to", size)?);
+        let copy = pipeline(gpu, &module, "copy_vectors");
+        let copied = bind(gpu, &copy, [(0, Bound::All(&from.raw)), (1, Bound::All(&to.raw))]);
+        let work = pipeline(gpu, &module, "multiply_add");
+        let worked = bind(gpu, &work, [(1, Bound::All(&to.raw))]);
+        Ok([(copy, copied), (work, worked)])
+    };
+    let [(copy, copied), (work, worked)] = gpu.checked("speed", make).await?;
+    let stopwatch = Stopwatch { gpu, timestamps: Timestamps::new(gpu, 1).await? };
     let vectors = u32::try_from(size / VECTOR).unwrap_or(u32::MAX);
-    let seconds = stopwatch.best(&copy, &bound, vectors.div_ceil(GROUP))?;
+    let seconds = stopwatch.best(&copy, &copied, vectors.div_ceil(GROUP)).await?;
     let bandwidth = 2.0 * size as f64 / seconds;
-
-    let work = pipeline(gpu, &module, "multiply_add")?;
-    let bound = bind(gpu, &work, &[(1, Bound::All(&to.raw))])?;
     let mut lanes = *LANES.start();
     loop {
-        let seconds = stopwatch.best(&work, &bound, lanes / GROUP)?;
+        let seconds = stopwatch.best(&work, &worked, lanes / GROUP).await?;
         if seconds >= LONG_ENOUGH || lanes >= *LANES.end() {
             let operations = OPERATIONS * f64::from(MULTIPLY_ADDS) * f64::from(lanes);
             return Ok(Speed { copy: bandwidth, arithmetic: operations / seconds });
@@ -62,31 +73,37 @@ pub fn measure_speed(gpu: &Gpu) -> Result<Speed> {
     }
 }
 
-/// Times single dispatches: by time stamps, or else by the clock.
+/// Times single dispatches: by timestamps, or by the clock where the GPU has none.
 struct Stopwatch<'a> {
     gpu: &'a Gpu,
-    stamps: Option<Stamps>,
+    timestamps: Option<Timestamps>,
 }
 
-impl<'a> Stopwatch<'a> {
-    fn new(gpu: &'a Gpu) -> Result<Self> {
-        Ok(Self { gpu, stamps: Stamps::new(gpu, 1)? })
-    }
-
-    /// Least seconds of some runs.
-    fn best(&self, pipeline: &wgpu::ComputePipeline, bound: &wgpu::BindGroup, groups: u32) -> Result<f64> {
+impl Stopwatch<'_> {
+    /// Seconds of the fastest of [`TIMES`] runs.
+    async fn best(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        bound: &wgpu::BindGroup,
+        groups: u32,
+    ) -> Result<f64> {
         let mut best = f64::INFINITY;
         for _ in 0..TIMES {
-            best = best.min(self.run(pipeline, bound, groups)?);
+            best = best.min(self.run(pipeline, bound, groups).await?);
         }
         Ok(best)
     }
 
-    fn run(&self, pipeline: &wgpu::ComputePipeline, bound: &wgpu::BindGroup, groups: u32) -> Result<f64> {
+    async fn run(
+        &self,
+        pipeline: &wgpu::ComputePipeline,
+        bound: &wgpu::BindGroup,
+        groups: u32,
+    ) -> Result<f64> {
         let gpu = self.gpu;
         let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
-            let timestamp_writes = self.stamps.as_ref().and_then(|stamps| stamps.writes(0));
+            let timestamp_writes = self.timestamps.as_ref().and_then(|timestamps| timestamps.writes(0));
             let mut pass =
                 encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
             pass.set_pipeline(pipeline);
@@ -94,14 +111,14 @@ impl<'a> Stopwatch<'a> {
             let (x, y) = dimensions(groups);
             pass.dispatch_workgroups(x, y, 1);
         }
-        if let Some(stamps) = &self.stamps {
-            stamps.resolve(&mut encoder, 1);
+        if let Some(timestamps) = &self.timestamps {
+            timestamps.resolve(&mut encoder, 1);
         }
         let clock = Instant::now();
         gpu.queue().submit([encoder.finish()]);
-        gpu.wait()?;
-        let Some(stamps) = &self.stamps else { return Ok(clock.elapsed().as_secs_f64()) };
-        let milliseconds = stamps.read(gpu, 1)?.first().map_or(0.0, |[start, end]| end - start);
+        gpu.wait_async().await?;
+        let Some(timestamps) = &self.timestamps else { return Ok(clock.elapsed().as_secs_f64()) };
+        let milliseconds = timestamps.read(gpu, 1).await?.first().map_or(0.0, |[start, end]| end - start);
         Ok(milliseconds / 1e3)
     }
 }

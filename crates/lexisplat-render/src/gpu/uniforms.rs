@@ -1,11 +1,12 @@
-//! Small structures that kernels read, laid out as in `frame.wgsl`, `scan.wgsl` and `sort.wgsl`.
+//! Small structures that kernels read. They are laid out as in `frame.wgsl`, `scan.wgsl` and `sort.wgsl`, which
+//! describe the fields.
 
 use bytemuck::{Pod, Zeroable};
 
-/// What is the same for a whole picture.
+/// Values that are the same for a whole picture.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Frame {
+pub(super) struct FrameUniform {
     pub(super) right: [f32; 3],
     pub(super) degree: u32,
     pub(super) down: [f32; 3],
@@ -30,7 +31,7 @@ pub(super) struct Frame {
 /// A part of the scene that fits in one binding.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
-pub(super) struct Chunk {
+pub(super) struct ChunkUniform {
     pub(super) first: u32,
     pub(super) count: u32,
     pub(super) first_block: u32,
@@ -50,7 +51,7 @@ pub(super) struct Band {
     pub(super) padding: u32,
 }
 
-/// What a scan works on: as many numbers as a counter says, or `fixed_length` if that is not 0.
+/// The length of a scan: what a counter says, or `fixed_length` if that is not 0.
 #[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Scan {

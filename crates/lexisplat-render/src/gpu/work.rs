@@ -1,20 +1,21 @@
-//! Buffers that drawing needs besides the scene: as large as the fullest view so far.
+//! Buffers that drawing needs besides the scene. They are as large as the fullest view so far needed.
 
 use crate::error::Result;
 
+use super::buffer::Buffer;
 use super::constants::{COUNTERS, DIGITS, Dispatch, GROUP, SCAN_BLOCK, SORT_BLOCK};
-use super::device::{Buffer, Gpu};
+use super::device::Gpu;
 use super::moments::MomentBuffers;
-use super::uniforms::Frame;
+use super::uniforms::FrameUniform;
 
-/// How much there is room for.
+/// How much the buffers can hold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Room {
-    /// Gaussians of the scene, in blocks.
+pub(super) struct Capacity {
+    /// Blocks of Gaussians of the scene.
     pub(super) blocks: u32,
     /// Chunks of the scene.
     pub(super) chunks: u32,
-    /// Gaussians that may be seen.
+    /// Gaussians that may be visible.
     pub(super) slots: u32,
     /// Entries in the tiles' lists of a band.
     pub(super) entries: u32,
@@ -24,16 +25,16 @@ pub(super) struct Room {
     pub(super) pixels: u64,
 }
 
-/// The buffers.
+/// The buffers, and how much they hold.
 #[derive(Debug)]
 pub(super) struct Work {
-    pub(super) room: Room,
+    pub(super) capacity: Capacity,
     pub(super) frame: Buffer,
     pub(super) masks: Buffer,
     pub(super) starts: Buffer,
     pub(super) counters: Buffer,
     pub(super) dispatches: Buffer,
-    /// Sums of scanned blocks.
+    /// Sums of the blocks of a scan.
     pub(super) sums: Buffer,
     pub(super) gaussians: Buffer,
     pub(super) centres: Buffer,
@@ -42,41 +43,46 @@ pub(super) struct Work {
     pub(super) colours: Buffer,
     pub(super) offsets: Buffer,
     pub(super) histogram: Buffer,
-    /// Depth keys and slots, from one and into the other in turn.
+    /// Depth keys, and with them slots. Each pass of the sort reads one of the two and writes the other.
     pub(super) slot_keys: [Buffer; 2],
     pub(super) slot_values: [Buffer; 2],
-    /// Tiles and slots, likewise.
+    /// Tiles, and with them slots, sorted in the same way.
     pub(super) entry_keys: [Buffer; 2],
     pub(super) entry_values: [Buffer; 2],
     pub(super) ranges: Buffer,
     pub(super) pixels: Buffer,
     pub(super) counters_back: Buffer,
-    /// Only while measuring.
+    /// There only while sensitivities are measured.
     pub(super) moments: Option<MomentBuffers>,
 }
 
-/// Bytes of a word.
+/// Bytes of a 32-bit word.
 pub(super) const WORD: u64 = 4;
 /// Bytes of a pixel: four floats.
 pub(super) const PIXEL: u64 = 16;
-/// Largest element of an array with one element a slot, in bytes: the centres' and conics'.
+/// Bytes of the largest element of an array with one element for each slot: of centres and conics.
 pub(super) const SLOT_ELEMENT: u64 = 16;
-/// Of an array with one element an entry.
+/// Bytes of an element of an array with one element for each entry.
 pub(super) const ENTRY_ELEMENT: u64 = WORD;
 
 impl Work {
-    pub(super) fn new(gpu: &Gpu, room: Room, measuring: bool) -> Result<Self> {
+    /// Makes the buffers, with those for moments where `measuring`.
+    pub(super) async fn new(gpu: &Gpu, capacity: Capacity, measuring: bool) -> Result<Self> {
+        gpu.checked("buffers for drawing", || Self::allocate(gpu, capacity, measuring)).await
+    }
+
+    fn allocate(gpu: &Gpu, capacity: Capacity, measuring: bool) -> Result<Self> {
         use wgpu::BufferUsages as U;
         let words = |label: &str, n: u64| gpu.storage(label, n * WORD);
-        let [blocks, slots, entries] = [room.blocks, room.slots, room.entries].map(u64::from);
+        let [blocks, slots, entries] = [capacity.blocks, capacity.slots, capacity.entries].map(u64::from);
         let most = slots.max(entries);
         let histogram = most.div_ceil(SORT_BLOCK.into()) * u64::from(DIGITS);
         let longest = histogram.max(slots + 1).max(blocks + 1);
-        let dispatches = 3 * (Dispatch::Chunks as u64 + u64::from(room.chunks));
-        let pair = |label: &str, n: u64| Ok::<_, crate::error::Error>([words(label, n)?, words(label, n)?]);
+        let dispatches = 3 * (Dispatch::Chunks as u64 + u64::from(capacity.chunks));
+        let pair = |label: &str, n: u64| -> Result<[Buffer; 2]> { Ok([words(label, n)?, words(label, n)?]) };
         Ok(Self {
-            room,
-            frame: gpu.uniform("frame", &Frame::default())?,
+            capacity,
+            frame: gpu.uniform("frame", &FrameUniform::default())?,
             masks: words("masks", blocks * u64::from(GROUP / u32::BITS))?,
             starts: words("starts", blocks + 1)?,
             counters: words("counters", COUNTERS as u64)?,
@@ -93,10 +99,10 @@ impl Work {
             slot_values: pair("slot values", slots)?,
             entry_keys: pair("entry keys", entries)?,
             entry_values: pair("entry values", entries)?,
-            ranges: words("ranges", 2 * u64::from(room.tiles))?,
-            pixels: gpu.storage("pixels", room.pixels * PIXEL)?,
-            counters_back: gpu.buffer("counters back", COUNTERS as u64 * WORD, U::MAP_READ | U::COPY_DST)?,
-            moments: measuring.then(|| MomentBuffers::new(gpu, room)).transpose()?,
+            ranges: words("ranges", 2 * u64::from(capacity.tiles))?,
+            pixels: gpu.storage("pixels", capacity.pixels * PIXEL)?,
+            counters_back: gpu.readable("counters back", COUNTERS as u64 * WORD)?,
+            moments: measuring.then(|| MomentBuffers::new(gpu, capacity)).transpose()?,
         })
     }
 }

@@ -1,4 +1,4 @@
-//! The fields of a `transforms.json` that matter, as they are written.
+//! The fields of a `transforms.json` that are used, as they are written.
 
 use std::fmt;
 
@@ -6,16 +6,17 @@ use serde::de::{
     Deserialize, DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor,
 };
 
-use crate::cameras_json::{MAX_CAMERAS, MAX_CAMERAS_BYTES};
-use crate::error::Checked;
+use crate::cameras_json::MAX_CAMERAS;
+use crate::error::Result;
+use crate::view_files::MAX_CAMERAS_BYTES;
 
-/// Most rows of a matrix, and most entries of a list of distortion parameters.
+/// Most rows of a matrix.
 const MAX_ROWS: usize = 4;
-/// See [`MAX_ROWS`]; `OpenCV` has no model of more.
+/// Most entries of a list of distortion parameters. `OpenCV` has no model with more.
 const MAX_DISTORTION: usize = 14;
-/// Models that are a pinhole if no distortion is given.
+/// Camera models that are a pinhole where no distortion is given.
 const PINHOLES: [&str; 3] = ["PINHOLE", "SIMPLE_PINHOLE", "OPENCV"];
-/// Fields of distortion, in the order of [`Lens::bent`].
+/// Names of the fields of distortion, in the order of [`Lens::bent`].
 const BENT: [&str; 8] = ["k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2"];
 
 /// What a frame, or the file for all frames, says about the lens. Lengths are in pixels, angles in radians.
@@ -34,7 +35,7 @@ pub(super) struct Lens {
 }
 
 impl Lens {
-    /// Reads the value of `key` if it is one of a lens; whether it was.
+    /// Reads the value of `key` if that is a field of a lens. Returns whether it is.
     fn read<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
         let slot = match key {
             "camera_model" => return map.next_value().map(|v| self.model = v).map(|()| true),
@@ -57,7 +58,7 @@ impl Lens {
         Ok(true)
     }
 
-    /// Why this is no pinhole, if it is none.
+    /// Returns why this is not a pinhole; `None` if it is one.
     pub(super) fn distortion(&self) -> Option<String> {
         if let Some(model) = self.model.as_deref().filter(|model| !PINHOLES.contains(model)) {
             return Some(format!("camera_model {model} is not supported"));
@@ -75,16 +76,16 @@ impl Lens {
     }
 
     /// Focal length along x for pictures `width` pixels wide.
-    pub(super) fn focal_x(&self, width: u32) -> Checked<Option<f64>> {
+    pub(super) fn focal_x(&self, width: u32) -> Result<Option<f64>, String> {
         self.focal(0, width)
     }
 
     /// Focal length along y for pictures `height` pixels high.
-    pub(super) fn focal_y(&self, height: u32) -> Checked<Option<f64>> {
+    pub(super) fn focal_y(&self, height: u32) -> Result<Option<f64>, String> {
         self.focal(1, height)
     }
 
-    fn focal(&self, axis: usize, side: u32) -> Checked<Option<f64>> {
+    fn focal(&self, axis: usize, side: u32) -> Result<Option<f64>, String> {
         if self.fl[axis].is_some() {
             return Ok(self.fl[axis]);
         }
@@ -101,7 +102,7 @@ impl Lens {
 #[derive(Debug)]
 pub(super) struct Frame {
     pub(super) path: String,
-    /// Rows of camera to world.
+    /// Rows of the camera-to-world matrix.
     pub(super) matrix: Vec<[f64; 4]>,
     pub(super) lens: Lens,
 }
@@ -117,7 +118,7 @@ pub(super) struct Transforms {
 }
 
 impl Transforms {
-    pub(super) fn parse(bytes: &[u8]) -> Checked<Self> {
+    pub(super) fn parse(bytes: &[u8]) -> Result<Self, String> {
         if u64::try_from(bytes.len()).is_ok_and(|len| len > MAX_CAMERAS_BYTES) {
             return Err(format!("over the limit of {MAX_CAMERAS_BYTES} bytes"));
         }
@@ -157,13 +158,13 @@ impl<'de> Visitor<'de> for TransformsVisitor {
             read.map_err(|e| A::Error::custom(format!("field '{key}': {e}")))?;
         }
         let frames = frames
-            .ok_or_else(|| A::Error::custom("field 'frames' is missing, so this is no transforms.json"))?;
+            .ok_or_else(|| A::Error::custom("field 'frames' is missing, so this is not a transforms.json"))?;
         let [train, val, test] = [train, val, test].map(|names| names.map(|list| list.0));
         Ok(Transforms { lens, frames, train, val, test })
     }
 }
 
-/// The list of frames.
+/// Reads the list of frames.
 struct Frames;
 
 impl<'de> DeserializeSeed<'de> for Frames {
@@ -193,7 +194,7 @@ impl<'de> Visitor<'de> for Frames {
     }
 }
 
-/// The frame at a position of the list.
+/// Reads the frame at this position of the list.
 struct FrameAt(usize);
 
 impl<'de> DeserializeSeed<'de> for FrameAt {
@@ -237,7 +238,7 @@ impl<'de> Visitor<'de> for FrameAt {
     }
 }
 
-/// A list of at most `N` values; longer ones are refused before they are held.
+/// A list of at most `N` values. A longer one is refused while it is read.
 #[derive(Debug)]
 struct List<T, const N: usize>(Vec<T>);
 

@@ -14,66 +14,57 @@ mod file;
 mod tests;
 
 use std::collections::HashSet;
-use std::path::Path;
 
 use crate::camera::{Camera, Split};
 use crate::cameras_json::{MAX_NAME, whole};
-use crate::error::{Checked, Error, Result};
+use crate::error::{Error, Result};
 use crate::orbit::single;
-use crate::view_set::{PrincipalPoints, SizeOf, ViewSet, read_limited};
+use crate::view_files::ViewFiles;
+use crate::view_set::{PrincipalPoints, SizeOf, ViewSet};
 use file::{Frame, Lens, Transforms};
 
-/// Files of a `NeRF` synthetic folder and the split that each is; `transforms_val.json` is not used, as in
-/// the 3DGS authors' loader.
+/// Files of a `NeRF` synthetic folder, each with its split. As in the 3DGS authors' loader, `transforms_val.json`
+/// is not used.
 const NERF_FILES: [(&str, Split); 2] =
     [("transforms_train.json", Split::Train), ("transforms_test.json", Split::Test)];
-/// How far the last row of a matrix may be from (0, 0, 0, 1).
+/// Largest difference of the last row of a matrix from (0, 0, 0, 1).
 const LAST_ROW_TOLERANCE: f64 = 1e-6;
 
 /// What to do about a lens that the rasteriser cannot draw through.
 const UNDISTORT: &str = "only pinhole cameras can be drawn from; undistort the photos (`colmap image_undistorter`) and use the cameras of that";
 
-/// Whether `folder` is a `NeRF` synthetic one.
-pub(crate) fn is_nerf(folder: &Path) -> bool {
-    folder.join(NERF_FILES[0].0).is_file()
+/// Whether `files` are those of a `NeRF` synthetic folder.
+pub(crate) fn is_nerf<F: ViewFiles + ?Sized>(files: &F) -> bool {
+    files.has(NERF_FILES[0].0)
 }
 
-/// Reads a `transforms.json`. See [`read_transforms_bytes`].
+/// Reads `transforms_train.json` and, if it is there, `transforms_test.json` of a `NeRF` synthetic folder.
+/// Every camera is marked with its split. These files name no size, so `size_of` has to know it.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read, else as [`read_transforms_bytes`].
-pub fn read_transforms(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
-    let path = path.as_ref();
-    read_transforms_bytes(&path.display().to_string(), &read_limited(path)?, size_of)
-}
-
-/// Reads `transforms_train.json` and, if it is there, `transforms_test.json` of a `NeRF` synthetic folder;
-/// every camera is marked with its split. These files name no size, so `size_of` has to know.
-///
-/// # Errors
-/// As [`read_transforms`].
-pub fn read_nerf(folder: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+/// [`Error::Io`] if a file cannot be read; otherwise as [`read_transforms_bytes`].
+pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) -> Result<ViewSet> {
     let mut all = ViewSet::default();
-    for (index, (name, split)) in NERF_FILES.into_iter().enumerate() {
-        let path = folder.as_ref().join(name);
-        if index > 0 && !path.is_file() {
+    for (index, (file, split)) in NERF_FILES.into_iter().enumerate() {
+        if index > 0 && !files.has(file) {
             continue;
         }
-        let set = read_transforms(&path, size_of)?;
+        let (name, bytes) = files.open(file)?.read_limited()?;
+        let set = read_transforms_bytes(&name, &bytes, size_of)?;
         all.cameras.extend(set.cameras.into_iter().map(|camera| Camera { split: Some(split), ..camera }));
-        all.warnings.extend(set.warnings.into_iter().map(|warning| format!("{name}: {warning}")));
+        all.warnings.extend(set.warnings.into_iter().map(|warning| format!("{file}: {warning}")));
     }
     Ok(all)
 }
 
-/// The cameras in `bytes`, in order, named by their `file_path` as written; `file` stands for them in
+/// Returns the cameras in `bytes`, in order, named by their `file_path` as written. `file` stands for them in
 /// errors.
 ///
-/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`, of the
-/// frame before those of the file; one for both axes if only x has any. Where `w` and `h` are missing,
+/// Focal lengths are `fl_x` and `fl_y`, or follow from `camera_angle_x` and `camera_angle_y`. Those of the frame
+/// come before those of the file. If only x has one, it holds for both axes. Where `w` and `h` are missing,
 /// `size_of` is asked with the `file_path`. The principal point is ignored, see [`ViewSet::warnings`].
-/// `train_filenames` and `test_filenames` set the split; `val_filenames` count as test if there are no
-/// `test_filenames`, as in nerfstudio's own evaluation.
+/// `train_filenames` and `test_filenames` set the split. If there are no `test_filenames`, `val_filenames` count
+/// as test, as in nerfstudio's own evaluation.
 ///
 /// # Errors
 /// [`Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
@@ -101,7 +92,7 @@ fn camera(
     split: Option<Split>,
     size_of: SizeOf<'_>,
     points: &mut PrincipalPoints,
-) -> Checked<Camera> {
+) -> Result<Camera, String> {
     if frame.path.len() > MAX_NAME {
         return Err(format!("field 'file_path' is over the limit of {MAX_NAME} bytes"));
     }
@@ -151,7 +142,7 @@ fn camera(
 
 impl Frame {
     /// The matrix's columns: right, up, back and position.
-    fn columns(&self) -> Checked<[[f64; 3]; 4]> {
+    fn columns(&self) -> Result<[[f64; 3]; 4], String> {
         if let [_, _, _, last] = self.matrix.as_slice() {
             let off = last.iter().zip([0.0, 0.0, 0.0, 1.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
             if off > LAST_ROW_TOLERANCE {
@@ -166,14 +157,14 @@ impl Frame {
     }
 }
 
-/// Names of the frames of each split, where the file has such lists.
+/// The names of the frames of each split, where the file lists them.
 struct Splits<'a> {
     train: HashSet<&'a str>,
     test: HashSet<&'a str>,
 }
 
 impl<'a> Splits<'a> {
-    fn new(transforms: &'a Transforms) -> Checked<Self> {
+    fn new(transforms: &'a Transforms) -> Result<Self, String> {
         let set = |names: &'a [String]| names.iter().map(|name| plain(name)).collect::<HashSet<_>>();
         let held = transforms.test.as_ref().or(transforms.val.as_ref());
         let train = set(transforms.train.as_deref().unwrap_or_default());
@@ -196,12 +187,14 @@ impl<'a> Splits<'a> {
         [("train", lost(&self.train)), ("test", lost(&self.test))]
             .into_iter()
             .filter(|(_, lost)| *lost > 0)
-            .map(|(split, lost)| format!("{lost} of the names listed for the {split} split are of no frame"))
+            .map(|(split, lost)| {
+                format!("{lost} of the names listed for the {split} split belong to no frame")
+            })
             .collect()
     }
 }
 
-/// A path without the `./` that some writers put before it.
+/// Returns a path without the `./` that some writers put before it.
 fn plain(path: &str) -> &str {
     path.strip_prefix("./").unwrap_or(path)
 }

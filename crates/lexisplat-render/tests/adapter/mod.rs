@@ -1,34 +1,29 @@
 //! The GPU that tests draw with.
+#![allow(dead_code, reason = "each test file uses a part")]
 
 use std::sync::OnceLock;
 
 use lexisplat_render::gpu::{Gpu, GpuChoice};
+use lexisplat_testing::{Need, missing};
 
-/// Set where GPU tests may not be skipped.
-const REQUIRE: &str = "LEXISPLAT_REQUIRE_GPU";
-
-/// The machine's best adapter, open once for all tests; none where there is none, unless it is required.
+/// The machine's best adapter, open once for all tests. `None`, and the running test is skipped, if there is none.
 ///
 /// # Panics
 /// If it is required and there is none.
 pub(crate) fn gpu() -> Option<Gpu> {
-    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
-    GPU.get_or_init(|| opened(Gpu::open(GpuChoice::Best))).clone()
+    static GPU: OnceLock<Result<Gpu, String>> = OnceLock::new();
+    let gpu = GPU.get_or_init(|| Gpu::open(GpuChoice::Best).map_err(|error| error.to_string()));
+    found(gpu.clone())
 }
 
-/// What was opened, if anything.
+/// The adapter that was opened. `None`, and the running test is skipped, if there is none.
 ///
 /// # Panics
 /// As [`gpu`].
 pub(crate) fn opened(gpu: lexisplat_render::Result<Gpu>) -> Option<Gpu> {
-    match gpu {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os(REQUIRE).is_some() => {
-            panic!("{REQUIRE} is set, but {error}")
-        }
-        Err(error) => {
-            eprintln!("skipped: {error}");
-            None
-        }
-    }
+    found(gpu.map_err(|error| error.to_string()))
+}
+
+fn found(gpu: Result<Gpu, String>) -> Option<Gpu> {
+    gpu.inspect_err(|error| missing(Need::Gpu, error)).ok()
 }

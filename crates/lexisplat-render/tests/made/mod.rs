@@ -6,29 +6,7 @@ use lexisplat::{
     Splats, Values,
 };
 use lexisplat_render::Camera;
-
-/// A small generator (Steele, Lea and Flood's `SplitMix64`).
-pub(crate) struct Random(u64);
-
-impl Random {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed)
-    }
-
-    /// The next number, 0 to 1.
-    pub(crate) fn next(&mut self) -> f32 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 40) as f32 / (1 << 24) as f32
-    }
-
-    /// The next number, `low` to `high`.
-    pub(crate) fn within(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * self.next()
-    }
-}
+pub(crate) use lexisplat_testing::Random;
 
 /// `count` Gaussians around the origin; every tenth is odd in one way: huge, a point, a needle, far
 /// off, without rotation, opaque, or invisible.
@@ -112,7 +90,7 @@ pub(crate) fn model_of(splats: Splats, atoms: usize, half: bool) -> Model {
         }
         let empty = dim == 0 || i % 17 == 0 || i % 13 == 0;
         let chosen: Vec<usize> =
-            (0..atoms).filter(|_| random.next() * (atoms as f32) < 8.0).take(dim).collect();
+            (0..atoms).filter(|_| random.unit() * (atoms as f32) < 8.0).take(dim).collect();
         let chosen = if empty { Vec::new() } else { chosen };
         counts.push(u8::try_from(chosen.len()).unwrap());
         picked.extend(chosen);

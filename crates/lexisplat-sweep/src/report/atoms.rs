@@ -1,12 +1,10 @@
 //! The dictionary as data for the page's script, which draws each atom as a ball.
 
-use std::fmt::Write;
-
 use lexisplat::Model;
 
 /// Atoms shown, the most used first.
 const SHOWN: usize = 180;
-/// Steps of a coefficient in the page: a thousandth is finer than any screen shows.
+/// Coefficients are whole numbers of this part of 1: a thousandth is finer than any screen shows.
 const STEPS: f32 = 1000.0;
 
 /// How often atoms are used.
@@ -34,17 +32,12 @@ impl Usage {
     }
 }
 
-/// `{"degree":3,"atoms":[[...],...]}` of the shown atoms, coefficients in thousandths.
+/// `{"degree":3,"atoms":[[...],...]}` of the shown atoms, with coefficients in thousandths.
 pub(super) fn json(model: &Model, usage: &Usage) -> String {
-    let mut out = format!("{{\"degree\":{},\"atoms\":[", model.degree());
-    for (k, &(atom, _)) in usage.shown().iter().enumerate() {
-        out.push_str(if k == 0 { "[" } else { ",[" });
-        for (i, value) in model.dictionary.atom(atom).iter().enumerate() {
-            let comma = if i == 0 { "" } else { "," };
-            let _ = write!(out, "{comma}{:.0}", value * STEPS);
-        }
-        out.push(']');
-    }
-    out.push_str("]}");
-    out
+    let thousandths = |value: &f32| (value * STEPS).round();
+    let atom = |&(atom, _): &(usize, u64)| {
+        model.dictionary.atom(atom).iter().map(thousandths).map(|v| v as i32).collect::<Vec<_>>()
+    };
+    let atoms: Vec<_> = usage.shown().iter().map(atom).collect();
+    serde_json::json!({ "degree": model.degree().get(), "atoms": atoms }).to_string()
 }

@@ -1,4 +1,5 @@
-//! Formats and containers: PLY and .lexi.
+//! Files: PLY, .lexi, and how to tell which of them some bytes are.
 
+pub(crate) mod kind;
 pub mod lexi;
 pub mod ply;

@@ -5,7 +5,7 @@ use half::f16;
 use super::canonical::{MortonKey, canonical};
 use super::chunk_codec::{ChunkCodec, Code, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
-use super::codebook::{Codebook, Codes, Costs, StopRule, learn};
+use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
 use super::pack::{PackOptions, PackReport};
@@ -16,11 +16,13 @@ use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Layout, Pursuit, Record};
 use crate::support::error::{Error, Result};
-use crate::support::progress::{Progress, Stage};
+use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
 /// Rows to learn a dictionary from at most.
 const SAMPLE: usize = 24_576;
+/// Most rows that decide how finely atoms are rounded.
+const ATOM_BITS_SAMPLE: usize = 2048;
 /// Gaussians that pay for one more atom.
 const GAUSSIANS_PER_ATOM: usize = 64;
 /// Atoms learned unless asked otherwise at most: as many as one byte counts. At least there are as many as
@@ -127,7 +129,7 @@ impl ChunkCoder {
             tolerance: options.tolerance,
         };
         if dim > 0 && view.len() > 0 {
-            let (rows, costs) = coder.learn(view, total, options, progress);
+            let (rows, costs) = coder.learn(view, total, options, progress)?;
             coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
             let atoms = rows.len() / dim;
             let rounded = code_dictionary(&mut coder.first, degree, atoms, coder.atom_bits, Some(&rows));
@@ -149,7 +151,7 @@ impl ChunkCoder {
         total: usize,
         options: &PackOptions,
         progress: &dyn Progress,
-    ) -> (Vec<f32>, Costs) {
+    ) -> Result<(Vec<f32>, Costs)> {
         let dim = view.splats.degree.rest();
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
         let (rows, classes) = view.scaled(sample, &self.parameters);
@@ -157,10 +159,7 @@ impl ChunkCoder {
         let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
         let pay = || (total / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED);
         let first = first_atoms(dim, options.atoms.unwrap_or_else(pay), &rows);
-        progress.begin(Stage::Learn, super::codebook::ROUNDS as u64);
-        let learned = learn(dim, &rows, &classes, first, self.stop, &mut || progress.advance(1));
-        progress.end();
-        learned
+        learn(dim, &rows, &classes, first, self.stop, progress)
     }
 
     /// How finely atoms need be rounded: the larger the values, the more their errors show.
@@ -168,7 +167,7 @@ impl ChunkCoder {
         let dim = view.splats.degree.rest();
         let n = view.len();
         let book = Codebook::new(dim, rows.to_vec(), costs.clone());
-        let stride = n.div_ceil(super::codebook::CHUNK).max(1);
+        let stride = n.div_ceil(ATOM_BITS_SAMPLE).max(1);
         let (sample, classes) = view.scaled((0..n).step_by(stride), &self.parameters);
         let codes = book.encode(&sample, &classes, self.stop);
         let (mut sum, mut count) = (0.0_f64, 1.0_f64);
@@ -333,27 +332,4 @@ impl Tally {
 
 fn too_large() -> Error {
     Error::parameter("values", "too large", "positions and colours whose sums f32 can hold")
-}
-
-/// Atoms to start learning from: principal axes, then rows of the sample.
-fn first_atoms(dim: usize, atoms: usize, rows: &[f32]) -> Vec<f32> {
-    let mut out = Vec::with_capacity(atoms * dim);
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-    for axis in crate::sparse::learn::principal_axes(dim, rows).iter().take(atoms / 2) {
-        out.extend(axis.iter().map(|&x| x as f32));
-    }
-    let mut rows = rows.chunks_exact(dim);
-    while out.len() < atoms * dim {
-        let Some(row) = rows.next() else { break };
-        let norm = row.iter().map(|x| x * x).sum::<f32>().sqrt();
-        if norm > 1.0 && norm.is_finite() {
-            out.extend(row.iter().map(|x| x / norm));
-        }
-    }
-    let mut axis = 0;
-    while out.len() < atoms * dim {
-        out.extend((0..dim).map(|d| if d == axis % dim { 1.0 } else { 0.0 }));
-        axis += 1;
-    }
-    out
 }

@@ -28,7 +28,7 @@ const MOST_DB: f64 = 100.0;
 #[derive(Debug, Clone, Default, PartialEq)]
 #[non_exhaustive]
 pub struct PackOptions {
-    /// TargetRecord: un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
+    /// The promised un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are
     /// then as exact as pictures need.
     pub tolerance: Option<f64>,
     /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
@@ -50,7 +50,7 @@ impl PackOptions {
         if let Some(tol) = self.tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
-            return Err(Error::parameter("tol", tol, "a finite number above 0"));
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
         }
         Ok(())
     }
@@ -66,9 +66,9 @@ pub struct PackReport {
     pub nonzero_histogram: Vec<u64>,
     /// Gaussians whose SH are stored exactly.
     pub escapes: u64,
-    /// Seconds bit_counts learning (0 where there is no clock).
+    /// Seconds spent learning (0 where there is no clock).
     pub learn_seconds: f64,
-    /// Seconds bit_counts on everything else.
+    /// Seconds spent on everything else.
     pub code_seconds: f64,
 }
 

@@ -1,7 +1,5 @@
 //! Packing a scene that comes part after part, in the order of the file.
 
-use std::path::Path;
-
 use super::CHUNK;
 use super::canonical::{Grid, MortonKey};
 use super::chunks::BitCounts;
@@ -18,7 +16,7 @@ use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::parallel::{map_chunks, map_vec};
 use crate::support::progress::Progress;
-use crate::support::spill::Spill;
+use crate::support::spill::{Spill, SpillTo};
 use crate::support::stopwatch::Stopwatch;
 
 /// Chunks whose symbols are coded before they are written.
@@ -58,14 +56,13 @@ pub(crate) struct PartPacker {
 
 impl PartPacker {
     /// Fits steps and predictors and learns the dictionary from `sample`, some of the Gaussians of `scene` in
-    /// the order of the file, best in runs. These and the options were checked. Temporary files are in
-    /// `folder`.
+    /// the order of the file, best in runs. These and the options were checked.
     pub(crate) fn new(
         scene: Whole,
         sample: &Splats,
         sensitivity: &Sensitivity,
         options: &PackOptions,
-        folder: &Path,
+        to: SpillTo<'_>,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let clock = Stopwatch::start();
@@ -84,11 +81,11 @@ impl PartPacker {
             tally: Tally::new(coder.dictionary.dim()),
             histograms,
             raw_bits: coder.first.raw_bits(),
-            symbols: Spill::new(folder)?,
-            raw: Spill::new(folder)?,
+            symbols: Spill::new(to)?,
+            raw: Spill::new(to)?,
             lengths: Vec::new(),
-            order: if options.keep_order { Some(Spill::new(folder)?) } else { None },
-            extras: Extras::new(folder, &sample.geometry)?,
+            order: if options.keep_order { Some(Spill::new(to)?) } else { None },
+            extras: Extras::new(to, &sample.geometry)?,
             meta: sample.meta.clone(),
             learn_seconds: clock.seconds(),
             clock: Stopwatch::start(),
@@ -127,12 +124,12 @@ impl PartPacker {
     /// `device` is the GPU that looked, if one did.
     pub(crate) fn finish(
         self,
-        folder: &Path,
+        to: SpillTo<'_>,
         device: Option<&str>,
     ) -> Result<(Packed, SpilledPacked, PackReport, Vec<StreamBits>)> {
         let tables = tables(&self.histograms)?;
         let bit_counts = bit_counts(&self.histograms, &self.raw_bits, &tables);
-        let mut data = Spill::new(folder)?;
+        let mut data = Spill::new(to)?;
         let mut lengths = Vec::with_capacity(2 * (self.lengths.len() + 1));
         let mut write = |parts: [Vec<u8>; 2]| -> Result<()> {
             for part in parts {

@@ -129,7 +129,7 @@ impl Packed {
         Ok(Decoder::new(self, UNNAMED, &self.data)?.dictionary)
     }
 
-    /// MemoryBudget for the scene beside `self`, of which its geometry is taken.
+    /// The memory budget for the scene beside `self`, of which its geometry is taken.
     fn budget<'a>(&self, file: &'a str) -> Result<MemoryBudget<'a>> {
         let words = self.parameters.len() + self.lengths.len() + self.order.as_ref().map_or(0, Vec::len);
         let extras = self.extras.iter().map(|e| e.values.width()).sum::<usize>();

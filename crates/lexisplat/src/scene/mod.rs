@@ -1,6 +1,7 @@
-//! What a dense scene is: Gaussians, SH, what pictures depend on, what looks wrong.
+//! Dense scenes: Gaussians, SH, sources to read them from, sensitivity of pictures, statistics.
 
 pub(crate) mod sensitivity;
 pub mod sh;
+pub(crate) mod source;
 pub(crate) mod splats;
 pub mod stats;

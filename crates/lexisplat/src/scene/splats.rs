@@ -72,6 +72,24 @@ macro_rules! for_extra {
 }
 pub(crate) use for_extra;
 
+macro_rules! values_from {
+    ($($variant:ident: $type:ty),+) => {
+        $(impl From<Vec<$type>> for ExtraValues {
+            fn from(values: Vec<$type>) -> Self {
+                Self::$variant(values)
+            }
+        })+
+    };
+}
+values_from!(I8: i8, U8: u8, I16: i16, U16: u16, I32: i32, U32: u32, F32: f32, F64: f64);
+
+impl Extra {
+    /// The values of Gaussians `range`, which are all there, under the same name.
+    pub(crate) fn slice(&self, range: std::ops::Range<usize>) -> Self {
+        Self { name: self.name.clone(), values: for_extra!(&self.values, v => v[range].to_vec().into()) }
+    }
+}
+
 impl ExtraValues {
     /// Number of values.
     #[must_use]

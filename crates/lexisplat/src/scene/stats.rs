@@ -8,7 +8,7 @@ use std::ops::Range;
 use serde::Serialize;
 
 use crate::scene::splats::{Splats, for_extra};
-use crate::support::parallel::{CHUNK, map_chunks};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in
 /// use, 0.03 to 0.3, are edges: the bins below a tolerance hold the Gaussians that need no atom at all.
@@ -93,7 +93,7 @@ impl Linter {
     /// [`crate::Error::Parameter`] if the part's arrays differ in length.
     pub fn add(&mut self, splats: &Splats) -> crate::Result<()> {
         splats.validate()?;
-        for part in map_chunks(splats.len(), CHUNK, |range| Counts::of(splats, range)) {
+        for part in map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| Counts::of(splats, range)) {
             self.counts.add(&part);
         }
         self.gaussians += splats.len() as u64;
@@ -272,7 +272,7 @@ fn columns(splats: &Splats) -> Vec<Column> {
 
 /// Every `width`-th value from `column` on.
 fn spans<T: Copy + Into<f64> + Sync>(name: &str, values: &[T], column: usize, width: usize) -> Column {
-    let parts = map_chunks(values.len() / width, CHUNK, |rows| {
+    let parts = map_chunks(values.len() / width, GAUSSIANS_PER_TASK, |rows| {
         let mut part = Span::EMPTY;
         for row in rows {
             let value: f64 = values[row * width + column].into();
@@ -314,7 +314,7 @@ mod tests {
     #[test]
     fn each_oddity_is_counted_once() {
         // Several chunks, oddities in the last.
-        let n = 2 * CHUNK + 10;
+        let n = 2 * GAUSSIANS_PER_TASK + 10;
         let mut s = scene(n);
         s.geometry.rotations[n - 1] = [0.0; 4];
         s.geometry.rotations[n - 2] = [2.0, 0.0, 0.0, 0.0];

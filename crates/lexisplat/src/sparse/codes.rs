@@ -1,14 +1,14 @@
-//! Sparse codes, stored column by column: for every Gaussian a few (atom, value) pairs.
+//! Sparse codes: for every Gaussian a few (atom, value) pairs, which are a sparse column of a matrix.
 
 use half::f16;
 
 use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 
-/// Gaussians between two stored offsets: finding a column adds up at most this many counts.
-const CHECKPOINT: usize = 64;
+/// Gaussians between two stored offsets. To find a column, fewer than this many counts are added up.
+const GAUSSIANS_PER_CHECKPOINT: usize = 64;
 
-/// Atom numbers, in one byte where the dictionary allows it.
+/// Atom numbers. They take one byte each if the dictionary has at most 256 atoms.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Indices {
     /// Dictionaries of up to 256 atoms.
@@ -27,7 +27,7 @@ pub enum Values {
 }
 
 impl Indices {
-    /// An empty list fit for a dictionary of `atoms` atoms.
+    /// An empty list for a dictionary of `atoms` atoms.
     #[must_use]
     pub fn for_atoms(atoms: usize) -> Self {
         if atoms <= 256 { Self::U8(Vec::new()) } else { Self::U16(Vec::new()) }
@@ -110,10 +110,10 @@ impl Values {
     }
 }
 
-/// Gaussians stored exactly, because no code reaches the tolerance.
+/// Gaussians whose SH-rest is stored exactly, because no code reaches the tolerance.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Escapes {
-    /// Which Gaussians, strictly ascending.
+    /// Their numbers, strictly ascending.
     pub gaussians: Vec<u32>,
     /// Their SH-rest rows, one after the other.
     pub rows: Vec<f32>,
@@ -121,8 +121,8 @@ pub struct Escapes {
 
 /// The sparse codes of a whole scene.
 ///
-/// Invariants, held by [`SparseCodes::new`]: indices are strictly ascending within a Gaussian and below
-/// the dictionary's length, values are finite, an escaped Gaussian has no nonzeros.
+/// [`SparseCodes::new`] checks these invariants: atom numbers are strictly ascending within a Gaussian and below the
+/// dictionary's length, values are finite, and an escaped Gaussian has no nonzeros.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SparseCodes {
     counts: Vec<u8>,
@@ -133,10 +133,10 @@ pub struct SparseCodes {
     dim: usize,
 }
 
-/// What stands for one Gaussian's SH-rest.
+/// The stored form of one Gaussian's SH-rest.
 #[derive(Debug, Clone, Copy)]
-pub enum Row<'a> {
-    /// A few atoms.
+pub enum CodedRest<'a> {
+    /// A sparse code.
     Code(Column<'a>),
     /// The exact coefficients.
     Exact(&'a [f32]),
@@ -175,7 +175,7 @@ impl SparseCodes {
     /// Checks all invariants and builds the offsets.
     ///
     /// # Errors
-    /// [`Error::Parameter`] that names the array and the first bad entry.
+    /// [`Error::Parameter`] that names the array and its first invalid entry.
     pub fn new(
         dictionary: &Dictionary,
         counts: Vec<u8>,
@@ -186,8 +186,8 @@ impl SparseCodes {
         Self::part(dictionary, 0, counts, indices, values, escapes)
     }
 
-    /// [`Self::new`] of a part of a scene, whose first Gaussian errors call number `first`. Escapes are
-    /// numbered from the part's start.
+    /// [`Self::new`] for a part of a scene. Errors call the part's first Gaussian number `first`; escapes are numbered
+    /// from the part's start.
     pub(crate) fn part(
         dictionary: &Dictionary,
         first: usize,
@@ -241,9 +241,9 @@ impl SparseCodes {
         if let Some(k) = (0..values.len()).find(|&k| !values.get(k).is_finite()) {
             return Err(Error::parameter("codes.values", values.get(k), "finite values"));
         }
-        let mut checkpoints = Vec::with_capacity(counts.len().div_ceil(CHECKPOINT));
+        let mut checkpoints = Vec::with_capacity(counts.len().div_ceil(GAUSSIANS_PER_CHECKPOINT));
         let mut offset = 0_u64;
-        for block in counts.chunks(CHECKPOINT) {
+        for block in counts.chunks(GAUSSIANS_PER_CHECKPOINT) {
             checkpoints.push(offset);
             offset += block.iter().map(|&c| u64::from(c)).sum::<u64>();
         }
@@ -286,7 +286,7 @@ impl SparseCodes {
         &self.values
     }
 
-    /// Bytes these codes take in memory: counts, offsets, indices, values, escapes.
+    /// Bytes of memory that the codes take: counts, offsets, indices, values, escapes.
     #[must_use]
     pub fn resident_bytes(&self) -> usize {
         self.counts.len()
@@ -302,41 +302,41 @@ impl SparseCodes {
         &self.escapes
     }
 
-    /// What stands for Gaussian `i`.
+    /// The stored form of Gaussian `i`.
     ///
     /// # Panics
     /// If `i` is not below [`Self::len`].
     #[must_use]
     #[inline]
-    pub fn row(&self, i: usize) -> Row<'_> {
+    pub fn row(&self, i: usize) -> CodedRest<'_> {
         let len = usize::from(self.counts[i]);
         if len == 0 && !self.escapes.gaussians.is_empty() {
-            // Gaussian counts are limited to u32 when codes are made.
+            // The conversion keeps the number, since a scene has fewer than 2^32 Gaussians.
             if let Ok(k) = self.escapes.gaussians.binary_search_by(|&g| (g as usize).cmp(&i)) {
-                return Row::Exact(&self.escapes.rows[k * self.dim..(k + 1) * self.dim]);
+                return CodedRest::Exact(&self.escapes.rows[k * self.dim..(k + 1) * self.dim]);
             }
         }
-        let block = i / CHECKPOINT;
-        let before: usize = self.counts[block * CHECKPOINT..i].iter().map(|&c| usize::from(c)).sum();
-        // The offset counts elements of a vector in memory, so it fits.
+        let block = i / GAUSSIANS_PER_CHECKPOINT;
+        let before: usize =
+            self.counts[block * GAUSSIANS_PER_CHECKPOINT..i].iter().map(|&c| usize::from(c)).sum();
         #[expect(clippy::cast_possible_truncation, reason = "bounded by a Vec's length")]
         let start = self.checkpoints[block] as usize + before;
-        Row::Code(Column { codes: self, start, len })
+        CodedRest::Code(Column { codes: self, start, len })
     }
 
-    /// Writes Gaussian `i`'s SH-rest into `out`: exactly the values `decompress` writes.
+    /// Writes the SH-rest of Gaussian `i` into `out`: exactly the values of the decompressed scene.
     ///
     /// # Panics
     /// If `i` is out of range or `out` is not `dictionary.dim()` long.
     pub fn reconstruct(&self, dictionary: &Dictionary, i: usize, out: &mut [f32]) {
         match self.row(i) {
-            Row::Exact(row) => out.copy_from_slice(row),
-            Row::Code(column) => reconstruct(dictionary, column.iter(), out),
+            CodedRest::Exact(row) => out.copy_from_slice(row),
+            CodedRest::Code(column) => reconstruct(dictionary, column.iter(), out),
         }
     }
 }
 
-/// The sum of `value * atom` in the order given, one f32 multiply and one f32 add at a time.
+/// Sums `value * atom` in the order given, with one f32 multiplication and one f32 addition at a time.
 ///
 /// This order and rounding are part of the promise: the encoder verifies exactly these values.
 #[inline]

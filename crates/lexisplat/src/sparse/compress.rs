@@ -13,14 +13,14 @@ use crate::sparse::model::{Layout, Model, Pursuit, Record};
 use crate::sparse::pursuit::{Coder, Encoded, StopRule, ValueType};
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::parallel::{CHUNK, map_chunks};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 use crate::support::progress::{Progress, Stage};
 use crate::support::stopwatch::Stopwatch;
 
 /// The paper's main tolerance.
 pub const DEFAULT_TOLERANCE: f64 = 0.1;
 /// Gaussians coded before their results are appended: bounds what is held twice.
-pub(crate) const AT_ONCE: usize = 32 * CHUNK;
+pub(crate) const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
 /// How to compress.
 #[derive(Debug, Clone, PartialEq)]
@@ -174,7 +174,7 @@ impl Encoder {
     }
 
     /// Codes `rest`, the SH-rest of Gaussians `range`, and appends to `coded`. The same bits come out of one
-    /// call and of several, if all but the last are for a multiple of [`CHUNK`] Gaussians.
+    /// call and of several, if all but the last are for a multiple of [`GAUSSIANS_PER_TASK`] Gaussians.
     pub(crate) fn code(&self, rest: &[f32], range: Range<usize>, coded: &mut Coded, progress: &dyn Progress) {
         let dim = self.dictionary.dim();
         let Some(coder) = &self.coder else {
@@ -183,7 +183,7 @@ impl Encoder {
             progress.advance(range.len() as u64);
             return;
         };
-        let parts = map_chunks(range.len(), CHUNK, |piece| {
+        let parts = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
             let mut part = self.nothing();
             let start = range.start + piece.start;
             coder.encode(&rest[piece.start * dim..piece.end * dim], |visit| {

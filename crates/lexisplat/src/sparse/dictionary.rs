@@ -1,15 +1,15 @@
-//! The dictionary: unit-norm atoms in SH-coefficient space. The type only; see [`mod@crate::learn`].
+//! The dictionary type: unit-norm atoms in the space of SH coefficients. [`mod@crate::learn`] makes one.
 
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
-/// How far an atom's norm may be from 1: f32 rounding of up to 72 values, with budget.
+/// Largest distance of an atom's norm from 1. It leaves room for the f32 rounding of 72 values.
 pub(crate) const NORM_TOLERANCE: f64 = 1e-5;
 
-/// `len` atoms of `dim` values each, every one of unit norm.
+/// `len` atoms of unit norm with `dim` values each.
 ///
-/// Degree 0 has `dim` 0 and no atoms.
+/// At degree 0 the dimension is 0, and there are no atoms.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Dictionary {
     degree: ShDegree,
@@ -20,8 +20,8 @@ impl Dictionary {
     /// A dictionary from `atoms`, stored one after the other, each `degree.rest()` long.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the length is not a whole number of atoms, there are none or more than
-    /// [`MAX_ATOMS`] (degree 0: any), or an atom is not finite and of unit norm.
+    /// [`Error::Parameter`] if the length is not a whole number of atoms, if there are no atoms or more than
+    /// [`MAX_ATOMS`] (at degree 0: if there are any), or if an atom does not have unit norm.
     pub fn new(degree: ShDegree, atoms: Vec<f32>) -> Result<Self> {
         let dim = degree.rest();
         if dim == 0 {
@@ -49,7 +49,7 @@ impl Dictionary {
         Self { degree: ShDegree::ZERO, atoms: Vec::new() }
     }
 
-    /// SH degree of the vectors it codes.
+    /// SH degree of the vectors that the dictionary codes.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
         self.degree

@@ -128,12 +128,12 @@ impl Model {
         if dim > 0 {
             crate::support::parallel::for_each_chunk_mut(
                 &mut rest,
-                dim * crate::support::parallel::CHUNK,
+                dim * crate::support::parallel::GAUSSIANS_PER_TASK,
                 |chunk, rows| {
                     for (k, row) in rows.chunks_exact_mut(dim).enumerate() {
                         self.codes.reconstruct(
                             &self.dictionary,
-                            chunk * crate::support::parallel::CHUNK + k,
+                            chunk * crate::support::parallel::GAUSSIANS_PER_TASK + k,
                             row,
                         );
                     }

@@ -1,22 +1,19 @@
-//! Records put in order by way of temporary files: dealt into buckets first, each of which fits in memory.
+//! Records distributed over buckets in temporary files, each of which fits in memory.
 
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use crate::support::error::{Error, Result};
-use crate::support::spill::{named, temporary};
+use crate::support::error::Result;
+use crate::support::spill::TemporaryFile;
 
 /// Bytes a bucket collects before they are written.
 const BLOCK: usize = 1 << 16;
-/// Temporary files at most: buckets share them, and each is given back when its last bucket was taken.
+/// Temporary files at most. Buckets share them, and a file is removed when its last bucket was taken.
 const FILES: usize = 64;
 
-/// Records of one length in buckets, in each in the order they came in.
+/// Records of one length in buckets. Within a bucket they stay in the order in which they came.
 #[derive(Debug)]
 pub(super) struct Buckets {
-    folder: PathBuf,
-    files: Vec<Option<File>>,
+    files: Vec<Option<TemporaryFile>>,
     /// Buckets that share a file.
     shared: usize,
     buckets: Vec<Bucket>,
@@ -24,23 +21,18 @@ pub(super) struct Buckets {
 
 #[derive(Debug, Default, Clone)]
 struct Bucket {
-    /// Not yet written.
+    /// Bytes not yet written.
     pending: Vec<u8>,
-    /// Where in the file what was written is.
+    /// Start and length of each block in the file.
     written: Vec<(u64, usize)>,
 }
 
 impl Buckets {
-    /// `count` empty buckets; temporary files are in `folder`.
+    /// Makes `count` empty buckets with temporary files in `folder`.
     pub(super) fn new(folder: &Path, count: usize) -> Result<Self> {
         let shared = count.div_ceil(FILES).max(1);
-        let files = (0..count.div_ceil(shared)).map(|_| temporary(folder).map(Some));
-        Ok(Self {
-            folder: folder.to_owned(),
-            files: files.collect::<Result<_>>()?,
-            shared,
-            buckets: vec![Bucket::default(); count],
-        })
+        let files = (0..count.div_ceil(shared)).map(|_| TemporaryFile::new(folder).map(Some));
+        Ok(Self { files: files.collect::<Result<_>>()?, shared, buckets: vec![Bucket::default(); count] })
     }
 
     /// Number of buckets.
@@ -58,18 +50,12 @@ impl Buckets {
     fn flush(&mut self, bucket: usize) -> Result<()> {
         let Bucket { pending, written } = &mut self.buckets[bucket];
         let Some(file) = &mut self.files[bucket / self.shared] else { return Ok(()) };
-        let mut append = || {
-            let at = file.seek(SeekFrom::End(0))?;
-            file.write_all(pending)?;
-            Ok(at)
-        };
-        let at = append().map_err(|e| Error::io(named(&self.folder), e))?;
-        written.push((at, pending.len()));
+        written.push((file.append(pending)?, pending.len()));
         pending.clear();
         Ok(())
     }
 
-    /// All records of bucket `bucket`, which is empty after. Buckets are taken in order.
+    /// Removes and returns all records of bucket `bucket`. Buckets are taken in order.
     pub(super) fn take(&mut self, bucket: usize) -> Result<Vec<u8>> {
         let out = self.read(bucket)?;
         self.buckets[bucket] = Bucket::default();
@@ -87,9 +73,7 @@ impl Buckets {
             let mut rest = out.as_mut_slice();
             for &(at, len) in written {
                 let (block, tail) = std::mem::take(&mut rest).split_at_mut(len);
-                file.seek(SeekFrom::Start(at))
-                    .and_then(|_| file.read_exact(block))
-                    .map_err(|e| Error::io(named(&self.folder), e))?;
+                file.read_at(at, block)?;
                 rest = tail;
             }
         }

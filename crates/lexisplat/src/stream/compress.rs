@@ -1,22 +1,19 @@
 //! The exact layouts: sample and learn first, then code and set aside, then write.
 
-use std::io::Write;
-use std::path::Path;
-
-use super::counted::Counted;
 use crate::formats::lexi::SpilledModel;
-use crate::formats::ply::PlyChunks;
+use crate::scene::source::SplatSource;
 use crate::sparse::compress::{AT_ONCE, CompressOptions, CompressReport, Encoder};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Layout, Record};
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::output::{Output, write_whole};
-use crate::support::parallel::CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
 use crate::support::progress::{Progress, Stage};
+use crate::support::sink::Sink;
+use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
-/// What [`compress_file`] did.
+/// What [`compress`] did.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Compressed {
@@ -48,69 +45,50 @@ impl Compressed {
     }
 }
 
-/// Compresses `ply` to the file `output`, whole or not at all: the bytes that
+/// Compresses the scene of `source` and writes it to `sink`: the bytes that
 /// [`compress()`](crate::compress()) and [`lexi::write`](crate::formats::lexi::write()) would make.
 ///
 /// # Errors
-/// As those two, [`Error::Io`] also for temporary files beside `output`.
-pub fn compress_file<'a>(
-    ply: &PlyChunks<'_>,
+/// As those two, [`Error::Io`] also for temporary files, and [`Error::Cancelled`].
+pub fn compress<'a>(
+    source: &dyn SplatSource,
     options: &CompressOptions,
-    output: impl Into<Output<'a>>,
+    sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<Compressed> {
-    let output = output.into();
-    run(ply, options, &output.spill_folder()?, AT_ONCE, progress, |fill, bytes| {
-        write_whole(output.of_bytes(bytes), |writer| fill(writer).map_err(|e| Error::io(output.path(), e)))
-    })
+    run(source, options, sink.into(), AT_ONCE, progress)
 }
-
-/// [`compress_file`] to a writer; temporary files are where the system wants them.
-///
-/// # Errors
-/// As [`compress_file`]; an [`Error::Io`] of the writer names no file.
-pub fn compress_to(
-    ply: &PlyChunks<'_>,
-    options: &CompressOptions,
-    writer: &mut impl Write,
-    progress: &dyn Progress,
-) -> Result<Compressed> {
-    run(ply, options, &std::env::temp_dir(), AT_ONCE, progress, |fill, _| {
-        fill(writer).map_err(|e| Error::io("output", e))
-    })
-}
-
-/// Writes a file, whose size is told too, to a writer.
-type Fill<'a> = dyn FnMut(&mut dyn Write) -> std::io::Result<()> + 'a;
 
 /// `at_once` Gaussians, a multiple of [`CHUNK`], are in memory at a time.
 fn run(
-    ply: &PlyChunks<'_>,
+    source: &dyn SplatSource,
     options: &CompressOptions,
-    folder: &Path,
+    sink: Sink<'_>,
     at_once: usize,
     progress: &dyn Progress,
-    write: impl FnOnce(&mut Fill<'_>, u64) -> Result<()>,
 ) -> Result<Compressed> {
     debug_assert!(at_once.is_multiple_of(CHUNK), "sums would be added in another order");
-    let n = ply.len();
+    let n = source.len();
     Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     if options.layout == Layout::Packed {
         let expected = "f32, f16 or paper: layout packed is what `pack_file` writes";
         return Err(Error::parameter("layout", options.layout, expected));
     }
+    let folder = sink.spill_folder()?;
     let clock = Stopwatch::start();
-    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| ply.read_rest(numbers, out);
-    let (encoder, learned) = Encoder::new(ply.degree(), n, &mut fetch, options, progress)?;
+    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
+    let mut splats = source.empty();
+    let (encoder, learned) = Encoder::new(splats.degree, n, &mut fetch, options, progress)?;
     let learn_seconds = clock.seconds();
     let clock = Stopwatch::start();
-    let mut splats = ply.empty();
-    let mut set_aside = SpilledModel::new(folder, &splats, ply.has_normals(), options.layout)?;
+    let mut set_aside =
+        SpilledModel::new(SpillTo::Folder(&folder), &splats, source.has_normals(), options.layout)?;
     let mut coded = encoder.nothing();
     progress.begin(Stage::Code, n as u64);
     for start in (0..n).step_by(at_once) {
+        progress.check()?;
         let range = start..n.min(start + at_once);
-        ply.read(range.clone(), &mut splats)?;
+        source.read(range.clone(), &mut splats)?;
         encoder.code(&splats.sh_rest, range, &mut coded, progress);
         set_aside.push(&splats.geometry, &coded)?;
         coded.clear();
@@ -118,12 +96,7 @@ fn run(
     progress.end();
     let (record, report) = coded.tally.into_report(options, n, learned, [learn_seconds, clock.seconds()]);
     let clock = Stopwatch::start();
-    let attribute_bytes = set_aside.finish(&encoder.dictionary, &record, ply.meta(), |fill, bytes| {
-        progress.begin(Stage::Write, bytes);
-        write(&mut |writer| fill(&mut Counted { writer, progress }), bytes)?;
-        progress.end();
-        Ok(())
-    })?;
+    let attribute_bytes = set_aside.finish(&encoder.dictionary, &record, &splats.meta, sink, progress)?;
     let write_seconds = clock.seconds();
     let dictionary = encoder.dictionary;
     Ok(Compressed { gaussians: n, dictionary, record, report, attribute_bytes, write_seconds })
@@ -132,7 +105,7 @@ fn run(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Extra, ExtraValues, Silent, Splats, compress, lexi, ply};
+    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply};
 
     /// More than two chunks, with normals, extras of several widths, and rows that no code reaches.
     fn scene() -> Splats {
@@ -153,15 +126,13 @@ mod tests {
 
     fn streamed(bytes: &[u8], options: &CompressOptions, drop_invalid: bool, at_once: usize) -> Vec<u8> {
         let read = ply::ReadOptions { drop_invalid, ..ply::ReadOptions::default() };
-        let chunks = PlyChunks::open("t.ply", bytes, &read, &Silent).unwrap();
+        let chunks = ply::PlySource::open("t.ply", bytes, &read, &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let mut out = Vec::new();
-        let done = run(&chunks, options, folder.path(), at_once, &Silent, |fill, _| {
-            fill(&mut out).map_err(|e| Error::io("out", e))
-        })
-        .unwrap();
+        let output = folder.path().join("out.lexi");
+        let done = run(&chunks, options, Sink::from(&output), at_once, &Silent).unwrap();
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        let out = std::fs::read(output).unwrap();
         assert_eq!(done.file_bytes(), out.len() as u64);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
         out
     }
 
@@ -169,7 +140,7 @@ mod tests {
         let read = ply::ReadOptions { drop_invalid, ..ply::ReadOptions::default() };
         let splats = ply::read_bytes("t.ply", bytes, &read).unwrap().splats;
         let mut out = Vec::new();
-        lexi::write_to(&mut out, &compress(splats, options, &Silent).unwrap().0).unwrap();
+        lexi::write(&mut out, &crate::compress(splats, options, &Silent).unwrap().0).unwrap();
         out
     }
 
@@ -222,11 +193,11 @@ mod tests {
     fn no_temporary_file_stays_after_an_error() {
         let mut bytes = Vec::new();
         ply::write_to(&mut bytes, &scene()).unwrap();
-        let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
+        let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");
         std::fs::create_dir(&output).unwrap();
-        let error = compress_file(&chunks, &quick(Layout::F16), &output, &Silent).unwrap_err();
+        let error = compress(&chunks, &quick(Layout::F16), &output, &Silent).unwrap_err();
         assert!(matches!(&error, Error::Io { file, .. } if file.ends_with("out.lexi")), "{error}");
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

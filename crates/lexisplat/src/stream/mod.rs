@@ -1,9 +1,10 @@
-//! Scenes larger than memory: files to files, a part at a time.
+//! Scenes larger than memory, converted a part at a time.
 //!
-//! What comes out is byte for byte what the functions that hold the whole scene make of it, but for
-//! [`pack_file`]. Anonymous memory is bounded whatever the number of Gaussians; temporary files as large as
-//! the output, when packing also as the input, lie beside the output, or in the system's folder for
-//! them if that is no plain file, and have no name.
+//! Scenes come from any [`SplatSource`](crate::SplatSource) and results go to any [`Sink`](crate::Sink). The
+//! bytes are those of the functions that hold the whole scene, except for [`pack`]. Anonymous memory does not
+//! grow with the number of Gaussians. Temporary files are as large as the output, and when packing also as
+//! large as the input. They have no name, and lie in the folder of the output, or in the system's folder for
+//! temporary files if the output is no plain file.
 //!
 //! ```
 //! use lexisplat_sample::{SampleOptions, scene};
@@ -14,30 +15,30 @@
 //! ply::write(&input, &scene(&SampleOptions::new(2000, 0)))?;
 //!
 //! let bytes = Input::open(&input)?;
-//! let chunks = ply::PlyChunks::open("scene.ply", &bytes, &ply::ReadOptions::default(), &Silent)?;
-//! let done = stream::compress_file(&chunks, &CompressOptions::default(), &small, &Silent)?;
+//! let chunks = ply::PlySource::open("scene.ply", &bytes, &ply::ReadOptions::default(), &Silent)?;
+//! let done = stream::compress(&chunks, &CompressOptions::default(), &small, &Silent)?;
 //! assert_eq!(done.gaussians, 2000);
 //!
 //! let bytes = Input::open(&small)?;
 //! let chunks = lexi::LexiChunks::open("scene.lexi", &bytes, &Limits::default())?;
-//! stream::decompress_file(&chunks, &back, &Silent)?;
+//! stream::decompress(&chunks, &back, &Silent)?;
 //! assert_eq!(std::fs::metadata(&back)?.len(), std::fs::metadata(&input)?.len());
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod buckets;
 mod compress;
-mod counted;
 mod decompress;
 mod importance;
 mod order;
 mod pack;
+mod rows;
 mod source_order;
 mod survey;
 
-pub use compress::{Compressed, compress_file, compress_to};
-pub use decompress::{decompress_file, decompress_to};
+pub use compress::{Compressed, compress};
+pub use decompress::decompress;
 pub use importance::Importance;
-pub use pack::{PackedFile, pack_file, pack_to};
+pub use pack::{PackedFile, pack};
 pub use source_order::in_source_order;
-pub use survey::{Survey, lint_ply, survey};
+pub use survey::{Survey, lint, survey};

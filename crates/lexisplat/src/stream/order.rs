@@ -4,14 +4,15 @@ use std::path::Path;
 
 use super::buckets::Buckets;
 use super::importance::Importance;
-use crate::formats::ply::{PlyChunks, RowBytes};
+use super::rows::RowLayout;
 use crate::packed::{Bounds, Grid, MortonKey, check};
 use crate::scene::sensitivity::{Sensitivity, heuristic_total};
+use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::progress::{Progress, Stage};
 use crate::support::rng::SplitMix64;
-use crate::support::spill::{Spill, Spilled};
+use crate::support::spill::{Spill, SpillTo, Spilled};
 
 /// How much is held at a time. The first does not show in the file, the second only if parts are judged.
 #[derive(Debug, Clone, Copy)]
@@ -41,7 +42,7 @@ pub(super) struct Ordered {
     pub(super) grid: Grid,
     /// Sum over all Gaussians of what their weights are guessed from.
     pub(super) heuristic_total: f64,
-    rows: RowBytes,
+    rows: RowLayout,
     buckets: Buckets,
     gaussians: usize,
     /// Where runs end, and one run in how many is of the sample.
@@ -59,25 +60,26 @@ pub(super) struct Judged {
 }
 
 impl Ordered {
-    /// Reads all of `ply`, twice.
+    /// Reads all of `source` twice: for the grid and the borders of buckets, and to fill the buckets.
     pub(super) fn new(
-        ply: &PlyChunks<'_>,
+        source: &dyn SplatSource,
         sizes: Sizes,
         seed: u64,
         folder: &Path,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let n = ply.len();
-        let row_bytes = ply.summary().row_bytes;
+        let n = source.len();
+        let row_bytes = source.row_bytes();
         progress.begin(Stage::Read, 2 * n as u64 * row_bytes);
-        let mut splats = ply.empty();
+        let mut splats = source.empty();
         let (mut bounds, mut total) = (None::<Bounds>, 0.0);
         let mut looked = Vec::with_capacity(sizes.looked_at.min(n));
         let mut look = stratified(n, sizes.looked_at, seed).peekable();
         let each_chunk = |splats: &mut Splats, f: &mut dyn FnMut(usize, &Splats) -> Result<()>| {
             for start in (0..n).step_by(sizes.at_once) {
                 let range = start..n.min(start + sizes.at_once);
-                ply.read(range.clone(), splats)?;
+                progress.check()?;
+                source.read(range.clone(), splats)?;
                 splats.geometry.normals = Vec::new();
                 f(start, splats)?;
                 progress.advance(range.len() as u64 * row_bytes);
@@ -108,7 +110,7 @@ impl Ordered {
         // One run in so many is of the sample.
         let every = n.div_ceil(sizes.sample).max(1);
 
-        let rows = RowBytes::new(&ply.empty());
+        let rows = RowLayout::new(source.empty());
         let mut buckets = Buckets::new(folder, bucket_ends.len() + 1)?;
         let mut bytes = Vec::new();
         each_chunk(&mut splats, &mut |start, splats| {
@@ -132,12 +134,13 @@ impl Ordered {
         progress: &dyn Progress,
     ) -> Result<Judged, E> {
         let (mut sample, mut sensitivity) = (Vec::new(), Sensitivity::default());
-        let mut weights = Spill::new(folder)?;
+        let mut weights = Spill::new(SpillTo::Folder(folder))?;
         progress.begin(Stage::Look, self.gaussians as u64);
         for bucket in 0..self.buckets.len() {
+            progress.check()?;
             let (mut bytes, mut places) = (Vec::new(), Vec::new());
             in_order(&self.buckets.read(bucket)?, &self.rows, &mut bytes, &mut places);
-            let splats = self.rows.unpack(&bytes)?;
+            let splats = self.rows.unpack(&bytes);
             let mut found = importance.of(&splats, self.gaussians, self.heuristic_total)?;
             check(&splats, &found)?;
             let pairs: Vec<[f32; 2]> =
@@ -154,7 +157,7 @@ impl Ordered {
             progress.advance(splats.len() as u64);
         }
         progress.end();
-        let sample = self.rows.unpack(&sample)?;
+        let sample = self.rows.unpack(&sample);
         Ok(Judged { sample, sensitivity, weights: weights.finish()? })
     }
 
@@ -168,7 +171,7 @@ impl Ordered {
             let last = bucket + 1 == count;
             let whole = if last { places.len() } else { places.len() / chunk * chunk };
             if whole > 0 {
-                let splats = self.rows.unpack(&bytes[..whole * self.rows.bytes()])?;
+                let splats = self.rows.unpack(&bytes[..whole * self.rows.bytes()]);
                 take(&splats, &weights.take(whole)?, &places[..whole])?;
                 bytes.drain(..whole * self.rows.bytes());
                 places.drain(..whole);
@@ -184,7 +187,7 @@ fn placed(grid: &Grid, position: [f32; 3], source: usize) -> MortonKey {
 }
 
 /// Appends the rows of `records` in order to `bytes`, and their places to `places`.
-fn in_order(records: &[u8], rows: &RowBytes, bytes: &mut Vec<u8>, places: &mut Vec<MortonKey>) {
+fn in_order(records: &[u8], rows: &RowLayout, bytes: &mut Vec<u8>, places: &mut Vec<MortonKey>) {
     let records: Vec<&[u8]> = records.chunks_exact(KEY_BYTES + rows.bytes()).collect();
     let key = |record: &[u8]| MortonKey {
         cell: record.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),

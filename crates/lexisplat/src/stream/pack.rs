@@ -1,25 +1,22 @@
 //! Layout packed: put in order first, then code chunk by chunk, then write.
 
-use std::io::Write;
-use std::path::Path;
-
-use super::counted::Counted;
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
 use crate::formats::lexi::write_spilled_packed;
-use crate::formats::ply::PlyChunks;
 use crate::packed::{CHUNK, PackOptions, PackReport, Packed, PartPacker, StreamBits, Whole};
+use crate::scene::source::SplatSource;
 use crate::sparse::compress::AT_ONCE;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
-use crate::support::output::{Output, write_whole};
 use crate::support::progress::{Progress, Stage};
+use crate::support::sink::Sink;
+use crate::support::spill::SpillTo;
 
 /// Peak of anonymous memory is below 1.5 GiB with these, at SH degree 3.
 const SIZES: Sizes =
     Sizes { at_once: AT_ONCE, bucket: 8 * CHUNK, looked_at: 1 << 20, sample: 1 << 19, run: 2048 };
 
-/// What [`pack_file`] did.
+/// What [`pack`] did.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct PackedFile {
@@ -42,80 +39,56 @@ impl PackedFile {
     }
 }
 
-/// Packs `ply` to the file `output`, whole or not at all, so that pictures are about `decibels` good.
+/// Packs the scene of `source` so that pictures are about `decibels` good, and writes it to `sink`.
 ///
-/// What shows is judged part by part (`importance`); steps, predictors and dictionary are found from some
-/// half a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but the same on
-/// any number of threads.
+/// `importance` measures the sensitivity part by part; steps, predictors and dictionary are found from about
+/// half a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but they are the
+/// same on any number of threads.
 ///
 /// # Errors
 /// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
-/// importances that do not fit their part or are not finite; [`Error::Io`] for `output` and for temporary
-/// files beside it; what `importance` returns.
-pub fn pack_file<'a, E: From<Error>>(
-    ply: &PlyChunks<'_>,
+/// sensitivities that do not fit their part or are not finite; [`Error::Io`] for `sink` and for temporary
+/// files; [`Error::Cancelled`]; and what `importance` returns.
+pub fn pack<'a, E: From<Error>>(
+    source: &dyn SplatSource,
     importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
-    output: impl Into<Output<'a>>,
+    sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    let output = output.into();
-    run(ply, importance, options, decibels, &output.spill_folder()?, SIZES, progress, |fill, bytes| {
-        write_whole(output.of_bytes(bytes), |writer| fill(writer).map_err(|e| Error::io(output.path(), e)))
-    })
+    run(source, importance, options, decibels, sink.into(), SIZES, progress)
 }
 
-/// [`pack_file`] to a writer; temporary files are where the system wants them.
-///
-/// # Errors
-/// As [`pack_file`]; an [`Error::Io`] of the writer names no file.
-pub fn pack_to<E: From<Error>>(
-    ply: &PlyChunks<'_>,
-    importance: Importance<'_, E>,
-    options: &PackOptions,
-    decibels: f64,
-    writer: &mut impl Write,
-    progress: &dyn Progress,
-) -> Result<PackedFile, E> {
-    run(ply, importance, options, decibels, &std::env::temp_dir(), SIZES, progress, |fill, _| {
-        fill(writer).map_err(|e| Error::io("output", e))
-    })
-}
-
-#[expect(clippy::too_many_arguments, reason = "those of the two above, and what differs between them")]
 fn run<E: From<Error>>(
-    ply: &PlyChunks<'_>,
+    source: &dyn SplatSource,
     mut importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
-    folder: &Path,
+    sink: Sink<'_>,
     sizes: Sizes,
     progress: &dyn Progress,
-    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
 ) -> Result<PackedFile, E> {
-    let n = ply.len();
+    let n = source.len();
     Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     options.check()?;
-    let mut ordered = Ordered::new(ply, sizes, options.seed, folder, progress)?;
-    let Judged { sample, sensitivity, weights } = ordered.judge(&mut importance, folder, progress)?;
+    let folder = sink.spill_folder()?;
+    let to = SpillTo::Folder(&folder);
+    let mut ordered = Ordered::new(source, sizes, options.seed, &folder, progress)?;
+    let Judged { sample, sensitivity, weights } = ordered.judge(&mut importance, &folder, progress)?;
     let whole = Whole { gaussians: n, grid: ordered.grid, decibels };
-    let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, folder, progress)?;
+    let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, to, progress)?;
     drop((sample, sensitivity));
     progress.begin(Stage::Code, n as u64);
     ordered.each(weights, CHUNK, &mut |splats, weights, places| {
+        progress.check()?;
         packer.push(splats, weights, places)?;
         progress.advance(splats.len() as u64);
         Ok(())
     })?;
     progress.end();
-    let (head, spilled, report, stream_bits) = packer.finish(folder, importance.device())?;
-    let tensor_bytes = write_spilled_packed(&head, spilled, |fill, bytes| {
-        progress.begin(Stage::Write, bytes);
-        write(&mut |writer| fill(&mut Counted { writer, progress }), bytes)?;
-        progress.end();
-        Ok(())
-    })?;
+    let (head, spilled, report, stream_bits) = packer.finish(to, importance.device())?;
+    let tensor_bytes = write_spilled_packed(&head, spilled, sink, progress)?;
     Ok(PackedFile { head, report, stream_bits, tensor_bytes })
 }
 
@@ -142,15 +115,12 @@ mod tests {
     fn streamed(splats: &Splats, importance: Importance<'_>, sizes: Sizes) -> Result<(Vec<u8>, PackedFile)> {
         let mut bytes = Vec::new();
         ply::write_to(&mut bytes, splats).unwrap();
-        let chunks = PlyChunks::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
+        let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
-        let mut out = Vec::new();
-        let write = |fill: &mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, _: u64| {
-            fill(&mut out).map_err(|e| Error::io("out", e))
-        };
-        let done = run(&chunks, importance, &options(), 38.0, folder.path(), sizes, &Silent, write);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
-        done.map(|done| (out, done))
+        let output = folder.path().join("out.lexi");
+        let done = run(&chunks, importance, &options(), 38.0, Sink::from(&output), sizes, &Silent);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), usize::from(done.is_ok()));
+        done.map(|done| (std::fs::read(output).unwrap(), done))
     }
 
     /// Everything fits in one bucket and is of the sample: then nothing is left to differ.
@@ -175,7 +145,7 @@ mod tests {
             let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
             let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
             let mut expected = Vec::new();
-            lexi::write_packed_to(&mut expected, &packed).unwrap();
+            lexi::write_packed(&mut expected, &packed).unwrap();
             assert!(found == expected, "{count}");
             assert_eq!(done.tensor_bytes, lexi::packed_tensor_bytes(&packed));
             let bits = packed.stream_bits().unwrap();

@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::buckets::Buckets;
+use super::rows::RowLayout;
 use crate::formats::lexi::LexiChunks;
-use crate::formats::ply::RowBytes;
 use crate::packed::StreamBits;
 use crate::scene::splats::Splats;
 use crate::sparse::model::Model;
@@ -57,7 +57,7 @@ fn by_buckets(
     take: &mut dyn FnMut(Splats) -> Result<()>,
 ) -> Result<Vec<StreamBits>> {
     let n = lexi.len();
-    let rows = RowBytes::new(&lexi.empty());
+    let rows = RowLayout::new(lexi.empty());
     let mut buckets = Buckets::new(folder, n.div_ceil(bucket_len))?;
     let mut bytes = Vec::new();
     let bits = lexi.parts(count_bits, &mut |first, model| {
@@ -80,7 +80,7 @@ fn by_buckets(
             let place = place.first_chunk().map_or(0, |p| u32::from_le_bytes(*p)) as usize - start;
             bytes[place * rows.bytes()..][..row.len()].copy_from_slice(row);
         }
-        take(rows.unpack(&bytes)?)?;
+        take(rows.unpack(&bytes))?;
     }
     Ok(bits)
 }
@@ -104,7 +104,7 @@ mod tests {
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let (packed, _) = packer.pack(packer.step_for(30.0), &Silent).unwrap();
         let mut bytes = Vec::new();
-        lexi::write_packed_to(&mut bytes, &packed).unwrap();
+        lexi::write_packed(&mut bytes, &packed).unwrap();
         let whole = lexi::read_bytes("t", &bytes, &Limits::default()).unwrap().into_splats();
         let chunks = LexiChunks::open("t", &bytes, &Limits::default()).unwrap();
         let folder = tempfile::tempdir().unwrap();
@@ -136,7 +136,7 @@ mod tests {
         }
         // No PLY can be made of it, and none is left half made.
         let output = folder.path().join("out.ply");
-        let error = super::super::decompress_file(&chunks, &output, &Silent).unwrap_err().to_string();
+        let error = super::super::decompress(&chunks, &output, &Silent).unwrap_err().to_string();
         assert!(error.contains("a name"), "{error}");
         assert_eq!(ply::write(&output, &whole).unwrap_err().to_string(), error);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

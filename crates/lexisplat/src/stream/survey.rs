@@ -4,11 +4,11 @@ use std::path::Path;
 
 use super::source_order::parts_and_source_order;
 use crate::formats::lexi::LexiChunks;
-use crate::formats::ply::PlyChunks;
 use crate::packed::StreamBits;
+use crate::scene::source::SplatSource;
 use crate::scene::stats::{Lint, Linter};
 use crate::support::error::Result;
-use crate::support::parallel::CHUNK;
+use crate::support::parallel::GAUSSIANS_PER_TASK as CHUNK;
 use crate::support::progress::{Progress, Stage};
 
 /// Gaussians looked over together.
@@ -34,20 +34,21 @@ pub struct Survey {
     pub stream_bits: Vec<StreamBits>,
 }
 
-/// [`lint`](crate::scene::stats::lint()) of a PLY.
+/// [`lint`](crate::scene::stats::lint()) of a scene that is read a part at a time.
 ///
 /// # Errors
-/// As [`PlyChunks::read`].
-pub fn lint_ply(ply: &PlyChunks<'_>, progress: &dyn Progress) -> Result<Lint> {
+/// As [`SplatSource::read`], and [`crate::Error::Cancelled`].
+pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     let mut linter = Linter::default();
-    let mut splats = ply.empty();
+    let mut splats = source.empty();
     linter.add(&splats)?;
-    let n = ply.len();
-    progress.begin(Stage::Read, n as u64 * ply.summary().row_bytes);
+    let n = source.len();
+    progress.begin(Stage::Read, n as u64 * source.row_bytes());
     for start in (0..n).step_by(AT_ONCE) {
         let range = start..n.min(start + AT_ONCE);
-        progress.advance(range.len() as u64 * ply.summary().row_bytes);
-        ply.read(range, &mut splats)?;
+        progress.check()?;
+        progress.advance(range.len() as u64 * source.row_bytes());
+        source.read(range, &mut splats)?;
         linter.add(&splats)?;
     }
     progress.end();

@@ -1,20 +1,36 @@
 //! What can go wrong, split by who is to blame.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use crate::formats::kind::{FileKind, Unsupported};
 
 /// Result with this crate's [`Error`].
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Any failure of the codec. The variant tells whose fault it is.
+/// Any failure of the codec. The variant tells who is to blame.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused a read or a write. Retry, free space, or fix permissions.
+    /// The operating system refused to read or write a file.
     #[error("{file}: {source}")]
     Io {
         /// The file, as the caller named it.
         file: String,
-        /// What the system said.
+        /// The system's error.
+        source: std::io::Error,
+    },
+    /// A writer that the caller passed refused bytes.
+    #[error("output: {source}")]
+    Writer {
+        /// The writer's error.
+        source: std::io::Error,
+    },
+    /// The operating system refused to make, read or write a temporary file.
+    #[error("{}: {source}", folder.join("(temporary file)").display())]
+    TemporaryFile {
+        /// The folder of the temporary file.
+        folder: PathBuf,
+        /// The system's error.
         source: std::io::Error,
     },
     /// The bytes are not what they claim to be. The file is at fault.
@@ -28,7 +44,7 @@ pub enum Error {
     /// An argument is out of range. The caller is at fault.
     #[error("{name} = {value}: {expected}")]
     Parameter {
-        /// The parameter's name, as the command line spells it where it has one.
+        /// The parameter's name.
         name: &'static str,
         /// The value given.
         value: String,
@@ -36,7 +52,7 @@ pub enum Error {
         expected: String,
     },
     /// The input may be well formed but asks for more than [`crate::Limits`] allows.
-    #[error("{what}: {found} is over the limit of {limit}{}", advice(*.name))]
+    #[error("{what}: {found} is over the limit of {limit}")]
     Limit {
         /// What was counted, and the file.
         what: String,
@@ -44,17 +60,12 @@ pub enum Error {
         found: u64,
         /// How many are allowed.
         limit: u64,
-        /// Which of [`crate::Limits`] it is; `None` if it cannot be raised.
+        /// Which of [`crate::Limits::NAMES`] to raise; `None` if the limit is fixed.
         name: Option<&'static str>,
     },
     /// The caller's [`Progress`](crate::Progress) cancelled the work.
     #[error("cancelled")]
     Cancelled,
-}
-
-/// How to raise the limit `name`, starting with punctuation.
-fn advice(name: Option<&'static str>) -> String {
-    name.map(|name| format!("; if you trust the file, raise it with --limit {name}=N")).unwrap_or_default()
 }
 
 /// What is wrong with a file's bytes.
@@ -77,25 +88,32 @@ pub enum FormatError {
         /// How many.
         extra: u64,
     },
-    /// A property every Gaussian needs is not there.
-    #[error("property '{name}' is missing{advice}")]
+    /// A property that every Gaussian needs does not exist.
+    #[error("property '{name}' is missing{hint}")]
     MissingProperty {
         /// The property's name.
         name: String,
-        /// What to do, starting with punctuation; may be empty.
-        advice: String,
+        /// What the file has instead, starting with punctuation; may be empty.
+        hint: &'static str,
     },
-    /// A known kind of file that this reader does not take.
-    #[error("this is {kind}, which is not supported; {advice}")]
+    /// A file of a kind that this reader does not read, but another one of this crate does.
+    #[error("this is {found}, not {expected}")]
+    OtherKind {
+        /// The kind of the file.
+        found: FileKind,
+        /// The kind that was to be read.
+        expected: FileKind,
+    },
+    /// A known kind of file that this crate does not read.
+    #[error("this is {kind}, which is not supported; {}", kind.advice())]
     Unsupported {
-        /// What it is, with an article.
-        kind: String,
-        /// What to do instead.
-        advice: String,
+        /// What it is.
+        kind: Unsupported,
     },
-    /// NaN or infinite values.
+    /// NaN or infinite values. A reader leaves such Gaussians out if
+    /// [`ReadOptions::drop_invalid`](crate::ply::ReadOptions::drop_invalid) is set.
     #[error(
-        "{count} Gaussians hold NaN or infinite values, the first is number {first} (property '{property}'); remove them with --drop-invalid"
+        "{count} Gaussians hold NaN or infinite values, the first is number {first} (property '{property}')"
     )]
     NotFinite {
         /// How many Gaussians hold at least one.
@@ -111,7 +129,7 @@ pub enum FormatError {
         /// The tensor, or `header`.
         part: String,
     },
-    /// Written by a newer version of the format.
+    /// The file was written by a newer version of the format.
     #[error(
         "format version {found} is newer than {supported}, the newest this build reads; update lexisplat"
     )]
@@ -132,6 +150,16 @@ impl Error {
         Self::Io { file: file.as_ref().display().to_string(), source }
     }
 
+    /// An [`Error::Writer`].
+    pub(crate) fn writer(source: std::io::Error) -> Self {
+        Self::Writer { source }
+    }
+
+    /// An [`Error::TemporaryFile`] in `folder`.
+    pub(crate) fn temporary_file(folder: &Path, source: std::io::Error) -> Self {
+        Self::TemporaryFile { folder: folder.to_owned(), source }
+    }
+
     /// An [`Error::Format`] about `file`.
     pub fn format(file: impl Into<String>, problem: FormatError) -> Self {
         Self::Format { file: file.into(), problem }
@@ -147,7 +175,7 @@ impl Error {
         Self::Limit { what: what.into(), found, limit, name }
     }
 
-    /// This error about what was read from `file`: a limit stays one, anything else is the file's fault.
+    /// Blames `file` for an error about what was read from it. A limit stays a limit.
     pub(crate) fn of_file(self, file: &str) -> Self {
         if matches!(self, Self::Limit { .. }) { self } else { Self::malformed(file, self.to_string()) }
     }

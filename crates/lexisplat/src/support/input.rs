@@ -1,12 +1,11 @@
-//! A file's bytes, mapped where that is possible.
+//! A file's bytes, mapped if possible.
 //!
 //! # Why this module may use `unsafe`
-//! Mapping a file is the one way to read a gigabyte without copying it first, and `memmap2` can only
-//! offer it as an unsafe function: if another process shortens the file while it is mapped, touching
-//! the lost pages raises `SIGBUS` (on Windows the system forbids the shortening instead). Nothing in a
-//! process can rule that out for a file it does not own. Changed contents, in contrast, are harmless
-//! here: every reader treats the bytes as untrusted and takes sizes from the header only once.
-//! Callers who cannot accept this build without the `mmap` feature, or pass bytes they own.
+//! Mapping a file is the only way to read a gigabyte without copying it first. `memmap2` can only offer it as an
+//! unsafe function: if another process shortens the file while it is mapped, touching the lost pages raises
+//! `SIGBUS`. (Windows forbids the shortening instead.) A process cannot rule that out for a file it does not own.
+//! Changed contents are harmless here, because every reader treats the bytes as untrusted and takes sizes from the
+//! header only once. Callers who cannot accept the risk build without the `mmap` feature, or pass bytes they own.
 
 use std::io::Read;
 use std::ops::Deref;
@@ -15,32 +14,32 @@ use std::path::Path;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
-/// The bytes of a file, as a slice: its own pages where it can be mapped, else a copy.
+/// The bytes of a file, as a slice. They are the file's own pages if it can be mapped, else a copy.
 #[derive(Debug)]
 pub struct Input(Bytes);
 
 #[derive(Debug)]
 enum Bytes {
-    /// Pages of the file itself; they do not count as anonymous memory.
+    /// Pages of the file itself, which do not count as anonymous memory.
     #[cfg(feature = "mmap")]
     Mapped(memmap2::Mmap),
-    /// A copy, for pipes, empty files and builds without `mmap`.
+    /// A copy: of pipes, of empty files, and in builds without `mmap`.
     Owned(Vec<u8>),
 }
 
 impl Input {
-    /// Maps the regular file `path`, or reads anything else to its end.
+    /// Maps `path` if it is a regular file, else reads it to its end.
     ///
     /// # Errors
-    /// [`Error::Io`] naming `path`.
+    /// [`Error::Io`] that names `path`.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Limits::default())
     }
 
-    /// [`Self::open`] that reads no more than [`Limits::bytes`] of what cannot be mapped.
+    /// [`Self::open`] that reads at most [`Limits::bytes`] of a file that cannot be mapped.
     ///
     /// # Errors
-    /// [`Error::Io`] naming `path`, [`Error::Limit`] if there is more.
+    /// [`Error::Io`] that names `path`, [`Error::Limit`] if the file is longer.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self> {
         let name = path.display().to_string();
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
@@ -56,13 +55,13 @@ impl Input {
         Self::read(&name, file, limits)
     }
 
-    /// All that `reader` gives, but no more than [`Limits::bytes`]; errors call it `name`.
+    /// Reads `reader` to its end. Errors call it `name`.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::Limit`], naming `name`.
+    /// [`Error::Io`] that names `name`, [`Error::Limit`] if there are more than [`Limits::bytes`].
     pub fn read(name: &str, reader: impl Read, limits: &Limits) -> Result<Self> {
         let mut bytes = Vec::new();
-        // A byte more tells too long from just as long.
+        // One byte over the limit tells a file that is too long from one that just fits.
         reader
             .take(limits.bytes.saturating_add(1))
             .read_to_end(&mut bytes)
@@ -81,11 +80,11 @@ impl From<Vec<u8>> for Input {
 #[cfg(feature = "mmap")]
 #[expect(unsafe_code, reason = "memory mapping; see the module's documentation")]
 fn map(file: &std::fs::File) -> std::io::Result<memmap2::Mmap> {
-    // SAFETY: the mapping is private to this process and read-only, so nothing here can write through
-    // it. What remains is another process: if it truncates the file while it is mapped, the system ends
-    // this one with SIGBUS rather than giving it wrong memory; if it writes to the file, bytes may change
-    // under a shared slice, which no type can rule out and no reader here relies on. The module's
-    // documentation says so, and the `mmap` feature turns it off.
+    // SAFETY: the mapping is private to this process and read-only, so nothing here can write through it. Another
+    // process can still change the file. If it truncates the file, the system ends this process with SIGBUS and
+    // never gives it wrong memory. If it writes to the file, bytes may change under a shared slice; no type can rule
+    // that out, and no reader here relies on it. The module's documentation says so, and the `mmap` feature turns
+    // mapping off.
     unsafe { memmap2::MmapOptions::new().map_copy_read_only(file) }
 }
 
@@ -105,7 +104,7 @@ impl Deref for Input {
 mod tests {
     use super::*;
 
-    /// The safe twin: what is mapped is what is read.
+    /// A mapped file holds the same bytes as a file that was read.
     #[test]
     fn mapped_bytes_are_those_of_the_file() {
         let folder = tempfile::tempdir().unwrap();
@@ -119,7 +118,7 @@ mod tests {
             assert_eq!(matches!(input.0, Bytes::Mapped(_)), len > 0, "{len}");
             let read = Input::read("file", std::fs::File::open(&path).unwrap(), &Limits::default()).unwrap();
             assert_eq!(*read, *bytes, "{len}");
-            // Another file of the same name leaves the mapping alone; Windows does not let it come.
+            // Replacing the file leaves the mapping as it is. Windows does not allow the replacement.
             #[cfg(unix)]
             {
                 std::fs::write(folder.path().join("other"), [9; 10]).unwrap();

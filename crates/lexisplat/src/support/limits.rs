@@ -1,26 +1,27 @@
 //! Limits on what a file may ask for, checked before anything is allocated.
 
 use crate::scene::sh::MAX_REST;
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 
 /// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
 pub const MAX_ATOMS: usize = 1024;
-/// Most Gaussians of a scene: their numbers are u32, and one more is counted.
+/// Most Gaussians of a scene. Gaussians are numbered by u32, and their count is stored as u32 too.
 pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64 - 1;
-/// Most bytes of arrays for each byte of a file. The most that a valid file has is 172: a byte of a packed one
-/// is at most 3 Gaussians of 57 bytes, and an offset is kept for every 64.
+/// Most bytes of arrays for each byte of a file. A valid file has at most 172: a byte of a packed file stands for at
+/// most 3 Gaussians of 57 bytes each, and an offset is stored for every 64 Gaussians.
 const EXPANSION: u64 = 256;
-/// Most bytes of a header. That of a packed scene of 2^32 Gaussians is some kilobytes.
+/// Most bytes of a header. The header of a packed scene of 2^32 Gaussians takes some kilobytes.
 const HEADER_BYTES: u64 = 4 << 20;
 /// Most properties of an element. INRIA's layout of SH degree 4 has 89.
 const PROPERTIES: u64 = 4096;
 
 /// How much a file may ask for.
 ///
-/// A reader allocates at most a constant times the file's own size, whatever the header says: counts are
-/// compared with the bytes present first. The constant is small but for packed files, where a byte may
+/// A reader allocates at most a constant times the file's own size, whatever the header says, because it first
+/// compares counts with the bytes present. The constant is small except for packed files, where a byte may
 /// stand for 3 Gaussians of some hundred bytes. These limits come on top of that. By default every valid file
-/// is within them; for files of unknown origin lower [`Self::gaussians`] or [`Self::bytes`]:
+/// is within them. For files of unknown origin, lower [`Self::gaussians`] or [`Self::bytes`]:
 ///
 /// ```
 /// use lexisplat::{Error, Limits, lexi};
@@ -29,32 +30,31 @@ const PROPERTIES: u64 = 4096;
 /// # let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(2000, 0));
 /// # let (model, _) = lexisplat::compress(splats, &Default::default(), &lexisplat::Silent)?;
 /// # let mut file = Vec::new();
-/// # lexi::write_to(&mut file, &model)?;
+/// # lexi::write(&mut file, &model)?;
 /// let refused = lexi::read_bytes("scene.lexi", &file, &small); // a scene of 2000
 /// assert!(matches!(refused, Err(Error::Limit { found: 2000, limit: 1000, .. })));
 /// # Ok::<(), Error>(())
 /// ```
 ///
-/// What is over a limit is an [`Error::Limit`] that names the file and the limit.
+/// A reader refuses a file that exceeds a limit with an [`Error::Limit`] that names the file and the limit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Limits {
-    /// Most Gaussians in a scene. Default `u32::MAX - 1`, since indices are stored as u32; more are refused
-    /// whatever this says.
+    /// Most Gaussians in a scene. Default `u32::MAX - 1`, since indices are stored as u32. Raising it further has no
+    /// effect.
     pub gaussians: u64,
-    /// Most atoms in a dictionary. Default [`MAX_ATOMS`]; more are refused whatever this says.
+    /// Most atoms in a dictionary. Default [`MAX_ATOMS`]. Raising it further has no effect.
     pub atoms: u64,
-    /// Most nonzeros of one Gaussian. Default 72, the dimension at SH degree 4; more than the dimension are
-    /// refused whatever this says.
+    /// Most nonzeros of one Gaussian. Default 72, the dimension at SH degree 4. Raising it further has no effect.
     pub nonzeros: u64,
-    /// Most bytes of arrays made of one file and held at once: geometry, SH or codes, extra properties, and what
-    /// of a packed file is kept. The dictionary is not counted, since `atoms` bounds it. A reader of whole scenes
-    /// holds the scene; one that goes part by part ([`ply::PlyChunks`](crate::formats::ply::PlyChunks),
-    /// [`lexi::LexiChunks`](crate::formats::lexi::LexiChunks)) a part. What a reader needs for itself may be twice as much
-    /// again. Also most bytes of a file that has to be held because it cannot be mapped, such as a pipe. Default
-    /// `u64::MAX`: none but the machine's.
+    /// Most bytes in memory at once of the arrays made from one file: geometry, SH or codes, extra properties, and
+    /// the parts of a packed file that are kept. The dictionary is not counted, since `atoms` bounds it. A reader of
+    /// whole scenes holds the whole scene. A reader of parts ([`ply::PlySource`](crate::formats::ply::PlySource),
+    /// [`lexi::LexiChunks`](crate::formats::lexi::LexiChunks)) holds one part. A reader's own working memory may be
+    /// twice as much again. This is also the most bytes of a file that has to be held because it cannot be mapped,
+    /// such as a pipe. Default `u64::MAX`, no limit.
     pub bytes: u64,
-    /// Most of the same bytes for each byte of the file. Default 256; a valid file has at most 172.
+    /// Most bytes of these arrays for each byte of the file. Default 256; a valid file has at most 172.
     pub expansion: u64,
     /// Most bytes of a text header (PLY) or JSON header (.lexi). Default 4 MiB.
     pub header_bytes: u64,
@@ -77,53 +77,21 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// The names of all limits, as [`Self::with`] takes them and errors give them.
+    /// The names of all limits. [`Self::with`] takes them, and [`Error::Limit`] states one.
     pub const NAMES: [&'static str; 7] =
         ["gaussians", "atoms", "nonzeros", "bytes", "expansion", "header_bytes", "properties"];
 
-    /// The same with another [`Self::gaussians`].
-    #[must_use]
-    pub fn with_gaussians(self, gaussians: u64) -> Self {
-        Self { gaussians, ..self }
-    }
+    builder_methods!(
+        with_gaussians(gaussians: u64),
+        with_atoms(atoms: u64),
+        with_nonzeros(nonzeros: u64),
+        with_bytes(bytes: u64),
+        with_expansion(expansion: u64),
+        with_header_bytes(header_bytes: u64),
+        with_properties(properties: u64),
+    );
 
-    /// The same with another [`Self::atoms`].
-    #[must_use]
-    pub fn with_atoms(self, atoms: u64) -> Self {
-        Self { atoms, ..self }
-    }
-
-    /// The same with another [`Self::nonzeros`].
-    #[must_use]
-    pub fn with_nonzeros(self, nonzeros: u64) -> Self {
-        Self { nonzeros, ..self }
-    }
-
-    /// The same with another [`Self::bytes`].
-    #[must_use]
-    pub fn with_bytes(self, bytes: u64) -> Self {
-        Self { bytes, ..self }
-    }
-
-    /// The same with another [`Self::expansion`].
-    #[must_use]
-    pub fn with_expansion(self, expansion: u64) -> Self {
-        Self { expansion, ..self }
-    }
-
-    /// The same with another [`Self::header_bytes`].
-    #[must_use]
-    pub fn with_header_bytes(self, header_bytes: u64) -> Self {
-        Self { header_bytes, ..self }
-    }
-
-    /// The same with another [`Self::properties`].
-    #[must_use]
-    pub fn with_properties(self, properties: u64) -> Self {
-        Self { properties, ..self }
-    }
-
-    /// The same with another limit `name`, one of [`Self::NAMES`].
+    /// Sets the limit called `name`, one of [`Self::NAMES`].
     ///
     /// # Errors
     /// [`Error::Parameter`] for any other name.
@@ -140,45 +108,49 @@ impl Limits {
         })
     }
 
-    /// `Ok` if `found <= limit`, else an [`Error::Limit`] that names `what`: of one that cannot be raised.
+    /// Refuses `found` of `what` if they are over a `limit` that cannot be raised.
     pub(crate) fn check(what: &str, found: u64, limit: u64) -> Result<()> {
         if found <= limit { Ok(()) } else { Err(Error::limit(what, found, limit, None)) }
     }
 
-    /// More than [`MAX_GAUSSIANS`] are refused whatever the limit.
+    /// Refuses a file with too many Gaussians. [`MAX_GAUSSIANS`] cannot be raised.
     pub(crate) fn check_gaussians(&self, file: &str, found: u64) -> Result<()> {
         Self::check(&format!("Gaussians in {file}"), found, MAX_GAUSSIANS)?;
         raisable("Gaussians in", file, found, self.gaussians, "gaussians")
     }
 
-    /// More than [`MAX_ATOMS`] are damage, and for others to refuse.
+    /// Refuses a file with too many atoms. More than [`MAX_ATOMS`] pass: they mean that the file is damaged, and its
+    /// reader says so.
     pub(crate) fn check_atoms(&self, file: &str, found: u64) -> Result<()> {
         let found = if found > MAX_ATOMS as u64 { 0 } else { found };
         raisable("atoms in the dictionary of", file, found, self.atoms, "atoms")
     }
 
-    /// Of Gaussian number `gaussian`. More than any dimension are damage, and for others to refuse.
+    /// Refuses a file whose Gaussian number `gaussian` has too many nonzeros. More than any dimension pass: they mean
+    /// that the file is damaged, and its reader says so.
     pub(crate) fn check_nonzeros(&self, file: &str, gaussian: usize, found: u64) -> Result<()> {
         let found = if found > MAX_REST as u64 { 0 } else { found };
         let what = format!("nonzeros of Gaussian {gaussian} in");
         raisable(&what, file, found, self.nonzeros, "nonzeros")
     }
 
-    /// Of a file that is held, not mapped.
+    /// Refuses a file of too many bytes that has to be held in memory.
     pub(crate) fn check_file(&self, file: &str, found: u64) -> Result<()> {
         raisable("bytes of", file, found, self.bytes, "bytes")
     }
 
+    /// Refuses a file whose header has too many bytes.
     pub(crate) fn check_header(&self, file: &str, found: u64) -> Result<()> {
         raisable("bytes in the header of", file, found, self.header_bytes, "header_bytes")
     }
 
-    /// Of one element.
+    /// Refuses a file with an element of too many properties.
     pub(crate) fn check_properties(&self, file: &str, found: u64) -> Result<()> {
         raisable("properties of an element of", file, found, self.properties, "properties")
     }
 }
 
+/// Refuses `found` of `what` in `file` if they are over the `limit` called `name`.
 fn raisable(what: &str, file: &str, found: u64, limit: u64, name: &'static str) -> Result<()> {
     if found <= limit {
         Ok(())
@@ -207,13 +179,14 @@ mod tests {
     }
 
     #[test]
-    fn errors_say_what_raises_a_limit() {
+    fn errors_name_the_limit_that_can_be_raised() {
         let limits = Limits::default().with_gaussians(5);
         assert!(limits.check_gaussians("a.ply", 5).is_ok());
-        assert_eq!(
-            limits.check_gaussians("a.ply", 6).unwrap_err().to_string(),
-            "Gaussians in a.ply: 6 is over the limit of 5; if you trust the file, raise it with --limit gaussians=N"
-        );
-        assert_eq!(Limits::check("pies", 6, 5).unwrap_err().to_string(), "pies: 6 is over the limit of 5");
+        let error = limits.check_gaussians("a.ply", 6).unwrap_err();
+        assert_eq!(error.to_string(), "Gaussians in a.ply: 6 is over the limit of 5");
+        assert!(matches!(error, Error::Limit { name: Some("gaussians"), .. }), "{error:?}");
+        let error = Limits::check("pies", 6, 5).unwrap_err();
+        assert_eq!(error.to_string(), "pies: 6 is over the limit of 5");
+        assert!(matches!(error, Error::Limit { name: None, .. }), "{error:?}");
     }
 }

@@ -1,60 +1,59 @@
-//! Functions that must give the same bits everywhere: a file is decoded with what it was encoded with.
+//! Functions that give the same bits on every machine, because a file must be decoded with the functions that
+//! encoded it.
 //!
-//! IEEE arithmetic and square roots are exact on every machine; the rest comes from `libm`, which is
-//! plain Rust and so the same everywhere, unlike the system's.
+//! IEEE arithmetic and square roots are rounded the same on every machine. The other functions come from `libm`,
+//! which is plain Rust and therefore the same everywhere, unlike the system's library.
+
+#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+#[inline]
+fn rounded(x: f64) -> f32 {
+    x as f32
+}
 
 /// 2 to the power `x`.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn exp2(x: f32) -> f32 {
-    libm::exp2(f64::from(x)) as f32
+    rounded(libm::exp2(f64::from(x)))
 }
 
 /// e to the power `x`.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn exp(x: f32) -> f32 {
-    libm::exp(f64::from(x)) as f32
+    rounded(libm::exp(f64::from(x)))
 }
 
 /// Natural logarithm.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn ln(x: f32) -> f32 {
-    libm::log(f64::from(x)) as f32
+    rounded(libm::log(f64::from(x)))
 }
 
 /// Binary logarithm.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn log2(x: f32) -> f32 {
-    libm::log2(f64::from(x)) as f32
+    rounded(libm::log2(f64::from(x)))
 }
 
 /// The angle of the point (x, y).
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
-    libm::atan2(f64::from(y), f64::from(x)) as f32
+    rounded(libm::atan2(f64::from(y), f64::from(x)))
 }
 
 /// Sine and cosine.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
     let (sine, cosine) = libm::sincos(f64::from(x));
-    (sine as f32, cosine as f32)
+    (rounded(sine), rounded(cosine))
 }
 
 /// ln(sigmoid(x)): the logarithm of an opacity, from what a trainer stores.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn log_sigmoid(x: f32) -> f32 {
     let x = f64::from(x);
-    (x.min(0.0) - libm::log1p(libm::exp(-x.abs()))) as f32
+    rounded(x.min(0.0) - libm::log1p(libm::exp(-x.abs())))
 }
 
 /// Inverse of [`log_sigmoid`], for arguments below 0.
-#[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
 pub(crate) fn logit_of_log(x: f32) -> f32 {
     let x = f64::from(x);
-    (x - libm::log(-libm::expm1(x))) as f32
+    rounded(x - libm::log(-libm::expm1(x)))
 }
 
-/// The value below which `share` of `sorted` lies; 0 if there is none.
+/// The value below which `share` of the values in `sorted` lie; 0 if `sorted` is empty.
 pub(crate) fn at_share<T: Copy + Default>(sorted: &[T], share: f64) -> T {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a length")]
     let index = ((sorted.len().max(1) - 1) as f64 * share) as usize;
@@ -79,14 +78,14 @@ pub(crate) fn normalised(a: Vec3) -> Vec3 {
     scaled(a, 1.0 / dot(a, a).sqrt().max(f32::MIN_POSITIVE))
 }
 
-/// Which axes are the longest, the middle and the shortest; equal ones in their own order.
+/// The axes from longest to shortest. Equally long axes keep their order.
 pub(crate) fn longest_first(scales: Vec3) -> [usize; 3] {
     let mut order = [0, 1, 2];
     order.sort_by(|&a, &b| scales[b].total_cmp(&scales[a]));
     order
 }
 
-/// Columns of the rotation of a quaternion (w, x, y, z) of any length; the identity for zero.
+/// Columns of the rotation that a quaternion (w, x, y, z) of any length means. Zero means the identity.
 pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     let length = q.iter().map(|v| v * v).sum::<f32>().sqrt();
     if length.is_nan() || length < 1e-12 {
@@ -100,7 +99,7 @@ pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     ]
 }
 
-/// The quaternion (w, x, y, z), w not negative, of a rotation given by its columns.
+/// The quaternion (w, x, y, z) with w >= 0 of the rotation with these columns.
 pub(crate) fn quaternion([a, b, c]: [Vec3; 3]) -> [f32; 4] {
     let trace = [
         1.0 + a[0] + b[1] + c[2],
@@ -127,9 +126,9 @@ pub(crate) fn quaternion([a, b, c]: [Vec3; 3]) -> [f32; 4] {
     if q[0] < 0.0 { q.map(|v| -v) } else { q }
 }
 
-/// Two directions that complete the unit vector `u` to a right-handed frame.
+/// Two unit vectors that make a right-handed frame with the unit vector `u`.
 pub(crate) fn frame(u: Vec3) -> [Vec3; 2] {
-    // The coordinate axis that u is least along.
+    // The coordinate axis that is most perpendicular to u.
     let mut least = 0;
     for k in 1..3 {
         if u[k].abs() < u[least].abs() {
@@ -142,8 +141,8 @@ pub(crate) fn frame(u: Vec3) -> [Vec3; 2] {
     [first, cross(u, first)]
 }
 
-/// A unit vector, or its opposite, as a point of the square from -1 to 1: an octahedron's upper half
-/// folded flat and turned by 45 degrees.
+/// Maps a unit vector and its opposite to one point of the square from -1 to 1: the upper half of an octahedron,
+/// flattened and turned by 45 degrees.
 pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     let u = if u[2] < 0.0 { scaled(u, -1.0) } else { u };
     let sum = u[0].abs() + u[1].abs() + u[2];
@@ -151,7 +150,7 @@ pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     [x + y, x - y]
 }
 
-/// Inverse of [`square_of_axis`], up to the sign.
+/// Inverse of [`square_of_axis`] up to the sign.
 pub(crate) fn axis_of_square([s, t]: [f32; 2]) -> Vec3 {
     let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
     normalised([x, y, (1.0 - x.abs() - y.abs()).max(0.0)])
@@ -183,8 +182,8 @@ mod tests {
         }
     }
 
-    /// Files are decoded with these functions: a new release of the library behind them must not change a
-    /// bit, or old files would decode differently.
+    /// Files are decoded with these functions. A new release of `libm` must not change a bit, or old files would
+    /// decode differently.
     #[test]
     fn values_are_frozen() {
         let mut hash = crc32fast::Hasher::new();

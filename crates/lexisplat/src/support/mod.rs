@@ -1,5 +1,6 @@
 //! What all other modules use: errors, limits, input and output, threads, vector instructions.
 
+pub(crate) mod builder;
 pub(crate) mod error;
 pub(crate) mod input;
 pub(crate) mod limits;
@@ -10,6 +11,7 @@ pub(crate) mod parallel;
 pub(crate) mod progress;
 pub(crate) mod rng;
 pub mod simd;
+pub(crate) mod sink;
 pub(crate) mod spill;
 pub(crate) mod stopwatch;
 #[cfg(test)]

@@ -1,18 +1,18 @@
-//! A small seeded generator, so that the same seed gives the same sample on every platform for ever.
+//! A small seeded generator that never changes: the same seed gives the same sample on every platform.
 
 use std::collections::HashMap;
 
-/// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014): full period, any seed is good.
+/// `SplitMix64` (Steele, Lea, Flood, OOPSLA 2014). It has full period, and any seed is good.
 #[derive(Debug, Clone)]
 pub(crate) struct SplitMix64(u64);
 
 impl SplitMix64 {
-    /// A generator for `seed`.
+    /// Makes a generator from `seed`.
     pub(crate) fn new(seed: u64) -> Self {
         Self(seed)
     }
 
-    /// The next 64 bits.
+    /// Returns the next 64 bits.
     pub(crate) fn next(&mut self) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
@@ -21,7 +21,8 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// A number below `bound`, which must not be 0. The bias of at most `bound / 2^64` is of no matter here.
+    /// Returns a number below `bound`, which must not be 0. Its bias is at most `bound / 2^64`, which does not matter
+    /// here.
     pub(crate) fn below(&mut self, bound: usize) -> usize {
         let wide = u128::from(self.next()) * bound as u128;
         #[expect(clippy::cast_possible_truncation, reason = "the high half is below `bound`, a usize")]
@@ -29,50 +30,51 @@ impl SplitMix64 {
         result
     }
 
-    /// The numbers below `count` in random order, drawn one by one (Fisher and Yates). Takes memory for the
-    /// numbers drawn, or for a small `count` for all.
+    /// Returns the numbers below `count` in random order, drawn one by one (Fisher and Yates). Memory grows with
+    /// the numbers drawn; a `count` of at most [`DENSE`] takes memory for all numbers at once.
     pub(crate) fn shuffled(mut self, count: usize) -> impl Iterator<Item = usize> {
-        let mut places = Places::new(count);
-        (0..count).map(move |i| places.take(i, i + self.below(count - i)))
+        let mut shuffle = Shuffle::new(count);
+        (0..count).map(move |i| shuffle.draw(i, i + self.below(count - i)))
     }
 }
 
-/// Of more numbers than this only those are kept that are not in their own place.
+/// Longest list that is always stored whole.
 const DENSE: usize = 1 << 20;
-/// So many numbers out of place, as a share of all, take as much memory as all in a list.
+/// A map of one in so many entries takes about as much memory as the whole list.
 const SPARSE_SHARE: usize = 16;
 
-/// The list that Fisher and Yates shuffle.
-enum Places {
-    All(Vec<usize>),
-    /// Numbers that are not in their own place, by place; of `usize` places in all.
-    Moved(HashMap<usize, usize>, usize),
+/// A list that Fisher and Yates shuffle. At first entry `i` is the number `i`.
+enum Shuffle {
+    Whole(Vec<usize>),
+    /// The entries that differ from their index, by index; and the length of the list.
+    Changed(HashMap<usize, usize>, usize),
 }
 
-impl Places {
+impl Shuffle {
     fn new(count: usize) -> Self {
-        if count <= DENSE { Self::All((0..count).collect()) } else { Self::Moved(HashMap::new(), count) }
+        if count <= DENSE { Self::Whole((0..count).collect()) } else { Self::Changed(HashMap::new(), count) }
     }
 
-    /// Takes the number at `from`, and puts that at `i` there, which is not above it and not asked for again.
-    fn take(&mut self, i: usize, from: usize) -> usize {
+    /// Swaps entries `i` and `from`, and returns the new entry `i`. Indices must be drawn in ascending order with
+    /// `from >= i`, because entry `i` is not kept.
+    fn draw(&mut self, i: usize, from: usize) -> usize {
         match self {
-            Self::All(list) => {
+            Self::Whole(list) => {
                 list.swap(i, from);
                 list[i]
             }
-            Self::Moved(moved, count) => {
-                let last = moved.remove(&i).unwrap_or(i);
+            Self::Changed(changed, count) => {
+                let first = changed.remove(&i).unwrap_or(i);
                 if from == i {
-                    return last;
+                    return first;
                 }
-                let taken = moved.insert(from, last).unwrap_or(from);
-                if moved.len() > *count / SPARSE_SHARE {
+                let drawn = changed.insert(from, first).unwrap_or(from);
+                if changed.len() > *count / SPARSE_SHARE {
                     let mut list: Vec<usize> = (0..*count).collect();
-                    moved.iter().for_each(|(&place, &number)| list[place] = number);
-                    *self = Self::All(list);
+                    changed.iter().for_each(|(&index, &number)| list[index] = number);
+                    *self = Self::Whole(list);
                 }
-                taken
+                drawn
             }
         }
     }
@@ -94,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn shuffling_does_not_depend_on_how_the_list_is_kept() {
+    fn shuffling_does_not_depend_on_how_the_list_is_stored() {
         for count in [0, 1, 2, 1000, DENSE, DENSE + 1] {
             for drawn in [0, count / 1000, count] {
                 let found: Vec<usize> = SplitMix64::new(7).shuffled(count).take(drawn).collect();

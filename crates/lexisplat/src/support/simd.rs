@@ -1,18 +1,16 @@
-//! Which vector instructions long loops may use; never what they compute.
+//! The choice of vector instructions for long loops. It changes their speed, never their results.
 //!
-//! Everything that is slow here is a loop of additions and multiplications, each rounded, over lanes that do not
-//! meet. The compiler makes it of wider registers where the CPU has them, and the bits stay the same. So a choice
-//! is only ever needed to test that, or to work around a CPU: the environment variable [`VARIABLE`] makes it for
-//! the whole process.
+//! The long loops of this workspace are additions and multiplications, each rounded, over lanes that never meet.
+//! The compiler can therefore use registers of any width, and the bits stay the same. By default the widest
+//! registers of the CPU are used. [`Simd::scope`] chooses others, to test that the bits are the same or to work
+//! around a faulty CPU.
+//!
+//! The choice is a value of the calling thread, and loops hand it on to the threads that work for them. The only
+//! state of the process is what `std` remembers of the CPU's features, which never changes.
 
-use std::sync::OnceLock;
+use std::cell::Cell;
 
-use crate::support::error::{Error, Result};
-
-/// The environment variable that chooses: `plain`, `avx2` or `avx512`. It is looked at once.
-pub const VARIABLE: &str = "LEXISPLAT_SIMD";
-
-/// A set of vector instructions that this CPU has. All give the same bits; they differ in speed.
+/// A set of vector instructions that this CPU has. All sets give the same bits; they differ in speed.
 #[derive(Debug, Clone, Copy)]
 pub struct Simd(Set);
 
@@ -25,11 +23,25 @@ enum Set {
     V4(pulp::x86::V4),
 }
 
+thread_local! {
+    /// The choice of the innermost scope of this thread; `None` outside of all scopes.
+    static CHOSEN: Cell<Option<Simd>> = const { Cell::new(None) };
+}
+
+/// Restores the choice of the outer scope, also when the work panics.
+struct Outer(Option<Simd>);
+
+impl Drop for Outer {
+    fn drop(&mut self) {
+        CHOSEN.set(self.0);
+    }
+}
+
 impl Simd {
-    /// What the target guarantees: SSE2 on `x86_64`, NEON on `aarch64`.
+    /// The instructions that the target guarantees: SSE2 on `x86_64`, NEON on `aarch64`.
     pub const PLAIN: Self = Self(Set::Plain);
 
-    /// All that this CPU has, slowest first.
+    /// All sets that this CPU has, slowest first.
     #[must_use]
     pub fn available() -> Vec<Self> {
         let all = std::iter::once(Set::Plain);
@@ -39,37 +51,26 @@ impl Simd {
         all.map(Self).collect()
     }
 
-    /// The one that [`VARIABLE`] names; the fastest if it is not set or empty.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] if it names none, or one that this CPU has not.
-    pub fn chosen() -> Result<Self> {
-        match std::env::var_os(VARIABLE) {
-            Some(name) if !name.is_empty() => Self::named(&name.to_string_lossy()),
-            _ => Ok(Self::fastest()),
-        }
-    }
-
-    /// [`Self::chosen`], found once for the whole process; the fastest where that is an error.
+    /// The fastest set that this CPU has.
     #[must_use]
-    pub fn detect() -> Self {
-        static DETECTED: OnceLock<Simd> = OnceLock::new();
-        *DETECTED.get_or_init(|| Self::chosen().unwrap_or_else(|_| Self::fastest()))
+    pub fn widest() -> Self {
+        #[cfg(target_arch = "x86_64")]
+        {
+            let v3 = || pulp::x86::V3::try_new().map(Set::V3);
+            if let Some(set) = pulp::x86::V4::try_new().map(Set::V4).or_else(v3) {
+                return Self(set);
+            }
+        }
+        Self::PLAIN
     }
 
-    fn fastest() -> Self {
-        Self::available().pop().unwrap_or(Self::PLAIN)
+    /// The set called `name`, if this CPU has it.
+    #[must_use]
+    pub fn named(name: &str) -> Option<Self> {
+        Self::available().into_iter().find(|simd| simd.name() == name)
     }
 
-    fn named(name: &str) -> Result<Self> {
-        let available = Self::available();
-        available.iter().copied().find(|simd| simd.name() == name).ok_or_else(|| {
-            let names: Vec<&str> = available.into_iter().map(Self::name).collect();
-            Error::parameter(VARIABLE, name, format!("{}: this CPU has no other", names.join(" or ")))
-        })
-    }
-
-    /// What [`VARIABLE`] calls it.
+    /// The name of the set: `plain`, `avx2` or `avx512`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self.0 {
@@ -81,8 +82,21 @@ impl Simd {
         }
     }
 
-    /// Runs `job` with these instructions enabled in everything inlined into it: mark the closure
-    /// `#[inline(always)]`.
+    /// Calls `work`, in which [`Self::current`] is this set on the calling thread and on the threads of parallel
+    /// loops. A thread that `work` starts by itself begins outside of all scopes.
+    pub fn scope<R>(self, work: impl FnOnce() -> R) -> R {
+        let _outer = Outer(CHOSEN.replace(Some(self)));
+        work()
+    }
+
+    /// The set of the innermost [`Self::scope`]; outside of all scopes the widest.
+    #[must_use]
+    pub fn current() -> Self {
+        CHOSEN.get().unwrap_or_else(Self::widest)
+    }
+
+    /// Calls `job` with these instructions enabled in everything that is inlined into it. The closure must be
+    /// marked `#[inline(always)]`.
     #[inline(always)]
     pub fn dispatch<R>(self, job: impl FnOnce() -> R) -> R {
         self.run(job)
@@ -104,6 +118,7 @@ impl Simd {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::support::parallel::map_chunks;
 
     #[test]
     fn what_the_cpu_has_can_be_named_and_nothing_else() {
@@ -111,9 +126,23 @@ mod tests {
             assert_eq!(Simd::named(simd.name()).unwrap().name(), simd.name());
             assert_eq!(simd.dispatch(|| 7), 7);
         }
-        let error = Simd::named("sse9").unwrap_err().to_string();
-        assert!(error.contains("LEXISPLAT_SIMD = sse9: plain"), "{error}");
+        assert_eq!(Simd::available().pop().unwrap().name(), Simd::widest().name());
+        assert!(Simd::named("sse9").is_none());
         #[cfg(target_arch = "x86_64")]
-        assert_eq!(Simd::named("avx2").is_ok(), std::is_x86_feature_detected!("avx2"));
+        assert_eq!(Simd::named("avx2").is_some(), std::is_x86_feature_detected!("avx2"));
+    }
+
+    #[test]
+    fn a_scope_holds_on_all_threads_of_its_loops_and_ends() {
+        let names = || map_chunks(100, 1, |_| Simd::current().name());
+        for simd in Simd::available() {
+            assert_eq!(simd.scope(names), [simd.name(); 100]);
+            let inner = simd.scope(|| {
+                assert!(std::panic::catch_unwind(|| Simd::PLAIN.scope(|| panic!("an inner scope"))).is_err());
+                Simd::current().name()
+            });
+            assert_eq!(inner, simd.name());
+        }
+        assert_eq!(names(), [Simd::widest().name(); 100]);
     }
 }

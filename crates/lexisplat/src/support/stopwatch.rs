@@ -1,24 +1,26 @@
-//! Elapsed time, where there is a clock.
+//! Elapsed time, on platforms with a clock.
 
-/// Time since it was started.
+/// Measures the time since it was started.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Stopwatch {
+pub struct Stopwatch {
     #[cfg(not(target_family = "wasm"))]
     start: std::time::Instant,
 }
 
 impl Stopwatch {
-    /// Starts now.
-    pub(crate) fn start() -> Self {
+    /// Starts a stopwatch.
+    #[must_use]
+    pub fn start() -> Self {
         Self {
             #[cfg(not(target_family = "wasm"))]
             start: std::time::Instant::now(),
         }
     }
 
-    /// Seconds since the start; 0 where `Instant` would panic, in a browser.
+    /// Seconds since the start. In a browser, where `Instant` would panic, it is 0.
     #[cfg_attr(target_family = "wasm", expect(clippy::unused_self, reason = "there is no clock"))]
-    pub(crate) fn seconds(self) -> f64 {
+    #[must_use]
+    pub fn seconds(self) -> f64 {
         #[cfg(not(target_family = "wasm"))]
         {
             self.start.elapsed().as_secs_f64()

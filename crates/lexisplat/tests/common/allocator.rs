@@ -2,11 +2,13 @@
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 struct Counting;
 
 static LIVE: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
+static TOTAL: AtomicUsize = AtomicUsize::new(0);
 
 #[expect(unsafe_code, reason = "a global allocator is an unsafe trait; every call goes to the system's")]
 // SAFETY: all requests are passed on unchanged to `System`; counting does not touch the memory.
@@ -33,6 +35,7 @@ unsafe impl GlobalAlloc for Counting {
 fn count(bytes: usize) {
     let live = LIVE.fetch_add(bytes, Relaxed) + bytes;
     PEAK.fetch_max(live, Relaxed);
+    TOTAL.fetch_add(bytes, Relaxed);
 }
 
 #[global_allocator]
@@ -45,4 +48,15 @@ pub(crate) fn counted<T>(work: impl FnOnce() -> T) -> (T, usize) {
     PEAK.store(before, Relaxed);
     let result = work();
     (result, PEAK.load(Relaxed) - before)
+}
+
+/// The bytes that the process has allocated so far, those given back included.
+pub(crate) fn total() -> usize {
+    TOTAL.load(Relaxed)
+}
+
+/// Waits until no other test counts. The caller counts until it drops what this returns.
+pub(crate) fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
 }

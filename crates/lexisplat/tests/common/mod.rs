@@ -108,7 +108,7 @@ pub fn models() -> Vec<(&'static str, Model)> {
 /// The bytes of `model` as written today.
 pub fn written(model: &Model) -> Vec<u8> {
     let mut bytes = Vec::new();
-    lexisplat::lexi::write_to(&mut bytes, model).unwrap();
+    lexisplat::lexi::write(&mut bytes, model).unwrap();
     bytes
 }
 

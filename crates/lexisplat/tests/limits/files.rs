@@ -51,7 +51,7 @@ pub(crate) fn exact(splats: &Splats, layout: Layout) -> Vec<u8> {
     let mut options = CompressOptions::default();
     (options.layout, options.atoms, options.sample) = (layout, Some(12), 500);
     let mut bytes = Vec::new();
-    lexi::write_to(&mut bytes, &compress(splats.clone(), &options, &Silent).unwrap().0).unwrap();
+    lexi::write(&mut bytes, &compress(splats.clone(), &options, &Silent).unwrap().0).unwrap();
     bytes
 }
 
@@ -61,7 +61,7 @@ pub(crate) fn packed(splats: &Splats, step: f64, keep_order: bool) -> Vec<u8> {
     let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packer.pack(step, &Silent).unwrap().0).unwrap();
+    lexi::write_packed(&mut bytes, &packer.pack(step, &Silent).unwrap().0).unwrap();
     bytes
 }
 

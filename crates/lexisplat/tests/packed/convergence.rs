@@ -2,7 +2,7 @@
 
 use lexisplat::{Geometry, lexi};
 
-use crate::support::{
+use super::support::{
     distance, options, pack, returned, root_mean_square, row_errors, sample, size, with_extras,
 };
 

@@ -3,7 +3,7 @@
 use lexisplat::packed::PackOptions;
 use lexisplat::{Limits, Sensitivity, Splats, lexi};
 
-use crate::support::{STEP, bytes, copies, distance, options, pack, returned, row_errors, sample, size};
+use super::support::{STEP, bytes, copies, distance, options, pack, returned, row_errors, sample, size};
 
 fn changed(gaussians: usize, change: impl FnOnce(&mut Splats)) -> (Splats, Splats) {
     let mut splats = sample(gaussians, 41, 3);
@@ -160,7 +160,7 @@ fn a_scene_nothing_depends_on_packs() {
     let zeros = Sensitivity::zeros(300);
     let packer = lexisplat::packed::Packer::new(&splats, &zeros, &options(|_| ())).unwrap();
     let (packed, _) = packer.pack(STEP, &lexisplat::Silent).unwrap();
-    crate::support::assert_finite(&packed.unpack().unwrap().into_splats());
+    super::support::assert_finite(&packed.unpack().unwrap().into_splats());
 }
 
 #[test]

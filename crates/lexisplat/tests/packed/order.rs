@@ -2,7 +2,7 @@
 
 use lexisplat::{Splats, ply};
 
-use crate::support::{STEP, distance, options, pack, row_errors, sample, size, with_extras};
+use super::support::{STEP, distance, options, pack, row_errors, sample, size, with_extras};
 
 /// A scene with escapes, whose rows are kept apart from the others'.
 fn scene() -> Splats {

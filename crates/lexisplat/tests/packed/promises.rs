@@ -3,7 +3,7 @@
 use lexisplat::packed::PackReport;
 use lexisplat::{Splats, lexi};
 
-use crate::support::{STEP, options, pack, returned, row_errors, sample};
+use super::support::{STEP, options, pack, returned, row_errors, sample};
 
 /// Packs with a tolerance; the promise holds and the record says by how much.
 fn assert_kept(splats: &Splats, tolerance: f64, atoms: Option<usize>) -> PackReport {

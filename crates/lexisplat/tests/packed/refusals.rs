@@ -3,7 +3,7 @@
 use lexisplat::packed::{PackOptions, Packed, Packer};
 use lexisplat::{Error, Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
 
-use crate::support::{STEP, bytes, options, pack, sample, with_extras};
+use super::support::{STEP, bytes, options, pack, sample, with_extras};
 
 fn refused(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> String {
     let error = Packer::new(splats, sensitivity, options).unwrap_err();
@@ -31,10 +31,10 @@ fn options_out_of_range_are_named() {
     let run = |change: fn(&mut PackOptions)| refused(&splats, &sensitivity, &options(change));
     assert!(run(|o| o.atoms = Some(0)).starts_with("atoms = 0: 1 to 1024"));
     assert!(run(|o| o.atoms = Some(1025)).starts_with("atoms = 1025"));
-    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tol = 0"));
-    assert!(run(|o| o.tolerance = Some(-0.1)).starts_with("tol = -0.1"));
-    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tol = NaN"));
-    assert!(run(|o| o.tolerance = Some(f64::INFINITY)).starts_with("tol = inf"));
+    assert!(run(|o| o.tolerance = Some(0.0)).starts_with("tolerance = 0"));
+    assert!(run(|o| o.tolerance = Some(-0.1)).starts_with("tolerance = -0.1"));
+    assert!(run(|o| o.tolerance = Some(f64::NAN)).starts_with("tolerance = NaN"));
+    assert!(run(|o| o.tolerance = Some(f64::INFINITY)).starts_with("tolerance = inf"));
 }
 
 #[test]

@@ -4,7 +4,7 @@ use lexisplat::lexi::Contents;
 use lexisplat::packed::{CHUNK, PackOptions, Packed, TargetRecord};
 use lexisplat::{Layout, Limits, Splats, lexi};
 
-use crate::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
+use super::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
 
 /// Every way to read `packed` gives it back.
 fn assert_travels(packed: &Packed, what: &str) {

@@ -79,7 +79,7 @@ pub(crate) fn returned(splats: &Splats, step: f64, options: &PackOptions) -> Spl
 
 pub(crate) fn bytes(packed: &Packed) -> Vec<u8> {
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, packed).unwrap();
+    lexi::write_packed(&mut bytes, packed).unwrap();
     bytes
 }
 

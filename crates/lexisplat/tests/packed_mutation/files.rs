@@ -19,7 +19,7 @@ fn packed(
     let (mut packed, _) = packer.pack(step, &Silent).unwrap();
     packed.target = promise;
     let mut bytes = Vec::new();
-    lexi::write_packed_to(&mut bytes, &packed).unwrap();
+    lexi::write_packed(&mut bytes, &packed).unwrap();
     bytes
 }
 

@@ -1,21 +1,9 @@
 //! Ways to change a packed file that leave its container whole.
 
+use lexisplat_testing::Random;
 use serde_json::Value;
 
 use crate::parts::Parts;
-
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn below(&mut self, bound: usize) -> usize {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        usize::try_from(self.0 >> 33).unwrap() % bound
-    }
-
-    fn byte(&mut self) -> u8 {
-        u8::try_from(self.below(256)).unwrap()
-    }
-}
 
 const TENSORS: [&str; 5] =
     ["packed.parameters", "packed.lengths", "packed.tables", "packed.data", "packed.order"];

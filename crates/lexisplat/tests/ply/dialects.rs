@@ -3,7 +3,7 @@
 use lexisplat::ply::{self, Dialect, Format, PlyRead, ReadOptions, ScalarType};
 use lexisplat::{Extra, ExtraValues, Splats};
 
-use crate::support::{Column, File, assert_same, columns, scene};
+use super::support::{Column, File, assert_same, columns, scene};
 
 const NORMALS: [&str; 3] = ["nx", "ny", "nz"];
 /// More than two chunks of rows.
@@ -77,8 +77,8 @@ fn every_dialect_is_the_same_scene() {
                 file.format = format;
                 let what = format!("{name} degree {degree} {format:?}");
                 let found = read(&file);
-                assert_eq!((found.source.dialect, found.source.format), (dialect, format), "{what}");
-                assert_eq!(found.source.vertices, ROWS as u64);
+                assert_eq!((found.summary.dialect, found.summary.format), (dialect, format), "{what}");
+                assert_eq!(found.summary.vertices, ROWS as u64);
                 assert_eq!(found.splats.meta.antialiased, ["brush", "postshot"].contains(&name), "{what}");
                 assert_eq!(found.splats.meta.comments, file.comments, "{what}");
 
@@ -198,7 +198,7 @@ fn other_elements_are_stepped_over() {
         file.after = (after.to_owned(), vec![1, 2, 3]);
         let found = read(&file);
         assert_same(&found.splats, &splats, "binary");
-        assert_eq!(found.source.other_elements, ["camera", "face", "nothing", "end"]);
+        assert_eq!(found.summary.other_elements, ["camera", "face", "nothing", "end"]);
         assert_eq!(found.warnings, [""; 0]);
     }
     let mut file = inria(&splats);

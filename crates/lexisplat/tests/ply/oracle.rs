@@ -4,9 +4,10 @@ use std::collections::HashMap;
 
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
 use lexisplat::{Extra, ExtraValues, Geometry, SceneMeta, ShDegree, Splats};
+use lexisplat_testing::Random;
 use proptest::prelude::*;
 
-use crate::support::{Column, File, Random, TYPES, assert_same, columns, scene};
+use super::support::{Column, File, TYPES, assert_same, columns, scene};
 
 /// A value in its own type, as text that loses nothing for integers and as bits for floats.
 #[derive(Clone, Copy)]
@@ -148,7 +149,7 @@ fn expected(bytes: &[u8]) -> Splats {
 
 /// Any finite value of `ty`, with many bit patterns for floats.
 fn any_value(ty: ScalarType, random: &mut Random) -> f64 {
-    let bits = random.next();
+    let bits = random.bits();
     let [a, b, c, d, e, f, g, h] = bits.to_le_bytes();
     match ty {
         ScalarType::I8 => f64::from(i8::from_le_bytes([a])),
@@ -169,7 +170,7 @@ fn any_value(ty: ScalarType, random: &mut Random) -> f64 {
 }
 
 fn random_file(degree: u8, rows: usize, normals: u8, extras: usize, format: Format, seed: u64) -> File {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let mut file = File::new(columns(&scene(degree, rows, seed)));
     file.format = format;
     if normals == 0 {

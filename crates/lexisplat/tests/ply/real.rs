@@ -1,17 +1,7 @@
 //! Every PLY of the data folder, where there is one, reads and comes back with the same bits.
 
-use std::path::PathBuf;
-
 use lexisplat::ply;
-
-/// `LEXISPLAT_DATA`, else `shared/data` beside the workspace; `None` if that is not there.
-fn data_folder() -> Option<PathBuf> {
-    let folder = std::env::var_os("LEXISPLAT_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
-        PathBuf::from,
-    );
-    folder.is_dir().then_some(folder)
-}
+use lexisplat_testing::real_data_folder;
 
 fn data_start(bytes: &[u8]) -> usize {
     let mark = b"end_header\n";
@@ -20,10 +10,7 @@ fn data_start(bytes: &[u8]) -> usize {
 
 #[test]
 fn every_real_file_keeps_its_bits() {
-    let Some(folder) = data_folder() else {
-        eprintln!("no data folder: nothing to check");
-        return;
-    };
+    let Some(folder) = real_data_folder() else { return };
     let mut seen = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -39,13 +26,13 @@ fn every_real_file_keeps_its_bits() {
         let again = ply::read_bytes("again", &written, &ply::ReadOptions::default()).unwrap();
         assert_eq!(again.splats, read.splats, "{}", path.display());
 
-        if read.source.dialect == ply::Dialect::Inria {
+        if read.summary.dialect == ply::Dialect::Inria {
             // The writer's own layout: the rows are the same bytes, whatever follows them.
             let rows = &written[data_start(&written)..];
             let from = data_start(&original);
             assert!(rows == &original[from..from + rows.len()], "{}", path.display());
         }
-        println!("{}: {:?} {} {:?}", path.display(), read.source.dialect, read.splats.len(), read.warnings);
+        println!("{}: {:?} {} {:?}", path.display(), read.summary.dialect, read.splats.len(), read.warnings);
     }
     assert!(seen > 0, "the data folder holds no PLY");
 }

@@ -1,9 +1,9 @@
 //! Every refusal says what is wrong, where, and what to do, on one line.
 
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
-use lexisplat::{Error, Extra, ExtraValues, Limits};
+use lexisplat::{CompressOptions, Error, Extra, ExtraValues, FormatError, Limits, Silent, lexi};
 
-use crate::support::{Column, File, assert_same, columns, scene};
+use super::support::{Column, File, assert_same, columns, scene};
 
 fn refuse(bytes: &[u8]) -> String {
     let said =
@@ -84,7 +84,7 @@ fn wrong_headers_are_named() {
         let said = refuse(&bytes);
         assert!(said.contains(part), "{said}");
     }
-    let wide = ReadOptions { limits: Limits::default(), ..ReadOptions::default() };
+    let wide = ReadOptions::default().with_limits(Limits::default());
     assert!(ply::read_bytes("t.ply", &good().bytes(), &wide).is_ok());
 }
 
@@ -161,8 +161,7 @@ fn bad_values_are_counted_or_dropped() {
         file.column(property).ty = ScalarType::F64;
         let said = refuse(&file.bytes());
         let part = format!(
-            "t.ply: 3 Gaussians hold NaN or infinite values, the first is number 1500 (property '{property}'); \
-             remove them with --drop-invalid"
+            "t.ply: 3 Gaussians hold NaN or infinite values, the first is number 1500 (property '{property}')"
         );
         assert_eq!(said, part);
 
@@ -171,11 +170,11 @@ fn bad_values_are_counted_or_dropped() {
             ty: ScalarType::F32,
             values: (0..rows).map(|i| if i == 7 { f64::NAN } else { 1.0 }).collect(),
         });
-        let options = ReadOptions { drop_invalid: true, ..ReadOptions::default() };
+        let options = ReadOptions::default().with_drop_invalid(true);
         for format in [Format::BinaryLittleEndian, Format::Ascii] {
             file.format = format;
             let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
-            assert_eq!(found.source.dropped, 3);
+            assert_eq!(found.summary.dropped, 3);
             assert!(
                 found.warnings.iter().any(|w| w.starts_with("dropped 3 of 3000 Gaussians")),
                 "{:?}",
@@ -207,11 +206,11 @@ fn infinite_opacities_are_sure_ones() {
             [(Format::BinaryLittleEndian, false), (Format::BinaryBigEndian, true), (Format::Ascii, false)]
         {
             file.format = format;
-            let options = ReadOptions { drop_invalid, ..ReadOptions::default() };
+            let options = ReadOptions::default().with_drop_invalid(drop_invalid);
             let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
             let warning = "3 opacities are infinite, taken as 100 (opaque) or -100 (invisible)";
             assert!(found.warnings.iter().any(|w| w == warning), "{:?}", found.warnings);
-            assert_eq!(found.source.dropped, 0);
+            assert_eq!(found.summary.dropped, 0);
             let mut expected = splats.clone();
             let opacities = &mut expected.geometry.opacities;
             (opacities[0], opacities[1501], opacities[2999]) = (100.0, -100.0, 100.0);
@@ -250,6 +249,17 @@ fn names_that_cannot_be_written_are_not_read() {
         assert!(said.contains("control characters in the name"), "{said}");
         assert!(!said.contains(char::is_control), "{said:?}");
     }
+}
+
+#[test]
+fn a_scene_of_the_other_kind_is_named() {
+    let mut lexi = Vec::new();
+    let (model, _) = lexisplat::compress(scene(1, 10, 0), &CompressOptions::default(), &Silent).unwrap();
+    lexi::write(&mut lexi, &model).unwrap();
+    assert_eq!(refuse(&lexi), "t.ply: this is a .lexi, not a PLY");
+    let said = lexi::read_bytes("t.lexi", &good().bytes(), &Limits::default()).unwrap_err();
+    assert_eq!(said.to_string(), "t.lexi: this is a PLY, not a .lexi");
+    assert!(matches!(said, Error::Format { problem: FormatError::OtherKind { .. }, .. }));
 }
 
 #[test]

@@ -4,6 +4,7 @@
 
 use lexisplat::ply::{Format, ScalarType};
 use lexisplat::{ExtraValues, Geometry, SceneMeta, ShDegree, Splats};
+use lexisplat_testing::Random;
 
 pub(crate) const TYPES: [ScalarType; 8] = [
     ScalarType::I8,
@@ -15,29 +16,6 @@ pub(crate) const TYPES: [ScalarType; 8] = [
     ScalarType::F32,
     ScalarType::F64,
 ];
-
-/// splitmix64 (Vigna): enough randomness for tests, and the same everywhere.
-pub(crate) struct Random(pub(crate) u64);
-
-impl Random {
-    pub(crate) fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub(crate) fn below(&mut self, n: usize) -> usize {
-        usize::try_from(self.next() % n as u64).unwrap_or(0)
-    }
-
-    /// In [-1, 1), a multiple of 2^-23: every step up to f32 is exact.
-    pub(crate) fn signed(&mut self) -> f32 {
-        let bits = u16::try_from(self.next() & 0xffff).unwrap_or(0);
-        f32::from(bits) / 32768.0 - 1.0
-    }
-}
 
 /// One column of the vertex element. Values are given as f64 and stored as `ty`.
 #[derive(Debug, Clone)]
@@ -139,7 +117,7 @@ fn push(out: &mut Vec<u8>, ty: ScalarType, value: f64, format: Format) {
 
 /// A scene of `n` Gaussians without normals, extras or comments.
 pub(crate) fn scene(degree: u8, n: usize, seed: u64) -> Splats {
-    let mut random = Random(seed);
+    let mut random = Random::new(seed);
     let degree = ShDegree::new(degree).expect("a degree");
     let mut triple = |scale: f32| [0; 3].map(|_| random.signed() * scale);
     let positions = (0..n).map(|_| triple(10.0)).collect();

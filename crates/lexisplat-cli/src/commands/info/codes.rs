@@ -1,147 +1,161 @@
-//! What `info` says about a .lexi beyond what it says about any scene.
+//! What `info` says about a .lexi file beyond what it says about any scene.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat::Layout;
 use lexisplat::lexi::{self, LexiChunks};
-use lexisplat::packed::StreamBits;
+use lexisplat::packed::{StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
-use serde_json::{Map, Value, json};
+use lexisplat::{Layout, Record};
+use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use lexisplat_eval::format;
+use serde::Serialize;
 
 use super::bars;
-use lexisplat_eval::format;
+use crate::commands::compress::{error_line, target_line};
 
-use crate::commands::compress::error_line;
-use crate::commands::pack::{attribute_bytes, promise_line, sh_bytes};
-
-/// Bytes of a Gaussian's SH in a dense degree-3 scene, DC and rest, in f32.
+/// Bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
 const DENSE_SH_BYTES: usize = 192;
-/// Atoms listed as the most used.
+/// Name of the processor as a device.
+const CPU: &str = "cpu";
+/// Number of atoms listed as the most used.
 const TOP_ATOMS: usize = 8;
 
-fn each(bytes: f64, lexi: &LexiChunks<'_>) -> f64 {
-    bytes / lexi.len().max(1) as f64
+/// The facts about a .lexi file.
+#[derive(Serialize)]
+pub(super) struct LexiFacts<'a> {
+    version: u64,
+    #[serde(flatten)]
+    made: RecordReport,
+    atoms: usize,
+    nonzeros: u64,
+    escapes: u64,
+    nonzero_histogram: &'a [u64],
+    atom_usage: &'a [u64],
+    resident_sh_bytes: u64,
+    resident_sh_bytes_per_gaussian: f64,
+    checksums: &'static str,
+    sh_bytes: ByteCount,
+    attribute_bytes: BTreeMap<&'a str, ByteCount>,
+    #[serde(flatten)]
+    packed: Option<PackedFacts<'a>>,
+    #[serde(skip)]
+    gaussians: usize,
+    #[serde(skip)]
+    record: &'a Record,
+    /// Bytes by part, in the order of the file.
+    #[serde(skip)]
+    parts: &'a [(String, f64)],
 }
 
-fn is_packed(lexi: &LexiChunks<'_>) -> bool {
-    lexi.record().layout == Layout::Packed
+/// The facts about a packed file.
+#[derive(Serialize)]
+struct PackedFacts<'a> {
+    promise: Option<&'a TargetRecord>,
+    device: &'a str,
+    order_kept: bool,
+    stream_bits_per_gaussian: BTreeMap<&'a str, f64>,
+    #[serde(skip)]
+    streams: &'a [StreamBits],
 }
 
-pub(super) fn as_json(lexi: &LexiChunks<'_>, survey: &Survey) -> Value {
-    let record = lexi.record();
-    let packed = is_packed(lexi);
-    let mut value = json!({
-        "version": if packed { lexi::PACKED_VERSION } else { lexi::VERSION },
-        "layout": record.layout.name(),
-        "tol": record.tolerance,
-        "seed": record.seed,
-        "max_residual": record.max_residual,
-        "rms_residual": record.rms_residual,
-        "over_tolerance": record.over_tolerance,
-        "atoms": lexi.dictionary().len(),
-        "nonzeros": survey.nonzeros,
-        "escapes": survey.escapes,
-        "nonzero_histogram": survey.nonzero_histogram,
-        "atom_usage": survey.atom_usage,
-        "resident_sh_bytes": survey.resident_sh_bytes,
-        "resident_sh_bytes_per_gaussian": each(survey.resident_sh_bytes as f64, lexi),
-        "checksums": "ok",
-    });
-    let tensors = lexi.attribute_bytes();
-    let bytes: Map<String, Value> = if packed {
+/// Bytes of each part of the file by name.
+pub(super) fn parts(lexi: &LexiChunks<'_>, survey: &Survey) -> Vec<(String, f64)> {
+    part_bytes(lexi.attribute_bytes(), &survey.stream_bits)
+}
+
+impl<'a> LexiFacts<'a> {
+    pub(super) fn new(lexi: &'a LexiChunks<'_>, survey: &'a Survey, parts: &'a [(String, f64)]) -> Self {
+        let (record, gaussians) = (lexi.record(), lexi.len());
+        let each = |value: f64| value / gaussians.max(1) as f64;
         let streams = &survey.stream_bits;
-        value["promise"] = json!(lexi.target());
-        value["device"] = lexi.device().unwrap_or("cpu").into();
-        value["order_kept"] = lexi.order_kept().into();
-        value["sh_bytes"] = sh_bytes(streams).into();
-        let bits = streams.iter().map(|s| (s.name.clone(), json!(each(s.bits, lexi))));
-        value["stream_bits_per_gaussian"] = Value::Object(bits.collect());
-        attribute_bytes(tensors, streams).into_iter().map(|(name, bytes)| (name, bytes.into())).collect()
-    } else {
-        value["pursuit"] = record.pursuit.name().into();
-        value["max_nnz"] = record.max_nonzeros.into();
-        value["sh_bytes"] = lexi.sh_bytes().into();
-        tensors.iter().map(|(name, bytes)| (name.clone(), (*bytes).into())).collect()
-    };
-    value["attribute_bytes"] = Value::Object(bytes);
-    value
-}
-
-pub(super) fn as_text(out: &mut String, lexi: &LexiChunks<'_>, survey: &Survey) -> Result<()> {
-    let record = lexi.record();
-    let atoms = lexi.dictionary().len();
-    let packed = is_packed(lexi);
-    if packed {
-        writeln!(
-            out,
-            ".lexi version {}, layout packed, {atoms} atoms, {}, all checksums right",
-            lexi::PACKED_VERSION,
-            if lexi.order_kept() { "order of the source kept" } else { "in an order of its own" },
-        )?;
-    } else {
-        writeln!(
-            out,
-            ".lexi version {}, layout {}, pursuit {}, {atoms} atoms, all checksums right",
-            lexi::VERSION,
-            record.layout,
-            record.pursuit,
-        )?;
-    }
-    if let Some(promise) = lexi.target() {
-        writeln!(out, "pictures: {}", promise_line(promise))?;
-    }
-    if let Some(device) = lexi.device() {
-        writeln!(out, "looked at on: {device}")?;
-    }
-    if atoms > 0 {
-        writeln!(out, "error: {}", error_line(record))?;
-        let mean = survey.nonzeros as f64 / lexi.len().max(1) as f64;
-        writeln!(out, "codes: {mean:.2} nonzeros a Gaussian, {} stored exactly", survey.escapes)?;
-    }
-    writeln!(
-        out,
-        "in memory: {:.1} bytes of SH a Gaussian (codes, base colour, dictionary), beside {DENSE_SH_BYTES} dense",
-        each(survey.resident_sh_bytes as f64, lexi)
-    )?;
-    if packed {
-        packed_bytes(out, lexi, &survey.stream_bits)?;
-    } else {
-        writeln!(out, "\nbytes")?;
-        for (name, bytes) in lexi.attribute_bytes() {
-            let one = each(*bytes as f64, lexi);
-            writeln!(out, "  {name:<18} {:>10}  {one:>8.2} a Gaussian", format::bytes(*bytes))?;
+        let packed = (record.layout == Layout::Packed).then(|| PackedFacts {
+            promise: lexi.target(),
+            device: lexi.device().unwrap_or(CPU),
+            order_kept: lexi.order_kept(),
+            stream_bits_per_gaussian: streams.iter().map(|s| (s.name.as_str(), each(s.bits))).collect(),
+            streams,
+        });
+        Self {
+            version: if packed.is_some() { lexi::PACKED_VERSION } else { lexi::VERSION },
+            made: record.into(),
+            atoms: lexi.dictionary().len(),
+            nonzeros: survey.nonzeros,
+            escapes: survey.escapes,
+            nonzero_histogram: &survey.nonzero_histogram,
+            atom_usage: &survey.atom_usage,
+            resident_sh_bytes: survey.resident_sh_bytes,
+            resident_sh_bytes_per_gaussian: each(survey.resident_sh_bytes as f64),
+            checksums: "ok",
+            sh_bytes: sh_bytes(parts).into(),
+            attribute_bytes: parts.iter().map(|(name, bytes)| (name.as_str(), (*bytes).into())).collect(),
+            packed,
+            gaussians,
+            record,
+            parts,
         }
     }
-    if atoms > 0 {
-        writeln!(out, "\nGaussians by nonzeros")?;
-        let histogram = &survey.nonzero_histogram;
-        let last = histogram.iter().rposition(|&n| n > 0).unwrap_or(0);
-        let labels: Vec<String> = (0..=last).map(|n| n.to_string()).collect();
-        bars(out, &labels, &histogram[..=last])?;
-        usage_text(out, &survey.atom_usage)?;
-    }
-    Ok(())
-}
 
-/// Each attribute with the streams it is made of.
-fn packed_bytes(out: &mut String, lexi: &LexiChunks<'_>, streams: &[StreamBits]) -> Result<()> {
-    writeln!(out, "\n{:<14} {:>10} {:>16}   streams", "attribute", "bytes", "bits a Gaussian")?;
-    for (name, bytes) in attribute_bytes(lexi.attribute_bytes(), streams) {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]
-        let size = format::bytes(bytes.round() as u64);
-        let parts: Vec<&StreamBits> = streams.iter().filter(|s| s.attribute == name).collect();
-        let parts = match parts.as_slice() {
-            [] | [_] => String::new(),
-            parts => {
-                let part = |s: &&StreamBits| format!("{} {:.2}", s.name, each(s.bits, lexi));
-                parts.iter().map(part).collect::<Vec<_>>().join(", ")
-            }
-        };
-        let line = format!("{name:<14} {size:>10} {:>16.2}   {parts}", each(8.0 * bytes, lexi));
-        writeln!(out, "{}", line.trim_end())?;
+    fn each(&self, value: f64) -> f64 {
+        value / self.gaussians.max(1) as f64
     }
-    Ok(())
+
+    pub(super) fn text(&self, out: &mut String) -> Result<()> {
+        let Self { version, made, atoms, packed, escapes, .. } = self;
+        let layout = made.layout;
+        let how = match (packed, made.pursuit) {
+            (Some(packed), _) if packed.order_kept => ", order of the source kept".to_owned(),
+            (Some(_), _) => ", order of the source not kept".to_owned(),
+            (None, pursuit) => pursuit.map(|name| format!(", pursuit {name}")).unwrap_or_default(),
+        };
+        writeln!(out, ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match")?;
+        if let Some(target) = packed.as_ref().and_then(|packed| packed.promise) {
+            writeln!(out, "pictures: {}", target_line(target))?;
+        }
+        if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
+            writeln!(out, "measured on: {}", format::escape(packed.device))?;
+        }
+        if *atoms > 0 {
+            writeln!(out, "SH error: {}", error_line(self.record))?;
+            let mean = self.each(self.nonzeros as f64);
+            writeln!(out, "codes: {mean:.2} nonzeros a Gaussian, {escapes} stored exactly")?;
+        }
+        writeln!(
+            out,
+            "in memory: {:.1} bytes of SH a Gaussian (codes, base colour, dictionary), beside {DENSE_SH_BYTES} dense",
+            self.resident_sh_bytes_per_gaussian
+        )?;
+        self.parts_text(out)?;
+        if *atoms > 0 {
+            writeln!(out, "\nGaussians by nonzeros")?;
+            let last = self.nonzero_histogram.iter().rposition(|&n| n > 0).unwrap_or(0);
+            let labels: Vec<String> = (0..=last).map(|n| n.to_string()).collect();
+            bars(out, &labels, self.nonzero_histogram)?;
+            usage_text(out, self.atom_usage)?;
+        }
+        Ok(())
+    }
+
+    /// A line for each part of the file. Those of a packed file list their streams.
+    fn parts_text(&self, out: &mut String) -> Result<()> {
+        writeln!(out, "\n{:<18} {:>10} {:>16}   streams", "part", "bytes", "bits a Gaussian")?;
+        for (name, bytes) in self.parts {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]
+            let size = format::bytes(bytes.round() as u64);
+            let streams = self.packed.as_ref().map_or(&[][..], |packed| packed.streams);
+            let streams: Vec<String> = streams
+                .iter()
+                .filter(|s| s.attribute == name)
+                .map(|s| format!("{} {:.2}", s.name, self.each(s.bits)))
+                .collect();
+            let streams = if streams.len() > 1 { streams.join(", ") } else { String::new() };
+            let name = format::escape(name);
+            let line = format!("{name:<18} {size:>10} {:>16.2}   {streams}", self.each(8.0 * bytes));
+            writeln!(out, "{}", line.trim_end())?;
+        }
+        Ok(())
+    }
 }
 
 fn usage_text(out: &mut String, usage: &[u64]) -> Result<()> {

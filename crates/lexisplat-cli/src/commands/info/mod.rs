@@ -6,13 +6,13 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::lexi::LexiChunks;
-use lexisplat::ply::{PlyChunks, ReadOptions};
+use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
-use lexisplat::stream::Survey;
-use lexisplat::{Splats, lexi, stream};
+use lexisplat::{FileKind, SplatSource as _, Splats, stream};
 use lexisplat_eval::format;
-use serde_json::json;
+use serde::Serialize;
 
+use self::codes::LexiFacts;
 use crate::args::{Common, Info};
 use crate::files::{input, print, print_json, warn};
 use crate::progress::Bars;
@@ -23,124 +23,122 @@ const BAR: usize = 40;
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.file, common)?;
     let bars = Bars::new(common.quiet || common.json);
-    let (scene, lint) = if lexi::is_lexi(&bytes) {
-        let lexi = LexiChunks::open(&name, &bytes, &common.limits()?)?;
+    let limits = common.limits()?;
+    let file = (name.as_str(), bytes.len() as u64);
+    if FileKind::of(&name, &bytes) == FileKind::Lexi {
+        let lexi = LexiChunks::open(&name, &bytes, &limits)?;
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
-        let lint = survey.lint.clone();
-        (Scene::Lexi(Box::new(lexi), Box::new(survey)), lint)
-    } else {
-        let read = ReadOptions { drop_invalid: args.drop_invalid, limits: common.limits()? };
-        let ply = PlyChunks::open(&name, &bytes, &read, &bars)?;
-        warn(&name, ply.warnings());
-        let lint = stream::lint_ply(&ply, &bars)?;
-        (Scene::Ply(Box::new(ply)), lint)
-    };
-    let file = File { name: &name, bytes: bytes.len() as u64, scene };
-    if common.json {
-        return print_json(&as_json(&file, &lint)?);
+        let parts = codes::parts(&lexi, &survey);
+        let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
+        return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: lexi_facts }).print(common);
     }
-    warn(&name, &lint.warnings);
-    if common.quiet {
-        return Ok(());
-    }
-    print(&as_text(&file, &lint)?)
+    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
+    let ply = PlySource::open(&name, &bytes, &read, &bars)?;
+    warn(&name, ply.warnings());
+    let lint = stream::lint(&ply, &bars)?;
+    let kind = Kind::Ply { ply: ply.summary(), warnings: ply.warnings() };
+    Facts::new(file, &ply.empty(), &lint, kind).print(common)
 }
 
-/// A file to be told of.
-struct File<'a> {
-    name: &'a str,
-    bytes: u64,
-    scene: Scene<'a>,
+/// The facts about a scene's file.
+#[derive(Serialize)]
+struct Facts<'a> {
+    file: &'a str,
+    file_bytes: u64,
+    gaussians: u64,
+    sh_degree: u8,
+    antialiased: bool,
+    comments: &'a [String],
+    extras: Vec<&'a str>,
+    statistics: &'a Lint,
+    norm_bins: &'static [f64],
+    #[serde(flatten)]
+    kind: Kind<'a>,
 }
 
-enum Scene<'a> {
-    Ply(Box<PlyChunks<'a>>),
-    Lexi(Box<LexiChunks<'a>>, Box<Survey>),
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+enum Kind<'a> {
+    Ply { ply: &'a PlySummary, warnings: &'a [String] },
+    Lexi { lexi: LexiFacts<'a> },
 }
 
-impl Scene<'_> {
-    /// A scene like it without Gaussians.
-    fn empty(&self) -> Splats {
-        match self {
-            Self::Ply(ply) => ply.empty(),
-            Self::Lexi(lexi, _) => lexi.empty(),
+impl<'a> Facts<'a> {
+    /// The facts about the file `name` of `file_bytes` bytes. `like` is a scene like it without Gaussians.
+    fn new(
+        (file, file_bytes): (&'a str, u64),
+        like: &'a Splats,
+        statistics: &'a Lint,
+        kind: Kind<'a>,
+    ) -> Self {
+        Self {
+            file,
+            file_bytes,
+            gaussians: statistics.gaussians,
+            sh_degree: like.degree.get(),
+            antialiased: like.meta.antialiased,
+            comments: &like.meta.comments,
+            extras: like.geometry.extras.iter().map(|e| e.name.as_str()).collect(),
+            statistics,
+            norm_bins: &NORM_BINS,
+            kind,
         }
     }
-}
 
-fn as_json(file: &File<'_>, lint: &Lint) -> Result<serde_json::Value> {
-    let like = file.scene.empty();
-    let mut value = json!({
-        "file": file.name,
-        "file_bytes": file.bytes,
-        "gaussians": lint.gaussians,
-        "sh_degree": like.degree.get(),
-        "antialiased": like.meta.antialiased,
-        "comments": like.meta.comments,
-        "extras": like.geometry.extras.iter().map(|e| &e.name).collect::<Vec<_>>(),
-        "statistics": lint,
-        "norm_bins": NORM_BINS,
-    });
-    match &file.scene {
-        Scene::Ply(ply) => {
-            value["kind"] = "ply".into();
-            value["ply"] = serde_json::to_value(ply.summary())?;
-            value["warnings"] = json!(ply.warnings());
+    fn print(&self, common: &Common) -> Result<()> {
+        if common.json {
+            return print_json(&serde_json::to_value(self)?);
         }
-        Scene::Lexi(lexi, survey) => {
-            value["kind"] = "lexi".into();
-            value["lexi"] = codes::as_json(lexi, survey);
-        }
+        warn(self.file, &self.statistics.warnings);
+        if common.quiet { Ok(()) } else { print(&self.text()?) }
     }
-    Ok(value)
-}
 
-fn as_text(file: &File<'_>, lint: &Lint) -> Result<String> {
-    let mut out = String::new();
-    let like = file.scene.empty();
-    let count = format::count(lint.gaussians);
-    writeln!(
-        out,
-        "{}: {}, {count} Gaussians, SH degree {}",
-        file.name,
-        format::bytes(file.bytes),
-        like.degree
-    )?;
-    if like.meta.antialiased {
-        writeln!(out, "trained with the anti-aliased dilation, and drawn so")?;
-    }
-    for comment in &like.meta.comments {
-        writeln!(out, "comment: {comment}")?;
-    }
-    match &file.scene {
-        Scene::Ply(ply) => {
-            let source = ply.summary();
-            let kind = serde_json::to_value(source.dialect)?;
-            let format = serde_json::to_value(source.format)?;
+    fn text(&self) -> Result<String> {
+        let mut out = String::new();
+        let (bytes, count) = (format::bytes(self.file_bytes), format::count(self.gaussians));
+        writeln!(out, "{}: {bytes}, {count} Gaussians, SH degree {}", self.file, self.sh_degree)?;
+        if self.antialiased {
+            writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
+        }
+        for comment in self.comments {
+            writeln!(out, "comment: {}", format::escape(comment))?;
+        }
+        match &self.kind {
+            Kind::Ply { ply, .. } => {
+                let name = |value: serde_json::Value| value.as_str().unwrap_or_default().to_owned();
+                let format = name(serde_json::to_value(ply.format)?);
+                let dialect = name(serde_json::to_value(ply.dialect)?);
+                let (properties, row_bytes) = (ply.properties.len(), ply.row_bytes);
+                writeln!(
+                    out,
+                    "PLY, {format}, layout {dialect}, {properties} properties, {row_bytes} bytes a Gaussian"
+                )?;
+            }
+            Kind::Lexi { lexi } => lexi.text(&mut out)?,
+        }
+        writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
+        for a in &self.statistics.attributes {
             writeln!(
                 out,
-                "PLY, {}, layout {}, {} properties, {} bytes a Gaussian",
-                format.as_str().unwrap_or_default(),
-                kind.as_str().unwrap_or_default(),
-                source.properties.len(),
-                source.row_bytes
+                "{:<12} {:>12.5} {:>12.5} {:>12.5}",
+                format::escape(&a.name),
+                a.min,
+                a.mean,
+                a.max
             )?;
         }
-        Scene::Lexi(lexi, survey) => codes::as_text(&mut out, lexi, survey)?,
+        if self.sh_degree > 0 {
+            let mean = self.statistics.mean_rest_norm;
+            writeln!(out, "\nnorm of a Gaussian's SH without DC, mean {mean:.4}")?;
+            let labels = NORM_BINS.iter().map(|from| format!("{from} and up")).collect::<Vec<_>>();
+            bars(&mut out, &labels, &self.statistics.rest_norms)?;
+        }
+        Ok(out)
     }
-    writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
-    for a in &lint.attributes {
-        writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", a.name, a.min, a.mean, a.max)?;
-    }
-    if like.degree.rest() > 0 {
-        writeln!(out, "\nnorm of a Gaussian's SH without DC, mean {:.4}", lint.mean_rest_norm)?;
-        let labels = NORM_BINS.iter().map(|from| format!("{from} and up")).collect::<Vec<_>>();
-        bars(&mut out, &labels, &lint.rest_norms)?;
-    }
-    Ok(out)
 }
 
-pub(super) fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Result<()> {
+/// Writes a bar for each label, as long as its count is beside the largest.
+fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Result<()> {
     let most = counts.iter().copied().max().unwrap_or(0).max(1);
     for (label, &count) in labels.iter().zip(counts) {
         let length = (u128::from(count) * BAR as u128).div_ceil(u128::from(most));

@@ -1,6 +1,6 @@
 //! Colour spaces of FLIP. All constants are those of NVIDIA's `FLIP.h` (v1.7), which gives their sources.
 
-/// sRGB values up to here are on the straight part of the curve (IEC 61966-2-1).
+/// Largest sRGB value on the straight part of the curve (IEC 61966-2-1).
 const SRGB_KNEE: f64 = 0.04045;
 /// Slope of the straight part.
 const SRGB_SLOPE: f64 = 12.92;
@@ -15,7 +15,7 @@ const RGB_TO_XYZ: [[f64; 3]; 3] = [
     [2_613_072.0 / 12_288_897.0, 8_788_810.0 / 12_288_897.0, 887_015.0 / 12_288_897.0],
     [1_425_312.0 / 73_733_382.0, 8_788_810.0 / 73_733_382.0, 70_074_185.0 / 73_733_382.0],
 ];
-/// And back (`XYZ2LinearRGB`).
+/// CIE XYZ to linear sRGB (`XYZ2LinearRGB`).
 const XYZ_TO_RGB: [[f64; 3]; 3] = [
     [3.241_003_275, -1.537_398_934, -0.498_615_861],
     [-0.969_224_334, 1.875_930_071, 0.041_554_224],
@@ -23,17 +23,17 @@ const XYZ_TO_RGB: [[f64; 3]; 3] = [
 ];
 /// XYZ of the D65 white point (`DEFAULT_ILLUMINANT`).
 const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
-/// One over it, as rounded there (`INV_DEFAULT_ILLUMINANT`).
+/// Reciprocal of the white point, rounded as in the source (`INV_DEFAULT_ILLUMINANT`).
 const INVERSE_WHITE: [f64; 3] = [1.052_156_925, 1.0, 0.918_357_670];
 
-/// CIE L*a*b*: `L = 116 y - 16`, `a = 500 (x - y)`, `b = 200 (y - z)`. YCxCz has the same without the curve.
+/// CIE L*a*b*: `L = 116 y - 16`, `a = 500 (x - y)`, `b = 200 (y - z)`. YCxCz is the same without the curve.
 pub(super) const LIGHTNESS_SCALE: f64 = 116.0;
 const LIGHTNESS_OFFSET: f64 = 16.0;
 const RED_GREEN_SCALE: f64 = 500.0;
 const BLUE_YELLOW_SCALE: f64 = 200.0;
-/// Where the cube root of L*a*b* gives way to a line.
+/// Largest value for which L*a*b* has a line instead of the cube root.
 const LAB_DELTA: f64 = 6.0 / 29.0;
-/// That line's value at 0.
+/// Value of that line at 0.
 const LAB_TERM: f64 = 4.0 / 29.0;
 
 /// Strength of the Hunt effect: chroma is seen in proportion to lightness (`Hunt`).
@@ -51,7 +51,7 @@ fn linear(value: f64) -> f64 {
     }
 }
 
-/// XYZ over the white point's.
+/// Returns XYZ divided by the white point.
 fn white_balanced(rgb: [f64; 3]) -> [f64; 3] {
     let xyz = times(&RGB_TO_XYZ, rgb);
     [xyz[0] * INVERSE_WHITE[0], xyz[1] * INVERSE_WHITE[1], xyz[2] * INVERSE_WHITE[2]]
@@ -61,19 +61,19 @@ fn opponent([x, y, z]: [f64; 3]) -> [f64; 3] {
     [LIGHTNESS_SCALE * y - LIGHTNESS_OFFSET, RED_GREEN_SCALE * (x - y), BLUE_YELLOW_SCALE * (y - z)]
 }
 
-/// sRGB in 0..1 to YCxCz, the linear opponent space in which the eye's blur is applied.
+/// Converts sRGB in 0..1 to YCxCz, the linear opponent space in which the blur is applied.
 pub(super) fn srgb_to_ycxcz(srgb: [f64; 3]) -> [f64; 3] {
     opponent(white_balanced(srgb.map(linear)))
 }
 
-/// YCxCz to linear sRGB clipped to 0..1.
+/// Converts YCxCz to linear sRGB clipped to 0..1.
 pub(super) fn ycxcz_to_rgb([y, cx, cz]: [f64; 3]) -> [f64; 3] {
     let y = (y + LIGHTNESS_OFFSET) / LIGHTNESS_SCALE;
     let xyz = [(y + cx / RED_GREEN_SCALE) * WHITE[0], y * WHITE[1], (y - cz / BLUE_YELLOW_SCALE) * WHITE[2]];
     times(&XYZ_TO_RGB, xyz).map(|value| value.clamp(0.0, 1.0))
 }
 
-/// Linear sRGB to L*a*b* with chroma scaled by the Hunt effect.
+/// Converts linear sRGB to L*a*b* with chroma scaled by the Hunt effect.
 pub(super) fn rgb_to_hunt_lab(rgb: [f64; 3]) -> [f64; 3] {
     let curve = |value: f64| {
         if value > LAB_DELTA * LAB_DELTA * LAB_DELTA {
@@ -86,8 +86,8 @@ pub(super) fn rgb_to_hunt_lab(rgb: [f64; 3]) -> [f64; 3] {
     [lightness, HUNT * lightness * a, HUNT * lightness * b]
 }
 
-/// Distance of two colours that may be far apart: city block in lightness, Euclidean in chroma
-/// (Abasi et al. 2020).
+/// Returns the distance of two colours that may differ much: city block in lightness, Euclidean in chroma (Abasi et
+/// al. 2020).
 pub(super) fn hyab(p: [f64; 3], q: [f64; 3]) -> f64 {
     let (a, b) = (p[1] - q[1], p[2] - q[2]);
     (p[0] - q[0]).abs() + (a * a + b * b).sqrt()

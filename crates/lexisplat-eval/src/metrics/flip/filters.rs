@@ -1,4 +1,5 @@
-//! Filters of FLIP: what the eye blurs at this distance, and edges and points as wide as it sees them.
+//! Filters of FLIP: the blur of the eye at the viewing distance, and detectors of edges and points as wide as the
+//! eye sees them.
 
 use std::f64::consts::PI;
 
@@ -16,7 +17,7 @@ const ACHROMATIC: (f64, f64) = (1.0, 0.0047);
 const RED_GREEN: (f64, f64) = (1.0, 0.0053);
 /// `(a, b)` of both Gaussians of Cz.
 const BLUE_YELLOW: [(f64, f64); 2] = [(34.1, 0.04), (13.5, 0.025)];
-/// Largest `b`, which sets the radius of all of them.
+/// Largest `b`. It sets the radius of all filters.
 const WIDEST: f64 = 0.04;
 /// Filters end after this many standard deviations.
 const DEVIATIONS: f64 = 3.0;
@@ -29,7 +30,7 @@ pub(super) fn pixels_per_degree() -> f64 {
     DISTANCE * (SCREEN_PIXELS / SCREEN_METRES) * (PI / 180.0)
 }
 
-/// Weights along one axis of the blur of each channel; all have the same odd length. Y and Cx are the product
+/// Weights along one axis of the blur of each channel. All have the same odd length. Y and Cx are the product
 /// of their weights down and across. Cz is the sum of two such products.
 pub(super) struct Blur {
     pub(super) y: Vec<f64>,
@@ -60,7 +61,7 @@ impl Blur {
     }
 }
 
-/// Weights along one axis of the feature detectors; all have the same odd length.
+/// Weights along one axis of the feature detectors. All have the same odd length.
 pub(super) struct Features {
     /// A Gaussian that sums to 1.
     pub(super) smooth: Vec<f64>,

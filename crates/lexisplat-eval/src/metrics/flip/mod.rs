@@ -16,15 +16,16 @@ use crate::error::Result;
 
 /// Exponent that compresses colour differences (`gqc`).
 const COLOUR_EXPONENT: f64 = 0.7;
-/// Colour differences up to this share of the largest are told apart finely (`gpc`).
+/// Share of the largest colour difference up to which differences are resolved finely (`gpc`).
 const COLOUR_KNEE: f64 = 0.4;
-/// What the knee maps to (`gpt`).
+/// Value that this share maps to (`gpt`).
 const COLOUR_KNEE_TO: f64 = 0.95;
 /// Exponent that raises feature differences (`gqf`).
 const FEATURE_EXPONENT: f64 = 0.5;
 
-/// Mean FLIP over all pixels of `test` beside `reference`, both sRGB, seen from 0.7 m on a screen of 0.7 m and
-/// 3840 pixels (67 pixels per degree, FLIP's default): 0 for identical pictures, at most 1. Symmetric.
+/// Returns the mean FLIP over all pixels of `test` and `reference`, both sRGB: 0 for identical pictures, at most 1.
+/// Symmetric. The pictures are seen from 0.7 m on a screen of 0.7 m and 3840 pixels (67 pixels per degree), which is
+/// FLIP's default.
 ///
 /// # Errors
 /// [`crate::Error::Parameter`] if the sizes differ or a picture is empty.
@@ -47,7 +48,7 @@ pub fn flip(reference: &Image, test: &Image) -> Result<f64> {
     Ok(sum / (width * height) as f64)
 }
 
-/// What does not depend on the pictures.
+/// Constants that do not depend on the pictures.
 struct Filters {
     blur: Blur,
     features: Features,
@@ -65,17 +66,17 @@ static FILTERS: LazyLock<Filters> = LazyLock::new(|| {
     }
 });
 
-/// A pixel as the eye takes it in.
+/// A pixel as the eye sees it.
 struct Seen {
     /// L*a*b* with the Hunt effect.
     lab: [f64; 3],
-    /// Strength of the edge here.
+    /// Strength of an edge at the pixel.
     edge: f64,
-    /// Strength of the point here.
+    /// Strength of a point at the pixel.
     point: f64,
 }
 
-/// FLIP of one pixel.
+/// Returns the FLIP of one pixel.
 fn pixel(a: Seen, b: Seen, largest: f64) -> f64 {
     let difference = hyab(a.lab, b.lab).powf(COLOUR_EXPONENT);
     let knee = COLOUR_KNEE * largest;
@@ -88,7 +89,7 @@ fn pixel(a: Seen, b: Seen, largest: f64) -> f64 {
     colour.powf(1.0 - feature.powf(FEATURE_EXPONENT))
 }
 
-/// Filtered rows of one picture. Outside the picture its border goes on.
+/// Filtered rows of one picture. Its border is repeated outside of it.
 struct Row {
     /// Filtered down the columns, the border repeated to each side: Y, Cx, Cz twice.
     blurred: [Vec<f64>; 4],

@@ -3,30 +3,30 @@
 use super::gemm::{Sizes, Store, multiply};
 use super::map::{Map, windows};
 
-/// Output pixels multiplied at a time, about: enough to pay for packing the weights, few enough to share out.
+/// Output pixels of one product, about. Fewer do not pay for packing the weights. More leave threads without work.
 const BLOCK_PIXELS: usize = 512;
-/// Blocks a map is cut into at least, so that small maps use all cores too.
+/// Number of blocks that a map is cut into at least, so that small maps use all cores.
 const MIN_BLOCKS: usize = 8;
 
 /// Shape of a convolution.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct ConvShape {
-    /// Its number in torchvision's `features`, by which its tensors are named.
+    /// Number in torchvision's `features`, which is in the names of its tensors.
     pub(super) index: usize,
-    /// Features of a pixel going in.
+    /// Number of features of an input pixel.
     pub(super) inputs: usize,
-    /// Features of a pixel coming out.
+    /// Number of features of an output pixel.
     pub(super) outputs: usize,
     /// Side of the window in pixels.
     pub(super) side: usize,
     /// Pixels from one window to the next.
     pub(super) stride: usize,
-    /// Zeros put around the map, in pixels.
+    /// Width of the border of zeros around the map, in pixels.
     pub(super) padding: usize,
 }
 
 impl ConvShape {
-    /// Shape of the weights as PyTorch has them.
+    /// Returns the shape of the weights in PyTorch.
     pub(super) fn weight_shape(&self) -> [usize; 4] {
         [self.outputs, self.inputs, self.side, self.side]
     }
@@ -36,14 +36,14 @@ impl ConvShape {
 #[derive(Debug)]
 pub(super) struct Conv {
     pub(super) shape: ConvShape,
-    /// For each row of the window, and each pixel of the row, and each input: a weight for each output.
+    /// Weights by row of the window, pixel of the row, input and output.
     weights: Vec<f32>,
     bias: Vec<f32>,
 }
 
 impl Conv {
-    /// A convolution from weights in PyTorch's order: output, input, row, column. Both are as long as `shape`
-    /// says.
+    /// Returns the convolution with weights in PyTorch's order: output, input, row, column. Weights and biases have
+    /// the lengths that `shape` says.
     pub(super) fn new(shape: ConvShape, weights: &[f32], bias: Vec<f32>) -> Self {
         let ConvShape { inputs, outputs, side, .. } = shape;
         let window = side * side;
@@ -57,11 +57,11 @@ impl Conv {
         Self { shape, weights: ordered, bias }
     }
 
-    /// The layer's output, with `padding` zeros around it. `None` if not one window fits. The border of `input`
-    /// is as wide as this layer's padding.
+    /// Returns the output of the layer with a border of `padding` zeros, or `None` if no window fits. The border of
+    /// `input` is as wide as the padding of this layer.
     ///
-    /// Nothing is gathered. Pixels of a window's row lie together, so the rows of one matrix product overlap:
-    /// a product a row of the window, added up. Blocks of several output rows go in one product, borders and all.
+    /// The pixels of a window's row lie together in memory. So each row of the window is one matrix product, whose
+    /// input rows overlap, and the products are added. One product covers several output rows with their borders.
     pub(super) fn apply(&self, input: &Map, padding: usize) -> Option<Map> {
         let ConvShape { inputs, outputs, side, stride, .. } = self.shape;
         let padded = input.width + 2 * input.padding;
@@ -108,7 +108,7 @@ mod tests {
         (0..count).map(|_| next()).collect()
     }
 
-    /// The definition, in `f64`.
+    /// The convolution by its definition, in `f64`.
     fn naive(shape: ConvShape, weights: &[f32], bias: &[f32], input: &Map) -> Vec<f64> {
         let ConvShape { inputs, outputs, side, stride, padding, .. } = shape;
         let (width, height) = (

@@ -1,4 +1,4 @@
-//! Products of matrices in `f32`: the one place that hands pointers to `matrixmultiply`.
+//! Products of matrices in `f32`. Only this file gives pointers to `matrixmultiply`.
 #![expect(unsafe_code, reason = "matrixmultiply::sgemm takes pointers; bounds are asserted before the call")]
 
 /// Sizes of a product: a matrix of `rows` x `depth` times one of `depth` x `columns`.
@@ -9,15 +9,15 @@ pub(super) struct Sizes {
     pub(super) columns: usize,
 }
 
-/// Whether a product replaces what is there or is added to it.
+/// Whether a product replaces the output or is added to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Store {
     Replace,
     Add,
 }
 
-/// Puts the product of `a` and `b` into `out`. Rows of `a` begin `step` entries apart and may overlap; `b` and
-/// `out` are dense, row by row. Every entry of `out` is summed in an order that depends on `sizes` alone.
+/// Writes the product of `a` and `b` to `out`. Rows of `a` begin `step` entries apart and may overlap. `b` and `out`
+/// are dense, row by row. The order of each sum depends only on `sizes`.
 ///
 /// # Panics
 /// If a slice is too short for `sizes`.

@@ -2,41 +2,41 @@
 
 use rayon::prelude::*;
 
-/// Features of every pixel, with a border of zeros for the layer that reads them.
+/// Features of all pixels, with a border of zeros for the layer that reads them.
 #[derive(Debug, Clone)]
 pub(super) struct Map {
-    /// Pixels in a row, borders not counted.
+    /// Pixels in a row, without borders.
     pub(super) width: usize,
-    /// Rows, borders not counted.
+    /// Number of rows, without borders.
     pub(super) height: usize,
-    /// Features of a pixel.
+    /// Number of features of a pixel.
     pub(super) channels: usize,
-    /// Zeros to each side, in pixels.
+    /// Width of the border, in pixels.
     pub(super) padding: usize,
-    /// Rows from the top, borders included; a pixel's features lie together.
+    /// Rows from the top, with borders. The features of a pixel lie together.
     pub(super) values: Vec<f32>,
 }
 
 impl Map {
-    /// A map of zeros.
+    /// Returns a map of zeros.
     pub(super) fn zeros(width: usize, height: usize, channels: usize, padding: usize) -> Self {
         let values = vec![0.0; (width + 2 * padding) * (height + 2 * padding) * channels];
         Self { width, height, channels, padding, values }
     }
 
-    /// Entries from one row to the next.
+    /// Returns the number of entries from one row to the next.
     pub(super) fn row_entries(&self) -> usize {
         (self.width + 2 * self.padding) * self.channels
     }
 
-    /// Features of row `y`, without its borders.
+    /// Returns the features of row `y`, without borders.
     pub(super) fn row(&self, y: usize) -> &[f32] {
         let start = (y + self.padding) * self.row_entries() + self.padding * self.channels;
         &self.values[start..start + self.width * self.channels]
     }
 
-    /// Calls `f` on blocks of `rows` rows, in parallel, each with scratch memory of its thread, the number of
-    /// the first row, and the rows with their borders.
+    /// Calls `f` on blocks of `rows` rows in parallel. `f` is given scratch memory of its thread, the index of the
+    /// first row, and the rows with their borders.
     pub(super) fn fill_blocks<S>(
         &mut self,
         rows: usize,
@@ -51,8 +51,8 @@ impl Map {
             .for_each_init(scratch, |scratch, (block, values)| f(scratch, block * rows, values));
     }
 
-    /// The largest of every window of `side` x `side`, `stride` apart, those that leave the map left out
-    /// (`torch.nn.MaxPool2d`). `None` if not one window fits.
+    /// Returns the largest value of every window of `side` x `side` within the map, `stride` apart
+    /// (`torch.nn.MaxPool2d`), or `None` if no window fits.
     pub(super) fn max_pool(&self, side: usize, stride: usize, padding: usize) -> Option<Self> {
         let (width, height) = (windows(self.width, side, stride)?, windows(self.height, side, stride)?);
         let channels = self.channels;
@@ -79,7 +79,7 @@ impl Map {
     }
 }
 
-/// Windows of `side` that fit into `length` when `stride` apart.
+/// Returns the number of windows of `side`, `stride` apart, that fit into `length`.
 pub(super) fn windows(length: usize, side: usize, stride: usize) -> Option<usize> {
     Some(length.checked_sub(side)? / stride + 1)
 }

@@ -1,5 +1,5 @@
 //! LPIPS, version 0.1: Zhang et al., "The Unreasonable Effectiveness of Deep Features as a Perceptual Metric",
-//! 2018, as the `lpips` package 0.1.4 computes it. No weights come with this crate; [`Lpips::load`] reads them.
+//! 2018, as the `lpips` package 0.1.4 computes it. This crate has no weights. [`Lpips::load`] reads them.
 
 mod conv;
 mod gemm;
@@ -19,43 +19,42 @@ use super::rows::sum_rows;
 use super::{clip, same_size};
 use crate::error::{Error, Result};
 
-/// Added to the length of a pixel's features before dividing by it (`lpips.normalize_tensor`).
+/// Term added to the length of a pixel's features before the division by it (`lpips.normalize_tensor`).
 const EPSILON: f64 = 1e-10;
-/// Taken off each colour (`lpips.ScalingLayer`), for pictures in -1..1.
+/// Value subtracted from each colour (`lpips.ScalingLayer`), for pictures in -1..1.
 const SHIFT: [f32; COLOURS] = [-0.030, -0.088, -0.188];
-/// What each colour is then divided by (the same).
+/// Divisor of each colour after that (`lpips.ScalingLayer`).
 const SCALE: [f32; COLOURS] = [0.458, 0.448, 0.450];
-/// Sums kept apart while adding over features.
+/// Number of partial sums over features.
 const LANES: usize = 8;
 
-/// How pixel values are mapped before the network sees them.
+/// Range of the pixel values that the network is given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Range {
-    /// 0..1 to -1..1, which the constants are for: what the `lpips` package gives.
+    /// -1..1, which the constants are for. The `lpips` package uses it.
     Standard,
-    /// Left in 0..1: what the 3DGS repository's `metrics.py` gives, and tables of 3DGS papers print (issue 1239
-    /// there).
+    /// 0..1. `metrics.py` of the 3DGS repository uses it, so tables of 3DGS papers print it (its issue 1239).
     Inria,
 }
 
-/// A network with weights, ready to compare pictures.
+/// A network with weights that compares pictures.
 pub struct Lpips {
     network: Network,
     stages: Vec<Layers>,
 }
 
-/// One stage: its output is compared.
+/// A stage of the network. Its output is compared.
 struct Layers {
     pool: Option<Pool>,
     convs: Vec<Conv>,
-    /// How much each feature counts.
+    /// Weight of each feature.
     linear: Vec<f32>,
-    /// Border of the output, for the next layer to read.
+    /// Border of the output that the next layer needs, in pixels.
     padding_after: usize,
 }
 
-/// What a network makes of a picture, kept to compare several others with it. VGG16 keeps 122 floats a pixel:
-/// 52 MB for 400 x 266 pixels, 0.83 GB for 1600 x 1066.
+/// Features of a picture that several others are compared with. VGG16 has 122 floats a pixel: 52 MB for 400 x 266
+/// pixels, 0.83 GB for 1600 x 1066.
 #[derive(Clone)]
 pub struct Features {
     network: Network,
@@ -65,7 +64,7 @@ pub struct Features {
 }
 
 impl Lpips {
-    /// Puts together what `get` has by name and shape.
+    /// Returns the network with the weights that `get` returns by name and shape.
     fn build(network: Network, mut get: impl FnMut(&str, &[usize]) -> Result<Vec<f32>>) -> Result<Self> {
         let shapes = network.stages();
         let mut stages = Vec::with_capacity(STAGES);
@@ -88,14 +87,14 @@ impl Lpips {
         Ok(Self { network, stages })
     }
 
-    /// Which network this is.
+    /// Returns the network.
     #[must_use]
     pub fn network(&self) -> Network {
         self.network
     }
 
-    /// LPIPS of two pictures: 0 if the network sees no difference. Symmetric. In `f32`, so good to five
-    /// digits or so. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x 1066.
+    /// Returns the LPIPS of two pictures: 0 if all features are equal. Symmetric. It is computed in `f32` and right to
+    /// about five digits. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x 1066.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the sizes differ, a picture is smaller than [`Network::min_size`], or the weights
@@ -111,7 +110,7 @@ impl Lpips {
         self.finite(total)
     }
 
-    /// What the network makes of `image`.
+    /// Returns the features of `image`.
     ///
     /// # Errors
     /// [`Error::Parameter`] if the picture's pixels do not fill it or it is smaller than
@@ -127,11 +126,10 @@ impl Lpips {
         Ok(Features { network: self.network, range, size: (image.width, image.height), maps })
     }
 
-    /// [`Self::distance`] of `image` to the picture that `reference` was made of, by this network and with
-    /// these weights: the same number for half the work.
+    /// Returns the [`Self::distance`] of `image` to the picture of `reference`, for half the work.
     ///
     /// # Errors
-    /// [`Error::Parameter`] as for [`Self::distance`], and if another network made `reference`.
+    /// [`Error::Parameter`] as [`Self::distance`], and if `reference` is of another network.
     pub fn distance_to(&self, reference: &Features, image: &Image) -> Result<f64> {
         same_size(image, image)?;
         if reference.network != self.network {
@@ -155,7 +153,7 @@ impl Lpips {
         self.finite(total)
     }
 
-    /// The picture as the first layer reads it.
+    /// Returns the picture as the first layer reads it.
     fn input(&self, image: &Image, range: Range) -> Result<Map> {
         if image.width.min(image.height) < self.network.min_size() {
             return Err(self.too_small(image.width, image.height));
@@ -180,7 +178,7 @@ impl Lpips {
         Ok(map)
     }
 
-    /// One stage.
+    /// Returns the output of a stage.
     fn run(&self, layers: &Layers, mut map: Map) -> Result<Map> {
         let (width, height) = (map.width, map.height);
         let small = || self.too_small(width, height);
@@ -228,8 +226,8 @@ impl fmt::Debug for Features {
     }
 }
 
-/// Squared difference of the features of each pixel, each picture's scaled to length 1, weighted by feature;
-/// the mean over pixels.
+/// Returns the mean over pixels of the weighted squared difference of features. The features of each pixel are scaled
+/// to length 1 first.
 fn difference(a: &Map, b: &Map, weights: &[f32]) -> f64 {
     let channels = weights.len();
     let row = |y| -> f64 {
@@ -251,7 +249,7 @@ fn length(features: &[f32]) -> f64 {
     sum_lanes(features.len(), |i| f64::from(features[i]) * f64::from(features[i])).sqrt()
 }
 
-/// The sum of `term` over `0..count`, in [`LANES`] sums that a processor can do at once.
+/// Returns the sum of `term` over `0..count`, in [`LANES`] partial sums that a processor can compute at once.
 #[inline]
 fn sum_lanes(count: usize, term: impl Fn(usize) -> f64) -> f64 {
     let whole = count - count % LANES;

@@ -4,7 +4,7 @@ use std::fmt;
 
 use super::conv::ConvShape;
 
-/// Which network's features are compared.
+/// A network whose features are compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Network {
     /// VGG16 (torchvision `vgg16`).
@@ -20,23 +20,23 @@ pub(super) struct Pool {
     pub(super) stride: usize,
 }
 
-/// Layers whose output is compared.
+/// Layers of a network whose last output is compared.
 #[derive(Debug)]
 pub(super) struct Stage {
     pub(super) pool: Option<Pool>,
     pub(super) convs: Vec<ConvShape>,
 }
 
-/// Stages of both networks.
+/// Number of stages of either network.
 pub(super) const STAGES: usize = 5;
 /// Channels of a picture.
 pub(super) const COLOURS: usize = 3;
 
 impl Network {
-    /// Both.
+    /// Both networks.
     pub const ALL: [Self; 2] = [Self::Vgg, Self::Alex];
 
-    /// Name in files.
+    /// Returns the name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -45,7 +45,7 @@ impl Network {
         }
     }
 
-    /// The stages, from the picture on (torchvision `models/vgg.py`, configuration D, and
+    /// Returns the stages in order (torchvision `models/vgg.py`, configuration D, and
     /// `models/alexnet.py`; cut as in `lpips/pretrained_networks.py`).
     pub(super) fn stages(self) -> [Stage; STAGES] {
         match self {
@@ -54,7 +54,7 @@ impl Network {
         }
     }
 
-    /// Smallest picture, in pixels either way, that reaches the last stage.
+    /// Returns the smallest width and height of a picture that reaches the last stage, in pixels.
     #[must_use]
     pub fn min_size(self) -> u32 {
         match self {

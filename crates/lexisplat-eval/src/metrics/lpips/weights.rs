@@ -1,8 +1,8 @@
 //! Weights of a network and of LPIPS, read from safetensors.
 //!
 //! Tensors have the names of the published files: `features.N.weight` and `.bias` as in torchvision,
-//! `linN.model.1.weight` as in the `lpips` package. Metadata `network` says `vgg` or `alex`; without it, the
-//! first layer's shape tells. Other tensors are not looked at. `scripts/lpips_weights.py` writes such files.
+//! `linN.model.1.weight` as in the `lpips` package. The metadata key `network` is `vgg` or `alex`. Without it
+//! the shape of the first layer tells. Other tensors are ignored. `scripts/lpips_weights.py` writes such files.
 
 use std::fs::File;
 use std::io::Read;
@@ -14,21 +14,21 @@ use super::Lpips;
 use super::network::Network;
 use crate::error::{Error, Result};
 
-/// Largest file read, in bytes. VGG16 with all its layers has 0.55 GB.
+/// Largest file that is read, in bytes. VGG16 with all its layers has 0.55 GB.
 const MAX_BYTES: u64 = 1 << 30;
 /// Metadata key that names the network.
 const NETWORK_KEY: &str = "network";
 /// Tensor whose shape tells the networks apart.
 const FIRST_TENSOR: &str = "features.0.weight";
-/// What to do about a file that will not do.
+/// Advice for a file that cannot be used.
 const ADVICE: &str = "scripts/lpips_weights.py writes such files";
 
 impl Lpips {
     /// Reads the weights of a network and of LPIPS from a safetensors file (see the module's notes on names).
     ///
     /// # Errors
-    /// [`Error::Io`] if the file cannot be read; [`Error::Limit`] if it has more than 1 GiB; [`Error::Format`]
-    /// if it is not safetensors, or a tensor is missing, not F32, of the wrong shape, or holds NaN or infinity.
+    /// [`Error::Io`] if the file cannot be read. [`Error::Limit`] if it has more than 1 GiB. [`Error::Format`] if it
+    /// is not safetensors, or a tensor is missing, not F32, of the wrong shape, or holds NaN or infinity.
     pub fn load(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let io = |e| Error::io(path, e);
@@ -47,7 +47,7 @@ impl Lpips {
         Self::from_bytes(&path.display().to_string(), &bytes)
     }
 
-    /// [`Self::load`] of a file in memory; errors call it `file`.
+    /// Reads weights from a file in memory, as [`Self::load`] does. Errors call it `file`.
     ///
     /// # Errors
     /// [`Error::Format`] as for [`Self::load`].
@@ -77,7 +77,7 @@ impl Reader<'_> {
         Error::format(self.file, format!("{problem}; {ADVICE}"))
     }
 
-    /// The network whose first layer this is.
+    /// Returns the network whose first layer has these weights.
     fn guess(&self) -> Result<Network> {
         let missing = |e| self.wrong(format!("no metadata '{NETWORK_KEY}' and {e}"));
         let tensor = self.tensors.tensor(FIRST_TENSOR).map_err(missing)?;

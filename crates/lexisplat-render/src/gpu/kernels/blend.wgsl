@@ -1,7 +1,8 @@
-// Draws tiles: each group one tile, each lane one pixel, splats from front to back. Twin: `cpu::blend`.
+// Draws tiles as `cpu::blend` does. Each group draws one tile, and each lane one pixel, with the splats from
+// front to back.
 @group(0) @binding(7) var<storage, read_write> pixels: array<vec4<f32>>;
 
-// A batch of splats: centre and the conic's xx and xy; its yy and opacity; colour.
+// A batch of splats: the centre with the conic's xx and xy; the conic's yy with the opacity; the colour.
 var<workgroup> batch_centre: array<vec4<f32>, GROUP>;
 var<workgroup> batch_conic: array<vec2<f32>, GROUP>;
 var<workgroup> batch_colour: array<vec3<f32>, GROUP>;

@@ -1,4 +1,4 @@
-// What is the same for a whole picture. Twin: `gpu::uniforms::Frame`.
+// Values that are the same for a whole picture, laid out as `gpu::uniforms::FrameUniform`.
 struct Frame {
     // World directions of the camera: rows of the world-to-view rotation.
     right: vec3<f32>,
@@ -14,7 +14,7 @@ struct Frame {
     // 1 for the anti-aliased rules.
     antialiased: u32,
     background: vec3<f32>,
-    // Slots for Gaussians that may be seen.
+    // Number of slots for Gaussians that may be visible.
     slots: u32,
     // Tangents of half the field of view.
     tangents: vec2<f32>,
@@ -26,27 +26,27 @@ struct Frame {
     // Blocks of Gaussians in the scene.
     blocks: u32,
     chunks: u32,
-    // Room for entries of the tiles' lists.
+    // Number of entries that the buffers of the tiles' lists hold.
     entries: u32,
     padding: u32,
 }
 
-// A part of the scene that fits in one binding. Twin: `gpu::uniforms::Chunk`.
+// A part of the scene that fits in one binding, laid out as `gpu::uniforms::ChunkUniform`.
 struct Chunk {
-    // Its first Gaussian, a multiple of GROUP, and how many.
+    // Its first Gaussian, a multiple of GROUP, and the number of them.
     first: u32,
     count: u32,
-    // Its first block of GROUP Gaussians, and how many.
+    // Its first block of GROUP Gaussians, and the number of them.
     first_block: u32,
     blocks: u32,
-    // Where in `columns` the numbers of its escaped Gaussians begin, and how many.
+    // Where in `columns` the numbers of its escaped Gaussians begin, and how many there are.
     escapes_at: u32,
     escapes: u32,
     padding_a: u32,
     padding_b: u32,
 }
 
-// Rows of tiles drawn at once. Twin: `gpu::uniforms::Band`.
+// Rows of tiles drawn at once, laid out as `gpu::uniforms::Band`.
 struct Band {
     first: u32,
     rows: u32,
@@ -54,7 +54,7 @@ struct Band {
     padding: u32,
 }
 
-// The group's number where there are more than fit in one dimension.
+// The number of the workgroup. A dispatch has two dimensions where one does not hold all groups.
 fn group_number(group: vec3<u32>, groups: vec3<u32>) -> u32 {
     return group.x + group.y * groups.x;
 }

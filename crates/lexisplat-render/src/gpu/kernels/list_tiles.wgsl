@@ -29,7 +29,7 @@ fn list_tiles(
             at++;
         }
     }
-    // Another compilation of the same sums may round otherwise; what is left over belongs to no tile.
+    // The same sums, compiled for another kernel, may round differently. Entries left over belong to no tile.
     for (; at < end; at++) {
         entry_tiles[at] = band.tiles;
         entry_slots[at] = slot;

@@ -1,41 +1,41 @@
-// How a tile's pixels change with its splats: sums over pixels, for each splat. Each group one tile; lanes
-// are pixels while they draw, and share the pixels of one splat while they sum. Twin: `cpu::moments`.
-// Where each entry's moments belong.
+// Sums, for each splat of a tile, how the tile's pixels change with it, as `cpu::moments` does. Each group has
+// one tile. While drawing, each lane has one pixel; while summing, lanes share the pixels of one splat.
+// The place of each entry in the lists, where its moments belong.
 @group(0) @binding(7) var<storage, read> entry_places: array<u32>;
-// The finished picture over black.
+// The finished picture, over black.
 @group(0) @binding(8) var<storage, read> pixels: array<vec4<f32>>;
-// Zeros, where nothing shows.
+// The moments of each entry. They are zeros at first, and stay so where nothing shows.
 @group(0) @binding(9) var<storage, read_write> moments: array<f32>;
 
-// Numbers a splat has for each pixel.
+// The numbers that a splat has for each pixel.
 const PARTS: u32 = 3u;
-// Lanes that share a splat while summing, and pixels each of them looks at.
+// The lanes that share a splat while summing, and the pixels that each of them sums.
 const SHARERS: u32 = GROUP / MOMENT_SPLATS;
 const SHARE: u32 = GROUP / SHARERS;
 
-// A batch of splats: centre and the conic's xx and xy; its yy, opacity, red and green; blue; the last
-// diagonal element of the conic's root; place.
+// A batch of splats: the centre with the conic's xx and xy; the conic's yy with the opacity, red and green;
+// blue; the last diagonal element of the conic's root; the place in the lists.
 var<workgroup> batch_centre: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_conic: array<vec4<f32>, MOMENT_BATCH>;
 var<workgroup> batch_blue: array<f32, MOMENT_BATCH>;
 var<workgroup> batch_root: array<f32, MOMENT_BATCH>;
 var<workgroup> batch_place: array<u32, MOMENT_BATCH>;
-// First the numbers of every pixel for some splats, then the moments that every lane sums.
+// At first the numbers of every pixel for some splats, then the moments that every lane has summed.
 var<workgroup> scratch: array<f32, PARTS * MOMENT_SPLATS * GROUP>;
-// One bit for each of those splats: it shows.
+// One bit for each of those splats, set if the splat shows.
 var<workgroup> shown: atomic<u32>;
 
 struct Pixel {
     at: vec2<f32>,
     picture: vec3<f32>,
-    // What has been drawn so far.
+    // The colour drawn so far.
     colour: vec3<f32>,
     transmittance: f32,
     finished: bool,
 }
 
-// Draws splat `k` of the batch as `blend` does. The squared derivative by one channel of its colour, g, and
-// the largest change of a channel when it is left out; zeros where it does not show.
+// Draws splat `k` of the batch as `blend` does. Returns the squared derivative by one channel of its colour; g;
+// and the largest change of a channel when the splat is left out. All are 0 where it does not show.
 fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
     let conic = batch_conic[k];
     let alpha = alpha_at(batch_centre[k], conic.x, conic.y, (*pixel).at);
@@ -52,7 +52,7 @@ fn draw(pixel: ptr<function, Pixel>, k: u32) -> vec3<f32> {
     (*pixel).colour += own;
     (*pixel).transmittance = left;
     let behind = (*pixel).picture - (*pixel).colour;
-    // alpha / (1 - alpha): what of the light behind one more unit of ln alpha takes away.
+    // alpha / (1 - alpha) is the share of the light behind that one more unit of ln alpha takes away.
     let change = own - behind * (alpha / (1.0 - alpha));
     let sizes = abs(change);
     return vec3<f32>(weight * weight, dot(change, change), max(sizes.x, max(sizes.y, sizes.z)));
@@ -81,7 +81,7 @@ fn tile_moments(
     if inside {
         pixel.picture = pixels[(row + at.y) * frame.width + left + at.x].xyz;
     }
-    // While summing.
+    // These are used while summing.
     let splat = lane / SHARERS;
     let sharer = lane % SHARERS;
     for (var first = entries.x; first < entries.y; first += MOMENT_BATCH) {
@@ -122,7 +122,7 @@ fn tile_moments(
             var rest = vec3<f32>(0.0);
             if own {
                 let centre = batch_centre[k + splat];
-                // The conic's root, upper triangular. Twin: `cpu::project::Root`.
+                // The conic's root, which is upper triangular: `cpu::project::Root`.
                 let xx = sqrt(centre.z);
                 let xy = centre.w / xx;
                 let yy = batch_root[k + splat];
@@ -164,7 +164,7 @@ fn tile_moments(
                 let which = lane % MOMENTS;
                 var sum = 0.0;
                 for (var p = 0u; p < SHARERS; p++) {
-                    // Lanes begin at different places, which lie in different banks.
+                    // Lanes begin at different places, so that they read from different banks.
                     let value = scratch[which * GROUP + summed * SHARERS + (p + lane) % SHARERS];
                     sum = select(sum + value, max(sum, value), which == MOMENT_SUMS);
                 }

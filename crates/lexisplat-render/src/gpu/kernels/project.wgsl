@@ -1,18 +1,18 @@
-// From Gaussians in the world to ellipses on screen. Twin: `cpu::project`.
+// Projects Gaussians in the world to ellipses on screen, as `cpu::project` does.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> starts: array<u32>;
 @group(0) @binding(3) var<storage, read> gaussians: array<u32>;
 @group(0) @binding(4) var<storage, read> bodies: array<vec4<f32>>;
-// Log scales and opacity logit, then the quaternion (w, x, y, z).
+// The log scales and the opacity logit, then the quaternion (w, x, y, z).
 @group(0) @binding(5) var<storage, read> shapes: array<vec4<f32>>;
-// Centre and the conic's xx and xy.
+// The centre, and the conic's xx and xy.
 @group(0) @binding(6) var<storage, read_write> centres: array<vec4<f32>>;
-// The conic's yy and determinant, opacity, and the level of the quadratic form beyond which opacity is
-// surely below ALPHA_MIN.
+// The conic's yy and determinant, the opacity, and the level of the quadratic form beyond which the opacity is
+// below ALPHA_MIN for sure.
 @group(0) @binding(7) var<storage, read_write> conics: array<vec4<f32>>;
 @group(0) @binding(8) var<storage, read_write> keys: array<u32>;
-// Tiles it may touch: first and end, each column + row * 2^16.
+// The tiles that it may touch: the first, and the first after them, each as column + row * 2^16.
 @group(0) @binding(9) var<storage, read_write> rects: array<vec2<u32>>;
 
 // One of the three standard deviations, as a vector on screen.
@@ -40,7 +40,7 @@ fn project(
     if slot >= end {
         return;
     }
-    // Until proven otherwise it touches no tile, and comes last.
+    // A slot that is left out touches no tile, and comes last in the order.
     keys[slot] = KEY_LAST;
     rects[slot] = vec2<u32>(0u);
     let i = gaussians[slot] - chunk.first;
@@ -96,10 +96,10 @@ fn project(
     let level = 2.0 * (log(opacity / ALPHA_MIN) + POWER_SLACK);
     let grid = vec2<f32>(f32(frame.columns), f32(frame.rows));
     let tile = f32(TILE);
-    // INRIA's getRect; truncation is toward zero, and clamped numbers are not negative.
+    // INRIA's getRect. It truncates toward zero, which is the floor here: clamped numbers are not negative.
     let low = floor(clamp((centre - radius) / tile, vec2<f32>(0.0), grid));
     let high = floor(clamp((centre + radius + (tile - 1.0)) / tile, vec2<f32>(0.0), grid));
-    // Tiles with a pixel that the ellipse of `level` reaches, or a few more.
+    // The tiles with a pixel that the ellipse of `level` reaches, or a few more.
     let reach = sqrt(level * vec2<f32>(a, c)) * (1.0 + REACH_SLACK) + REACH_MARGIN;
     let least = max(low, ceil(clamp((centre - reach - (tile - 1.0)) / tile, vec2<f32>(0.0), grid)));
     let most = min(high, floor(clamp((centre + reach) / tile + 1.0, vec2<f32>(0.0), grid)));

@@ -1,4 +1,4 @@
-// Colour towards the camera of the Gaussians that have slots. Twin: `radiance::Radiance::colour`.
+// Works out the colour towards the camera of the Gaussians that have slots, as `radiance::Radiance::colour`.
 @group(0) @binding(0) var<uniform> frame: Frame;
 @group(0) @binding(1) var<uniform> chunk: Chunk;
 @group(0) @binding(2) var<storage, read> starts: array<u32>;
@@ -6,7 +6,7 @@
 @group(0) @binding(4) var<storage, read> bodies: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> colours: array<f32>;
 
-// The slot this lane colours, or NO_SLOT.
+// The slot that this lane colours, or NO_SLOT.
 fn slot_of(group: u32, lane: u32) -> u32 {
     let first = min(starts[chunk.first_block], frame.slots);
     let end = min(starts[chunk.first_block + chunk.blocks], frame.slots);
@@ -14,13 +14,13 @@ fn slot_of(group: u32, lane: u32) -> u32 {
     return select(NO_SLOT, slot, slot < end);
 }
 
-// From the camera to the Gaussian. INRIA's and the CPU's is not guarded against length 0 either: such a
-// Gaussian is not in front of the camera.
+// The direction from the camera to the Gaussian. A length of 0 needs no guard: such a Gaussian is not in front
+// of the camera. INRIA's renderer and the CPU's have none either.
 fn direction_to(i: u32) -> vec3<f32> {
     return normalize(bodies[i].xyz - frame.position);
 }
 
-// Values of the basis without DC; those above the frame's degree are 0. Twin: `lexisplat::sh::rest_basis`.
+// The values of the basis without DC, as `lexisplat::sh::rest_basis`. Those above the frame's degree are 0.
 fn rest_basis(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     var b: array<f32, MAX_BASIS>;
     let x = d.x;
@@ -67,7 +67,7 @@ fn rest_basis(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     return b;
 }
 
-// Colours that overflow become NO_COLOUR, with which nothing is drawn.
+// Stores a colour. One that overflows becomes NO_COLOUR, and its splat draws nothing.
 fn write_colour(slot: u32, dc: vec3<f32>, rest: vec3<f32>) {
     let sum = COLOUR_OFFSET + SH_C0 * dc + rest;
     let finite = all(abs(sum) < vec3<f32>(FAR_LIMIT));

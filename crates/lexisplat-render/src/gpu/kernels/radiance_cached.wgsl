@@ -1,4 +1,4 @@
-// Atoms read through the cache, a vector at a time.
+// Reads atoms through the cache, a vector at a time.
 fn look(d: vec3<f32>) -> array<f32, MAX_BASIS> {
     return rest_basis(d);
 }

@@ -1,4 +1,4 @@
-// Slots as they come.
+// Colours slots in the order they have.
 @compute @workgroup_size(GROUP)
 fn radiance(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -1,4 +1,4 @@
-// Dense SH: for each Gaussian its coefficients in order, DC first, red, green and blue side by side.
+// Dense SH. A row has the coefficients of a Gaussian in order, DC first, with red, green and blue side by side.
 @group(0) @binding(6) var<storage, read> rows: array<ROW_TYPE>;
 
 @compute @workgroup_size(GROUP)

@@ -1,5 +1,5 @@
-// The group's slots ordered by nonzeros first: lanes in step then have codes of
-// like length, and none waits for a much longer one. Which of two equal ones goes first makes no difference.
+// Orders the group's slots by their number of nonzeros first. Lanes that run in step then have codes of similar
+// length, and none waits for a much longer one. The order of equal ones makes no difference.
 var<workgroup> bins: array<atomic<u32>, COUNT_BINS>;
 var<workgroup> bin_ends: array<u32, COUNT_BINS>;
 var<workgroup> ordered: array<u32, GROUP>;

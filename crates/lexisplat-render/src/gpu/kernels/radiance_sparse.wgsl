@@ -1,19 +1,20 @@
-// Sparse codes, never expanded: each atom is multiplied with the basis and only three sums are kept.
+// Sparse codes, which are never expanded: each atom is multiplied with the basis, and only three sums are kept.
 @group(0) @binding(6) var<storage, read> base_colours: array<f32>;
-// For every COLUMN_GROUP Gaussians where their nonzeros begin, in words, and a byte for each: how many, or
-// ESCAPED for one stored exactly. Numbers of escaped Gaussians follow.
+// For every COLUMN_GROUP Gaussians, the word at which their nonzeros begin, and a byte for each Gaussian: its
+// number of nonzeros, or ESCAPED if it is stored exactly. The numbers of the escaped Gaussians follow.
 @group(0) @binding(7) var<storage, read> columns: array<u32>;
-// For every COLUMN_GROUP Gaussians their atom numbers, then their values.
+// For every COLUMN_GROUP Gaussians, their atom numbers, then their values.
 @group(0) @binding(8) var<storage, read> nonzeros: array<u32>;
-// Atoms, then exact rows, ATOM_VECTORS each: coefficients in order, red, green and blue side by side.
+// The atoms, then the exact rows, of ATOM_VECTORS each: coefficients in order, with red, green and blue side by
+// side.
 @group(0) @binding(9) var<storage, read> atoms: array<vec4<f32>>;
 
 struct Column {
-    // First word of the atom numbers of the group.
+    // The first word of the group's atom numbers.
     words: u32,
-    // Words of atom numbers before the values.
+    // The number of words of atom numbers before the values.
     index_words: u32,
-    // Nonzeros of the group before the Gaussian's.
+    // The number of the group's nonzeros before those of the Gaussian.
     before: u32,
     count: u32,
     escaped: bool,
@@ -63,7 +64,7 @@ fn value_at(column: Column, k: u32) -> f32 {
     return select(pair.x, pair.y, at % 2u == 1u);
 }
 
-// Which exact row belongs to Gaussian `i` of the chunk: a binary search.
+// Finds which exact row belongs to Gaussian `i` of the chunk, by binary search.
 fn escape_of(i: u32) -> u32 {
     var low = 0u;
     var high = chunk.escapes;
@@ -82,15 +83,15 @@ fn base_colour(i: u32) -> vec3<f32> {
     return vec3<f32>(base_colours[3u * i], base_colours[3u * i + 1u], base_colours[3u * i + 2u]);
 }
 
-// Dot products of the three channels of the atom or row at `at` with the basis.
+// The dot products of the three channels of the atom or row at `at` with the basis.
 fn seen(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     // ATOM_TERMS
     return sum;
 }
 
-// Colours the Gaussian of `slot`, if it is one. The path says what `look` makes of a direction, once for a
-// Gaussian, and what `atom_seen` makes of an atom with that.
+// Colours the Gaussian of `slot`, unless that is NO_SLOT. The path defines `look`, which prepares a direction
+// once for each Gaussian, and `atom_seen`, which evaluates an atom with it.
 fn colour_slot(slot: u32) {
     if slot == NO_SLOT {
         return;

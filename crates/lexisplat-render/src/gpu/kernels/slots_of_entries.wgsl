@@ -1,7 +1,7 @@
-// The slots of entries that were sorted by their places in the lists.
+// Gives each sorted entry its slot. While measuring, the sort moves the entries' places in the lists instead.
 @group(0) @binding(0) var<storage, read> counters: array<u32>;
 @group(0) @binding(1) var<storage, read> entry_places: array<u32>;
-// In the order they were listed in.
+// The slot of each entry, in the order the entries were listed in.
 @group(0) @binding(2) var<storage, read> listed_slots: array<u32>;
 @group(0) @binding(3) var<storage, read_write> entry_slots: array<u32>;
 

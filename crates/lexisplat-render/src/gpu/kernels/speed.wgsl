@@ -1,4 +1,4 @@
-// What the card can do at best, to hold the stages against.
+// Measures what the GPU can do at best, to compare the stages with.
 @group(0) @binding(0) var<storage, read> from_here: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> to_there: array<vec4<f32>>;
 
@@ -14,7 +14,7 @@ fn copy_vectors(
     }
 }
 
-// Four independent chains of multiplications and additions, of four numbers each.
+// Runs four independent chains of multiplications and additions, of four numbers each.
 @compute @workgroup_size(GROUP)
 fn multiply_add(
     @builtin(workgroup_id) group: vec3<u32>,
@@ -34,7 +34,7 @@ fn multiply_add(
         c = c * factor + term;
         d = d * factor + term;
     }
-    // Never true; so that nothing is left out.
+    // This is never true. It keeps the compiler from leaving the work out.
     if a.x + b.y + c.z + d.w == -1.0 {
         to_there[0] = a + b + c + d;
     }

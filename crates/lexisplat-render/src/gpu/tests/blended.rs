@@ -25,7 +25,7 @@ fn tiles_are_blended_as_on_the_processor() {
         }
         let scene = Scene::from(&splats);
         let camera = made::camera(seed, 75, 50);
-        let options = RenderOptions { background, ..RenderOptions::default() };
+        let options = RenderOptions::default().with_background(background);
         let view = View::new(&gpu, &scene, &camera, &options);
         let centres: Vec<[f32; 4]> = gpu.read_back(&view.work().centres);
         let conics: Vec<[f32; 4]> = gpu.read_back(&view.work().conics);

@@ -3,7 +3,7 @@
 use lexisplat::ShDegree;
 
 use super::super::constants::GROUP;
-use super::super::source::Source;
+use super::super::sh_data::ShData;
 use super::super::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
 use super::{adapter, bits, gpu, made};
 use crate::cpu::RenderOptions;
@@ -15,9 +15,11 @@ const ROW: u64 = 192;
 
 /// A GPU whose kernels see only `binding` bytes at once.
 fn narrow(binding: u64) -> Option<Gpu> {
-    adapter::opened(Gpu::open_with(GpuChoice::Best, |limits| {
-        limits.max_storage_buffer_binding_size = binding;
-    }))
+    let reduced = Gpu::find_with(GpuChoice::Best, |limits| limits.max_storage_buffer_binding_size = binding);
+    adapter::opened(
+        pollster::block_on(reduced)
+            .and_then(|gpu| gpu.ok_or_else(|| Error::Gpu { problem: "there is no adapter".to_owned() })),
+    )
 }
 
 #[test]
@@ -48,7 +50,7 @@ fn chunks_are_whole_blocks_within_the_limit() {
     let block = GROUP as usize;
     let splats = made::scene(5, 5 * block + 7, ShDegree::THREE, false);
     let scene = Scene::from(&splats);
-    let source = Source::Dense { scene: &scene, half: false };
+    let source = ShData::Dense { scene: &scene, half: false };
     // 16 coefficients of three channels in 32 bits fill as much.
     let row = ROW * block as u64;
     assert_eq!(source.chunks(scene.len(), u64::MAX).unwrap(), vec![0..scene.len()]);
@@ -76,7 +78,7 @@ fn a_later_block_that_fits_nowhere_is_refused() {
     let none = (lexisplat::Indices::U8(Vec::new()), lexisplat::Values::F16(Vec::new()));
     let counts = vec![0; 2 * block];
     model.codes = lexisplat::SparseCodes::new(&model.dictionary, counts, none.0, none.1, escapes).unwrap();
-    let source = Source::Codes(&model);
+    let source = ShData::Codes(&model);
     let escaped = (block + 20) as u64 * ROW;
     assert_eq!(source.chunks(2 * block, escaped).unwrap().len(), 1);
     assert!(matches!(source.chunks(2 * block, escaped - 1), Err(Error::GpuLimit { .. })));

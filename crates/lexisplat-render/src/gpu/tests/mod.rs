@@ -9,13 +9,13 @@
 #[path = "../../../tests/adapter/mod.rs"]
 mod adapter;
 mod blended;
+mod capacity;
 mod chunks;
 mod lists;
 #[path = "../../../tests/made/mod.rs"]
 mod made;
 mod projected;
 mod radiance;
-mod room;
 mod visible;
 mod wgsl;
 

@@ -9,8 +9,8 @@ use super::super::constants::{COUNTERS, GROUP, SCAN_BLOCK, SORT_BLOCK};
 use super::super::plan::dimensions;
 use super::super::shaders::Kernels;
 use super::super::tests::{Random, gpu};
-use super::super::uniforms::Frame;
-use super::super::work::{Room, Work};
+use super::super::uniforms::FrameUniform;
+use super::super::work::{Capacity, Work};
 use super::*;
 
 /// The buffers for up to `slots` numbers, and what works on them.
@@ -22,11 +22,11 @@ struct Bench {
 
 impl Bench {
     fn new(gpu: &Gpu, slots: u32) -> Self {
-        let room = Room { blocks: slots, chunks: 0, slots, entries: slots, tiles: 1, pixels: 1 };
+        let capacity = Capacity { blocks: slots, chunks: 0, slots, entries: slots, tiles: 1, pixels: 1 };
         Self {
             gpu: gpu.clone(),
-            kernels: Kernels::new(gpu).unwrap(),
-            work: Work::new(gpu, room, false).unwrap(),
+            kernels: gpu.block_on(Kernels::new(gpu)).unwrap(),
+            work: gpu.block_on(Work::new(gpu, capacity, false)).unwrap(),
         }
     }
 
@@ -42,7 +42,7 @@ impl Bench {
     }
 
     fn fill(&self, buffer: &Buffer, words: &[u32]) {
-        self.gpu.write(buffer, bytemuck::cast_slice(words));
+        self.gpu.block_on(self.gpu.write(buffer, bytemuck::cast_slice(words))).unwrap();
     }
 
     fn run(&self, steps: &[Step]) {
@@ -69,16 +69,10 @@ impl Bench {
     fn count(&self, planner: &mut Planner<'_>, count: u32) {
         let work = &self.work;
         self.fill(&work.starts, &[count]);
-        self.gpu
-            .write(&work.frame, bytemuck::bytes_of(&Frame { slots: work.room.slots, ..Frame::default() }));
-        let bound = [
-            (0, all(&work.frame)),
-            (1, all(&work.starts)),
-            (2, all(&work.masks)),
-            (3, all(&work.counters)),
-            (4, all(&work.dispatches)),
-        ];
-        planner.step(&self.kernels.plan_slots, &bound, Size::Groups(1)).unwrap();
+        let frame = FrameUniform { slots: work.capacity.slots, ..FrameUniform::default() };
+        self.gpu.block_on(self.gpu.write(&work.frame, bytemuck::bytes_of(&frame))).unwrap();
+        let bound = [&work.frame, &work.starts, &work.masks, &work.counters, &work.dispatches];
+        planner.step(&self.kernels.plan_slots, all_from(0, bound), Size::Groups(1));
     }
 }
 
@@ -108,13 +102,12 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     }
     bench.fill(&bench.work.masks, &masks);
     bench.fill(&bench.work.starts, &starts);
-    let frame = Frame { blocks, slots: blocks, ..Frame::default() };
-    gpu.write(&bench.work.frame, bytemuck::bytes_of(&frame));
+    let frame = FrameUniform { blocks, slots: blocks, ..FrameUniform::default() };
+    gpu.block_on(gpu.write(&bench.work.frame, bytemuck::bytes_of(&frame))).unwrap();
     let mut planner = bench.planner();
     let work = &bench.work;
-    let bound =
-        [(0, all(&work.frame)), (1, all(&work.masks)), (2, all(&work.starts)), (3, all(&work.gaussians))];
-    planner.step(&bench.kernels.compact, &bound, Size::Groups(blocks)).unwrap();
+    let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
+    planner.step(&bench.kernels.compact, all_from(0, bound), Size::Groups(blocks));
     bench.run(&planner.steps);
     let found: Vec<u32> = gpu.read_back(&work.gaussians);
     assert!(found[..marked.len()] == marked);
@@ -130,7 +123,7 @@ fn scans_are_exclusive_sums() {
         [1, 2, GROUP, GROUP + 1, SCAN_BLOCK - 1, SCAN_BLOCK, SCAN_BLOCK + 1, 5 * SCAN_BLOCK + 7, most];
     for length in lengths {
         for fixed in [true, false] {
-            let numbers: Vec<u32> = (0..=most).map(|_| (random.next() * 1000.0) as u32).collect();
+            let numbers: Vec<u32> = (0..=most).map(|_| (random.unit() * 1000.0) as u32).collect();
             bench.fill(&bench.work.offsets, &numbers);
             let mut planner = bench.planner();
             if fixed {
@@ -182,7 +175,7 @@ fn sorts_are_stable() {
     let most = 9 * SORT_BLOCK + 3;
     let bench = Bench::new(&gpu, most);
     let mut random = Random::new(2);
-    let mut bits = || (random.next() * 65_536.0) as u32 | ((random.next() * 65_536.0) as u32) << 16;
+    let mut bits = || (random.unit() * 65_536.0) as u32 | ((random.unit() * 65_536.0) as u32) << 16;
     for length in [0, 1, 2, GROUP, GROUP + 1, SORT_BLOCK - 1, SORT_BLOCK, SORT_BLOCK + 1, most] {
         for (key_bits, distinct_bits) in [(1, 1), (4, 4), (5, 3), (8, 8), (13, 2), (32, 32), (32, 4)] {
             for identity in [true, false] {

@@ -15,7 +15,8 @@ use crate::sparse::model::Layout;
 use crate::support::error::{Error, Result};
 use crate::support::input::Input;
 use crate::support::limits::Limits;
-use crate::support::output::Output;
+use crate::support::progress::Silent;
+use crate::support::sink::Sink;
 
 /// Reads the dictionary of a dictionary file or of a .lexi scene.
 ///
@@ -56,11 +57,11 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
     read::dictionary(&checked, degree, limits)
 }
 
-/// Writes `dictionary` to `output`, whole or not at all. Returns the file's size in bytes.
+/// Writes `dictionary`. Returns the number of bytes.
 ///
 /// # Errors
-/// [`Error::Parameter`] for the empty dictionary of degree 0, [`Error::Io`] for the file.
-pub fn write_dictionary<'a>(output: impl Into<Output<'a>>, dictionary: &Dictionary) -> Result<u64> {
+/// [`Error::Parameter`] for the empty dictionary of degree 0, [`Error::Io`] for the sink.
+pub fn write_dictionary<'a>(sink: impl Into<Sink<'a>>, dictionary: &Dictionary) -> Result<u64> {
     if dictionary.is_empty() {
         return Err(Error::parameter("dictionary", "empty", "a scene with view-dependent colour"));
     }
@@ -68,5 +69,5 @@ pub fn write_dictionary<'a>(output: impl Into<Output<'a>>, dictionary: &Dictiona
     metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
     let tensor = Tensor::plain(tensor::DICTIONARY, Dtype::F32, &shape, dictionary.as_slice());
-    Draft::new(metadata, vec![tensor]).save(output.into())
+    Draft::new(metadata, vec![tensor]).save(sink.into(), &Silent)
 }

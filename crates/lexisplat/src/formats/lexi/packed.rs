@@ -1,7 +1,6 @@
 //! Packed scenes in the container: four tensors instead of one for each attribute.
 
 use std::collections::BTreeMap;
-use std::io::Write;
 
 use safetensors::Dtype;
 
@@ -14,27 +13,20 @@ use crate::packed::{CHUNK, Packed, TargetRecord};
 use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
-use crate::support::output::Output;
+use crate::support::progress::{Progress, Silent};
+use crate::support::sink::Sink;
 use crate::support::spill::Spilled;
 
 /// Gaussians a byte of a packed file stands for at most: a rotation takes at least 3 raw bits. So a lying
 /// header is refused before anything is allocated.
 const GAUSSIANS_PER_BYTE: u64 = 3;
 
-/// Writes `packed` to `output`, whole or not at all. Returns the file's size in bytes.
+/// Writes `packed`. Returns the number of bytes.
 ///
 /// # Errors
-/// [`crate::Error::Io`] for the file.
-pub fn write_packed<'a>(output: impl Into<Output<'a>>, packed: &Packed) -> Result<u64> {
-    draft(packed).save(output.into())
-}
-
-/// Writes `packed` to `writer`. Returns the number of bytes.
-///
-/// # Errors
-/// [`crate::Error::Io`], which names no file.
-pub fn write_packed_to(writer: &mut impl Write, packed: &Packed) -> Result<u64> {
-    draft(packed).stream(writer)
+/// [`crate::Error::Io`] for the sink.
+pub fn write_packed<'a>(sink: impl Into<Sink<'a>>, packed: &Packed) -> Result<u64> {
+    draft(packed).save(sink.into(), &Silent)
 }
 
 /// Bytes of the whole file as written.
@@ -161,12 +153,13 @@ pub(crate) struct SpilledPacked {
     pub(crate) extras: Extras,
 }
 
-/// Writes the file of `head`, which lacks what is in `spilled`, with `write`, which is given what to do with
-/// a writer. Returns what [`packed_tensor_bytes`] does of the whole.
+/// Writes the file of `head`, which lacks what is in `spilled`. Returns what [`packed_tensor_bytes`] does of
+/// the whole.
 pub(crate) fn write_spilled_packed(
     head: &Packed,
     spilled: SpilledPacked,
-    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
 ) -> Result<Vec<(String, u64)>> {
     let (metadata, mut tensors) = contents(head);
     let n = head.gaussians;
@@ -178,7 +171,7 @@ pub(crate) fn write_spilled_packed(
         tensors.push(Tensor::spilled(tensor::ORDER, Dtype::U32, &[n], order));
     }
     tensors.extend(spilled.extras.tensors(n)?);
-    write_tensors(metadata, tensors, write)
+    write_tensors(metadata, tensors, sink, progress)
 }
 
 fn draft(packed: &Packed) -> Draft<'_> {

@@ -6,7 +6,7 @@ use std::path::Path;
 use safetensors::Dtype;
 
 use super::exact::Exact;
-use super::schema::{EXTRA_PREFIX, FORMAT, LENGTH_BYTES, PACKED_VERSION, key, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, PACKED_VERSION, key, tensor};
 use super::tensors::Checked;
 use crate::packed::Packed;
 use crate::scene::sh::ShDegree;
@@ -25,12 +25,6 @@ use crate::support::limits::{Limits, MAX_ATOMS};
 pub fn read(path: &Path, limits: &Limits) -> Result<Model> {
     let bytes = Input::open_within(path, limits)?;
     read_bytes(&path.display().to_string(), &bytes, limits)
-}
-
-/// Whether `bytes` begin like a .lexi or other safetensors file.
-#[must_use]
-pub fn is_lexi(bytes: &[u8]) -> bool {
-    bytes.get(LENGTH_BYTES..LENGTH_BYTES + 2) == Some(b"{\"")
 }
 
 /// Reads a .lexi file that is in memory. `file` is its name in errors.

@@ -1,8 +1,6 @@
 //! The file of an exact layout made part after part: its tensors are set aside until all sizes are known.
 
 use std::collections::BTreeMap;
-use std::io::Write;
-use std::path::Path;
 
 use safetensors::Dtype;
 
@@ -16,7 +14,9 @@ use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Layout, Record};
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
-use crate::support::spill::Spill;
+use crate::support::progress::Progress;
+use crate::support::sink::Sink;
+use crate::support::spill::{Spill, SpillTo};
 
 /// Geometry and codes set aside; byte for byte what [`write`](super::write()) makes of the whole model.
 #[derive(Debug)]
@@ -41,9 +41,9 @@ pub(crate) struct SpilledModel {
 }
 
 impl SpilledModel {
-    /// Nothing yet of a scene that is like `splats`; temporary files are in `folder`.
-    pub(crate) fn new(folder: &Path, splats: &Splats, normals: bool, layout: Layout) -> Result<Self> {
-        let spill = || Spill::new(folder);
+    /// Nothing yet of a scene that is like `splats`.
+    pub(crate) fn new(to: SpillTo<'_>, splats: &Splats, normals: bool, layout: Layout) -> Result<Self> {
+        let spill = || Spill::new(to);
         let mut counts = spill()?;
         if layout == Layout::Paper {
             counts.push(&[0_i32])?;
@@ -59,7 +59,7 @@ impl SpilledModel {
             scale: spill()?,
             rotation: spill()?,
             normal: if normals { Some(spill()?) } else { None },
-            extras: Extras::new(folder, &splats.geometry)?,
+            extras: Extras::new(to, &splats.geometry)?,
             counts,
             indices: spill()?,
             values: spill()?,
@@ -114,19 +114,20 @@ impl SpilledModel {
         self.indices.push(&indices)
     }
 
-    /// Writes the file with `write`, which is given what to do with a writer. Returns the bytes of each
-    /// tensor and of the header, as [`attribute_bytes`](super::attribute_bytes).
+    /// Writes the file. Returns the bytes of each tensor and of the header, as
+    /// [`attribute_bytes`](super::attribute_bytes).
     pub(crate) fn finish(
         self,
         dictionary: &Dictionary,
         record: &Record,
         meta: &SceneMeta,
-        write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
     ) -> Result<Vec<(String, u64)>> {
         let mut metadata = preamble(FORMAT, VERSION);
         put_record(&mut metadata, dictionary.degree(), record, meta);
         let tensors = self.tensors(dictionary)?;
-        write_tensors(metadata, tensors, write)
+        write_tensors(metadata, tensors, sink, progress)
     }
 
     fn tensors(self, dictionary: &Dictionary) -> Result<Vec<Tensor<'_>>> {
@@ -175,23 +176,17 @@ impl SpilledModel {
     }
 }
 
-/// Writes a file with `write`, which is given what to do with a writer. Returns the bytes of each tensor and
-/// of the header.
+/// Writes a file. Returns the bytes of each tensor and of the header.
 pub(super) fn write_tensors(
     metadata: BTreeMap<String, String>,
     tensors: Vec<Tensor<'_>>,
-    write: impl FnOnce(&mut dyn FnMut(&mut dyn Write) -> std::io::Result<()>, u64) -> Result<()>,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
 ) -> Result<Vec<(String, u64)>> {
     let mut sizes: Vec<(String, u64)> = tensors.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
     let draft = Draft::new(metadata, tensors);
     sizes.push(("header".to_owned(), draft.header_bytes()));
-    let bytes = sizes.iter().map(|s| s.1).sum();
-    let mut draft = Some(draft);
-    let mut to = |writer: &mut dyn Write| match draft.take() {
-        Some(draft) => draft.write_to(writer).map(|_| ()),
-        None => Ok(()),
-    };
-    write(&mut to, bytes)?;
+    draft.save(sink, progress)?;
     Ok(sizes)
 }
 
@@ -201,7 +196,7 @@ pub(crate) struct Extras(Vec<(String, Dtype, Spill)>);
 
 impl Extras {
     /// None yet of a scene with those of `like`.
-    pub(crate) fn new(folder: &Path, like: &Geometry) -> Result<Self> {
+    pub(crate) fn new(to: SpillTo<'_>, like: &Geometry) -> Result<Self> {
         let extra = |extra: &crate::scene::splats::Extra| {
             let dtype = match extra.values {
                 ExtraValues::I8(_) => Dtype::I8,
@@ -213,7 +208,7 @@ impl Extras {
                 ExtraValues::F32(_) => Dtype::F32,
                 ExtraValues::F64(_) => Dtype::F64,
             };
-            Ok((format!("{EXTRA_PREFIX}{}", extra.name), dtype, Spill::new(folder)?))
+            Ok((format!("{EXTRA_PREFIX}{}", extra.name), dtype, Spill::new(to)?))
         };
         like.extras.iter().map(extra).collect::<Result<_>>().map(Self)
     }

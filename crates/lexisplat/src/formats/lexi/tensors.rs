@@ -1,17 +1,19 @@
 //! A list of tensors with their metadata: written as safetensors with checksums, and read back checked.
 
 use std::collections::BTreeMap;
-use std::io::Write;
+use std::io::{self, Write};
 use std::ops::Range;
 
 use safetensors::tensor::{SafeTensorError, TensorView};
 use safetensors::{Dtype, SafeTensors};
 
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, MAX_VERSION, key, tensor};
+use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
-use crate::support::output::{Output, write_whole};
 use crate::support::parallel::map_chunks;
+use crate::support::progress::Progress;
+use crate::support::sink::Sink;
 use crate::support::spill::Spilled;
 
 #[cfg(target_endian = "big")]
@@ -69,8 +71,8 @@ impl Tensor<'_> {
 
 fn each_block(
     mut entries: &mut dyn Iterator<Item = i32>,
-    mut f: impl FnMut(&[u8]) -> std::io::Result<()>,
-) -> std::io::Result<()> {
+    mut f: impl FnMut(&[u8]) -> io::Result<()>,
+) -> io::Result<()> {
     let mut block = Vec::with_capacity(BLOCK);
     loop {
         block.clear();
@@ -149,20 +151,10 @@ impl<'a> Draft<'a> {
         out
     }
 
-    /// Writes the file to `output`, whole or not at all. Returns its size in bytes.
-    pub(super) fn save(self, output: Output<'_>) -> Result<u64> {
-        let mut bytes = 0;
-        let all = self.header_bytes() + self.tensors.iter().map(|t| t.bytes() as u64).sum::<u64>();
-        write_whole(output.of_bytes(all), |writer| {
-            bytes = self.write_to(writer).map_err(|e| Error::io(output.path(), e))?;
-            Ok(())
-        })?;
-        Ok(bytes)
-    }
-
-    /// Writes the file where it has no name. Returns its size in bytes.
-    pub(super) fn stream(self, writer: &mut impl Write) -> Result<u64> {
-        self.write_to(writer).map_err(|e| Error::io("output", e))
+    /// Writes the file. Returns its size in bytes.
+    pub(super) fn save(self, sink: Sink<'_>, progress: &dyn Progress) -> Result<u64> {
+        let bytes = self.header_bytes() + self.tensors.iter().map(|t| t.bytes() as u64).sum::<u64>();
+        sink.write(bytes, progress, |writer, named| self.write_to(writer).map_err(named))
     }
 
     /// Bytes of the length, the JSON and the header's checksum.
@@ -170,9 +162,7 @@ impl<'a> Draft<'a> {
         (self.header.len() + self.header_checksum.len()) as u64
     }
 
-    /// Writes the whole file; returns its size.
-    pub(super) fn write_to(self, writer: &mut dyn Write) -> std::io::Result<u64> {
-        let mut written = self.header_bytes();
+    fn write_to(self, writer: &mut dyn Write) -> io::Result<()> {
         writer.write_all(&self.header)?;
         let mut checksum = Some(self.header_checksum);
         for tensor in self.tensors {
@@ -181,7 +171,6 @@ impl<'a> Draft<'a> {
             {
                 writer.write_all(&bytes)?;
             }
-            written += tensor.bytes() as u64;
             match tensor.source {
                 Source::Bytes(bytes) => writer.write_all(bytes)?,
                 Source::Spilled(spilled) => spilled.copy_to(writer)?,
@@ -191,7 +180,7 @@ impl<'a> Draft<'a> {
         if let Some(bytes) = checksum {
             writer.write_all(&bytes)?;
         }
-        Ok(written)
+        Ok(())
     }
 }
 
@@ -212,6 +201,7 @@ pub(super) struct Checked<'a> {
 impl<'a> Checked<'a> {
     /// Parses `bytes` and verifies everything that does not need to know what the tensors mean.
     pub(super) fn open(file: &'a str, bytes: &'a [u8], formats: &[&str], limits: &Limits) -> Result<Self> {
+        FileKind::Lexi.expect(file, bytes)?;
         let format = |problem| Error::format(file, problem);
         let malformed = |text: String| Error::malformed(file, text);
         let Some(length) = bytes.first_chunk::<LENGTH_BYTES>() else {

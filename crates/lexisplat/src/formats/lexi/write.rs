@@ -1,7 +1,6 @@
 //! Writing a [`Model`].
 
 use std::collections::BTreeMap;
-use std::io::Write;
 
 use safetensors::Dtype;
 
@@ -12,23 +11,17 @@ use crate::scene::splats::{Extra, ExtraValues, SceneMeta};
 use crate::sparse::codes::{Indices, Values};
 use crate::sparse::model::{Layout, Model, Record};
 use crate::support::error::{Error, Result};
-use crate::support::output::Output;
+use crate::support::progress::Silent;
+use crate::support::sink::Sink;
 
-/// Writes `model` to `output`, whole or not at all. Returns the file's size in bytes.
+/// Writes `model`. Returns the number of bytes.
 ///
 /// # Errors
-/// [`Error::Io`] for the file; [`Error::Parameter`] if the values' type is not the layout's;
+/// [`Error::Io`] for the sink; [`Error::Parameter`] if the values' type is not the layout's;
 /// [`Error::Limit`] if the paper's 32-bit pointers cannot count the nonzeros.
-pub fn write<'a>(output: impl Into<Output<'a>>, model: &Model) -> Result<u64> {
-    draft(model)?.save(output.into())
-}
-
-/// Writes `model` to `writer`. Returns the number of bytes.
-///
-/// # Errors
-/// As [`write()`]; an [`Error::Io`] names no file.
-pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
-    draft(model)?.stream(writer)
+pub fn write<'a>(sink: impl Into<Sink<'a>>, model: &Model) -> Result<u64> {
+    let (metadata, tensors) = contents(model)?;
+    Draft::new(metadata, tensors).save(sink.into(), &Silent)
 }
 
 /// Bytes of each tensor as written, in file order, and of the header under `header`. They sum to the
@@ -60,11 +53,6 @@ pub fn sh_bytes(model: &Model) -> Result<u64> {
 /// Whether a tensor stands for SH-rest.
 pub(crate) fn is_sh(name: &str) -> bool {
     name == tensor::DICTIONARY || name.starts_with("codes.") || name.starts_with("escapes.")
-}
-
-fn draft(model: &Model) -> Result<Draft<'_>> {
-    let (metadata, tensors) = contents(model)?;
-    Ok(Draft::new(metadata, tensors))
 }
 
 fn contents(model: &Model) -> Result<(BTreeMap<String, String>, Vec<Tensor<'_>>)> {

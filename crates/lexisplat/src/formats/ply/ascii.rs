@@ -1,26 +1,27 @@
-//! ASCII rows, turned into packed little-endian ones a chunk at a time.
+//! Rows of an ASCII file, turned into packed little-endian rows a chunk at a time.
 
 use std::ops::Range;
 
-use super::header::{Header, Kind, ScalarType};
+use super::header::{Header, Kind};
 use super::names::shown;
-use super::rows::CHUNK_ROWS;
+use super::rows::ROWS_PER_TASK;
+use super::scalar::{Scalar, ScalarType, with_scalar};
 use crate::support::error::{Error, FormatError, Result};
 
-/// Vertex lines of an ASCII file.
+/// The vertex lines of an ASCII file.
 #[derive(Debug)]
 pub(super) struct AsciiRows<'a> {
     file: &'a str,
     data: &'a [u8],
-    /// Where each chunk of [`CHUNK_ROWS`] rows starts in `data`.
+    /// Where each chunk of [`ROWS_PER_TASK`] rows starts in `data`.
     starts: Vec<usize>,
     types: Vec<ScalarType>,
     row_bytes: usize,
 }
 
 impl<'a> AsciiRows<'a> {
-    /// Finds the lines of element `index` of `header`, and checks that the file has as many lines as
-    /// the header promises.
+    /// Finds the lines of element `index` of `header`, and checks that the file has as many lines as the header
+    /// promises.
     pub(super) fn locate(
         file: &'a str,
         header: &Header,
@@ -37,15 +38,15 @@ impl<'a> AsciiRows<'a> {
                 Kind::List { .. } => None,
             })
             .collect();
-        // A digit and a separator a value, but for the very last separator. Without this check a few
-        // short lines could ask for many wide rows.
+        // Each value takes at least a digit and a separator; the last separator may be missing. Without this check a
+        // few short lines could ask for many wide rows.
         let expected = vertex.count.saturating_mul(2 * types.len() as u64).saturating_sub(1);
         let found = data.len() as u64;
         if expected > found {
             let what = format!("element 'vertex' ({} rows of {} values)", vertex.count, types.len());
             return Err(Error::format(file, FormatError::Truncated { what, expected, found }));
         }
-        // Elements without properties have no lines: blank ones are skipped.
+        // Elements without properties have no lines, because blank lines are skipped.
         let rows = |elements: &[super::header::Element]| {
             let filled = elements.iter().filter(|e| !e.properties.is_empty());
             filled.fold(0_u64, |sum, e| sum.saturating_add(e.count))
@@ -54,7 +55,7 @@ impl<'a> AsciiRows<'a> {
         let vertices = before..before.saturating_add(vertex.count);
         let (mut starts, mut seen) = (Vec::new(), 0_u64);
         for (start, _) in lines(data, 0) {
-            if vertices.contains(&seen) && (seen - before).is_multiple_of(CHUNK_ROWS as u64) {
+            if vertices.contains(&seen) && (seen - before).is_multiple_of(ROWS_PER_TASK as u64) {
                 starts.push(start);
             }
             seen += 1;
@@ -69,18 +70,18 @@ impl<'a> AsciiRows<'a> {
         Ok(Self { file, data, starts, types, row_bytes })
     }
 
-    /// Rows `range`; quickest from a chunk border on.
+    /// Packs rows `range`. This is fastest if the range starts at a multiple of [`ROWS_PER_TASK`].
     pub(super) fn pack(&self, range: Range<usize>) -> Result<Vec<u8>> {
         let mut packed = Vec::with_capacity(range.len() * self.row_bytes);
-        let start = self.starts.get(range.start / CHUNK_ROWS).copied().unwrap_or(self.data.len());
-        let before = range.start % CHUNK_ROWS;
+        let start = self.starts.get(range.start / ROWS_PER_TASK).copied().unwrap_or(self.data.len());
+        let before = range.start % ROWS_PER_TASK;
         for (row, (_, line)) in range.zip(lines(self.data, start).skip(before)) {
             let bad = |why: String| Error::malformed(self.file, format!("vertex {row}: {why}"));
             let line = std::str::from_utf8(line).map_err(|_| bad("not text".to_owned()))?;
             let mut words = line.split_ascii_whitespace();
             let mut found = 0;
             for (&ty, word) in self.types.iter().zip(&mut words) {
-                push(&mut packed, ty, word)
+                with_scalar!(ty, T => T::push_text(word, &mut packed))
                     .ok_or_else(|| bad(format!("value {found}, '{}', is no {}", shown(word), ty.name())))?;
                 found += 1;
             }
@@ -93,7 +94,7 @@ impl<'a> AsciiRows<'a> {
     }
 }
 
-/// Lines from `start` on that hold something, with the place where each starts.
+/// The lines from `start` on that are not blank, each with the offset where it starts.
 fn lines(data: &[u8], start: usize) -> impl Iterator<Item = (usize, &[u8])> {
     let mut at = start;
     std::iter::from_fn(move || {
@@ -109,22 +110,4 @@ fn lines(data: &[u8], start: usize) -> impl Iterator<Item = (usize, &[u8])> {
         }
         None
     })
-}
-
-/// Appends `word` as a little-endian value of type `ty`; `None` if it is no such value.
-fn push(packed: &mut Vec<u8>, ty: ScalarType, word: &str) -> Option<()> {
-    fn append<const N: usize>(packed: &mut Vec<u8>, bytes: [u8; N]) {
-        packed.extend_from_slice(&bytes);
-    }
-    match ty {
-        ScalarType::I8 => append(packed, word.parse::<i8>().ok()?.to_le_bytes()),
-        ScalarType::U8 => append(packed, word.parse::<u8>().ok()?.to_le_bytes()),
-        ScalarType::I16 => append(packed, word.parse::<i16>().ok()?.to_le_bytes()),
-        ScalarType::U16 => append(packed, word.parse::<u16>().ok()?.to_le_bytes()),
-        ScalarType::I32 => append(packed, word.parse::<i32>().ok()?.to_le_bytes()),
-        ScalarType::U32 => append(packed, word.parse::<u32>().ok()?.to_le_bytes()),
-        ScalarType::F32 => append(packed, word.parse::<f32>().ok()?.to_le_bytes()),
-        ScalarType::F64 => append(packed, word.parse::<f64>().ok()?.to_le_bytes()),
-    }
-    Some(())
 }

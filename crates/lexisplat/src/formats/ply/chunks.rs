@@ -3,48 +3,50 @@
 use std::ops::Range;
 
 use super::columns::Packed;
+use super::file::PlyFile;
 use super::fill::{Bad, empty, fill, fill_normals};
 use super::read::ReadOptions;
-use super::rows::CHUNK_ROWS;
-use super::source::Source;
+use super::rows::ROWS_PER_TASK;
 use super::summary::PlySummary;
 use crate::scene::sh::ShDegree;
+use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
 
-/// Rows looked at together when a file is opened.
-const SCAN_ROWS: usize = 64 * CHUNK_ROWS;
+/// Rows read together when a file is opened.
+const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 
-/// A PLY whose Gaussians are read a part at a time: everything [`read_bytes`](super::read_bytes) says of a
-/// file is known, refused or left out alike, but no array is as long as the scene.
+/// A PLY whose Gaussians are read a part at a time. It refuses, leaves out and warns of the same as
+/// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
-pub struct PlyChunks<'a> {
-    source: Source<'a>,
+pub struct PlySource<'a> {
+    source: PlyFile<'a>,
     /// Rows left out, ascending.
     dropped: Vec<usize>,
     /// Whether any Gaussian has a normal.
     normals: bool,
 }
 
-impl<'a> PlyChunks<'a> {
-    /// Looks the PLY in `bytes` over once; messages call it `name`. `progress` is told of
-    /// [`Stage::Read`].
+impl<'a> PlySource<'a> {
+    /// Reads the PLY in `bytes` once to find out what is in it; messages call it `name`. Reports
+    /// [`Stage::Read`] to `progress`.
     ///
     /// # Errors
-    /// As [`read_bytes`](super::read_bytes).
+    /// As [`read_bytes`](super::read_bytes), and [`crate::Error::Cancelled`].
     pub fn open(
         name: &'a str,
         bytes: &'a [u8],
         options: &ReadOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut source = Source::open(name, bytes, options)?;
+        let mut source = PlyFile::open(name, bytes, options)?;
         let (mut bad, mut normals, mut sure) = (Vec::<Bad>::new(), false, 0);
-        source.check_room(source.count.min(SCAN_ROWS), false)?;
+        source.check_memory(source.count.min(SCAN_ROWS), false)?;
         let mut scratch = empty(&source.layout);
         progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
         for start in (0..source.count).step_by(SCAN_ROWS) {
+            progress.check()?;
             let range = start..(start + SCAN_ROWS).min(source.count);
             progress.advance(range.len() as u64 * source.layout.row_bytes as u64);
             let found = fill(&source.rows, &source.layout, name, range, &mut scratch)?;
@@ -53,21 +55,9 @@ impl<'a> PlyChunks<'a> {
             sure += found.sure;
         }
         progress.end();
-        source.judge(&bad, sure, options)?;
+        source.report(&bad, sure, options)?;
         let dropped = bad.into_iter().flat_map(|b| b.rows).collect();
         Ok(Self { source, dropped, normals })
-    }
-
-    /// Number of Gaussians, without those left out.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.source.count - self.dropped.len()
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// SH degree.
@@ -94,34 +84,55 @@ impl<'a> PlyChunks<'a> {
         &self.source.summary
     }
 
-    /// Whether [`Self::read`] gives normals.
-    #[must_use]
-    pub fn has_normals(&self) -> bool {
-        self.normals
+    /// The row of Gaussian `gaussian`.
+    fn row(&self, gaussian: usize) -> usize {
+        // `dropped[j] - j` Gaussians come before the dropped row number j.
+        let (mut low, mut high) = (0, self.dropped.len());
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.dropped[middle] - middle <= gaussian {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        gaussian + low
+    }
+}
+
+impl SplatSource for PlySource<'_> {
+    /// Number of Gaussians, without those left out.
+    fn len(&self) -> usize {
+        self.source.count - self.dropped.len()
     }
 
-    /// A scene like this one without Gaussians, to be filled by [`Self::read`].
-    #[must_use]
-    pub fn empty(&self) -> Splats {
+    fn empty(&self) -> Splats {
         Splats { meta: self.source.meta.clone(), ..empty(&self.source.layout) }
     }
 
-    /// Reads Gaussians `range` into `splats`, which came from [`Self::empty`] and may have been filled
-    /// before.
-    ///
-    /// # Errors
-    /// [`crate::Error::Format`] if an ASCII row is not what the header promises; [`crate::Error::Limit`] if the
-    /// range is longer than limits allow to hold.
-    ///
-    /// # Panics
-    /// If the range ends after [`Self::len`].
-    pub fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
-        assert!(range.end <= self.len(), "{range:?} of {} Gaussians", self.len());
+    fn has_normals(&self) -> bool {
+        self.normals
+    }
+
+    fn row_bytes(&self) -> u64 {
+        self.source.summary.row_bytes
+    }
+
+    fn source_bytes(&self) -> u64 {
+        self.source.summary.file_bytes
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.source.warnings
+    }
+
+    fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
+        check_range(&range, self.len())?;
         let rows = match range.end.checked_sub(1) {
             Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
             _ => 0..0,
         };
-        self.source.check_room(rows.len(), self.normals)?;
+        self.source.check_memory(rows.len(), self.normals)?;
         fill(&self.source.rows, &self.source.layout, self.source.name, rows.clone(), splats)?;
         if self.normals {
             fill_normals(&self.source.rows, &self.source.layout, rows.clone(), splats)?;
@@ -137,18 +148,20 @@ impl<'a> PlyChunks<'a> {
         Ok(())
     }
 
-    /// Appends the SH-rest of `gaussians`, in any order, to `out`.
-    pub(crate) fn read_rest(&self, gaussians: &[usize], out: &mut Vec<f32>) -> Result<()> {
+    fn read_rest(&self, gaussians: &[usize], out: &mut Vec<f32>) -> Result<()> {
         let dim = self.degree().rest();
         let start = out.len();
         out.resize(start + gaussians.len() * dim, 0.0);
         let out = &mut out[start..];
-        // Neighbours in the file come together: a line of text is found from the last known one on.
+        if let Some(&last) = gaussians.iter().max() {
+            check_range(&(last..last.saturating_add(1)), self.len())?;
+        }
+        // Neighbours in the file are read together: a line of text is found from the last known one on.
         let mut order: Vec<(usize, usize)> =
             gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
         order.sort_unstable();
         let row_bytes = self.source.layout.row_bytes;
-        for group in order.chunk_by(|a, b| a.0 / CHUNK_ROWS == b.0 / CHUNK_ROWS) {
+        for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {
             let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else { continue };
             let (bytes, big) = self.source.rows.packed(first..last + 1)?;
             for &(row, k) in group {
@@ -158,20 +171,5 @@ impl<'a> PlyChunks<'a> {
             }
         }
         Ok(())
-    }
-
-    /// The row of Gaussian `gaussian`.
-    fn row(&self, gaussian: usize) -> usize {
-        // Dropped row number j has `dropped[j] - j` Gaussians before it.
-        let (mut low, mut high) = (0, self.dropped.len());
-        while low < high {
-            let middle = low.midpoint(high);
-            if self.dropped[middle] - middle <= gaussian {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
-        }
-        gaussian + low
     }
 }

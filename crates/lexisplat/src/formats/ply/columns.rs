@@ -1,62 +1,6 @@
-//! Copies columns out of packed rows: type and byte order are fixed before the loop over rows.
+//! Copies columns out of packed rows. Type and byte order are looked up before the loop over rows.
 
-use super::header::ScalarType;
-
-/// A scalar as it lies in a row.
-pub(super) trait Scalar: Copy {
-    /// Bytes of one value.
-    const BYTES: usize;
-    /// The value in `bytes`, which has [`Self::BYTES`] of them.
-    fn load<const BIG: bool>(bytes: &[u8]) -> Self;
-    /// The nearest f32; infinite if there is none.
-    fn to_f32(self) -> f32;
-}
-
-macro_rules! scalar {
-    ($($ty:ty),*) => {$(
-        impl Scalar for $ty {
-            const BYTES: usize = size_of::<$ty>();
-
-            #[inline(always)]
-            fn load<const BIG: bool>(bytes: &[u8]) -> Self {
-                match bytes.first_chunk() {
-                    Some(&bytes) if BIG => Self::from_be_bytes(bytes),
-                    Some(&bytes) => Self::from_le_bytes(bytes),
-                    None => Self::default(),
-                }
-            }
-
-            #[inline(always)]
-            #[allow(clippy::cast_possible_truncation, trivial_numeric_casts, reason = "rounding is meant")]
-            fn to_f32(self) -> f32 {
-                self as f32
-            }
-        }
-    )*};
-}
-scalar!(i8, u8, i16, u16, i32, u32, f32, f64);
-
-/// Calls `$call` with the type parameters of `$ty` and `$big`, written as `(T, BIG)`.
-macro_rules! monomorphise {
-    ($ty:expr, $big:expr, $name:ident($($arg:expr),*)) => {
-        match ($ty, $big) {
-            (ScalarType::I8, _) => $name::<i8, false>($($arg),*),
-            (ScalarType::U8, _) => $name::<u8, false>($($arg),*),
-            (ScalarType::I16, false) => $name::<i16, false>($($arg),*),
-            (ScalarType::I16, true) => $name::<i16, true>($($arg),*),
-            (ScalarType::U16, false) => $name::<u16, false>($($arg),*),
-            (ScalarType::U16, true) => $name::<u16, true>($($arg),*),
-            (ScalarType::I32, false) => $name::<i32, false>($($arg),*),
-            (ScalarType::I32, true) => $name::<i32, true>($($arg),*),
-            (ScalarType::U32, false) => $name::<u32, false>($($arg),*),
-            (ScalarType::U32, true) => $name::<u32, true>($($arg),*),
-            (ScalarType::F32, false) => $name::<f32, false>($($arg),*),
-            (ScalarType::F32, true) => $name::<f32, true>($($arg),*),
-            (ScalarType::F64, false) => $name::<f64, false>($($arg),*),
-            (ScalarType::F64, true) => $name::<f64, true>($($arg),*),
-        }
-    };
-}
+use super::scalar::{Scalar, ScalarType, with_scalar};
 
 /// Packed rows of one size and byte order.
 #[derive(Debug, Clone, Copy)]
@@ -65,7 +9,7 @@ pub(super) struct Packed<'a> {
     pub(super) bytes: &'a [u8],
     /// Bytes of one row, not 0.
     pub(super) row_bytes: usize,
-    /// Most significant byte first.
+    /// Whether the most significant byte comes first.
     pub(super) big: bool,
 }
 
@@ -78,18 +22,18 @@ pub(super) struct Field {
     pub(super) ty: ScalarType,
 }
 
-/// Properties that become one array of f32, `width` to a Gaussian.
+/// Properties that become one array of f32 with `width` values a Gaussian.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
     width: usize,
     runs: Vec<Run>,
 }
 
-/// Fields of one type that follow each other both in the row and in the array.
+/// Fields of one type that are consecutive both in the file's row and in the array's.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Run {
     first: Field,
-    /// Place of the first one in the array's row.
+    /// Index of the first field in the array's row.
     slot: usize,
     len: usize,
 }
@@ -120,13 +64,14 @@ impl Group {
     /// Fills `out`, `width` values a row of `rows`.
     pub(super) fn read(&self, rows: Packed<'_>, out: &mut [f32]) {
         for &run in &self.runs {
-            monomorphise!(run.first.ty, rows.big, read_run(rows, run, out, self.width));
+            let read = with_scalar!(run.first.ty, T => if rows.big { read_run::<T, true> } else { read_run::<T, false> });
+            read(rows, run, out, self.width);
         }
     }
 }
 
 fn read_run<T: Scalar, const BIG: bool>(rows: Packed<'_>, run: Run, out: &mut [f32], width: usize) {
-    // The lengths every layout has get loops the compiler unrolls.
+    // The lengths that every layout has are constants here, so that the compiler unrolls their loops.
     match run.len {
         1 => copy_run::<T, BIG>(rows, Run { len: 1, ..run }, out, width),
         3 => copy_run::<T, BIG>(rows, Run { len: 3, ..run }, out, width),
@@ -161,7 +106,7 @@ pub(super) fn read_column<T: Scalar>(rows: Packed<'_>, offset: usize, out: &mut 
 
 /// Whether any value is NaN or infinite.
 pub(super) fn any_not_finite(values: &[f32]) -> bool {
-    // No early exit, so that this runs at vector speed; the answer is nearly always no.
+    // There is no early exit, so that the loop is vectorised. The answer is nearly always no.
     values.iter().fold(false, |any, v| any | !v.is_finite())
 }
 

@@ -3,44 +3,35 @@
 use std::ops::Range;
 
 use super::columns::{Packed, any_not_finite, read_column};
-use super::header::ScalarType;
 use super::layout::{Layout, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
-use super::rows::{CHUNK_ROWS, Rows};
-use crate::scene::splats::{Extra, ExtraValues, Geometry, SceneMeta, Splats, for_extra};
+use super::rows::{ROWS_PER_TASK, Rows};
+use super::scalar::{Scalar, with_scalar};
+use crate::scene::splats::{Extra, Geometry, SceneMeta, Splats, for_extra};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 
-/// What an infinite opacity, before the sigmoid, is taken as, with its sign: in f32 the sigmoid of this is 1 and
-/// that of its negative 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply) write such values
-/// for 255 and 0.
+/// Replaces an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid; in f32 the sigmoid of
+/// this value is 1 and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply)
+/// write infinities for 255 and 0.
 pub(super) const SURE_OPACITY: f32 = 100.0;
 
 /// A scene of this layout without Gaussians.
 pub(super) fn empty(layout: &Layout) -> Splats {
-    let extras = layout.extras.iter().map(|(name, field)| {
-        let values = match field.ty {
-            ScalarType::I8 => ExtraValues::I8(Vec::new()),
-            ScalarType::U8 => ExtraValues::U8(Vec::new()),
-            ScalarType::I16 => ExtraValues::I16(Vec::new()),
-            ScalarType::U16 => ExtraValues::U16(Vec::new()),
-            ScalarType::I32 => ExtraValues::I32(Vec::new()),
-            ScalarType::U32 => ExtraValues::U32(Vec::new()),
-            ScalarType::F32 => ExtraValues::F32(Vec::new()),
-            ScalarType::F64 => ExtraValues::F64(Vec::new()),
-        };
-        Extra { name: name.clone(), values }
+    let extras = layout.extras.iter().map(|(name, field)| Extra {
+        name: name.clone(),
+        values: with_scalar!(field.ty, T => T::no_values()),
     });
     let geometry = Geometry { extras: extras.collect(), ..Geometry::default() };
     Splats { geometry, degree: layout.degree, sh_rest: Vec::new(), meta: SceneMeta::default() }
 }
 
-/// Makes room for `count` Gaussians, normals left out. What the arrays hold then is of no meaning.
+/// Resizes all arrays but the normals to `count` Gaussians. Their contents have no meaning afterwards.
 ///
-/// The caller has checked that the file holds `count` rows, and every property takes at least a byte
-/// of a row, so this is at most four times the file.
+/// The caller has checked that the file holds `count` rows, and every property takes at least a byte of a row. The
+/// arrays therefore take at most four times the bytes of the file.
 fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Result<()> {
-    /// Zeroed memory comes untouched from the system; the threads that fill it are the first to write it.
+    /// New memory comes zeroed from the system. The threads that fill it are the first to touch it.
     fn sized<T: Copy>(values: &mut Vec<T>, len: usize, zero: T) {
         if values.is_empty() {
             *values = vec![zero; len];
@@ -49,7 +40,7 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
         }
     }
     let rest = layout.degree.rest();
-    // 14 floats and 3 for normals; extras are 8 bytes at most. Only 32-bit systems can fail this.
+    // 14 floats, 3 for normals, and at most 8 bytes for an extra. Only 32-bit systems can fail here.
     let row = (17 + rest) * size_of::<f32>() + layout.extras.len() * size_of::<f64>();
     if count.checked_mul(row).is_none_or(|bytes| isize::try_from(bytes).is_err()) {
         return Err(Error::malformed(file, format!("{count} vertices do not fit in memory")));
@@ -62,16 +53,7 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
     sized(&mut g.scales, count, [0.0; 3]);
     sized(&mut g.rotations, count, [0.0; 4]);
     for extra in &mut g.extras {
-        match &mut extra.values {
-            ExtraValues::I8(v) => sized(v, count, 0),
-            ExtraValues::U8(v) => sized(v, count, 0),
-            ExtraValues::I16(v) => sized(v, count, 0),
-            ExtraValues::U16(v) => sized(v, count, 0),
-            ExtraValues::I32(v) => sized(v, count, 0),
-            ExtraValues::U32(v) => sized(v, count, 0),
-            ExtraValues::F32(v) => sized(v, count, 0.0),
-            ExtraValues::F64(v) => sized(v, count, 0.0),
-        }
+        for_extra!(&mut extra.values, values => sized(values, count, Default::default()));
     }
     sized(&mut splats.sh_rest, rest * count, 0.0);
     Ok(())
@@ -80,16 +62,16 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
 /// Gaussians of one chunk that hold NaN or infinite values.
 #[derive(Debug)]
 pub(super) struct Bad {
-    /// Which rows of the file, ascending; at least one.
+    /// Their rows in the file, ascending; at least one.
     pub(super) rows: Vec<usize>,
-    /// The first one's first such property, in the INRIA order.
+    /// The first such property of the first one, in INRIA's order.
     pub(super) property: String,
 }
 
-/// Fills one column of extras for one chunk of rows.
+/// Fills one extra for one chunk of rows.
 type ExtraFill<'a> = Box<dyn FnMut(Packed<'_>) + Send + 'a>;
 
-/// One chunk of rows and where they go.
+/// One chunk of rows and the parts of the arrays that it fills.
 struct Piece<'a> {
     rows: Range<usize>,
     positions: &'a mut [f32],
@@ -101,26 +83,27 @@ struct Piece<'a> {
     extras: Vec<ExtraFill<'a>>,
 }
 
-/// What filling a piece found.
+/// What [`fill_piece`] found.
 struct Found {
     bad: Option<Bad>,
     normals: bool,
-    /// Opacities that were infinite.
+    /// Number of infinite opacities.
     sure: usize,
 }
 
-/// What filling found.
+/// What [`fill`] found.
 #[derive(Debug, Default)]
 pub(super) struct Filled {
-    /// The chunks with bad values, in order.
+    /// Chunks with values that are not finite, in order.
     pub(super) bad: Vec<Bad>,
-    /// Whether a Gaussian without bad values has a normal.
+    /// Whether any Gaussian whose values are all finite has a normal.
     pub(super) normals: bool,
-    /// Opacities that were infinite.
+    /// Number of infinite opacities.
     pub(super) sure: usize,
 }
 
-/// Fills the arrays of `splats`, which was [`empty`] or filled before, with rows `range`; normals left out.
+/// Fills all arrays of `splats` but the normals with rows `range`. `splats` came from [`empty`] and may have been
+/// filled before.
 pub(super) fn fill(
     rows: &Rows<'_>,
     layout: &Layout,
@@ -139,7 +122,7 @@ pub(super) fn fill(
     Ok(filled)
 }
 
-/// Fills the normals alone. Rare enough for a second pass, which spares everyone else the array.
+/// Fills the normals. Few files have any, so they get a second pass, and scenes without normals need no array.
 pub(super) fn fill_normals(
     rows: &Rows<'_>,
     layout: &Layout,
@@ -148,9 +131,9 @@ pub(super) fn fill_normals(
 ) -> Result<()> {
     let Some(group) = &layout.normal else { return Ok(()) };
     splats.geometry.normals = vec![[0.0; 3]; range.len()];
-    let parts = splats.geometry.normals.chunks_mut(CHUNK_ROWS).enumerate().collect();
+    let parts = splats.geometry.normals.chunks_mut(ROWS_PER_TASK).enumerate().collect();
     let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
-        let start = range.start + c * CHUNK_ROWS;
+        let start = range.start + c * ROWS_PER_TASK;
         let (bytes, big) = rows.packed(start..start + part.len())?;
         group.read(Packed { bytes: &bytes, row_bytes: layout.row_bytes, big }, part.as_flattened_mut());
         Ok(())
@@ -158,7 +141,7 @@ pub(super) fn fill_normals(
     done.into_iter().collect()
 }
 
-/// The arrays of `splats`, whose first Gaussian is row `first`, cut into chunks of rows.
+/// Cuts the arrays of `splats`, whose first Gaussian is row `first`, into chunks of rows.
 fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<Piece<'a>> {
     fn take<'a, T>(left: &mut &'a mut [T], len: usize) -> &'a mut [T] {
         let (head, tail) = std::mem::take(left).split_at_mut(len);
@@ -174,9 +157,9 @@ fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<P
     let mut opacities = geometry.opacities.as_mut_slice();
     let mut scales = geometry.scales.as_flattened_mut();
     let mut rotations = geometry.rotations.as_flattened_mut();
-    let mut pieces: Vec<Piece<'a>> = Vec::with_capacity(count.div_ceil(CHUNK_ROWS));
-    for start in (0..count).step_by(CHUNK_ROWS) {
-        let n = CHUNK_ROWS.min(count - start);
+    let mut pieces: Vec<Piece<'a>> = Vec::with_capacity(count.div_ceil(ROWS_PER_TASK));
+    for start in (0..count).step_by(ROWS_PER_TASK) {
+        let n = ROWS_PER_TASK.min(count - start);
         pieces.push(Piece {
             rows: first + start..first + start + n,
             positions: take(&mut positions, 3 * n),
@@ -191,7 +174,7 @@ fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<P
     for (extra, (_, field)) in geometry.extras.iter_mut().zip(&layout.extras) {
         let offset = field.offset;
         for_extra!(&mut extra.values, values => {
-            for (piece, part) in pieces.iter_mut().zip(values.chunks_mut(CHUNK_ROWS)) {
+            for (piece, part) in pieces.iter_mut().zip(values.chunks_mut(ROWS_PER_TASK)) {
                 piece.extras.push(Box::new(move |rows| read_column(rows, offset, part)));
             }
         });
@@ -220,7 +203,7 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
         group.read(packed, &mut normals);
     }
     let bad = bad_rows(&piece, &normals);
-    // A negative zero is worth keeping too: what comes out must have the bits that went in.
+    // A negative zero counts as a normal, because a value must keep all its bits.
     let any_bits = |values: &[f32]| values.iter().fold(0, |any, v| any | v.to_bits()) != 0;
     let any_normal = match &bad {
         None => any_bits(&normals),
@@ -232,7 +215,7 @@ fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<
     Ok(Found { bad, normals: any_normal, sure })
 }
 
-/// The piece's Gaussians with NaN or infinite values, if any.
+/// Finds the Gaussians of `piece` with NaN or infinite values.
 fn bad_rows(piece: &Piece<'_>, normals: &[f32]) -> Option<Bad> {
     let count = piece.rows.len();
     let groups: [&[f32]; 7] =

@@ -1,88 +1,26 @@
-//! The text at the head of a PLY: strict about sizes, tolerant about dialect.
+//! The text at the start of a PLY. The parser is strict about sizes and tolerant about dialects.
 
 use serde::Serialize;
 
 use super::names::shown;
-use crate::support::error::{Error, FormatError, Result};
+use super::scalar::ScalarType;
+use crate::formats::kind::FileKind;
+use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
 /// Most elements one header may declare. Real files have one to three.
 const MAX_ELEMENTS: u64 = 1024;
 
-/// How the data after the header are stored.
+/// How values are stored after the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Format {
-    /// One row a line, values as decimal text.
+    /// Decimal text, one row a line.
     Ascii,
     /// Packed rows, least significant byte first.
     BinaryLittleEndian,
     /// Packed rows, most significant byte first.
     BinaryBigEndian,
-}
-
-/// Type of a scalar property.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ScalarType {
-    /// `char` or `int8`.
-    I8,
-    /// `uchar` or `uint8`.
-    U8,
-    /// `short` or `int16`.
-    I16,
-    /// `ushort` or `uint16`.
-    U16,
-    /// `int` or `int32`.
-    I32,
-    /// `uint` or `uint32`.
-    U32,
-    /// `float` or `float32`.
-    F32,
-    /// `double` or `float64`.
-    F64,
-}
-
-impl ScalarType {
-    /// Bytes of one value in a binary file.
-    #[must_use]
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
-            Self::I32 | Self::U32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
-
-    /// The name the first PLY specification gave it, which every reader knows.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::I8 => "char",
-            Self::U8 => "uchar",
-            Self::I16 => "short",
-            Self::U16 => "ushort",
-            Self::I32 => "int",
-            Self::U32 => "uint",
-            Self::F32 => "float",
-            Self::F64 => "double",
-        }
-    }
-
-    fn parse(word: &str) -> Option<Self> {
-        Some(match word {
-            "char" | "int8" => Self::I8,
-            "uchar" | "uint8" => Self::U8,
-            "short" | "int16" => Self::I16,
-            "ushort" | "uint16" => Self::U16,
-            "int" | "int32" => Self::I32,
-            "uint" | "uint32" => Self::U32,
-            "float" | "float32" => Self::F32,
-            "double" | "float64" => Self::F64,
-            _ => return None,
-        })
-    }
 }
 
 /// A property's shape.
@@ -101,7 +39,7 @@ pub(super) struct Property {
     pub(super) kind: Kind,
 }
 
-/// A table of rows.
+/// An element: rows of properties.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Element {
     pub(super) name: String,
@@ -129,14 +67,14 @@ pub(super) struct Header {
     /// Comment texts in order, without the keyword and outer spaces.
     pub(super) comments: Vec<String>,
     pub(super) elements: Vec<Element>,
-    /// Where the data start.
+    /// Bytes of the header; the data start here.
     pub(super) bytes: usize,
 }
 
 impl Header {
     /// Parses the header at the start of `bytes`, which came from the file called `file`.
     pub(super) fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
-        check_magic(file, bytes)?;
+        FileKind::Ply.expect(file, bytes)?;
         let mut lines = Lines::new(file, bytes, *limits);
         let (mut format, mut comments, mut elements) = (None, Vec::new(), Vec::<Element>::new());
         loop {
@@ -224,37 +162,14 @@ fn parse_property<'a>(
         word => Kind::Scalar(ty(word)?),
     };
     match (words.next(), words.next()) {
-        // No writer could repeat it.
+        // A PLY writer could not write such a name back.
         (Some(name), None) if name.chars().any(char::is_control) => Err("control characters in the name"),
         (Some(name), None) => Ok(Property { name: name.to_owned(), kind }),
         _ => Err("expected one name after the type"),
     }
 }
 
-/// Refuses what is no PLY, naming the splat formats people mix up with it.
-fn check_magic(file: &str, bytes: &[u8]) -> Result<()> {
-    let because = |kind: &str, advice: &str| FormatError::Unsupported {
-        kind: kind.to_owned(),
-        advice: advice.to_owned(),
-    };
-    let unsupported = |kind| because(kind, "convert it to PLY first, for example with splat-transform");
-    let problem = match bytes {
-        [b'p', b'l', b'y', b'\n' | b'\r' | b' ' | b'\t', ..] => return Ok(()),
-        [0x1f, 0x8b, ..] => unsupported("a gzip file (SPZ?)"),
-        [b'P', b'K', 3, 4, ..] => unsupported("a zip archive (SOG?)"),
-        [b'N', b'G', b'S', b'P', ..] => unsupported("SPZ, version 4"),
-        // Python's pickle, protocols 2 to 5.
-        [0x80, 2..=5, ..] => because(
-            "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)",
-            "it is never read here: load it where it was made and write a PLY, for EAGLES with load_compressed_pkl and save_ply",
-        ),
-        [] => FormatError::Malformed("the file is empty".to_owned()),
-        _ => FormatError::Malformed("not a PLY file: it does not start with a line 'ply'".to_owned()),
-    };
-    Err(Error::format(file, problem))
-}
-
-/// Header lines, ended by `\n`, `\r\n` or, throughout a file whose first line is, `\r`.
+/// Header lines, which end in `\n` or `\r\n`. If the first line ends in `\r` alone, all lines do.
 struct Lines<'a> {
     file: &'a str,
     bytes: &'a [u8],
@@ -343,24 +258,6 @@ mod tests {
             header.bytes = plain.bytes;
             header.comments = vec![header.comments[0].split_whitespace().collect::<Vec<_>>().join(" ")];
             assert_eq!(header, plain, "{odd:?}");
-        }
-    }
-
-    #[test]
-    fn aliases_name_the_same_types() {
-        for (old, new) in [
-            ("char", "int8"),
-            ("uchar", "uint8"),
-            ("short", "int16"),
-            ("ushort", "uint16"),
-            ("int", "int32"),
-            ("uint", "uint32"),
-            ("float", "float32"),
-            ("double", "float64"),
-        ] {
-            let ty = ScalarType::parse(old).unwrap();
-            assert_eq!(Some(ty), ScalarType::parse(new));
-            assert_eq!(ty.name(), old);
         }
     }
 

@@ -1,34 +1,36 @@
-//! From property names to places in a row, and the refusal of what is no 3DGS scene.
+//! Where each property lies in a row, and the refusal of PLY files that are no 3DGS scenes.
 
 use std::collections::HashMap;
 
 use super::columns::{Field, Group};
-use super::header::{Element, Header, Kind, ScalarType};
+use super::header::{Element, Header, Kind};
 use super::names::{DC, NORMAL, OPACITY, POSITION, REST_PREFIX, ROTATION, SCALE, VERTEX, listed, shown};
+use super::scalar::ScalarType;
+use crate::formats::kind::Unsupported;
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, FormatError, Result};
 
-/// Where everything lies in a vertex row.
+/// Where each property lies in a vertex row.
 #[derive(Debug)]
 pub(super) struct Layout {
     pub(super) row_bytes: usize,
     pub(super) degree: ShDegree,
     pub(super) position: Group,
-    /// All three normals, if they are there.
+    /// The three normals, if all exist.
     pub(super) normal: Option<Group>,
     pub(super) dc: Group,
     pub(super) rest: Group,
     pub(super) opacity: Group,
     pub(super) scale: Group,
     pub(super) rotation: Group,
-    /// Properties 3DGS does not know, in file order.
+    /// Properties that 3DGS does not define, in file order.
     pub(super) extras: Vec<(String, Field)>,
-    /// What the reader of the file should know about the above.
+    /// Oddities of the properties, one plain sentence each.
     pub(super) warnings: Vec<String>,
 }
 
 impl Layout {
-    /// The layout of `header`'s vertices.
+    /// Finds the layout of the vertices of `header`.
     pub(super) fn new(file: &str, header: &Header) -> Result<Self> {
         let refuse = |problem| Error::format(file, problem);
         let vertex = vertex(header).map_err(refuse)?;
@@ -72,7 +74,7 @@ impl Layout {
     }
 }
 
-/// Index of the vertex element in `header.elements`.
+/// Returns the index of the vertex element in `header.elements`.
 pub(super) fn vertex_index(header: &Header) -> Option<usize> {
     header.elements.iter().position(|e| e.name == VERTEX)
 }
@@ -81,12 +83,7 @@ fn vertex(header: &Header) -> std::result::Result<&Element, FormatError> {
     let has = |name: &str| header.elements.iter().any(|e| e.name == name);
     let compressed = |e: &Element| e.properties.iter().any(|p| p.name == "packed_position");
     if has("chunk") || header.elements.iter().any(compressed) {
-        return Err(FormatError::Unsupported {
-            kind: "a PlayCanvas compressed.ply".to_owned(),
-            advice: "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start \
-                     from the trainer's own PLY"
-                .to_owned(),
-        });
+        return Err(FormatError::Unsupported { kind: Unsupported::CompressedPly });
     }
     let mut found = header.elements.iter().filter(|e| e.name == VERTEX);
     match (found.next(), found.next()) {
@@ -102,35 +99,23 @@ fn vertex(header: &Header) -> std::result::Result<&Element, FormatError> {
     }
 }
 
-/// Recognises relatives of 3DGS by the properties they have or lack.
+/// Refuses relatives of 3DGS, recognised by the properties they have or lack.
 fn refuse_other_kinds(columns: &Columns<'_>) -> std::result::Result<(), FormatError> {
     let has = |name: &str| columns.fields.contains_key(name);
-    let unsupported = |kind: &str, advice: &str| {
-        Err(FormatError::Unsupported { kind: kind.to_owned(), advice: advice.to_owned() })
-    };
-    if has("f_anchor_feat_0") {
-        return unsupported(
-            "a Scaffold-GS anchor model",
-            "its Gaussians come out of a network; export them as plain 3DGS first",
-        );
-    }
     let shaped = has(SCALE[0]) && has(ROTATION[0]);
-    if !has(OPACITY[0]) && !shaped {
-        return unsupported(
-            "a point cloud, not a Gaussian scene (no opacity)",
-            "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
-        );
-    }
-    if has(SCALE[0]) && has(SCALE[1]) && !has(SCALE[2]) {
-        return unsupported(
-            "a 2D Gaussian Splatting model (no scale_2)",
-            "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20",
-        );
-    }
-    Ok(())
+    let kind = if has("f_anchor_feat_0") {
+        Unsupported::Anchors
+    } else if !has(OPACITY[0]) && !shaped {
+        Unsupported::PointCloud
+    } else if has(SCALE[0]) && has(SCALE[1]) && !has(SCALE[2]) {
+        Unsupported::TwoDimensional
+    } else {
+        return Ok(());
+    };
+    Err(FormatError::Unsupported { kind })
 }
 
-/// `f_rest_0` to the highest, whose count must be that of an SH degree.
+/// Returns the names from `f_rest_0` to the highest. Their number must be that of an SH degree.
 fn rest_names(columns: &Columns<'_>) -> std::result::Result<Vec<String>, FormatError> {
     let number = |name: &str| -> Option<usize> {
         let digits = name.strip_prefix(REST_PREFIX)?;
@@ -154,16 +139,16 @@ fn rest_names(columns: &Columns<'_>) -> std::result::Result<Vec<String>, FormatE
     }
 }
 
-/// Name of SH-rest coefficient `number`.
+/// Returns the name of SH-rest coefficient `number`.
 pub(super) fn rest_name(number: usize) -> String {
     format!("{REST_PREFIX}{number}")
 }
 
-/// The columns of the vertex element that nothing has claimed yet.
+/// The properties of the vertex element that no group has claimed yet.
 struct Columns<'a> {
     fields: HashMap<&'a str, Field>,
     row_bytes: usize,
-    /// Claimed columns that are not f32, as `name (type)`.
+    /// Claimed properties that are not f32, as `name (type)`.
     converted: Vec<String>,
 }
 
@@ -193,15 +178,16 @@ impl<'a> Columns<'a> {
         self.fields.remove(name)
     }
 
-    /// Claims `names`, which become one array.
-    fn group<S: AsRef<str>>(&mut self, names: &[S], advice: &str) -> std::result::Result<Group, FormatError> {
+    /// Claims the properties `names`, which become one array. `hint` is for the error if one is missing.
+    fn group<S: AsRef<str>>(
+        &mut self,
+        names: &[S],
+        hint: &'static str,
+    ) -> std::result::Result<Group, FormatError> {
         let mut fields = Vec::with_capacity(names.len());
         for name in names.iter().map(AsRef::as_ref) {
             let Some(field) = self.take(name) else {
-                return Err(FormatError::MissingProperty {
-                    name: name.to_owned(),
-                    advice: advice.to_owned(),
-                });
+                return Err(FormatError::MissingProperty { name: name.to_owned(), hint });
             };
             if field.ty != ScalarType::F32 {
                 self.converted.push(format!("{name} ({})", field.ty.name()));
@@ -211,7 +197,7 @@ impl<'a> Columns<'a> {
         Ok(Group::new(&fields))
     }
 
-    /// What is left, in file order.
+    /// Returns the properties that are left, in file order.
     fn rest(&mut self) -> Vec<(String, Field)> {
         let mut left: Vec<(String, Field)> = self.fields.drain().map(|(n, f)| (n.to_owned(), f)).collect();
         left.sort_by_key(|(_, field)| field.offset);

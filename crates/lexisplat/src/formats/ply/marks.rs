@@ -1,12 +1,12 @@
-//! The anti-aliasing mark, which trainers leave in a comment.
+//! The anti-aliasing mark that trainers write into a comment.
 //!
 //! Brush writes `SplatRenderMode: mip` or `SplatRenderMode: default`, Postshot `antialiased 1` or
 //! `antialiased 0`. The mark decides how a scene is drawn, so it must survive every conversion.
 
-/// Postshot's mark; what the writer adds when no comment says it.
+/// Postshot's mark. The writer adds it if no comment has a mark.
 pub(super) const ANTIALIASED: &str = "antialiased 1";
 
-/// What one comment says about anti-aliasing, if anything.
+/// Whether a comment says that the scene is anti-aliased; `None` if it says nothing about it.
 pub(super) fn mark(comment: &str) -> Option<bool> {
     let lower = comment.to_ascii_lowercase();
     let mut words =
@@ -26,13 +26,13 @@ pub(super) fn mark(comment: &str) -> Option<bool> {
     }
 }
 
-/// What all comments together say.
+/// What all comments together say about anti-aliasing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Marks {
-    /// At least one says yes. A scene with both is taken as anti-aliased: the yes needs a trainer that
-    /// supports it, the no is a default.
+    /// Whether at least one comment says yes. A scene with both answers counts as anti-aliased: the yes needs a trainer
+    /// that supports it, the no is a default.
     pub(super) antialiased: bool,
-    /// One says yes and another says no.
+    /// Whether one comment says yes and another says no.
     pub(super) contradict: bool,
 }
 

@@ -1,14 +1,14 @@
-//! PLY scenes: every trainer's dialect in, the INRIA layout out.
+//! PLY scenes: reads every trainer's dialect, writes INRIA's layout.
 //!
-//! Properties are found by name, in any order and of any scalar type, in binary of either byte order
-//! or ASCII. What a trainer adds beyond 3DGS stays as [`Extra`](crate::Extra); what this crate cannot
-//! code (compressed, 2D or anchor models, point clouds) is refused by name.
+//! The reader finds properties by name, in any order and of any scalar type, in binary files of either byte order
+//! and in ASCII files. It keeps properties beyond 3DGS as [`Extra`](crate::Extra). It refuses files that this crate
+//! cannot code (compressed, 2D and anchor models, point clouds) and says what they are.
 //!
-//! Layouts this is tested on: INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush, Postshot.
+//! It is tested on the layouts of INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush and Postshot.
 //!
-//! A binary file is mapped and filled in parallel, a chunk of rows at a time and in each chunk a run of
-//! neighbouring properties at a time; type and byte order are looked up once a run, never once a value.
-//! ASCII rows are turned into binary ones a chunk at a time and take the same way.
+//! A binary file is mapped, and the arrays are filled in parallel. Each task copies a chunk of rows, one run of
+//! neighbouring properties after another; type and byte order are looked up once a run, never once a value. Rows of
+//! an ASCII file become binary rows first.
 //!
 //! ```
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -39,22 +39,22 @@
 mod ascii;
 mod chunks;
 mod columns;
+mod file;
 mod fill;
 mod header;
 mod layout;
 mod marks;
 mod names;
 mod read;
-mod row_bytes;
 mod rows;
-mod source;
+mod scalar;
 mod summary;
 mod write;
 
-pub use chunks::PlyChunks;
-pub use header::{Format, ScalarType};
+pub use chunks::PlySource;
+pub use header::Format;
 pub use read::{PlyRead, ReadOptions, read, read_bytes};
-pub(crate) use row_bytes::RowBytes;
+pub use scalar::ScalarType;
 pub use summary::{Dialect, PlySummary};
-pub(crate) use write::{PlyWriter, check};
+pub(crate) use write::{PlyWriter, check, file_bytes};
 pub use write::{write, write_to};

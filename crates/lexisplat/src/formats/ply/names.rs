@@ -6,7 +6,7 @@ pub(super) const POSITION: [&str; 3] = ["x", "y", "z"];
 pub(super) const NORMAL: [&str; 3] = ["nx", "ny", "nz"];
 /// SH coefficient 0.
 pub(super) const DC: [&str; 3] = ["f_dc_0", "f_dc_1", "f_dc_2"];
-/// What precedes the number of an SH-rest coefficient.
+/// Prefix of an SH-rest coefficient's number.
 pub(super) const REST_PREFIX: &str = "f_rest_";
 /// Opacity before the sigmoid.
 pub(super) const OPACITY: [&str; 1] = ["opacity"];
@@ -17,10 +17,10 @@ pub(super) const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
 /// The element that holds Gaussians.
 pub(super) const VERTEX: &str = "vertex";
 
-/// Longest part of a name or token from a file that a message repeats, in characters.
+/// Most characters of a name or token from a file that a message repeats.
 const SHOWN: usize = 48;
 
-/// A name or token from a file, made fit for a one-line message: control characters escaped, and cut.
+/// Makes a name or token from a file safe for a one-line message: escapes control characters, and cuts it.
 pub(super) fn shown(text: &str) -> String {
     let mut out: String = text.chars().take(SHOWN).flat_map(char::escape_debug).collect();
     if text.chars().nth(SHOWN).is_some() {
@@ -29,7 +29,7 @@ pub(super) fn shown(text: &str) -> String {
     out
 }
 
-/// `names` for a message: the first few, and how many more.
+/// Lists `names` for a message: the first few, and how many more there are.
 pub(super) fn listed<S: AsRef<str>>(names: &[S]) -> String {
     /// Names spelt out before "and n more".
     const SPELT: usize = 6;

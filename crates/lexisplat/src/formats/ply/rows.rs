@@ -1,32 +1,32 @@
-//! Finds the vertex rows in the bytes after a header and hands them out a chunk at a time.
+//! Finds the vertex rows in the bytes after a header, and gives them out a chunk at a time.
 
 use std::borrow::Cow;
 use std::ops::Range;
 
 use super::ascii::AsciiRows;
-use super::columns::{Packed, Scalar};
-use super::header::{Element, Format, Header, Kind, ScalarType};
+use super::columns::Packed;
+use super::header::{Element, Format, Header, Kind};
 use super::layout::vertex_index;
 use super::names::shown;
+use super::scalar::{Scalar, with_scalar};
 use crate::support::error::{Error, FormatError, Result};
 
-/// Rows in one unit of work: at 248 bytes a row the chunk stays in a core's second-level cache while
-/// one run of columns after another is copied out of it.
-pub(super) const CHUNK_ROWS: usize = 1024;
+/// Rows that one task copies, one run of columns after another. At 248 bytes a row they stay in a core's second-level
+/// cache meanwhile.
+pub(super) const ROWS_PER_TASK: usize = 1024;
 
 /// The vertex rows of a file.
 #[derive(Debug)]
 pub(super) enum Rows<'a> {
-    /// As they lie in the file.
+    /// Rows as they lie in the file.
     Binary(Packed<'a>),
-    /// Turned into little-endian rows when asked for.
+    /// Lines, which become little-endian rows on request.
     Ascii(AsciiRows<'a>),
 }
 
 impl<'a> Rows<'a> {
-    /// Finds the rows of the vertex element, and checks that all of them are there.
-    ///
-    /// `data` is what follows the header. Oddities that do no harm are added to `warnings`.
+    /// Finds the rows of the vertex element in `data`, which are the bytes after the header, and checks that all of
+    /// them are present. Harmless oddities are added to `warnings`.
     pub(super) fn locate(
         file: &'a str,
         header: &Header,
@@ -52,7 +52,8 @@ impl<'a> Rows<'a> {
         Ok(Self::Binary(Packed { bytes: &data[start..end], row_bytes, big }))
     }
 
-    /// Rows `range` packed. Of an ASCII file quickest from a multiple of [`CHUNK_ROWS`] on.
+    /// Returns rows `range` packed, and whether they are big-endian. In an ASCII file this is fastest if the range
+    /// starts at a multiple of [`ROWS_PER_TASK`].
     pub(super) fn packed(&self, range: Range<usize>) -> Result<(Cow<'_, [u8]>, bool)> {
         match self {
             Self::Binary(rows) => {
@@ -64,9 +65,9 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// Where `element`, which starts at `start`, ends; an error if that is not inside `data`.
+/// Returns where `element`, which starts at `start`, ends. It must end inside `data`.
 fn skip(element: &Element, data: &[u8], start: usize, big: bool) -> std::result::Result<usize, FormatError> {
-    let Some(row) = element.row_bytes() else { return walk(element, data, start, big) };
+    let Some(row) = element.row_bytes() else { return skip_lists(element, data, start, big) };
     let found = (data.len() - start) as u64;
     let expected = element.count.saturating_mul(row as u64);
     if expected > found {
@@ -76,14 +77,19 @@ fn skip(element: &Element, data: &[u8], start: usize, big: bool) -> std::result:
             found,
         });
     }
-    // Fits: it is at most the length of a slice.
+    // The conversion cannot fail, because the number is at most the length of a slice.
     Ok(start + usize::try_from(expected).unwrap_or(data.len() - start))
 }
 
-/// [`skip`] for an element with lists, row by row.
-fn walk(element: &Element, data: &[u8], start: usize, big: bool) -> std::result::Result<usize, FormatError> {
+/// [`skip`] for an element with lists, whose rows differ in length.
+fn skip_lists(
+    element: &Element,
+    data: &[u8],
+    start: usize,
+    big: bool,
+) -> std::result::Result<usize, FormatError> {
     let mut at = start;
-    // Ends after at most `data.len()` rows: a row with a list has at least the list's count.
+    // The loop ends after at most `data.len()` rows, because a row with a list has at least the list's count.
     for row in 0..element.count {
         for property in &element.properties {
             let need = match property.kind {
@@ -91,7 +97,9 @@ fn walk(element: &Element, data: &[u8], start: usize, big: bool) -> std::result:
                 Kind::List { count, item } => data
                     .get(at..)
                     .and_then(|rest| rest.get(..count.bytes()))
-                    .map(|bytes| list_length(bytes, count, big))
+                    .map(|bytes| {
+                        with_scalar!(count, T => if big { T::load::<true>(bytes) } else { T::load::<false>(bytes) }.to_length())
+                    })
                     .and_then(|length| length?.checked_mul(item.bytes())?.checked_add(count.bytes())),
             };
             at = need.and_then(|n| at.checked_add(n)).filter(|&end| end <= data.len()).ok_or_else(|| {
@@ -104,23 +112,6 @@ fn walk(element: &Element, data: &[u8], start: usize, big: bool) -> std::result:
         }
     }
     Ok(at)
-}
-
-/// A list's length; `None` if negative.
-fn list_length(bytes: &[u8], ty: ScalarType, big: bool) -> Option<usize> {
-    fn load<T: Scalar>(bytes: &[u8], big: bool) -> T {
-        if big { T::load::<true>(bytes) } else { T::load::<false>(bytes) }
-    }
-    match ty {
-        ScalarType::I8 => usize::try_from(load::<i8>(bytes, big)).ok(),
-        ScalarType::U8 => Some(usize::from(load::<u8>(bytes, big))),
-        ScalarType::I16 => usize::try_from(load::<i16>(bytes, big)).ok(),
-        ScalarType::U16 => Some(usize::from(load::<u16>(bytes, big))),
-        ScalarType::I32 => usize::try_from(load::<i32>(bytes, big)).ok(),
-        ScalarType::U32 => usize::try_from(load::<u32>(bytes, big)).ok(),
-        // The header refuses these.
-        ScalarType::F32 | ScalarType::F64 => None,
-    }
 }
 
 /// Compares the `left` bytes after the vertices with what the elements after them need.

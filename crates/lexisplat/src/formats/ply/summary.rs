@@ -1,13 +1,14 @@
-//! What a PLY was like, for people and reports.
+//! A description of a PLY for people and reports.
 
 use serde::Serialize;
 
-use super::header::{Format, Header, Kind, ScalarType};
+use super::header::{Format, Header, Kind};
 use super::layout::vertex_index;
 use super::marks::mark;
 use super::names::{DC, NORMAL, POSITION};
+use super::scalar::ScalarType;
 
-/// Which program probably wrote a file, from its comments and the order of its properties.
+/// The program that probably wrote a file, judged by its comments and the order of its properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
@@ -26,13 +27,13 @@ pub enum Dialect {
     Other,
 }
 
-/// What a PLY was like, before its values became a [`Splats`](crate::Splats).
+/// A description of a PLY, from which a [`Splats`](crate::Splats) was read.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 #[non_exhaustive]
 pub struct PlySummary {
     /// Probable writer.
     pub dialect: Dialect,
-    /// How values are stored.
+    /// How the file stores values.
     pub format: Format,
     /// Size of the whole file.
     pub file_bytes: u64,
@@ -51,7 +52,7 @@ pub struct PlySummary {
 }
 
 impl PlySummary {
-    /// Summary of a file of `file_bytes` with this header; the caller fills in `dropped`.
+    /// Summarises a file of `file_bytes` with this header. The caller sets `dropped`.
     pub(super) fn new(header: &Header, file_bytes: u64, row_bytes: u64) -> Self {
         let vertex = vertex_index(header).map(|i| &header.elements[i]);
         let mut properties = Vec::new();

@@ -1,26 +1,29 @@
-//! Writes a [`Splats`] in the INRIA layout, which every viewer reads.
+//! Writes a [`Splats`] in INRIA's layout, which every viewer reads.
 
-use super::header::ScalarType;
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
-use crate::scene::splats::{ExtraValues, SceneMeta, Splats, for_extra};
+use super::rows::ROWS_PER_TASK;
+use super::scalar::ScalarType;
+use crate::scene::splats::{SceneMeta, Splats, for_extra};
 use crate::support::error::{Error, Result};
 use crate::support::output::{Output, write_whole};
 use crate::support::parallel::for_each_chunk_mut;
 use std::collections::HashSet;
 use std::io::{self, Write};
 
-/// Rows one thread formats at a time.
-const CHUNK_ROWS: usize = 1024;
-/// Rows formatted before they are written: at 248 bytes a row, 8 MiB.
-const BLOCK_ROWS: usize = 32 * CHUNK_ROWS;
+/// Rows formatted in memory before they are written: 8 MiB at 248 bytes a row.
+const BLOCK_ROWS: usize = 32 * ROWS_PER_TASK;
 
-/// Writes `splats` to `output`, whole or not at all; the number of bytes.
+/// Floats of a row besides SH-rest.
+const FIXED_FLOATS: usize =
+    POSITION.len() + NORMAL.len() + DC.len() + OPACITY.len() + SCALE.len() + ROTATION.len();
+
+/// Writes `splats` to `output`, whole or not at all. Returns the number of bytes written.
 ///
-/// Little-endian, in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
-/// own types. Normals are zeros if the scene has none. Comments go back in; the anti-aliasing mark is
-/// added if no comment carries it.
+/// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
+/// own types. Normals are zeros if the scene has none. The scene's comments are written too. If the scene is
+/// anti-aliased and no comment says so, a comment is added.
 ///
 /// # Errors
 /// [`Error::Io`] if the file cannot be written, [`Error::Parameter`] if the arrays differ in length or
@@ -36,11 +39,10 @@ pub fn write<'a>(output: impl Into<Output<'a>>, splats: &Splats) -> Result<u64> 
     Ok(bytes)
 }
 
-/// Writes `splats` as [`write()`] does; the number of bytes.
+/// Writes `splats` as [`write()`] does. Returns the number of bytes written.
 ///
 /// # Errors
-/// Whatever `writer` returns, or [`io::ErrorKind::InvalidInput`] for a scene that
-/// [`write()`] refuses.
+/// Any error of `writer`, and [`io::ErrorKind::InvalidInput`] for a scene that [`write()`] refuses.
 pub fn write_to(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
     check(splats).map_err(|e| io::Error::new(io::ErrorKind::InvalidInput, e))?;
     write_checked(writer, splats)
@@ -52,7 +54,7 @@ fn write_checked(writer: &mut impl Write, splats: &Splats) -> io::Result<u64> {
     Ok(writer.bytes)
 }
 
-/// Writes a scene part after part.
+/// Writes a scene part by part.
 pub(crate) struct PlyWriter<W> {
     writer: W,
     layout: RowLayout,
@@ -61,9 +63,14 @@ pub(crate) struct PlyWriter<W> {
     pub(crate) bytes: u64,
 }
 
+/// Bytes of the file of a scene of `count` Gaussians that is like `splats`.
+pub(crate) fn file_bytes(splats: &Splats, count: usize) -> u64 {
+    header(splats, count).len() as u64 + RowLayout::new(splats).row_bytes as u64 * count as u64
+}
+
 impl<W: Write> PlyWriter<W> {
-    /// Writes the header of a scene of `count` Gaussians that is like `splats`, whose own number is of no
-    /// matter; it was [`check`]ed.
+    /// Writes the header of a scene of `count` Gaussians. `splats`, which was [`check`]ed, gives its properties and
+    /// comments and may hold any number of Gaussians.
     pub(crate) fn begin(mut writer: W, splats: &Splats, count: usize) -> io::Result<Self> {
         let header = header(splats, count);
         writer.write_all(header.as_bytes())?;
@@ -72,19 +79,14 @@ impl<W: Write> PlyWriter<W> {
         Ok(Self { writer, layout, block, bytes: header.len() as u64 })
     }
 
-    /// Bytes of a Gaussian.
-    pub(crate) fn row_bytes(&self) -> u64 {
-        self.layout.row_bytes as u64
-    }
-
     /// Writes the next Gaussians.
     pub(crate) fn write(&mut self, splats: &Splats) -> io::Result<()> {
         let (count, row_bytes) = (splats.len(), self.layout.row_bytes);
         for start in (0..count).step_by(BLOCK_ROWS) {
             let rows = &mut self.block[..row_bytes * BLOCK_ROWS.min(count - start)];
             let layout = &self.layout;
-            for_each_chunk_mut(rows, row_bytes * CHUNK_ROWS, |chunk, rows| {
-                layout.pack(splats, start + chunk * CHUNK_ROWS, rows);
+            for_each_chunk_mut(rows, row_bytes * ROWS_PER_TASK, |chunk, rows| {
+                layout.pack(splats, start + chunk * ROWS_PER_TASK, rows);
             });
             self.writer.write_all(rows)?;
         }
@@ -93,7 +95,7 @@ impl<W: Write> PlyWriter<W> {
     }
 }
 
-/// Names of the properties every file has, in order.
+/// Returns the names of the properties that every file has, in order.
 fn names(rest: usize) -> impl Iterator<Item = String> {
     let fixed = |names: &'static [&'static str]| names.iter().map(|&n| n.to_owned());
     fixed(&POSITION)
@@ -105,13 +107,13 @@ fn names(rest: usize) -> impl Iterator<Item = String> {
         .chain(fixed(&ROTATION))
 }
 
-/// Refuses what no PLY can hold.
+/// Refuses a scene that no PLY can hold.
 pub(crate) fn check(splats: &Splats) -> Result<()> {
     splats.validate()?;
     let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
     for extra in &splats.geometry.extras {
         let name = &extra.name;
-        // A line break in a name would let it write header lines of its own.
+        // A name with a line break could add lines to the header.
         if name.is_empty() || name.chars().any(|c| c.is_whitespace() || c.is_control()) {
             return Err(Error::parameter(
                 "extra",
@@ -126,7 +128,7 @@ pub(crate) fn check(splats: &Splats) -> Result<()> {
     Ok(())
 }
 
-/// The header of a scene of `count` Gaussians that is like `splats`.
+/// Returns the header of a scene of `count` Gaussians with the properties and comments of `splats`.
 pub(super) fn header(splats: &Splats, count: usize) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments(&splats.meta) {
@@ -138,13 +140,13 @@ pub(super) fn header(splats: &Splats, count: usize) -> String {
         text.push_str(&format!("property float {name}\n"));
     }
     for extra in &splats.geometry.extras {
-        text.push_str(&format!("property {} {}\n", extra_type(&extra.values).name(), extra.name));
+        text.push_str(&format!("property {} {}\n", ScalarType::of(&extra.values).name(), extra.name));
     }
     text.push_str("end_header\n");
     text
 }
 
-/// The scene's comments on one line each, brought in agreement with its anti-aliasing mark.
+/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark.
 fn comments(meta: &SceneMeta) -> Vec<String> {
     let mut out: Vec<String> =
         meta.comments.iter().map(|c| c.replace(char::is_control, " ").trim().to_owned()).collect();
@@ -156,87 +158,52 @@ fn comments(meta: &SceneMeta) -> Vec<String> {
     out
 }
 
-fn extra_type(values: &ExtraValues) -> ScalarType {
-    match values {
-        ExtraValues::I8(_) => ScalarType::I8,
-        ExtraValues::U8(_) => ScalarType::U8,
-        ExtraValues::I16(_) => ScalarType::I16,
-        ExtraValues::U16(_) => ScalarType::U16,
-        ExtraValues::I32(_) => ScalarType::I32,
-        ExtraValues::U32(_) => ScalarType::U32,
-        ExtraValues::F32(_) => ScalarType::F32,
-        ExtraValues::F64(_) => ScalarType::F64,
-    }
-}
-
-/// Byte offsets of the groups in a row.
+/// How scenes with the same properties become rows.
 pub(super) struct RowLayout {
-    normal: usize,
-    dc: usize,
-    rest: usize,
-    opacity: usize,
-    scale: usize,
-    rotation: usize,
-    extras: Vec<usize>,
     pub(super) row_bytes: usize,
 }
 
 impl RowLayout {
     pub(super) fn new(splats: &Splats) -> Self {
-        let mut at = 0;
-        let mut place = |bytes: usize| {
-            let start = at;
-            at += bytes;
-            start
-        };
-        let float = size_of::<f32>();
-        let _position = place(3 * float);
-        let normal = place(3 * float);
-        let dc = place(3 * float);
-        let rest = place(splats.degree.rest() * float);
-        let opacity = place(float);
-        let scale = place(3 * float);
-        let rotation = place(4 * float);
-        let extras = splats.geometry.extras.iter().map(|e| place(extra_type(&e.values).bytes())).collect();
-        Self { normal, dc, rest, opacity, scale, rotation, extras, row_bytes: at }
+        let extras: usize = splats.geometry.extras.iter().map(|e| e.values.width()).sum();
+        Self { row_bytes: (FIXED_FLOATS + splats.degree.rest()) * size_of::<f32>() + extras }
     }
 
-    /// Formats the Gaussians from `start` on into `rows`.
+    /// Writes the Gaussians from `start` on into `rows`.
     pub(super) fn pack(&self, splats: &Splats, start: usize, rows: &mut [u8]) {
         let count = rows.len() / self.row_bytes;
         let range = start..start + count;
         let geometry = &splats.geometry;
         let dim = splats.degree.rest();
-        let mut put = |offset: usize, values: &[f32], width: usize| {
-            if width == 0 {
-                return;
-            }
+        let no_normals = if geometry.normals.is_empty() { vec![[0.0; 3]; count] } else { Vec::new() };
+        let normals = geometry.normals.get(range.clone()).unwrap_or(&no_normals);
+        let groups = [
+            (geometry.positions[range.clone()].as_flattened(), POSITION.len()),
+            (normals.as_flattened(), NORMAL.len()),
+            (geometry.dc[range.clone()].as_flattened(), DC.len()),
+            (&splats.sh_rest[range.start * dim..range.end * dim], dim),
+            (&geometry.opacities[range.clone()], OPACITY.len()),
+            (geometry.scales[range.clone()].as_flattened(), SCALE.len()),
+            (geometry.rotations[range.clone()].as_flattened(), ROTATION.len()),
+        ];
+        let mut offset = 0;
+        for (values, width) in groups.into_iter().filter(|group| group.1 > 0) {
+            let field = offset..offset + width * size_of::<f32>();
             for (row, values) in rows.chunks_exact_mut(self.row_bytes).zip(values.chunks_exact(width)) {
-                let target =
-                    row[offset..offset + width * size_of::<f32>()].chunks_exact_mut(size_of::<f32>());
-                for (target, value) in target.zip(values) {
+                for (target, value) in row[field.clone()].chunks_exact_mut(size_of::<f32>()).zip(values) {
                     target.copy_from_slice(&value.to_le_bytes());
                 }
             }
-        };
-        put(0, geometry.positions[range.clone()].as_flattened(), 3);
-        if geometry.normals.is_empty() {
-            put(self.normal, &vec![0.0; 3 * count], 3);
-        } else {
-            put(self.normal, geometry.normals[range.clone()].as_flattened(), 3);
+            offset = field.end;
         }
-        put(self.dc, geometry.dc[range.clone()].as_flattened(), 3);
-        put(self.rest, &splats.sh_rest[range.start * dim..range.end * dim], dim);
-        put(self.opacity, &geometry.opacities[range.clone()], 1);
-        put(self.scale, geometry.scales[range.clone()].as_flattened(), 3);
-        put(self.rotation, geometry.rotations[range.clone()].as_flattened(), 4);
-        for (extra, &offset) in geometry.extras.iter().zip(&self.extras) {
+        for extra in &geometry.extras {
+            let field = offset..offset + extra.values.width();
             for_extra!(&extra.values, values => {
                 for (row, value) in rows.chunks_exact_mut(self.row_bytes).zip(&values[range.clone()]) {
-                    let bytes = value.to_le_bytes();
-                    row[offset..offset + bytes.len()].copy_from_slice(&bytes);
+                    row[field.clone()].copy_from_slice(&value.to_le_bytes());
                 }
             });
+            offset = field.end;
         }
     }
 }

@@ -1,6 +1,6 @@
-//! First atoms, replacement of useless ones, and the canonical form of a finished dictionary.
+//! The first atoms, the replacement of useless ones, and the canonical form of a finished dictionary.
 
-use std::cmp::Reverse;
+use std::cmp::{Ordering, Reverse};
 
 use super::LearnOptions;
 use super::axes::principal_axes;
@@ -9,15 +9,15 @@ use super::update::{dot, normalised};
 use crate::sparse::dictionary::Dictionary;
 use crate::support::rng::SplitMix64;
 
-/// Two atoms whose |cos| is over this are one (KSVD-Box, `muthresh`).
+/// Two atoms whose |cos| is above this count as one (KSVD-Box, `muthresh`).
 const DUPLICATE_COS: f32 = 0.99;
-/// An atom with fewer users is not worth its place (KSVD-Box, `cleardict`).
+/// An atom with fewer users is replaced (KSVD-Box, `cleardict`).
 const MIN_USERS: usize = 4;
-/// First atoms should be at most this similar, as long as enough others can be found.
+/// Largest |cos| of two first atoms, as long as enough dissimilar vectors can be found.
 const FIRST_COS: f32 = 0.9;
-/// Draws per atom while insisting on dissimilar first atoms, and altogether.
+/// Draws for each first atom that keep to [`FIRST_COS`], and draws altogether.
 const DRAWS_PER_ATOM: [usize; 2] = [20, 40];
-/// Mixed into the seed, so that the sample and the first atoms are independent.
+/// Mixed into the seed, so that the first atoms do not depend on the sample's random numbers.
 const FIRST_STREAM: u64 = 0x46;
 
 fn direction(vector: &[f32]) -> Option<Vec<f32>> {
@@ -25,16 +25,16 @@ fn direction(vector: &[f32]) -> Option<Vec<f32>> {
     normalised(&wide)
 }
 
-/// `atoms` unit vectors: the principal axes, directions of random samples that differ, then whatever is
-/// left, then coordinate axes and random directions when there are too few samples.
+/// Returns `atoms` unit vectors: principal axes, then directions of dissimilar random vectors of `sample`, then of any
+/// others, then coordinate axes, then random directions.
 ///
-/// Without the principal axes learning ends in worse optima: samples alone share their strongest
-/// directions, and the weak ones, which small tolerances need, are found late or never.
+/// Without the principal axes learning ends in worse optima. Vectors of the sample share their strongest directions,
+/// and the weak ones, which small tolerances need, would be found late or never.
 pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &LearnOptions) -> Vec<f32> {
     let vectors = sample.len() / dim;
     let mut rng = SplitMix64::new(options.seed ^ FIRST_STREAM);
     let mut out: Vec<f32> = Vec::with_capacity(atoms * dim);
-    // At least half must be samples, or a small dictionary would have nothing to tell apart.
+    // At least half of the atoms are vectors of the sample, because axes alone do not tell vectors apart.
     for axis in principal_axes(dim, sample).iter().take(atoms / 2) {
         out.extend(normalised(axis).into_iter().flatten());
     }
@@ -51,11 +51,8 @@ pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &Le
             }
         }
     }
-    for axis in 0..dim {
-        if out.len() < atoms * dim {
-            out.extend((0..dim).map(|d| if d == axis { 1.0 } else { 0.0 }));
-        }
-    }
+    let missing = (atoms - out.len() / dim).min(dim);
+    out.extend((0..missing).flat_map(|axis| unit_axis(dim, axis)));
     while out.len() < atoms * dim {
         #[expect(clippy::cast_precision_loss, reason = "any direction will do")]
         let random: Vec<f64> = (0..dim).map(|_| (rng.next() >> 11) as f64 - (1_u64 << 52) as f64).collect();
@@ -64,7 +61,22 @@ pub(super) fn first_atoms(dim: usize, sample: &[f32], atoms: usize, options: &Le
     out
 }
 
-/// Replaces atoms with few users, and the less used of two alike, by the vectors that cost most.
+/// Returns coordinate axis `axis`.
+pub(crate) fn unit_axis(dim: usize, axis: usize) -> impl Iterator<Item = f32> {
+    (0..dim).map(move |d| if d == axis { 1.0 } else { 0.0 })
+}
+
+/// Returns the first `wanted` of `list` in the order of `compare`, or all if there are fewer. No two may be equal.
+pub(crate) fn take_first<T>(mut list: Vec<T>, wanted: usize, compare: impl Fn(&T, &T) -> Ordering) -> Vec<T> {
+    if wanted > 0 && wanted < list.len() {
+        list.select_nth_unstable_by(wanted - 1, &compare);
+    }
+    list.truncate(wanted);
+    list.sort_unstable_by(compare);
+    list
+}
+
+/// Replaces atoms with few users, and the less used of two similar atoms, by the vectors that cost most.
 pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training: &Training, vectors: &[f32]) {
     let dim = training.dim;
     let count = atoms.len() / dim;
@@ -82,22 +94,16 @@ pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training:
     if useless.is_empty() {
         return;
     }
-    // With a tolerance all residuals are about as large; what tells a badly served vector is its count.
-    let mut worst: Vec<(Reverse<usize>, Reverse<u64>, usize)> = (0..training.len())
+    // With a tolerance all residuals have about the same norm. A vector that the atoms fit badly has many nonzeros.
+    let costs: Vec<(Reverse<usize>, Reverse<u64>, usize)> = (0..training.len())
         .map(|i| {
             let residual = &training.residuals[i * dim..][..dim];
-            // Norms are not negative, so their bits order as they do.
+            // Squared norms are not negative, so their bits have the same order.
             let error = f64::from(dot(residual, residual).max(0.0)).to_bits();
             (Reverse(training.starts[i + 1] - training.starts[i]), Reverse(error), i)
         })
         .collect();
-    let wanted = useless.len().min(worst.len());
-    if wanted == 0 {
-        return;
-    }
-    worst.select_nth_unstable(wanted - 1);
-    worst.truncate(wanted);
-    worst.sort_unstable();
+    let worst = take_first(costs, useless.len(), Ord::cmp);
     for (j, (_, _, i)) in useless.into_iter().zip(worst) {
         if let Some(new) = direction(&vectors[i * dim..][..dim]) {
             atoms[j * dim..][..dim].copy_from_slice(&new);
@@ -106,7 +112,7 @@ pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training:
     }
 }
 
-/// The atoms by falling use, each with its largest entry positive.
+/// Returns the atoms most used first, each with its largest entry positive.
 pub(super) fn canonical(dictionary: &Dictionary, usage: &[usize]) -> Vec<f32> {
     let mut order: Vec<usize> = (0..dictionary.len()).collect();
     order.sort_by_key(|&j| Reverse(usage[j]));

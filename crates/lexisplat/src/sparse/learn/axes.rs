@@ -1,15 +1,15 @@
-//! Principal axes of a sample: where its energy lies.
+//! The principal axes of a sample.
 
-/// Vectors that are enough to find the axes.
+/// Most vectors that the axes are computed from.
 const MAX_VECTORS: usize = 16_384;
-/// Passes over all pairs of coordinates; convergence is quadratic, so few are needed.
+/// Passes over all pairs of coordinates. Convergence is quadratic, so few are needed.
 const SWEEPS: usize = 12;
 
-/// Eigenvectors of the second moments of `sample` (about zero, not the mean), most energy first; none
-/// for an empty sample.
+/// Returns the eigenvectors of the second moments of `sample` (about zero, not the mean), largest eigenvalue first. An
+/// empty sample has none.
 ///
-/// Cyclic Jacobi rotations in f64: slow beside a library, but exact operations in a fixed order, so the
-/// result is the same everywhere.
+/// The method is cyclic Jacobi rotations in f64. A library would be faster, but these operations have a fixed order and
+/// rounding, so the result is the same on every machine.
 pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     if sample.is_empty() {
         return Vec::new();
@@ -37,12 +37,12 @@ pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     order.into_iter().map(|i| axes[i].clone()).collect()
 }
 
-/// Rotates coordinates `p < q` so that their moment becomes zero.
+/// Rotates coordinates `p < q` so that their mixed moment becomes zero.
 fn rotate(moments: &mut [Vec<f64>], axes: &mut [Vec<f64>], p: usize, q: usize) {
     let off = moments[p][q];
     let theta = (moments[q][q] - moments[p][p]) / (2.0 * off);
     let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
-    // Moments without energy, or already as good as diagonal.
+    // The moments are zero, or already diagonal up to rounding.
     if off == 0.0 || !tangent.is_finite() {
         return;
     }

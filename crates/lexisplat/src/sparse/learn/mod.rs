@@ -1,10 +1,9 @@
-//! Learning a dictionary: code a sample, refit the atoms to their users, repeat.
+//! Learns a dictionary: codes a sample, refits the atoms to their users, repeats.
 //!
-//! One round is a pursuit with the very tolerance of the final coding, followed by approximate K-SVD
-//! (Rubinstein et al. 2008), which refits each atom and the values of its users in turn. Rounds are
-//! accelerated: each atom moves by its K-SVD step plus a share of how it moved before. Plain K-SVD
-//! creeps; with momentum fewer rounds end at 2 to 3 % fewer nonzeros (docs/METHOD.md
-//! has the figures). The sample grows as learning goes on, since early rounds need only the direction.
+//! One round is a pursuit with the tolerance of the final coding, followed by approximate K-SVD (Rubinstein et al.
+//! 2008), which refits each atom and the values of its users in turn. Each atom moves by its K-SVD step plus a share of
+//! its last movement. With this momentum, fewer rounds than plain K-SVD needs end at 2 to 3 % fewer nonzeros
+//! (docs/METHOD.md has the figures). The sample grows during learning, since early rounds need only the direction.
 
 mod atom_replacement;
 mod axes;
@@ -16,31 +15,34 @@ use crate::scene::sh::ShDegree;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 use crate::sparse::pursuit::{Coder, StopRule, ValueType};
+use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 use crate::support::progress::{Progress, Stage};
+pub(crate) use atom_replacement::{take_first, unit_axis};
 pub(crate) use axes::principal_axes;
 pub(crate) use sample::Fetch;
 use sample::Sample;
 use training::Training;
+pub(crate) use update::ksvd_atom;
 
-/// Vectors learned from at most. On the real models tried, half as many already gave the same mean nonzeros
-/// within the differences between seeds (docs/METHOD.md).
+/// Most vectors that a dictionary is learned from. On the real models tried, half as many gave the same mean nonzeros
+/// up to the differences between seeds (docs/METHOD.md).
 pub const DEFAULT_SAMPLE: usize = 65_536;
-/// Share of an atom's last movement that the next round keeps. 0.8 to 0.97 end alike; 0 ends at 3 to 18 %
-/// more nonzeros.
+/// Share of an atom's last movement that the next round keeps. Values from 0.8 to 0.97 give the same nonzeros; 0 gives
+/// 3 to 18 % more.
 pub const DEFAULT_MOMENTUM: f32 = 0.9;
-/// Vectors per atom in the first, fastest stage; each later stage has [`GROWTH`] times more.
+/// Vectors for each atom in the first stage, which is the fastest. Each later stage has [`GROWTH`] times more.
 const FIRST_STAGE_PER_ATOM: usize = 48;
 /// Growth of the sample between stages.
 const GROWTH: usize = 4;
 /// Most rounds in the first stage, and in each later one.
 const STAGE_ROUNDS: [usize; 2] = [150, 20];
-/// Rounds between looks at the held-out vectors.
-const LOOK_EVERY: usize = 5;
-/// A look that does not lower the held-out score by this share is a disappointment.
+/// Rounds between evaluations on the held-out vectors.
+const EVALUATE_EVERY: usize = 5;
+/// An evaluation counts as progress if it lowers the held-out score by this share.
 const MIN_GAIN: f64 = 1e-3;
-/// Disappointing looks forgiven in a row before a stage ends.
+/// Evaluations in a row without progress after which a stage still goes on.
 const PATIENCE: u32 = 2;
 
 /// How to learn a dictionary.
@@ -51,19 +53,19 @@ pub struct LearnOptions {
     pub atoms: Option<usize>,
     /// The pursuit that will code.
     pub pursuit: Pursuit,
-    /// When that pursuit will stop. With a tolerance, learning minimises mean nonzeros; with only a cap
-    /// on nonzeros, the squared error.
+    /// When that pursuit will stop. With a tolerance, learning minimises mean nonzeros. With only a cap on nonzeros, it
+    /// minimises the squared error.
     pub stop: StopRule,
     /// Seed of the sample and of the first atoms.
     pub seed: u64,
-    /// Vectors to learn from at most.
+    /// Most vectors to learn from.
     pub sample: usize,
     /// Share of an atom's last movement that the next round keeps, from 0 to below 1.
     pub momentum: f32,
 }
 
 impl LearnOptions {
-    /// The defaults for a given stop: OLS, seed 0, [`DEFAULT_SAMPLE`] vectors, twice the dimension atoms.
+    /// The defaults for a stopping rule: OLS, seed 0, [`DEFAULT_SAMPLE`] vectors, twice as many atoms as dimensions.
     #[must_use]
     pub fn new(stop: StopRule) -> Self {
         Self {
@@ -75,19 +77,27 @@ impl LearnOptions {
             momentum: DEFAULT_MOMENTUM,
         }
     }
+
+    builder_methods!(
+        with_atoms(atoms: Option<usize>),
+        with_pursuit(pursuit: Pursuit),
+        with_seed(seed: u64),
+        with_sample(sample: usize),
+        with_momentum(momentum: f32),
+    );
 }
 
-/// A learned dictionary and how learning went.
+/// A learned dictionary and a report of the learning.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Learned {
     /// The atoms, most used first, each with its largest entry positive.
     pub dictionary: Dictionary,
-    /// Rounds done.
+    /// Number of rounds.
     pub rounds: usize,
-    /// Vectors learned from.
+    /// Number of vectors learned from.
     pub sample: usize,
-    /// Mean nonzeros on vectors not learned from; 0 when there were too few to hold any out.
+    /// Mean nonzeros of the held-out vectors; 0 if there were too few vectors to hold any out.
     pub held_out_nonzeros: f64,
 }
 
@@ -96,8 +106,8 @@ pub struct Learned {
 /// The result depends only on the arguments, not on threads or CPU.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a number of atoms out of range, or `signals` that are not a whole number of
-/// finite vectors.
+/// [`Error::Parameter`] if the number of atoms or the momentum is out of range, or if `signals` are not a whole number
+/// of finite vectors. [`Error::Cancelled`] if `progress` cancels.
 pub fn learn(
     degree: ShDegree,
     signals: &[f32],
@@ -116,7 +126,7 @@ pub fn learn(
     learn_from(degree, vectors, &mut fetch, options, progress)
 }
 
-/// [`learn`] from `vectors` vectors, of which `fetch` gives those asked for.
+/// [`learn`] from `vectors` vectors, which `fetch` reads by number.
 pub(crate) fn learn_from(
     degree: ShDegree,
     vectors: usize,
@@ -154,12 +164,12 @@ pub(crate) fn learn_from(
     Ok(Learned { dictionary, rounds: learner.rounds, sample: sample.learn.len() / dim, held_out_nonzeros })
 }
 
-/// The state that rounds change.
+/// The state of learning.
 struct Learner<'a> {
     options: &'a LearnOptions,
     sample: &'a Sample,
     dictionary: Dictionary,
-    /// How each atom moved in the last round.
+    /// The movement of each atom in the last round.
     velocity: Vec<f32>,
     /// Lowest held-out score so far, and its dictionary.
     best: (f64, Dictionary),
@@ -174,7 +184,7 @@ impl Learner<'_> {
         while let Some(&last) = sizes.last()
             && last < vectors
         {
-            // A last step of less than twice the size is not worth a stage of its own.
+            // The last stage takes all vectors if they are less than twice as many as the next stage would take.
             let next = last * GROWTH;
             sizes.push(if next * 2 > vectors { vectors } else { next });
         }
@@ -182,13 +192,14 @@ impl Learner<'_> {
         progress.begin(Stage::Learn, most as u64);
         for (stage, size) in sizes.into_iter().enumerate() {
             let part = &self.sample.learn[..size * dim];
-            // A new stage sees new vectors: what was best on the old ones may not be.
+            // Progress is counted anew, because a stage with more vectors may begin at a worse score.
             let mut reference = f64::INFINITY;
             let mut patience = PATIENCE;
             for round in 1..=STAGE_ROUNDS[stage.min(1)] {
                 self.round(part)?;
                 progress.advance(1);
-                if round % LOOK_EVERY == 0 {
+                progress.check()?;
+                if round % EVALUATE_EVERY == 0 {
                     let score = self.score(&self.dictionary);
                     if score < self.best.0 {
                         self.best = (score, self.dictionary.clone());
@@ -223,9 +234,9 @@ impl Learner<'_> {
         Ok(())
     }
 
-    /// What learning minimises, on vectors not learned from.
+    /// What learning minimises, on the validation vectors.
     fn score(&self, dictionary: &Dictionary) -> f64 {
-        let cost = training::cost(&self.coder(dictionary), self.sample.judge(), dictionary.dim());
+        let cost = training::cost(&self.coder(dictionary), self.sample.validation(), dictionary.dim());
         if self.options.stop.tolerance().is_some() { cost.nonzeros } else { cost.squared_error }
     }
 
@@ -233,11 +244,11 @@ impl Learner<'_> {
         training::cost(&self.coder(dictionary), &self.sample.held_out, dictionary.dim()).nonzeros
     }
 
-    /// The best dictionary in an order and with signs that do not depend on how it was found.
+    /// The best dictionary, in an order and with signs that do not depend on the way it was found.
     fn canonical(&self) -> Result<Dictionary> {
         let best = &self.best.1;
         let coder = self.coder(best);
-        let usage = training::usage(&coder, self.sample.judge(), best);
+        let usage = training::usage(&coder, self.sample.validation(), best);
         Dictionary::new(best.degree(), atom_replacement::canonical(best, &usage))
     }
 }

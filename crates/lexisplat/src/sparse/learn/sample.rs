@@ -1,33 +1,33 @@
-//! Which vectors to learn from and which to judge by.
+//! Which vectors to learn from, and which to measure progress by.
 
 use super::LearnOptions;
 use crate::support::error::Result;
 use crate::support::rng::SplitMix64;
 
-/// Vectors held out at most; the standard error of mean nonzeros is then about 0.1.
+/// Most vectors held out. The standard error of mean nonzeros is then about 0.1.
 const MAX_HELD_OUT: usize = 4096;
 /// One in so many vectors is held out, up to the maximum.
 const HELD_OUT_SHARE: usize = 10;
-/// Mixed into the seed, so that the sample and the first atoms are independent.
+/// Mixed into the seed, so that the sample does not depend on the first atoms' random numbers.
 const SAMPLE_STREAM: u64 = 0x53;
 
 /// Two disjoint sets of vectors, in random order.
 #[derive(Debug)]
 pub(super) struct Sample {
-    /// Vectors to learn from. Those within the tolerance are left out: they cost no atoms.
+    /// Vectors to learn from. Vectors within the tolerance are left out, because they need no atoms.
     pub(super) learn: Vec<f32>,
-    /// Vectors to judge by, whatever their norm.
+    /// Vectors to measure progress by, of any norm.
     pub(super) held_out: Vec<f32>,
 }
 
-/// Vectors asked for at a time.
+/// Vectors fetched at a time.
 const BATCH: usize = 4096;
 
-/// Appends the vectors of these numbers, in this order, to a list.
+/// Appends the vectors with the given numbers, in the given order, to a list.
 pub(crate) type Fetch<'a> = dyn FnMut(&[usize], &mut Vec<f32>) -> Result<()> + 'a;
 
 impl Sample {
-    /// Draws from `vectors` vectors of length `dim`.
+    /// Draws a sample of `vectors` vectors of length `dim`.
     pub(super) fn draw(
         dim: usize,
         vectors: usize,
@@ -63,8 +63,8 @@ impl Sample {
         }
     }
 
-    /// The vectors to judge by: the held-out ones, or all when the scene is too small to hold any out.
-    pub(super) fn judge(&self) -> &[f32] {
+    /// The vectors to measure progress by: those held out, or all if the scene is too small to hold any out.
+    pub(super) fn validation(&self) -> &[f32] {
         if self.held_out.is_empty() { &self.learn } else { &self.held_out }
     }
 }

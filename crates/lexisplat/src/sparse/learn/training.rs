@@ -1,20 +1,20 @@
-//! The coded sample: who uses which atom, and what the codes leave of each vector.
+//! The coded sample: which vectors use which atom, and the residual of each vector.
 
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::pursuit::{Coder, Encoded};
-use crate::support::parallel::{CHUNK, map_chunks};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Codes and residuals of a set of vectors.
 #[derive(Debug, Default)]
 pub(super) struct Training {
     pub(super) dim: usize,
-    /// Start of each vector's entries, and the end of the last one's.
+    /// Start of each vector's entries, followed by the end of the last vector's.
     pub(super) starts: Vec<usize>,
     /// Atom of each entry.
     pub(super) atoms: Vec<u16>,
     /// Value of each entry.
     pub(super) values: Vec<f32>,
-    /// What the codes leave of each vector.
+    /// Residuals of all vectors, one after the other.
     pub(super) residuals: Vec<f32>,
 }
 
@@ -28,9 +28,9 @@ pub(super) struct Use {
 }
 
 impl Training {
-    /// Codes all `vectors`. One that cannot be coded counts as having no entries and no residual.
+    /// Codes all `vectors`. A vector that cannot be coded has no entries, and its residual is 0.
     pub(super) fn code(coder: &Coder, vectors: &[f32], dim: usize) -> Self {
-        let parts = map_chunks(vectors.len() / dim, CHUNK, |range| {
+        let parts = map_chunks(vectors.len() / dim, GAUSSIANS_PER_TASK, |range| {
             let mut part = Self { dim, ..Self::default() };
             coder.encode(&vectors[range.start * dim..range.end * dim], |visit| {
                 if visit.outcome == Encoded::Escape {
@@ -61,7 +61,7 @@ impl Training {
         self.starts.len() - 1
     }
 
-    /// The uses of every one of `atoms` atoms, by ascending vector.
+    /// The uses of each of `atoms` atoms, by ascending vector.
     pub(super) fn uses(&self, atoms: usize) -> Vec<Vec<Use>> {
         let mut uses = vec![Vec::new(); atoms];
         for vector in 0..self.len() {
@@ -83,14 +83,14 @@ pub(super) struct Cost {
 /// Mean cost of coding `vectors`.
 pub(super) fn cost(coder: &Coder, vectors: &[f32], dim: usize) -> Cost {
     let count = vectors.len() / dim;
-    let parts = map_chunks(count, CHUNK, |range| {
+    let parts = map_chunks(count, GAUSSIANS_PER_TASK, |range| {
         let (mut nonzeros, mut squared_error) = (0_usize, 0.0);
         coder.encode(&vectors[range.start * dim..range.end * dim], |visit| match visit.outcome {
             Encoded::Code { error } => {
                 nonzeros += visit.code.len();
                 squared_error += error * error;
             }
-            // Stored exactly, as long as a full code.
+            // The vector is stored exactly, which costs as much as a code with all atoms.
             Encoded::Escape => nonzeros += dim,
         });
         (nonzeros, squared_error)
@@ -102,7 +102,7 @@ pub(super) fn cost(coder: &Coder, vectors: &[f32], dim: usize) -> Cost {
     }
 }
 
-/// How many of `vectors` use each atom.
+/// Counts for each atom how many of `vectors` use it.
 pub(super) fn usage(coder: &Coder, vectors: &[f32], dictionary: &Dictionary) -> Vec<usize> {
     let training = Training::code(coder, vectors, dictionary.dim());
     let mut usage = vec![0; dictionary.len()];

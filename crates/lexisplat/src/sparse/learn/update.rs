@@ -1,24 +1,38 @@
-//! Moving the atoms: approximate K-SVD, and momentum over rounds.
+//! Moves the atoms: approximate K-SVD, and momentum over rounds.
 
 use super::training::Training;
 use crate::scene::sh::MAX_REST;
 use crate::sparse::dictionary::Dictionary;
 
-/// Users summed in f32 before the sum goes on in f64.
+/// Users whose residuals are summed in f32 before the sum goes on in f64.
 const PARTIAL: usize = 64;
-/// Fixed partial sums of a dot product.
+/// Number of partial sums of a dot product. It is fixed, so that results do not depend on the CPU.
 const PARTS: usize = 8;
-/// A direction shorter than this is none.
+/// Shortest vector that has a direction.
 const MIN_NORM: f64 = 1e-12;
 
-/// `vector` scaled to unit norm, unless it is too short or not finite.
-pub(super) fn normalised(vector: &[f64]) -> Option<Vec<f32>> {
+/// Scales `vector` to unit norm, unless its norm is not finite or not above `min_norm`.
+fn normalised_over(vector: &[f64], min_norm: f64) -> Option<Vec<f32>> {
     let norm = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     #[expect(clippy::cast_possible_truncation, reason = "atoms are f32")]
-    (norm.is_finite() && norm > MIN_NORM).then(|| vector.iter().map(|x| (x / norm) as f32).collect())
+    (norm.is_finite() && norm > min_norm).then(|| vector.iter().map(|x| (x / norm) as f32).collect())
 }
 
-/// Refits every atom in turn to what its users leave over, and their values to the new atom.
+/// Scales `vector` to unit norm, unless its norm is not finite or not above [`MIN_NORM`].
+pub(super) fn normalised(vector: &[f64]) -> Option<Vec<f32>> {
+    normalised_over(vector, MIN_NORM)
+}
+
+/// Returns the new direction of `atom` in K-SVD: the normalised `sum + energy * atom`, where `sum` adds up the
+/// `g_i r_i` of its users and `energy` their `g_i^2`; `None` if its norm is not finite or not above `min_norm`.
+pub(crate) fn ksvd_atom(mut sum: Vec<f64>, energy: f64, atom: &[f32], min_norm: f64) -> Option<Vec<f32>> {
+    for (s, a) in sum.iter_mut().zip(atom) {
+        *s += energy * f64::from(*a);
+    }
+    normalised_over(&sum, min_norm)
+}
+
+/// Refits every atom in turn to its users' residuals, and the users' values to the new atom.
 ///
 /// Step j replaces atom `d` with users `i`, values `g_i` and residuals `r_i` by the normalised
 /// `sum_i g_i (r_i + g_i d)`, then each `g_i` by the projection of `r_i + g_i d` on it. Later atoms see
@@ -44,10 +58,7 @@ pub(super) fn refit(dictionary: &Dictionary, training: &mut Training) -> Vec<f32
                 *s += f64::from(*p);
             }
         }
-        for (s, a) in sum.iter_mut().zip(&*atom) {
-            *s += energy * f64::from(*a);
-        }
-        let Some(new) = normalised(&sum) else { continue };
+        let Some(new) = ksvd_atom(sum, energy, atom, MIN_NORM) else { continue };
         for u in uses {
             let value = &mut training.values[u.entry];
             let residual = &mut training.residuals[u.vector * dim..][..dim];
@@ -64,8 +75,8 @@ pub(super) fn refit(dictionary: &Dictionary, training: &mut Training) -> Vec<f32
     atoms
 }
 
-/// Lets each of `atoms` go on as it moved before: the step from `old` is added to `momentum` times the
-/// velocity, and the sum becomes both the new velocity and the step taken.
+/// Adds momentum to each of `atoms`. Its step from `old` plus `momentum` times its velocity becomes both its new
+/// velocity and the step that it takes.
 pub(super) fn accelerate(old: &Dictionary, atoms: &mut [f32], velocity: &mut [f32], momentum: f32) {
     let dim = old.dim();
     let moving = atoms.chunks_exact_mut(dim).zip(velocity.chunks_exact_mut(dim));
@@ -81,7 +92,7 @@ pub(super) fn accelerate(old: &Dictionary, atoms: &mut [f32], velocity: &mut [f3
     }
 }
 
-/// Dot product in fixed partial sums.
+/// Returns the dot product, summed in [`PARTS`] partial sums.
 pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; PARTS];
     let (a_chunks, b_chunks) = (a.chunks_exact(PARTS), b.chunks_exact(PARTS));
@@ -108,7 +119,7 @@ mod tests {
         (0..len).map(|_| f32::from(u16::try_from(rng.below(2001)).unwrap()) / 1000.0 - 1.0).collect()
     }
 
-    /// K-SVD never raises the squared error at fixed supports, and keeps its own books.
+    /// K-SVD lowers the squared error, and the residuals it maintains are those of the new atoms and values.
     #[test]
     fn refit_lowers_the_error_and_keeps_residuals_true() {
         let degree = ShDegree::new(2).unwrap();

@@ -1,4 +1,4 @@
-//! Coding many vectors: the stopping rule, the value type, and the check that the promise holds.
+//! Codes many vectors: the stopping rule, the value type, and the check that every error is within the tolerance.
 
 use half::f16;
 
@@ -8,14 +8,14 @@ use crate::sparse::model::Pursuit;
 use crate::support::error::{Error, Result};
 use crate::support::simd::Simd;
 
-/// Relative distance kept from the tolerance, so that another order of summing f64 squares agrees.
+/// Codes stay below the tolerance by this share of it, so that a reader who sums the squares in another order agrees.
 const PROMISE_MARGIN: f64 = 1e-12;
-/// A vector with a larger squared norm is not coded: f32 squares of its correlations could overflow.
+/// Largest squared norm of a vector that is coded. Above it, f32 squares of correlations could overflow.
 const MAX_ENERGY: f64 = 1e30;
-/// Below this share of the signal's energy the f32 residual is rounding noise; more atoms add nothing.
+/// Below this share of the signal's energy the f32 residual is rounding noise, and more atoms would not help.
 const NOISE_FLOOR: f64 = 1e-12;
 
-/// Precision of the stored values. The error is verified after rounding to it.
+/// Precision of the stored values. The error is verified after the values are rounded to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ValueType {
     /// 32-bit float.
@@ -24,7 +24,7 @@ pub enum ValueType {
     F16,
 }
 
-/// When a pursuit ends: whichever comes first.
+/// When a pursuit ends: at a tolerance or at a number of atoms, whichever comes first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopRule {
     tolerance: Option<f64>,
@@ -35,15 +35,15 @@ impl StopRule {
     /// Stops at the un-squared L2 norm `tolerance` of the error, at `max_nonzeros` atoms, or both.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if both are missing, or the tolerance is not finite and above 0.
+    /// [`Error::Parameter`] if both are missing, or if the tolerance is not finite or not above 0.
     pub fn new(tolerance: Option<f64>, max_nonzeros: Option<u8>) -> Result<Self> {
         if let Some(tol) = tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
-            return Err(Error::parameter("tol", tol, "a finite number above 0"));
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
         }
         if tolerance.is_none() && max_nonzeros.is_none() {
-            return Err(Error::parameter("tol", "none", "a tolerance, --max-nnz, or both"));
+            return Err(Error::parameter("tolerance", "none", "a tolerance, a cap on nonzeros, or both"));
         }
         Ok(Self { tolerance, max_nonzeros })
     }
@@ -60,7 +60,7 @@ impl StopRule {
         self.max_nonzeros
     }
 
-    /// The same stop without the cap.
+    /// The rule without the cap; unchanged if it has no tolerance.
     #[must_use]
     pub fn without_cap(self) -> Self {
         Self { max_nonzeros: if self.tolerance.is_some() { None } else { self.max_nonzeros }, ..self }
@@ -75,32 +75,32 @@ pub enum Encoded {
         /// Un-squared L2 norm of the error.
         error: f64,
     },
-    /// No code keeps the promise: the vector must be stored exactly.
+    /// No code reaches the tolerance: the vector must be stored exactly.
     Escape,
 }
 
-/// One coded vector, as [`Coder::encode`] shows it.
+/// One coded vector, as [`Coder::encode`] passes it on.
 #[derive(Debug, Clone, Copy)]
 pub struct Visit<'a> {
     /// The vector.
     pub signal: &'a [f32],
-    /// Its (atom, value) pairs by ascending atom, values already rounded; meaningless for an escape.
+    /// Its (atom, value) pairs by ascending atom. Values are already rounded. An escape has no meaningful pairs.
     pub code: &'a [(u16, f32)],
-    /// How it went.
+    /// The outcome.
     pub outcome: Encoded,
     reconstruction: &'a [f32],
 }
 
 impl Visit<'_> {
-    /// What a decoder makes of the code, as long as the vector.
+    /// The vector that a decoder reconstructs from the code.
     #[must_use]
     pub fn reconstruction(&self) -> &[f32] {
         &self.reconstruction[..self.signal.len()]
     }
 }
 
-/// The loop of [`Coder::encode`] as a value: a closure would not be inlined into the dispatch, and would
-/// then be compiled without its instructions.
+/// The loop of [`Coder::encode`]. A closure would not be inlined into the dispatch, and would then be compiled without
+/// the chosen instructions.
 struct Job<'a, F> {
     coder: &'a Coder,
     signals: &'a [f32],
@@ -122,43 +122,38 @@ impl<F: FnMut(Visit<'_>)> pulp::NullaryFnOnce for Job<'_, F> {
     }
 }
 
-/// Codes vectors over one dictionary. Shared by all threads; each makes its own workspace.
+/// Codes vectors over one dictionary. Threads can share it, since each call has its own working memory.
 #[derive(Debug)]
 pub struct Coder {
     plan: Plan,
     pursuit: Pursuit,
     stop: StopRule,
     values: ValueType,
-    simd: Simd,
 }
 
 impl Coder {
-    /// A coder over `dictionary`.
+    /// Makes a coder over `dictionary`.
     #[must_use]
     pub fn new(dictionary: &Dictionary, pursuit: Pursuit, stop: StopRule, values: ValueType) -> Self {
-        Self::with_simd(dictionary, pursuit, stop, values, Simd::detect())
+        Self { plan: Plan::new(dictionary), pursuit, stop, values }
     }
 
-    /// A coder that uses the given instructions.
-    pub(super) fn with_simd(
-        dictionary: &Dictionary,
-        pursuit: Pursuit,
-        stop: StopRule,
-        values: ValueType,
-        simd: Simd,
-    ) -> Self {
-        Self { plan: Plan::new(dictionary), pursuit, stop, values, simd }
-    }
-
-    /// Codes the vectors in `signals`, each as long as an atom, and hands each result to `sink`, in order.
+    /// Codes the vectors in `signals`, each as long as an atom, and passes each result to `sink`, in order. Uses the
+    /// vector instructions of [`Simd::current`](crate::simd::Simd::current).
     ///
     /// # Panics
     /// If the dictionary is empty (degree 0).
     pub fn encode(&self, signals: &[f32], mut sink: impl FnMut(Visit<'_>)) {
         let mut scratch = self.plan.scratch();
         let mut code = Vec::with_capacity(self.plan.dim());
-        // Compiles the loop once per vector width; the arithmetic is the same in each.
-        self.simd.run(Job { coder: self, signals, scratch: &mut scratch, code: &mut code, sink: &mut sink });
+        // The loop is compiled once for each vector width; the arithmetic is the same in each.
+        Simd::current().run(Job {
+            coder: self,
+            signals,
+            scratch: &mut scratch,
+            code: &mut code,
+            sink: &mut sink,
+        });
     }
 
     #[inline(always)]
@@ -177,8 +172,8 @@ impl Coder {
         let target = (promise * promise).max(energy * NOISE_FLOOR);
         self.plan.start(s, signal, energy);
         loop {
-            // At least one atom more than last time: the check below found the recurrence too optimistic,
-            // or rounding to the value type cost the rest.
+            // Each time round takes at least one more atom. The recurrence was too optimistic, or rounding to the value
+            // type raised the error above the tolerance.
             let mut exhausted = false;
             loop {
                 exhausted |= s.len() >= cap || !self.plan.step(s, self.pursuit);

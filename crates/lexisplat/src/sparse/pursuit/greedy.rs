@@ -1,45 +1,15 @@
 //! The inner loop of the pursuit: choosing atoms for one vector.
 
+use super::lanes::{LANES, Lane, ZERO, accumulate, blocks_of, first_maximum, transposed};
 use crate::scene::sh::MAX_REST;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 
-/// Atoms handled together; the padding unit of every per-atom array. Fixed, so that results do not depend
-/// on the CPU's vector width.
-pub(super) const LANES: usize = 16;
-
-/// An atom whose squared distance to the chosen span is below this is as good as inside it: what f32
-/// recurrences say about its direction is noise.
+/// An atom whose squared distance to the chosen span is below this counts as part of the span, because the f32
+/// recurrences hold only noise about its direction.
 const MIN_SPAN_DISTANCE: f32 = 1e-5;
 
-/// `LANES` neighbouring entries of a per-atom array, aligned to a cache line.
-#[derive(Debug, Clone, Copy)]
-#[repr(align(64))]
-pub(super) struct Lane(pub(super) [f32; LANES]);
-
-const ZERO: Lane = Lane([0.0; LANES]);
-
-impl Lane {
-    /// `f` of every entry. One operation over one array at a time is what the compiler vectorises.
-    #[inline(always)]
-    fn map(mut self, f: impl Fn(f32) -> f32) -> Self {
-        for x in &mut self.0 {
-            *x = f(*x);
-        }
-        self
-    }
-
-    /// `f` of every pair of entries.
-    #[inline(always)]
-    fn zip(mut self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
-        for (x, y) in self.0.iter_mut().zip(&other.0) {
-            *x = f(*x, *y);
-        }
-        self
-    }
-}
-
-/// What a dictionary needs precomputed: its transpose, its Gram matrix, and padded atoms.
+/// A dictionary prepared for pursuit: its transpose, its Gram matrix, and padded atoms.
 #[derive(Debug)]
 pub(super) struct Plan {
     /// Lanes of one per-atom array.
@@ -55,12 +25,12 @@ pub(super) struct Plan {
     padded: Vec<Lane>,
 }
 
-/// Working memory for one vector at a time; reused.
+/// Working memory for one vector at a time.
 #[derive(Debug)]
 pub(super) struct Scratch {
     /// Inner products of the residual with every atom.
     correlations: Vec<Lane>,
-    /// Squared distance of every atom to the chosen span; infinite once chosen or inside it.
+    /// Squared distance of every atom to the chosen span; infinite for atoms that are chosen or in the span.
     distances: Vec<Lane>,
     /// Row k: inner products of every atom with the k-th orthonormal direction.
     directions: Vec<Lane>,
@@ -81,16 +51,16 @@ pub(super) struct Scratch {
 impl Plan {
     pub(super) fn new(dictionary: &Dictionary) -> Self {
         let (dim, atoms) = (dictionary.dim(), dictionary.len());
-        let (blocks, atom_blocks) = (atoms.div_ceil(LANES), dim.div_ceil(LANES));
-        let mut transposed = vec![ZERO; dim * blocks];
+        let (blocks, atom_blocks) = (blocks_of(atoms), dim.div_ceil(LANES));
         let mut gram = vec![ZERO; atoms * blocks];
         let mut padded = vec![ZERO; atoms * atom_blocks];
         for j in 0..atoms {
             let atom = dictionary.atom(j);
             for (d, &value) in atom.iter().enumerate() {
-                transposed[d * blocks + j / LANES].0[j % LANES] = value;
                 padded[j * atom_blocks + d / LANES].0[d % LANES] = value;
             }
+            // Products are summed in f64 and rounded once, unlike those of `packed::codebook`: that codec sums them in
+            // f32, which costs it nothing, and its files depend on it.
             for i in 0..atoms {
                 let product: f64 =
                     atom.iter().zip(dictionary.atom(i)).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
@@ -99,7 +69,7 @@ impl Plan {
                 gram[j * blocks + i / LANES].0[i % LANES] = product;
             }
         }
-        Self { blocks, atom_blocks, dim, transposed, gram, padded }
+        Self { blocks, atom_blocks, dim, transposed: transposed(dim, dictionary.as_slice()), gram, padded }
     }
 
     pub(super) fn scratch(&self) -> Scratch {
@@ -128,7 +98,7 @@ impl Plan {
         s.energy = energy;
     }
 
-    /// Chooses one more atom. `false` if none helps, or all `dim` are taken.
+    /// Chooses one more atom. Returns `false` if no atom helps, or if `dim` atoms are chosen already.
     #[inline(always)]
     pub(super) fn step(&self, s: &mut Scratch, pursuit: Pursuit) -> bool {
         let k = s.len;
@@ -163,7 +133,7 @@ impl Plan {
             *n = distance.map(|n| if n > MIN_SPAN_DISTANCE { n } else { f32::INFINITY });
             *r = correlation.zip(distance, |r, n| if n > MIN_SPAN_DISTANCE { r } else { 0.0 });
         }
-        // Rounding must not leave a chosen atom in play.
+        // Because of rounding, the recurrence alone may not exclude the chosen atom.
         s.distances[block].0[lane] = f32::INFINITY;
         s.correlations[block].0[lane] = 0.0;
         s.diagonal[k] = length;
@@ -192,7 +162,7 @@ impl Plan {
             }
             code.push((s.chosen[l], value));
         }
-        // A dozen entries: an insertion sort beats the general one.
+        // An insertion sort is faster than the general one for a dozen entries.
         for i in 1..code.len() {
             let mut j = i;
             while j > 0 && code[j - 1].0 > code[j].0 {
@@ -202,7 +172,8 @@ impl Plan {
         }
     }
 
-    /// Distance of `signal` from what [`crate::sparse::codes::reconstruct`] makes of `code`, in f64.
+    /// Returns the distance in f64 of `signal` from the vector that [`crate::sparse::codes::reconstruct`] makes of
+    /// `code`.
     #[inline(always)]
     pub(super) fn error(&self, s: &mut Scratch, signal: &[f32], code: &[(u16, f32)]) -> f64 {
         match self.atom_blocks {
@@ -214,7 +185,7 @@ impl Plan {
         squared_distance(signal, &s.reconstruction).sqrt()
     }
 
-    /// The same sums as [`crate::sparse::codes::reconstruct`], `BLOCKS` lanes at a time.
+    /// Computes the sums of [`crate::sparse::codes::reconstruct`], `BLOCKS` lanes at a time.
     #[inline(always)]
     fn reconstruct<const BLOCKS: usize>(&self, s: &mut Scratch, code: &[(u16, f32)]) {
         let mut sums = [ZERO; BLOCKS];
@@ -250,13 +221,13 @@ impl Scratch {
         &self.chosen[..self.len]
     }
 
-    /// The vector [`Plan::error`] made last, padded with zeros.
+    /// The vector that [`Plan::error`] reconstructed last, padded with zeros.
     pub(super) fn reconstruction(&self) -> &[f32] {
         &self.reconstruction
     }
 }
 
-/// Sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
+/// Returns the sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
 #[inline(always)]
 pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     const PARTS: usize = 8;
@@ -276,59 +247,9 @@ pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
 }
 
-/// Folds `factors[l]` and row l of `rows`, each `blocks` lanes long, into `sums`, in order of l.
+/// Returns the atom with the largest `correlation^2 / distance`, which lowers the residual most.
 ///
-/// Works on as many lanes at once as the registers hold, so that `sums` is read and written once.
-#[inline(always)]
-fn accumulate(
-    sums: &mut [Lane],
-    factors: &[f32],
-    rows: &[Lane],
-    blocks: usize,
-    f: impl Fn(f32, f32, f32) -> f32 + Copy,
-) {
-    let mut done = 0;
-    while done + 6 <= sums.len() {
-        accumulate_group::<6>(&mut sums[done..], factors, rows, blocks, done, f);
-        done += 6;
-    }
-    while done + 2 <= sums.len() {
-        accumulate_group::<2>(&mut sums[done..], factors, rows, blocks, done, f);
-        done += 2;
-    }
-    if done < sums.len() {
-        accumulate_group::<1>(&mut sums[done..], factors, rows, blocks, done, f);
-    }
-}
-
-#[inline(always)]
-fn accumulate_group<const GROUP: usize>(
-    sums: &mut [Lane],
-    factors: &[f32],
-    rows: &[Lane],
-    blocks: usize,
-    offset: usize,
-    f: impl Fn(f32, f32, f32) -> f32 + Copy,
-) {
-    // Arrays of a known length, so that the group stays in registers and nothing is checked in the loop.
-    let Some(sums) = sums.first_chunk_mut::<GROUP>() else { return };
-    let mut group = *sums;
-    for (l, &factor) in factors.iter().enumerate() {
-        let Some(row) = rows.get(l * blocks + offset..).and_then(<[Lane]>::first_chunk::<GROUP>) else {
-            return;
-        };
-        for g in 0..GROUP {
-            for i in 0..LANES {
-                group[g].0[i] = f(group[g].0[i], factor, row[g].0[i]);
-            }
-        }
-    }
-    *sums = group;
-}
-
-/// The atom with the largest `correlation^2 / distance`: the one that lowers the residual most.
-///
-/// Lanes compare by cross-multiplication, which is cheaper than dividing every entry.
+/// Lanes compare by cross-multiplication, which is cheaper than a division for every entry.
 #[inline(always)]
 fn best_ratio(correlations: &[Lane], distances: &[Lane]) -> Option<usize> {
     let mut gains = [0.0_f32; LANES];
@@ -346,10 +267,10 @@ fn best_ratio(correlations: &[Lane], distances: &[Lane]) -> Option<usize> {
     for i in 0..LANES {
         gains[i] /= spans[i];
     }
-    first_maximum(&gains, &blocks)
+    positive(first_maximum(&gains, &blocks))
 }
 
-/// The atom with the largest `correlation^2`; those in the span have 0.
+/// Returns the atom with the largest `correlation^2`. Atoms in the span have 0.
 #[inline(always)]
 fn best_correlation(correlations: &[Lane]) -> Option<usize> {
     let mut gains = [0.0_f32; LANES];
@@ -362,29 +283,11 @@ fn best_correlation(correlations: &[Lane]) -> Option<usize> {
             blocks[i] = if better { number } else { blocks[i] };
         }
     }
-    first_maximum(&gains, &blocks)
+    positive(first_maximum(&gains, &blocks))
 }
 
-/// Atom of the first lane that holds the maximum, if that is above 0.
+/// The atom of a gain, if the gain is above 0.
 #[inline(always)]
-fn first_maximum(gains: &[f32; LANES], blocks: &[u32; LANES]) -> Option<usize> {
-    let mut fold = *gains;
-    let mut width = LANES / 2;
-    while width > 0 {
-        for i in 0..width {
-            fold[i] = if fold[i + width] > fold[i] { fold[i + width] } else { fold[i] };
-        }
-        width /= 2;
-    }
-    let maximum = fold[0];
-    let mut mask = 0_u32;
-    for (i, &gain) in gains.iter().enumerate() {
-        mask |= u32::from(gain == maximum) << i;
-    }
-    if maximum > 0.0 && mask != 0 {
-        let lane = mask.trailing_zeros() as usize;
-        Some(blocks[lane % LANES] as usize * LANES + lane)
-    } else {
-        None
-    }
+fn positive(best: Option<(f32, usize)>) -> Option<usize> {
+    best.filter(|&(gain, _)| gain > 0.0).map(|(_, atom)| atom)
 }

@@ -1,12 +1,12 @@
 //! Files that appear whole or not at all.
 //!
-//! On Linux a file has no name until it is whole, where the file system can do that: then nothing is left of
-//! it however the process ends. Elsewhere it is a `.lexisplat-*.part` beside its place until then, which an
-//! error removes, and [`stop`] when the process is told to end.
+//! On Linux a file has no name until it is whole, if the file system supports that. Nothing is then left of it
+//! however the process ends. Elsewhere an unfinished file is named `.lexisplat-*.part` and lies in the folder of
+//! the output. An error removes it, and so does [`OutputGroup::stop`].
 
+mod group;
 mod place;
 mod temporary;
-mod unfinished;
 #[cfg(target_os = "linux")]
 mod unnamed;
 
@@ -18,27 +18,28 @@ use self::place::{Place, in_folder, place};
 use self::temporary::Temporary;
 use crate::support::error::{Error, Result};
 
-pub use self::unfinished::{is_stopped, stop};
+pub use self::group::OutputGroup;
 
 /// Bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
-/// What to do about a file that is already there.
+/// What to do about a file that already exists.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Existing {
-    /// The new file takes its place, in one step.
+    /// The new file replaces it in one step.
     #[default]
     Replace,
-    /// An error of kind [`io::ErrorKind::AlreadyExists`], also if it came while the new one was written.
+    /// The write fails with [`io::ErrorKind::AlreadyExists`], also if the file was made during the write.
     Refuse,
 }
 
-/// Where to write a file. A path alone replaces what is there.
+/// Where to write a file. A path converts into an output that replaces an existing file.
 #[derive(Debug, Clone, Copy)]
 pub struct Output<'a> {
     path: &'a Path,
     existing: Existing,
     bytes: Option<u64>,
+    group: Option<&'a OutputGroup>,
 }
 
 impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Output<'a> {
@@ -48,27 +49,33 @@ impl<'a, P: AsRef<Path> + ?Sized> From<&'a P> for Output<'a> {
 }
 
 impl<'a> Output<'a> {
-    /// The file `path`. A link is followed: what it points to is written, and the link stays.
+    /// The file `path`. If `path` is a link, the file that it points to is written, and the link stays.
     pub fn new(path: &'a (impl AsRef<Path> + ?Sized), existing: Existing) -> Self {
-        Self { path: path.as_ref(), existing, bytes: None }
+        Self { path: path.as_ref(), existing, bytes: None, group: None }
     }
 
-    /// As the caller named it.
+    /// Makes the output a member of `group`, which can end it.
+    #[must_use]
+    pub fn within(self, group: &'a OutputGroup) -> Self {
+        Self { group: Some(group), ..self }
+    }
+
+    /// The path as the caller named it.
     #[must_use]
     pub fn path(&self) -> &'a Path {
         self.path
     }
 
-    /// The same with its size in bytes, which an error about a full disk then names.
+    /// Sets the size in bytes, which an error about a full disk then states.
     pub(crate) fn of_bytes(self, bytes: u64) -> Self {
         Self { bytes: Some(bytes), ..self }
     }
 
-    /// Finds out, before any work is done, whether a file could be written here. Leaves nothing.
+    /// Finds out, before any work is done, whether a file could be written here. Leaves no file behind.
     ///
     /// # Errors
-    /// [`Error::Io`] for a folder, for a file that is there and must not be, and for a folder around it that
-    /// is missing or cannot be written to; [`Error::Parameter`] for a disk.
+    /// [`Error::Io`] if the path is a folder, if a file exists that must not be replaced, or if the folder around
+    /// it is missing or not writable. [`Error::Parameter`] if the path is a block device.
     pub fn check(&self) -> Result<()> {
         if let Place::File(target) = place(self)? {
             let folder = folder_of(&target);
@@ -77,7 +84,8 @@ impl<'a> Output<'a> {
         Ok(())
     }
 
-    /// Where temporary files go that are as large as this one: beside it, or where the system wants them.
+    /// The folder for temporary files as large as this output: the output's own folder, or the system's
+    /// temporary folder if the output is no regular file.
     ///
     /// # Errors
     /// As [`check`](Self::check).
@@ -88,7 +96,7 @@ impl<'a> Output<'a> {
         })
     }
 
-    /// Says how much room the file needs, if `error` is that it found none.
+    /// Adds the file's size to `error` if the disk is full.
     fn explained(&self, error: Error) -> Error {
         let full =
             |e: &io::Error| matches!(e.kind(), io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded);
@@ -110,18 +118,19 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Lets `write` fill a file that appears under its name when it is whole and on the disk.
+/// Writes a file with `write`. The file appears under its name only when it is whole and on the disk.
 ///
-/// A file that was there is replaced in one step, or refused: see [`Existing`]. On any error nothing is left
-/// behind. What is neither file nor folder, such as a pipe or `/dev/null`, is written to as it is.
+/// An existing file is replaced in one step, or refused: see [`Existing`]. An error leaves nothing behind. A pipe
+/// or a device such as `/dev/null` is written to directly.
 ///
 /// # Errors
-/// [`Error::Io`] naming the output, or whatever `write` returns.
+/// [`Error::Io`] that names the output, or any error of `write`.
 pub fn write_whole<'a>(
     output: impl Into<Output<'a>>,
     write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
 ) -> Result<()> {
     let output = output.into();
+    let group = output.group.cloned().unwrap_or_default();
     let io = |source| Error::io(output.path, source);
     let fill = |file| {
         let mut writer = BufWriter::with_capacity(BUFFER, file);
@@ -132,11 +141,12 @@ pub fn write_whole<'a>(
         Place::Special => {
             let file = OpenOptions::new().write(true).open(output.path).map_err(io)?;
             fill(file)?;
-            unfinished::count().map_err(io)
+            group.count().map_err(io)
         }
         Place::File(target) => {
             let folder = folder_of(&target);
-            let (file, temporary) = Temporary::create(folder).map_err(|e| io(in_folder(folder, e)))?;
+            let (file, temporary) =
+                Temporary::create(folder, &group).map_err(|e| io(in_folder(folder, e)))?;
             let file = fill(file)?;
             file.sync_all().map_err(io)?;
             temporary.name(file, &target, output.existing).map_err(io)?;
@@ -147,8 +157,8 @@ pub fn write_whole<'a>(
     whole().map_err(|e| output.explained(e))
 }
 
-/// Asks for the new name to reach the disk too. Not every system and file system can; the file is whole
-/// either way.
+/// Asks the system to store the new name on the disk too. Not every file system can, so errors are ignored: the
+/// file is whole either way.
 fn sync_folder(folder: &Path) {
     if cfg!(unix)
         && let Ok(folder) = File::open(folder)

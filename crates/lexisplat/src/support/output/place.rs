@@ -1,4 +1,4 @@
-//! What is at an output's path: nothing, a file, a link, something that only looks like a file.
+//! What an output's path leads to: nothing, a file, a link, a folder or a device.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -6,26 +6,28 @@ use std::path::{Path, PathBuf};
 use super::{Existing, Output, folder_of};
 use crate::support::error::{Error, Result};
 
-/// Links that are followed, one to the next: as many as Linux follows.
+/// Most links followed in a row. Linux follows as many.
 const MAX_LINKS: usize = 40;
 
 /// Where a file goes.
 #[derive(Debug)]
 pub(super) enum Place {
-    /// This name, which is no link.
+    /// A regular file of this name, which is no link.
     File(PathBuf),
-    /// A pipe or device, to be written to as it is: a file renamed over `/dev/null` would replace it for
-    /// everyone.
+    /// A pipe or device, which is written to directly. A file renamed over `/dev/null` would replace it for every
+    /// process.
     Special,
 }
 
-/// Where `output` goes.
+/// Finds out where `output` goes.
 pub(super) fn place(output: &Output<'_>) -> Result<Place> {
     let path = output.path;
     let refuse = |kind: io::ErrorKind| Err(Error::io(path, kind.into()));
     match std::fs::metadata(path) {
         Ok(found) if found.is_dir() => refuse(io::ErrorKind::IsADirectory),
-        Ok(found) if is_disk(&found) => Err(Error::parameter("output", path.display(), "a file, not a disk")),
+        Ok(found) if is_disk(&found) => {
+            Err(Error::parameter("output", path.display(), "a file, not a block device"))
+        }
         Ok(found) if !found.is_file() => Ok(Place::Special),
         Ok(_) if output.existing == Existing::Refuse => refuse(io::ErrorKind::AlreadyExists),
         _ => Ok(Place::File(followed(path).map_err(|e| Error::io(path, e))?)),
@@ -45,7 +47,7 @@ fn is_disk(found: &std::fs::Metadata) -> bool {
     }
 }
 
-/// What `path` points to if it is a link, whether that is there or not; else `path`.
+/// The target of `path` if it is a link, whether the target exists or not; else `path` itself.
 fn followed(path: &Path) -> io::Result<PathBuf> {
     let mut path = path.to_owned();
     for _ in 0..MAX_LINKS {
@@ -54,10 +56,10 @@ fn followed(path: &Path) -> io::Result<PathBuf> {
             Err(_) => return Ok(path),
         }
     }
-    Err(io::Error::other("too many links, one to the next"))
+    Err(io::Error::other("too many links in a row"))
 }
 
-/// `error` of making a file in `folder`, saying so.
+/// Adds to `error`, which came up when a file was made in `folder`, the folder and what to do.
 pub(super) fn in_folder(folder: &Path, error: io::Error) -> io::Error {
     let advice = match error.kind() {
         io::ErrorKind::NotFound => "make it, or name another folder",

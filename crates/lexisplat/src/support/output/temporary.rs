@@ -1,4 +1,5 @@
-//! A file that is being written: without a name where that is possible, else with one that is remembered.
+//! A file that is being written. It has no name if the system allows that, else a temporary one that its group
+//! remembers.
 
 use std::fs::File;
 use std::io;
@@ -6,20 +7,21 @@ use std::path::Path;
 
 use tempfile::TempPath;
 
-use super::{Existing, unfinished};
+use super::{Existing, OutputGroup};
 
-/// The name of a file that is being written.
+/// A file that is being written. Dropping it removes the file.
 #[derive(Debug)]
-pub(super) struct Temporary(
-    /// `None`: it has none.
-    Option<TempPath>,
-);
+pub(super) struct Temporary {
+    /// The temporary name, if the file has one.
+    path: Option<TempPath>,
+    group: OutputGroup,
+}
 
-/// Makes names of unfinished files.
+/// Chooses names and permissions of unfinished files.
 fn builder() -> tempfile::Builder<'static, 'static> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(".lexisplat-").suffix(".part");
-    // A temporary file is private by default; the finished one gets what the umask gives any file.
+    // A temporary file is private by default. The finished one should have the permissions of any new file.
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
@@ -29,27 +31,27 @@ fn builder() -> tempfile::Builder<'static, 'static> {
 }
 
 impl Temporary {
-    /// An empty file in `folder`.
-    pub(super) fn create(folder: &Path) -> io::Result<(File, Self)> {
+    /// Makes an empty file in `folder`.
+    pub(super) fn create(folder: &Path, group: &OutputGroup) -> io::Result<(File, Self)> {
         #[cfg(target_os = "linux")]
         if let Ok(file) = super::unnamed::create(folder) {
-            return Ok((file, Self(None)));
+            return Ok((file, Self { path: None, group: group.clone() }));
         }
-        Self::create_named(folder)
+        Self::create_named(folder, group)
     }
 
-    fn create_named(folder: &Path) -> io::Result<(File, Self)> {
-        unfinished::unless_stopped(|all| {
+    fn create_named(folder: &Path, group: &OutputGroup) -> io::Result<(File, Self)> {
+        group.unless_stopped(|state| {
             let (file, path) = builder().tempfile_in(folder)?.into_parts();
-            all.names.push(path.to_path_buf());
-            Ok((file, Self(Some(path))))
+            state.names.push(path.to_path_buf());
+            Ok((file, Self { path: Some(path), group: group.clone() }))
         })
     }
 
-    /// Gives `file`, which is whole, the name `target`.
+    /// Gives the whole `file` the name `target`.
     pub(super) fn name(mut self, file: File, target: &Path, existing: Existing) -> io::Result<()> {
-        match self.0.take() {
-            Some(path) => rename(path, target, existing),
+        match self.path.take() {
+            Some(path) => self.rename(path, target, existing),
             None => self.name_unnamed(file, target, existing),
         }
     }
@@ -63,55 +65,55 @@ impl Temporary {
     fn name_unnamed(self, mut file: File, target: &Path, existing: Existing) -> io::Result<()> {
         use super::folder_of;
         use super::unnamed::link;
-        let linked = unfinished::unless_stopped(|all| {
+        let linked = self.group.unless_stopped(|state| {
             match link(&file, target) {
-                // No call puts a file without a name in the place of another, so for an instant it has two.
+                // No system call replaces a file by one without a name, so the new file gets a temporary name first.
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists && existing == Existing::Replace => {
                     let staged = builder().make_in(folder_of(target), |name| link(&file, name))?;
                     staged.into_temp_path().persist(target).map_err(|e| e.error)?;
                 }
                 linked => linked?,
             }
-            all.finished += 1;
+            state.finished += 1;
             Ok(())
         });
         match linked {
-            Err(e) if e.kind() != io::ErrorKind::AlreadyExists && !unfinished::is_stopped() => {
-                copy(&mut file, target, existing).map_err(|_| e)
+            Err(e) if e.kind() != io::ErrorKind::AlreadyExists && !self.group.is_stopped() => {
+                copy(&mut file, target, existing, &self.group).map_err(|_| e)
             }
             linked => linked,
         }
     }
+
+    fn rename(&self, path: TempPath, target: &Path, existing: Existing) -> io::Result<()> {
+        self.group.unless_stopped(|state| {
+            state.names.retain(|name| *name != *path);
+            match existing {
+                Existing::Replace => path.persist(target),
+                Existing::Refuse => path.persist_noclobber(target),
+            }
+            .map_err(|e| e.error)?;
+            state.finished += 1;
+            Ok(())
+        })
+    }
 }
 
-/// Writes what `file` holds to `target` by way of a named temporary file: for file systems that make files
-/// without a name but cannot name them.
+/// Copies `file` to `target` by way of a temporary file with a name. Some file systems make files without a name
+/// but cannot name them afterwards.
 #[cfg(target_os = "linux")]
-fn copy(file: &mut File, target: &Path, existing: Existing) -> io::Result<()> {
-    let (mut named, temporary) = Temporary::create_named(super::folder_of(target))?;
+fn copy(file: &mut File, target: &Path, existing: Existing, group: &OutputGroup) -> io::Result<()> {
+    let (mut named, temporary) = Temporary::create_named(super::folder_of(target), group)?;
     io::Seek::rewind(file)?;
     io::copy(file, &mut named)?;
     named.sync_all()?;
     temporary.name(named, target, existing)
 }
 
-fn rename(path: TempPath, target: &Path, existing: Existing) -> io::Result<()> {
-    unfinished::unless_stopped(|all| {
-        all.names.retain(|name| *name != *path);
-        match existing {
-            Existing::Replace => path.persist(target),
-            Existing::Refuse => path.persist_noclobber(target),
-        }
-        .map_err(|e| e.error)?;
-        all.finished += 1;
-        Ok(())
-    })
-}
-
 impl Drop for Temporary {
     fn drop(&mut self) {
-        if let Some(path) = self.0.take() {
-            unfinished::remove(path);
+        if let Some(path) = self.path.take() {
+            self.group.remove(path);
         }
     }
 }
@@ -126,8 +128,8 @@ mod tests {
         entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
     }
 
-    /// Both kinds, so that each is tested wherever the tests run.
-    fn each(test: impl Fn(&Path, fn(&Path) -> io::Result<(File, Temporary)>)) {
+    /// Runs `test` with both kinds of temporary file.
+    fn each(test: impl Fn(&Path, fn(&Path, &OutputGroup) -> io::Result<(File, Temporary)>)) {
         for create in [Temporary::create, Temporary::create_named] {
             let folder = tempfile::tempdir().unwrap();
             test(folder.path(), create);
@@ -141,7 +143,7 @@ mod tests {
             for (existing, text, expected) in
                 [(Existing::Refuse, "1", "1"), (Existing::Refuse, "2", "1"), (Existing::Replace, "3", "3")]
             {
-                let (mut file, temporary) = create(folder).unwrap();
+                let (mut file, temporary) = create(folder, &OutputGroup::default()).unwrap();
                 file.write_all(text.as_bytes()).unwrap();
                 let named = temporary.name(file, &target, existing);
                 let refused = named.is_err_and(|e| e.kind() == io::ErrorKind::AlreadyExists);
@@ -155,7 +157,7 @@ mod tests {
     #[test]
     fn dropped_ones_leave_nothing() {
         each(|folder, create| {
-            drop(create(folder).unwrap());
+            drop(create(folder, &OutputGroup::default()).unwrap());
             assert!(names(folder).is_empty());
         });
     }
@@ -166,7 +168,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut file = tempfile::tempfile().unwrap();
         file.write_all(b"all of it").unwrap();
-        copy(&mut file, &folder.path().join("a"), Existing::Refuse).unwrap();
+        copy(&mut file, &folder.path().join("a"), Existing::Refuse, &OutputGroup::default()).unwrap();
         assert_eq!(std::fs::read(folder.path().join("a")).unwrap(), b"all of it");
         assert_eq!(names(folder.path()), ["a"]);
     }

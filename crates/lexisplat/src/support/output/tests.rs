@@ -126,3 +126,18 @@ fn devices_are_written_to_as_they_are() {
     }
     assert!(!Path::new("/dev/null").metadata().unwrap().is_file());
 }
+
+#[test]
+fn a_stopped_group_finishes_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let [path, other] = ["a", "b"].map(|name| folder.path().join(name));
+    let group = OutputGroup::default();
+    let output = || Output::new(&path, Existing::Replace).within(&group);
+    let done = write_whole(output(), |_| {
+        assert_eq!(group.stop(1), Some(0));
+        Ok(())
+    });
+    assert!(done.is_err() && put(output(), "late").is_err());
+    put((&other).into(), "of no group").unwrap();
+    assert_eq!(names(folder.path()), ["b"]);
+}

@@ -1,4 +1,4 @@
-//! Files that have no name until they are whole (`O_TMPFILE` of open(2)).
+//! Files without a name until they are whole (`O_TMPFILE` of open(2)).
 
 use std::fs::File;
 use std::io;
@@ -10,22 +10,22 @@ use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, openat};
 /// Permissions before the umask: those of any new file.
 const MODE: Mode = Mode::from_raw_mode(0o666);
 
-/// The name that `/proc` has for an open file: links are made from it.
+/// The path of an open file in `/proc`, from which a link can be made.
 fn of_process(file: &File) -> PathBuf {
     PathBuf::from(format!("/proc/self/fd/{}", file.as_raw_fd()))
 }
 
-/// A file in `folder` without a name.
+/// Makes a file in `folder` without a name.
 ///
 /// # Errors
-/// If the file system has no such files, or there is no `/proc`; or as for any file.
+/// If the file system does not support it, if there is no `/proc`, or if no file can be made in `folder`.
 pub(super) fn create(folder: &Path) -> io::Result<File> {
     let file = File::from(openat(CWD, folder, OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC, MODE)?);
     std::fs::symlink_metadata(of_process(&file))?;
     Ok(file)
 }
 
-/// Gives `file` the name `target`, which must be free.
+/// Gives `file` the name `target`. Fails if `target` exists.
 pub(super) fn link(file: &File, target: &Path) -> io::Result<()> {
     Ok(linkat(CWD, of_process(file), CWD, target, AtFlags::SYMLINK_FOLLOW)?)
 }

@@ -1,0 +1,162 @@
+//! The options of `compress` and `decompress`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lexisplat::packed::Preset;
+use lexisplat::{Layout, Pursuit};
+use lexisplat_render::Device;
+
+use super::values::{preset, size, whole};
+
+/// Heading of the options that say how good or how small the file shall be.
+const TARGET: &str = "Target, at most one of";
+/// Heading of the options that packed files do not have.
+const EXACT: &str = "Options of the layouts f16, f32 and paper";
+
+/// Compress a trained PLY to a .lexi file. Needs no photos, no cameras and no retraining.
+#[derive(Debug, Args)]
+pub(crate) struct Compress {
+    /// The scene, a PLY file; `-` reads standard input.
+    pub(crate) input: PathBuf,
+    /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi].
+    #[arg(short, long)]
+    pub(crate) output: Option<PathBuf>,
+    /// Quality of the pictures, from the smallest files to the best pictures: about 35, 40, 45 and 54 dB of PSNR
+    /// [default: balanced].
+    #[arg(long, value_parser = preset(), group = "goal", value_name = "NAME", help_heading = TARGET)]
+    pub(crate) preset: Option<Preset>,
+    /// Make the smallest file whose pictures have at least this PSNR on average, in dB, above 0.
+    #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
+    pub(crate) psnr: Option<f64>,
+    /// Make the smallest file of which every picture has at least this PSNR, in dB, above 0.
+    #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
+    pub(crate) min_psnr: Option<f64>,
+    /// Make the best file of at most this size, such as 10MB or 800kB.
+    #[arg(long, group = "goal", value_name = "BYTES", value_parser = size, help_heading = TARGET)]
+    pub(crate) size: Option<u64>,
+    /// Make the best file that is at least this many times smaller than the PLY, above 1.
+    #[arg(long, group = "goal", value_name = "R", help_heading = TARGET)]
+    pub(crate) ratio: Option<f64>,
+    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default:
+    /// views generated around the scene].
+    #[arg(long, value_name = "PATH")]
+    pub(crate) cameras: Option<PathBuf>,
+    /// Store the index that each Gaussian has in the source, 4 bytes each. Without it packed files lose the order
+    /// of the source.
+    #[arg(long)]
+    pub(crate) keep_order: bool,
+    /// Remove Gaussians that hardly show. Without all of them together, no pixel of any view changes by more than
+    /// LEVELS of 255 levels; LEVELS is above 0, and 1 if it is not given. The report says how many were removed.
+    #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, conflicts_with = "keep_order")]
+    pub(crate) prune: Option<f32>,
+    /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
+    /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
+    /// --layout packed everything else is quantised [default: 0.1 with exact geometry, otherwise none].
+    #[arg(long, value_name = "T")]
+    pub(crate) tol: Option<f64>,
+    /// Most nonzeros in the code of one Gaussian. With it --tol is no longer guaranteed: the report counts the
+    /// Gaussians whose error is larger [default: no cap].
+    #[arg(long, value_name = "K", value_parser = whole::<u8>(0..=255), help_heading = EXACT)]
+    pub(crate) max_nnz: Option<u8>,
+    /// Atoms of the dictionary, 1 to 1024 [default: as many as make the file smaller if packed, otherwise twice the
+    /// dimension: 90 at SH degree 3].
+    #[arg(long, value_name = "M", value_parser = whole::<usize>(0..=u64::MAX))]
+    pub(crate) atoms: Option<usize>,
+    /// The pursuit that chooses atoms: `ols` needs fewer of them, `omp` is the paper's [default: ols].
+    #[arg(long, value_name = "omp|ols", help_heading = EXACT)]
+    pub(crate) pursuit: Option<Pursuit>,
+    /// Layout of the file. `packed` quantises and entropy-codes everything. `f16` and `f32` keep geometry exactly
+    /// and hold the values of codes in 16 or 32 bits. `paper` holds what the paper counts [default: packed, or
+    /// f16 if --tol or an option for exact geometry is given].
+    #[arg(long, value_name = "packed|f32|f16|paper")]
+    pub(crate) layout: Option<Layout>,
+    /// Use the dictionary in this file, a dictionary or a .lexi, instead of learning one.
+    #[arg(long, value_name = "FILE", conflicts_with = "atoms", help_heading = EXACT)]
+    pub(crate) dictionary: Option<PathBuf>,
+    /// Also write the dictionary to this file, for use with other scenes.
+    #[arg(long, value_name = "FILE", help_heading = EXACT)]
+    pub(crate) save_dictionary: Option<PathBuf>,
+    /// Most Gaussians that the dictionary is learned from [default: 65536].
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), help_heading = EXACT)]
+    pub(crate) sample: Option<usize>,
+    /// Seed of the choice of Gaussians that the dictionary is learned from.
+    #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
+    pub(crate) seed: u64,
+    /// Remove Gaussians with NaN or infinite values. Without this option such a file is refused.
+    #[arg(long)]
+    pub(crate) drop_invalid: bool,
+    /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
+    /// faster and makes larger files of the same quality. The only target is then --preset.
+    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "prune"])]
+    pub(crate) guess: bool,
+    /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
+    /// parts, each drawn on its own, and the only target is then --preset. Packing in parts takes up to 1.5 GiB,
+    /// however small BYTES is. Files of the other layouts do not depend on it.
+    #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
+    pub(crate) memory: u64,
+    /// The device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one) or a number from `lexisplat
+    /// devices`. With `cpu` the same input gives the same file on every machine. A GPU is faster, and its name is
+    /// recorded in the file.
+    #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
+    pub(crate) device: Device,
+}
+
+impl Compress {
+    /// The options that only layouts with exact geometry have, and whether they are given.
+    fn exact_only(&self) -> [(&'static str, bool); 5] {
+        [
+            ("--max-nnz", self.max_nnz.is_some()),
+            ("--pursuit", self.pursuit.is_some()),
+            ("--dictionary", self.dictionary.is_some()),
+            ("--save-dictionary", self.save_dictionary.is_some()),
+            ("--sample", self.sample.is_some()),
+        ]
+    }
+
+    /// The options that only packed files have, and whether they are given.
+    fn packed_only(&self) -> [(&'static str, bool); 9] {
+        [
+            ("--guess", self.guess),
+            ("--preset", self.preset.is_some()),
+            ("--psnr", self.psnr.is_some()),
+            ("--min-psnr", self.min_psnr.is_some()),
+            ("--size", self.size.is_some()),
+            ("--ratio", self.ratio.is_some()),
+            ("--cameras", self.cameras.is_some()),
+            ("--keep-order", self.keep_order),
+            ("--prune", self.prune.is_some()),
+        ]
+    }
+
+    /// Returns the layout that is given, or the one that the other options need.
+    ///
+    /// # Errors
+    /// A layout and an option that do not go together.
+    pub(crate) fn chosen_layout(&self) -> Result<Layout, lexisplat::Error> {
+        let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
+        let (exact, packed) = (given(&self.exact_only()), given(&self.packed_only()));
+        let layout = self.layout.unwrap_or(match (exact, packed, self.tol) {
+            (None, Some(_), _) | (None, None, None) => Layout::Packed,
+            _ => Layout::F16,
+        });
+        let wrong = if layout == Layout::Packed { exact } else { packed };
+        match wrong {
+            None => Ok(layout),
+            Some(option) => {
+                let other = if layout == Layout::Packed { "f16, f32 or paper" } else { "packed" };
+                Err(lexisplat::Error::parameter("layout", layout, format!("{other}, which {option} is for")))
+            }
+        }
+    }
+}
+
+/// Turn a .lexi file back into a PLY in INRIA's layout.
+#[derive(Debug, Args)]
+pub(crate) struct Decompress {
+    /// The compressed scene, a .lexi file; `-` reads standard input.
+    pub(crate) input: PathBuf,
+    /// The PLY; `-` writes to standard output [default: the input's name with extension .ply].
+    #[arg(short, long)]
+    pub(crate) output: Option<PathBuf>,
+}

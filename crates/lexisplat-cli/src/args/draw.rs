@@ -1,0 +1,81 @@
+//! The options of the commands that draw: `render`, `compare`, `view` and `bench`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lexisplat_render::gpu::ShPath;
+
+use super::values::{sh_path, whole};
+use super::views::Views;
+
+/// Draw a scene to PNG files. A .lexi is drawn straight from its sparse codes.
+#[derive(Debug, Args)]
+pub(crate) struct Render {
+    /// The scene, a PLY or .lexi file; `-` reads standard input.
+    pub(crate) file: PathBuf,
+    /// Folder for the pictures [default: the scene's name with `-views` added].
+    #[arg(short, long, value_name = "DIR")]
+    pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) views: Views,
+}
+
+/// Draw two scenes from the same cameras and score the second against the first.
+#[derive(Debug, Args)]
+pub(crate) struct Compare {
+    /// The original, a PLY or .lexi file.
+    pub(crate) a: PathBuf,
+    /// The scene to score, a PLY or .lexi file.
+    pub(crate) b: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: Views,
+    /// Round pictures to 8 bits before they are scored, as saving them does.
+    #[arg(long = "8bit")]
+    pub(crate) eight_bit: bool,
+    /// Save a picture of each view to this folder: both scenes and their amplified difference, side by side.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) save_views: Option<PathBuf>,
+}
+
+/// Open a window on one or two scenes: fly, compare, measure PSNR, compress.
+///
+/// Drag to orbit. Drag with shift to pan, with ctrl to look around. Turn the wheel to come nearer. W A S D Q E fly.
+/// The square brackets choose a camera. 1 to 5 show the first scene, the second, both side by side, both with a wipe
+/// between them, or their difference. P saves a screenshot. A file dropped on the window becomes the second scene; it
+/// becomes the first if shift is held or no scene is open.
+#[cfg(feature = "view")]
+#[derive(Debug, Args)]
+#[command(after_long_help = lexisplat_view::SCRIPT_WORDS)]
+pub(crate) struct View {
+    /// One or two scenes, PLY or .lexi files.
+    #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
+    pub(crate) files: Vec<PathBuf>,
+    #[command(flatten)]
+    pub(crate) views: Views,
+    /// Actions for tests and recordings, such as `camera=3,mode=wipe,screenshot=a.png,quit`. `--help` lists them.
+    #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
+    pub(crate) actions: String,
+}
+
+/// Measure the time to draw each stage, with SH held in each way that the scene has.
+///
+/// Each view is drawn repeatedly after a warm-up. Only drawing is timed. On a GPU its own time stamps are used.
+#[derive(Debug, Args)]
+pub(crate) struct Bench {
+    /// The scene, a PLY or .lexi file. A .lexi is also drawn as a dense scene.
+    pub(crate) file: PathBuf,
+    #[command(flatten)]
+    pub(crate) views: Views,
+    /// Frames timed from each view on the GPU; at least 1.
+    #[arg(long, default_value_t = 100, value_name = "N", value_parser = whole::<u32>(1..=u64::from(u32::MAX)))]
+    pub(crate) repeat: u32,
+    /// Frames drawn from each view before the timed ones.
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
+    pub(crate) warmup: u32,
+    /// Frames timed from each view on the CPU; 0 leaves the CPU out.
+    #[arg(long, default_value_t = 3, value_name = "N", value_parser = whole::<u32>(0..=u64::from(u32::MAX)))]
+    pub(crate) cpu_repeat: u32,
+    /// Ways to hold SH in GPU memory, with commas between them [default: all that the scene has].
+    #[arg(long, value_delimiter = ',', value_name = "NAMES", value_parser = sh_path())]
+    pub(crate) paths: Vec<ShPath>,
+}

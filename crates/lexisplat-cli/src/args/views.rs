@@ -1,0 +1,74 @@
+//! The options that say what is drawn from where.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use lexisplat_eval::{SceneKind, SplitFilter, ViewOptions};
+use lexisplat_render::Device;
+
+use super::values::{colour, scene_kind, split, whole};
+
+/// Which cameras to draw from, and on what.
+#[derive(Debug, Args)]
+pub(crate) struct Views {
+    /// Cameras to draw from: INRIA's cameras.json, a transforms.json of nerfstudio, or a COLMAP folder such as
+    /// sparse/0 [default: views generated for the scene].
+    #[arg(long, visible_alias = "sparse", value_name = "PATH", conflicts_with_all = ["orbit", "scene"])]
+    pub(crate) cameras: Option<PathBuf>,
+    /// The cameras to use: all of them, or those of one split. If the file marks no split, --hold makes one
+    /// [default: all; with photos, test].
+    #[arg(long, value_parser = split(), requires = "cameras")]
+    pub(crate) split: Option<SplitFilter>,
+    /// Where the file marks no split, every N-th camera in order of names is a test camera, starting with the
+    /// first; at least 1.
+    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_HOLD, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), requires = "cameras")]
+    pub(crate) hold: usize,
+    /// The place of generated views: around an `object`, or inside a `room`. `auto` decides by the scene.
+    #[arg(long, value_parser = scene_kind(), default_value = "auto")]
+    pub(crate) scene: SceneKind,
+    /// Number of generated views, 1 to 65535.
+    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
+    pub(crate) orbit: u16,
+    /// Largest width of a picture, 1 to 16384 pixels. Wider pictures are drawn smaller.
+    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
+    pub(crate) width: u32,
+    /// Colour behind the scene: `black`, `white`, or R,G,B, each from 0 to 1.
+    #[arg(long, default_value = "black", value_parser = colour)]
+    pub(crate) background: [f32; 3],
+    /// The device that draws: `cpu`, `gpu`, `auto` (a GPU if there is one that is not emulated in software, else the
+    /// CPU), or a number from `lexisplat devices`.
+    #[arg(long, default_value = "auto", value_name = "auto|cpu|gpu|N")]
+    pub(crate) device: Device,
+}
+
+/// Photos to score against.
+#[derive(Debug, Args)]
+pub(crate) struct Photos {
+    /// Folder of photos. Each photo belongs to the camera of the same name. Without --split only test cameras are
+    /// used.
+    #[arg(long, value_name = "DIR", requires = "cameras")]
+    pub(crate) images: Option<PathBuf>,
+    /// Divide the width and height of photos by N: 1, 2, 4 or 8. The folder `DIR_N` is used if it exists, otherwise
+    /// the photos are scaled [default: 1].
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(0..=u64::MAX), requires = "images")]
+    pub(crate) resolution: Option<u32>,
+}
+
+impl Views {
+    /// Returns the same options as the library takes them.
+    pub(crate) fn options(&self, photos: Option<&Photos>) -> ViewOptions {
+        let mut options = ViewOptions::default();
+        options.cameras.clone_from(&self.cameras);
+        options.hold = self.hold;
+        options.kind = self.scene;
+        options.count = self.orbit;
+        options.max_width = self.width;
+        if let Some(photos) = photos {
+            options.images.clone_from(&photos.images);
+            options.resolution = photos.resolution;
+        }
+        let default = if options.images.is_some() { SplitFilter::Test } else { SplitFilter::All };
+        options.split = self.split.unwrap_or(default);
+        options
+    }
+}

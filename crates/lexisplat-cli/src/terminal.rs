@@ -1,0 +1,53 @@
+//! What the program prints: results on standard output, notes on standard error.
+//!
+//! Everything goes through [`format::escape`], because names and comments from files may hold control characters.
+
+use std::io::Write;
+
+use anyhow::Result;
+use lexisplat::Error;
+use lexisplat_eval::format;
+use serde::Serialize;
+use serde_json::Value;
+
+/// What messages call standard output.
+pub(crate) const STANDARD_OUTPUT: &str = "standard output";
+/// Version of the objects that [`print_json`] prints. A member that changes its meaning or goes raises it.
+const SCHEMA_VERSION: u32 = 1;
+
+/// Prints a line to standard error. A program whose standard error is full goes on.
+pub(crate) fn note(line: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{}", format::escape(line));
+}
+
+/// Prints warnings about `name` to standard error.
+pub(crate) fn warn(name: &str, warnings: &[String]) {
+    for warning in warnings {
+        note(&format!("warning: {name}: {warning}"));
+    }
+}
+
+/// Prints text of any number of lines to standard output.
+pub(crate) fn print(text: &str) -> Result<()> {
+    print_unescaped(&format::escape_lines(text))
+}
+
+/// Prints text of which nothing comes from a file.
+pub(crate) fn print_unescaped(text: &str) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes())
+        .and_then(|()| out.flush())
+        .map_err(|e| Error::io(STANDARD_OUTPUT, e).into())
+}
+
+/// Prints a JSON object, with its schema version as the first member.
+pub(crate) fn print_json(object: &Value) -> Result<()> {
+    #[derive(Serialize)]
+    struct Versioned<'a> {
+        schema_version: u32,
+        #[serde(flatten)]
+        object: &'a Value,
+    }
+    let versioned = Versioned { schema_version: SCHEMA_VERSION, object };
+    print(&format!("{}\n", serde_json::to_string_pretty(&versioned)?))
+}

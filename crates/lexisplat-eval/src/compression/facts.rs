@@ -1,0 +1,87 @@
+//! Facts about a .lexi file, as reports give them.
+
+use lexisplat::packed::StreamBits;
+use lexisplat::{Layout, Record};
+use serde::Serialize;
+
+/// How a .lexi file was made, and its errors, to serialize. docs/FORMAT.md has the meaning of the keys.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[allow(missing_docs, reason = "the fields are those of a record, by their keys in reports")]
+#[non_exhaustive]
+pub struct RecordReport {
+    pub layout: &'static str,
+    /// `None` for a packed file.
+    pub pursuit: Option<&'static str>,
+    pub tol: Option<f64>,
+    pub max_nnz: Option<u8>,
+    pub seed: u64,
+    pub max_residual: f64,
+    pub rms_residual: f64,
+    pub over_tolerance: u64,
+}
+
+impl From<&Record> for RecordReport {
+    fn from(record: &Record) -> Self {
+        Self {
+            layout: record.layout.name(),
+            pursuit: (record.layout != Layout::Packed).then(|| record.pursuit.name()),
+            tol: record.tolerance,
+            max_nnz: record.max_nonzeros,
+            seed: record.seed,
+            max_residual: record.max_residual,
+            rms_residual: record.rms_residual,
+            over_tolerance: record.over_tolerance,
+        }
+    }
+}
+
+/// A number of bytes to serialize: an integer if it is whole. Streams of a packed file share bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(untagged)]
+pub enum ByteCount {
+    /// Whole bytes.
+    Whole(u64),
+    /// Bytes and a part of one.
+    Part(f64),
+}
+
+impl From<f64> for ByteCount {
+    fn from(bytes: f64) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "checked")]
+        if bytes >= 0.0 && bytes.fract() == 0.0 { Self::Whole(bytes as u64) } else { Self::Part(bytes) }
+    }
+}
+
+/// Returns the bytes of each part of a file by name. Their sum is the file's size.
+///
+/// `tensors` are the bytes of each tensor and of the header. For a packed file `streams` are the bits of each
+/// stream in the tensor `packed.data`: they are summed by attribute, and `rounding` is what the tensor has
+/// beyond them, since streams end in whole words.
+#[must_use]
+pub fn part_bytes(tensors: &[(String, u64)], streams: &[StreamBits]) -> Vec<(String, f64)> {
+    let mut out: Vec<(String, f64)> = Vec::new();
+    for stream in streams {
+        match out.iter_mut().find(|a| a.0 == stream.attribute) {
+            Some(found) => found.1 += stream.bits / 8.0,
+            None => out.push((stream.attribute.to_owned(), stream.bits / 8.0)),
+        }
+    }
+    let coded: f64 = out.iter().map(|a| a.1).sum();
+    for (name, bytes) in tensors {
+        let bytes = *bytes as f64;
+        match name.strip_prefix("packed.") {
+            Some("data") => out.push(("rounding".to_owned(), bytes - coded)),
+            Some(name) => out.push((name.to_owned(), bytes)),
+            None => out.push((name.clone(), bytes)),
+        }
+    }
+    out
+}
+
+/// Returns the bytes of those `parts` that stand for SH-rest: dictionary, codes and escapes.
+#[must_use]
+pub fn sh_bytes(parts: &[(String, f64)]) -> f64 {
+    let is_sh =
+        |name: &str| name == "dictionary" || name.starts_with("codes.") || name.starts_with("escapes.");
+    parts.iter().filter(|part| is_sh(&part.0)).map(|part| part.1).sum()
+}

@@ -1,0 +1,36 @@
+//! Compression as one call: a source of splats in, a .lexi file and a report out.
+//!
+//! A [`Compression`] says how. [`Compression::run`] measures what shows in pictures, prunes, packs to a quality
+//! or a size, writes, and reports. Programs, windows and bindings need no more than this:
+//!
+//! ```
+//! use lexisplat::packed::Preset;
+//! use lexisplat::{Limits, Silent, lexi};
+//! use lexisplat_eval::{Compression, Packing};
+//! use lexisplat_sample::{SampleOptions, scene};
+//!
+//! let splats = scene(&SampleOptions::new(2000, 0));
+//! let compression = Compression::from(Packing::new(Preset::Small));
+//! let mut file = Vec::new();
+//! let report = compression.run(&splats, &mut file, &Silent)?;
+//! assert_eq!(report.file_bytes, file.len() as u64);
+//! assert_eq!(lexi::read_bytes("scene.lexi", &file, &Limits::default())?.len(), splats.len());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod facts;
+mod judge;
+mod packing;
+mod prune;
+mod report;
+mod run;
+mod target;
+mod views;
+
+pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+pub use judge::Judge;
+pub use packing::{Compression, Packing, Quality};
+pub use prune::{Pruned, prune};
+pub use report::{CompressionReport, SensitivitySource};
+pub use target::{Target, pack_to_target};
+pub use views::PackingViews;

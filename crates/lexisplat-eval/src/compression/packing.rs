@@ -1,0 +1,176 @@
+//! How to compress: the choices, and which of them go together.
+
+use std::sync::Arc;
+
+use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::{CompressOptions, Sensitivity};
+use lexisplat_render::{Camera, Device};
+
+use super::target::Target;
+use crate::error::{Error, Result};
+
+/// Bytes of memory that packing a whole scene takes for each byte of its source. 1.85 was measured.
+const MEMORY_PER_BYTE: u64 = 2;
+
+/// How to compress a scene.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Compression {
+    /// The geometry stays exact, and the SH become codes over a dictionary.
+    Exact(CompressOptions),
+    /// Everything is quantised and entropy-coded as far as views of the scene allow.
+    Packed(Packing),
+    /// Everything is quantised and entropy-coded without drawing the scene: what shows follows from each
+    /// Gaussian alone. Several times faster than [`Self::Packed`], for larger files of the same quality. The
+    /// scene is never whole in memory.
+    Heuristic(Preset, PackOptions),
+}
+
+impl From<CompressOptions> for Compression {
+    fn from(options: CompressOptions) -> Self {
+        Self::Exact(options)
+    }
+}
+
+impl From<Packing> for Compression {
+    fn from(packing: Packing) -> Self {
+        Self::Packed(packing)
+    }
+}
+
+/// The quality of a packed file.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Quality {
+    /// A quality by name. One packing gives it, without a search.
+    Preset(Preset),
+    /// A quality or a size that a search reaches.
+    Target(Target),
+}
+
+impl From<Preset> for Quality {
+    fn from(preset: Preset) -> Self {
+        Self::Preset(preset)
+    }
+}
+
+impl From<Target> for Quality {
+    fn from(target: Target) -> Self {
+        Self::Target(target)
+    }
+}
+
+/// How to pack a scene by what shows in views of it.
+///
+/// A scene that needs more than the memory allowed is packed part by part, each part by its own views. Only
+/// presets without cameras and pruning can be had so.
+#[derive(Debug, Clone)]
+pub struct Packing {
+    pub(super) quality: Quality,
+    pub(super) options: PackOptions,
+    pub(super) cameras: Option<Vec<Camera>>,
+    pub(super) prune: Option<f32>,
+    pub(super) device: Device,
+    pub(super) sensitivity: Option<Arc<Sensitivity>>,
+    memory: u64,
+}
+
+impl Default for Packing {
+    fn default() -> Self {
+        Self::new(Preset::default())
+    }
+}
+
+impl Packing {
+    /// Packs to `quality`, by views generated around the scene that the processor draws, in any memory.
+    #[must_use]
+    pub fn new(quality: impl Into<Quality>) -> Self {
+        Self {
+            quality: quality.into(),
+            options: PackOptions::default(),
+            cameras: None,
+            prune: None,
+            device: Device::Cpu,
+            sensitivity: None,
+            memory: u64::MAX,
+        }
+    }
+
+    /// Packs with these options of the codec.
+    #[must_use]
+    pub fn with_options(self, options: PackOptions) -> Self {
+        Self { options, ..self }
+    }
+
+    /// Measures and judges by these cameras instead of generated ones. [`Compression::run`] refuses fewer than
+    /// two.
+    #[must_use]
+    pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
+        Self { cameras: Some(cameras), ..self }
+    }
+
+    /// Leaves Gaussians out as long as no pixel of any view changes by more than `levels` of 255, a finite
+    /// number above 0. The source's order cannot be kept then.
+    #[must_use]
+    pub fn with_prune(self, levels: f32) -> Self {
+        Self { prune: Some(levels), ..self }
+    }
+
+    /// Draws on `device`. The file records a GPU, because its results are not the same on every machine.
+    #[must_use]
+    pub fn with_device(self, device: Device) -> Self {
+        Self { device, ..self }
+    }
+
+    /// Allows about `bytes` bytes of memory for packing a whole scene.
+    #[must_use]
+    pub fn with_memory(self, bytes: u64) -> Self {
+        Self { memory: bytes, ..self }
+    }
+
+    /// Packs by a sensitivity that was measured before, for several files of one scene.
+    #[must_use]
+    pub fn with_sensitivity(self, sensitivity: Arc<Sensitivity>) -> Self {
+        Self { sensitivity: Some(sensitivity), ..self }
+    }
+
+    /// Refuses choices that are out of range or do not go together.
+    pub(super) fn check(&self) -> Result<()> {
+        if let Quality::Target(target) = self.quality {
+            target.check()?;
+        }
+        match self.prune {
+            Some(levels) if !levels.is_finite() || levels <= 0.0 => {
+                Err(Error::parameter("prune", levels, "a finite number above 0"))
+            }
+            Some(levels) if self.options.keep_order => {
+                let expected =
+                    "nothing if the order of the source is kept: it has no place for what is left out";
+                Err(Error::parameter("prune", levels, expected))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a scene of `source_bytes` bytes is packed whole. Otherwise it is packed part by part.
+    ///
+    /// # Errors
+    /// [`Error::Memory`] if the memory allowed is too small for the whole scene and a choice needs it.
+    pub(super) fn is_whole(&self, source_bytes: u64) -> Result<bool> {
+        let needed = source_bytes.saturating_mul(MEMORY_PER_BYTE);
+        match self.needs_whole() {
+            _ if needed <= self.memory => Ok(true),
+            Some(choice) => Err(Error::Memory { choice, needed, allowed: self.memory }),
+            None => Ok(false),
+        }
+    }
+
+    /// The first choice that needs the whole scene in memory.
+    fn needs_whole(&self) -> Option<&'static str> {
+        match self.quality {
+            Quality::Target(target) => Some(target.name()),
+            Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
+            Quality::Preset(_) if self.prune.is_some() => Some("prune"),
+            Quality::Preset(_) => self.sensitivity.as_ref().map(|_| "sensitivity"),
+        }
+    }
+}

@@ -1,0 +1,215 @@
+//! What a compression did: the facts that programs print as text and as JSON.
+
+use lexisplat::packed::{PackReport, Packed, StreamBits, TargetRecord};
+use lexisplat::{CompressReport, Dictionary, Record, ShDegree};
+use serde::{Serialize, Serializer};
+
+use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use super::prune::Pruned;
+
+/// What a compression did.
+///
+/// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
+/// fields that are renamed.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct CompressionReport {
+    /// Number of Gaussians in the file.
+    pub gaussians: usize,
+    /// SH degree, 0 to 4.
+    pub sh_degree: u8,
+    /// Number of atoms.
+    pub atoms: usize,
+    /// How the file was made, and its errors. The keys are those of [`RecordReport`].
+    #[serde(flatten, serialize_with = "record")]
+    pub record: Record,
+    /// Mean number of nonzeros of a Gaussian. An escape counts as a full vector.
+    pub mean_nonzeros: f64,
+    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` if there are no nonzeros.
+    pub coefficient_ratio: Option<f64>,
+    /// Number of Gaussians by number of nonzeros, from 0 to the dimension, without escapes.
+    pub nonzero_histogram: Vec<u64>,
+    /// Number of Gaussians whose SH are stored exactly.
+    pub escapes: u64,
+    /// Size of the source, in bytes.
+    #[serde(rename = "ply_bytes")]
+    pub source_bytes: u64,
+    /// Size of the file, in bytes.
+    pub file_bytes: u64,
+    /// Bytes of the file that stand for SH-rest.
+    #[serde(serialize_with = "eighths")]
+    pub sh_bytes: f64,
+    /// Bytes of the same SH-rest as dense f32.
+    pub dense_sh_bytes: u64,
+    /// Bytes of each part of the file by name, as [`part_bytes`] gives them.
+    #[serde(serialize_with = "map")]
+    pub attribute_bytes: Vec<(String, f64)>,
+    /// What was asked and reached, if the quality was a target.
+    #[serde(rename = "promise")]
+    pub target: Option<TargetRecord>,
+    /// What the sensitivity comes from. `None` if the geometry is exact, which needs none.
+    pub importance: Option<SensitivitySource>,
+    /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
+    pub device: Option<String>,
+    /// What pruning did, if it was asked for.
+    pub pruned: Option<Pruned>,
+    /// Whether a packed scene was measured and packed part by part.
+    pub in_parts: bool,
+    /// Rounds of learning. `None` if the dictionary was given or the file is packed, as the next two.
+    pub learn_rounds: Option<usize>,
+    /// Number of Gaussians that the dictionary was learned from.
+    pub learn_sample: Option<usize>,
+    /// Mean nonzeros of Gaussians that were not learned from.
+    pub held_out_nonzeros: Option<f64>,
+    /// Seconds spent reading the source.
+    pub read_seconds: f64,
+    /// Seconds spent measuring the sensitivity and pruning.
+    pub look_seconds: f64,
+    /// Seconds spent learning the dictionary.
+    pub learn_seconds: f64,
+    /// Seconds spent coding and verifying.
+    pub code_seconds: f64,
+    /// Seconds spent on learning, coding and all else that makes a file of a scene.
+    pub pack_seconds: f64,
+    /// Seconds spent writing the file.
+    pub write_seconds: f64,
+    /// Seconds spent in all.
+    pub total_seconds: f64,
+    /// What is odd about the source, one sentence each.
+    pub warnings: Vec<String>,
+    /// The dictionary of a file with exact geometry.
+    #[serde(skip)]
+    pub dictionary: Option<Dictionary>,
+}
+
+/// What the sensitivity of a scene comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SensitivitySource {
+    /// Views of the scene were drawn.
+    Views,
+    /// Each Gaussian was judged alone.
+    #[serde(rename = "guess")]
+    Heuristic,
+}
+
+/// What the reports of the exact and of the packed codec share.
+struct Coding<'a> {
+    record: &'a Record,
+    mean_nonzeros: f64,
+    nonzero_histogram: &'a [u64],
+    escapes: u64,
+    learn_seconds: f64,
+    code_seconds: f64,
+}
+
+impl CompressionReport {
+    fn new(
+        gaussians: usize,
+        degree: ShDegree,
+        atoms: usize,
+        coding: &Coding<'_>,
+        tensors: &[(String, u64)],
+        streams: &[StreamBits],
+    ) -> Self {
+        let &Coding { record, mean_nonzeros, nonzero_histogram, escapes, learn_seconds, code_seconds } =
+            coding;
+        let (parts, dim) = (part_bytes(tensors, streams), degree.rest());
+        Self {
+            gaussians,
+            sh_degree: degree.get(),
+            atoms,
+            record: record.clone(),
+            mean_nonzeros,
+            coefficient_ratio: (mean_nonzeros > 0.0).then(|| dim as f64 / mean_nonzeros),
+            nonzero_histogram: nonzero_histogram.to_vec(),
+            escapes,
+            source_bytes: 0,
+            file_bytes: tensors.iter().map(|t| t.1).sum(),
+            sh_bytes: sh_bytes(&parts),
+            dense_sh_bytes: (gaussians * dim * size_of::<f32>()) as u64,
+            attribute_bytes: parts,
+            target: None,
+            importance: None,
+            device: None,
+            pruned: None,
+            in_parts: false,
+            learn_rounds: None,
+            learn_sample: None,
+            held_out_nonzeros: None,
+            read_seconds: 0.0,
+            look_seconds: 0.0,
+            learn_seconds,
+            code_seconds,
+            pack_seconds: learn_seconds + code_seconds,
+            write_seconds: 0.0,
+            total_seconds: 0.0,
+            warnings: Vec::new(),
+            dictionary: None,
+        }
+    }
+
+    /// Returns the report of a file with exact geometry, whose tensors take the bytes in `tensors`.
+    pub(super) fn exact(
+        gaussians: usize,
+        dictionary: &Dictionary,
+        record: &Record,
+        report: &CompressReport,
+        tensors: &[(String, u64)],
+    ) -> Self {
+        let coding = Coding {
+            record,
+            mean_nonzeros: report.mean_nonzeros,
+            nonzero_histogram: &report.nonzero_histogram,
+            escapes: report.escapes,
+            learn_seconds: report.learn_seconds,
+            code_seconds: report.code_seconds,
+        };
+        let learned = report.learned.as_ref();
+        Self {
+            learn_rounds: learned.map(|l| l.rounds),
+            learn_sample: learned.map(|l| l.sample),
+            held_out_nonzeros: learned.map(|l| l.held_out_nonzeros),
+            dictionary: Some(dictionary.clone()),
+            ..Self::new(gaussians, dictionary.degree(), dictionary.len(), &coding, tensors, &[])
+        }
+    }
+
+    /// Returns the report of a packed file, whose tensors take the bytes in `tensors` and whose streams the
+    /// bits in `streams`.
+    pub(super) fn packed(
+        head: &Packed,
+        report: &PackReport,
+        tensors: &[(String, u64)],
+        streams: &[StreamBits],
+        importance: SensitivitySource,
+    ) -> Self {
+        let coding = Coding {
+            record: &head.record,
+            mean_nonzeros: report.mean_nonzeros,
+            nonzero_histogram: &report.nonzero_histogram,
+            escapes: report.escapes,
+            learn_seconds: report.learn_seconds,
+            code_seconds: report.code_seconds,
+        };
+        Self {
+            target: head.target.clone(),
+            importance: Some(importance),
+            device: Some(head.device.clone().unwrap_or_else(|| "cpu".to_owned())),
+            ..Self::new(head.gaussians, head.degree, head.atoms, &coding, tensors, streams)
+        }
+    }
+}
+
+fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Error> {
+    RecordReport::from(record).serialize(serializer)
+}
+
+fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    ByteCount::from((bytes * 8.0).round() / 8.0).serialize(serializer)
+}
+
+fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer
+        .collect_map(parts.iter().map(|(name, bytes)| (name, ByteCount::from((bytes * 8.0).round() / 8.0))))
+}

@@ -1,0 +1,180 @@
+//! The steps from a source of splats to a written file and its report.
+
+use lexisplat::packed::{PackOptions, Packer, Preset};
+use lexisplat::stream::{self, Importance};
+use lexisplat::{CompressOptions, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch, lexi};
+use lexisplat_render::Renderer;
+
+use super::judge::Judge;
+use super::packing::{Compression, Packing, Quality};
+use super::prune::prune;
+use super::report::{CompressionReport, SensitivitySource};
+use super::target::pack_to_target;
+use super::views::PackingViews;
+use crate::error::Result;
+
+impl Compression {
+    /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. `progress` is told
+    /// of every step and may cancel. Nothing is left of a file that was cancelled.
+    ///
+    /// The result is the same for any number of threads. Of a packed file it depends on the memory only in
+    /// whether the scene is packed whole.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`](crate::Error::Parameter) for choices out of range or that do not go together, and
+    /// for a target that cannot be met. [`Error::Memory`](crate::Error::Memory) if a choice needs the whole scene
+    /// and memory does not allow it. Errors of the source, of the sink and of a GPU.
+    /// [`Error::Codec`](crate::Error::Codec) with [`lexisplat::Error::Cancelled`] if `progress` cancels.
+    pub fn run<'a>(
+        &self,
+        source: &dyn SplatSource,
+        sink: impl Into<Sink<'a>>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        let clock = Stopwatch::start();
+        let sink = sink.into();
+        let mut report = match self {
+            Self::Exact(options) => exact(options, source, sink, progress)?,
+            Self::Heuristic(preset, options) => in_parts(options, *preset, None, source, sink, progress)?,
+            Self::Packed(packing) => packing.run(source, sink, progress)?,
+        };
+        report.source_bytes = source.source_bytes();
+        report.warnings = source.warnings().to_vec();
+        report.total_seconds = clock.seconds();
+        Ok(report)
+    }
+}
+
+fn exact(
+    options: &CompressOptions,
+    source: &dyn SplatSource,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
+) -> Result<CompressionReport> {
+    let done = stream::compress(source, options, sink, progress)?;
+    let write_seconds = done.write_seconds;
+    let report = CompressionReport::exact(
+        done.gaussians,
+        &done.dictionary,
+        &done.record,
+        &done.report,
+        &done.attribute_bytes,
+    );
+    Ok(CompressionReport { write_seconds, ..report })
+}
+
+/// Packs part by part. `renderer` measures the parts. Without one the heuristic does.
+fn in_parts(
+    options: &PackOptions,
+    preset: Preset,
+    mut renderer: Option<Renderer>,
+    source: &dyn SplatSource,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
+) -> Result<CompressionReport> {
+    let clock = Stopwatch::start();
+    let device = renderer.as_ref().and_then(gpu);
+    let origin = if renderer.is_some() { SensitivitySource::Views } else { SensitivitySource::Heuristic };
+    let mut look_seconds = 0.0;
+    let mut measure;
+    let importance = match &mut renderer {
+        None => Importance::Heuristic,
+        Some(renderer) => {
+            measure = |part: &Splats| -> Result<Sensitivity> {
+                let clock = Stopwatch::start();
+                let views = PackingViews::of_part(part);
+                let sensitivity = views.sensitivity(renderer, part, &OnlyCancels(progress));
+                look_seconds += clock.seconds();
+                sensitivity
+            };
+            Importance::Judge { judge: &mut measure, device }
+        }
+    };
+    let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;
+    let report =
+        CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, &done.stream_bits, origin);
+    let pack_seconds = clock.seconds() - look_seconds;
+    Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
+}
+
+impl Packing {
+    fn run(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        self.check()?;
+        let whole = self.is_whole(source.source_bytes())?;
+        match self.quality {
+            Quality::Preset(preset) if !whole => {
+                let renderer = Some(Renderer::open(self.device)?);
+                in_parts(&self.options, preset, renderer, source, sink, progress)
+            }
+            _ => self.whole(source, sink, progress),
+        }
+    }
+
+    fn whole(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        let clock = Stopwatch::start();
+        let mut splats = source.whole()?;
+        let read_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        let views = match &self.cameras {
+            Some(cameras) => PackingViews::given(cameras)?,
+            None => PackingViews::generated(&splats),
+        };
+        let mut renderer = Renderer::open(self.device)?;
+        let device = gpu(&renderer);
+        let mut sensitivity = match &self.sensitivity {
+            Some(measured) => Sensitivity::clone(measured),
+            None => views.sensitivity(&mut renderer, &splats, progress)?,
+        };
+        let mut prune =
+            |levels| prune(&mut renderer, splats.to_mut(), &mut sensitivity, &views, levels, progress);
+        let pruned = self.prune.map(&mut prune).transpose()?;
+        let look_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        let packer = Packer::new(&splats, &sensitivity, &self.options)?;
+        drop(sensitivity);
+        let (mut packed, report) = match self.quality {
+            Quality::Preset(preset) => packer.pack(packer.step_for(preset.decibels()), progress)?,
+            Quality::Target(target) => {
+                let mut judge = Judge::new(renderer, &splats, &views)?;
+                pack_to_target(&packer, &mut judge, target, source.source_bytes(), progress)?
+            }
+        };
+        drop(packer);
+        packed.device = device;
+        let pack_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        lexi::write_packed(sink, &packed)?;
+        let write_seconds = clock.seconds();
+        let (tensors, streams) = (lexi::packed_tensor_bytes(&packed), packed.stream_bits()?);
+        let report =
+            CompressionReport::packed(&packed, &report, &tensors, &streams, SensitivitySource::Views);
+        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
+    }
+}
+
+/// Name of the GPU that `renderer` draws on, if it does. The results of a GPU are its own, so files name it.
+fn gpu(renderer: &Renderer) -> Option<String> {
+    renderer.is_gpu().then(|| renderer.name().to_owned())
+}
+
+/// Passes cancellation on, but no reports: those of the work around it go on.
+struct OnlyCancels<'a>(&'a dyn Progress);
+
+impl Progress for OnlyCancels<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}

@@ -1,0 +1,243 @@
+//! The search for the smallest file of a quality, or for the best file of a size.
+
+use lexisplat::packed::{PackReport, Packed, Packer, TargetRecord};
+use lexisplat::{Progress, lexi};
+
+use super::judge::Judge;
+use crate::error::{Error, Result};
+
+/// A quality may exceed the target by this much, in dB.
+const CLOSE_DB: f64 = 0.06;
+/// A size may fall short of the target by this share.
+const CLOSE_SIZE: f64 = 0.01;
+/// Number of packings tried at most.
+const MAX_TRIES: usize = 9;
+/// First estimate of the decibels that pictures gain when the step is halved.
+const DB_PER_HALVING: f64 = 4.5;
+/// Quality that [`FIRST_BYTES`] is for, in dB.
+const FIRST_DB: f64 = 40.0;
+/// First estimate of the bytes of a Gaussian at [`FIRST_DB`].
+const FIRST_BYTES: f64 = 8.0;
+/// First estimate of the factor by which the file grows when the step is halved.
+const BYTES_PER_HALVING: f64 = 1.4;
+/// Largest change of the step's binary logarithm from one try to the next.
+const MAX_MOVE: f64 = 3.0;
+/// Smallest and largest step tried. Others give no useful file.
+const STEPS: [f64; 2] = [1e-9, 1e-2];
+/// Bytes reserved for the target's record in the header of a file whose size is the target.
+const RECORD_BYTES: u64 = 256;
+/// A try between two others keeps this share of their distance from each, so that the interval shrinks.
+const LEAST_SHARE: f64 = 0.05;
+/// Binary logarithms of steps closer than this count as equal.
+const SAME_STEP: f64 = 1e-4;
+/// Two tries must differ by more than this in the step's binary logarithm to give a slope.
+const SLOPE_STEP: f64 = 1e-3;
+/// A measured slope may differ from the last one by this factor at most.
+const SLOPE_FACTOR: f64 = 3.0;
+
+/// What a packed file shall reach.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub enum Target {
+    /// The smallest file whose mean PSNR over the judging views is at least this, in dB.
+    MeanPsnr(f64),
+    /// The smallest file whose PSNR in every judging view is at least this, in dB.
+    MinPsnr(f64),
+    /// The best file of at most this many bytes.
+    Size(u64),
+    /// The best file that is at least this many times smaller than the source.
+    Ratio(f64),
+}
+
+impl Target {
+    /// Name of the target in errors and, but for a ratio, in the file's record.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MeanPsnr(_) => "psnr",
+            Self::MinPsnr(_) => "min-psnr",
+            Self::Size(_) => "size",
+            Self::Ratio(_) => "ratio",
+        }
+    }
+
+    fn asked(self) -> f64 {
+        match self {
+            Self::MeanPsnr(asked) | Self::MinPsnr(asked) | Self::Ratio(asked) => asked,
+            Self::Size(bytes) => bytes as f64,
+        }
+    }
+
+    pub(super) fn check(self) -> Result<()> {
+        let (least, expected) = match self {
+            Self::Ratio(_) => (1.0, "a finite number above 1"),
+            _ => (0.0, "a finite number above 0"),
+        };
+        if self.asked().is_finite() && self.asked() > least {
+            return Ok(());
+        }
+        Err(Error::parameter(self.name(), self.asked(), expected))
+    }
+
+    /// The target that the file records: a ratio is recorded as the size it means.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the source's size")]
+    fn recorded(self, source_bytes: u64) -> Self {
+        match self {
+            Self::Ratio(ratio) => Self::Size((source_bytes as f64 / ratio) as u64),
+            other => other,
+        }
+    }
+
+    /// The error of a target that is out of reach. `best` is the value nearest to it that was found.
+    fn unreachable(self, best: f64, source_bytes: u64) -> Error {
+        let nothing_smaller = "nothing smaller can be made of this scene";
+        let smallest = libm::exp2(-best);
+        let expected = match self {
+            Self::MeanPsnr(_) | Self::MinPsnr(_) => {
+                format!("at most {best:.1} dB: nothing better can be made of this scene")
+            }
+            Self::Size(_) => format!("at least {smallest:.0} bytes: {nothing_smaller}"),
+            Self::Ratio(_) => format!("at most {:.1}: {nothing_smaller}", source_bytes as f64 / smallest),
+        };
+        Error::parameter(self.name(), self.asked(), expected)
+    }
+}
+
+/// One packing tried.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Try {
+    log_step: f64,
+    /// For a quality decibels, which fall as the step grows. For a size minus the binary logarithm of the
+    /// bytes, which rises as the step grows.
+    value: f64,
+}
+
+/// Packs until `target` is met as closely as possible. The file records what was asked and reached. A ratio
+/// is one of `source_bytes`.
+///
+/// # Errors
+/// [`Error::Parameter`] if the target is out of range or cannot be met. Errors of packing and drawing.
+pub fn pack_to_target(
+    packer: &Packer<'_>,
+    judge: &mut Judge,
+    target: Target,
+    source_bytes: u64,
+    progress: &dyn Progress,
+) -> Result<(Packed, PackReport)> {
+    target.check()?;
+    let recorded = target.recorded(source_bytes);
+    let asked = recorded.asked();
+    let size = matches!(recorded, Target::Size(_));
+    let wanted = if size { -libm::log2(asked) } else { asked };
+    let close = if size { -libm::log2(1.0 - CLOSE_SIZE) } else { CLOSE_DB };
+    let mut slope = if size { libm::log2(BYTES_PER_HALVING) } else { -DB_PER_HALVING };
+    let mut log_step = if size {
+        let first = -libm::log2(FIRST_BYTES * packer.len().max(1) as f64);
+        libm::log2(packer.step_for(FIRST_DB)) + (wanted - first) / slope
+    } else {
+        libm::log2(packer.step_for(wanted))
+    };
+    let mut tries: Vec<Try> = Vec::new();
+    let mut best: Option<(f64, Packed, PackReport, Option<[f64; 2]>)> = None;
+    for _ in 0..MAX_TRIES {
+        progress.check()?;
+        log_step = log_step.clamp(libm::log2(STEPS[0]), libm::log2(STEPS[1]));
+        let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
+        let (value, reached) = if size {
+            (-libm::log2((lexi::packed_bytes(&packed) + RECORD_BYTES) as f64), None)
+        } else {
+            let [mean, least] = judge.score(&packed.unpack()?)?;
+            (if matches!(target, Target::MinPsnr(_)) { least } else { mean }, Some([mean, least]))
+        };
+        tries.push(Try { log_step, value });
+        let met = value >= wanted;
+        // The smallest file of those that reach a quality has the largest step. The best file of those that
+        // reach a size has the smallest step.
+        let better = |other: f64| if size { log_step < other } else { log_step > other };
+        if met && best.as_ref().is_none_or(|b| better(b.0)) {
+            best = Some((log_step, packed, report, reached));
+        }
+        if met && value - wanted <= close {
+            break;
+        }
+        let Some(next) = next_step(&tries, wanted + 0.5 * close, &mut slope) else { break };
+        log_step = next;
+    }
+    let Some((_, mut packed, report, reached)) = best else {
+        let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
+        return Err(target.unreachable(found, source_bytes));
+    };
+    let reached = match reached {
+        Some(reached) => reached,
+        None => judge.score(&packed.unpack()?)?,
+    };
+    let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
+    let given = judge.views_are_given();
+    packed.target = Some(TargetRecord::new(recorded.name(), asked, reached.map(rounded), views, given));
+    Ok((packed, report))
+}
+
+/// Rounds decibels to the thousandths that a file records.
+fn rounded(decibels: f64) -> f64 {
+    (decibels * 1000.0).round() / 1000.0
+}
+
+/// Returns the binary logarithm of the next step to try: on the line through the two tries around the wanted
+/// value, or beyond the last try. `None` if that step was tried.
+fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
+    let above = tries.iter().filter(|t| t.value >= wanted).min_by(|a, b| a.value.total_cmp(&b.value));
+    let below = tries.iter().filter(|t| t.value < wanted).max_by(|a, b| a.value.total_cmp(&b.value));
+    let next = match (above, below) {
+        (Some(a), Some(b)) => {
+            let t = (wanted - b.value) / (a.value - b.value);
+            b.log_step + (a.log_step - b.log_step) * t.clamp(LEAST_SHARE, 1.0 - LEAST_SHARE)
+        }
+        (one, other) => {
+            if let [.., p, q] = tries
+                && (p.log_step - q.log_step).abs() > SLOPE_STEP
+            {
+                let measured = (q.value - p.value) / (q.log_step - p.log_step);
+                *slope = slope.signum()
+                    * (measured / *slope).clamp(1.0 / SLOPE_FACTOR, SLOPE_FACTOR)
+                    * slope.abs();
+            }
+            let from = one.or(other)?;
+            from.log_step + ((wanted - from.value) / *slope).clamp(-MAX_MOVE, MAX_MOVE)
+        }
+    };
+    tries.iter().all(|t| (t.log_step - next).abs() > SAME_STEP).then_some(next)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Distance from `wanted` to the nearest value that the search finds on `curve`.
+    fn nearest(curve: impl Fn(f64) -> f64, wanted: f64, mut slope: f64) -> f64 {
+        let mut tries = vec![Try { log_step: -17.0, value: curve(-17.0) }];
+        while tries.len() < MAX_TRIES {
+            let Some(next) = next_step(&tries, wanted, &mut slope) else { break };
+            tries.push(Try { log_step: next, value: curve(next) });
+        }
+        tries.iter().map(|t| (t.value - wanted).abs()).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn the_search_closes_in_on_decibels() {
+        // Decibels over the logarithm of the step, steeper on one side.
+        let curve = |x: f64| 40.0 - 4.0 * (x + 17.0) - 0.2 * (x + 17.0).powi(2) * (x + 17.0).signum();
+        for wanted in [25.0, 40.0, 47.3, 60.0] {
+            assert!(nearest(curve, wanted, -DB_PER_HALVING) < 0.02, "{wanted}");
+        }
+    }
+
+    #[test]
+    fn the_search_closes_in_on_sizes() {
+        // Minus the logarithm of the bytes: a constant part of dictionary and tables, and a part that shrinks.
+        let curve = |x: f64| -(5000.0 + 90_000.0 * (-0.45 * (x + 17.0)).exp2()).log2();
+        for bytes in [8e3_f64, 2e4, 1e5, 1e6] {
+            let wanted = -bytes.log2();
+            assert!(nearest(curve, wanted, BYTES_PER_HALVING.log2()) < 0.01, "{bytes}");
+        }
+    }
+}

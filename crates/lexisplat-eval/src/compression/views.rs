@@ -1,0 +1,121 @@
+//! The views that packing draws: some measure the sensitivity, some judge the result.
+
+use lexisplat::{Progress, Sensitivity, Splats};
+use lexisplat_render::{Camera, Renderer, Scene, Split, surround};
+
+use crate::error::{Error, Result};
+
+/// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
+/// fewer, for a view of so many Gaussians takes long.
+const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
+/// Gaussians drawn in all generated views together, about.
+const GAUSSIANS_DRAWN: usize = 48_000_000;
+/// Width and height of generated views, in pixels.
+const GENERATED_SIZE: [u32; 2] = [384, 256];
+/// Distances of generated views that measure, in radii of the scene's detail.
+const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
+/// Number of generated views that may judge. [`Judge`](super::Judge) takes those with the most detail.
+const CANDIDATES: usize = 72;
+/// Distances of generated views that may judge, in radii of the scene's detail.
+const JUDGE_DISTANCES: [f64; 2] = [2.0, 10.0];
+/// Largest width of a given camera's picture, in pixels. Sharper pictures give the same sensitivity.
+const MAX_WIDTH: u32 = 480;
+/// Number of given cameras that are used at most, evenly spread.
+const MAX_VIEWS: usize = 150;
+/// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
+/// than views that did not measure (docs/METHOD.md).
+const JUDGE_SHARE: usize = 2;
+/// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
+const PRIOR_SHARE: f32 = 0.3;
+
+/// The views that packing draws.
+#[derive(Debug, Clone)]
+pub struct PackingViews {
+    measuring: Vec<Camera>,
+    judging: Vec<Camera>,
+    given: bool,
+}
+
+impl PackingViews {
+    /// Generates views from all around `splats`.
+    #[must_use]
+    pub fn generated(splats: &Splats) -> Self {
+        let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
+        let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
+        let around = |count, distances| surround(&splats.geometry, count, GENERATED_SIZE, distances);
+        Self {
+            measuring: around(views, GENERATED_DISTANCES),
+            judging: around(CANDIDATES, JUDGE_DISTANCES),
+            given: false,
+        }
+    }
+
+    /// Generates views from all around `part` of a scene. None of them judges. Their number is that of a large
+    /// scene.
+    #[must_use]
+    pub fn of_part(part: &Splats) -> Self {
+        let measuring =
+            surround(&part.geometry, *GENERATED_VIEWS.start(), GENERATED_SIZE, GENERATED_DISTANCES);
+        Self { measuring, judging: Vec::new(), given: false }
+    }
+
+    /// Takes the given cameras. If some are marked as training cameras, takes only those.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are fewer than two.
+    pub fn given(cameras: &[Camera]) -> Result<Self> {
+        let marked = cameras.iter().any(|c| c.split == Some(Split::Train));
+        let used: Vec<&Camera> =
+            cameras.iter().filter(|c| !marked || c.split == Some(Split::Train)).collect();
+        if used.len() < 2 {
+            return Err(Error::parameter("cameras", used.len(), "at least two training cameras"));
+        }
+        let stride = used.len().div_ceil(MAX_VIEWS);
+        let measuring: Vec<Camera> =
+            used.into_iter().step_by(stride).map(|camera| camera.with_max_width(MAX_WIDTH)).collect();
+        let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
+        Ok(Self { measuring, judging, given: true })
+    }
+
+    /// Whether the cameras were given. Otherwise they were generated.
+    #[must_use]
+    pub fn are_given(&self) -> bool {
+        self.given
+    }
+
+    /// The views that measure the sensitivity.
+    #[must_use]
+    pub fn measuring(&self) -> &[Camera] {
+        &self.measuring
+    }
+
+    /// The views that judge, or of which the judging ones are chosen if they were generated.
+    #[must_use]
+    pub fn judging(&self) -> &[Camera] {
+        &self.judging
+    }
+
+    /// Returns every view once.
+    pub fn all(&self) -> impl Iterator<Item = &Camera> {
+        // Given cameras that judge also measure.
+        let judging = if self.given { &[] } else { self.judging.as_slice() };
+        self.measuring.iter().chain(judging)
+    }
+
+    /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
+    /// is blended with the heuristic, which stands for all views that are not among these. Reports
+    /// [`Stage::Draw`](lexisplat::Stage::Draw) to `progress`, in views.
+    ///
+    /// # Errors
+    /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn sensitivity(
+        &self,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Sensitivity> {
+        let mut measured = renderer.sensitivity(&Scene::from(splats), &self.measuring, progress)?;
+        measured.blend_with_prior(&splats.geometry, PRIOR_SHARE);
+        Ok(measured)
+    }
+}

@@ -1,0 +1,68 @@
+//! Signs that cameras do not belong to a scene.
+
+use lexisplat_render::Image;
+
+use crate::scores::Comparison;
+
+/// Share of pixels below which a picture shows almost nothing of a scene.
+const ALMOST_NOTHING: f64 = 0.02;
+/// Largest mean PSNR against photos that warns, in dB. Published models reach 20 dB and more on their hardest
+/// scenes, and a plain grey picture 10 to 14 dB.
+const MISFIT_DB: f64 = 15.0;
+
+/// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show
+/// nothing but `background`, or they are far from the photos.
+#[must_use]
+pub fn misfit(
+    model: &str,
+    pictures: &[Image],
+    background: [f32; 3],
+    to_photos: Option<&Comparison>,
+) -> Vec<String> {
+    let mut warnings = Vec::new();
+    let is_empty = |picture: &&Image| {
+        let drawn = picture.pixels.iter().filter(|pixel| **pixel != background).count();
+        (drawn as f64) < ALMOST_NOTHING * picture.pixels.len() as f64
+    };
+    let (empty, all) = (pictures.iter().filter(is_empty).count(), pictures.len());
+    if 2 * empty > all {
+        warnings.push(format!(
+            "{empty} of {all} views show almost nothing of {model}; check that the cameras belong to this scene and are in its coordinates"
+        ));
+    }
+    if let Some(mean) = to_photos.and_then(|comparison| comparison.psnr.mean).filter(|&mean| mean < MISFIT_DB)
+    {
+        warnings.push(format!(
+            "{model} has {mean:.1} dB against the photos, and models of the photographed scene have 20 dB or more; check that model, cameras and photos belong to one scene, that the cameras are in its coordinates, and that the background is right"
+        ));
+    }
+    warnings
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scores::ViewScore;
+
+    fn picture(drawn: usize) -> Image {
+        let pixels = (0..100).map(|i| if i < drawn { [0.5; 3] } else { [1.0; 3] }).collect();
+        Image { width: 10, height: 10, pixels }
+    }
+
+    #[test]
+    fn views_of_nothing_are_told_if_they_are_most() {
+        let white = [1.0; 3];
+        let warnings = misfit("a.ply", &[picture(1), picture(0), picture(50)], white, None);
+        assert!(warnings.len() == 1 && warnings[0].starts_with("2 of 3 views"), "{warnings:?}");
+        assert!(misfit("a.ply", &[picture(1), picture(2)], white, None).is_empty());
+        assert!(misfit("a.ply", &[picture(0)], [0.0; 3], None).is_empty(), "another background");
+    }
+
+    #[test]
+    fn pictures_far_from_their_photos_are_told() {
+        let score = |psnr| Comparison::of(vec![ViewScore::new("v", [10, 10], psnr, 0.5, Default::default())]);
+        let warnings = |psnr| misfit("a.ply", &[picture(50)], [1.0; 3], Some(&score(psnr)));
+        assert!(warnings(Some(11.2))[0].contains("11.2 dB against the photos"));
+        assert!(warnings(Some(19.0)).is_empty() && warnings(None).is_empty());
+    }
+}

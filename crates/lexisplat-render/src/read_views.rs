@@ -1,0 +1,150 @@
+//! Reads cameras of any kind, told apart by content.
+
+#[cfg(not(target_family = "wasm"))]
+use std::path::Path;
+
+#[cfg(not(target_family = "wasm"))]
+use crate::camera::Camera;
+use crate::cameras_json::read_cameras_bytes;
+use crate::colmap;
+use crate::error::{Error, Result};
+use crate::transforms::{self, read_transforms_bytes};
+use crate::view_files::ViewFiles;
+use crate::view_set::{SizeOf, ViewSet};
+
+/// Files of a COLMAP model; any of them stands for its folder.
+#[cfg(not(target_family = "wasm"))]
+const COLMAP_FILES: [&str; 4] = ["cameras.bin", "images.bin", "cameras.txt", "images.txt"];
+/// Names of a file of cameras in a folder, in the order in which they are looked for.
+const JSON_FILES: [&str; 2] = ["transforms.json", "cameras.json"];
+
+/// Reads the cameras of a folder: the first found of a COLMAP model, here or in `sparse/0`, `sparse` or
+/// `colmap/sparse/0`; `transforms_train.json` with `transforms_test.json`; `transforms.json`; `cameras.json`.
+///
+/// # Errors
+/// [`Error::Format`] if there is none of these, or a file is damaged; [`Error::Limit`] if it has too much of
+/// something; [`Error::Io`] if it cannot be read.
+pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    if let Some(model) = colmap::find(files) {
+        return colmap::read(files, &model);
+    }
+    if transforms::is_nerf(files) {
+        return transforms::read_nerf_files(files, size_of);
+    }
+    if let Some(file) = JSON_FILES.into_iter().find(|file| files.has(file)) {
+        let (name, bytes) = files.open(file)?.read_limited()?;
+        return read_views_bytes(&name, &bytes, size_of);
+    }
+    Err(Error::format(
+        files.name(),
+        "no cameras here: looked for a COLMAP model (cameras and images, .bin or .txt, here, in sparse/0, sparse or colmap/sparse/0), transforms_train.json, transforms.json and cameras.json",
+    ))
+}
+
+/// Reads the cameras in `bytes`: a JSON list as [`read_cameras_bytes`], a JSON object as
+/// [`read_transforms_bytes`]. `file` stands for them in errors.
+///
+/// # Errors
+/// [`Error::Format`] if they are neither; otherwise as those two.
+pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
+    match bytes.iter().find(|byte| !byte.is_ascii_whitespace()) {
+        Some(b'[') => Ok(ViewSet { cameras: read_cameras_bytes(file, bytes)?, warnings: Vec::new() }),
+        Some(b'{') => read_transforms_bytes(file, bytes, size_of),
+        _ => Err(Error::format(
+            file,
+            "neither a JSON list (cameras.json) nor a JSON object (transforms.json); a COLMAP model is given by its folder",
+        )),
+    }
+}
+
+/// Reads the cameras of `path`, whichever kind it is:
+///
+/// - a folder, as [`read_view_files`];
+/// - a file of a COLMAP model: its folder, as [`read_colmap`];
+/// - another file, as [`read_views_bytes`].
+///
+/// # Errors
+/// As those three.
+#[cfg(not(target_family = "wasm"))]
+pub fn read_views(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let path = path.as_ref();
+    let metadata = std::fs::metadata(path).map_err(|e| Error::io(path, e))?;
+    if metadata.is_dir() {
+        return read_view_files(path, size_of);
+    }
+    if path.file_name().is_some_and(|name| COLMAP_FILES.iter().any(|known| name == *known)) {
+        let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+        return read_colmap(folder.unwrap_or(Path::new(".")));
+    }
+    let (file, bytes) = crate::view_files::open(path)?.read_limited()?;
+    read_views_bytes(&file, &bytes, size_of)
+}
+
+/// Reads a `cameras.json`. See [`read_cameras_bytes`].
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read; otherwise as [`read_cameras_bytes`].
+#[cfg(not(target_family = "wasm"))]
+pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<Camera>> {
+    let (file, bytes) = crate::view_files::open(path.as_ref())?.read_limited()?;
+    read_cameras_bytes(&file, &bytes)
+}
+
+/// Reads a `transforms.json`. See [`read_transforms_bytes`].
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read; otherwise as [`read_transforms_bytes`].
+#[cfg(not(target_family = "wasm"))]
+pub fn read_transforms(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let (file, bytes) = crate::view_files::open(path.as_ref())?.read_limited()?;
+    read_transforms_bytes(&file, &bytes, size_of)
+}
+
+/// Reads a `NeRF` synthetic folder. See [`transforms::read_nerf_files`].
+///
+/// # Errors
+/// As [`read_transforms`].
+#[cfg(not(target_family = "wasm"))]
+pub fn read_nerf(folder: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
+    transforms::read_nerf_files(folder.as_ref(), size_of)
+}
+
+/// Reads the COLMAP model of `folder`, or of its `sparse/0`, `sparse` or `colmap/sparse/0`: the binary files if
+/// both are there, otherwise the text files. See [`crate::read_colmap_binary`].
+///
+/// # Errors
+/// [`Error::Io`] if a file cannot be read; [`Error::Format`] if there is no model, or as
+/// [`crate::read_colmap_binary`]; [`Error::Limit`] if a file is over [`crate::MAX_COLMAP_BYTES`].
+#[cfg(not(target_family = "wasm"))]
+pub fn read_colmap(folder: impl AsRef<Path>) -> Result<ViewSet> {
+    let folder = folder.as_ref();
+    let Some(model) = colmap::find(folder) else {
+        std::fs::metadata(folder).map_err(|e| Error::io(folder, e))?;
+        let problem = "no COLMAP model: neither cameras.bin with images.bin nor cameras.txt with images.txt is here or in sparse/0, sparse or colmap/sparse/0";
+        return Err(Error::format(folder.display().to_string(), problem));
+    };
+    colmap::read(folder, &model)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    #[test]
+    fn files_in_memory_are_read_as_those_on_disk() {
+        let list = r#"[{"img_name": "a", "width": 8, "height": 8, "fx": 8, "fy": 8,
+            "position": [0, 0, 0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]"#;
+        let mut files = BTreeMap::new();
+        let read = |files: &BTreeMap<String, Vec<u8>>| read_view_files(files, &mut |_| None);
+        assert!(matches!(read(&files), Err(Error::Format { .. })));
+        files.insert("cameras.json".to_owned(), list.as_bytes().to_vec());
+        assert_eq!(read(&files).unwrap().cameras[0].name, "a");
+        let model =
+            [("cameras.txt", "1 PINHOLE 64 48 60 60 32 24\n"), ("images.txt", "1 1 0 0 0 0 0 2 1 b\n\n")];
+        files.extend(model.map(|(name, text)| (format!("sparse/0/{name}"), text.as_bytes().to_vec())));
+        assert_eq!(read(&files).unwrap().cameras[0].name, "b");
+        assert!(matches!(files.open("images.bin"), Err(Error::Io { .. })));
+    }
+}

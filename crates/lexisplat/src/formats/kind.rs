@@ -1,0 +1,188 @@
+//! What kind of file some bytes begin.
+
+use std::fmt;
+
+use crate::support::error::{Error, FormatError, Result};
+
+/// Extension of the files that [`Unsupported::Splat`] means. Their bytes have no mark.
+const SPLAT_EXTENSION: &str = ".splat";
+/// Extension of the files that [`Unsupported::Ksplat`] means. Their bytes have no mark.
+const KSPLAT_EXTENSION: &str = ".ksplat";
+/// Where the JSON header of a safetensors file begins: after its length, a u64.
+const JSON_OFFSET: usize = 8;
+
+/// A kind of file, as far as its first bytes and its name tell.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FileKind {
+    /// A PLY.
+    Ply,
+    /// A .lexi, or another safetensors file.
+    Lexi,
+    /// A known kind that this crate does not read.
+    Unsupported(Unsupported),
+    /// A file without bytes.
+    Empty,
+    /// None of these.
+    Unknown,
+}
+
+/// A kind of file that people mistake for a scene this crate reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Unsupported {
+    /// Anything gzip compressed. SPZ before version 4 is.
+    Gzip,
+    /// A zip archive. SOG is one.
+    Zip,
+    /// SPZ, version 4.
+    Spz,
+    /// A Python pickle.
+    Pickle,
+    /// The `.splat` of antimatter15's viewer, recognised by name.
+    Splat,
+    /// The `.ksplat` of mkkellogg's viewer, recognised by name.
+    Ksplat,
+    /// A PLY with `PlayCanvas`'s packed elements.
+    CompressedPly,
+    /// A PLY with the anchors of Scaffold-GS.
+    Anchors,
+    /// A PLY without opacities.
+    PointCloud,
+    /// A PLY of 2D Gaussians.
+    TwoDimensional,
+}
+
+impl FileKind {
+    /// The kind of the file called `name` that begins with `bytes`.
+    #[must_use]
+    pub fn of(name: &str, bytes: &[u8]) -> Self {
+        let named = |extension: &str| name.to_ascii_lowercase().ends_with(extension);
+        let unsupported = match bytes {
+            [] => return Self::Empty,
+            [b'p', b'l', b'y', b'\n' | b'\r' | b' ' | b'\t', ..] => return Self::Ply,
+            [b'P', b'K', 3, 4, ..] => Unsupported::Zip,
+            [b'N', b'G', b'S', b'P', ..] => Unsupported::Spz,
+            // The length before it may have any low bytes, so this comes before the marks of two bytes.
+            bytes if bytes.get(JSON_OFFSET) == Some(&b'{') => return Self::Lexi,
+            [0x1f, 0x8b, ..] => Unsupported::Gzip,
+            // Protocols 2 to 5.
+            [0x80, 2..=5, ..] => Unsupported::Pickle,
+            _ if named(SPLAT_EXTENSION) => Unsupported::Splat,
+            _ if named(KSPLAT_EXTENSION) => Unsupported::Ksplat,
+            _ => return Self::Unknown,
+        };
+        Self::Unsupported(unsupported)
+    }
+
+    /// Refuses the file called `name` if its `bytes` are of another kind than `self`. A .lexi begins with a length, so
+    /// a file of unknown kind may be a damaged one. It passes, and its reader says what is wrong with it.
+    pub(crate) fn expect(self, name: &str, bytes: &[u8]) -> Result<()> {
+        let problem = match Self::of(name, bytes) {
+            Self::Unsupported(kind) => FormatError::Unsupported { kind },
+            Self::Empty => FormatError::Malformed("the file is empty".to_owned()),
+            Self::Unknown if self == Self::Ply => {
+                FormatError::Malformed("not a PLY file: it does not start with a line 'ply'".to_owned())
+            }
+            found @ (Self::Ply | Self::Lexi) if found != self => {
+                FormatError::OtherKind { found, expected: self }
+            }
+            _ => return Ok(()),
+        };
+        Err(Error::format(name, problem))
+    }
+}
+
+impl fmt::Display for FileKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Ply => f.write_str("a PLY"),
+            Self::Lexi => f.write_str("a .lexi"),
+            Self::Unsupported(kind) => kind.fmt(f),
+            Self::Empty => f.write_str("an empty file"),
+            Self::Unknown => f.write_str("a file of unknown kind"),
+        }
+    }
+}
+
+impl Unsupported {
+    /// What to do instead of reading the file.
+    #[must_use]
+    pub fn advice(self) -> &'static str {
+        match self {
+            Self::Gzip | Self::Zip | Self::Spz | Self::Splat | Self::Ksplat => {
+                "convert it to PLY first, for example with splat-transform"
+            }
+            Self::Pickle => {
+                "it is never read here: load it where it was made and write a PLY, for EAGLES with \
+                 load_compressed_pkl and save_ply"
+            }
+            Self::CompressedPly => {
+                "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start from the \
+                 trainer's own PLY"
+            }
+            Self::Anchors => "its Gaussians come out of a network; export them as plain 3DGS first",
+            Self::PointCloud => "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
+            Self::TwoDimensional => {
+                "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Unsupported {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Gzip => "a gzip file (SPZ?)",
+            Self::Zip => "a zip archive (SOG?)",
+            Self::Spz => "SPZ, version 4",
+            Self::Pickle => {
+                "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)"
+            }
+            Self::Splat => "a .splat file",
+            Self::Ksplat => "a .ksplat file",
+            Self::CompressedPly => "a PlayCanvas compressed.ply",
+            Self::Anchors => "a Scaffold-GS anchor model",
+            Self::PointCloud => "a point cloud, not a Gaussian scene (no opacity)",
+            Self::TwoDimensional => "a 2D Gaussian Splatting model (no scale_2)",
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_told_by_their_first_bytes_or_their_name() {
+        let unsupported = FileKind::Unsupported;
+        let cases: [(&str, &[u8], FileKind); 13] = [
+            ("a", b"", FileKind::Empty),
+            ("a", b"ply\nformat", FileKind::Ply),
+            ("a.splat", b"ply\r\n", FileKind::Ply),
+            ("a", b"ply", FileKind::Unknown),
+            ("a", b"\x50\0\0\0\0\0\0\0{\"", FileKind::Lexi),
+            // A header of 640 or 35,615 bytes is not a pickle or gzip.
+            ("a", b"\x80\x02\0\0\0\0\0\0{\"", FileKind::Lexi),
+            ("a", b"\x1f\x8b\0\0\0\0\0\0{\"", FileKind::Lexi),
+            ("a.lexi", b"\x1f\x8b\x08\0", unsupported(Unsupported::Gzip)),
+            ("a.ply", b"PK\x03\x04", unsupported(Unsupported::Zip)),
+            ("a.ply", b"NGSP\x04\0\0\0{", unsupported(Unsupported::Spz)),
+            ("a.ply", b"\x80\x04\x95", unsupported(Unsupported::Pickle)),
+            ("b/a.SPLAT", b"\0\0\0\0", unsupported(Unsupported::Splat)),
+            ("a.ksplat", b"\0\x01", unsupported(Unsupported::Ksplat)),
+        ];
+        for (name, bytes, kind) in cases {
+            assert_eq!(FileKind::of(name, bytes), kind, "{name} {bytes:?}");
+        }
+    }
+
+    #[test]
+    fn readers_name_the_kind_they_were_given() {
+        let said = |wanted: FileKind, bytes: &[u8]| wanted.expect("a", bytes).unwrap_err().to_string();
+        assert_eq!(said(FileKind::Lexi, b"ply\nformat"), "a: this is a PLY, not a .lexi");
+        assert_eq!(said(FileKind::Ply, b"\x50\0\0\0\0\0\0\0{\""), "a: this is a .lexi, not a PLY");
+        assert!(said(FileKind::Lexi, b"PK\x03\x04").contains("a zip archive (SOG?), which is not supported"));
+        assert!(FileKind::Lexi.expect("a", b"anything").is_ok());
+    }
+}

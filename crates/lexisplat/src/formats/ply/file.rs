@@ -1,0 +1,86 @@
+//! A PLY whose header was read and whose values were not.
+
+use super::fill::{Bad, SURE_OPACITY};
+use super::header::Header;
+use super::layout::Layout;
+use super::marks::marks;
+use super::names::NORMAL;
+use super::read::ReadOptions;
+use super::rows::Rows;
+use super::summary::PlySummary;
+use crate::scene::splats::SceneMeta;
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+use crate::support::memory_budget::{GEOMETRY_BYTES, MemoryBudget};
+
+/// A PLY with a valid header and all its rows.
+#[derive(Debug)]
+pub(super) struct PlyFile<'a> {
+    /// The file's name in messages.
+    pub(super) name: &'a str,
+    pub(super) rows: Rows<'a>,
+    pub(super) layout: Layout,
+    /// Number of rows of the vertex element.
+    pub(super) count: usize,
+    pub(super) meta: SceneMeta,
+    pub(super) warnings: Vec<String>,
+    pub(super) summary: PlySummary,
+    limits: Limits,
+}
+
+impl<'a> PlyFile<'a> {
+    /// Reads the header of `bytes`, which messages call `name`.
+    pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
+        let header = Header::parse(name, bytes, &options.limits)?;
+        let layout = Layout::new(name, &header)?;
+        let summary = PlySummary::new(&header, bytes.len() as u64, layout.row_bytes as u64);
+        options.limits.check_gaussians(name, summary.vertices)?;
+        let marks = marks(&header.comments);
+        let mut warnings = layout.warnings.clone();
+        if marks.contradict {
+            let said = "comments contradict each other about anti-aliasing; taken as anti-aliased";
+            warnings.push(said.to_owned());
+        }
+        let rows = Rows::locate(name, &header, layout.row_bytes, &bytes[header.bytes..], &mut warnings)?;
+        let count = usize::try_from(summary.vertices).map_err(|_| {
+            Error::malformed(name, format!("{} vertices do not fit in memory", summary.vertices))
+        })?;
+        if count == 0 {
+            warnings.push("the scene holds no Gaussians".to_owned());
+        }
+        let meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased };
+        Ok(Self { name, rows, layout, count, meta, warnings, summary, limits: options.limits })
+    }
+
+    /// Refuses to hold `rows` rows, with normals or without, if the limits do not allow it.
+    pub(super) fn check_memory(&self, rows: usize, normals: bool) -> Result<()> {
+        let extras = self.layout.extras.iter().map(|(_, field)| field.ty.bytes()).sum::<usize>();
+        let floats = self.layout.degree.rest() + if normals { NORMAL.len() } else { 0 };
+        let budget = MemoryBudget::new(&self.limits, self.name, self.summary.file_bytes);
+        budget.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
+    }
+
+    /// Refuses the file if there are `bad` rows, or adds a warning that they are dropped. Adds a warning about `sure`
+    /// infinite opacities.
+    pub(super) fn report(&mut self, bad: &[Bad], sure: usize, options: &ReadOptions) -> Result<()> {
+        if sure > 0 {
+            self.warnings.push(format!(
+                "{sure} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)"
+            ));
+        }
+        let Some(first) = bad.first() else { return Ok(()) };
+        let dropped: usize = bad.iter().map(|b| b.rows.len()).sum();
+        let (row, property) = (first.rows.first().copied().unwrap_or(0), first.property.clone());
+        if !options.drop_invalid {
+            let problem = FormatError::NotFinite { count: dropped as u64, first: row as u64, property };
+            return Err(Error::format(self.name, problem));
+        }
+        self.summary.dropped = dropped as u64;
+        self.warnings.push(format!(
+            "dropped {dropped} of {} Gaussians with NaN or infinite values, the first is number {row} \
+             (property '{property}')",
+            self.count
+        ));
+        Ok(())
+    }
+}

@@ -1,0 +1,133 @@
+//! Gaussians as rows of bytes, for temporary files.
+
+use crate::scene::splats::{Extra, Splats, for_extra};
+use crate::support::parallel::for_each_chunk_mut;
+
+/// Rows that one thread converts at a time.
+const CHUNK_ROWS: usize = 1024;
+
+/// The layout of rows of scenes that are like a given one and have no normals: the values of each array one
+/// after the other, as they lie in memory.
+pub(super) struct RowLayout {
+    like: Splats,
+    /// Bytes of one Gaussian in each array.
+    widths: Vec<usize>,
+}
+
+impl RowLayout {
+    /// The layout for scenes like `empty`, which has no Gaussians.
+    pub(super) fn new(empty: Splats) -> Self {
+        let float = size_of::<f32>();
+        let mut widths: Vec<usize> =
+            [3, 3, empty.degree.rest(), 1, 3, 4].iter().map(|values| values * float).collect();
+        widths.extend(empty.geometry.extras.iter().map(|extra| extra.values.width()));
+        Self { like: empty, widths }
+    }
+
+    /// Bytes of a row.
+    pub(super) fn bytes(&self) -> usize {
+        self.widths.iter().sum()
+    }
+
+    /// Replaces `rows` by the rows of `splats`.
+    pub(super) fn pack(&self, splats: &Splats, rows: &mut Vec<u8>) {
+        rows.clear();
+        rows.resize(splats.len() * self.bytes(), 0);
+        let columns = columns(splats);
+        for_each_chunk_mut(rows, self.bytes() * CHUNK_ROWS, |chunk, rows| {
+            for (i, row) in (chunk * CHUNK_ROWS..).zip(rows.chunks_exact_mut(self.bytes())) {
+                let mut rest = row;
+                for (column, &width) in columns.iter().zip(&self.widths) {
+                    let (value, tail) = rest.split_at_mut(width);
+                    value.copy_from_slice(&column[i * width..][..width]);
+                    rest = tail;
+                }
+            }
+        });
+    }
+
+    /// The Gaussians of `rows`.
+    pub(super) fn unpack(&self, rows: &[u8]) -> Splats {
+        let n = rows.len() / self.bytes();
+        let mut splats = self.like.clone();
+        let g = &mut splats.geometry;
+        g.positions = vec![[0.0; 3]; n];
+        g.dc = vec![[0.0; 3]; n];
+        splats.sh_rest = vec![0.0; n * splats.degree.rest()];
+        g.opacities = vec![0.0; n];
+        g.scales = vec![[0.0; 3]; n];
+        g.rotations = vec![[0.0; 4]; n];
+        for Extra { values, .. } in &mut g.extras {
+            for_extra!(values, v => v.resize(n, Default::default()));
+        }
+        let mut offset = 0;
+        for (column, &width) in columns_mut(&mut splats).into_iter().zip(&self.widths) {
+            // Scenes of degree 0 have no SH-rest.
+            for_each_chunk_mut(column, (width * CHUNK_ROWS).max(1), |chunk, values| {
+                let rows = rows[chunk * CHUNK_ROWS * self.bytes()..].chunks_exact(self.bytes());
+                for (value, row) in values.chunks_exact_mut(width).zip(rows) {
+                    value.copy_from_slice(&row[offset..offset + width]);
+                }
+            });
+            offset += width;
+        }
+        splats
+    }
+}
+
+/// The bytes of every array in the order of a row.
+fn columns(splats: &Splats) -> Vec<&[u8]> {
+    let g = &splats.geometry;
+    let mut out: Vec<&[u8]> = vec![
+        bytemuck::cast_slice(&g.positions),
+        bytemuck::cast_slice(&g.dc),
+        bytemuck::cast_slice(&splats.sh_rest),
+        bytemuck::cast_slice(&g.opacities),
+        bytemuck::cast_slice(&g.scales),
+        bytemuck::cast_slice(&g.rotations),
+    ];
+    out.extend(g.extras.iter().map(|extra| for_extra!(&extra.values, v => bytemuck::cast_slice(v))));
+    out
+}
+
+/// [`columns`] to be filled.
+fn columns_mut(splats: &mut Splats) -> Vec<&mut [u8]> {
+    let g = &mut splats.geometry;
+    let mut out: Vec<&mut [u8]> = vec![
+        bytemuck::cast_slice_mut(&mut g.positions),
+        bytemuck::cast_slice_mut(&mut g.dc),
+        bytemuck::cast_slice_mut(&mut splats.sh_rest),
+        bytemuck::cast_slice_mut(&mut g.opacities),
+        bytemuck::cast_slice_mut(&mut g.scales),
+        bytemuck::cast_slice_mut(&mut g.rotations),
+    ];
+    out.extend(
+        g.extras.iter_mut().map(|extra| for_extra!(&mut extra.values, v => bytemuck::cast_slice_mut(v))),
+    );
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{ShDegree, SplatSource};
+
+    #[test]
+    fn rows_give_the_scene_back() {
+        for (count, degree) in [(0, 3), (1, 0), (2 * CHUNK_ROWS + 7, 1)] {
+            let mut splats = crate::support::testing::scene(count, 3);
+            splats = splats.with_degree_cut(ShDegree::new(degree).unwrap());
+            let numbers = || (0..count).map(|i| i as f64);
+            splats.geometry.extras = vec![
+                Extra { name: "a name".into(), values: vec![7_u8; count].into() },
+                Extra { name: String::new(), values: numbers().collect::<Vec<f64>>().into() },
+            ];
+            splats.meta.comments = vec!["a".into()];
+            let layout = RowLayout::new(splats.empty());
+            let mut rows = vec![1];
+            layout.pack(&splats, &mut rows);
+            assert_eq!(rows.len(), count * layout.bytes());
+            assert_eq!(layout.unpack(&rows), splats);
+        }
+    }
+}
