@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lexisplat::{Progress, Stage};
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
 use crate::terminal::note;
 
@@ -61,9 +61,9 @@ impl Current {
     /// What is being done, and how much of it is done.
     fn text(&self) -> String {
         let (label, unit) = (&self.label, &self.unit);
-        let done = text::count(self.bar.position());
+        let done = format::count(self.bar.position());
         match self.bar.length() {
-            Some(total) if total > 0 => format!("{label}, {done} of {} {unit}", text::count(total)),
+            Some(total) if total > 0 => format!("{label}, {done} of {} {unit}", format::count(total)),
             _ => format!("{label}, {done} {unit}"),
         }
     }
@@ -100,7 +100,7 @@ impl Bars {
     /// Changes the label of the current stage.
     pub(crate) fn say(&self, label: &str) {
         if let Some(stage) = current().as_mut() {
-            stage.label = text::escape(label).into_owned();
+            stage.label = format::escape(label).into_owned();
             stage.bar.set_message(stage.label.clone());
         }
     }

@@ -1,12 +1,12 @@
 //! What the program prints: results on standard output, notes on standard error.
 //!
-//! Everything goes through [`text::escape`], because names and comments from files may hold control characters.
+//! Everything goes through [`format::escape`], because names and comments from files may hold control characters.
 
 use std::io::Write;
 
 use anyhow::Result;
 use lexisplat::Error;
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -17,7 +17,7 @@ const SCHEMA_VERSION: u32 = 1;
 
 /// Prints a line to standard error. A program whose standard error is full goes on.
 pub(crate) fn note(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{}", text::escape(line));
+    let _ = writeln!(std::io::stderr().lock(), "{}", format::escape(line));
 }
 
 /// Prints warnings about `name` to standard error.
@@ -29,7 +29,7 @@ pub(crate) fn warn(name: &str, warnings: &[String]) {
 
 /// Prints text of any number of lines to standard output.
 pub(crate) fn print(text: &str) -> Result<()> {
-    print_unescaped(&text::escape_lines(text))
+    print_unescaped(&format::escape_lines(text))
 }
 
 /// Prints text of which nothing comes from a file.

@@ -205,6 +205,21 @@ fn a_killed_sweep_is_finished_by_the_next() {
 }
 
 #[test]
+fn models_given_by_path_can_be_named() {
+    let folder = Folder::new();
+    let rest = ["--tol", "0.2", "--no-fps", "--orbit", "2", "--width", "64", "--device", "cpu", "-o", "out"];
+    std::fs::copy(folder.path("scene.ply"), folder.path("copy.ply")).unwrap();
+    let named = ["sweep", "scene.ply", "copy.ply", "--name", "a\u{1b}[2Jb"];
+    let output = lexisplat().current_dir(folder.0.path()).args(named).args(rest).output().unwrap();
+    let text = String::from_utf8(output.stdout).unwrap();
+    assert!(text.contains("a\\u001b[2Jb") && !text.contains('\u{1b}'), "{text}");
+    let report = folder.json(&[&named[..], &["--name", "second"], &rest].concat());
+    let names = report["results"]["scenes"].as_array().unwrap().iter().map(|scene| &scene["name"]);
+    assert_eq!(names.collect::<Vec<_>>(), [&json!("a\u{1b}[2Jb"), &json!("second")]);
+    folder.fail(&[&named[..], &["--name", "second", "--name", "third"], &rest].concat(), 5);
+}
+
+#[test]
 fn a_manifest_skips_what_is_not_there() {
     let folder = Folder::new();
     let text = "[[scene]]\nname = \"a\"\nmethod = \"3dgs\"\nmodel = \"scene.ply\"\n\

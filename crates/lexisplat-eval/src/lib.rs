@@ -35,6 +35,7 @@ mod compare;
 pub mod compression;
 mod drawing;
 mod error;
+pub mod format;
 pub mod metrics;
 mod misfit;
 pub mod montage;
@@ -42,7 +43,7 @@ mod png;
 mod scene_file;
 mod scorer;
 mod scores;
-pub mod text;
+
 pub mod views;
 
 pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};

@@ -1,14 +1,14 @@
-//! Pictures for people: original, compressed, and what differs, side by side.
+//! Two pictures and their difference side by side.
 
 use lexisplat_render::Image;
 
 use crate::metrics::clip;
 
-/// How much differences are amplified so that they can be seen.
+/// Factor that makes differences visible.
 pub const AMPLIFICATION: f32 = 10.0;
-/// Pixels of grey between the pictures.
+/// Width of the gap between pictures, in pixels.
 const GAP: u32 = 4;
-/// The grey.
+/// Colour of the gap: a medium grey.
 const GAP_COLOUR: [u8; 3] = [128; 3];
 
 /// The absolute difference of two pictures of one size, times [`AMPLIFICATION`].

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 /// An 8-bit RGB picture of `width * height` pixels as the bytes of a PNG file.
 ///
 /// # Errors
-/// [`Error::Parameter`] if there are not that many pixels, or none.
+/// [`Error::Parameter`] if there are no pixels, or not `width * height`.
 pub fn png(width: u32, height: u32, pixels: &[[u8; 3]]) -> Result<Vec<u8>> {
     let wrong = || Error::parameter("picture", pixels.len(), format!("{width} x {height} pixels"));
     if pixels.len() as u64 != u64::from(width) * u64::from(height) {

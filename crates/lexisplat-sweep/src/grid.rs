@@ -1,25 +1,26 @@
-//! Results as a grid: methods down, scenes across, settings in a sensible order.
+//! Results as a grid: one row for each method, one column for each scene, settings in order.
 
-use super::table::Cell;
-use super::{Method, Point, Results, SceneResult, Setting, paper};
-use lexisplat_eval::Comparison;
 use lexisplat_eval::metrics::Metric;
 
-/// How methods, scenes and settings of a sweep stand to each other.
+use super::measure::{IDENTICAL, Measure};
+use super::table::{Cell, Column};
+use super::{Method, Point, Results, SceneResult, Setting, paper};
+
+/// The methods, scenes and settings of a sweep, in the order of tables.
 pub(super) struct Grid<'a> {
     /// Headings of the columns of scenes, in the manifest's order.
-    pub(super) columns: Vec<String>,
+    pub(super) headings: Vec<String>,
     /// The scenes' own names, column by column.
     names: Vec<&'a str>,
-    /// Methods there are, in the paper's order.
+    /// Methods that have a model, in the paper's order.
     pub(super) methods: Vec<Method>,
-    /// Settings there are: tolerances from small to large, then caps from many to few nonzeros, then presets
+    /// Settings that have a point: tolerances from small to large, then caps from many to few nonzeros, then presets
     /// from large to small files.
     pub(super) settings: Vec<Setting>,
     cells: Vec<(usize, &'a SceneResult)>,
 }
 
-/// Sorts settings by kind, then from close to far from the original.
+/// A key that sorts settings by kind, then from close to the original to far from it.
 fn order(setting: Setting) -> (u8, f64) {
     match setting {
         Setting::Tolerance(tolerance) => (0, tolerance),
@@ -38,7 +39,7 @@ fn same_scene(a: &SceneResult, b: &SceneResult) -> bool {
 
 impl<'a> Grid<'a> {
     pub(super) fn new(results: &'a Results) -> Self {
-        // Each column is known by its first scene. A method has one scene in a column.
+        // The first scene of a column names it. A column has at most one scene of each method.
         let mut first: Vec<&SceneResult> = Vec::new();
         let mut cells: Vec<(usize, &SceneResult)> = Vec::new();
         for scene in &results.scenes {
@@ -51,19 +52,19 @@ impl<'a> Grid<'a> {
                 });
             cells.push((column, scene));
         }
-        let mut columns: Vec<String> = Vec::new();
+        let mut headings: Vec<String> = Vec::new();
         for scene in &first {
             let mut heading = scene.name.clone();
-            if columns.contains(&heading) && !scene.dataset.is_empty() {
+            if headings.contains(&heading) && !scene.dataset.is_empty() {
                 heading = format!("{} ({})", scene.name, scene.dataset);
             }
             let plain = heading.clone();
             let mut copy = 2;
-            while columns.contains(&heading) {
+            while headings.contains(&heading) {
                 heading = format!("{plain} ({copy})");
                 copy += 1;
             }
-            columns.push(heading);
+            headings.push(heading);
         }
         let mut settings: Vec<Setting> = Vec::new();
         for point in results.scenes.iter().flat_map(|scene| &scene.points) {
@@ -80,137 +81,130 @@ impl<'a> Grid<'a> {
             .filter(|method| results.scenes.iter().any(|scene| scene.method == *method))
             .collect();
         let names = first.iter().map(|scene| scene.name.as_str()).collect();
-        Self { columns, names, methods, settings, cells }
+        Self { headings, names, methods, settings, cells }
     }
 
-    /// The name of a column's scene, as its heading may not be; empty beyond the last.
+    /// The name of a column's scene without what makes its heading unique. Empty beyond the last column.
     pub(super) fn name(&self, column: usize) -> &'a str {
         self.names.get(column).copied().unwrap_or_default()
     }
 
-    /// The scene of a column by a method.
+    /// The model of a method in a column.
     pub(super) fn scene(&self, method: Method, column: usize) -> Option<&'a SceneResult> {
         self.cells.iter().find(|(k, scene)| *k == column && scene.method == method).map(|(_, scene)| *scene)
     }
 
-    /// The same, compressed in a way.
-    pub(super) fn point(&self, method: Method, column: usize, setting: Setting) -> Option<&'a Point> {
-        self.scene(method, column)?.points.iter().find(|point| point.setting == setting)
+    /// The same model at one setting.
+    pub(super) fn point(
+        &self,
+        method: Method,
+        column: usize,
+        setting: Setting,
+    ) -> Option<(&'a SceneResult, &'a Point)> {
+        let scene = self.scene(method, column)?;
+        Some((scene, scene.points.iter().find(|point| point.setting == setting)?))
     }
 
-    /// Scenes column by column with their heading, methods in order within.
+    /// All models of a method at one setting, in the order of columns.
+    pub(super) fn points(
+        &self,
+        method: Method,
+        setting: Setting,
+    ) -> impl Iterator<Item = (&'a SceneResult, &'a Point)> {
+        (0..self.headings.len()).filter_map(move |column| self.point(method, column, setting))
+    }
+
+    /// Models column by column with their heading, methods in order within a column.
     pub(super) fn scenes(&self) -> impl Iterator<Item = (&str, &'a SceneResult)> {
-        self.columns.iter().enumerate().flat_map(move |(column, heading)| {
+        self.headings.iter().enumerate().flat_map(move |(column, heading)| {
             self.methods
                 .iter()
                 .filter_map(move |&method| Some((heading.as_str(), self.scene(method, column)?)))
         })
     }
 
-    /// One cell a scene, then their mean.
-    pub(super) fn across(&self, digits: usize, cell: impl FnMut(usize) -> Cell) -> Vec<Cell> {
-        let mut cells: Vec<Cell> = (0..self.columns.len()).map(cell).collect();
-        cells.push(mean(&cells, digits));
+    /// The settings that models of a method were compressed at.
+    pub(super) fn settings_of(&self, method: Method) -> impl Iterator<Item = Setting> {
+        self.settings.iter().copied().filter(move |&setting| self.points(method, setting).next().is_some())
+    }
+
+    /// Columns of a table with `labels`, one cell for each scene, and the mean.
+    pub(super) fn columns(&self, labels: &[&str]) -> Vec<Column> {
+        let labels = labels.iter().copied().map(Column::new);
+        let scenes = self.headings.iter().map(Column::new);
+        labels.chain(scenes).chain([Column::new("Mean")]).collect()
+    }
+
+    /// One cell for each column, then their mean.
+    pub(super) fn across(&self, cell: impl FnMut(usize) -> Cell) -> Vec<Cell> {
+        let mut cells: Vec<Cell> = (0..self.headings.len()).map(cell).collect();
+        cells.push(mean(&cells));
         cells
     }
 
-    /// Whether a method was compressed in this way anywhere.
-    pub(super) fn has(&self, method: Method, setting: Setting) -> bool {
-        (0..self.columns.len()).any(|column| self.point(method, column, setting).is_some())
-    }
-
-    /// The tolerance there is that is nearest to the paper's main one.
-    pub(super) fn main_setting(&self) -> Option<Setting> {
-        self.settings
-            .iter()
-            .filter_map(|&setting| match setting {
-                Setting::Tolerance(tolerance) => Some((setting, (tolerance - paper::TOLERANCE).abs())),
-                _ => None,
-            })
-            .min_by(|a, b| a.1.total_cmp(&b.1))
-            .map(|(setting, _)| setting)
-    }
-
-    /// Metrics that any comparison picked by `pick` has, in the order of tables.
-    pub(super) fn metrics(&self, pick: impl Fn(&SceneResult) -> Vec<&Comparison>) -> Vec<Metric> {
-        let has = |metric: Metric| {
-            self.cells.iter().any(|(_, scene)| {
-                pick(scene)
-                    .iter()
-                    .any(|comparison| comparison.get(metric).is_some() && !comparison.views.is_empty())
-            })
-        };
-        Metric::ALL.into_iter().filter(|&metric| has(metric)).collect()
-    }
-
-    /// Metrics measured against the original.
-    pub(super) fn metrics_to_original(&self) -> Vec<Metric> {
-        self.metrics(|scene| scene.points.iter().map(|point| &point.to_original).collect())
-    }
-
-    /// Metrics measured against photos.
-    pub(super) fn metrics_to_photos(&self) -> Vec<Metric> {
-        self.metrics(|scene| {
-            scene.to_photos.iter().chain(scene.points.iter().filter_map(|p| p.to_photos.as_ref())).collect()
+    /// A measure of a method in each column, then the mean. Without a setting it is that of the models as trained.
+    pub(super) fn measured(&self, measure: Measure, method: Method, setting: Option<Setting>) -> Vec<Cell> {
+        self.across(|column| {
+            let found = match setting {
+                Some(setting) => {
+                    self.point(method, column, setting).map(|(scene, point)| (scene, Some(point)))
+                }
+                None => self.scene(method, column).map(|scene| (scene, None)),
+            };
+            found.map_or(Cell::Missing, |(scene, point)| measure.cell(scene, point))
         })
     }
 
-    /// What FPS were measured on, for headings: `CPU`, a GPU's name, or `several devices`.
-    pub(super) fn device(&self) -> String {
-        let mut names: Vec<&str> = Vec::new();
-        for (_, scene) in &self.cells {
-            if scene.points.iter().all(|point| point.fps.is_none()) {
-                continue;
-            }
-            let name = if scene.on_gpu { scene.device.as_str() } else { "CPU" };
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
+    /// The tolerance that is nearest to the paper's main one.
+    pub(super) fn main_setting(&self) -> Option<Setting> {
+        let apart = |setting: &Setting| match setting {
+            Setting::Tolerance(tolerance) => Some((tolerance - paper::TOLERANCE).abs()),
+            _ => None,
+        };
+        let tolerances = self.settings.iter().filter_map(|setting| Some((*setting, apart(setting)?)));
+        tolerances.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(setting, _)| setting)
+    }
+
+    /// The scores of one kind that any model has, in the order of tables.
+    pub(super) fn scores(&self, kind: fn(Metric) -> Measure) -> Vec<Measure> {
+        let any = |measure: &Measure| {
+            self.cells.iter().any(|(_, scene)| {
+                let points = scene.points.iter().map(Some).chain([None]);
+                points.into_iter().any(|point| measure.is_measured(scene, point))
+            })
+        };
+        Metric::ALL.into_iter().map(kind).filter(any).collect()
+    }
+
+    /// The device that FPS were measured on, for headings: `CPU`, a GPU's name, or `several devices`. Empty if
+    /// none were measured.
+    pub(super) fn device(&self) -> &'a str {
+        let timed =
+            self.cells.iter().filter(|(_, scene)| scene.points.iter().any(|point| point.fps.is_some()));
+        let mut names: Vec<&str> =
+            timed.map(|(_, scene)| if scene.on_gpu { scene.device.as_str() } else { "CPU" }).collect();
+        names.sort_unstable();
+        names.dedup();
         match names.as_slice() {
-            [name] => (*name).to_owned(),
-            [] => String::new(),
-            _ => "several devices".to_owned(),
+            [name] => name,
+            [] => "",
+            _ => "several devices",
         }
     }
 }
 
-/// A score of a comparison, averaged over its views.
-pub(super) fn score(comparison: Option<&Comparison>, metric: Metric) -> Cell {
-    let Some(comparison) = comparison.filter(|comparison| !comparison.views.is_empty()) else {
-        return Cell::Missing;
-    };
-    if metric == Metric::Psnr && comparison.identical {
-        return Cell::text(IDENTICAL);
-    }
-    Cell::number(comparison.get(metric).and_then(|summary| summary.mean), metric.digits())
-}
-
-/// What stands for the PSNR of pictures that do not differ.
-pub(super) const IDENTICAL: &str = "identical";
-
-/// The mean of the numbers among `cells`. Words and missing ones do not count; if there are words alone, it is
-/// those.
-pub(super) fn mean(cells: &[Cell], digits: usize) -> Cell {
+/// The mean of the numbers among `cells`, with their digits. Words and missing values do not count. Without
+/// numbers it is [`IDENTICAL`] if any cell is.
+pub(super) fn mean(cells: &[Cell]) -> Cell {
     let values: Vec<f64> = cells.iter().filter_map(Cell::value).collect();
-    if values.is_empty() {
-        return cells
-            .iter()
-            .find(|cell| matches!(cell, Cell::Text(text) if text == IDENTICAL))
-            .cloned()
-            .unwrap_or(Cell::Missing);
+    let mean = values.iter().sum::<f64>() / values.len() as f64;
+    let number = cells.iter().find(|cell| matches!(cell, Cell::Number { .. }));
+    let identical = || cells.iter().find(|cell| **cell == Cell::text(IDENTICAL));
+    match number.or_else(identical) {
+        Some(&Cell::Number { digits, signed: true, .. }) => Cell::change(Some(mean), digits),
+        Some(&Cell::Number { digits, .. }) => Cell::number(Some(mean), digits),
+        other => other.cloned().unwrap_or(Cell::Missing),
     }
-    let mean = Some(values.iter().sum::<f64>() / values.len() as f64);
-    if cells.iter().any(|cell| matches!(cell, Cell::Change { .. })) {
-        Cell::change(mean, digits)
-    } else {
-        Cell::number(mean, digits)
-    }
-}
-
-/// `a / b`; nothing if `b` is 0.
-pub(super) fn quotient(a: f64, b: f64) -> Option<f64> {
-    (b > 0.0).then(|| a / b)
 }
 
 #[cfg(test)]
@@ -233,7 +227,7 @@ mod tests {
             results.scenes.push(scene(dataset, name, method));
         }
         let grid = Grid::new(&results);
-        assert_eq!(grid.columns, ["Room", "room", "Room (a)"]);
+        assert_eq!(grid.headings, ["Room", "room", "Room (a)"]);
         assert_eq!(grid.scene(Method::Mcmc, 0).unwrap().name, "room");
         assert_eq!(grid.scene(Method::PixelGs, 0).unwrap().name, "ROOM");
         assert_eq!(grid.scene(Method::Gs3d, 1).unwrap().dataset, "b");
@@ -265,9 +259,9 @@ mod tests {
     #[test]
     fn means_skip_what_is_missing() {
         let number = |v| Cell::number(Some(v), 2);
-        assert_eq!(mean(&[number(1.0), Cell::Missing, number(4.0), Cell::text(IDENTICAL)], 2), number(2.5));
-        assert_eq!(mean(&[Cell::Missing, Cell::text(IDENTICAL)], 2), Cell::text(IDENTICAL));
-        assert_eq!(mean(&[Cell::Missing], 2), Cell::Missing);
-        assert_eq!(mean(&[Cell::change(Some(-1.0), 1)], 1), Cell::change(Some(-1.0), 1));
+        assert_eq!(mean(&[number(1.0), Cell::Missing, number(4.0), Cell::text(IDENTICAL)]), number(2.5));
+        assert_eq!(mean(&[Cell::Missing, Cell::text(IDENTICAL)]), Cell::text(IDENTICAL));
+        assert_eq!(mean(&[Cell::Missing]), Cell::Missing);
+        assert_eq!(mean(&[Cell::change(Some(-1.0), 1)]), Cell::change(Some(-1.0), 1));
     }
 }

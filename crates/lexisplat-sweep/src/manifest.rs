@@ -1,4 +1,4 @@
-//! `scenes.toml`: which models to evaluate, from where to look at them, and their photos.
+//! `scenes.toml`: the models of a sweep with their cameras and photos.
 
 use std::path::{Component, Path, PathBuf};
 
@@ -12,10 +12,12 @@ use lexisplat_eval::{Error, Result};
 const MAX_BYTES: u64 = 1 << 20;
 
 /// One model of a sweep.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Entry {
     /// Data set, such as `Mip-NeRF 360`; may be empty.
+    #[serde(default)]
     pub dataset: String,
     /// Scene, such as `bonsai`.
     pub name: String,
@@ -25,18 +27,32 @@ pub struct Entry {
     pub model: PathBuf,
     /// Cameras: a `cameras.json`, a `transforms.json`, or a COLMAP folder. Without, views are generated.
     pub cameras: Option<PathBuf>,
-    /// Folder of photos. Without, models are scored against the original alone.
+    /// Folder of photos. Without, models are scored against the original only.
     pub images: Option<PathBuf>,
-    /// Divisor of the photos' size: 1, 2, 4 or 8; as [`lexisplat_eval::views::ViewOptions`] has it.
+    /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_eval::views::ViewOptions`].
     pub resolution: Option<u32>,
-    /// Which of the cameras to use. The test split, unless said.
+    /// Which of the cameras to use. The default is the test split.
+    #[serde(with = "SplitName", default = "test_split")]
     pub split: SplitFilter,
-    /// File that would be shipped in place of the model, to be counted, not read.
+    /// A file that is shipped in place of the model. It is counted, not read.
     pub shipped: Option<PathBuf>,
 }
 
+/// The names of splits.
+#[derive(Deserialize)]
+#[serde(remote = "SplitFilter", rename_all = "snake_case")]
+enum SplitName {
+    All,
+    Train,
+    Test,
+}
+
+fn test_split() -> SplitFilter {
+    SplitFilter::Test
+}
+
 impl Entry {
-    /// A model on its own: its scene's name is taken from its path, its method is [`Method::Other`].
+    /// A model on its own: the scene's name is taken from the path, the method is [`Method::Other`].
     #[must_use]
     pub fn of_model(model: &Path) -> Self {
         Self {
@@ -53,7 +69,7 @@ impl Entry {
     }
 }
 
-/// The scene's name: a file's, or that of the folder above `point_cloud/iteration_30000/point_cloud.ply`.
+/// The name of the scene: that of the file, or of the folder above `point_cloud/iteration_30000/point_cloud.ply`.
 fn name_of(model: &Path) -> String {
     let text = |part: &std::ffi::OsStr| part.to_string_lossy().into_owned();
     let stem = model.file_stem().map(text).unwrap_or_default();
@@ -74,37 +90,14 @@ fn name_of(model: &Path) -> String {
 #[serde(deny_unknown_fields)]
 struct Document {
     #[serde(default)]
-    scene: Vec<Table>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Table {
-    #[serde(default)]
-    dataset: String,
-    name: String,
-    method: Method,
-    model: PathBuf,
-    cameras: Option<PathBuf>,
-    images: Option<PathBuf>,
-    resolution: Option<u32>,
-    split: Option<Split>,
-    shipped: Option<PathBuf>,
-}
-
-#[derive(Debug, Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
-enum Split {
-    All,
-    Train,
-    Test,
+    scene: Vec<Entry>,
 }
 
 /// Reads a manifest. Relative paths in it start at `root`, or else at the manifest's folder.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read; [`Error::Format`] naming line and field if it is no manifest, or two
-/// of its entries have the same data set, name and method.
+/// [`Error::Io`] if it cannot be read. [`Error::Format`] with line and field if it is no manifest, or if two
+/// entries have the same data set, name and method.
 pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
     let size = std::fs::metadata(path).map_err(|e| Error::io(path, e))?.len();
     if size > MAX_BYTES {
@@ -115,45 +108,33 @@ pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
     parse_manifest(path, &text, root.unwrap_or(folder))
 }
 
-/// The entries of the manifest `text`; `file` names it in errors. Relative paths start at `root`.
+/// The entries of the manifest `text`. Errors name `file`. Relative paths start at `root`.
 ///
 /// # Errors
 /// As [`read_manifest`].
 pub fn parse_manifest(file: &Path, text: &str, root: &Path) -> Result<Vec<Entry>> {
     let document: Document = toml::from_str(text).map_err(|e| Error::format(file, e.to_string().trim()))?;
-    let mut entries: Vec<Entry> = Vec::with_capacity(document.scene.len());
-    for table in document.scene {
-        if table.name.trim().is_empty() {
+    let mut entries = document.scene;
+    if entries.is_empty() {
+        return Err(Error::format(file, "no [[scene]] in it"));
+    }
+    for i in 0..entries.len() {
+        let (before, entry) = (&entries[..i], &entries[i]);
+        if entry.name.trim().is_empty() {
             return Err(Error::format(file, "a scene's `name` is empty"));
         }
-        let same =
-            |e: &&Entry| (&e.dataset, &e.name, e.method) == (&table.dataset, &table.name, table.method);
-        if entries.iter().any(|e| same(&e)) {
+        let key = |e: &Entry| (e.dataset.clone(), e.name.clone(), e.method);
+        if before.iter().any(|other| key(other) == key(entry)) {
             let problem = format!(
-                "scene '{}' by '{}' is there twice: two entries differ in dataset, name or method",
-                table.name, table.method
+                "scene '{}' by '{}' is there twice: two entries must differ in dataset, name or method",
+                entry.name, entry.method
             );
             return Err(Error::format(file, problem));
         }
-        let at = |path: PathBuf| root.join(path);
-        entries.push(Entry {
-            dataset: table.dataset,
-            name: table.name,
-            method: table.method,
-            model: at(table.model),
-            cameras: table.cameras.map(at),
-            images: table.images.map(at),
-            resolution: table.resolution,
-            split: match table.split {
-                None | Some(Split::Test) => SplitFilter::Test,
-                Some(Split::Train) => SplitFilter::Train,
-                Some(Split::All) => SplitFilter::All,
-            },
-            shipped: table.shipped.map(at),
-        });
     }
-    if entries.is_empty() {
-        return Err(Error::format(file, "no [[scene]] in it"));
+    for entry in &mut entries {
+        let paths = [&mut entry.cameras, &mut entry.images, &mut entry.shipped].into_iter().flatten();
+        paths.chain([&mut entry.model]).for_each(|path| *path = root.join(&path));
     }
     Ok(entries)
 }

@@ -1,22 +1,22 @@
-//! How to sweep, and who is told how it goes.
+//! Options and progress of a sweep.
 
 use lexisplat::output::OutputGroup;
-use lexisplat::{Layout, Limits, Pursuit};
-use lexisplat_render::Device;
+use lexisplat::{Layout, Limits, Progress, Pursuit};
+use lexisplat_render::gpu::Gpu;
 
 use super::results::Setting;
 use lexisplat_eval::views::{DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, SceneKind};
 use lexisplat_eval::{Error, Result};
 
-/// How to sweep.
+/// Options of a sweep.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct SweepOptions {
-    /// Ways to compress, in the order of tables; none twice.
+    /// Ways to compress, each of them once, in the order of tables.
     pub settings: Vec<Setting>,
     /// The pursuit of settings with exact geometry.
     pub pursuit: Pursuit,
-    /// Their layout.
+    /// The layout of settings with exact geometry.
     pub layout: Layout,
     /// Seed of learning samples.
     pub seed: u64,
@@ -24,25 +24,25 @@ pub struct SweepOptions {
     pub eight_bit: bool,
     /// Whether to measure frames a second.
     pub fps: bool,
-    /// Colour behind scenes.
+    /// Colour behind scenes: red, green, blue in 0..1.
     pub background: [f32; 3],
-    /// Widest picture.
+    /// Largest width of a picture, in pixels.
     pub max_width: u32,
-    /// Where cameras are not marked, every how manyeth by name is a test one.
+    /// Every `hold`-th camera in order of names is a test camera, if no camera is marked as one.
     pub hold: usize,
-    /// What views of models without cameras are generated for.
+    /// The kind of scene that views are generated for, where a model has no cameras.
     pub kind: SceneKind,
-    /// How many.
+    /// Number of generated views.
     pub generated: u16,
-    /// What to draw on.
-    pub device: Device,
-    /// What models may ask for.
+    /// The GPU that draws. `None` stands for the processor.
+    pub gpu: Option<Gpu>,
+    /// Limits on the size of models.
     pub limits: Limits,
-    /// Views of each model whose pictures are saved.
+    /// Number of views of each model whose pictures are saved.
     pub pictures: usize,
-    /// Whether finished parts that are already in the folder count.
+    /// Whether finished parts in the folder are used.
     pub resume: bool,
-    /// Stands for what is not among these options but changes scores, such as the weights of LPIPS.
+    /// Describes what changes scores but is not among these options, such as the weights of LPIPS.
     pub fingerprint: String,
     /// The group of all files that the sweep writes.
     pub outputs: OutputGroup,
@@ -62,7 +62,7 @@ impl Default for SweepOptions {
             hold: DEFAULT_HOLD,
             kind: SceneKind::Auto,
             generated: DEFAULT_ORBIT,
-            device: Device::Auto,
+            gpu: None,
             limits: Limits::default(),
             pictures: 1,
             resume: true,
@@ -76,7 +76,7 @@ impl SweepOptions {
     /// Checks the settings.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are none, one is there twice, or out of range.
+    /// [`Error::Parameter`] if there are none, or if one is repeated or out of range.
     pub(super) fn check(&self) -> Result<()> {
         if self.settings.is_empty() {
             return Err(Error::parameter("settings", "none", "a tolerance, a cap on nonzeros or a preset"));
@@ -100,21 +100,21 @@ impl SweepOptions {
     }
 }
 
-/// Is told how a sweep goes. Everything has a default that does nothing.
-pub trait Watch {
-    /// `parts` parts are to be done in all.
-    fn begin(&self, parts: u64) {
+/// Receives reports from a sweep, and may cancel it. Every method does nothing by default.
+pub trait SweepProgress: Progress {
+    /// The sweep starts and has `parts` parts.
+    fn start(&self, parts: u64) {
         let _ = parts;
     }
-    /// A part begins: `what` says which.
+    /// A part begins. `what` names model and setting.
     fn part(&self, what: &str) {
         let _ = what;
     }
-    /// `parts` parts are done, or need not be.
+    /// `parts` more parts are done. They are `reused` if an earlier run had finished them.
     fn done(&self, parts: u64, reused: bool) {
         let _ = (parts, reused);
     }
-    /// Something to tell about a model.
+    /// A warning about a model.
     fn warn(&self, model: &str, warning: &str) {
         let _ = (model, warning);
     }

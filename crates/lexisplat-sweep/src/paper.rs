@@ -1,18 +1,20 @@
-//! The numbers that the paper prints (arXiv 2605.30396v1), to stand beside ours.
+//! The numbers that the paper prints (arXiv 2605.30396v1), for comparison with ours.
 
-use std::sync::OnceLock;
+use std::sync::LazyLock;
+
+use serde::Deserialize;
 
 use super::Method;
 
 /// Every printed number of the paper's three tables: main, by tolerance, against photos.
 const PRINTED: &str = include_str!("paper.csv");
-/// The tolerance of the paper's main table. Its table against photos names none; the text suggests the same.
+/// The tolerance of the paper's main table. Its table against photos names none; its text suggests the same.
 pub const TOLERANCE: f64 = 0.1;
 /// Tolerances of the paper's supplementary table.
 pub const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
 /// SH-rest coefficients of the paper's Gaussians: degree 3.
 pub const COEFFICIENTS: f64 = 45.0;
-/// Tolerances this close are the same one.
+/// Largest difference of two tolerances that count as equal.
 const SAME: f64 = 1e-9;
 
 /// The paper's scenes, in the order of its main table.
@@ -34,7 +36,7 @@ pub const SCENES: [&str; 13] = [
 
 /// One of the paper's tables.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Table {
+pub enum Experiment {
     /// Table 1: compressed at tolerance 0.1 against the original's pictures, with ratio and FPS.
     Main,
     /// Supplement: compressed at this tolerance against the original's pictures.
@@ -46,116 +48,90 @@ pub enum Table {
 }
 
 /// What the paper measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Quantity {
-    /// In dB.
+    /// PSNR in dB.
     Psnr,
     /// SSIM.
     Ssim,
-    /// LPIPS; which network and input range is not said.
+    /// LPIPS. The paper does not say which network and input range it used.
     Lpips,
     /// `Comp Ratio`: 45 over mean nonzeros, by the paper's own numbers. Main table only.
     Ratio,
-    /// Frames a second of the compressed. Main table only.
+    /// Frames a second of the compressed model. Main table only.
     Fps,
     /// `FPS(-Comp)`: frames a second of the original. Main table only.
     FpsDense,
 }
 
-impl Quantity {
-    fn name(self) -> &'static str {
-        match self {
-            Self::Psnr => "psnr",
-            Self::Ssim => "ssim",
-            Self::Lpips => "lpips",
-            Self::Ratio => "ratio",
-            Self::Fps => "fps",
-            Self::FpsDense => "fps_dense",
-        }
-    }
-}
-
 /// A mean of the paper.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mean {
-    /// As printed. A few do not follow from the row they stand in.
+    /// As printed. A few do not follow from the columns they belong to.
     pub printed: f64,
     /// Of the 13 printed columns.
     pub computed: f64,
 }
 
 /// One line of [`PRINTED`].
-struct Row {
-    table: &'static str,
+#[derive(Debug, Deserialize)]
+struct Line {
+    experiment: String,
     method: Method,
     tolerance: Option<f64>,
-    quantity: &'static str,
+    quantity: Quantity,
     /// In the order of [`SCENES`].
-    scenes: Vec<f64>,
+    scenes: [f64; SCENES.len()],
     mean: f64,
 }
 
-fn row(line: &'static str) -> Option<Row> {
-    let mut cells = line.split(',');
-    let (table, method, tolerance, quantity) = (cells.next()?, cells.next()?, cells.next()?, cells.next()?);
-    let mut scenes: Vec<f64> = cells.map(str::parse).collect::<Result<_, _>>().ok()?;
-    let mean = scenes.pop()?;
-    (scenes.len() == SCENES.len()).then_some(Row {
-        table,
-        method: method.parse().ok()?,
-        tolerance: tolerance.parse().ok(),
-        quantity,
-        scenes,
-        mean,
-    })
-}
+static LINES: LazyLock<Vec<Line>> = LazyLock::new(|| {
+    let mut reader = csv::ReaderBuilder::new().has_headers(false).from_reader(PRINTED.as_bytes());
+    // Without headers fields are read in order. The first line names the columns.
+    reader.deserialize().skip(1).filter_map(Result::ok).collect()
+});
 
-fn rows() -> &'static [Row] {
-    static ROWS: OnceLock<Vec<Row>> = OnceLock::new();
-    ROWS.get_or_init(|| PRINTED.lines().skip(1).filter_map(row).collect())
-}
-
-fn find(table: Table, method: Method, quantity: Quantity) -> Option<&'static Row> {
-    let (name, tolerance) = match table {
-        Table::Main => ("main", Some(TOLERANCE)),
-        Table::Tolerance(tolerance) => ("tolerance", Some(tolerance)),
-        Table::Base => ("base", None),
-        Table::Compressed => ("compressed", None),
+fn find(experiment: Experiment, method: Method, quantity: Quantity) -> Option<&'static Line> {
+    let (name, tolerance) = match experiment {
+        Experiment::Main => ("main", Some(TOLERANCE)),
+        Experiment::Tolerance(tolerance) => ("tolerance", Some(tolerance)),
+        Experiment::Base => ("base", None),
+        Experiment::Compressed => ("compressed", None),
     };
     let same = |printed: Option<f64>| match (printed, tolerance) {
         (Some(a), Some(b)) => same_tolerance(a, b),
-        (None, None) => true,
-        _ => false,
+        (a, b) => a == b,
     };
-    rows().iter().find(|row| {
-        row.table == name && row.method == method && row.quantity == quantity.name() && same(row.tolerance)
+    LINES.iter().find(|line| {
+        line.experiment == name && line.method == method && line.quantity == quantity && same(line.tolerance)
     })
 }
 
-/// Whether two tolerances are the same but for rounding.
+/// Whether two tolerances are equal up to rounding.
 #[must_use]
 pub fn same_tolerance(a: f64, b: f64) -> bool {
     (a - b).abs() < SAME
 }
 
-/// The place of a scene in [`SCENES`]; upper and lower case do not matter.
+/// The index of a scene in [`SCENES`]. Case does not matter.
 #[must_use]
 pub fn scene(name: &str) -> Option<usize> {
     SCENES.iter().position(|scene| scene.eq_ignore_ascii_case(name.trim()))
 }
 
-/// The printed number; `None` where the paper has none.
+/// The printed number. `None` if the paper has none.
 #[must_use]
-pub fn value(table: Table, method: Method, quantity: Quantity, scene_name: &str) -> Option<f64> {
-    find(table, method, quantity)?.scenes.get(scene(scene_name)?).copied()
+pub fn value(experiment: Experiment, method: Method, quantity: Quantity, scene_name: &str) -> Option<f64> {
+    find(experiment, method, quantity)?.scenes.get(scene(scene_name)?).copied()
 }
 
-/// The mean over the 13 scenes; `None` where the paper has none.
+/// The mean over the 13 scenes. `None` if the paper has none.
 #[must_use]
-pub fn mean(table: Table, method: Method, quantity: Quantity) -> Option<Mean> {
-    find(table, method, quantity).map(|row| Mean {
-        printed: row.mean,
-        computed: row.scenes.iter().sum::<f64>() / row.scenes.len() as f64,
+pub fn mean(experiment: Experiment, method: Method, quantity: Quantity) -> Option<Mean> {
+    find(experiment, method, quantity).map(|line| Mean {
+        printed: line.mean,
+        computed: line.scenes.iter().sum::<f64>() / line.scenes.len() as f64,
     })
 }
 
@@ -167,7 +143,7 @@ mod tests {
     fn every_line_is_read() {
         assert_eq!(PRINTED.lines().count(), 79);
         // 3 methods x 6 quantities, x 4 tolerances x 3, x 2 against photos x 3, and EAGLES twice x 3.
-        let count = |table: &str| rows().iter().filter(|row| row.table == table).count();
+        let count = |table: &str| LINES.iter().filter(|line| line.experiment == table).count();
         assert_eq!([count("main"), count("tolerance"), count("base"), count("compressed")], [18, 36, 15, 9]);
         let header = PRINTED.lines().next().unwrap();
         assert_eq!(header, format!("table,method,tolerance,metric,{},mean", SCENES.join(",")));
@@ -178,27 +154,27 @@ mod tests {
         use Method::{Eagles, EaglesNoSq, Gs3d, Mcmc, PixelGs};
         use Quantity::{Fps, FpsDense, Lpips, Psnr, Ratio, Ssim};
         let spots = [
-            (Table::Main, Gs3d, Psnr, "bicycle", 38.54),
-            (Table::Main, Mcmc, Ratio, "Drjohnson", 3.56),
-            (Table::Main, PixelGs, Fps, "treehill", 97.3),
-            (Table::Main, Mcmc, FpsDense, "garden", 82.9),
-            (Table::Tolerance(0.03), Mcmc, Psnr, "stump", 53.86),
-            (Table::Tolerance(0.2), PixelGs, Lpips, "flowers", 0.0284),
-            (Table::Tolerance(0.05), Gs3d, Ssim, "truck", 0.9897),
+            (Experiment::Main, Gs3d, Psnr, "bicycle", 38.54),
+            (Experiment::Main, Mcmc, Ratio, "Drjohnson", 3.56),
+            (Experiment::Main, PixelGs, Fps, "treehill", 97.3),
+            (Experiment::Main, Mcmc, FpsDense, "garden", 82.9),
+            (Experiment::Tolerance(0.03), Mcmc, Psnr, "stump", 53.86),
+            (Experiment::Tolerance(0.2), PixelGs, Lpips, "flowers", 0.0284),
+            (Experiment::Tolerance(0.05), Gs3d, Ssim, "truck", 0.9897),
             // The table against photos has its scenes in another order.
-            (Table::Base, Gs3d, Psnr, "drjohnson", 29.41),
-            (Table::Compressed, PixelGs, Psnr, "truck", 25.38),
-            (Table::Compressed, Mcmc, Ssim, "garden", 0.9250),
-            (Table::Base, Eagles, Psnr, "bonsai", 31.24),
-            (Table::Base, EaglesNoSq, Lpips, "treehill", 0.2663),
+            (Experiment::Base, Gs3d, Psnr, "drjohnson", 29.41),
+            (Experiment::Compressed, PixelGs, Psnr, "truck", 25.38),
+            (Experiment::Compressed, Mcmc, Ssim, "garden", 0.9250),
+            (Experiment::Base, Eagles, Psnr, "bonsai", 31.24),
+            (Experiment::Base, EaglesNoSq, Lpips, "treehill", 0.2663),
         ];
         for (table, method, quantity, scene, expected) in spots {
             assert_eq!(value(table, method, quantity, scene), Some(expected), "{table:?} {method} {scene}");
         }
-        assert_eq!(value(Table::Main, Gs3d, Psnr, "garage"), None);
-        assert_eq!(value(Table::Tolerance(0.07), Gs3d, Psnr, "garden"), None);
-        assert_eq!(value(Table::Compressed, Eagles, Psnr, "garden"), None);
-        assert_eq!(value(Table::Base, Gs3d, Ratio, "garden"), None);
+        assert_eq!(value(Experiment::Main, Gs3d, Psnr, "garage"), None);
+        assert_eq!(value(Experiment::Tolerance(0.07), Gs3d, Psnr, "garden"), None);
+        assert_eq!(value(Experiment::Compressed, Eagles, Psnr, "garden"), None);
+        assert_eq!(value(Experiment::Base, Gs3d, Ratio, "garden"), None);
     }
 
     /// The supplement repeats the main table at its tolerance.
@@ -208,8 +184,8 @@ mod tests {
             for quantity in [Quantity::Psnr, Quantity::Ssim, Quantity::Lpips] {
                 for scene in SCENES {
                     assert_eq!(
-                        value(Table::Main, method, quantity, scene),
-                        value(Table::Tolerance(TOLERANCE), method, quantity, scene)
+                        value(Experiment::Main, method, quantity, scene),
+                        value(Experiment::Tolerance(TOLERANCE), method, quantity, scene)
                     );
                 }
             }
@@ -221,26 +197,26 @@ mod tests {
     #[test]
     fn printed_means_follow_from_their_columns_but_for_four() {
         let mut wrong = Vec::new();
-        for (line, row) in PRINTED.lines().skip(1).zip(rows()) {
+        for (line, row) in PRINTED.lines().skip(1).zip(LINES.iter()) {
             let digits = line.rsplit('.').next().unwrap().len();
             let unit = 10_f64.powi(-i32::try_from(digits).unwrap());
             let computed = row.scenes.iter().sum::<f64>() / 13.0;
             if (computed - row.mean).abs() > unit {
-                wrong.push((row.table, row.method.name(), row.quantity, row.mean, computed));
+                wrong.push((row.experiment.as_str(), row.method.name(), row.quantity, row.mean, computed));
             }
         }
         let rounded: Vec<_> = wrong.iter().map(|w| (w.0, w.1, w.2, w.3, (w.4 * 1e4).round() / 1e4)).collect();
         assert_eq!(
             rounded,
             [
-                ("main", "3dgs", "fps_dense", 169.3, 176.9615),
-                ("main", "mcmc", "fps_dense", 113.0, 120.8077),
-                ("compressed", "mcmc", "lpips", 0.1677, 0.1667),
-                ("base", "eagles", "ssim", 0.8689, 0.8535),
+                ("main", "3dgs", Quantity::FpsDense, 169.3, 176.9615),
+                ("main", "mcmc", Quantity::FpsDense, 113.0, 120.8077),
+                ("compressed", "mcmc", Quantity::Lpips, 0.1677, 0.1667),
+                ("base", "eagles", Quantity::Ssim, 0.8689, 0.8535),
             ]
         );
         // Rounded to its digits a fifth differs by one, which rounding of the columns explains.
-        let fifth = mean(Table::Compressed, Method::PixelGs, Quantity::Ssim).unwrap();
+        let fifth = mean(Experiment::Compressed, Method::PixelGs, Quantity::Ssim).unwrap();
         assert_eq!((fifth.printed, (fifth.computed * 1e4).round() / 1e4), (0.8619, 0.8618));
     }
 }

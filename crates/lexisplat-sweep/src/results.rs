@@ -1,4 +1,4 @@
-//! What a sweep found out, as it is kept in `results.json`.
+//! The results of a sweep, as stored in `results.json`.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,8 +6,8 @@ use std::str::FromStr;
 use lexisplat::packed::Preset;
 use serde::{Deserialize, Serialize};
 
-use lexisplat_eval::Comparison;
-use lexisplat_eval::{Error, Result};
+use super::paper::same_tolerance;
+use lexisplat_eval::{Comparison, Error, Result};
 
 /// Who trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -37,30 +37,28 @@ impl Method {
     pub const ALL: [Self; 6] =
         [Self::Gs3d, Self::Mcmc, Self::PixelGs, Self::Eagles, Self::EaglesNoSq, Self::Other];
 
+    /// The name in files and manifests, and the name for people, as the paper prints it.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Gs3d => ("3dgs", "3DGS"),
+            Self::Mcmc => ("mcmc", "MCMC"),
+            Self::PixelGs => ("pixelgs", "PixelGS"),
+            Self::Eagles => ("eagles", "EAGLES"),
+            Self::EaglesNoSq => ("eagles-no-sq", "EAGLES, no SQ"),
+            Self::Other => ("other", "other"),
+        }
+    }
+
     /// Name in files and manifests.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Gs3d => "3dgs",
-            Self::Mcmc => "mcmc",
-            Self::PixelGs => "pixelgs",
-            Self::Eagles => "eagles",
-            Self::EaglesNoSq => "eagles-no-sq",
-            Self::Other => "other",
-        }
+        self.names().0
     }
 
     /// Name for people, as the paper prints it.
     #[must_use]
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Gs3d => "3DGS",
-            Self::Mcmc => "MCMC",
-            Self::PixelGs => "PixelGS",
-            Self::Eagles => "EAGLES",
-            Self::EaglesNoSq => "EAGLES, no SQ",
-            Self::Other => "other",
-        }
+        self.names().1
     }
 
     /// Whether the method compresses by itself, so that its models are only scored, not compressed.
@@ -87,14 +85,14 @@ impl FromStr for Method {
     }
 }
 
-/// How a model was compressed at one point of a sweep.
+/// A way to compress models.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum Setting {
-    /// SH within this un-squared L2 norm, geometry exact: the paper's.
+    /// SH within this un-squared L2 norm, geometry exact. The paper has this kind.
     Tolerance(f64),
-    /// At most so many nonzeros a Gaussian, no tolerance, geometry exact.
+    /// At most this many nonzeros for each Gaussian, no tolerance, geometry exact.
     MaxNonzeros(u8),
     /// A packed file by preset: everything quantised.
     Preset(#[serde(with = "by_name")] Preset),
@@ -111,10 +109,9 @@ impl Setting {
         }
     }
 
-    /// Whether this is a setting of the paper's: SH coded, all else untouched.
-    #[must_use]
-    pub fn is_exact(self) -> bool {
-        !matches!(self, Self::Preset(_))
+    /// Whether this is `tolerance`, up to rounding.
+    pub(crate) fn is_tolerance(self, tolerance: f64) -> bool {
+        matches!(self, Self::Tolerance(t) if same_tolerance(t, tolerance))
     }
 }
 
@@ -133,25 +130,25 @@ mod by_name {
     }
 }
 
-/// Frames in a second.
+/// Frames a second.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fps {
-    /// Of the original, SH dense.
+    /// Of the original, from dense SH.
     pub dense: f64,
-    /// Of the compressed, straight from codes.
+    /// Of the compressed model, straight from codes.
     pub sparse: f64,
 }
 
 /// One model compressed in one way.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Point {
-    /// How.
+    /// The way it was compressed.
     pub setting: Setting,
-    /// The whole file.
+    /// Bytes of the whole file.
     pub file_bytes: u64,
-    /// What view-dependent colour takes of it: dictionary, counts, indices, values, escapes.
+    /// Bytes of view-dependent colour in the file: dictionary, counts, indices, values, escapes.
     pub sh_bytes: u64,
-    /// What colour takes in memory while drawing from codes, base colour included.
+    /// Bytes of colour in memory while drawing from codes, base colour included.
     pub resident_sh_bytes: u64,
     /// Atoms of the dictionary.
     pub atoms: usize,
@@ -159,54 +156,54 @@ pub struct Point {
     pub mean_nonzeros: f64,
     /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` where nothing is coded.
     pub coefficient_ratio: Option<f64>,
-    /// Largest SH error of a Gaussian; `None` for packed files without a promise.
+    /// Largest SH error of a Gaussian; `None` for packed files, which promise none.
     pub max_residual: Option<f64>,
     /// Gaussians over the tolerance; 0 unless nonzeros are capped.
     pub over_tolerance: u64,
-    /// The compressed against the original's pictures.
+    /// Scores of the compressed model against the original's pictures.
     pub to_original: Comparison,
-    /// The compressed against photos.
+    /// Scores of the compressed model against photos.
     pub to_photos: Option<Comparison>,
-    /// Speed, if it was measured.
+    /// Frames a second, if measured.
     pub fps: Option<Fps>,
-    /// Seconds that compressing took, learning included.
+    /// Seconds of compression, learning included.
     pub seconds: f64,
 }
 
-/// One model: what it is, and all its points.
+/// One model, with all its points.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct SceneResult {
-    /// Data set, such as `Mip-NeRF 360`; empty if not said.
+    /// Data set, such as `Mip-NeRF 360`; empty if unknown.
     pub dataset: String,
     /// Scene, such as `bonsai`.
     pub name: String,
     /// Who trained it.
     pub method: Method,
-    /// The file, as it was named.
+    /// Path of the model, as given.
     pub model: String,
-    /// Its Gaussians.
+    /// Number of Gaussians.
     pub gaussians: u64,
-    /// Its SH degree.
+    /// SH degree.
     pub sh_degree: u8,
-    /// Its bytes.
+    /// Bytes of the file.
     pub ply_bytes: u64,
-    /// Bytes of the file that a competitor would ship instead, if the manifest names it.
+    /// Bytes of the file that a competitor ships instead, if the manifest names it.
     pub shipped_bytes: Option<u64>,
-    /// Where the views are from: a file's name, or `orbit` or `room`.
+    /// Source of the views: a file's name, or `orbit` or `room`.
     pub views_from: String,
-    /// How many there are.
+    /// Number of views.
     pub views: usize,
-    /// Size of the first one's picture.
+    /// Width and height of the first view's picture.
     pub size: [u32; 2],
-    /// What pictures were drawn on: `cpu`, or the GPU's name. FPS are of this device.
+    /// The device that drew pictures: `cpu`, or the GPU's name. FPS are of this device.
     pub device: String,
-    /// Whether that is a GPU.
+    /// Whether the device is a GPU.
     pub on_gpu: bool,
-    /// The model itself against photos.
+    /// Scores of the model as trained against photos.
     pub to_photos: Option<Comparison>,
-    /// Frames in a second of the model itself, if measured.
+    /// Frames a second of the model as trained, if measured.
     pub fps: Option<f64>,
-    /// Each way it was compressed.
+    /// One for each setting.
     pub points: Vec<Point>,
 }
 
@@ -219,11 +216,11 @@ pub struct Skipped {
     pub name: String,
     /// Who trained it.
     pub method: Method,
-    /// Why not.
+    /// The reason.
     pub reason: String,
 }
 
-/// Everything a sweep found out.
+/// All results of a sweep.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Results {
     /// Version of the program.
@@ -236,10 +233,22 @@ pub struct Results {
     pub layout: String,
     /// Whether pictures were rounded to 8 bits before scoring.
     pub eight_bit: bool,
-    /// What was evaluated, in the manifest's order.
+    /// Models that were evaluated, in the manifest's order.
     pub scenes: Vec<SceneResult>,
-    /// What was not.
+    /// Models that were not.
     pub skipped: Vec<Skipped>,
+}
+
+impl Results {
+    /// The version, the pursuit and the layout, for the reports.
+    pub(crate) fn facts(&self) -> Vec<String> {
+        let facts = [
+            (!self.version.is_empty()).then(|| format!("lexisplat {}", self.version)),
+            (!self.pursuit.is_empty()).then(|| format!("{} pursuit", self.pursuit)),
+            (!self.layout.is_empty()).then(|| format!("values as {}", self.layout)),
+        ];
+        facts.into_iter().flatten().collect()
+    }
 }
 
 #[cfg(test)]

@@ -1,88 +1,62 @@
-//! Results in the layout of the 3DGS compression survey (`w-m/3dgs-compression-survey`): one CSV a scene,
+//! Results in the layout of the 3DGS compression survey (`w-m/3dgs-compression-survey`): one CSV for each scene,
 //! values against photos.
 
-use super::csv;
-use super::{Results, SceneResult};
 use lexisplat_eval::Comparison;
+use lexisplat_eval::format::file_name;
 use lexisplat_eval::metrics::Metric;
+
+use super::table::csv_text;
+use super::{Results, SceneResult, unique};
 
 /// The survey's header.
 const HEADER: [&str; 6] = ["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"];
-/// Letters of a name that a path keeps: file systems take 255 bytes, and something may be added.
-const LONGEST_NAME: usize = 60;
 /// Folder of scenes without a data set.
 const NO_DATASET: &str = "other";
 
-/// Files of the survey's layout: path relative to where they are kept, and content. Scenes without photos are
-/// left out. The LPIPS column is the 3DGS repository's, as the survey's numbers are; empty where it was not
-/// measured. A PSNR of identical pictures is `inf`.
+/// Files of the survey's layout: relative path and content. Scenes without photos are left out. The LPIPS column
+/// is the 3DGS repository's, as the survey's numbers are; it is empty where that was not measured. The PSNR of
+/// identical pictures is `inf`.
 #[must_use]
 pub fn survey(results: &Results) -> Vec<(String, String)> {
-    let mut files: Vec<(String, &SceneResult, String)> = Vec::new();
+    let mut files: Vec<(String, &SceneResult, Vec<Vec<String>>)> = Vec::new();
     for scene in &results.scenes {
         let lines = lines(scene);
         if lines.is_empty() {
             continue;
         }
-        let same = |other: &SceneResult| {
-            other.dataset.to_lowercase() == scene.dataset.to_lowercase()
-                && other.name.to_lowercase() == scene.name.to_lowercase()
-        };
-        if let Some((_, _, content)) = files.iter_mut().find(|(_, other, _)| same(other)) {
-            content.push_str(&lines);
+        let key = |scene: &SceneResult| (scene.dataset.to_lowercase(), scene.name.to_lowercase());
+        if let Some((_, _, content)) = files.iter_mut().find(|(_, other, _)| key(other) == key(scene)) {
+            content.extend(lines);
             continue;
         }
-        let dataset = if scene.dataset.is_empty() { NO_DATASET.to_owned() } else { safe(&scene.dataset) };
-        let stem = format!("results/{dataset}/{}", safe(&scene.name));
-        let mut path = format!("{stem}.csv");
-        let mut copy = 2;
-        // Names that differ in letters that paths cannot have must not overwrite each other.
-        while files.iter().any(|(other, _, _)| other.to_lowercase() == path.to_lowercase()) {
-            path = format!("{stem}-{copy}.csv");
-            copy += 1;
-        }
-        let mut content = String::new();
-        csv::line(&mut content, HEADER);
-        files.push((path, scene, content + &lines));
+        let dataset =
+            if scene.dataset.is_empty() { NO_DATASET.to_owned() } else { file_name(&scene.dataset) };
+        // Names that differ only in letters that paths cannot have must not overwrite each other.
+        let stem = unique(&format!("results/{dataset}/{}", file_name(&scene.name)), |stem| {
+            files.iter().any(|(other, ..)| other.to_lowercase() == stem.to_lowercase())
+        });
+        files.push((stem, scene, [vec![HEADER.map(str::to_owned).into()], lines].concat()));
     }
-    files.into_iter().map(|(path, _, content)| (path, content)).collect()
+    files.into_iter().map(|(stem, _, content)| (format!("{stem}.csv"), csv_text(content))).collect()
 }
 
-/// `name` as one part of a path, on every system.
-pub(super) fn safe(name: &str) -> String {
-    let kept = |c: char| if c.is_alphanumeric() || matches!(c, '-' | '_' | '.') { c } else { '_' };
-    let name: String = name.trim().chars().take(LONGEST_NAME).map(kept).collect();
-    if name.chars().all(|c| c == '.') { "_".to_owned() } else { name }
-}
-
-fn lines(scene: &SceneResult) -> String {
-    let mut out = String::new();
-    let mut add = |submethod: &str, comparison: &Comparison, size: u64| {
-        if comparison.views.is_empty() {
-            return;
-        }
-        let psnr = match comparison.psnr.mean {
-            Some(psnr) => psnr.to_string(),
-            None => "inf".to_owned(),
-        };
-        let text = |metric| {
-            let mean = comparison.get(metric).and_then(|summary| summary.mean);
-            mean.map_or_else(String::new, |value| value.to_string())
-        };
-        let (ssim, lpips) = (text(Metric::Ssim), text(Metric::LpipsVggInria));
-        let (size, gaussians) = (size.to_string(), scene.gaussians.to_string());
-        csv::line(&mut out, [submethod, &psnr, &ssim, &lpips, &size, &gaussians]);
+fn lines(scene: &SceneResult) -> Vec<Vec<String>> {
+    let line = |submethod: String, comparison: Option<&Comparison>, size: u64| {
+        let comparison = comparison.filter(|comparison| !comparison.views.is_empty())?;
+        let text = |metric| comparison.get(metric)?.mean.map(|value| value.to_string());
+        let psnr = text(Metric::Psnr).unwrap_or_else(|| "inf".to_owned());
+        let [ssim, lpips] =
+            [Metric::Ssim, Metric::LpipsVggInria].map(|metric| text(metric).unwrap_or_default());
+        Some(vec![submethod, psnr, ssim, lpips, size.to_string(), scene.gaussians.to_string()])
     };
-    if let Some(comparison) = &scene.to_photos {
-        add(scene.method.name(), comparison, scene.shipped_bytes.unwrap_or(scene.ply_bytes));
-    }
-    for point in &scene.points {
-        if let Some(comparison) = &point.to_photos {
-            let name = format!("lexisplat {} {}", scene.method.name(), point.setting.label());
-            add(&name, comparison, point.file_bytes);
-        }
-    }
-    out
+    let method = scene.method.name();
+    let shipped = scene.shipped_bytes.unwrap_or(scene.ply_bytes);
+    let original = line(method.to_owned(), scene.to_photos.as_ref(), shipped);
+    let points = scene.points.iter().filter_map(|point| {
+        let name = format!("lexisplat {method} {}", point.setting.label());
+        line(name, point.to_photos.as_ref(), point.file_bytes)
+    });
+    original.into_iter().chain(points).collect()
 }
 
 #[cfg(test)]
@@ -135,7 +109,6 @@ mod tests {
             ]
         );
         assert!(survey(&results)[0].1.contains("3dgs,inf,1,0,"));
-        assert_eq!(safe(&"\u{1d4a}".repeat(300)).chars().count(), LONGEST_NAME);
     }
 
     #[test]

@@ -29,7 +29,7 @@ pub(super) fn point(setting: Setting, nonzeros: f64, psnr: Option<f64>) -> Point
         atoms: 90,
         mean_nonzeros: nonzeros,
         coefficient_ratio: (nonzeros > 0.0).then(|| 45.0 / nonzeros),
-        max_residual: setting.is_exact().then_some(0.099),
+        max_residual: (!matches!(setting, Setting::Preset(_))).then_some(0.099),
         over_tolerance: 0,
         to_original: comparison(psnr),
         to_photos: None,

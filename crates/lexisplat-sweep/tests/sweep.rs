@@ -1,40 +1,55 @@
 //! A whole sweep over made-up scenes: what it finds, keeps, reuses and skips.
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
-use std::cell::{Cell, RefCell};
 use std::path::Path;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use lexisplat::packed::Preset;
-use lexisplat::ply;
+use lexisplat::{Progress, ply};
 use lexisplat_eval::Scorer;
-use lexisplat_render::Device;
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_sweep::{
-    Entry, Method, Point, Results, Saved, Setting, SweepOptions, Watch, parse_manifest, sweep,
+    Entry, Method, PictureFiles, Point, Results, Setting, SweepOptions, SweepProgress, parse_manifest, sweep,
 };
 
 const GAUSSIANS: usize = 800;
 
 #[derive(Default)]
-struct Seen {
-    made: Cell<u64>,
-    reused: Cell<u64>,
-    all: Cell<u64>,
-    warnings: RefCell<Vec<String>>,
+struct Count(AtomicU64);
+
+impl Count {
+    fn add(&self, parts: u64) {
+        self.0.fetch_add(parts, Ordering::Relaxed);
+    }
+
+    fn get(&self) -> u64 {
+        self.0.load(Ordering::Relaxed)
+    }
 }
 
-impl Watch for Seen {
-    fn begin(&self, parts: u64) {
-        self.all.set(parts);
+#[derive(Default)]
+struct Seen {
+    made: Count,
+    reused: Count,
+    all: Count,
+    warnings: Mutex<Vec<String>>,
+}
+
+impl Progress for Seen {}
+
+impl SweepProgress for Seen {
+    fn start(&self, parts: u64) {
+        self.all.add(parts);
     }
 
     fn done(&self, parts: u64, reused: bool) {
         let count = if reused { &self.reused } else { &self.made };
-        count.set(count.get() + parts);
+        count.add(parts);
     }
 
     fn warn(&self, model: &str, warning: &str) {
-        self.warnings.borrow_mut().push(format!("{model}: {warning}"));
+        self.warnings.lock().unwrap().push(format!("{model}: {warning}"));
     }
 }
 
@@ -43,7 +58,6 @@ fn options() -> SweepOptions {
     options.settings = vec![Setting::Tolerance(0.1), Setting::MaxNonzeros(1), Setting::Preset(Preset::Small)];
     options.max_width = 96;
     options.generated = 3;
-    options.device = Device::Cpu;
     options.fps = false;
     options
 }
@@ -54,7 +68,7 @@ fn entry(folder: &Path, name: &str, seed: u64) -> Entry {
     Entry::of_model(&path)
 }
 
-fn run(entries: &[Entry], options: &SweepOptions, out: &Path) -> (Results, Vec<Saved>, Seen) {
+fn run(entries: &[Entry], options: &SweepOptions, out: &Path) -> (Results, Vec<PictureFiles>, Seen) {
     let seen = Seen::default();
     let (results, saved) = sweep(entries, options, &Scorer::new(), out, &seen).unwrap();
     (results, saved, seen)
@@ -153,16 +167,16 @@ fn what_is_missing_is_skipped_and_listed() {
     let (results, _, seen) = run(&entries, &options(), &folder.path().join("out"));
     let skipped: Vec<(&str, Method)> = results.skipped.iter().map(|s| (&*s.name, s.method)).collect();
     assert_eq!(skipped, [("gone", Method::Mcmc), ("pickled", Method::Eagles)]);
-    assert!(results.skipped[0].reason.contains("not there"), "{}", results.skipped[0].reason);
+    assert!(results.skipped[0].reason.contains("does not exist"), "{}", results.skipped[0].reason);
     assert!(results.skipped[1].reason.contains("pickle"), "{}", results.skipped[1].reason);
-    assert_eq!(seen.warnings.borrow().len(), 2);
+    assert_eq!(seen.warnings.lock().unwrap().len(), 2);
     // A competitor is scored, not compressed; what it ships is counted.
     let [_, decoded] = &results.scenes[..] else { panic!("two scenes") };
     assert_eq!((decoded.points.len(), decoded.shipped_bytes), (0, Some(3)));
 
     let nothing = sweep(&entries[1..3], &options(), &Scorer::new(), folder.path(), &Seen::default());
     let message = nothing.unwrap_err().to_string();
-    assert!(message.contains("not there"), "{message}");
+    assert!(message.contains("does not exist"), "{message}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use eframe::egui;
 use egui::{Color32, CornerRadius, DragValue, Grid, Margin, RichText, ScrollArea, Slider, Ui};
 use lexisplat::ShDegree;
 use lexisplat::packed::Preset;
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
 use crate::app::App;
 use crate::command::{Command, Mode, Quality, Slot};
@@ -99,7 +99,7 @@ fn about(ui: &mut Ui, slot: Slot, model: &OpenModel, other: Option<&OpenModel>) 
     let name = RichText::new(format!("{}  {}", slot.index() + 1, model.short_name())).strong();
     let whole = model.path.as_ref().map_or_else(|| model.scene.name.clone(), |p| p.display().to_string());
     ui.add(egui::Label::new(name).truncate()).on_hover_text(whole);
-    let size = text::bytes(model.scene.bytes);
+    let size = format::bytes(model.scene.bytes);
     ui.horizontal_wrapped(|ui| {
         ui.label(format!("{size}  {}", model.layout));
         let original = other.filter(|_| slot == Slot::Second);
@@ -108,7 +108,7 @@ fn about(ui: &mut Ui, slot: Slot, model: &OpenModel, other: Option<&OpenModel>) 
             ui.label(smaller).on_hover_text(format!("smaller {of}, whole files"));
         }
     });
-    let gaussians = text::count(model.gaussians() as u64);
+    let gaussians = format::count(model.gaussians() as u64);
     ui.label(RichText::new(format!("{gaussians} Gaussians, SH degree {}", model.degree())).color(QUIET));
     if let Some(guarantee) = &model.guarantee {
         ui.add(egui::Label::new(RichText::new(guarantee).color(QUIET)).wrap());
@@ -256,7 +256,7 @@ fn numbers(app: &App, frame: &Frame, ui: &mut Ui) {
             ui.end_row();
         };
         let milliseconds = |time: f64| format!("{time:.1} ms");
-        row(ui, "drawn", pictures.iter().map(|p| text::count(p.gaussians as u64)).collect());
+        row(ui, "drawn", pictures.iter().map(|p| format::count(p.gaussians as u64)).collect());
         let stages = pictures.first().map(|p| p.stage_times.as_slice()).unwrap_or_default();
         for (stage, _) in stages {
             let times = pictures.iter().filter_map(|p| p.stage_times.iter().find(|(s, _)| s == stage));
@@ -267,7 +267,7 @@ fn numbers(app: &App, frame: &Frame, ui: &mut Ui) {
         let camera = &frame.view.camera;
         let (width, height) = pictures.first().map_or((camera.width, camera.height), |p| (p.width, p.height));
         row(ui, "picture", vec![format!("{width} x {height}")]);
-        row(ui, "GPU memory", vec![text::bytes(frame.resident_bytes)]);
+        row(ui, "GPU memory", vec![format::bytes(frame.resident_bytes)]);
     });
     let by = RichText::new(format!("drawn by {}", app.render_thread.name)).color(QUIET);
     ui.add(egui::Label::new(by).truncate());

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
 use lexisplat_sweep::Method;
@@ -57,9 +58,13 @@ pub(crate) struct Sweep {
     /// The models, PLY files.
     #[arg(value_name = "MODEL", required_unless_present = "manifest")]
     pub(crate) models: Vec<PathBuf>,
+    /// Name of the first model's scene, which the tables show. May be given again for the next models, in their order
+    /// [default: from the path].
+    #[arg(long = "name", value_name = "NAME", value_parser = NonEmptyStringValueParser::new())]
+    pub(crate) names: Vec<String>,
     /// A TOML file that lists models with their methods, cameras and photos, each in a table `scene`
     /// (docs/EVALUATION.md). Models that do not exist are skipped, and listed in the report.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["models", "cameras", "images", "method"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["models", "names", "cameras", "images", "method"])]
     pub(crate) manifest: Option<PathBuf>,
     /// The folder that relative paths in the manifest start from [default: the manifest's folder].
     #[arg(long, value_name = "DIR", requires = "manifest")]

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat_eval::{
-    BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, text,
+    BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, format,
 };
 use lexisplat_render::gpu::{DrawStage, Gpu, ShPath, Speed, measure_speed};
 use lexisplat_render::{Camera, Device, Scene};
@@ -185,7 +185,13 @@ impl Report<'_> {
     fn text(&self) -> Result<String> {
         let mut out = String::new();
         let n = self.scene.len();
-        write!(out, "{}: {} Gaussians, SH degree {}", self.name, text::count(n as u64), self.scene.degree())?;
+        write!(
+            out,
+            "{}: {} Gaussians, SH degree {}",
+            self.name,
+            format::count(n as u64),
+            self.scene.degree()
+        )?;
         if let Some(nonzeros) = self.nonzeros() {
             write!(out, ", {nonzeros:.2} nonzeros each")?;
         }
@@ -197,7 +203,7 @@ impl Report<'_> {
                 "{name} ({driver}): copies {:.0} GB/s, {:.2} Tflop/s; at most {} of its memory was used",
                 speed.copy / 1e9,
                 speed.arithmetic / 1e12,
-                text::bytes(self.most_bytes.unwrap_or(0))
+                format::bytes(self.most_bytes.unwrap_or(0))
             )?;
         }
         let stages = DrawStage::ALL.map(DrawStage::name);
@@ -217,7 +223,7 @@ impl Report<'_> {
                 }
             }
             let each = times.sh_bytes as f64 / n.max(1) as f64;
-            writeln!(out, " {:>10} {each:>11.1}", text::bytes(times.sh_bytes))?;
+            writeln!(out, " {:>10} {each:>11.1}", format::bytes(times.sh_bytes))?;
         }
         if let Some(times) = self.results.first() {
             writeln!(

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
-use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, montage, png, text};
+use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, format, montage, png};
 use serde_json::json;
 
 use crate::args::{Common, Compare};
@@ -75,8 +75,8 @@ fn table(
         writeln!(
             out,
             "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
-            text::escape(&view.name),
-            text::decibels(view.psnr),
+            format::escape(&view.name),
+            format::decibels(view.psnr),
             view.ssim
         )?;
     }
@@ -90,14 +90,14 @@ fn table(
             ("maximum", psnr.max, ssim.max),
         ];
         for (label, psnr, ssim) in rows {
-            let (psnr, ssim) = (text::decibels(psnr), ssim.unwrap_or(1.0));
+            let (psnr, ssim) = (format::decibels(psnr), ssim.unwrap_or(1.0));
             writeln!(out, "{label:<width$}  {:>11}  {psnr:>10}  {ssim:>8.5}", "")?;
         }
     }
     for input in [a, b] {
-        writeln!(out, "{:>10}  {}", text::bytes(input.bytes), input.name)?;
+        writeln!(out, "{:>10}  {}", format::bytes(input.bytes), input.name)?;
     }
-    writeln!(out, "{:>10}  first file over second, whole files", text::ratio(a.bytes, b.bytes))?;
+    writeln!(out, "{:>10}  first file over second, whole files", format::ratio(a.bytes, b.bytes))?;
     writeln!(out, "{:>10}  {device}", "drawn on")?;
     if let Some(folder) = &args.save_views {
         let times = montage::AMPLIFICATION;

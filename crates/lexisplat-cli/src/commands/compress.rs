@@ -9,7 +9,7 @@ use lexisplat::packed::{PackOptions, TargetRecord};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, Record, lexi};
 use lexisplat_eval::compression::SensitivitySource;
-use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, text};
+use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
@@ -130,22 +130,22 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     let whole = |number: f64| number.round() as u64;
     let mut out = String::new();
     let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-    let count = text::count(*gaussians as u64);
+    let count = format::count(*gaussians as u64);
     line("wrote", format!("{}: {count} Gaussians, SH degree {}", output.display(), report.sh_degree))?;
     line(
         "file bytes",
         format!(
             "{} of {}: {} smaller (whole file against the PLY), {:.2} bytes a Gaussian",
-            text::bytes(report.file_bytes),
-            text::bytes(report.source_bytes),
-            text::ratio(report.source_bytes, report.file_bytes),
+            format::bytes(report.file_bytes),
+            format::bytes(report.source_bytes),
+            format::ratio(report.source_bytes, report.file_bytes),
             each(report.file_bytes as f64)
         ),
     )?;
     if dim > 0 {
         let (sh, dense) = (whole(report.sh_bytes), report.dense_sh_bytes);
-        let ratio = text::ratio(dense, sh);
-        let (sh, dense) = (text::bytes(sh), text::bytes(dense));
+        let ratio = format::ratio(dense, sh);
+        let (sh, dense) = (format::bytes(sh), format::bytes(dense));
         line(
             "SH bytes",
             format!("{sh} of {dense}: {ratio} smaller (dictionary, codes, escapes; against dense f32)"),
@@ -162,7 +162,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
             "pruned",
             format!(
                 "{} Gaussians; no pixel of {} views changes by more than {:.2} of 255 levels without them",
-                text::count(pruned.removed as u64),
+                format::count(pruned.removed as u64),
                 pruned.views,
                 pruned.largest_change * LEVELS
             ),
@@ -174,7 +174,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     let dictionary = match (report.learn_sample, report.learn_rounds) {
         _ if dim == 0 => "none: the scene has no view-dependent colour".to_owned(),
         (Some(sample), Some(rounds)) => {
-            let sample = text::count(sample as u64);
+            let sample = format::count(sample as u64);
             format!("{atoms} atoms from {sample} Gaussians in {rounds} rounds, {learn_seconds:.1} s")
         }
         _ if report.layout == Layout::Packed => format!("{atoms} atoms, {learn_seconds:.1} s"),
@@ -182,7 +182,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     };
     line("dictionary", dictionary)?;
     if let Some(ratio) = report.coefficient_ratio {
-        let rate = text::count(whole(*gaussians as f64 / code_seconds.max(1e-9)));
+        let rate = format::count(whole(*gaussians as f64 / code_seconds.max(1e-9)));
         let nonzeros = report.mean_nonzeros;
         line(
             "codes",
@@ -194,7 +194,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     if report.layout != Layout::Packed || record.tolerance.is_some() {
         line("error", error_line(record))?;
         if report.escapes > 0 {
-            line("escapes", format!("{} Gaussians' SH stored exactly", text::count(report.escapes)))?;
+            line("escapes", format!("{} Gaussians' SH stored exactly", format::count(report.escapes)))?;
         }
     }
     if report.importance == Some(SensitivitySource::Heuristic) {
@@ -223,7 +223,7 @@ pub(crate) fn error_line(record: &Record) -> String {
         (Some(tol), None) => format!("{found}; promised: at most {tol} for every Gaussian"),
         (Some(tol), Some(cap)) => format!(
             "{found}; {} Gaussians are over {tol}, because no more than {cap} nonzeros were allowed",
-            text::count(record.over_tolerance)
+            format::count(record.over_tolerance)
         ),
         (None, _) => format!("{found}; nothing was promised"),
     }

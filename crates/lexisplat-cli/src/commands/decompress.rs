@@ -7,7 +7,7 @@ use lexisplat::lexi::LexiReader;
 use lexisplat::{Error, stream};
 use serde_json::json;
 
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
 use crate::args::{Common, Decompress};
 use crate::files::{check_output, input, is_pipe, output_path, print, print_json, write_output};
@@ -40,11 +40,11 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     } else if common.quiet || is_pipe(&output) {
         Ok(())
     } else {
-        let count = text::count(lexi.len() as u64);
+        let count = format::count(lexi.len() as u64);
         print(&format!(
             "wrote {name}: {count} Gaussians, SH degree {}, {}, {seconds:.1} s\n",
             lexi.degree(),
-            text::bytes(bytes)
+            format::bytes(bytes)
         ))
     }
 }

@@ -7,7 +7,8 @@ use anyhow::Result;
 use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, lexi, ply};
 use lexisplat_eval::{
-    Comparison, Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing, compare, montage, png, text,
+    Comparison, Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing, compare, format, montage,
+    png,
 };
 use lexisplat_render::{Camera, Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -152,18 +153,18 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let line = |name: &str, bytes: u64, what: &str, scores: &Comparison| {
         format!(
             "{name:<17} {}, {} smaller, {what}: pictures {} on average, {} at worst, over {} views\n",
-            text::bytes(bytes),
-            text::ratio(ply_bytes, bytes),
-            text::decibels(scores.psnr.mean),
-            text::decibels(scores.psnr.min),
+            format::bytes(bytes),
+            format::ratio(ply_bytes, bytes),
+            format::decibels(scores.psnr.mean),
+            format::decibels(scores.psnr.min),
             scores.views.len(),
         )
     };
     print(&format!(
         "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser ({seconds:.0} s in all).\n",
         FILES[0],
-        text::bytes(ply_bytes),
-        text::count(exact.len() as u64),
+        format::bytes(ply_bytes),
+        format::count(exact.len() as u64),
         line(FILES[1], packed_report.file_bytes, "packed", &packed_scores),
         line(FILES[2], report.file_bytes, "geometry exact", &exact_scores),
         "",

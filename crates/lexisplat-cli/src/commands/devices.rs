@@ -2,7 +2,7 @@
 
 use anyhow::Result;
 use lexisplat::simd::Simd;
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 use lexisplat_render::gpu::AdapterSummary;
 use serde_json::json;
 
@@ -46,7 +46,7 @@ pub(crate) fn run(common: &Common) -> Result<()> {
 fn line(a: &AdapterSummary) -> String {
     let kind = if a.software { "emulated in software, never chosen by `auto`" } else { "GPU" };
     let times = if a.timestamps { "" } else { ", without stage times" };
-    let largest = text::bytes(a.max_binding);
+    let largest = format::bytes(a.max_binding);
     format!(
         "{:<4} {} ({}, {}; {kind}; arrays of up to {largest}{times})\n",
         a.index, a.name, a.backend, a.driver

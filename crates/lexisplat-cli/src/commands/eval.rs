@@ -7,7 +7,8 @@ use anyhow::Result;
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
 use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, misfit, montage, png, score_views, text,
+    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, format, misfit, montage, png,
+    score_views,
 };
 use lexisplat_render::{Camera, Image};
 use serde::Serialize;
@@ -200,7 +201,7 @@ fn table(report: &Report<'_>) -> Result<String> {
             one(&mut out, comparison)?;
             writeln!(out)?;
         }
-        let (bytes, count) = (text::bytes(model.bytes), text::count(model.gaussians as u64));
+        let (bytes, count) = (format::bytes(model.bytes), format::count(model.gaussians as u64));
         writeln!(out, "{bytes:>10}  {}: {count} Gaussians", model.file)?;
     }
     let photos = if report.images.is_some() { ", each with a photo" } else { "" };
@@ -223,7 +224,7 @@ fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
     writeln!(out)?;
     for view in &comparison.views {
         let size = format!("{}x{}", view.width, view.height);
-        write!(out, "{:<width$}  {size:>11}", text::escape(&view.name))?;
+        write!(out, "{:<width$}  {size:>11}", format::escape(&view.name))?;
         for (&metric, column) in metrics.iter().zip(&columns) {
             write!(out, "  {:>column$}", number(metric, view.get(metric)))?;
         }

@@ -1,17 +1,20 @@
 //! `lexisplat sweep`.
 
-use std::cell::Cell;
 use std::fmt::Write as _;
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{SplitFilter, text};
-use lexisplat_sweep::{Entry, Results, Setting, SweepOptions, Watch, read_manifest, sweep, write_report};
+use lexisplat_eval::{Comparison, Error, SplitFilter, format};
+use lexisplat_sweep::{
+    Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, sweep, write_report,
+};
 use serde_json::json;
 
 use super::eval::scorer;
 use crate::args::{Common, Sweep};
+use crate::device::open_gpu;
 use crate::exit::OutputExists;
 use crate::files::{make_folder, outputs, print, print_json};
 use crate::progress::Bars;
@@ -19,8 +22,10 @@ use crate::stop::{self, Work};
 
 /// The paper's tolerances.
 const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
-/// What a sweep keeps in its folder: by this it is told from any other folder.
-const KEPT: &str = "points";
+/// The folder of finished parts. A folder that has it is the output of a sweep.
+const PARTS: &str = "points";
+/// Columns of the summary with text. The others have numbers.
+const TEXT_COLUMNS: usize = 3;
 
 pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let folder = &args.output;
@@ -30,31 +35,32 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let options = options(args, common)?;
     stop::while_writing(Work::Resumable);
     make_folder(folder)?;
-    let watch = Watcher { bars: Bars::new(common.quiet), reused: Cell::new(0), made: Cell::new(0) };
-    let outcome = sweep(&entries, &options, &scorer, folder, &watch);
-    watch.bars.end();
-    let (mut results, saved) = outcome?;
+    let progress =
+        Shown { bars: Bars::new(common.quiet), reused: AtomicU64::new(0), made: AtomicU64::new(0) };
+    let outcome = sweep(&entries, &options, &scorer, folder, &progress);
+    progress.bars.end();
+    let (mut results, pictures) = outcome?;
     results.command = command();
-    let files = write_report(folder, &results, &saved, args.date.as_deref(), outputs())?;
+    let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
     if common.json {
         return print_json(&json!({
             "output": folder.display().to_string(),
             "files": files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
-            "parts_reused": watch.reused.get(),
-            "parts_made": watch.made.get(),
+            "parts_reused": progress.reused,
+            "parts_made": progress.made,
             "results": results,
         }));
     }
     if common.quiet {
         return Ok(());
     }
-    print(&summary(folder, &results, &watch)?)
+    print(&summary(folder, &results, &progress)?)
 }
 
-/// Refuses folders that hold something else than a sweep.
+/// Refuses folders that hold something other than a sweep.
 fn check_folder(folder: &Path, overwrite: bool) -> Result<()> {
     let used = std::fs::read_dir(folder).is_ok_and(|mut entries| entries.next().is_some());
-    if (used || folder.is_file()) && !folder.join(KEPT).is_dir() && !overwrite {
+    if (used || folder.is_file()) && !folder.join(PARTS).is_dir() && !overwrite {
         return Err(OutputExists(folder.display().to_string()).into());
     }
     Ok(())
@@ -65,6 +71,13 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
         return Ok(read_manifest(path, args.root.as_deref())?);
     }
     let mut entries: Vec<Entry> = args.models.iter().map(|model| Entry::of_model(model)).collect();
+    if args.names.len() > entries.len() {
+        let expected = format!("at most one name for each of the {} models", entries.len());
+        return Err(Error::parameter("name", format!("{} names", args.names.len()), expected).into());
+    }
+    for (entry, name) in entries.iter_mut().zip(&args.names) {
+        entry.name.clone_from(name);
+    }
     for entry in &mut entries {
         entry.method = args.method;
         entry.cameras.clone_from(&args.views.cameras);
@@ -94,7 +107,7 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.generated = args.views.orbit;
     options.kind = args.views.scene;
     options.hold = args.views.hold;
-    options.device = args.views.device;
+    options.gpu = open_gpu(args.views.device)?;
     options.pictures = args.pictures;
     options.resume = !args.fresh;
     options.outputs = outputs().clone();
@@ -119,15 +132,19 @@ fn command() -> String {
     format!("lexisplat {}", words.join(" "))
 }
 
-/// Shows how the sweep goes.
-struct Watcher {
+/// Shows the progress of a sweep, and counts its parts.
+struct Shown {
     bars: Bars,
-    reused: Cell<u64>,
-    made: Cell<u64>,
+    /// Parts that an earlier run had finished.
+    reused: AtomicU64,
+    /// Parts that this run finished.
+    made: AtomicU64,
 }
 
-impl Watch for Watcher {
-    fn begin(&self, parts: u64) {
+impl Progress for Shown {}
+
+impl SweepProgress for Shown {
+    fn start(&self, parts: u64) {
         self.bars.start("sweeping", "parts", parts);
     }
 
@@ -137,7 +154,7 @@ impl Watch for Watcher {
 
     fn done(&self, parts: u64, reused: bool) {
         let count = if reused { &self.reused } else { &self.made };
-        count.set(count.get() + parts);
+        count.fetch_add(parts, Ordering::Relaxed);
         self.bars.advance(parts);
     }
 
@@ -146,34 +163,39 @@ impl Watch for Watcher {
     }
 }
 
-fn summary(folder: &Path, results: &Results, watch: &Watcher) -> Result<String> {
-    let mut out = String::new();
+fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String> {
     let head = ["scene", "method", "setting", "ratio", "bytes each", "PSNR", "photos", "fps"];
     let mut rows = vec![head.map(str::to_owned)];
+    let none = || "-".to_owned();
     for scene in &results.scenes {
-        let photos = |comparison: &Option<lexisplat_eval::Comparison>| {
-            comparison.as_ref().map_or_else(|| "-".to_owned(), |c| text::decibels(c.psnr.mean))
-        };
-        let each = |bytes: u64| format!("{:.2}", bytes as f64 / scene.gaussians.max(1) as f64);
-        let fps = |fps: Option<f64>| fps.map_or_else(|| "-".to_owned(), |fps| format!("{fps:.1}"));
-        let row = |setting: &str, bytes, psnr, found: &_, speed| {
-            let (name, method) = (scene.name.clone(), scene.method.to_string());
-            let ratio = text::ratio(scene.ply_bytes, bytes);
-            [name, method, setting.to_owned(), ratio, each(bytes), psnr, photos(found), fps(speed)]
-        };
-        rows.push(row("original", scene.ply_bytes, "-".to_owned(), &scene.to_photos, scene.fps));
+        let mut add =
+            |setting: &str, bytes: u64, psnr: String, photos: &Option<Comparison>, fps: Option<f64>| {
+                rows.push([
+                    format::escape(&scene.name).into_owned(),
+                    scene.method.to_string(),
+                    setting.to_owned(),
+                    format::ratio(scene.ply_bytes, bytes),
+                    format!("{:.2}", bytes as f64 / scene.gaussians.max(1) as f64),
+                    psnr,
+                    photos.as_ref().map_or_else(none, |photos| format::decibels(photos.psnr.mean)),
+                    fps.map_or_else(none, |fps| format!("{fps:.1}")),
+                ]);
+            };
+        add("original", scene.ply_bytes, none(), &scene.to_photos, scene.fps);
         for point in &scene.points {
-            let psnr = text::decibels(point.to_original.psnr.mean);
-            let speed = point.fps.map(|fps| fps.sparse);
-            rows.push(row(&point.setting.label(), point.file_bytes, psnr, &point.to_photos, speed));
+            let psnr = format::decibels(point.to_original.psnr.mean);
+            let fps = point.fps.map(|fps| fps.sparse);
+            add(&point.setting.label(), point.file_bytes, psnr, &point.to_photos, fps);
         }
     }
     let widths: [usize; 8] =
         std::array::from_fn(|i| rows.iter().map(|row| row[i].chars().count()).max().unwrap_or(0));
+    let mut out = String::new();
     for row in &rows {
         let mut line = String::new();
         for (i, (cell, width)) in row.iter().zip(widths).enumerate() {
-            if i < 3 { write!(line, "{cell:<width$}  ")? } else { write!(line, "{cell:>width$}  ")? }
+            let cell = if i < TEXT_COLUMNS { format!("{cell:<width$}") } else { format!("{cell:>width$}") };
+            write!(line, "{cell}  ")?;
         }
         writeln!(out, "{}", line.trim_end())?;
     }
@@ -183,12 +205,13 @@ fn summary(folder: &Path, results: &Results, watch: &Watcher) -> Result<String> 
     )?;
     if let Some(scene) = results.scenes.first() {
         let kind = if scene.on_gpu { "frames a second of" } else { "frames a second on the processor," };
-        writeln!(out, "fps: {kind} {}", scene.device)?;
+        writeln!(out, "fps: {kind} {}", format::escape(&scene.device))?;
     }
     if !results.skipped.is_empty() {
         writeln!(out, "skipped: {} models, listed in the report", results.skipped.len())?;
     }
-    writeln!(out, "{} parts made, {} kept from before", watch.made.get(), watch.reused.get())?;
+    let [made, reused] = [&progress.made, &progress.reused].map(|count| count.load(Ordering::Relaxed));
+    writeln!(out, "{made} parts made, {reused} kept from before")?;
     writeln!(out, "wrote {}: report.html, report.md, tables, figures, results.json", folder.display())?;
     Ok(out)
 }

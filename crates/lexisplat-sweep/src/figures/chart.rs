@@ -14,25 +14,25 @@ use lexisplat_eval::{Error, Result};
 /// Size of the whole chart in SVG pixels.
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 500.0;
-/// Pixels of the PNG for one of the SVG.
+/// PNG pixels for each SVG pixel.
 const PNG_SCALE: f32 = 2.0;
 /// Sizes of text in SVG pixels.
 const TITLE_SIZE: u32 = 17;
 const LABEL_SIZE: u32 = 15;
 const TEXT_SIZE: u32 = 13;
-/// Characters of a title before it goes on in the next line.
+/// Most characters in a line of a title.
 const TITLE_WRAP: usize = 78;
 /// Width of lines and radius of marks, in SVG pixels.
 const LINE: f64 = 2.2;
 const MARK: f64 = 4.2;
 const BAND_OPACITY: f64 = 0.14;
-/// Steps along y that values are spread over, at most.
+/// Most steps between the labels of the y axis.
 const STEPS: f64 = 7.0;
-/// Most steps between marked powers of two: their texts are up to eight letters long.
+/// Most steps between labelled powers of two. A label has up to eight characters.
 const MOST_POWERS: f64 = 8.0;
-/// Range of values where they do not differ.
+/// Least range of the y axis, for values that do not differ.
 const LEAST_RANGE: f64 = 1.0;
-/// Numbers beyond this, and below its inverse along x, are no measurements.
+/// Largest number that is drawn. Along x its inverse is the smallest. Every measurement is well within.
 const LARGEST: f64 = 1e9;
 /// Colours of everything but data; the page's style sheet swaps them in its dark theme.
 const INK: &str = "#1d1e22";
@@ -40,7 +40,7 @@ const SOFT: &str = "#5c5f68";
 const GRID: &str = "#e4e2dc";
 const PAPER: &str = "#ffffff";
 
-/// All of them.
+/// The four colours.
 #[cfg(test)]
 pub(super) const COLOURS: [&str; 4] = [INK, SOFT, GRID, PAPER];
 
@@ -49,11 +49,8 @@ pub(super) const SOLID: &str = "";
 pub(super) const DASHED: &str = "6 5";
 pub(super) const DOTTED: &str = "2 5";
 
-/// What is drawn at points.
+/// The shape drawn at points.
 pub(super) type Mark = MarkerShape;
-
-/// Pairs: x and y, or lowest and highest.
-pub(super) type Pairs = Vec<(f64, f64)>;
 
 /// One line of a chart.
 #[derive(Debug, Clone)]
@@ -63,26 +60,29 @@ pub(super) struct Series {
     pub(super) mark: Option<Mark>,
     /// Whether points are joined.
     pub(super) joined: bool,
-    pub(super) points: Pairs,
+    /// Pairs of x and y.
+    pub(super) points: Vec<(f64, f64)>,
     /// Lowest and highest value at each point; empty for none.
-    pub(super) band: Pairs,
+    pub(super) band: Vec<(f64, f64)>,
 }
 
-/// One line of a legend.
-#[derive(Debug, Clone)]
-pub(super) struct Key {
-    pub(super) text: String,
-    pub(super) colour: &'static str,
-    pub(super) dash: &'static str,
-    /// A mark instead of a line.
-    pub(super) mark: Option<Mark>,
+/// A group of a legend: title and entries.
+pub(super) type Legend = (&'static str, Vec<LegendEntry>);
+
+/// One entry of a legend, shown with a mark, or else with a line.
+pub(super) fn key(text: &str, colour: &str, dash: &str, mark: Option<Mark>) -> LegendEntry {
+    LegendEntry {
+        label: literal(text),
+        color: colour.to_owned(),
+        shape: mark.map_or(LegendShape::Line, LegendShape::Marker),
+        dasharray: (!dash.is_empty()).then(|| dash.to_owned()),
+    }
 }
 
-/// Colour of keys that say what a dash or mark means for every colour.
+/// Colour of entries that explain a dash or mark of every colour.
 pub(super) const NEUTRAL: &str = SOFT;
 
 /// A chart with a logarithmic axis to base 2 along x.
-#[derive(Debug)]
 pub(super) struct Chart {
     pub(super) name: String,
     pub(super) title: String,
@@ -94,11 +94,10 @@ pub(super) struct Chart {
     /// Whether the range of values starts at 0.
     pub(super) from_zero: bool,
     pub(super) series: Vec<Series>,
-    /// Groups of the legend.
-    pub(super) keys: Vec<(&'static str, Vec<Key>)>,
+    pub(super) legends: Vec<Legend>,
 }
 
-/// `text` without what `kuva` takes for mathematics.
+/// `text` with what `kuva` takes for mathematics escaped.
 fn literal(text: &str) -> String {
     text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace('$', "\\$")
 }
@@ -109,7 +108,7 @@ fn range(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     Some((finite.clone().reduce(f64::min)?, finite.reduce(f64::max)?))
 }
 
-/// A round number of which about [`STEPS`] make up `spread`.
+/// The smallest round step that divides `spread` into at most [`STEPS`] parts.
 fn step(spread: f64) -> f64 {
     let least = spread / STEPS;
     let power = 10_f64.powf(least.log10().floor());
@@ -117,8 +116,8 @@ fn step(spread: f64) -> f64 {
     rounds.filter(|round| *round >= least).reduce(f64::min).unwrap_or(10.0 * power)
 }
 
-/// First and last power of two on an axis that shows `logarithms`, and how many powers lie between two marked
-/// numbers: few enough that their texts do not touch.
+/// The first and the last power of two of an axis that shows `logarithms`, and the powers between two labels: enough
+/// that labels do not touch.
 fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
     let first = logarithms.0.floor();
     let spread = (logarithms.1 - first).ceil().max(1.0);
@@ -127,10 +126,25 @@ fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
 }
 
 impl Chart {
-    /// The chart; `None` if it has no points.
+    /// A chart without a name over the paper's compression ratio.
+    pub(super) fn over_ratio(y: &str, series: Vec<Series>, legends: Vec<Legend>) -> Self {
+        Self {
+            name: String::new(),
+            title: String::new(),
+            caption: String::new(),
+            x: "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)",
+            x_unit: "\u{d7}",
+            y: y.to_owned(),
+            from_zero: false,
+            series,
+            legends,
+        }
+    }
+
+    /// Draws the chart. `None` if it has no points.
     pub(super) fn draw(mut self) -> Result<Option<Figure>> {
         for series in &mut self.series {
-            // A logarithm has no place for others.
+            // The axis cannot show other numbers.
             let good = |&(x, y): &(f64, f64)| x >= LARGEST.recip() && x <= LARGEST && y.abs() <= LARGEST;
             if series.band.len() == series.points.len() {
                 let both = series.points.iter().zip(&series.band).filter(|(point, _)| good(point));
@@ -180,7 +194,7 @@ impl Chart {
             Error::parameter("figure", &self.name, format!("a chart that can be drawn: {why}"))
         })?;
         let svg = SvgBackend::new().render_scene(&scene);
-        // With a view box the picture scales to the room there is.
+        // With a view box the picture scales to the width of the page.
         let view_box = format!("<svg viewBox=\"0 0 {} {}\" ", scene.width, scene.height);
         let svg = svg.replacen("<svg ", &view_box, 1);
         Ok(Some(Figure { name: self.name, title: self.title, caption: self.caption, svg, png }))
@@ -206,7 +220,7 @@ impl Chart {
         let step = step((y.1 - low).max(LEAST_RANGE));
         let low = (low / step).floor() * step;
         let high = ((y.1 / step).ceil() * step).max(low + step);
-        // Whole powers of two at both ends, so that there are two marked numbers at least.
+        // Both ends are whole powers of two, so that the axis has at least two labels.
         let (first, last, powers) = powers(x);
         let mut layout = Layout::new((first, last), (low, high))
             .with_width(WIDTH)
@@ -228,14 +242,8 @@ impl Chart {
             .with_y_tick_step(step)
             .with_x_tick_format(ticks)
             .with_legend_box(false);
-        for (title, keys) in self.keys.iter().filter(|group| !group.1.is_empty()) {
-            let entries = keys.iter().map(|key| LegendEntry {
-                label: literal(&key.text),
-                color: key.colour.to_owned(),
-                shape: key.mark.map_or(LegendShape::Line, LegendShape::Marker),
-                dasharray: (!key.dash.is_empty()).then(|| key.dash.to_owned()),
-            });
-            layout = layout.with_legend_group(*title, entries.collect());
+        for (title, keys) in self.legends.iter().filter(|legend| !legend.1.is_empty()) {
+            layout = layout.with_legend_group(*title, keys.clone());
         }
         layout
     }

@@ -4,39 +4,40 @@ mod chart;
 
 use std::fmt::Write;
 
-use chart::{Chart, DASHED, DOTTED, Key, Mark, NEUTRAL, Pairs, SOLID, Series};
+use kuva::plot::legend::LegendEntry;
+use lexisplat_eval::Result;
+use lexisplat_eval::format::file_name;
+
+use chart::{Chart, DASHED, DOTTED, Legend, Mark, NEUTRAL, SOLID, Series, key};
 
 use super::curve::{At, Kind, curve};
 use super::grid::Grid;
+use super::measure::Measure;
 use super::paper::{self, Quantity};
-use super::survey::safe;
-use super::{Method, Results, Setting};
-use lexisplat_eval::Result;
+use super::{Method, Results, Setting, unique};
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Figure {
-    /// Name for files, without ending; safe on every system and unique among the figures of a sweep.
+    /// Name for files, without extension; safe on every system and unique among the figures of a sweep.
     pub name: String,
-    /// What it shows, in a few words.
+    /// What the figure shows, in a few words.
     pub title: String,
     /// How to read it.
     pub caption: String,
     /// An SVG document.
     pub svg: String,
-    /// The same as the bytes of a PNG file.
+    /// The same picture as a PNG file.
     pub png: Vec<u8>,
 }
 
-const RATIO: &str = "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)";
+/// Start of the ids in SVG by `kuva`; a number follows.
+const KUVA_ID: &str = "kuva-clip-";
+/// Most characters of a device's name on an axis. Captions have the whole name.
+const LONGEST_DEVICE: usize = 36;
 const PSNR: &str = "PSNR against the original, dB";
 
-/// What ids in SVG by `kuva` start with; a number follows.
-const KUVA_ID: &str = "kuva-clip-";
-/// Letters of a device's name that an axis has room for. Captions have it whole.
-const LONGEST_DEVICE: usize = 36;
-
-/// Colours of Okabe and Ito (2008), which colour-blind people can tell apart, and marks for those who see none.
+/// The colour and mark of a method: colours of Okabe and Ito (2008), which colour-blind people can tell apart.
 fn look(method: Method) -> (&'static str, Mark) {
     match method {
         Method::Gs3d => ("#0072b2", Mark::Circle),
@@ -48,73 +49,77 @@ fn look(method: Method) -> (&'static str, Mark) {
     }
 }
 
-/// Every colour there is in a figure: what a style sheet has to know to swap them.
+/// The dashes, mark and name of a kind of settings.
+fn kind_look(kind: Kind) -> (&'static str, Mark, &'static str) {
+    match kind {
+        Kind::Tolerances => (SOLID, Mark::Circle, "tolerances"),
+        Kind::Caps => (DOTTED, Mark::Triangle, "capped nonzeros"),
+        Kind::Presets => (DASHED, Mark::Square, "packed presets"),
+    }
+}
+
+/// Every colour in a figure. The page's style sheet swaps them in its dark theme.
 #[cfg(test)]
 pub(super) fn colours() -> Vec<&'static str> {
     chart::COLOURS.into_iter().chain(Method::ALL.map(|method| look(method).0)).collect()
 }
 
 /// A line of one method.
-fn line(method: Method, dash: &'static str, points: Pairs) -> Series {
+fn line(method: Method, dash: &'static str, points: Vec<(f64, f64)>) -> Series {
     let (colour, mark) = look(method);
     Series { colour, dash, mark: Some(mark), joined: true, points, band: Vec::new() }
 }
 
+/// PSNR over ratio. The band is from the lowest to the highest PSNR.
+fn psnr_line(method: Method, dash: &'static str, points: &[At<'_>]) -> Series {
+    let point = |at: &At<'_>| {
+        let psnr = at.psnr();
+        let mean = psnr.mean?;
+        Some(((at.ratio()?, mean), (psnr.min.unwrap_or(mean), psnr.max.unwrap_or(mean))))
+    };
+    let (points, band) = points.iter().filter_map(point).unzip();
+    Series { band, ..line(method, dash, points) }
+}
+
 /// The legend of methods that have a line.
-fn methods(grid: &Grid<'_>, series: &[Series]) -> (&'static str, Vec<Key>) {
-    let drawn = |&method: &Method| series.iter().any(|series| series.colour == look(method).0);
-    let keys = grid.methods.iter().copied().filter(drawn).map(|method| {
+fn method_keys(grid: &Grid<'_>, series: &[Series], with_marks: bool) -> Legend {
+    let drawn =
+        |method: &&Method| series.iter().any(|s| s.colour == look(**method).0 && !s.points.is_empty());
+    let keys = grid.methods.iter().filter(drawn).map(|&method| {
         let (colour, mark) = look(method);
-        Key { text: method.title().to_owned(), colour, dash: SOLID, mark: Some(mark) }
+        key(method.title(), colour, SOLID, with_marks.then_some(mark))
     });
     ("Method", keys.collect())
 }
 
-/// A key for every colour.
-fn key(text: &str, dash: &'static str, mark: Option<Mark>) -> Key {
-    Key { text: text.to_owned(), colour: NEUTRAL, dash, mark }
+/// A key for lines of every colour.
+fn dash_key(text: &str, dash: &'static str) -> LegendEntry {
+    key(text, NEUTRAL, dash, None)
 }
 
-/// Points of PSNR over ratio, with lowest and highest PSNR.
-fn psnr_over_ratio(points: &[At]) -> (Pairs, Pairs) {
-    points
-        .iter()
-        .filter_map(|at| {
-            let psnr = at.psnr.mean?;
-            Some(((at.ratio?, psnr), (at.psnr.min.unwrap_or(psnr), at.psnr.max.unwrap_or(psnr))))
-        })
-        .unzip()
-}
-
-/// Every figure there is something to show in.
+/// Every figure that has something to show.
 ///
 /// # Errors
-/// [`Error::Parameter`](crate::Error::Parameter) if a chart cannot be drawn.
+/// [`Error::Parameter`](lexisplat_eval::Error::Parameter) if a chart cannot be drawn.
 pub fn figures(results: &Results) -> Result<Vec<Figure>> {
     let grid = Grid::new(results);
-    let mut figures = Vec::new();
-    let charts = [psnr_ratio(&grid), fps_ratio(&grid), bytes_psnr(&grid)];
-    let scenes = (0..grid.columns.len()).map(|column| scene(&grid, column));
-    for chart in charts.into_iter().chain(levels(&grid)).chain(scenes) {
-        figures.extend(chart.draw()?);
-    }
-    // Scenes' names may differ in letters alone that files cannot have.
-    for i in 1..figures.len() {
-        let plain = figures[i].name.clone();
-        let mut copy = 2;
-        while figures[..i].iter().any(|figure| figure.name.to_lowercase() == figures[i].name.to_lowercase()) {
-            figures[i].name = format!("{plain}-{copy}");
-            copy += 1;
-        }
-    }
-    for figure in &mut figures {
+    let charts = [quality(&grid, None), speed(&grid), bytes(&grid)];
+    let scenes = (0..grid.headings.len()).map(|column| quality(&grid, Some(column)));
+    let mut figures: Vec<Figure> = Vec::new();
+    for chart in charts.into_iter().chain(saturation(&grid).into_iter().flatten()).chain(scenes) {
+        let Some(mut figure) = chart.draw()? else { continue };
+        // Scenes' names may differ only in letters that file names cannot have.
+        figure.name = unique(&figure.name, |name| {
+            figures.iter().any(|other| other.name.to_lowercase() == name.to_lowercase())
+        });
         figure.svg = with_own_ids(&figure.svg, &figure.name);
+        figures.push(figure);
     }
     Ok(figures)
 }
 
-/// Ids in `svg` made from the figure's name: `kuva` counts them through the whole process, so they would
-/// change from run to run, and several figures share one page.
+/// `svg` with ids made from the figure's name. `kuva` counts ids through the whole process, so they would change
+/// from run to run, and several figures share one page.
 fn with_own_ids(svg: &str, name: &str) -> String {
     let plain = |b: u8| {
         if b.is_ascii_alphanumeric() || b == b'-' { char::from(b).to_string() } else { format!("_{b:02x}") }
@@ -135,109 +140,75 @@ fn with_own_ids(svg: &str, name: &str) -> String {
     out
 }
 
-/// PSNR over ratio, a line a method, with the paper's means.
-fn psnr_ratio(grid: &Grid<'_>) -> Chart {
-    let mut series = Vec::new();
-    for &method in &grid.methods {
-        let (points, band) = psnr_over_ratio(&curve(grid, method, Kind::Tolerances, None));
-        if !points.is_empty() {
-            series.push(Series { band, ..line(method, SOLID, points) });
-        }
+/// PSNR over ratio: over all scenes with the paper's means, or of one scene.
+fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
+    let lines = grid.methods.iter();
+    let lines = lines.map(|&method| psnr_line(method, SOLID, &curve(grid, method, Kind::Tolerances, column)));
+    let mut series: Vec<Series> = lines.filter(|line| !line.points.is_empty()).collect();
+    let mut legends = vec![method_keys(grid, &series, true)];
+    let title = "Quality against the paper's compression ratio";
+    if let Some(column) = column {
+        let heading = &grid.headings[column];
+        return Chart {
+            name: format!("scene-{}", file_name(heading)),
+            title: format!("{title}: {heading}"),
+            caption: format!("{heading} at each tolerance; the band is from the worst to the best view."),
+            ..Chart::over_ratio(PSNR, series, legends)
+        };
     }
-    let mut keys = vec![methods(grid, &series)];
     if !series.is_empty() {
-        let mut of_paper = Vec::new();
+        let mut keys = Vec::new();
         for method in [Method::Gs3d, Method::Mcmc, Method::PixelGs] {
-            let mean = |quantity| paper::mean(paper::Table::Main, method, quantity).map(|mean| mean.computed);
-            if let (Some(ratio), Some(psnr)) = (mean(Quantity::Ratio), mean(Quantity::Psnr)) {
-                let colour = look(method).0;
-                let points = vec![(ratio, psnr)];
-                series.push(Series { mark: Some(Mark::Cross), joined: false, ..line(method, SOLID, points) });
-                of_paper.push(Key {
-                    text: method.title().to_owned(),
-                    colour,
-                    dash: SOLID,
-                    mark: Some(Mark::Cross),
-                });
+            let mean = |quantity| Some(paper::mean(paper::Experiment::Main, method, quantity)?.computed);
+            if let Some(point) = mean(Quantity::Ratio).zip(mean(Quantity::Psnr)) {
+                let mark = Some(Mark::Cross);
+                series.push(Series { mark, joined: false, ..line(method, SOLID, vec![point]) });
+                keys.push(key(method.title(), look(method).0, SOLID, mark));
             }
         }
-        keys.push(("Paper, tol 0.1", of_paper));
+        legends.push(("Paper, tol 0.1", keys));
     }
     Chart {
         name: "psnr-ratio".to_owned(),
-        title: "Quality against the paper's compression ratio".to_owned(),
+        title: title.to_owned(),
         caption: "Means over scenes at each tolerance; the band is from the worst to the best scene. Crosses are the paper's means \
                   over its 13 scenes at tol 0.1."
             .to_owned(),
-        x: RATIO,
-        x_unit: "\u{d7}",
-        y: PSNR.to_owned(),
-        from_zero: false,
-        series,
-        keys,
+        ..Chart::over_ratio(PSNR, series, legends)
     }
 }
 
-/// PSNR over ratio of one scene.
-fn scene(grid: &Grid<'_>, column: usize) -> Chart {
+/// FPS over ratio for kinds of settings. The original's are dashed.
+fn fps_lines(grid: &Grid<'_>, kinds: &[Kind]) -> Vec<Series> {
     let mut series = Vec::new();
     for &method in &grid.methods {
-        let (points, band) = psnr_over_ratio(&curve(grid, method, Kind::Tolerances, Some(column)));
-        if !points.is_empty() {
-            series.push(Series { band, ..line(method, SOLID, points) });
-        }
-    }
-    let keys = vec![methods(grid, &series)];
-    let heading = grid.columns.get(column).cloned().unwrap_or_default();
-    Chart {
-        name: format!("scene-{}", safe(&heading)),
-        title: format!("Quality against the paper's compression ratio: {heading}"),
-        caption: format!("{heading} at each tolerance; the band is from the worst to the best view."),
-        x: RATIO,
-        x_unit: "\u{d7}",
-        y: PSNR.to_owned(),
-        from_zero: false,
-        series,
-        keys,
-    }
-}
-
-/// FPS over ratio for the given kinds of settings, dense ones dashed.
-fn fps_series(grid: &Grid<'_>, kinds: &[(Kind, &'static str)]) -> Vec<Series> {
-    let mut series = Vec::new();
-    for &method in &grid.methods {
-        for &(kind, dash) in kinds {
+        for &kind in kinds {
             let points = curve(grid, method, kind, None);
-            let sparse: Vec<_> = points.iter().filter_map(|at| Some((at.ratio?, at.fps?))).collect();
-            if sparse.is_empty() {
-                continue;
-            }
-            series.push(line(method, dash, sparse));
+            let over_ratio =
+                |measure| points.iter().filter_map(|at| at.ratio().zip(at.mean(measure))).collect();
+            series.push(line(method, kind_look(kind).0, over_ratio(Measure::SparseFps)));
             if kind == Kind::Tolerances {
-                let dense = points.iter().filter_map(|at| Some((at.ratio?, at.fps_dense?))).collect();
-                series.push(Series { mark: None, ..line(method, DASHED, dense) });
+                series.push(Series { mark: None, ..line(method, DASHED, over_ratio(Measure::DenseFps)) });
             }
         }
     }
     series
 }
 
-/// What FPS were measured on, for an axis.
-fn fps_label(grid: &Grid<'_>) -> String {
+/// A chart of FPS, its axis named for the device that they were measured on.
+fn fps_chart(grid: &Grid<'_>, kinds: &[Kind], legend: Legend) -> Chart {
+    let series = fps_lines(grid, kinds);
     let device = grid.device();
-    if device.chars().count() > LONGEST_DEVICE {
-        "Frames a second".to_owned()
-    } else {
-        format!("Frames a second ({device})")
-    }
+    let axis = match device.chars().count() {
+        ..=LONGEST_DEVICE => format!("Frames a second ({device})"),
+        _ => "Frames a second".to_owned(),
+    };
+    let legends = vec![method_keys(grid, &series, true), legend];
+    Chart { from_zero: true, ..Chart::over_ratio(&axis, series, legends) }
 }
 
-fn fps_ratio(grid: &Grid<'_>) -> Chart {
-    let series = fps_series(grid, &[(Kind::Tolerances, SOLID)]);
-    let keys = vec![
-        methods(grid, &series),
-        ("Drawn from", vec![key("codes", SOLID, None), key("dense SH", DASHED, None)]),
-    ];
+fn speed(grid: &Grid<'_>) -> Chart {
+    let keys = vec![dash_key("codes", SOLID), dash_key("dense SH", DASHED)];
     Chart {
         name: "fps-ratio".to_owned(),
         title: "Speed against the paper's compression ratio".to_owned(),
@@ -245,45 +216,26 @@ fn fps_ratio(grid: &Grid<'_>) -> Chart {
             "Means over scenes at each tolerance, drawn on {}. Dashed: the original from dense SH, measured beside it.",
             grid.device()
         ),
-        x: RATIO,
-        x_unit: "\u{d7}",
-        y: fps_label(grid),
-        from_zero: true,
-        series,
-        keys,
+        ..fps_chart(grid, &[Kind::Tolerances], ("Drawn from", keys))
     }
 }
 
-/// How kinds of settings look where they stand side by side.
-fn kind_look(kind: Kind) -> (&'static str, Mark, &'static str) {
-    match kind {
-        Kind::Tolerances => (SOLID, Mark::Circle, "tolerances"),
-        Kind::Caps => (DOTTED, Mark::Triangle, "capped nonzeros"),
-        Kind::Presets => (DASHED, Mark::Square, "packed presets"),
-    }
-}
-
-fn bytes_psnr(grid: &Grid<'_>) -> Chart {
+fn bytes(grid: &Grid<'_>) -> Chart {
     let mut series = Vec::new();
-    let mut kinds = Vec::new();
+    let mut keys = Vec::new();
     for kind in Kind::ALL {
         let (dash, mark, name) = kind_look(kind);
         let before = series.len();
         for &method in &grid.methods {
-            let points: Vec<_> = curve(grid, method, kind, None)
-                .iter()
-                .filter_map(|at| Some((at.bytes_each?, at.psnr.mean?)))
-                .collect();
-            if !points.is_empty() {
-                series.push(Series { mark: Some(mark), ..line(method, dash, points) });
-            }
+            let points = curve(grid, method, kind, None);
+            let points = points.iter().filter_map(|at| at.mean(Measure::BytesEach).zip(at.psnr().mean));
+            series.push(Series { mark: Some(mark), ..line(method, dash, points.collect()) });
         }
-        if series.len() > before {
-            kinds.push(key(name, dash, Some(mark)));
+        if series[before..].iter().any(|line| !line.points.is_empty()) {
+            keys.push(key(name, NEUTRAL, dash, Some(mark)));
         }
     }
-    let (title, methods) = methods(grid, &series);
-    let methods = methods.into_iter().map(|key| Key { mark: None, ..key }).collect();
+    let legends = vec![method_keys(grid, &series, false), ("Settings", keys)];
     Chart {
         name: "bytes-psnr".to_owned(),
         title: "Quality against real size".to_owned(),
@@ -292,68 +244,50 @@ fn bytes_psnr(grid: &Grid<'_>) -> Chart {
             .to_owned(),
         x: "Bytes a Gaussian, whole file (log scale)",
         x_unit: "",
-        y: PSNR.to_owned(),
-        from_zero: false,
-        series,
-        keys: vec![(title, methods), ("Settings", kinds)],
+        ..Chart::over_ratio(PSNR, series, legends)
     }
 }
 
-/// PSNR and FPS as far as settings go. Nothing without capped nonzeros and tolerances beyond the paper's.
-fn levels(grid: &Grid<'_>) -> Vec<Chart> {
-    let far = grid.settings.iter().any(|setting| match setting {
+/// PSNR and FPS as far as the settings go. `None` without capped nonzeros and tolerances beyond the paper's.
+fn saturation(grid: &Grid<'_>) -> Option<[Chart; 2]> {
+    let is_far = |setting: &Setting| match setting {
         Setting::Tolerance(tolerance) => *tolerance > paper::TOLERANCES[3],
         Setting::MaxNonzeros(_) => true,
         Setting::Preset(_) => false,
-    });
-    if !far {
-        return Vec::new();
+    };
+    if !grid.settings.iter().any(is_far) {
+        return None;
     }
     let mut series = Vec::new();
     let mut floors: Vec<(Method, f64)> = Vec::new();
     for &method in &grid.methods {
         for kind in [Kind::Tolerances, Kind::Caps] {
             let points = curve(grid, method, kind, None);
-            let (over_ratio, _) = psnr_over_ratio(&points);
-            if !over_ratio.is_empty() {
-                series.push(line(method, kind_look(kind).0, over_ratio));
-            }
-            let dropped = points.iter().find(|at| at.setting == Setting::MaxNonzeros(0));
-            floors.extend(dropped.and_then(|at| at.psnr.mean).map(|psnr| (method, psnr)));
+            series.push(Series { band: Vec::new(), ..psnr_line(method, kind_look(kind).0, &points) });
+            let without_sh = points.iter().find(|at| at.setting == Setting::MaxNonzeros(0));
+            floors.extend(without_sh.and_then(|at| Some((method, at.psnr().mean?))));
         }
     }
-    let ratios: Vec<f64> = series.iter().flat_map(|series| &series.points).map(|point| point.0).collect();
+    let ratios: Vec<f64> = series.iter().flat_map(|line| &line.points).map(|point| point.0).collect();
     let ends = [f64::min, f64::max].map(|pick| ratios.iter().copied().reduce(pick).unwrap_or(1.0));
     for &(method, psnr) in &floors {
         let points = ends.map(|ratio| (ratio, psnr)).into();
         series.push(Series { mark: None, ..line(method, DASHED, points) });
     }
-    let kinds = |caps: bool| {
-        let mut keys = vec![key("tolerances", SOLID, None)];
-        if caps {
-            keys.push(key("capped nonzeros", DOTTED, None));
-        }
-        keys
+    let keys = |dashed: Option<&str>| {
+        let has_caps = grid.settings.iter().any(|s| matches!(s, Setting::MaxNonzeros(most) if *most > 0));
+        let caps = has_caps.then(|| dash_key("capped nonzeros", DOTTED));
+        let dashed = dashed.map(|text| dash_key(text, DASHED));
+        ("Settings", [Some(dash_key("tolerances", SOLID)), caps, dashed].into_iter().flatten().collect())
     };
-    let has_caps = grid.settings.iter().any(|s| matches!(s, Setting::MaxNonzeros(most) if *most > 0));
-    let mut quality_keys = kinds(has_caps);
-    if !floors.is_empty() {
-        quality_keys.push(key("no SH at all", DASHED, None));
-    }
-    let mut speed_keys = kinds(has_caps);
-    speed_keys.push(key("dense SH", DASHED, None));
+    let no_sh = (!floors.is_empty()).then_some("no SH at all");
+    let legends = vec![method_keys(grid, &series, true), keys(no_sh)];
     let quality = Chart {
         name: "levels-psnr".to_owned(),
         title: "Does quality level off?".to_owned(),
         caption: "Means over scenes, as far as the settings go: down to one nonzero a Gaussian and to none, where measured.".to_owned(),
-        x: RATIO,
-        x_unit: "\u{d7}",
-        y: PSNR.to_owned(),
-        from_zero: false,
-        keys: vec![methods(grid, &series), ("Settings", quality_keys)],
-        series,
+        ..Chart::over_ratio(PSNR, series, legends)
     };
-    let series = fps_series(grid, &[(Kind::Tolerances, SOLID), (Kind::Caps, DOTTED)]);
     let speed = Chart {
         name: "levels-fps".to_owned(),
         title: "Does speed level off?".to_owned(),
@@ -361,14 +295,9 @@ fn levels(grid: &Grid<'_>) -> Vec<Chart> {
             "Means over scenes, drawn on {}. Dashed: the original from dense SH.",
             grid.device()
         ),
-        x: RATIO,
-        x_unit: "\u{d7}",
-        y: fps_label(grid),
-        from_zero: true,
-        keys: vec![methods(grid, &series), ("Settings", speed_keys)],
-        series,
+        ..fps_chart(grid, &[Kind::Tolerances, Kind::Caps], keys(Some("dense SH")))
     };
-    vec![quality, speed]
+    Some([quality, speed])
 }
 
 #[cfg(test)]
@@ -425,7 +354,7 @@ mod tests {
         assert!(text("bytes-psnr", "packed presets") && text("bytes-psnr", "capped nonzeros"));
         assert!(text("levels-psnr", "no SH at all") && text("fps-ratio", "dense SH"));
         assert!(text("fps-ratio", "Frames a second (CPU)"));
-        let escaped = crate::report::text::escape(ODD).replace("&#39;", "&apos;");
+        let escaped = maud::html! { (ODD) }.into_string().replace('\'', "&apos;");
         assert!(figures[6].svg.contains(&escaped), "{}", figures[6].svg);
     }
 

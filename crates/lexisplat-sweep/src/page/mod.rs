@@ -1,73 +1,60 @@
 //! One self-contained HTML page about a sweep.
 //!
 //! The page carries its styles, script, figures and pictures in itself and forbids itself any request.
-//! Without scripts it still shows everything; it follows the reader's light or dark theme.
+//! Without scripts it still shows everything. It follows the reader's light or dark theme.
 
-mod facts;
+mod cards;
 mod sections;
 
-use std::fmt::Write;
+use maud::{PreEscaped, html};
 
-use facts::Facts;
+use super::grid::Grid;
+use super::{Figure, Results, SweepPicture};
 
-use super::{Figure, Method, Results};
-
-/// The page's own style comes after that of the other report.
+/// The style sheet of the report about one scene. [`STYLE`] extends it.
 const BASE_STYLE: &str = include_str!("../report/page.css");
 const STYLE: &str = include_str!("sweep.css");
 const SCRIPT: &str = include_str!("sweep.js");
-
-/// One view of a model and of what compressing made of it, as PNG files of one size.
-#[derive(Debug, Clone, Copy)]
-pub struct SweepPicture<'a> {
-    /// The scene's name.
-    pub scene: &'a str,
-    /// Who trained it.
-    pub method: Method,
-    /// [`Setting::label`](super::Setting::label) of how it was compressed.
-    pub setting_label: &'a str,
-    /// The view's name.
-    pub view: &'a str,
-    /// The original.
-    pub original_png: &'a [u8],
-    /// The compressed.
-    pub compressed_png: &'a [u8],
-    /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
-    pub difference_png: &'a [u8],
-    /// The photo from there, if there is one.
-    pub photo_png: Option<&'a [u8]>,
-}
+const POLICY: &str =
+    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// The page as UTF-8 text; the same input gives the same page. `date` is printed as it is.
 #[must_use]
 pub fn sweep_html(
     results: &Results,
     figures: &[Figure],
-    pictures: &[SweepPicture<'_>],
+    pictures: &[SweepPicture],
     date: Option<&str>,
 ) -> String {
-    let facts = Facts::new(results);
-    let mut page = String::with_capacity(1 << 18);
-    let _ = write!(
-        page,
-        "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
-         <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; \
-         style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\
-         <title>Sweep \u{b7} lexisplat</title>\n<style>\n{BASE_STYLE}{STYLE}</style></head>\n<body>\n"
-    );
-    sections::header(&mut page, &facts, date);
-    page.push_str("<main>\n");
-    sections::pictures(&mut page, &facts, pictures);
-    sections::figures(&mut page, figures);
-    sections::levels(&mut page, &facts, figures);
-    sections::tables(&mut page, &facts);
-    sections::paper(&mut page, &facts);
-    sections::details(&mut page, &facts, figures);
-    page.push_str("</main>\n");
-    sections::footer(&mut page, &facts, date);
-    let _ = writeln!(page, "<script>\n{SCRIPT}</script>\n</body></html>");
-    page
+    let grid = Grid::new(results);
+    html! {
+        (PreEscaped("<!doctype html>\n"))
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                meta name="viewport" content="width=device-width, initial-scale=1";
+                meta http-equiv="Content-Security-Policy" content=(POLICY);
+                title { "Sweep \u{b7} lexisplat" }
+                style { "\n" (PreEscaped(BASE_STYLE)) (PreEscaped(STYLE)) }
+            }
+            "\n"
+            body {
+                (sections::header(&grid, date))
+                main {
+                    (sections::pictures(results, pictures))
+                    (sections::figures(figures))
+                    (sections::saturation(results, figures))
+                    (sections::tables(results))
+                    (sections::paper(results))
+                    (sections::details(results, figures))
+                }
+                (sections::footer(results, date))
+                script { "\n" (PreEscaped(SCRIPT)) }
+            }
+        }
+        "\n"
+    }
+    .into_string()
 }
 
 #[cfg(test)]
@@ -76,18 +63,21 @@ mod tests {
     use super::super::testing::{ODD, results};
     use super::*;
     use crate::report::testing::check_nesting;
-    use crate::report::text::escape;
 
-    fn picture<'a>(setting_label: &'a str, view: &'a str, photo_png: Option<&'a [u8]>) -> SweepPicture<'a> {
+    /// `text` as the page has it.
+    fn escape(text: &str) -> String {
+        html! { (text) }.into_string()
+    }
+
+    fn picture(setting: &str, view: &str, photo: Option<&[u8]>) -> SweepPicture {
         SweepPicture {
-            scene: ODD,
-            method: Method::Mcmc,
-            setting_label,
-            view,
-            original_png: b"one",
-            compressed_png: b"two",
-            difference_png: b"three",
-            photo_png,
+            scene: 3,
+            setting: setting.to_owned(),
+            view: view.to_owned(),
+            original: b"one".into(),
+            compressed: b"two".into(),
+            difference: b"three".into(),
+            photo: photo.map(Into::into),
         }
     }
 
@@ -131,10 +121,10 @@ mod tests {
             assert!(page.contains(&escape(text)), "{text}");
         }
         assert!(!page.contains(ODD) && !page.contains("<May>"));
-        for note in super::super::NOTES {
+        for note in super::super::NOTES.iter() {
             assert!(page.contains(&escape(note.title)), "{}", note.title);
         }
-        for paragraph in super::super::level_off(&results) {
+        for paragraph in super::super::saturation(&results) {
             assert!(page.contains(&escape(&paragraph)));
         }
         // 42 dB of bonsai by two methods' means: (42 + 44 + 40) / 3; garden is identical.

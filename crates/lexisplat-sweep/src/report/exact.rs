@@ -1,6 +1,7 @@
 //! The parts of the page about the file in an exact layout: the paper's method and the bound on its error.
 
 use lexisplat::{CodeLayout, Layout, Pursuit, Record};
+use lexisplat_eval::format;
 use maud::{Markup, PreEscaped, html};
 
 use super::atoms::{self, Usage};
@@ -86,7 +87,7 @@ impl<'a> Facts<'a> {
                         @if packed::ply_groups(report)[0] > report.ply_bytes as f64 / 2.0 { ": most of the PLY" } "."
                     }
                     li {
-                        strong { "Learn" } "From a sample of them, " (text::count(model.dictionary().len() as u64))
+                        strong { "Learn" } "From a sample of them, " (format::count(model.dictionary().len() as u64))
                         " typical patterns were learnt: the dictionary\u{2019}s atoms." (seconds(report.learn_seconds))
                     }
                     li {
@@ -101,7 +102,7 @@ impl<'a> Facts<'a> {
                         @match model.codes().escapes().gaussians.len() {
                             0 => "All of them are within the bound.",
                             1 => "One that did not fit is stored exactly.",
-                            n => { (text::count(n as u64)) " that did not fit are stored exactly." }
+                            n => { (format::count(n as u64)) " that did not fit are stored exactly." }
                         }
                     }
                 }
@@ -136,7 +137,7 @@ impl<'a> Facts<'a> {
         html! {
             .bound {
                 p {
-                    b { "Kept for all " (text::count(self.gaussians)) " Gaussians." }
+                    b { "Kept for all " (format::count(self.gaussians)) " Gaussians." }
                     " None is further than " (tolerance) " from its original, measured as the length of the difference of its "
                     (self.dim) " numbers. The furthest is at " (format!("{max:.8}")) ", the typical one (root mean square) at "
                     (format!("{rms:.4}")) "."
@@ -167,7 +168,7 @@ impl<'a> Facts<'a> {
                     b {
                         @match record.tolerance {
                             Some(tolerance) => {
-                                (text::count(record.over_tolerance)) " Gaussians are further than " (tolerance)
+                                (format::count(record.over_tolerance)) " Gaussians are further than " (tolerance)
                                 " from their original"
                             }
                             None => "There is no bound on a Gaussian\u{2019}s error",
@@ -212,7 +213,7 @@ impl<'a> Facts<'a> {
                 .panel {
                     .histogram role="img" aria-label=(format!("How many Gaussians need how many atoms; {mean}")) {
                         @for (k, &n) in counts[..used].iter().enumerate() {
-                            span title=(format!("{k} atoms: {} Gaussians ({:.1}%)", text::count(n), n as f64 / total * 100.0)) {
+                            span title=(format!("{k} atoms: {} Gaussians ({:.1}%)", format::count(n), n as f64 / total * 100.0)) {
                                 i.g-codes style=(format!("height:{:.2}%", n as f64 / tallest * 100.0)) {}
                                 small { @if k.is_multiple_of(5) { (k) } }
                             }
@@ -249,7 +250,7 @@ impl<'a> Facts<'a> {
                 .panel {
                     #atoms tabindex="0" role="img" aria-label=(format!("{which} as balls")) {
                         @for (atom, users) in usage.shown() {
-                            figure title=(format!("atom {atom}: {} Gaussians", text::count(*users))) {
+                            figure title=(format!("atom {atom}: {} Gaussians", format::count(*users))) {
                                 canvas {}
                                 figcaption { (format!("{:.1}%", *users as f64 / self.gaussians.max(1) as f64 * 100.0)) }
                             }

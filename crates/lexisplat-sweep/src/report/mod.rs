@@ -8,7 +8,7 @@
 mod atoms;
 mod exact;
 mod packed;
-pub(crate) mod text;
+mod text;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;

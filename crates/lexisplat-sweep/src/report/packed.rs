@@ -1,7 +1,7 @@
 //! The parts of the page about the packed file, and those that show both files beside each other.
 
 use lexisplat::sh::CHANNELS;
-use lexisplat_eval::Comparison;
+use lexisplat_eval::{Comparison, format};
 use maud::{Markup, html};
 
 use super::{CompressedFile, Picture, Report, card, embedded, smaller, text};
@@ -59,7 +59,7 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
             h1 { (text::bytes(*ply_bytes)) " became " em { (text::bytes(packed.bytes)) } }
             p.lede {
                 strong { (report.title) }
-                " is a 3D scene made of " (text::count(gaussians)) " soft coloured blobs, so-called Gaussians, whose \
+                " is a 3D scene made of " (format::count(gaussians)) " soft coloured blobs, so-called Gaussians, whose \
                  colour changes with the side you look from. lexisplat rounded each of their numbers as finely as the \
                  pictures need it, and stored them in as few bits as possible. No photos, cameras or training were needed."
             }

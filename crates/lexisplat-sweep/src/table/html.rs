@@ -1,59 +1,51 @@
 //! Tables as HTML.
 
-use std::fmt::Write;
+use maud::{Markup, html};
 
-use super::{Cell, Style, Table};
-use crate::report::text::escape;
+use super::{Cell, Row, Style, Table};
 
-pub(super) fn write(table: &Table) -> String {
-    let mut out = String::from("<table>");
-    if !table.caption.is_empty() {
-        let _ = write!(out, "<caption>{}</caption>", escape(&table.caption));
+/// The classes of a row in the page's style sheet.
+fn classes(row: &Row) -> Option<&'static str> {
+    match (row.rule, row.style) {
+        (false, Style::Plain) => None,
+        (true, Style::Plain) => Some("rule"),
+        (false, Style::Paper) => Some("paper"),
+        (true, Style::Paper) => Some("rule paper"),
+        (false, Style::Total) => Some("total"),
+        (true, Style::Total) => Some("rule total"),
     }
-    out.push_str("<thead>");
-    if !table.groups.is_empty() {
-        out.push_str("<tr>");
-        for (name, wide) in &table.groups {
-            let _ = write!(out, "<th scope=\"colgroup\" colspan=\"{wide}\">{}</th>", escape(name));
-        }
-        out.push_str("</tr>");
-    }
-    out.push_str("<tr>");
-    for (column, heading) in table.header.iter().enumerate() {
-        let class = if column < table.labels { " class=\"name\"" } else { "" };
-        let _ = write!(out, "<th scope=\"col\"{class}>{}</th>", escape(heading));
-    }
-    out.push_str("</tr></thead><tbody>\n");
-    for row in &table.rows {
-        let mut classes = Vec::new();
-        if row.rule {
-            classes.push("rule");
-        }
-        match row.style {
-            Style::Plain => (),
-            Style::Paper => classes.push("paper"),
-            Style::Total => classes.push("total"),
-        }
-        if classes.is_empty() {
-            out.push_str("<tr>");
-        } else {
-            let _ = write!(out, "<tr class=\"{}\">", classes.join(" "));
-        }
-        for column in 0..table.header.len() {
-            let cell = Table::cell(row, column);
-            let text = escape(&cell.shown());
-            if column < table.labels {
-                let _ = write!(out, "<th scope=\"row\" class=\"name\">{text}</th>");
-            } else if matches!(cell, Cell::Missing) {
-                let _ = write!(out, "<td class=\"none\">{text}</td>");
-            } else {
-                let _ = write!(out, "<td>{text}</td>");
+}
+
+pub(super) fn write(table: &Table) -> Markup {
+    let groups = table.groups();
+    let name = |column| (column < table.labels).then_some("name");
+    html! {
+        table {
+            @if !table.caption.is_empty() { caption { (table.caption) } }
+            thead {
+                @if !groups.is_empty() {
+                    tr { @for (name, wide) in groups { th scope="colgroup" colspan=(wide) { (name) } } }
+                }
+                tr { @for (i, column) in table.columns.iter().enumerate() { th scope="col" class=[name(i)] { (column.heading) } } }
+            }
+            tbody {
+                "\n"
+                @for row in &table.rows {
+                    tr class=[classes(row)] {
+                        @for column in 0..table.columns.len() {
+                            @let cell = row.cell(column);
+                            @if column < table.labels {
+                                th scope="row" class="name" { (cell.shown()) }
+                            } @else {
+                                td class=[(*cell == Cell::Missing).then_some("none")] { (cell.shown()) }
+                            }
+                        }
+                    }
+                    "\n"
+                }
             }
         }
-        out.push_str("</tr>\n");
     }
-    out.push_str("</tbody></table>");
-    out
 }
 
 #[cfg(test)]

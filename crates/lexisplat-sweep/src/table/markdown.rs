@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use super::{Style, Table, one_line};
 
-/// `text` with everything Markdown gives a meaning inside a table cell taken literally.
+/// `text` with every character that has a meaning in a Markdown table escaped.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in one_line(text).chars() {
@@ -24,18 +24,18 @@ pub(crate) fn escape(text: &str) -> String {
 
 pub(super) fn write(table: &Table) -> String {
     let mut out = String::from("|");
-    for heading in table.full_header() {
-        let _ = write!(out, " {} |", escape(&heading));
+    for column in &table.columns {
+        let _ = write!(out, " {} |", escape(&column.full()));
     }
     out.push_str("\n|");
-    for column in 0..table.header.len() {
+    for column in 0..table.columns.len() {
         out.push_str(if column < table.labels { "---|" } else { "---:|" });
     }
     out.push('\n');
     for row in &table.rows {
         out.push('|');
-        for column in 0..table.header.len() {
-            let text = escape(&Table::cell(row, column).shown());
+        for column in 0..table.columns.len() {
+            let text = escape(&row.cell(column).shown());
             let mark = match row.style {
                 Style::Total if !text.is_empty() => "**",
                 Style::Paper if !text.is_empty() => "*",

@@ -6,10 +6,9 @@ mod markdown;
 
 pub(super) use markdown::escape as escape_markdown;
 
-use super::csv;
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 
-/// What stands where there is nothing to print; CSV leaves the cell empty.
+/// What stands for a missing value; CSV leaves the cell empty.
 const DASH: &str = "\u{2013}";
 
 /// One cell.
@@ -17,23 +16,18 @@ const DASH: &str = "\u{2013}";
 pub enum Cell {
     /// Words.
     Text(String),
-    /// A finite number, printed with so many digits after the point; CSV has it in full.
+    /// A finite number. CSV has it in full.
     Number {
         /// The number.
         value: f64,
         /// Digits after the point.
         digits: usize,
-    },
-    /// A difference: as [`Cell::Number`], always with its sign.
-    Change {
-        /// The number.
-        value: f64,
-        /// Digits after the point.
-        digits: usize,
+        /// Whether a sign is always printed: the number is a difference.
+        signed: bool,
     },
     /// A whole number.
     Count(u64),
-    /// Nothing: not measured, or there is no such thing.
+    /// No value: it was not measured, or does not exist.
     Missing,
 }
 
@@ -44,68 +38,74 @@ impl Cell {
         Self::Text(text.into())
     }
 
-    /// A number; missing if there is none or it is not finite.
+    /// A number. `None` and numbers that are not finite are missing.
     #[must_use]
     pub fn number(value: Option<f64>, digits: usize) -> Self {
-        value.filter(|v| v.is_finite()).map_or(Self::Missing, |value| Self::Number { value, digits })
+        value.filter(|v| v.is_finite()).map_or(Self::Missing, |value| Self::Number {
+            value,
+            digits,
+            signed: false,
+        })
     }
 
-    /// A difference; missing if there is none or it is not finite.
+    /// A difference, printed with its sign. `None` and numbers that are not finite are missing.
     #[must_use]
     pub fn change(value: Option<f64>, digits: usize) -> Self {
-        value.filter(|v| v.is_finite()).map_or(Self::Missing, |value| Self::Change { value, digits })
+        match Self::number(value, digits) {
+            Self::Number { value, digits, .. } => Self::Number { value, digits, signed: true },
+            missing => missing,
+        }
     }
 
     /// The number in the cell.
     #[must_use]
     pub fn value(&self) -> Option<f64> {
         match self {
-            Self::Number { value, .. } | Self::Change { value, .. } => Some(*value),
+            Self::Number { value, .. } => Some(*value),
             Self::Count(count) => Some(*count as f64),
             Self::Text(_) | Self::Missing => None,
         }
     }
 
-    /// As people read it, not escaped.
+    /// The text for people, not escaped for any format.
     #[must_use]
     pub fn shown(&self) -> String {
         match self {
             Self::Text(text) => one_line(text),
-            Self::Number { value, digits } => {
+            Self::Number { value, digits, signed: true } => format!("{value:+.digits$}"),
+            Self::Number { value, digits, signed: false } => {
                 let text = format!("{value:.digits$}");
                 // A small negative number must not become "-0.00".
-                if text.trim_start_matches('-').chars().all(|c| c == '0' || c == '.') {
-                    text.trim_start_matches('-').to_owned()
-                } else {
-                    text
+                match text.strip_prefix('-') {
+                    Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+                    _ => text,
                 }
             }
-            Self::Change { value, digits } => format!("{value:+.digits$}"),
-            Self::Count(count) => text::count(*count),
+            Self::Count(count) => format::count(*count),
             Self::Missing => DASH.to_owned(),
         }
     }
 
-    /// As programs read it, not quoted.
-    fn plain(&self) -> String {
+    /// The text for programs, not quoted.
+    fn in_full(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
-            Self::Number { value, .. } | Self::Change { value, .. } => value.to_string(),
+            Self::Number { value, .. } => value.to_string(),
             Self::Count(count) => count.to_string(),
             Self::Missing => String::new(),
         }
     }
 }
 
-/// `text` without line ends and other control characters, which would break a row.
+/// `text` with control characters, which would break a row, replaced by spaces.
 fn one_line(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect()
+    text.replace(char::is_control, " ")
 }
 
-/// What a row is.
+/// The kind of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Style {
-    /// A row like any other.
+    /// Measured values.
     #[default]
     Plain,
     /// Numbers of the paper.
@@ -117,27 +117,66 @@ pub enum Style {
 /// One row.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Row {
-    /// As many as the table has columns.
+    /// One cell for each column. Missing ones are printed as dashes.
     pub cells: Vec<Cell>,
-    /// What it is.
+    /// The kind of the row.
     pub style: Style,
-    /// Whether a line above sets it off from the rows before.
+    /// Whether a line above separates the row from the rows before it.
     pub rule: bool,
 }
 
-/// A table. Rows with fewer cells than the header are filled up with dashes.
+impl Row {
+    /// A row of `labels`, then `cells`.
+    pub(crate) fn new<const N: usize>(labels: [&str; N], cells: impl IntoIterator<Item = Cell>) -> Self {
+        Self { cells: labels.map(Cell::text).into_iter().chain(cells).collect(), ..Self::default() }
+    }
+
+    /// The row with another style.
+    pub(crate) fn styled(self, style: Style) -> Self {
+        Self { style, ..self }
+    }
+
+    /// The cell of a column.
+    fn cell(&self, column: usize) -> &Cell {
+        self.cells.get(column).unwrap_or(&Cell::Missing)
+    }
+}
+
+/// One column.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Column {
+    /// Heading over this column and neighbours of the same group; may be empty.
+    pub group: String,
+    /// Heading of the column alone, with its unit.
+    pub heading: String,
+}
+
+impl Column {
+    /// A column that belongs to no group.
+    pub(crate) fn new(heading: impl Into<String>) -> Self {
+        Self { heading: heading.into(), ..Self::default() }
+    }
+
+    /// Both headings: `Size: bytes`.
+    fn full(&self) -> String {
+        if self.group.is_empty() { self.heading.clone() } else { format!("{}: {}", self.group, self.heading) }
+    }
+}
+
+/// A column of a table whose rows are made from records of type `R`: group, heading, and the cell of a record.
+pub(crate) type Field<'a, R> = (&'a str, &'a str, &'a dyn Fn(&R) -> Cell);
+
+/// A table.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Table {
     /// Name for files: lower case, digits, `-`.
     pub name: &'static str,
-    /// What it shows, in a few words.
+    /// What the table shows, in a few words.
     pub title: String,
     /// How to read it; may be empty.
     pub caption: String,
-    /// Headings over several columns, from the left: text (may be empty) and number of columns. May be empty.
-    pub groups: Vec<(String, usize)>,
-    /// Heading of each column.
-    pub header: Vec<String>,
+    /// From left to right.
+    pub columns: Vec<Column>,
     /// How many columns, from the left, name the row.
     pub labels: usize,
     /// From top to bottom.
@@ -145,28 +184,61 @@ pub struct Table {
 }
 
 impl Table {
+    /// A table without columns and rows.
+    pub(crate) fn new(name: &'static str, title: impl Into<String>, caption: impl Into<String>) -> Self {
+        Self { name, title: title.into(), caption: caption.into(), ..Self::default() }
+    }
+
+    /// The table with these columns, of which the first `labels` name the row.
+    pub(crate) fn with_columns(mut self, labels: usize, columns: impl IntoIterator<Item = Column>) -> Self {
+        self.labels = labels;
+        self.columns.extend(columns);
+        self
+    }
+
+    /// The table with a column for each of `fields` and a row for each record. A line separates the blocks.
+    pub(crate) fn with_records<R>(
+        self,
+        labels: usize,
+        fields: &[Field<'_, R>],
+        blocks: impl IntoIterator<Item = Vec<R>>,
+    ) -> Self {
+        let columns = fields
+            .iter()
+            .map(|&(group, heading, _)| Column { group: group.to_owned(), heading: heading.to_owned() });
+        let mut table = self.with_columns(labels, columns);
+        for block in blocks {
+            let row = |record| Row {
+                cells: fields.iter().map(|field| field.2(record)).collect(),
+                ..Row::default()
+            };
+            table.push_block(block.iter().map(row));
+        }
+        table
+    }
+
+    /// Appends rows, and separates them from those above.
+    pub(crate) fn push_block(&mut self, rows: impl IntoIterator<Item = Row>) {
+        let first = self.rows.len();
+        self.rows.extend(rows);
+        if let Some(row) = self.rows.get_mut(first).filter(|_| first > 0) {
+            row.rule = true;
+        }
+    }
+
     /// Whether there are no rows.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
-    /// Headings with the group each stands in before it: `Size: bytes`.
-    fn full_header(&self) -> Vec<String> {
-        let mut groups =
-            self.groups.iter().flat_map(|(name, columns)| std::iter::repeat_n(name.as_str(), *columns));
-        self.header
-            .iter()
-            .map(|heading| match groups.next() {
-                Some(group) if !group.is_empty() => format!("{group}: {heading}"),
-                _ => heading.clone(),
-            })
-            .collect()
-    }
-
-    /// The cell of a row, or a missing one.
-    fn cell(row: &Row, column: usize) -> &Cell {
-        row.cells.get(column).unwrap_or(&Cell::Missing)
+    /// Groups of neighbouring columns and how many columns each has. Empty if no column has a group.
+    fn groups(&self) -> Vec<(&str, usize)> {
+        if self.columns.iter().all(|column| column.group.is_empty()) {
+            return Vec::new();
+        }
+        let runs = self.columns.chunk_by(|a, b| a.group == b.group);
+        runs.map(|run| (run[0].group.as_str(), run.len())).collect()
     }
 
     /// A Markdown table of the GitHub kind, without title and caption.
@@ -175,20 +247,16 @@ impl Table {
         markdown::write(self)
     }
 
-    /// CSV with a header line; numbers in full, missing ones empty.
+    /// CSV with a header line. Numbers are written in full, missing ones are empty.
     #[must_use]
     pub fn to_csv(&self) -> String {
-        let mut out = String::new();
-        csv::line(&mut out, self.full_header().iter().map(String::as_str));
-        for row in &self.rows {
-            let cells: Vec<String> =
-                (0..self.header.len()).map(|column| Self::cell(row, column).plain()).collect();
-            csv::line(&mut out, cells.iter().map(String::as_str));
-        }
-        out
+        let header = self.columns.iter().map(Column::full).collect();
+        let cells = |row: &Row| (0..self.columns.len()).map(|column| row.cell(column).in_full()).collect();
+        csv_text(std::iter::once(header).chain(self.rows.iter().map(cells)))
     }
 
-    /// A `table` with a `tabular` in it, for a document that uses `booktabs`. Letters beyond
+    /// A `table` environment for a document that uses `booktabs` and `graphicx`. It is never wider than the text:
+    /// it is scaled down, and if that would make it too small to read, split into several parts. Letters beyond
     /// what the document's fonts have need another engine, such as `XeLaTeX`.
     #[must_use]
     pub fn to_latex(&self) -> String {
@@ -198,8 +266,18 @@ impl Table {
     /// A `table` element, caption included.
     #[must_use]
     pub fn to_html(&self) -> String {
-        html::write(self)
+        html::write(self).into_string()
     }
+}
+
+/// Records as CSV (RFC 4180, lines end with a line feed).
+pub(crate) fn csv_text(records: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
+    for record in records {
+        // Writing to memory cannot fail.
+        let _ = writer.write_record(&record);
+    }
+    String::from_utf8_lossy(&writer.into_inner().unwrap_or_default()).into_owned()
 }
 
 #[cfg(test)]
@@ -212,8 +290,9 @@ pub(super) mod testing {
             name: "odd",
             title: "Odd & <ends>".to_owned(),
             caption: "100% of a_b, \"quoted\" {braces}".to_owned(),
-            groups: vec![(String::new(), 1), ("Size & more".to_owned(), 2)],
-            header: vec!["Scene".to_owned(), "a|b".to_owned(), "n".to_owned()],
+            columns: [("", "Scene"), ("Size & more", "a|b"), ("Size & more", "n")]
+                .map(|(group, heading)| Column { group: group.to_owned(), heading: heading.to_owned() })
+                .into(),
             labels: 1,
             rows: vec![
                 Row {

@@ -1,19 +1,20 @@
-//! Real bytes: what every file takes, on disk and while drawing.
+//! Real bytes: what every file takes on disk and while drawing.
 
 use lexisplat::ShDegree;
 use lexisplat::sh::CHANNELS;
 
-use super::{row, ruled};
-use crate::Results;
-use crate::grid::{Grid, quotient};
+use crate::grid::Grid;
+use crate::measure::{DIGITS, Measure, quotient};
 use crate::table::{Cell, Table};
+use crate::{Point, Results, SceneResult};
 
-/// Bytes of a value in a PLY and in memory while drawing dense SH: f32.
+/// Bytes of a value in a PLY, and in memory while drawing dense SH: f32.
 const VALUE: u64 = 4;
-/// Digits of ratios.
-const DIGITS: usize = 2;
 /// Digits of residuals: tolerances have two, rounding shows in the sixth.
 const RESIDUAL_DIGITS: usize = 6;
+const CAPTION: &str = "Whole files, every byte counted; a ratio says how many times smaller. SH is view-dependent colour: its bytes in \
+                       the file are dictionary, counts, indices, values and what is stored exactly, against f32 in the PLY. Resident \
+                       is what colour takes in memory while drawing straight from the codes, base colour included, against dense f32.";
 
 /// Bytes of all SH-rest values as f32, and of all SH values, base colour included.
 fn dense(gaussians: u64, degree: u8) -> (u64, u64) {
@@ -22,93 +23,57 @@ fn dense(gaussians: u64, degree: u8) -> (u64, u64) {
     (each(rest), each(rest + CHANNELS as u64))
 }
 
-/// Every scene in every setting: bytes of files, of view-dependent colour alone, and resident while drawing.
+/// A file: that of a point, or else the one that a competitor ships.
+struct File<'a> {
+    heading: &'a str,
+    scene: &'a SceneResult,
+    point: Option<&'a Point>,
+    bytes: u64,
+}
+
+/// Every scene at every setting: bytes of files, of view-dependent colour alone, and resident while drawing.
 #[must_use]
 pub fn bytes(results: &Results) -> Table {
     let grid = Grid::new(results);
-    let mut rows = Vec::new();
-    for (heading, scene) in grid.scenes() {
-        let (sh_rest, sh) = dense(scene.gaussians, scene.sh_degree);
-        let names = |setting: String| [heading.to_owned(), scene.method.title().to_owned(), setting];
-        let over = |a: u64, b: u64| Cell::number(quotient(a as f64, b as f64), DIGITS);
-        let mut of_scene = Vec::new();
-        if let Some(shipped) = scene.shipped_bytes {
-            let mut cells = vec![
-                Cell::Count(scene.gaussians),
-                Cell::Count(scene.ply_bytes),
-                Cell::Count(shipped),
-                over(scene.ply_bytes, shipped),
-                over(shipped, scene.gaussians),
-            ];
-            cells.resize(HEADER.len() - names(String::new()).len(), Cell::Missing);
-            of_scene.push(row(names("as shipped".to_owned()), cells));
-        }
-        for point in &scene.points {
-            of_scene.push(row(
-                names(point.setting.label()),
-                [
-                    Cell::Count(scene.gaussians),
-                    Cell::Count(scene.ply_bytes),
-                    Cell::Count(point.file_bytes),
-                    over(scene.ply_bytes, point.file_bytes),
-                    over(point.file_bytes, scene.gaussians),
-                    Cell::Count(point.sh_bytes),
-                    over(sh_rest, point.sh_bytes),
-                    Cell::Count(point.resident_sh_bytes),
-                    over(sh, point.resident_sh_bytes),
-                    Cell::Count(point.atoms as u64),
-                    Cell::number(Some(point.mean_nonzeros), DIGITS),
-                    Cell::number(point.coefficient_ratio, DIGITS),
-                    Cell::number(point.max_residual, RESIDUAL_DIGITS),
-                    Cell::Count(point.over_tolerance),
-                    Cell::number(Some(point.seconds), 1),
-                ],
-            ));
-        }
-        rows.extend(ruled(of_scene));
-    }
-    Table {
-        name: "bytes",
-        title: "Real bytes".to_owned(),
-        caption: "Whole files, every byte counted; a ratio says how many times smaller. SH is view-dependent colour: its bytes in the file \
-                  are dictionary, counts, indices, values and what is stored exactly, against f32 in the PLY. Resident is what \
-                  colour takes in memory while drawing straight from the codes, base colour included, against dense f32."
-            .to_owned(),
-        groups: vec![
-            (String::new(), 4),
-            ("Whole file".to_owned(), 4),
-            ("SH in the file".to_owned(), 2),
-            ("SH resident".to_owned(), 2),
-            ("Codes".to_owned(), 3),
-            ("Error".to_owned(), 2),
-            (String::new(), 1),
+    let blocks = grid.scenes().map(|(heading, scene)| {
+        let shipped = scene.shipped_bytes.map(|bytes| File { heading, scene, point: None, bytes });
+        let points = scene.points.iter();
+        let points = points.map(|point| File { heading, scene, point: Some(point), bytes: point.file_bytes });
+        shipped.into_iter().chain(points).collect()
+    });
+    let ratio = |a: u64, b: u64| Cell::number(quotient(a as f64, b as f64), DIGITS);
+    let of_point = |file: &File<'_>, cell: &dyn Fn(&Point) -> Cell| file.point.map_or(Cell::Missing, cell);
+    let sh = |file: &File<'_>| dense(file.scene.gaussians, file.scene.sh_degree);
+    let measure = |file: &File<'_>, measure: Measure| measure.cell(file.scene, file.point);
+    Table::new("bytes", "Real bytes", CAPTION).with_records::<File<'_>>(
+        3,
+        &[
+            ("", "Scene", &|file| Cell::text(file.heading)),
+            ("", "Method", &|file| Cell::text(file.scene.method.title())),
+            ("", "Setting", &|file| {
+                Cell::text(file.point.map_or("as shipped".to_owned(), |p| p.setting.label()))
+            }),
+            ("", "Gaussians", &|file| Cell::Count(file.scene.gaussians)),
+            ("Whole file", "PLY bytes", &|file| Cell::Count(file.scene.ply_bytes)),
+            ("Whole file", "File bytes", &|file| Cell::Count(file.bytes)),
+            ("Whole file", "Ratio", &|file| ratio(file.scene.ply_bytes, file.bytes)),
+            ("Whole file", "Bytes a Gaussian", &|file| ratio(file.bytes, file.scene.gaussians)),
+            ("SH in the file", "Bytes", &|file| of_point(file, &|p| Cell::Count(p.sh_bytes))),
+            ("SH in the file", "Ratio", &|file| of_point(file, &|p| ratio(sh(file).0, p.sh_bytes))),
+            ("SH resident", "Bytes", &|file| of_point(file, &|p| Cell::Count(p.resident_sh_bytes))),
+            ("SH resident", "Ratio", &|file| of_point(file, &|p| ratio(sh(file).1, p.resident_sh_bytes))),
+            ("Codes", "Atoms", &|file| of_point(file, &|p| Cell::Count(p.atoms as u64))),
+            ("Codes", "Mean nonzeros", &|file| measure(file, Measure::MeanNonzeros)),
+            ("Codes", "Comp Ratio (coefficients)", &|file| measure(file, Measure::CoefficientRatio)),
+            ("Error", "Largest residual", &|file| {
+                of_point(file, &|p| Cell::number(p.max_residual, RESIDUAL_DIGITS))
+            }),
+            ("Error", "Over tolerance", &|file| of_point(file, &|p| Cell::Count(p.over_tolerance))),
+            ("", "Seconds", &|file| of_point(file, &|p| Cell::number(Some(p.seconds), 1))),
         ],
-        header: HEADER.map(str::to_owned).into(),
-        labels: 3,
-        rows,
-    }
+        blocks,
+    )
 }
-
-const HEADER: [&str; 18] = [
-    "Scene",
-    "Method",
-    "Setting",
-    "Gaussians",
-    "PLY bytes",
-    "File bytes",
-    "Ratio",
-    "Bytes a Gaussian",
-    "Bytes",
-    "Ratio",
-    "Bytes",
-    "Ratio",
-    "Atoms",
-    "Mean nonzeros",
-    "Comp Ratio (coefficients)",
-    "Largest residual",
-    "Over tolerance",
-    "Seconds",
-];
 
 #[cfg(test)]
 mod tests {

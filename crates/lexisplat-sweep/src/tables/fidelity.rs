@@ -1,86 +1,16 @@
-//! How close the compressed is to the original: the paper's Table 1, all settings, and view by view.
+//! How close the compressed is to the original: the paper's Table 1, all settings, and every single view.
 
-use super::{header, heading, paper_row, printed, row, ruled};
-use crate::grid::{Grid, IDENTICAL, quotient, score};
-use crate::paper::{self, Quantity};
-use crate::table::{Cell, Row, Style, Table};
-use crate::{Method, Results, Setting};
-use lexisplat_eval::Comparison;
 use lexisplat_eval::metrics::Metric;
+use lexisplat_eval::{Comparison, Summary};
 
-/// Digits of ratios and of bytes a Gaussian, as the paper prints its ratio.
-const RATIO_DIGITS: usize = 2;
-/// Digits of frames a second, as the paper prints them.
-const FPS_DIGITS: usize = 1;
+use super::paper_row;
+use crate::grid::Grid;
+use crate::measure::{IDENTICAL, Measure};
+use crate::paper::{self, Experiment};
+use crate::table::{Cell, Column, Row, Style, Table};
+use crate::{Results, Setting};
 
-/// What a row of [`main`] shows of a scene.
-#[derive(Clone, Copy)]
-enum Quality {
-    Score(Metric),
-    Coefficients,
-    WholeFile,
-    BytesEach,
-    Fps,
-    FpsDense,
-}
-
-impl Quality {
-    fn name(self, device: &str) -> String {
-        match self {
-            Self::Score(metric) => heading(metric),
-            Self::Coefficients => "Comp Ratio (coefficients)".to_owned(),
-            Self::WholeFile => "Ratio of whole files".to_owned(),
-            Self::BytesEach => "Bytes a Gaussian".to_owned(),
-            Self::Fps => format!("{device} FPS"),
-            Self::FpsDense => format!("{device} FPS(-Comp)"),
-        }
-    }
-
-    fn digits(self) -> usize {
-        match self {
-            Self::Score(metric) => metric.digits(),
-            Self::Coefficients | Self::WholeFile | Self::BytesEach => RATIO_DIGITS,
-            Self::Fps | Self::FpsDense => FPS_DIGITS,
-        }
-    }
-
-    /// The paper's name for it. Its FPS are of another device and not set beside ours.
-    fn printed(self) -> Option<Quantity> {
-        match self {
-            Self::Score(metric) => printed(metric),
-            Self::Coefficients => Some(Quantity::Ratio),
-            _ => None,
-        }
-    }
-
-    fn cell(self, grid: &Grid<'_>, method: Method, column: usize, setting: Setting) -> Cell {
-        let (Some(scene), Some(point)) = (grid.scene(method, column), grid.point(method, column, setting))
-        else {
-            return Cell::Missing;
-        };
-        let (file, ply) = (point.file_bytes as f64, scene.ply_bytes as f64);
-        let value = match self {
-            Self::Score(metric) => return score(Some(&point.to_original), metric),
-            Self::Coefficients => point.coefficient_ratio,
-            Self::WholeFile => quotient(ply, file),
-            Self::BytesEach => quotient(file, scene.gaussians as f64),
-            Self::Fps => point.fps.map(|fps| fps.sparse),
-            Self::FpsDense => point.fps.map(|fps| fps.dense),
-        };
-        Cell::number(value, self.digits())
-    }
-}
-
-fn qualities(grid: &Grid<'_>, device: &str) -> Vec<Quality> {
-    let mut all: Vec<Quality> = grid.metrics_to_original().into_iter().map(Quality::Score).collect();
-    all.extend([Quality::Coefficients, Quality::WholeFile, Quality::BytesEach]);
-    if !device.is_empty() {
-        all.extend([Quality::Fps, Quality::FpsDense]);
-    }
-    all
-}
-
-/// Says what a PSNR of words means, if there is one.
+/// Explains a PSNR that is a word, if there is one.
 fn about_identical(grid: &Grid<'_>) -> &'static str {
     let identical = |c: &Comparison| c.views.iter().any(|view| view.identical);
     let any = grid.scenes().any(|(_, scene)| scene.points.iter().any(|p| identical(&p.to_original)));
@@ -100,145 +30,99 @@ pub fn main(results: &Results, tolerance: Option<f64>) -> Table {
         return Table::default();
     };
     let device = grid.device();
-    let beside_paper = matches!(setting, Setting::Tolerance(t) if paper::same_tolerance(t, paper::TOLERANCE));
-    let mut rows = Vec::new();
-    for &method in grid.methods.iter().filter(|&&method| grid.has(method, setting)) {
-        let mut of_method = Vec::new();
-        for quality in qualities(&grid, &device) {
-            let names = |method: String| [method, quality.name(&device)];
-            let cells = grid.across(quality.digits(), |column| quality.cell(&grid, method, column, setting));
-            of_method.push(row(names(method.title().to_owned()), cells));
-            if let Some(quantity) = quality.printed().filter(|_| beside_paper) {
-                let label = names(format!("{}, paper", method.title()));
-                of_method.extend(paper_row(
-                    label,
-                    &grid,
-                    paper::Table::Main,
-                    method,
-                    quantity,
-                    quality.digits(),
-                ));
-            }
-        }
-        rows.extend(ruled(of_method));
+    let mut measures = grid.scores(Measure::ToOriginal);
+    measures.extend([Measure::CoefficientRatio, Measure::FileRatio, Measure::BytesEach]);
+    if !device.is_empty() {
+        measures.extend([Measure::SparseFps, Measure::DenseFps]);
     }
-    Table {
-        name: "main",
-        title: format!("Compressed at {} against the original's pictures", setting.label()),
-        caption: format!(
-            "Means over views. FPS(-Comp) is the original, drawn from dense SH. The paper's numbers stand below ours for \
-             scenes that are the paper's too; a mean is over the numbers in its row.{}",
-            about_identical(&grid)
-        ),
-        header: header(&["Method", "Metric"], &grid),
-        labels: 2,
-        rows,
-        ..Table::default()
+    let caption = format!(
+        "Means over views. FPS(-Comp) is the original, drawn from dense SH. The paper's numbers stand below ours for \
+         scenes that are the paper's too; a mean is over the numbers in its row.{}",
+        about_identical(&grid)
+    );
+    let title = format!("Compressed at {} against the original's pictures", setting.label());
+    let mut table = Table::new("main", title, caption).with_columns(2, grid.columns(&["Method", "Metric"]));
+    for &method in grid.methods.iter().filter(|&&method| grid.points(method, setting).next().is_some()) {
+        table.push_block(measures.iter().flat_map(|&measure| {
+            let heading = measure.heading(device);
+            let ours = Row::new([method.title(), &heading], grid.measured(measure, method, Some(setting)));
+            let labels = [&*format!("{}, paper", method.title()), &heading];
+            let theirs = setting
+                .is_tolerance(paper::TOLERANCE)
+                .then(|| paper_row(labels, &grid, Experiment::Main, method, measure));
+            [Some(ours), theirs.flatten()].into_iter().flatten()
+        }));
     }
+    table
 }
 
-/// Every method in every setting against the original's pictures, scene by scene.
+/// Every method at every setting against the original's pictures, scene by scene.
 #[must_use]
 pub fn settings(results: &Results) -> Table {
     let grid = Grid::new(results);
-    let mut qualities: Vec<Quality> = grid.metrics_to_original().into_iter().map(Quality::Score).collect();
-    qualities.push(Quality::Coefficients);
-    let mut rows = Vec::new();
+    let mut measures = grid.scores(Measure::ToOriginal);
+    measures.push(Measure::CoefficientRatio);
+    let caption = format!(
+        "tol: SH within this L2 norm. nnz: at most so many nonzeros a Gaussian, without a promise. Names: packed \
+         files with everything quantised.{}",
+        about_identical(&grid)
+    );
+    let mut table = Table::new("settings", "Every setting against the original's pictures", caption)
+        .with_columns(3, grid.columns(&["Method", "Setting", "Metric"]));
     for &method in &grid.methods {
-        for &setting in grid.settings.iter().filter(|&&setting| grid.has(method, setting)) {
-            let of_setting = qualities.iter().map(|quality| {
-                let cells =
-                    grid.across(quality.digits(), |column| quality.cell(&grid, method, column, setting));
-                row([method.title().to_owned(), setting.label(), quality.name("")], cells)
-            });
-            rows.extend(ruled(of_setting.collect()));
+        for setting in grid.settings_of(method) {
+            table.push_block(measures.iter().map(|&measure| {
+                let labels = [method.title(), &setting.label(), &measure.heading("")];
+                Row::new(labels, grid.measured(measure, method, Some(setting)))
+            }));
         }
     }
-    Table {
-        name: "settings",
-        title: "Every setting against the original's pictures".to_owned(),
-        caption: format!(
-            "tol: SH within this L2 norm. nnz: at most so many nonzeros a Gaussian, without a promise. Names: packed \
-             files with everything quantised.{}",
-            about_identical(&grid)
-        ),
-        header: header(&["Method", "Setting", "Metric"], &grid),
-        labels: 3,
-        rows,
-        ..Table::default()
-    }
+    table
 }
 
 /// Every single view, then mean, minimum and maximum over the views.
 #[must_use]
 pub fn views(results: &Results) -> Table {
     let grid = Grid::new(results);
-    let photos = grid.metrics_to_photos();
-    let metrics: Vec<Metric> = {
-        let original = grid.metrics_to_original();
-        Metric::ALL.into_iter().filter(|m| original.contains(m) || photos.contains(m)).collect()
+    let (original, photos) = (grid.scores(Measure::ToOriginal), grid.scores(Measure::ToPhotos));
+    let is_measured = |&metric: &Metric| {
+        original.contains(&Measure::ToOriginal(metric)) || photos.contains(&Measure::ToPhotos(metric))
     };
-    let mut rows = Vec::new();
+    let metrics: Vec<Metric> = Metric::ALL.into_iter().filter(is_measured).collect();
+    let labels = ["Scene", "Method", "Setting", "Against", "View"].map(str::to_owned);
+    let headings = metrics.iter().map(|&metric| Measure::ToOriginal(metric).heading(""));
+    let caption = "Mean, minimum and maximum PSNR are over the views that are not identical.";
+    let mut table = Table::new("views", "View by view", caption)
+        .with_columns(labels.len(), labels.into_iter().chain(headings).map(Column::new));
+    let cell = |metric: Metric, identical: bool, value: Option<f64>| match metric {
+        Metric::Psnr if identical => Cell::text(IDENTICAL),
+        metric => Cell::number(value, metric.digits()),
+    };
     for (heading, scene) in grid.scenes() {
-        let mut add = |setting: String, against: &str, comparison: &Comparison| {
-            let names =
-                |view: &str| [heading, scene.method.title(), &setting, against, view].map(str::to_owned);
-            let mut of_setting: Vec<Row> = comparison
-                .views
-                .iter()
-                .map(|view| {
-                    row(
-                        names(&view.name),
-                        metrics.iter().map(|&metric| {
-                            if metric == Metric::Psnr && view.identical {
-                                Cell::text(IDENTICAL)
-                            } else {
-                                Cell::number(view.get(metric), metric.digits())
-                            }
-                        }),
-                    )
-                })
-                .collect();
-            if of_setting.is_empty() {
-                return;
-            }
-            for (name, pick) in [("mean", 0), ("minimum", 1), ("maximum", 2)] {
-                let cells = metrics.iter().map(|&metric| {
-                    let summary = comparison.get(metric);
-                    let value = summary.and_then(|s| [s.mean, s.min, s.max][pick]);
-                    if metric == Metric::Psnr && comparison.identical {
-                        Cell::text(IDENTICAL)
-                    } else {
-                        Cell::number(value, metric.digits())
-                    }
-                });
-                of_setting.push(Row { style: Style::Total, ..row(names(name), cells) });
-            }
-            rows.extend(ruled(of_setting));
-        };
-        if let Some(comparison) = &scene.to_photos {
-            add("original".to_owned(), "photos", comparison);
-        }
+        let mut comparisons: Vec<(String, &str, &Comparison)> = Vec::new();
+        comparisons.extend(scene.to_photos.as_ref().map(|c| ("original".to_owned(), "photos", c)));
         for point in &scene.points {
-            add(point.setting.label(), "original", &point.to_original);
-            if let Some(comparison) = &point.to_photos {
-                add(point.setting.label(), "photos", comparison);
-            }
+            comparisons.push((point.setting.label(), "original", &point.to_original));
+            comparisons.extend(point.to_photos.as_ref().map(|c| (point.setting.label(), "photos", c)));
+        }
+        comparisons.retain(|(_, _, comparison)| !comparison.views.is_empty());
+        for (setting, against, comparison) in &comparisons {
+            let row = |view: &str, value: &dyn Fn(Metric) -> (bool, Option<f64>)| {
+                let cells = metrics.iter().map(|&metric| cell(metric, value(metric).0, value(metric).1));
+                Row::new([heading, scene.method.title(), setting, against, view], cells)
+            };
+            let views =
+                comparison.views.iter().map(|view| row(&view.name, &|m| (view.identical, view.get(m))));
+            let total = |name, pick: fn(Summary) -> Option<f64>| {
+                let value = |metric| (comparison.identical, comparison.get(metric).and_then(pick));
+                row(name, &value).styled(Style::Total)
+            };
+            let totals =
+                [total("mean", |s| s.mean), total("minimum", |s| s.min), total("maximum", |s| s.max)];
+            table.push_block(views.chain(totals));
         }
     }
-    Table {
-        name: "views",
-        title: "View by view".to_owned(),
-        caption: "Mean, minimum and maximum PSNR are over the views that are not identical.".to_owned(),
-        header: ["Scene", "Method", "Setting", "Against", "View"]
-            .into_iter()
-            .map(str::to_owned)
-            .chain(metrics.iter().map(|&metric| heading(metric)))
-            .collect(),
-        labels: 5,
-        rows,
-        ..Table::default()
-    }
+    table
 }
 
 #[cfg(test)]

@@ -1,176 +1,100 @@
-//! What was evaluated, what it came to on average, and what was not.
+//! What was evaluated, the means, and what was skipped.
 
-use super::{heading, row, ruled};
-use crate::Results;
-use crate::grid::{Grid, mean, quotient, score};
-use crate::table::{Cell, Table};
-use lexisplat_eval::metrics::Metric;
+use crate::grid::Grid;
+use crate::measure::Measure;
+use crate::table::{Cell, Column, Row, Table};
+use crate::{Results, SceneResult, Skipped};
 
-/// Digits of nonzeros and ratios.
-const DIGITS: usize = 2;
-
-/// Every method in every setting, averaged over its scenes.
+/// Every method at every setting, averaged over its scenes.
 #[must_use]
 pub fn summary(results: &Results) -> Table {
     let grid = Grid::new(results);
-    let (original, photos) = (grid.metrics_to_original(), grid.metrics_to_photos());
-    // Against photos the paper's three numbers are enough here; the whole is in another table.
-    let photos: Vec<Metric> = photos.into_iter().filter(|m| super::printed(*m).is_some()).collect();
     let device = grid.device();
-    let mut rows = Vec::new();
-    for &method in &grid.methods {
-        let mut of_method = Vec::new();
-        if photos.iter().any(|&metric| {
-            (0..grid.columns.len()).any(|column| {
-                let comparison = grid.scene(method, column).and_then(|scene| scene.to_photos.as_ref());
-                score(comparison, metric) != Cell::Missing
-            })
-        }) {
-            let average = |metric: Metric| {
-                let cell = |column| {
-                    score(grid.scene(method, column).and_then(|scene| scene.to_photos.as_ref()), metric)
-                };
-                mean(&(0..grid.columns.len()).map(cell).collect::<Vec<_>>(), metric.digits())
-            };
-            let scenes = (0..grid.columns.len())
-                .filter(|&column| grid.scene(method, column).is_some_and(|scene| scene.to_photos.is_some()))
-                .count();
-            let mut cells = vec![Cell::Count(scenes as u64)];
-            cells.extend(original.iter().map(|_| Cell::Missing));
-            cells.extend(photos.iter().map(|&metric| average(metric)));
-            cells.extend([const { Cell::Missing }; 4]);
-            if !device.is_empty() {
-                cells.extend([const { Cell::Missing }; 2]);
-            }
-            of_method.push(row([method.title().to_owned(), "original".to_owned()], cells));
-        }
-        for &setting in grid.settings.iter().filter(|&&setting| grid.has(method, setting)) {
-            let average = |digits: usize, cell: &dyn Fn(usize) -> Cell| {
-                mean(&(0..grid.columns.len()).map(cell).collect::<Vec<_>>(), digits)
-            };
-            let number = |digits: usize, value: &dyn Fn(usize) -> Option<f64>| {
-                average(digits, &|column| Cell::number(value(column), digits))
-            };
-            let point = |column| grid.point(method, column, setting);
-            let scenes = (0..grid.columns.len()).filter(|&column| point(column).is_some()).count();
-            let mut cells = vec![Cell::Count(scenes as u64)];
-            cells.extend(original.iter().map(|&metric| {
-                average(metric.digits(), &|column| score(point(column).map(|p| &p.to_original), metric))
-            }));
-            cells.extend(photos.iter().map(|&metric| {
-                average(metric.digits(), &|column| {
-                    score(point(column).and_then(|p| p.to_photos.as_ref()), metric)
-                })
-            }));
-            cells.push(number(DIGITS, &|column| point(column).map(|p| p.mean_nonzeros)));
-            cells.push(number(DIGITS, &|column| point(column)?.coefficient_ratio));
-            cells.push(number(DIGITS, &|column| {
-                quotient(grid.scene(method, column)?.ply_bytes as f64, point(column)?.file_bytes as f64)
-            }));
-            cells.push(number(DIGITS, &|column| {
-                quotient(point(column)?.file_bytes as f64, grid.scene(method, column)?.gaussians as f64)
-            }));
-            if !device.is_empty() {
-                cells.push(number(1, &|column| Some(point(column)?.fps?.sparse)));
-                cells.push(number(1, &|column| Some(point(column)?.fps?.dense)));
-            }
-            of_method.push(row([method.title().to_owned(), setting.label()], cells));
-        }
-        rows.extend(ruled(of_method));
+    let mut measures: Vec<(&str, String, Measure)> = Vec::new();
+    let mut add = |group, measure: Measure| measures.push((group, measure.heading(device), measure));
+    grid.scores(Measure::ToOriginal).into_iter().for_each(|m| add("Against the original", m));
+    // Against photos the paper's three numbers are enough here. Another table has all.
+    let photos = || grid.scores(Measure::ToPhotos).into_iter().filter(|m| m.in_paper().is_some());
+    photos().for_each(|m| add("Against photos", m));
+    for measure in [Measure::MeanNonzeros, Measure::CoefficientRatio, Measure::FileRatio, Measure::BytesEach]
+    {
+        add("Size", measure);
     }
-    let mut groups = vec![(String::new(), 3)];
-    let mut header: Vec<String> = ["Method", "Setting", "Scenes"].map(str::to_owned).into();
-    for (name, metrics) in [("Against the original", &original), ("Against photos", &photos)] {
-        if !metrics.is_empty() {
-            groups.push((name.to_owned(), metrics.len()));
-            header.extend(metrics.iter().map(|&metric| heading(metric)));
-        }
-    }
-    groups.push(("Size".to_owned(), 4));
-    header.extend(
-        ["Mean nonzeros", "Comp Ratio (coefficients)", "Ratio of whole files", "Bytes a Gaussian"]
-            .map(str::to_owned),
-    );
+    let fps = format!("FPS, {device}");
     if !device.is_empty() {
-        groups.push((format!("FPS, {device}"), 2));
-        header.extend(["From codes", "Dense SH"].map(str::to_owned));
+        measures.push((&fps, "From codes".to_owned(), Measure::SparseFps));
+        measures.push((&fps, "Dense SH".to_owned(), Measure::DenseFps));
     }
-    Table {
-        name: "summary",
-        title: "Means over scenes".to_owned(),
-        caption: "A mean is over the scenes that have the number. A ratio says how many times smaller; that of coefficients is the \
-                  paper's and counts neither indices nor anything but SH."
-            .to_owned(),
-        groups,
-        header,
-        labels: 2,
-        rows,
+    let columns = measures
+        .iter()
+        .map(|(group, heading, _)| Column { group: (*group).to_owned(), heading: heading.clone() });
+    let caption = "A mean is over the scenes that have the number. A ratio says how many times smaller; that of coefficients is the \
+                   paper's and counts neither indices nor anything but SH.";
+    let mut table = Table::new("summary", "Means over scenes", caption)
+        .with_columns(2, ["Method", "Setting", "Scenes"].map(Column::new).into_iter().chain(columns));
+    for &method in &grid.methods {
+        let scenes = || (0..grid.headings.len()).filter_map(|column| grid.scene(method, column));
+        let has_photos = photos().any(|m| scenes().any(|scene| m.cell(scene, None) != Cell::Missing));
+        let original = has_photos.then(|| {
+            let count = scenes().filter(|scene| scene.to_photos.is_some()).count();
+            ("original".to_owned(), count, None)
+        });
+        let settings = grid
+            .settings_of(method)
+            .map(|setting| (setting.label(), grid.points(method, setting).count(), Some(setting)));
+        table.push_block(original.into_iter().chain(settings).map(|(label, count, setting)| {
+            let cells = measures.iter().map(|(_, _, measure)| {
+                grid.measured(*measure, method, setting).pop().unwrap_or(Cell::Missing)
+            });
+            Row::new([method.title(), &label], std::iter::once(Cell::Count(count as u64)).chain(cells))
+        }));
     }
+    table
 }
 
 /// Every model that was evaluated.
 #[must_use]
 pub fn models(results: &Results) -> Table {
     let grid = Grid::new(results);
-    let rows = grid.scenes().map(|(heading, scene)| {
-        row(
-            [heading.to_owned(), scene.method.title().to_owned()],
-            [
-                if scene.dataset.is_empty() { Cell::Missing } else { Cell::text(scene.dataset.clone()) },
-                Cell::text(scene.model.clone()),
-                Cell::Count(scene.gaussians),
-                Cell::Count(u64::from(scene.sh_degree)),
-                Cell::Count(scene.ply_bytes),
-                Cell::Count(scene.views as u64),
-                Cell::text(scene.views_from.clone()),
-                Cell::text(format!("{} \u{d7} {}", scene.size[0], scene.size[1])),
-                Cell::text(scene.device.clone()),
-                Cell::text(if scene.to_photos.is_some() { "yes" } else { "no" }),
-            ],
-        )
-    });
-    Table {
-        name: "models",
-        title: "Models".to_owned(),
-        caption: String::new(),
-        header: [
-            "Scene",
-            "Method",
-            "Data set",
-            "File",
-            "Gaussians",
-            "SH degree",
-            "PLY bytes",
-            "Views",
-            "Views from",
-            "First picture",
-            "Drawn on",
-            "Photos",
-        ]
-        .map(str::to_owned)
-        .into(),
-        labels: 2,
-        rows: rows.collect(),
-        ..Table::default()
-    }
+    let dataset = |scene: &SceneResult| match &*scene.dataset {
+        "" => Cell::Missing,
+        dataset => Cell::text(dataset),
+    };
+    Table::new("models", "Models", "").with_records::<(&str, &SceneResult)>(
+        2,
+        &[
+            ("", "Scene", &|model| Cell::text(model.0)),
+            ("", "Method", &|model| Cell::text(model.1.method.title())),
+            ("", "Data set", &|model| dataset(model.1)),
+            ("", "File", &|model| Cell::text(&model.1.model)),
+            ("", "Gaussians", &|model| Cell::Count(model.1.gaussians)),
+            ("", "SH degree", &|model| Cell::Count(model.1.sh_degree.into())),
+            ("", "PLY bytes", &|model| Cell::Count(model.1.ply_bytes)),
+            ("", "Views", &|model| Cell::Count(model.1.views as u64)),
+            ("", "Views from", &|model| Cell::text(&model.1.views_from)),
+            ("", "First picture", &|model| {
+                Cell::text(format!("{} \u{d7} {}", model.1.size[0], model.1.size[1]))
+            }),
+            ("", "Drawn on", &|model| Cell::text(&model.1.device)),
+            ("", "Photos", &|model| Cell::text(if model.1.to_photos.is_some() { "yes" } else { "no" })),
+        ],
+        [grid.scenes().collect()],
+    )
 }
 
 /// What could not be evaluated, and why.
 #[must_use]
 pub fn skipped(results: &Results) -> Table {
-    let rows = results.skipped.iter().map(|skipped| {
-        let names = [skipped.name.clone(), skipped.method.title().to_owned()];
-        row(names, [Cell::text(skipped.dataset.clone()), Cell::text(skipped.reason.clone())])
-    });
-    Table {
-        name: "skipped",
-        title: "Skipped".to_owned(),
-        caption: String::new(),
-        header: ["Scene", "Method", "Data set", "Reason"].map(str::to_owned).into(),
-        labels: 4,
-        rows: rows.collect(),
-        ..Table::default()
-    }
+    Table::new("skipped", "Skipped", "").with_records::<&Skipped>(
+        4,
+        &[
+            ("", "Scene", &|skipped| Cell::text(&skipped.name)),
+            ("", "Method", &|skipped| Cell::text(skipped.method.title())),
+            ("", "Data set", &|skipped| Cell::text(&skipped.dataset)),
+            ("", "Reason", &|skipped| Cell::text(&skipped.reason)),
+        ],
+        [results.skipped.iter().collect()],
+    )
 }
 
 #[cfg(test)]
@@ -196,7 +120,8 @@ mod tests {
             format!("1{0}{0}{0} 31.00 0.9000 0.2500{0}{0}{0}{0}{0}{0}", " \u{2013}")
         );
         assert!(line("3DGS", "nnz 0").contains(" 0.00 \u{2013} 2.50 "));
-        assert_eq!(table.groups.last().unwrap(), &("FPS, CPU".to_owned(), 2));
+        assert!(table.columns.iter().rev().take(2).all(|column| column.group == "FPS, CPU"));
+        assert_eq!(table.columns.iter().filter(|column| column.group == "FPS, CPU").count(), 2);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use lexisplat::lexi::{self, LexiReader};
 use lexisplat::packed::{StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
 use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 use serde::Serialize;
 
 use super::bars;
@@ -115,7 +115,7 @@ impl<'a> LexiFacts<'a> {
             writeln!(out, "pictures: {}", target_line(target))?;
         }
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
-            writeln!(out, "measured on: {}", text::escape(packed.device))?;
+            writeln!(out, "measured on: {}", format::escape(packed.device))?;
         }
         if *atoms > 0 {
             writeln!(out, "SH error: {}", error_line(self.record))?;
@@ -143,7 +143,7 @@ impl<'a> LexiFacts<'a> {
         writeln!(out, "\n{:<18} {:>10} {:>16}   streams", "part", "bytes", "bits a Gaussian")?;
         for (name, bytes) in self.parts {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a size to look at")]
-            let size = text::bytes(bytes.round() as u64);
+            let size = format::bytes(bytes.round() as u64);
             let streams = self.packed.as_ref().map_or(&[][..], |packed| packed.streams);
             let streams: Vec<String> = streams
                 .iter()
@@ -151,7 +151,7 @@ impl<'a> LexiFacts<'a> {
                 .map(|s| format!("{} {:.2}", s.name, self.each(s.bits)))
                 .collect();
             let streams = if streams.len() > 1 { streams.join(", ") } else { String::new() };
-            let name = text::escape(name);
+            let name = format::escape(name);
             let line = format!("{name:<18} {size:>10} {:>16.2}   {streams}", self.each(8.0 * bytes));
             writeln!(out, "{}", line.trim_end())?;
         }
@@ -178,7 +178,7 @@ fn usage_text(out: &mut String, usage: &[u64]) -> Result<()> {
     )?;
     for &j in order.iter().take(TOP_ATOMS) {
         let share = 100.0 * usage[j] as f64 / total as f64;
-        writeln!(out, "  atom {j:>4} {:>10} {share:>5.1} %", text::count(usage[j]))?;
+        writeln!(out, "  atom {j:>4} {:>10} {share:>5.1} %", format::count(usage[j]))?;
     }
     Ok(())
 }

@@ -9,7 +9,7 @@ use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::{FileKind, SplatSource as _, Splats, stream};
-use lexisplat_eval::text;
+use lexisplat_eval::format;
 use serde::Serialize;
 
 use self::codes::LexiFacts;
@@ -96,13 +96,13 @@ impl<'a> Facts<'a> {
 
     fn text(&self) -> Result<String> {
         let mut out = String::new();
-        let (bytes, count) = (text::bytes(self.file_bytes), text::count(self.gaussians));
+        let (bytes, count) = (format::bytes(self.file_bytes), format::count(self.gaussians));
         writeln!(out, "{}: {bytes}, {count} Gaussians, SH degree {}", self.file, self.sh_degree)?;
         if self.antialiased {
             writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
         }
         for comment in self.comments {
-            writeln!(out, "comment: {}", text::escape(comment))?;
+            writeln!(out, "comment: {}", format::escape(comment))?;
         }
         match &self.kind {
             Kind::Ply { ply, .. } => {
@@ -119,7 +119,14 @@ impl<'a> Facts<'a> {
         }
         writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
         for a in &self.statistics.attributes {
-            writeln!(out, "{:<12} {:>12.5} {:>12.5} {:>12.5}", text::escape(&a.name), a.min, a.mean, a.max)?;
+            writeln!(
+                out,
+                "{:<12} {:>12.5} {:>12.5} {:>12.5}",
+                format::escape(&a.name),
+                a.min,
+                a.mean,
+                a.max
+            )?;
         }
         if self.sh_degree > 0 {
             let mean = self.statistics.mean_rest_norm;
@@ -137,7 +144,7 @@ fn bars(out: &mut String, labels: &[String], counts: &[u64]) -> Result<()> {
     for (label, &count) in labels.iter().zip(counts) {
         let length = (u128::from(count) * BAR as u128).div_ceil(u128::from(most));
         let length = usize::try_from(length).unwrap_or(BAR);
-        writeln!(out, "  {label:>12} {:>10} {}", text::count(count), "#".repeat(length))?;
+        writeln!(out, "  {label:>12} {:>10} {}", format::count(count), "#".repeat(length))?;
     }
     Ok(())
 }

@@ -1,6 +1,9 @@
-//! Numbers and names for people to read.
+//! Numbers and names as text, for people and for files.
 
 use std::borrow::Cow;
+
+/// Most bytes of a file name: file systems take 255, and a number and an extension may follow.
+const LONGEST_NAME: usize = 180;
 
 /// Returns `text` with every character that a terminal obeys instead of showing written as JSON writes it, such
 /// as `\u001b`.
@@ -82,6 +85,15 @@ pub fn ratio(whole: u64, part: u64) -> String {
     if part == 0 { "-".to_owned() } else { format!("{:.2}x", whole as f64 / part as f64) }
 }
 
+/// `name` as one part of a path that is safe on every system: letters, digits and `-_.` stay, other characters become
+/// `_`. The result is not empty, not `.` or `..`, and at most 180 bytes long. Two names may give the same result.
+#[must_use]
+pub fn file_name(name: &str) -> String {
+    let mut out = name.trim().replace(|c: char| !c.is_alphanumeric() && !"-_.".contains(c), "_");
+    out.truncate(out.floor_char_boundary(LONGEST_NAME));
+    if out.chars().all(|c| c == '.') { "_".to_owned() } else { out }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -113,5 +125,22 @@ mod tests {
             ["0", "999", "89,963", "1,000,000"]
         );
         assert_eq!([ratio(10, 4), ratio(1, 0)], ["2.50x", "-"]);
+    }
+
+    #[test]
+    fn file_names_are_one_part_of_a_path() {
+        for (name, expected) in [
+            ("bonsai-3dgs_1.0", "bonsai-3dgs_1.0"),
+            ("a b/c\\d:e*f", "a_b_c_d_e_f"),
+            (" caf\u{e9} ", "caf\u{e9}"),
+            ("../..", ".._.."),
+            ("..", "_"),
+            ("", "_"),
+            ("a\n\u{202e}b", "a__b"),
+        ] {
+            assert_eq!(file_name(name), expected, "{name:?}");
+        }
+        let long = file_name(&"\u{20000}".repeat(300));
+        assert_eq!((long.len(), long.chars().count()), (180, 45));
     }
 }

@@ -1,43 +1,40 @@
-//! Does quality level off as fewer and fewer coefficients are kept? In words, from the numbers.
+//! Whether quality stops falling as fewer and fewer coefficients are kept, in words made from the numbers.
 
 use super::curve::{At, Kind, curve};
 use super::grid::Grid;
+use super::measure::Measure;
 use super::{Method, Results, Setting};
 
-/// Steps shorter than this many doublings of the ratio have no slope worth telling.
+/// Shortest step along a curve that has a slope, in doublings of the ratio.
 const SHORTEST_STEP: f64 = 0.05;
-/// The curve flattens where the last step is at most this steep, the first being 1.
+/// The curve flattens if the last step is at most this steep, relative to the first.
 const FLAT: f64 = 0.5;
-/// The curve gets steeper where the last step is at least this steep, the first being 1.
+/// The curve gets steeper if the last step is at least this steep, relative to the first.
 const STEEP: f64 = 1.5;
 
 /// One step along a curve.
 struct Step {
     from: Setting,
     to: Setting,
-    /// Change for each doubling of the ratio.
+    /// Change of the value for each doubling of the ratio.
     slope: f64,
 }
 
-/// Steps between neighbours by ratio that are long enough to have a slope.
-fn steps(curve: &[At], value: impl Fn(&At) -> Option<f64>) -> Vec<Step> {
-    let mut points: Vec<(f64, f64, Setting)> = curve
-        .iter()
-        .filter_map(|at| Some((at.ratio.filter(|ratio| *ratio > 0.0)?.log2(), value(at)?, at.setting)))
-        .collect();
+/// The steps between neighbours by ratio that are long enough to have a slope.
+fn steps(curve: &[At<'_>], value: impl Fn(&At<'_>) -> Option<f64>) -> Vec<Step> {
+    let point = |at: &At<'_>| Some((at.ratio().filter(|ratio| *ratio > 0.0)?.log2(), value(at)?, at.setting));
+    let mut points: Vec<(f64, f64, Setting)> = curve.iter().filter_map(point).collect();
     points.sort_by(|a, b| a.0.total_cmp(&b.0));
-    points
-        .windows(2)
-        .filter(|pair| pair[1].0 - pair[0].0 >= SHORTEST_STEP)
-        .map(|pair| Step {
-            from: pair[0].2,
-            to: pair[1].2,
-            slope: (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0),
-        })
-        .collect()
+    let long = points.windows(2).filter(|pair| pair[1].0 - pair[0].0 >= SHORTEST_STEP);
+    long.map(|pair| Step {
+        from: pair[0].2,
+        to: pair[1].2,
+        slope: (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0),
+    })
+    .collect()
 }
 
-/// What the curve does, by its first and last slope.
+/// Describes the curve by its first and last slope.
 fn verdict(first: f64, last: f64) -> &'static str {
     if last >= 0.0 || last.abs() <= FLAT * first.abs() {
         "the curve flattens"
@@ -54,11 +51,11 @@ fn cost(slope: f64) -> String {
     format!("{word} {:.1}\u{a0}dB", slope.abs())
 }
 
-/// One paragraph a method: what a doubling of the ratio costs in PSNR along tolerances and along capped
-/// nonzeros, where PSNR is with at most one nonzero in every Gaussian and without SH, and what speed does
-/// meanwhile. Plain text; methods with too few settings are left out.
+/// One paragraph for each method: what a doubling of the ratio costs in PSNR along tolerances and along capped
+/// nonzeros, the PSNR with at most one nonzero in every Gaussian and without SH, and how speed changes. Plain
+/// text. Methods with too few settings are left out.
 #[must_use]
-pub fn level_off(results: &Results) -> Vec<String> {
+pub fn saturation(results: &Results) -> Vec<String> {
     let grid = Grid::new(results);
     grid.methods.iter().filter_map(|&method| paragraph(&grid, method)).collect()
 }
@@ -68,8 +65,7 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
     let caps = curve(grid, method, Kind::Caps, None);
     let mut sentences = Vec::new();
     for (points, what) in [(&tolerances, "Along tolerances"), (&caps, "With capped nonzeros")] {
-        let steps = steps(points, |at| at.psnr.mean);
-        if let [first, .., last] = steps.as_slice() {
+        if let [first, .., last] = steps(points, |at| at.psnr().mean).as_slice() {
             sentences.push(format!(
                 "{what} each doubling of the coefficient ratio {} at first ({} to {}) and {} at last ({} to {}): {}.",
                 cost(first.slope),
@@ -83,14 +79,12 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
         }
     }
     let at_cap = |most: u8| caps.iter().find(|at| at.setting == Setting::MaxNonzeros(most));
-    if let Some(at) = at_cap(1)
-        && let (Some(psnr), Some(ratio)) = (at.psnr.mean, at.ratio)
-    {
+    if let Some((psnr, ratio)) = at_cap(1).and_then(|at| at.psnr().mean.zip(at.ratio())) {
         sentences.push(format!(
             "With at most one nonzero in every Gaussian (ratio {ratio:.1}) PSNR is {psnr:.2}\u{a0}dB."
         ));
     }
-    if let Some(psnr) = at_cap(0).and_then(|at| at.psnr.mean) {
+    if let Some(psnr) = at_cap(0).and_then(|at| at.psnr().mean) {
         sentences.push(format!("With SH dropped altogether it is {psnr:.2}\u{a0}dB, the floor."));
     }
     if sentences.is_empty() {
@@ -100,17 +94,17 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
     Some(format!("{}. {}", method.title(), sentences.join(" ")))
 }
 
-/// What FPS do from the first to the last setting that has them.
-fn speed(grid: &Grid<'_>, points: &[At]) -> Option<String> {
-    let timed: Vec<&At> = points.iter().filter(|at| at.fps.is_some() && at.ratio.is_some()).collect();
-    let (first, last) = (timed.first()?, timed.last()?);
-    let (from, to) = (first.fps?, last.fps?);
-    if first.setting == last.setting || from <= 0.0 {
+/// How FPS change from the first to the last setting that has them.
+fn speed(grid: &Grid<'_>, points: &[At<'_>]) -> Option<String> {
+    let fps = |at: &At<'_>| at.mean(Measure::SparseFps);
+    let mut timed = points.iter().filter(|at| at.ratio().is_some() && fps(at).is_some());
+    let (first, last) = (timed.next()?, timed.next_back()?);
+    let (from, to) = (fps(first)?, fps(last)?);
+    if from <= 0.0 {
         return None;
     }
-    let steps = steps(points, |at| at.fps);
     let share = |slope: f64| format!("{:+.1}\u{a0}%", slope / from * 100.0);
-    let slopes = match steps.as_slice() {
+    let slopes = match steps(points, fps).as_slice() {
         [first, .., last] => format!(
             "; a doubling of the ratio brings {} at first and {} at last",
             share(first.slope),
@@ -118,7 +112,8 @@ fn speed(grid: &Grid<'_>, points: &[At]) -> Option<String> {
         ),
         _ => String::new(),
     };
-    let dense = first.fps_dense.map_or_else(String::new, |dense| format!(", {dense:.1} from dense SH"));
+    let dense = first.mean(Measure::DenseFps);
+    let dense = dense.map_or_else(String::new, |dense| format!(", {dense:.1} from dense SH"));
     Some(format!(
         "FPS on {} are {from:.1} at {} and {to:.1} at {}{dense}{slopes}.",
         grid.device(),
@@ -150,25 +145,25 @@ mod tests {
 
     #[test]
     fn slopes_by_hand() {
-        let text = level_off(&falling([50.0, 44.0, 40.0, 38.0])).join("");
+        let text = saturation(&falling([50.0, 44.0, 40.0, 38.0])).join("");
         assert_eq!(
             text.replace('\u{a0}', " "),
             "3DGS. Along tolerances each doubling of the coefficient ratio costs 6.0 dB at first (tol 0.5 to tol 1) and costs \
              2.0 dB at last (tol 1.5 to tol 2): the curve flattens. FPS on CPU are 20.0 at tol 0.5 and 29.0 at tol \
              2, 10.0 from dense SH; a doubling of the ratio brings +5.0 % at first and +25.0 % at last."
         );
-        assert!(level_off(&falling([50.0, 44.0, 40.0, 35.0]))[0].contains("keeps falling"));
-        assert!(level_off(&falling([50.0, 44.0, 40.0, 20.0]))[0].contains("steeper"));
-        assert!(level_off(&falling([50.0, 44.0, 40.0, 41.0]))[0].contains("gains 1.0"));
+        assert!(saturation(&falling([50.0, 44.0, 40.0, 35.0]))[0].contains("keeps falling"));
+        assert!(saturation(&falling([50.0, 44.0, 40.0, 20.0]))[0].contains("steeper"));
+        assert!(saturation(&falling([50.0, 44.0, 40.0, 41.0]))[0].contains("gains 1.0"));
     }
 
     #[test]
     fn caps_and_the_floor_are_told() {
-        let text = level_off(&results());
+        let text = saturation(&results());
         assert_eq!(text.len(), 1, "MCMC has one step only");
         assert!(text[0].contains("at most one nonzero in every Gaussian (ratio 50.0) PSNR is 29.00"));
         assert!(text[0].contains("dropped altogether it is 25.00"));
-        assert!(level_off(&Results::default()).is_empty());
+        assert!(saturation(&Results::default()).is_empty());
     }
 
     #[test]
@@ -177,6 +172,6 @@ mod tests {
         for point in &mut results.scenes[0].points {
             point.coefficient_ratio = Some(4.0);
         }
-        assert!(level_off(&results).is_empty());
+        assert!(saturation(&results).is_empty());
     }
 }

@@ -1,4 +1,4 @@
-//! One model of a sweep: its parts, each kept as soon as it is finished.
+//! One model of a sweep. Each part of its results is stored as soon as it is finished.
 
 use std::fs::File;
 use std::io::Read;
@@ -6,115 +6,122 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lexisplat::ply::{self, ReadOptions};
-use lexisplat::{Sensitivity, Silent, Splats};
-use lexisplat_render::gpu::{Gpu, ShPath};
+use lexisplat::{Sensitivity, Splats};
+use lexisplat_eval::format::file_name;
+use lexisplat_eval::montage::difference;
+use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
+use lexisplat_eval::{
+    BenchOptions, Comparison, DrawOptions, Error, Result, Scorer, bench_cpu, bench_gpu, draw_views, png,
+    score_views,
+};
+use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-use super::kept::{Kept, file_name, write_whole};
+use super::cache::{Cache, write_whole};
+use super::compress_scene::compress_scene;
 use super::manifest::Entry;
-use super::options::{SweepOptions, Watch};
+use super::options::{SweepOptions, SweepProgress};
+use super::picture::PictureFiles;
 use super::results::{Fps, Point, SceneResult, Setting};
-use super::run::Saved;
-use super::squeeze::{How, squeeze};
-use lexisplat_eval::Comparison;
-use lexisplat_eval::Scorer;
-use lexisplat_eval::montage::difference;
-use lexisplat_eval::png;
-use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
-use lexisplat_eval::{BenchOptions, bench_cpu, bench_gpu};
-use lexisplat_eval::{DrawOptions, draw_views, score_views};
-use lexisplat_eval::{Error, Result};
 
-/// Frames timed from each view: on a GPU as the 3DGS authors do (INRIA `gaussian-splatting` issue 351),
-/// on the processor as many as show the spread.
+/// Frames timed from each view on a GPU, as the 3DGS authors do (INRIA `gaussian-splatting` issue 351).
 const GPU_REPEAT: u32 = 100;
+/// Frames timed from each view on the processor: enough to show the spread.
 const CPU_REPEAT: u32 = 3;
-/// Frames drawn from each view before.
+/// Frames drawn from each view before timing.
 const WARMUP: u32 = 1;
-/// Bytes read at once to recognise a file.
-const CHUNK: usize = 1 << 20;
+/// Bytes read at once for a checksum.
+const READ_BYTES: usize = 1 << 20;
 
-/// What a model is compressed to.
+/// The settings that a model is compressed at.
 pub(super) fn settings<'a>(entry: &Entry, options: &'a SweepOptions) -> &'a [Setting] {
     if entry.method.is_competitor() { &[] } else { &options.settings }
 }
 
-/// Why work on a scene ended early.
-pub(super) enum Stop {
+/// The reason why work on a scene ended early.
+pub(super) enum Failure {
     /// This scene cannot be evaluated; others may.
     Scene(String),
-    /// Nothing further can be: the disk is full, the GPU is lost.
-    All(Error),
+    /// No other scene can be evaluated either: the disk is full, the GPU is lost, or the sweep is cancelled.
+    Sweep(Error),
 }
 
-/// What a part of a scene gives.
-type Part<T> = std::result::Result<T, Stop>;
+/// The result of a part of a scene.
+type Part<T> = std::result::Result<T, Failure>;
 
-impl From<Error> for Stop {
+impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         match error {
-            Error::Render(lexisplat_render::Error::Gpu { .. }) => Self::All(error),
+            Error::Render(lexisplat_render::Error::Gpu { .. }) => Self::Sweep(error),
+            Error::Codec(lexisplat::Error::Cancelled) => Self::Sweep(error),
             error => Self::Scene(error.to_string()),
         }
     }
 }
 
-impl From<lexisplat::Error> for Stop {
+impl From<lexisplat::Error> for Failure {
     fn from(error: lexisplat::Error) -> Self {
         Error::from(error).into()
     }
 }
 
-/// What is known of a model itself.
+/// Results of a model as trained.
 #[derive(Serialize, Deserialize)]
-struct Base {
+struct Original {
     to_photos: Option<Comparison>,
     fps: Option<f64>,
 }
 
-/// A model under evaluation. Its pictures are made when the first part needs them.
+/// A model under evaluation.
 struct Subject {
     splats: Splats,
     cameras: Vec<Camera>,
-    /// The views again, if they have photos.
+    /// The views that have photos.
     photos: Vec<View>,
-    /// Everything that results depend on but the setting.
+    /// Describes everything that results depend on except the setting.
     key: String,
-    /// Start of its files' names.
+    /// Start of the names of the model's files.
     name: String,
-    /// Places of the views whose pictures are saved.
+    /// Indices of the views whose pictures are saved.
     shown: Vec<usize>,
-    originals: Option<Vec<Image>>,
-    pictures_of_photos: Option<Vec<Image>>,
-    seen: Option<Arc<Sensitivity>>,
+    /// Pictures of the original and photos, made when the first part needs them.
+    references: Option<References>,
+    sensitivity: Option<Arc<Sensitivity>>,
 }
 
-pub(super) struct Runner<'a> {
+/// Pictures that others are compared with, one for each view.
+struct References {
+    originals: Vec<Image>,
+    /// Empty without photos.
+    photos: Vec<Image>,
+}
+
+pub(super) struct Evaluator<'a> {
     pub(super) options: &'a SweepOptions,
     pub(super) scorer: &'a Scorer,
-    pub(super) gpu: Option<Gpu>,
     pub(super) renderer: Renderer,
-    pub(super) kept: Kept,
+    pub(super) cache: Cache,
     pub(super) pictures: PathBuf,
-    pub(super) watch: &'a dyn Watch,
+    pub(super) progress: &'a dyn SweepProgress,
 }
 
-impl Runner<'_> {
-    pub(super) fn scene(&mut self, entry: &Entry, place: usize) -> Part<(SceneResult, Vec<Saved>)> {
+impl Evaluator<'_> {
+    pub(super) fn scene(&mut self, entry: &Entry, place: usize) -> Part<(SceneResult, Vec<PictureFiles>)> {
         if !entry.model.is_file() {
-            return Err(Stop::Scene(format!("{} is not there", entry.model.display())));
+            return Err(Failure::Scene(format!("{} does not exist", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
         let options = ReadOptions::default().with_limits(self.options.limits);
         let read = ply::read(&entry.model, &options)?;
         for warning in &read.warnings {
-            self.watch.warn(&entry.name, warning);
+            self.progress.warn(&entry.name, warning);
         }
         let splats = read.splats;
         let found = find_views(&self.view_options(entry), &splats.geometry)?;
         for warning in &found.warnings {
-            self.watch.warn(&entry.name, warning);
+            self.progress.warn(&entry.name, warning);
         }
         let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
         let photos: Vec<View> = found.views.into_iter().filter(|view| view.photo.is_some()).collect();
@@ -129,18 +136,17 @@ impl Runner<'_> {
             splats,
             cameras,
             photos,
-            originals: None,
-            pictures_of_photos: None,
-            seen: None,
+            references: None,
+            sensitivity: None,
         };
-        self.watch.part(&format!("{} {}", entry.name, entry.method));
-        let base = self.base(&mut subject)?;
+        self.progress.part(&format!("{} {}", entry.name, entry.method));
+        let original = self.original(&mut subject)?;
         let mut points = Vec::new();
-        let mut saved = Vec::new();
+        let mut files = Vec::new();
         for &setting in settings(entry, self.options) {
-            self.watch.part(&format!("{} {} {}", entry.name, entry.method, setting.label()));
+            self.progress.part(&format!("{} {} {}", entry.name, entry.method, setting.label()));
             points.push(self.point(&mut subject, setting)?);
-            saved.extend(subject.shown.iter().map(|&view| self.saved(&subject, place, view, setting)));
+            files.extend(subject.shown.iter().map(|&view| self.files(&subject, place, view, setting)));
         }
         let shipped_bytes =
             entry.shipped.as_deref().and_then(|path| std::fs::metadata(path).ok()).map(|found| found.len());
@@ -158,11 +164,11 @@ impl Runner<'_> {
             size,
             device: self.renderer.name().to_owned(),
             on_gpu: self.renderer.is_gpu(),
-            to_photos: base.to_photos,
-            fps: base.fps,
+            to_photos: original.to_photos,
+            fps: original.fps,
             points,
         };
-        Ok((scene, saved))
+        Ok((scene, files))
     }
 
     fn view_options(&self, entry: &Entry) -> ViewOptions {
@@ -180,7 +186,7 @@ impl Runner<'_> {
         options
     }
 
-    /// Everything that results depend on but the setting, in words.
+    /// Describes everything that results depend on except the setting.
     fn key(&self, model: &str, cameras: &[Camera], photos: &[View]) -> Result<String> {
         let paths = photos.iter().filter_map(|view| view.photo.as_deref());
         let photos = paths.map(fingerprint).collect::<Result<Vec<_>>>()?;
@@ -201,31 +207,38 @@ impl Runner<'_> {
         ))
     }
 
-    fn base(&mut self, subject: &mut Subject) -> Part<Base> {
+    /// The stored part `name`, if `key` is the same and its pictures still exist.
+    fn find<T: DeserializeOwned>(&self, name: &str, key: &str, pictures: &[PathBuf]) -> Option<T> {
+        let part = self.cache.find(name, key).filter(|_| pictures.iter().all(|path| path.is_file()))?;
+        self.progress.done(1, true);
+        Some(part)
+    }
+
+    fn store(&self, name: &str, key: &str, part: &impl Serialize) -> Part<()> {
+        self.cache.store(name, key, part).map_err(Failure::Sweep)?;
+        self.progress.done(1, false);
+        Ok(())
+    }
+
+    fn original(&mut self, subject: &mut Subject) -> Part<Original> {
         let shown: Vec<PathBuf> =
             subject.shown.iter().map(|&view| self.picture(subject, view, "original")).collect();
-        let kept = self.kept.find(&subject.name, &subject.key);
-        if let Some(base) = kept.filter(|_| shown.iter().all(|path| path.is_file())) {
-            self.watch.done(1, true);
-            return Ok(base);
+        if let Some(original) = self.find(&subject.name, &subject.key, &shown) {
+            return Ok(original);
         }
-        self.look(subject)?;
-        let (originals, photos) = (subject.originals(), subject.photographs());
-        let to_photos = match photos {
-            [] => None,
-            photos => Some(score_views(self.scorer, &subject.cameras, photos, originals)?),
-        };
-        for &view in &subject.shown {
-            self.save(&self.picture(subject, view, "original"), &originals[view])?;
+        let References { originals, photos } = self.references(subject)?;
+        for (&view, path) in subject.shown.iter().zip(&shown) {
+            self.save(path, &originals[view])?;
             if let Some(photo) = photos.get(view) {
                 self.save(&self.picture(subject, view, "photo"), photo)?;
             }
         }
+        let to_photos = self.score_photos(subject, &photos, &originals)?;
         let fps = self.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-        let base = Base { to_photos, fps };
-        self.kept.keep(&subject.name, &subject.key, &base).map_err(Stop::All)?;
-        self.watch.done(1, false);
-        Ok(base)
+        let original = Original { to_photos, fps };
+        subject.references = Some(References { originals, photos });
+        self.store(&subject.name, &subject.key, &original)?;
+        Ok(original)
     }
 
     fn point(&mut self, subject: &mut Subject, setting: Setting) -> Part<Point> {
@@ -234,98 +247,90 @@ impl Runner<'_> {
         let key = format!("{}; {label}", subject.key);
         let shown: Vec<PathBuf> =
             subject.shown.iter().map(|&view| self.picture(subject, view, &label)).collect();
-        let kept = self.kept.find(&name, &key);
-        if let Some(point) = kept.filter(|_| shown.iter().all(|path| path.is_file())) {
-            self.watch.done(1, true);
+        if let Some(point) = self.find(&name, &key, &shown) {
             return Ok(point);
         }
-        self.look(subject)?;
-        let o = self.options;
-        let how = How { pursuit: o.pursuit, layout: o.layout, seed: o.seed };
-        let renderer = &mut self.renderer;
-        let squeezed = squeeze(&subject.splats, setting, how, renderer, &mut subject.seen, &Silent)?;
-        let scene = Scene::from(&squeezed.model);
+        let References { originals, photos } = self.references(subject)?;
+        let Subject { splats, sensitivity, .. } = subject;
+        let (model, compressed) =
+            compress_scene(splats, setting, self.options, &mut self.renderer, sensitivity, self.progress)?;
+        let scene = Scene::from(&model);
         let drawn = self.draw(&scene, &subject.cameras)?;
-        let (originals, photos) = (subject.originals(), subject.photographs());
         for (&view, path) in subject.shown.iter().zip(&shown) {
             self.save(path, &drawn[view])?;
             let apart = difference(&originals[view], &drawn[view]);
             self.save(&self.picture(subject, view, &format!("{label} difference")), &apart)?;
         }
-        // Side by side, so that whatever else the machine does slows both.
+        // Dense and sparse are timed one right after the other, so that other load on the machine slows both.
         let dense = self.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-        let fps = match (dense, self.fps(&scene, &subject.cameras)?) {
-            (Some(dense), Some(sparse)) => Some(Fps { dense, sparse }),
-            _ => None,
-        };
+        let fps = dense.zip(self.fps(&scene, &subject.cameras)?).map(|(dense, sparse)| Fps { dense, sparse });
         let point = Point {
-            setting,
-            file_bytes: squeezed.file_bytes,
-            sh_bytes: squeezed.sh_bytes,
-            resident_sh_bytes: squeezed.model.resident_sh_bytes() as u64,
-            atoms: squeezed.model.dictionary().len(),
-            mean_nonzeros: squeezed.mean_nonzeros,
-            coefficient_ratio: squeezed.coefficient_ratio,
-            max_residual: squeezed.max_residual,
-            over_tolerance: squeezed.over_tolerance,
-            to_original: score_views(self.scorer, &subject.cameras, originals, &drawn)?,
-            to_photos: match photos {
-                [] => None,
-                photos => Some(score_views(self.scorer, &subject.cameras, photos, &drawn)?),
-            },
+            to_original: score_views(self.scorer, &subject.cameras, &originals, &drawn)?,
+            to_photos: self.score_photos(subject, &photos, &drawn)?,
             fps,
-            seconds: squeezed.seconds,
+            ..compressed
         };
-        self.kept.keep(&name, &key, &point).map_err(Stop::All)?;
-        self.watch.done(1, false);
+        subject.references = Some(References { originals, photos });
+        self.store(&name, &key, &point)?;
         Ok(point)
     }
 
-    /// Draws the original and reads the photos, unless that was done.
-    fn look(&mut self, subject: &mut Subject) -> Result<()> {
-        if subject.originals.is_none() {
-            subject.originals = Some(self.draw(&Scene::from(&subject.splats), &subject.cameras)?);
+    /// Takes the pictures to compare with out of `subject`, or makes them.
+    fn references(&mut self, subject: &mut Subject) -> Result<References> {
+        if let Some(references) = subject.references.take() {
+            return Ok(references);
         }
-        if subject.pictures_of_photos.is_none() {
-            let read = |view: &View| photo(view, self.options.background);
-            let photos: Result<Vec<Image>> = subject.photos.iter().map(read).collect();
-            subject.pictures_of_photos = Some(photos?);
+        let read = |view: &View| photo(view, self.options.background);
+        let photos = subject.photos.iter().map(read).collect::<Result<_>>()?;
+        let originals = self.draw(&Scene::from(&subject.splats), &subject.cameras)?;
+        Ok(References { originals, photos })
+    }
+
+    /// Scores of pictures against photos, if there are any.
+    fn score_photos(
+        &self,
+        subject: &Subject,
+        photos: &[Image],
+        pictures: &[Image],
+    ) -> Result<Option<Comparison>> {
+        if photos.is_empty() {
+            return Ok(None);
         }
-        Ok(())
+        score_views(self.scorer, &subject.cameras, photos, pictures).map(Some)
     }
 
     fn draw(&mut self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Vec<Image>> {
         let options = DrawOptions::new(self.options.background, self.options.eight_bit);
-        draw_views(&mut self.renderer, scene, cameras, &options, &Silent)
+        draw_views(&mut self.renderer, scene, cameras, &options, self.progress)
     }
 
     fn fps(&self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Option<f64>> {
         if !self.options.fps {
             return Ok(None);
         }
-        let repeat = if self.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
+        let repeat = if self.options.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
         let mut options = BenchOptions::new(WARMUP, repeat);
         options.background = self.options.background;
-        let times = match &self.gpu {
-            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, &Silent)?,
-            None => bench_cpu(scene, cameras, &options, &Silent)?,
+        let times = match &self.options.gpu {
+            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, self.progress)?,
+            None => bench_cpu(scene, cameras, &options, self.progress)?,
         };
         Ok(Some(times.fps))
     }
 
-    /// Where a picture of a view is saved.
+    /// The path of a picture of a view.
     fn picture(&self, subject: &Subject, view: usize, what: &str) -> PathBuf {
         self.pictures.join(format!("{}-{view:03}-{}.png", subject.name, file_name(what)))
     }
 
     fn save(&self, path: &Path, image: &Image) -> Part<()> {
-        write_whole(&self.options.outputs, path, &png(image.width, image.height, &image.to_8bit())?)
-            .map_err(Stop::All)
+        let bytes = png(image.width, image.height, &image.to_8bit())?;
+        write_whole(&self.options.outputs, path, &bytes).map_err(Failure::Sweep)
     }
 
-    fn saved(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> Saved {
+    fn files(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> PictureFiles {
         let label = setting.label();
-        Saved {
+        PictureFiles {
             scene,
             view: subject.cameras[view].name.clone(),
             original: self.picture(subject, view, "original"),
@@ -337,17 +342,7 @@ impl Runner<'_> {
     }
 }
 
-impl Subject {
-    fn originals(&self) -> &[Image] {
-        self.originals.as_deref().unwrap_or_default()
-    }
-
-    fn photographs(&self) -> &[Image] {
-        self.pictures_of_photos.as_deref().unwrap_or_default()
-    }
-}
-
-/// How the names of an entry's files start: no two entries share one.
+/// Start of the names of an entry's files. No two entries share one.
 pub(super) fn file_start(entry: &Entry) -> String {
     let dataset = if entry.dataset.is_empty() { String::new() } else { format!("{}-", entry.dataset) };
     file_name(&format!("{dataset}{}-{}", entry.name, entry.method))
@@ -357,7 +352,7 @@ pub(super) fn file_start(entry: &Entry) -> String {
 fn fingerprint(path: &Path) -> Result<String> {
     let mut file = File::open(path).map_err(|e| Error::io(path, e))?;
     let mut sum = crc32fast::Hasher::new();
-    let mut chunk = vec![0; CHUNK];
+    let mut chunk = vec![0; READ_BYTES];
     let mut length = 0_u64;
     loop {
         let count = file.read(&mut chunk).map_err(|e| Error::io(path, e))?;

@@ -1,60 +1,42 @@
-//! The results as Markdown, to be kept beside the figures.
+//! The results as a Markdown report beside the figures.
 
 use std::fmt::Write;
 
 use super::table::{Table, escape_markdown as escape};
-use super::{Figure, NOTES, Results, level_off, tables};
+use super::{Figure, NOTES, Results, saturation, tables};
 
-/// A report in Markdown: the main tables, and each of `figures` by the path it is kept at relative to the
-/// report.
+/// A report in Markdown: the main tables, and each of `figures`, which are in the folder `figures` beside it.
 #[must_use]
-pub fn sweep_markdown(results: &Results, figures: &[(String, &Figure)], date: Option<&str>) -> String {
+pub fn sweep_markdown(results: &Results, figures: &[Figure], date: Option<&str>) -> String {
     let mut out = String::from("# Results of a sweep\n\n");
     if results.scenes.is_empty() {
         out.push_str("Nothing was evaluated.\n\n");
     }
     if !results.command.is_empty() {
         // A fence longer than any in the command cannot be closed by it.
-        let fence =
-            "`".repeat(results.command.split(|c| c != '`').map(str::len).max().unwrap_or(0).max(2) + 1);
+        let longest = results.command.split(|c| c != '`').map(str::len).max().unwrap_or(0);
+        let fence = "`".repeat(longest.max(2) + 1);
         let _ = write!(out, "{fence}sh\n{}\n{fence}\n\n", results.command);
     }
-    let mut facts = Vec::new();
-    if !results.version.is_empty() {
-        facts.push(format!("lexisplat {}", results.version));
-    }
-    facts.extend(date.map(str::to_owned));
-    if !results.pursuit.is_empty() {
-        facts.push(format!("{} pursuit", results.pursuit));
-    }
-    if !results.layout.is_empty() {
-        facts.push(format!("values as {}", results.layout));
+    let mut facts = results.facts();
+    if let Some(date) = date {
+        facts.insert(usize::from(!results.version.is_empty()), date.to_owned());
     }
     let rounded = if results.eight_bit { "rounded to 8 bits" } else { "not rounded" };
     facts.push(format!("pictures {rounded} before scoring"));
     let _ = write!(out, "{}.\n\n", escape(&facts.join(", ")));
     section(&mut out, &tables::summary(results));
-    if !figures.is_empty() {
-        out.push_str("## Figures\n\n");
-        for (path, figure) in figures {
-            // Angle brackets let a path hold anything but themselves and line ends.
-            let path: String = path
-                .chars()
-                .map(|c| if matches!(c, '<' | '>') || c.is_control() { '_' } else { c })
-                .collect();
-            let _ = write!(out, "![{}](<{path}>)\n\n{}\n\n", escape(&figure.title), escape(&figure.caption));
-        }
-    }
-    let paragraphs = level_off(results);
-    if !paragraphs.is_empty() {
-        out.push_str("## Does quality level off?\n\n");
-        for paragraph in paragraphs {
-            let _ = write!(out, "{}\n\n", escape(&paragraph));
-        }
-    }
+    let drawn = figures.iter().map(|figure| {
+        let (title, caption) = (escape(&figure.title), escape(&figure.caption));
+        format!("![{title}](<figures/{}.svg>)\n\n{caption}\n\n", figure.name)
+    });
+    headed(&mut out, "Figures", &drawn.collect::<String>());
+    let paragraphs = saturation(results);
+    let paragraphs: String = paragraphs.iter().map(|text| format!("{}\n\n", escape(text))).collect();
+    headed(&mut out, "Does quality level off?", &paragraphs);
     for table in [
         tables::main(results, None),
-        tables::truth(results),
+        tables::vs_photos(results),
         tables::drops(results),
         tables::psnr(results),
         tables::nonzeros(results),
@@ -62,11 +44,8 @@ pub fn sweep_markdown(results: &Results, figures: &[(String, &Figure)], date: Op
         section(&mut out, &table);
     }
     if !results.scenes.is_empty() {
-        out.push_str("## How things are counted\n\n");
-        for note in NOTES {
-            let _ = writeln!(out, "- **{}.** {}", escape(note.title), escape(note.text));
-        }
-        out.push('\n');
+        let notes = NOTES.iter().map(|note| format!("- **{}.** {}\n", escape(note.title), escape(note.text)));
+        headed(&mut out, "How things are counted", &notes.chain(["\n".to_owned()]).collect::<String>());
     }
     section(&mut out, &tables::models(results));
     section(&mut out, &tables::skipped(results));
@@ -75,15 +54,20 @@ pub fn sweep_markdown(results: &Results, figures: &[(String, &Figure)], date: Op
     out
 }
 
+/// `content` under a heading, if there is any.
+fn headed(out: &mut String, heading: &str, content: &str) {
+    if !content.is_empty() {
+        let _ = write!(out, "## {}\n\n{content}", escape(heading));
+    }
+}
+
 fn section(out: &mut String, table: &Table) {
     if table.is_empty() {
         return;
     }
-    let _ = write!(out, "## {}\n\n", escape(&table.title));
-    if !table.caption.is_empty() {
-        let _ = write!(out, "{}\n\n", escape(&table.caption));
-    }
-    let _ = writeln!(out, "{}", table.to_markdown());
+    let caption =
+        if table.caption.is_empty() { String::new() } else { format!("{}\n\n", escape(&table.caption)) };
+    headed(out, &table.title, &format!("{caption}{}\n", table.to_markdown()));
 }
 
 #[cfg(test)]
@@ -94,7 +78,7 @@ mod tests {
     #[test]
     fn the_report_holds_tables_and_figures() {
         let figure = Figure {
-            name: "f".to_owned(),
+            name: "f (1)".to_owned(),
             title: "A [title]".to_owned(),
             caption: "A caption.".to_owned(),
             svg: String::new(),
@@ -102,7 +86,7 @@ mod tests {
         };
         let mut results = results();
         results.command = "lexisplat ``` sweep".to_owned();
-        let text = sweep_markdown(&results, &[("figures/f (1).svg".to_owned(), &figure)], Some("2026-05-01"));
+        let text = sweep_markdown(&results, &[figure], Some("2026-05-01"));
         assert!(text.starts_with(
             "# Results of a sweep\n\n````sh\nlexisplat ``` sweep\n````\n\nlexisplat 0.1.0, 2026-05-01, "
         ));
