@@ -43,7 +43,6 @@ mod png;
 mod scene_file;
 mod scorer;
 mod scores;
-
 pub mod views;
 
 pub use bench::{BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes};
