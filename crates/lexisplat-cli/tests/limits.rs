@@ -42,7 +42,7 @@ fn every_command_keeps_to_the_limits_given() {
         &["compress", "scene.ply", "--dictionary", "d.lexi", "-o", "out.lexi", "--limit", "atoms=1"],
         LIMIT,
     );
-    assert!(over.contains("dictionary of d.lexi: 90 is over the limit of 1;"), "{over}");
+    assert!(over.contains("dictionary of d.lexi: 90 is over the limit of 1\nhelp: "), "{over}");
     let wrong = folder.fail(&["info", "scene.ply", "--limit", "splats=5"], 2);
     assert!(wrong.contains("gaussians, atoms, nonzeros"), "{wrong}");
 }

@@ -35,6 +35,7 @@ impl Usage {
 /// `{"degree":3,"atoms":[[...],...]}` of the shown atoms, with coefficients in thousandths.
 pub(super) fn json(model: &Model, usage: &Usage) -> String {
     let thousandths = |value: &f32| (value * STEPS).round();
+    #[expect(clippy::cast_possible_truncation, reason = "a coefficient of a unit vector, in thousandths")]
     let atom = |&(atom, _): &(usize, u64)| {
         model.dictionary().atom(atom).iter().map(thousandths).map(|v| v as i32).collect::<Vec<_>>()
     };
