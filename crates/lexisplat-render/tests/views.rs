@@ -54,7 +54,7 @@ fn sources_are_told_apart_by_content() {
     assert!(read(root).is_ok());
     put(root, "cameras.bin", "");
     let empty = read(root).unwrap_err().to_string();
-    assert!(empty.contains("cameras.bin: number of cameras: the file ends in it"), "{empty}");
+    assert!(empty.contains("cameras.bin: number of cameras: the file ends here"), "{empty}");
     // Files by themselves, whatever their names.
     put(root, "any", TRANSFORMS);
     assert_eq!(read(&root.join("any")).unwrap().cameras[0].split, None);
