@@ -100,7 +100,7 @@ pub fn read_transforms(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<Vi
     read_transforms_bytes(&file, &bytes, size_of)
 }
 
-/// Reads a `NeRF` synthetic folder. See [`transforms::read_nerf_files`].
+/// Reads a `NeRF` synthetic folder. Each split has a `transforms_SPLIT.json` in it.
 ///
 /// # Errors
 /// As [`read_transforms`].

@@ -34,7 +34,7 @@ pub enum SceneKind {
     Auto,
     /// From around the scene ([`object`]).
     Object,
-    /// From inside the scene ([`room`]).
+    /// From inside the scene ([`interior_views`]).
     Room,
 }
 

@@ -50,7 +50,7 @@ pub struct Limits {
     /// Most bytes in memory at once of the arrays made from one file: geometry, SH or codes, extra properties, and
     /// the parts of a packed file that are kept. The dictionary is not counted, since `atoms` bounds it. A reader of
     /// whole scenes holds the whole scene. A reader of parts ([`ply::PlySource`](crate::formats::ply::PlySource),
-    /// [`lexi::LexiChunks`](crate::formats::lexi::LexiChunks)) holds one part. A reader's own working memory may be
+    /// [`lexi::LexiReader`](crate::formats::lexi::LexiReader)) holds one part. A reader's own working memory may be
     /// twice as much again. This is also the most bytes of a file that has to be held because it cannot be mapped,
     /// such as a pipe. Default `u64::MAX`, no limit.
     pub bytes: u64,
