@@ -1,10 +1,10 @@
-# What fuzz/run and fuzz/long share; both are in this folder when they read it.
+# What fuzz/run and fuzz/long share. Both change to this folder before they read it.
 
 all_targets=(packed lexi ply entropy scene dictionary colmap transforms cameras_json)
 corpus=${FUZZ_CORPUS:-$PWD/corpus}
 toolchain=${FUZZ_TOOLCHAIN:-nightly}
 
-# Builds all targets; sets where the programs are, and writes the seeds.
+# Builds all targets, sets `programs` to the folder they are in, and writes the seeds.
 build() {
   cargo "+$toolchain" fuzz build
   local host
@@ -13,10 +13,10 @@ build() {
   "$programs/seeds" "$corpus"
 }
 
-# fuzz PROGRAMS TARGET SECONDS LOG: one run; its exit status is libFuzzer's.
+# fuzz PROGRAMS TARGET SECONDS LOG: runs one target and returns libFuzzer's exit status.
 fuzz() {
-  # One allocation and all memory, the sanitizer's included, in MiB. The time for one input, in seconds, is that of a
-  # clock on the wall, and long because machines are busy; the slowest ones over a second are kept.
+  # Limits in MiB of one allocation and of all memory, the sanitizer's included. The limit in seconds for one input is
+  # wall time; it is long because machines are busy. libFuzzer keeps the slowest inputs above one second.
   local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=1)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
