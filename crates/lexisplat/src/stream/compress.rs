@@ -68,7 +68,7 @@ pub fn compress_file<'a>(
 /// [`compress_file`] to a writer; temporary files are where the system wants them.
 ///
 /// # Errors
-/// As [`compress_file`]; an [`Error::Io`] of the writer names no file.
+/// As [`compress_file`]; [`Error::Writer`] if the writer fails.
 pub fn compress_to(
     ply: &PlyChunks<'_>,
     options: &CompressOptions,

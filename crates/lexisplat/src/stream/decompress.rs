@@ -35,7 +35,7 @@ pub fn decompress_file<'a>(
 /// [`decompress_file`] to a writer; temporary files are where the system wants them.
 ///
 /// # Errors
-/// As [`decompress_file`]; an [`Error::Io`] of the writer names no file.
+/// As [`decompress_file`]; [`Error::Writer`] if the writer fails.
 pub fn decompress_to(lexi: &LexiChunks<'_>, writer: &mut impl Write, progress: &dyn Progress) -> Result<u64> {
     run(lexi, writer, &std::env::temp_dir(), &Error::writer, progress)
 }

@@ -69,7 +69,7 @@ pub fn pack_file<'a, E: From<Error>>(
 /// [`pack_file`] to a writer; temporary files are where the system wants them.
 ///
 /// # Errors
-/// As [`pack_file`]; an [`Error::Io`] of the writer names no file.
+/// As [`pack_file`]; [`Error::Writer`] if the writer fails.
 pub fn pack_to<E: From<Error>>(
     ply: &PlyChunks<'_>,
     importance: Importance<'_, E>,

@@ -32,7 +32,7 @@ pub fn write_packed<'a>(output: impl Into<Output<'a>>, packed: &Packed) -> Resul
 /// Writes `packed` to `writer`. Returns the number of bytes.
 ///
 /// # Errors
-/// [`crate::Error::Io`], which names no file.
+/// [`crate::Error::Writer`] if the writer fails.
 pub fn write_packed_to(writer: &mut impl Write, packed: &Packed) -> Result<u64> {
     draft(packed).stream(writer)
 }

@@ -26,7 +26,7 @@ pub fn write<'a>(output: impl Into<Output<'a>>, model: &Model) -> Result<u64> {
 /// Writes `model` to `writer`. Returns the number of bytes.
 ///
 /// # Errors
-/// As [`write()`]; an [`Error::Io`] names no file.
+/// As [`write()`]; [`Error::Writer`] if the writer fails.
 pub fn write_to(writer: &mut impl Write, model: &Model) -> Result<u64> {
     draft(model)?.stream(writer)
 }
