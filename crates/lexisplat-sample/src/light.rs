@@ -1,9 +1,7 @@
 //! The studio: its lamps, the bodies that block light, and the light that leaves a surface.
 
 use crate::material::{Material, Surface};
-use crate::math::{
-    Vec3, add, dot, frame, mix, mul, norm, scale, smoothstep, spiral, sub, unit,
-};
+use crate::math::{Vec3, add, dot, frame, mix, mul, norm, scale, smoothstep, spiral, sub, unit};
 use crate::random::Random;
 use crate::shapes::{UP, block_axes, reflect};
 

@@ -70,7 +70,11 @@ pub(crate) fn things() -> Vec<Thing> {
         ball(0.62, 1.10, 0.22, paint([0.01, 0.28, 0.08], 0.08)),
         ball(-1.02, 0.62, 0.30, Material::Clay { colour: [0.56, 0.21, 0.11] }),
         ball(-0.62, 1.12, 0.15, paint([0.55, 0.53, 0.50], 0.15)),
-        thing(Shape::Torus { centre: at(0.82, 0.155, -0.52), ring: 0.30, tube: 0.155 }, Material::Doughnut, 1.1),
+        thing(
+            Shape::Torus { centre: at(0.82, 0.155, -0.52), ring: 0.30, tube: 0.155 },
+            Material::Doughnut,
+            1.1,
+        ),
         block(at(-0.12, 0.06, 1.05), [0.36, 0.06, 0.27], 0.03, Material::Book { colour: [0.02, 0.22, 0.24] }),
         block(
             at(-0.08, 0.17, 1.03),
