@@ -34,10 +34,10 @@ impl Usage {
 
 /// `{"degree":3,"atoms":[[...],...]}` of the shown atoms, with coefficients in thousandths.
 pub(super) fn json(model: &Model, usage: &Usage) -> String {
-    let thousandths = |value: &f32| (value * STEPS).round();
-    let atom = |&(atom, _): &(usize, u64)| {
-        model.dictionary.atom(atom).iter().map(thousandths).map(|v| v as i32).collect::<Vec<_>>()
-    };
+    #[expect(clippy::cast_possible_truncation, reason = "atoms are unit vectors")]
+    let thousandths = |value: &f32| (value * STEPS).round() as i32;
+    let atom =
+        |&(atom, _): &(usize, u64)| model.dictionary.atom(atom).iter().map(thousandths).collect::<Vec<_>>();
     let atoms: Vec<_> = usage.shown().iter().map(atom).collect();
     serde_json::json!({ "degree": model.degree().get(), "atoms": atoms }).to_string()
 }
