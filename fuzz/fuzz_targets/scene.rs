@@ -7,8 +7,8 @@ use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::stream::Importance;
 use lexisplat::{
-    CodeLayout, CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
-    stats, stream,
+    CodeLayout, CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress,
+    lexi, ply, stats, stream,
 };
 use lexisplat_fuzz::made::{Bytes, scene};
 use lexisplat_fuzz::{invariants, limits, one_thread};

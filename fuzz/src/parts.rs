@@ -2,8 +2,8 @@
 //! give the same Gaussians, bit by bit.
 
 use lexisplat::lexi::LexiReader;
-use lexisplat::ply::{PlySource, PlyRead, ReadOptions};
-use lexisplat::{Error, ExtraValues, Geometry, Model, Row, Silent, SplatSource, Splats, ply, stream};
+use lexisplat::ply::{PlyRead, PlySource, ReadOptions};
+use lexisplat::{CodedRest, Error, ExtraValues, Geometry, Model, Silent, SplatSource, Splats, ply, stream};
 
 use crate::allocator::bounded;
 
@@ -111,8 +111,8 @@ fn same_splat(a: &Splats, i: usize, b: &Splats, j: usize) {
 fn same_coded(a: &Model, i: usize, b: &Model, j: usize) {
     same_geometry(a.geometry(), i, b.geometry(), j);
     match (a.codes().row(i), b.codes().row(j)) {
-        (Row::Exact(a), Row::Exact(b)) => same(a, b),
-        (Row::Code(a), Row::Code(b)) => {
+        (CodedRest::Exact(a), CodedRest::Exact(b)) => same(a, b),
+        (CodedRest::Code(a), CodedRest::Code(b)) => {
             let bits = |(atom, value): (usize, f32)| (atom, value.to_bits());
             assert!(a.iter().map(bits).eq(b.iter().map(bits)), "codes of Gaussian {j} differ");
         }

@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lexisplat::packed::fuzzing::parts;
 use lexisplat::lexi::LexiWriter;
+use lexisplat::packed::fuzzing::parts;
 use lexisplat::packed::{PackOptions, Packer, TargetRecord};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
