@@ -11,6 +11,7 @@ fn commands_without_a_window_are_silent_without_a_desktop() {
         &["devices", "--json"],
         &["render", "scene.ply", "-o", "pictures", "--orbit", "1", "--width", "32", "-q"],
         &["compress", "scene.ply", "--json"],
+        &["compress", "scene.ply", "-o", "by-adapter.lexi", "--device", "auto", "-q"],
         &["compare", "scene.ply", "scene.lexi", "--orbit", "1", "--width", "32", "--json"],
     ] {
         let mut command = lexisplat();

@@ -13,6 +13,7 @@ use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, f
 use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
+use crate::device::open_gpu;
 use crate::files::{check_output, input, is_pipe, new_output, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
@@ -91,7 +92,7 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     let target = targets.into_iter().flatten().next();
     let mut packing = Packing::new(target.map_or(Quality::Preset(preset), Quality::Target))
         .with_options(options)
-        .with_device(args.device)
+        .with_gpu(open_gpu(args.device)?)
         .with_memory(args.memory);
     if let Some(path) = &args.cameras {
         let set = read_views(path, &mut |_| None)?;

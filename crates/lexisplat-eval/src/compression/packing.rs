@@ -4,7 +4,8 @@ use std::sync::Arc;
 
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CodeLayout, CompressOptions, Sensitivity};
-use lexisplat_render::{Camera, Device};
+use lexisplat_render::gpu::Gpu;
+use lexisplat_render::{Camera, Renderer};
 
 use super::target::Target;
 use crate::error::{Error, Result};
@@ -69,7 +70,7 @@ pub struct Packing {
     pub(super) options: PackOptions,
     pub(super) cameras: Option<Vec<Camera>>,
     pub(super) prune: Option<f32>,
-    pub(super) device: Device,
+    pub(super) gpu: Option<Gpu>,
     pub(super) sensitivity: Option<Arc<Sensitivity>>,
     memory: u64,
 }
@@ -89,7 +90,7 @@ impl Packing {
             options: PackOptions::default(),
             cameras: None,
             prune: None,
-            device: Device::Cpu,
+            gpu: None,
             sensitivity: None,
             memory: u64::MAX,
         }
@@ -115,10 +116,11 @@ impl Packing {
         Self { prune: Some(levels), ..self }
     }
 
-    /// Draws on `device`. The file records a GPU, because its results are not the same on every machine.
+    /// Draws on `gpu`, or on the processor if there is none. The file records a GPU, because its results are not
+    /// the same on every machine.
     #[must_use]
-    pub fn with_device(self, device: Device) -> Self {
-        Self { device, ..self }
+    pub fn with_gpu(self, gpu: Option<Gpu>) -> Self {
+        Self { gpu, ..self }
     }
 
     /// Allows about `bytes` bytes of memory for packing a whole scene. A scene that needs more is packed part by
@@ -132,6 +134,14 @@ impl Packing {
     #[must_use]
     pub fn with_sensitivity(self, sensitivity: Arc<Sensitivity>) -> Self {
         Self { sensitivity: Some(sensitivity), ..self }
+    }
+
+    /// The renderer that the choices mean.
+    pub(super) fn renderer(&self) -> Result<Renderer> {
+        match &self.gpu {
+            Some(gpu) => Ok(Renderer::on(gpu)?),
+            None => Ok(Renderer::cpu()),
+        }
     }
 
     /// Refuses choices that are out of range or do not go together.

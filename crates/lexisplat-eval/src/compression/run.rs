@@ -94,8 +94,7 @@ impl Packing {
         let whole = self.is_whole(source.source_bytes())?;
         match self.quality {
             Quality::Preset(preset) if !whole => {
-                let renderer = Some(Renderer::open(self.device)?);
-                in_parts(&self.options, preset, renderer, source, sink, progress)
+                in_parts(&self.options, preset, Some(self.renderer()?), source, sink, progress)
             }
             _ => self.whole(source, sink, progress),
         }
@@ -116,7 +115,7 @@ impl Packing {
             Some(cameras) => PackingViews::given(cameras)?,
             None => PackingViews::generated(&splats),
         };
-        let mut renderer = Renderer::open(self.device)?;
+        let mut renderer = self.renderer()?;
         let device = gpu(&renderer);
         let mut sensitivity = match &self.sensitivity {
             Some(measured) => Sensitivity::clone(measured),
