@@ -63,7 +63,7 @@ pub fn model(model: &Model) {
     let dense = model.to_splats();
     splats(&dense);
     let mut bytes = Vec::new();
-    match ply::write_to(&mut bytes, &dense) {
+    match ply::write(&mut bytes, &dense) {
         Ok(_) => {}
         // Names of extras that a PLY cannot hold.
         Err(error) if error.to_string().starts_with("extra = ") => return,

@@ -316,7 +316,7 @@ fn sources_of_every_kind_give_the_same_bytes() {
         bytes
     };
     let mut ply = Vec::new();
-    ply::write_to(&mut ply, &splats).unwrap();
+    ply::write(&mut ply, &splats).unwrap();
     let ply = PlySource::open("t.ply", &ply, &ReadOptions::default(), &Silent).unwrap();
     let bytes = compressed(&splats);
     assert!(bytes == compressed(&ply));

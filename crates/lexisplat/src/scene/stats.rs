@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::scene::splats::{Splats, for_extra};
+use crate::scene::extra::for_extra;
+use crate::scene::splats::Splats;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in

@@ -1,6 +1,7 @@
 //! Sparse codes: for every Gaussian a few (atom, value) pairs, which are a sparse column of a matrix.
 
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::pursuit::ValueType;
@@ -62,6 +63,14 @@ impl Indices {
         }
     }
 
+    /// All indices as they lie in memory.
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::U8(v) => v,
+            Self::U16(v) => bytemuck::cast_slice(v),
+        }
+    }
+
     /// Bytes of one index.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -116,6 +125,15 @@ impl Values {
         match self {
             Self::F32(v) => v[k],
             Self::F16(v) => v[k].to_f32(),
+        }
+    }
+
+    /// All values as they lie in memory.
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::F32(v) => bytemuck::cast_slice(v),
+            // `bytemuck` knows half floats as integers.
+            Self::F16(v) => bytemuck::cast_slice::<u16, u8>(v.reinterpret_cast()),
         }
     }
 

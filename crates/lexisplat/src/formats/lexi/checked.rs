@@ -6,7 +6,7 @@ use std::ops::Range;
 use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
 use safetensors::{Dtype, SafeTensors};
 
-use super::schema::{LENGTH_BYTES, MAX_VERSION, key, tensor};
+use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
@@ -102,8 +102,7 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        let sums: BTreeMap<String, String> = serde_json::from_str(self.text(key::CHECKSUMS)?)
-            .map_err(|e| self.malformed(format!("metadata 'checksums': {e}")))?;
+        let sums: BTreeMap<String, String> = self.json(key::CHECKSUMS)?;
         let mut names = self.names();
         names.retain(|&name| name != tensor::HEADER_CHECKSUM);
         if let Some(name) = sums.keys().find(|name| names.binary_search(&name.as_str()).is_err()) {
@@ -153,7 +152,17 @@ impl<'a> Checked<'a> {
 
     /// The metadata entry `key`, if it is there.
     pub(super) fn optional<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>> {
-        if self.metadata.contains_key(key) { self.number(key).map(Some) } else { Ok(None) }
+        self.has_text(key).then(|| self.number(key)).transpose()
+    }
+
+    /// Whether there is a metadata entry `key`.
+    pub(super) fn has_text(&self, key: &str) -> bool {
+        self.metadata.contains_key(key)
+    }
+
+    /// The JSON in the metadata entry `key`.
+    pub(super) fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<T> {
+        serde_json::from_str(self.text(key)?).map_err(|e| self.malformed(format!("metadata '{key}': {e}")))
     }
 
     /// All bytes of the file.
@@ -167,6 +176,23 @@ impl<'a> Checked<'a> {
             self.tensors.info(name).ok_or_else(missing)?;
         let data = self.bytes().get(self.data_start + start..self.data_start + end).ok_or_else(missing)?;
         Ok(View { dtype: *dtype, shape, data })
+    }
+
+    /// The length of the tensor `name`, which must have one dimension.
+    pub(super) fn list_len(&self, name: &str) -> Result<usize> {
+        match self.view(name)?.shape {
+            [len] => Ok(*len),
+            shape => Err(self.malformed(format!("tensor '{name}' has shape {shape:?}"))),
+        }
+    }
+
+    /// Refuses tensors that are neither `known` nor to be ignored. `whose` ends the message.
+    pub(super) fn refuse_unknown(&self, known: impl Fn(&str) -> bool, whose: &str) -> Result<()> {
+        let ignored = |name: &str| name == tensor::HEADER_CHECKSUM || name.starts_with(IGNORED_PREFIX);
+        match self.names.iter().find(|name| !ignored(name) && !known(name)) {
+            Some(name) => Err(self.malformed(format!("tensor '{name}' is not known {whose}"))),
+            None => Ok(()),
+        }
     }
 
     /// The bytes of the tensor `name`, which must have this type and shape.

@@ -8,7 +8,7 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::fields::{degree, dictionary, extras, layout, meta, record};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, tensor};
+use super::schema::{EXTRA_PREFIX, GEOMETRY, geometry_shape, tensor};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
@@ -78,10 +78,7 @@ impl<'a> Exact<'a> {
         let n = self.gaussians;
         let checked = &self.checked;
         self.dictionary = dictionary(checked, degree, &self.limits)?;
-        self.nonzeros = match checked.view(tensor::VALUES)?.shape {
-            [nonzeros] => *nonzeros,
-            shape => return Err(checked.malformed(format!("tensor 'codes.values' has shape {shape:?}"))),
-        };
+        self.nonzeros = checked.list_len(tensor::VALUES)?;
         let paper = self.layout == Layout::Paper;
         if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
@@ -109,10 +106,7 @@ impl<'a> Exact<'a> {
         if !checked.has(tensor::ESCAPED) {
             return Ok(());
         }
-        self.escapes = match checked.view(tensor::ESCAPED)?.shape {
-            [count] => *count,
-            shape => return Err(checked.malformed(format!("tensor 'escapes.gaussians' has shape {shape:?}"))),
-        };
+        self.escapes = checked.list_len(tensor::ESCAPED)?;
         self.escaped(0..0)?;
         checked.data(tensor::ESCAPE_ROWS, Dtype::F32, &[self.escapes, self.dictionary.dim()])?;
         let mut last = None;
@@ -273,15 +267,6 @@ impl<'a> Exact<'a> {
     }
 }
 
-/// Names and widths of the tensors of geometry, in the order in which errors name them.
-const GEOMETRY: [(&str, usize); 6] = [
-    (tensor::POSITION, 3),
-    (tensor::NORMAL, 3),
-    (tensor::DC, 3),
-    (tensor::OPACITY, 1),
-    (tensor::SCALE, 3),
-    (tensor::ROTATION, 4),
-];
 const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
 const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
 
@@ -291,40 +276,24 @@ pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDe
     let coded = degree != ShDegree::ZERO;
     let known = |name: &str| {
         GEOMETRY.iter().any(|g| g.0 == name)
-            || name == tensor::HEADER_CHECKSUM
             || (coded && (name == counts || CODES.contains(&name)))
             || (coded && checked.has(tensor::ESCAPED) && ESCAPES.contains(&name))
             || name.starts_with(EXTRA_PREFIX)
-            || name.starts_with(IGNORED_PREFIX)
     };
-    match checked.names().iter().find(|name| !known(name)) {
-        None => Ok(()),
-        Some(name) => {
-            let text = format!("tensor '{name}' is not known for layout '{layout}' and degree {degree}");
-            Err(checked.malformed(text))
-        }
-    }
+    checked.refuse_unknown(known, &format!("for layout '{layout}' and degree {degree}"))
 }
 
 /// Refuses NaN and infinity in geometry. Extras may hold anything.
 fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
-    for (name, width) in GEOMETRY {
-        if name == tensor::NORMAL && !normals {
-            continue;
-        }
-        let shape = [n, width];
-        let shape = if width == 1 { &shape[..1] } else { &shape };
-        checked.data(name, Dtype::F32, shape)?;
+    let arrays = GEOMETRY.into_iter().filter(|&(name, _)| normals || name != tensor::NORMAL);
+    let arrays = arrays.map(|(name, width)| (name, width, geometry_shape(n, width)));
+    for (name, _, shape) in arrays.clone() {
+        checked.data(name, Dtype::F32, &shape)?;
     }
-    for (name, width) in GEOMETRY {
-        if name == tensor::NORMAL && !normals {
-            continue;
-        }
-        let shape = [n, width];
-        let shape = if width == 1 { &shape[..1] } else { &shape };
+    for (name, width, shape) in arrays {
         let (mut count, mut first) = (0_u64, None);
         for start in (0..n).step_by(BLOCK) {
-            let values: Vec<f32> = checked.part(name, Dtype::F32, shape, &(start..n.min(start + BLOCK)))?;
+            let values: Vec<f32> = checked.part(name, Dtype::F32, &shape, &(start..n.min(start + BLOCK)))?;
             let bad = values.chunks_exact(width).enumerate();
             for (i, _) in bad.filter(|(_, row)| row.iter().any(|v| !v.is_finite())) {
                 count += 1;

@@ -9,11 +9,12 @@ use super::checked::{Checked, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, FORMAT, LENGTH_BYTES, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, tensor};
 use crate::packed::{CHUNK, Decoder, Packed, PackedHead, StreamBits};
+use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
-use crate::scene::splats::{Extra, Geometry, SceneMeta, Splats};
+use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Record};
 use crate::support::error::Result;
@@ -357,10 +358,6 @@ impl SplatSource for LexiReader<'_> {
 /// Bytes of all tensors that are not to be ignored, in the order in which writers list them, and of the
 /// header.
 fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
-    const FIRST: [&str; 6] =
-        [tensor::POSITION, tensor::DC, tensor::OPACITY, tensor::SCALE, tensor::ROTATION, tensor::NORMAL];
-    const PACKED: [&str; 5] =
-        [tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
     const LAST: [&str; 7] = [
         tensor::DICTIONARY,
         tensor::VALUES,
@@ -372,7 +369,8 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
     ];
     let names = checked.names();
     let extras = names.iter().copied().filter(|name| name.starts_with(EXTRA_PREFIX));
-    let order = FIRST.into_iter().chain(PACKED).chain(extras).chain(LAST);
+    let geometry = GEOMETRY.into_iter().map(|(name, _)| name);
+    let order = geometry.chain(PACKED).chain(extras).chain(LAST);
     let mut out = Vec::new();
     for name in order.filter(|name| names.contains(name)) {
         out.push((name.to_owned(), checked.view(name)?.data.len() as u64));

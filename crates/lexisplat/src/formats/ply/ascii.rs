@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::header::{Header, Kind};
 use super::names::shown;
 use super::rows::ROWS_PER_TASK;
-use super::scalar::{Scalar, ScalarType, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::{ScalarType, with_scalar};
 use crate::support::error::{Error, FormatError, Result};
 
 /// The vertex lines of an ASCII file.

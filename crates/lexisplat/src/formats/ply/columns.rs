@@ -1,6 +1,7 @@
 //! Copies columns out of packed rows. Type and byte order are looked up before the loop over rows.
 
-use super::scalar::{Scalar, ScalarType, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::{ScalarType, with_scalar};
 
 /// Packed rows of one size and byte order.
 #[derive(Debug, Clone, Copy)]

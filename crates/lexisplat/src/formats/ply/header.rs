@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::names::shown;
-use super::scalar::ScalarType;
 use crate::formats::kind::FileKind;
+use crate::scene::extra::ScalarType;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 

@@ -8,7 +8,8 @@ use super::columns::Packed;
 use super::header::{Element, Format, Header, Kind};
 use super::layout::vertex_index;
 use super::names::shown;
-use super::scalar::{Scalar, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::with_scalar;
 use crate::support::error::{Error, FormatError, Result};
 
 /// Rows that one task copies, one run of columns after another. At 248 bytes a row they stay in a core's second-level

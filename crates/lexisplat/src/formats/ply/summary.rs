@@ -6,7 +6,7 @@ use super::header::{Format, Header, Kind};
 use super::layout::vertex_index;
 use super::marks::mark;
 use super::names::{DC, NORMAL, POSITION};
-use super::scalar::ScalarType;
+use crate::scene::extra::ScalarType;
 
 /// The program that probably wrote a file, judged by its comments and the order of its properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
