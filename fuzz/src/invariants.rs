@@ -60,7 +60,7 @@ pub fn model(model: &Model) {
     if model.len() > SMALL {
         return;
     }
-    let dense = model.to_splats();
+    let dense = model.clone().into_splats();
     splats(&dense);
     let mut bytes = Vec::new();
     match ply::write(&mut bytes, &dense) {

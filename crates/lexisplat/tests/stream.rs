@@ -69,12 +69,12 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     let bytes = Input::open(&path("out.lexi")).unwrap();
     let chunks = LexiReader::open("out.lexi", &bytes, &Limits::default()).unwrap();
     let mut expected = Vec::new();
-    ply::write(&mut expected, &model.to_splats()).unwrap();
+    ply::write(&mut expected, &model.clone().into_splats()).unwrap();
     let written = stream::decompress(&chunks, &path("back.ply"), &Silent).unwrap();
     assert_eq!(written, expected.len() as u64);
     assert!(std::fs::read(path("back.ply")).unwrap() == expected);
     let survey = stream::survey(&chunks, folder.path()).unwrap();
-    assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
+    assert_eq!(survey.lint, stats::lint(&model.clone().into_splats()).unwrap());
     assert_eq!(survey.nonzeros, model.codes().nonzeros() as u64);
     assert_eq!(survey.resident_sh_bytes, model.resident_sh_bytes() as u64);
     assert_eq!(survey.nonzero_histogram.iter().sum::<u64>() + survey.escapes, GAUSSIANS as u64);
@@ -121,11 +121,11 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
         assert_eq!(chunks.order_kept(), keep_order);
         assert_eq!(chunks.attribute_bytes(), lexi::LexiWriter::packed(&packed).attribute_bytes());
         let (mut expected, mut found) = (Vec::new(), Vec::new());
-        ply::write(&mut expected, &model.to_splats()).unwrap();
+        ply::write(&mut expected, &model.clone().into_splats()).unwrap();
         stream::decompress(&chunks, &mut found, &Silent).unwrap();
         assert!(found == expected, "{keep_order}");
         let survey = stream::survey(&chunks, folder.path()).unwrap();
-        assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
+        assert_eq!(survey.lint, stats::lint(&model.clone().into_splats()).unwrap());
         assert_eq!(survey.stream_bits, packed.stream_bits().unwrap());
         assert_eq!(survey.resident_sh_bytes, model.resident_sh_bytes() as u64);
         assert_eq!(files(folder.path()), 0);

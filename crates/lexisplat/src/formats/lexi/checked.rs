@@ -24,7 +24,7 @@ pub(super) struct Checked<'a> {
     data_start: usize,
     tensors: Metadata,
     /// Names of all tensors, sorted.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     metadata: BTreeMap<String, String>,
 }
 
@@ -48,28 +48,27 @@ impl<'a> Checked<'a> {
     ) -> Result<Self> {
         let bytes: &[u8] = (*shared).as_ref();
         FileKind::Lexi.expect(&file, bytes)?;
-        let format = |problem| Error::format(file.as_str(), problem);
-        let malformed = |text: String| Error::malformed(file.as_str(), text);
-        let Some(length) = bytes.first_chunk::<LENGTH_BYTES>() else {
-            let what = "the header's length".to_owned();
-            let problem =
-                FormatError::Truncated { what, expected: LENGTH_BYTES as u64, found: bytes.len() as u64 };
-            return Err(format(problem));
+        let truncated = |what: &str, expected: u64| {
+            let (what, found) = (what.to_owned(), bytes.len() as u64);
+            Error::format(file.as_str(), FormatError::Truncated { what, expected, found })
         };
+        let length = bytes
+            .first_chunk::<LENGTH_BYTES>()
+            .ok_or_else(|| truncated("the header's length", LENGTH_BYTES as u64))?;
         let length = u64::from_le_bytes(*length);
         limits.check_header(&file, length)?;
         let end = length + LENGTH_BYTES as u64;
-        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end)).ok_or_else(|| {
-            let found = bytes.len() as u64;
-            format(FormatError::Truncated { what: "the header".to_owned(), expected: end, found })
+        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
+        let header = header.ok_or_else(|| truncated("the header", end))?;
+        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(|error| {
+            let text = match error {
+                SafeTensorError::MetadataIncompleteBuffer => {
+                    format!("truncated or too long: {} bytes do not match the header", bytes.len())
+                }
+                other => format!("not a valid safetensors file: {other}"),
+            };
+            Error::malformed(file.as_str(), text)
         })?;
-        let explain = |error: SafeTensorError| match error {
-            SafeTensorError::MetadataIncompleteBuffer => {
-                malformed(format!("truncated or too long: {} bytes do not match the header", bytes.len()))
-            }
-            other => malformed(format!("not a valid safetensors file: {other}")),
-        };
-        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(explain)?;
         let header_checksum = crc32fast::hash(header);
         let data_start = header.len();
         let metadata: BTreeMap<String, String> =
@@ -103,9 +102,8 @@ impl<'a> Checked<'a> {
 
     fn verify_tensors(&self) -> Result<()> {
         let sums: BTreeMap<String, String> = self.json(key::CHECKSUMS)?;
-        let mut names = self.names();
-        names.retain(|&name| name != tensor::HEADER_CHECKSUM);
-        if let Some(name) = sums.keys().find(|name| names.binary_search(&name.as_str()).is_err()) {
+        let names: Vec<&String> = self.names.iter().filter(|&name| name != tensor::HEADER_CHECKSUM).collect();
+        if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
         }
         let found = map_chunks(names.len(), 1, |range| {
@@ -125,11 +123,6 @@ impl<'a> Checked<'a> {
 
     pub(super) fn malformed(&self, text: impl Into<String>) -> Error {
         Error::malformed(&self.file, text)
-    }
-
-    /// Names of all tensors, sorted.
-    pub(super) fn names(&self) -> Vec<&str> {
-        self.names.iter().map(String::as_str).collect()
     }
 
     pub(super) fn has(&self, name: &str) -> bool {

@@ -26,12 +26,14 @@ const BLOCK: usize = 65_536;
 #[derive(Debug)]
 pub(super) struct Exact<'a> {
     pub(super) checked: Checked<'a>,
-    gaussians: usize,
+    /// Number of Gaussians.
+    pub(super) gaussians: usize,
     layout: Layout,
     pub(super) record: Record,
     pub(super) meta: SceneMeta,
     pub(super) dictionary: Dictionary,
-    normals: bool,
+    /// Whether the file holds normals.
+    pub(super) normals: bool,
     nonzeros: usize,
     escapes: usize,
     /// Nonzeros before each [`BLOCK`] of Gaussians.
@@ -123,23 +125,8 @@ impl<'a> Exact<'a> {
         Ok(())
     }
 
-    /// Number of Gaussians.
-    pub(super) fn len(&self) -> usize {
-        self.gaussians
-    }
-
-    /// Whether the file holds normals.
-    pub(super) fn has_normals(&self) -> bool {
-        self.normals
-    }
-
     /// Gaussians `range`. Escapes are numbered from its start.
     pub(super) fn part(&self, range: Range<usize>) -> Result<Model> {
-        let (geometry, codes) = self.geometry_and_codes(range)?;
-        Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
-    }
-
-    fn geometry_and_codes(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
         let (checked, n) = (&self.checked, self.gaussians);
         let budget = self.budget_for_geometry(range.len())?;
         let geometry = Geometry {
@@ -154,11 +141,11 @@ impl<'a> Exact<'a> {
             rotations: checked.part(tensor::ROTATION, Dtype::F32, &[n, 4], &range)?,
             extras: extras(checked, n, &range)?,
         };
+        let none = Values::empty(self.layout.values());
         if self.dictionary.is_empty() {
-            let none = Values::empty(self.layout.values());
             let (counts, indices) = (vec![0; range.len()], Indices::for_atoms(0));
             let codes = SparseCodes::new(&self.dictionary, counts, indices, none, Escapes::default())?;
-            return Ok((geometry, codes));
+            return self.model(geometry, codes);
         }
         let block = range.start / BLOCK;
         let before = self.counts(block * BLOCK..range.start)?;
@@ -166,14 +153,18 @@ impl<'a> Exact<'a> {
         let sum = |counts: &[u8]| counts.iter().map(|&c| usize::from(c)).sum::<usize>();
         let start = self.offsets.get(block).copied().unwrap_or(self.nonzeros) + sum(&before);
         let escaped = self.escaped_of(&range)?;
-        let width = Indices::for_atoms(self.dictionary.len()).width() + self.value_width();
+        let width = Indices::for_atoms(self.dictionary.len()).width() + none.width();
         budget.take(sum(&counts), width)?;
         budget.take(escaped.len(), size_of::<u32>() + self.dictionary.dim() * size_of::<f32>())?;
         let (indices, values) = self.read_codes(start..start + sum(&counts))?;
         let escapes = self.escapes(&range, &escaped)?;
         let codes = SparseCodes::part(&self.dictionary, range.start, counts, indices, values, escapes)
             .map_err(|e| checked.malformed(e.to_string()))?;
-        Ok((geometry, codes))
+        self.model(geometry, codes)
+    }
+
+    fn model(&self, geometry: Geometry, codes: SparseCodes) -> Result<Model> {
+        Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
     }
 
     /// What the limits leave for codes after everything else of `count` Gaussians.
@@ -184,11 +175,6 @@ impl<'a> Exact<'a> {
         let budget = MemoryBudget::new(&self.limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(count, GEOMETRY_BYTES + COUNT_BYTES + normals + extras)?;
         Ok(budget)
-    }
-
-    /// Bytes of a value in memory.
-    fn value_width(&self) -> usize {
-        if self.layout.values() == ValueType::F16 { size_of::<f16>() } else { size_of::<f32>() }
     }
 
     /// Nonzeros of Gaussians `range`.

@@ -84,7 +84,7 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
 /// Properties that 3DGS does not define, of Gaussians `range` of `n`.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
-    for full in checked.names() {
+    for full in &checked.names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         let dtype = checked.view(full)?.dtype;
         let ty = ScalarType::of_dtype(dtype)

@@ -45,7 +45,8 @@ impl<'a> LexiWriter<'a> {
         }
         let layout = Layout::of(codes, model.codes().values().value_type());
         let tensors = ExactTensors::of_model(model, codes).list(model.dictionary(), layout);
-        Ok(Self::of_exact(layout, model.record(), model.meta(), model.degree(), tensors))
+        let metadata = scene_metadata(VERSION, layout, model.degree(), model.record(), model.meta());
+        Ok(Self::new(metadata, tensors))
     }
 
     /// The file of `packed`.
@@ -65,7 +66,7 @@ impl<'a> LexiWriter<'a> {
     ) -> Result<Self> {
         let layout = spilled.layout;
         let tensors = spilled.finish()?.list(dictionary, layout);
-        Ok(Self::of_exact(layout, record, meta, dictionary.degree(), tensors))
+        Ok(Self::new(scene_metadata(VERSION, layout, dictionary.degree(), record, meta), tensors))
     }
 
     /// The file of a packed scene that was spilled.
@@ -75,16 +76,6 @@ impl<'a> LexiWriter<'a> {
         let extras = extras.map(|(extra, values)| extra_tensor(&extra, n, Source::Spilled(values)));
         let order = spilled.order.map(Source::Spilled);
         Self::of_packed(head, Source::Spilled(spilled.data), order, extras.collect())
-    }
-
-    fn of_exact(
-        layout: Layout,
-        record: &Record,
-        meta: &SceneMeta,
-        degree: ShDegree,
-        tensors: Vec<Tensor<'a>>,
-    ) -> Self {
-        Self::new(scene_metadata(VERSION, layout, degree, record, meta), tensors)
     }
 
     fn of_packed(

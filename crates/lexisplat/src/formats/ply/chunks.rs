@@ -24,7 +24,7 @@ const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 /// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
-    pub(super) source: PlyFile<'a>,
+    pub(super) file: PlyFile<'a>,
     /// Rows left out, ascending.
     dropped: Vec<usize>,
     /// Whether any Gaussian has a normal.
@@ -60,9 +60,9 @@ impl<'a> PlySource<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let (mut source, mut splats) = Self::look(name, bytes, options, usize::MAX, progress)?;
-        source.source.check_memory(source.source.count, source.normals)?;
-        source.finish(0..source.source.count, &mut splats)?;
-        splats.meta = source.source.meta.clone();
+        source.file.check_memory(source.file.count, source.normals)?;
+        source.finish(0..source.file.count, &mut splats)?;
+        splats.meta = source.file.meta.clone();
         source.whole = Mutex::new(Some(splats));
         Ok(source)
     }
@@ -75,24 +75,24 @@ impl<'a> PlySource<'a> {
         at_once: usize,
         progress: &dyn Progress,
     ) -> Result<(Self, Splats)> {
-        let mut source = PlyFile::open(name, bytes, options)?;
-        source.check_memory(source.count.min(at_once), false)?;
-        let (mut found, mut splats) = (Found::default(), empty(&source.layout));
-        progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
-        for start in (0..source.count).step_by(at_once) {
-            let range = start..start.saturating_add(at_once).min(source.count);
-            found.add(source.fill(range, &mut splats, progress)?);
+        let mut file = PlyFile::open(name, bytes, options)?;
+        file.check_memory(file.count.min(at_once), false)?;
+        let (mut found, mut splats) = (Found::default(), empty(&file.layout));
+        progress.begin(Stage::Read, file.count as u64 * file.layout.row_bytes as u64);
+        for start in (0..file.count).step_by(at_once) {
+            let range = start..start.saturating_add(at_once).min(file.count);
+            found.add(file.fill(range, &mut splats, progress)?);
         }
         progress.end();
-        source.report(&found, options)?;
+        file.report(&found, options)?;
         let Found { bad: dropped, normals, .. } = found;
-        Ok((Self { source, dropped, normals, whole: Mutex::default() }, splats))
+        Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
     }
 
     /// Adds the normals to `splats`, which hold rows `rows`, and leaves out those dropped.
     fn finish(&self, rows: Range<usize>, splats: &mut Splats) -> Result<()> {
         if self.normals {
-            self.source.fill_normals(rows.clone(), splats)?;
+            self.file.fill_normals(rows.clone(), splats)?;
         }
         let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
         let dropped = &self.dropped[from(rows.start)..from(rows.end)];
@@ -107,25 +107,25 @@ impl<'a> PlySource<'a> {
     /// SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
-        self.source.layout.degree
+        self.file.layout.degree
     }
 
     /// Comments and marks.
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
-        &self.source.meta
+        &self.file.meta
     }
 
     /// Oddities that did not prevent reading, one plain sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        &self.source.warnings
+        &self.file.warnings
     }
 
     /// What the file was like.
     #[must_use]
     pub fn summary(&self) -> &PlySummary {
-        &self.source.summary
+        &self.file.summary
     }
 
     /// The row of Gaussian `gaussian`.
@@ -147,11 +147,11 @@ impl<'a> PlySource<'a> {
 impl SplatSource for PlySource<'_> {
     /// Number of Gaussians, without those left out.
     fn len(&self) -> usize {
-        self.source.count - self.dropped.len()
+        self.file.count - self.dropped.len()
     }
 
     fn empty(&self) -> Splats {
-        Splats { meta: self.source.meta.clone(), ..empty(&self.source.layout) }
+        Splats { meta: self.file.meta.clone(), ..empty(&self.file.layout) }
     }
 
     fn has_normals(&self) -> bool {
@@ -159,15 +159,15 @@ impl SplatSource for PlySource<'_> {
     }
 
     fn row_bytes(&self) -> u64 {
-        self.source.summary.row_bytes
+        self.file.summary.row_bytes
     }
 
     fn source_bytes(&self) -> u64 {
-        self.source.summary.file_bytes
+        self.file.summary.file_bytes
     }
 
     fn warnings(&self) -> &[String] {
-        &self.source.warnings
+        &self.file.warnings
     }
 
     fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
@@ -176,8 +176,8 @@ impl SplatSource for PlySource<'_> {
             Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
             _ => 0..0,
         };
-        self.source.check_memory(rows.len(), self.normals)?;
-        self.source.fill(rows.clone(), splats, &Silent)?;
+        self.file.check_memory(rows.len(), self.normals)?;
+        self.file.fill(rows.clone(), splats, &Silent)?;
         self.finish(rows, splats)
     }
 
@@ -203,14 +203,14 @@ impl SplatSource for PlySource<'_> {
         let mut order: Vec<(usize, usize)> =
             gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
         order.sort_unstable();
-        let row_bytes = self.source.layout.row_bytes;
+        let row_bytes = self.file.layout.row_bytes;
         for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {
             let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else { continue };
-            let (bytes, big) = self.source.rows.packed(first..last + 1)?;
+            let (bytes, big) = self.file.rows.packed(first..last + 1)?;
             for &(row, k) in group {
                 let bytes = &bytes[(row - first) * row_bytes..][..row_bytes];
                 let out = &mut out[k * dim..(k + 1) * dim];
-                self.source.layout.groups[REST].read(Packed { bytes, row_bytes, big }, out);
+                self.file.layout.groups[REST].read(Packed { bytes, row_bytes, big }, out);
             }
         }
         Ok(())

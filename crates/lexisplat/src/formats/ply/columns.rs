@@ -26,7 +26,8 @@ pub(super) struct Field {
 /// Properties that become one array of f32 with `width` values a Gaussian.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
-    width: usize,
+    /// Values a Gaussian.
+    pub(super) width: usize,
     runs: Vec<Run>,
 }
 
@@ -55,11 +56,6 @@ impl Group {
             }
         }
         Self { width: fields.len(), runs }
-    }
-
-    /// Values a Gaussian.
-    pub(super) fn width(&self) -> usize {
-        self.width
     }
 
     /// Fills `out`, `width` values a row of `rows`.

@@ -33,7 +33,7 @@ impl<'a> PlyFile<'a> {
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
         let header = Header::parse(name, bytes, &options.limits)?;
         let layout = Layout::new(&header).map_err(|problem| Error::format(name, problem))?;
-        let summary = PlySummary::new(&header, bytes.len() as u64, layout.row_bytes as u64);
+        let summary = PlySummary::new(&header, &layout, bytes.len() as u64);
         options.limits.check_gaussians(name, summary.vertices)?;
         let marks = marks(&header.comments);
         let mut warnings = layout.warnings.clone();
@@ -41,7 +41,7 @@ impl<'a> PlyFile<'a> {
             let said = "comments contradict each other about anti-aliasing; taken as anti-aliased";
             warnings.push(said.to_owned());
         }
-        let rows = Rows::locate(name, &header, layout.row_bytes, &bytes[header.bytes..], &mut warnings)?;
+        let rows = Rows::locate(name, &header, &layout, &bytes[header.bytes..], &mut warnings)?;
         let count = usize::try_from(summary.vertices).map_err(|_| {
             Error::malformed(name, format!("{} vertices do not fit in memory", summary.vertices))
         })?;

@@ -119,7 +119,7 @@ impl PlyFile<'_> {
 
     /// Fills the normals. Few files have any, so they get a second pass, and scenes without normals need no array.
     pub(super) fn fill_normals(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
-        let width = self.layout.groups[NORMALS].width();
+        let width = self.layout.groups[NORMALS].width;
         if width == 0 {
             return Ok(());
         }
@@ -139,7 +139,7 @@ impl PlyFile<'_> {
         let Piece { rows, mut floats, mut extras } = piece;
         let (bytes, big) = self.rows.packed(rows.clone())?;
         let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
-        let mut normals = vec![0.0; self.layout.groups[NORMALS].width() * rows.len()];
+        let mut normals = vec![0.0; self.layout.groups[NORMALS].width * rows.len()];
         floats[NORMALS] = &mut normals;
         for (group, values) in self.layout.groups.iter().zip(&mut floats) {
             group.read(packed, values);
@@ -182,9 +182,8 @@ fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<P
     let mut pieces: Vec<Piece<'a>> = Vec::with_capacity(count.div_ceil(ROWS_PER_TASK));
     for start in (0..count).step_by(ROWS_PER_TASK) {
         let n = ROWS_PER_TASK.min(count - start);
-        let floats = std::array::from_fn(|k| {
-            left[k].split_off_mut(..layout.groups[k].width() * n).unwrap_or_default()
-        });
+        let floats =
+            std::array::from_fn(|k| left[k].split_off_mut(..layout.groups[k].width * n).unwrap_or_default());
         let extras = Vec::with_capacity(layout.extras.len());
         pieces.push(Piece { rows: first + start..first + start + n, floats, extras });
     }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::columns::{Field, Group};
-use super::header::{Element, Header, Kind};
+use super::header::{Element, Header};
 use super::names::{DC, NORMAL, OPACITY, POSITION, REST_PREFIX, ROTATION, SCALE, VERTEX, listed, shown};
 use crate::formats::kind::Unsupported;
 use crate::scene::extra::ScalarType;
@@ -17,12 +17,14 @@ pub(super) const NORMALS: usize = 1;
 pub(super) const REST: usize = 3;
 pub(super) const OPACITIES: usize = 4;
 
-/// What a function finds in a header, or why the file is refused.
-type Found<T> = Result<T, FormatError>;
+/// What a header says, or why the file is refused.
+type Accepted<T> = Result<T, FormatError>;
 
 /// Where each property lies in a vertex row.
 #[derive(Debug)]
 pub(super) struct Layout {
+    /// The index of the vertex element in the header.
+    pub(super) vertex: usize,
     pub(super) row_bytes: usize,
     pub(super) degree: ShDegree,
     /// The properties of each array of floats, in INRIA's order. Those of the normals are empty unless all three exist.
@@ -35,8 +37,9 @@ pub(super) struct Layout {
 
 impl Layout {
     /// Finds the layout of the vertices of `header`.
-    pub(super) fn new(header: &Header) -> Found<Self> {
-        let mut columns = Columns::new(vertex(header)?)?;
+    pub(super) fn new(header: &Header) -> Accepted<Self> {
+        let vertex = vertex_index(header)?;
+        let mut columns = Columns::new(&header.elements[vertex])?;
         refuse_other_kinds(&columns)?;
         let position = columns.group(&POSITION, "")?;
         let dc = columns.group(&DC, "; colours as red, green and blue alone are no spherical harmonics")?;
@@ -67,29 +70,25 @@ impl Layout {
             warnings.push(format!("extra properties kept: {}", listed(&names)));
         }
         let groups = [position, normal, dc, rest, opacity, scale, rotation];
-        Ok(Self { row_bytes, degree, groups, extras, warnings })
+        Ok(Self { vertex, row_bytes, degree, groups, extras, warnings })
     }
 }
 
 /// Returns the index of the vertex element in `header.elements`.
-pub(super) fn vertex_index(header: &Header) -> Option<usize> {
-    header.elements.iter().position(|e| e.name == VERTEX)
-}
-
-fn vertex(header: &Header) -> Found<&Element> {
-    let has = |name: &str| header.elements.iter().any(|e| e.name == name);
-    let compressed = |e: &Element| e.properties.iter().any(|p| p.name == "packed_position");
-    if has("chunk") || header.elements.iter().any(compressed) {
+fn vertex_index(header: &Header) -> Accepted<usize> {
+    let compressed =
+        |e: &Element| e.name == "chunk" || e.properties.iter().any(|p| p.name == "packed_position");
+    if header.elements.iter().any(compressed) {
         return Err(FormatError::Unsupported { kind: Unsupported::CompressedPly });
     }
-    let mut found = header.elements.iter().filter(|e| e.name == VERTEX);
+    let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
+    let mut found = (0..names.len()).filter(|&i| names[i] == VERTEX);
     match (found.next(), found.next()) {
-        (Some(vertex), None) => Ok(vertex),
+        (Some(index), None) => Ok(index),
         (Some(_), Some(_)) => {
             Err(FormatError::Malformed("element 'vertex' is declared more than once".to_owned()))
         }
         (None, _) => {
-            let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
             let found = if names.is_empty() { "none".to_owned() } else { listed(&names) };
             Err(FormatError::Malformed(format!("no element 'vertex'; elements found: {found}")))
         }
@@ -97,7 +96,7 @@ fn vertex(header: &Header) -> Found<&Element> {
 }
 
 /// Refuses relatives of 3DGS, recognised by the properties they have or lack.
-fn refuse_other_kinds(columns: &Columns<'_>) -> Found<()> {
+fn refuse_other_kinds(columns: &Columns<'_>) -> Accepted<()> {
     let has = |name: &str| columns.fields.contains_key(name);
     let shaped = has(SCALE[0]) && has(ROTATION[0]);
     let kind = if has("f_anchor_feat_0") {
@@ -113,7 +112,7 @@ fn refuse_other_kinds(columns: &Columns<'_>) -> Found<()> {
 }
 
 /// Returns the SH degree and the names from `f_rest_0` to the highest.
-fn rest_names(columns: &Columns<'_>) -> Found<(ShDegree, Vec<String>)> {
+fn rest_names(columns: &Columns<'_>) -> Accepted<(ShDegree, Vec<String>)> {
     let number = |name: &str| -> Option<usize> {
         let digits = name.strip_prefix(REST_PREFIX)?;
         let number = digits.parse().ok()?;
@@ -149,21 +148,15 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    fn new(vertex: &'a Element) -> Found<Self> {
+    fn new(vertex: &'a Element) -> Accepted<Self> {
         let (mut fields, mut row_bytes) = (HashMap::with_capacity(vertex.properties.len()), 0);
         for property in &vertex.properties {
             let name = property.name.as_str();
-            let Kind::Scalar(ty) = property.kind else {
-                return Err(FormatError::Malformed(format!(
-                    "vertex property '{}' is a list; a Gaussian's properties are single values",
-                    shown(name)
-                )));
-            };
+            let refuse = |what| FormatError::Malformed(format!("vertex property '{}' {what}", shown(name)));
+            let ty = property.kind.scalar();
+            let ty = ty.ok_or_else(|| refuse("is a list; a Gaussian's properties are single values"))?;
             if fields.insert(name, Field { offset: row_bytes, ty }).is_some() {
-                return Err(FormatError::Malformed(format!(
-                    "vertex property '{}' is declared twice",
-                    shown(name)
-                )));
+                return Err(refuse("is declared twice"));
             }
             row_bytes += ty.bytes();
         }
@@ -171,7 +164,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Claims the properties `names`, which become one array. `hint` is for the error if one is missing.
-    fn group<S: AsRef<str>>(&mut self, names: &[S], hint: &'static str) -> Found<Group> {
+    fn group<S: AsRef<str>>(&mut self, names: &[S], hint: &'static str) -> Accepted<Group> {
         let mut fields = Vec::with_capacity(names.len());
         for name in names.iter().map(AsRef::as_ref) {
             let Some(field) = self.fields.remove(name) else {

@@ -60,6 +60,6 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
     let source = PlySource::open_whole(name, bytes, options, &Silent)?;
     let splats = source.whole()?.into_owned();
-    let PlyFile { warnings, summary, .. } = source.source;
+    let PlyFile { warnings, summary, .. } = source.file;
     Ok(PlyRead { splats, warnings, summary })
 }

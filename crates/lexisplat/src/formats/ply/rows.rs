@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::ascii::AsciiRows;
 use super::columns::Packed;
 use super::header::{Element, Format, Header, Kind};
-use super::layout::vertex_index;
+use super::layout::Layout;
 use super::names::shown;
 use super::scalar::Scalar;
 use crate::scene::extra::with_scalar;
@@ -31,13 +31,11 @@ impl<'a> Rows<'a> {
     pub(super) fn locate(
         file: &'a str,
         header: &Header,
-        row_bytes: usize,
+        layout: &Layout,
         data: &'a [u8],
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
-        let Some(index) = vertex_index(header) else {
-            return Err(Error::malformed(file, "no element 'vertex'"));
-        };
+        let &Layout { vertex: index, row_bytes, .. } = layout;
         let big = match header.format {
             Format::Ascii => return AsciiRows::locate(file, header, index, row_bytes, data).map(Self::Ascii),
             Format::BinaryLittleEndian => false,
@@ -128,6 +126,6 @@ fn warn_about_the_end(after: &[Element], left: u64, warnings: &mut Vec<String>) 
         }
     }
     if left > needed {
-        warnings.push(format!("ignored: {}", FormatError::TrailingBytes { extra: left - needed }));
+        warnings.push(format!("ignored: {} bytes follow the end of the data", left - needed));
     }
 }
