@@ -2,7 +2,7 @@
 //! and a part at a time.
 #![no_main]
 
-use lexisplat::ply::{ReadOptions, read_bytes, write_to};
+use lexisplat::ply::{ReadOptions, read_bytes, write};
 use lexisplat_fuzz::allocator::bounded;
 use lexisplat_fuzz::{invariants, limits, one_thread, parts};
 use libfuzzer_sys::fuzz_target;
@@ -19,12 +19,12 @@ fuzz_target!(init: one_thread(), |data: &[u8]| {
     let Ok(read) = read else { return };
     invariants::splats(&read.splats);
     let mut bytes = Vec::new();
-    if let Err(error) = write_to(&mut bytes, &read.splats) {
+    if let Err(error) = write(&mut bytes, &read.splats) {
         panic!("what was read cannot be written: {error}");
     }
     let again = read_bytes("again.ply", &bytes, &options).expect("what was written can be read");
     assert_eq!(again.splats.len(), read.splats.len());
     let mut second = Vec::new();
-    write_to(&mut second, &again.splats).expect("written again");
+    write(&mut second, &again.splats).expect("written again");
     assert!(bytes == second, "written, read and written again differs");
 });

@@ -107,7 +107,7 @@ fn packed(splats: &Splats, how: u8, atoms: Option<usize>, in_parts: bool) {
 
 fn as_ply(splats: &Splats) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, splats).expect("written");
+    ply::write(&mut bytes, splats).expect("written");
     bytes
 }
 

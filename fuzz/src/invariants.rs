@@ -60,10 +60,10 @@ pub fn model(model: &Model) {
     if model.len() > SMALL {
         return;
     }
-    let dense = model.to_splats();
+    let dense = model.clone().into_splats();
     splats(&dense);
     let mut bytes = Vec::new();
-    match ply::write_to(&mut bytes, &dense) {
+    match ply::write(&mut bytes, &dense) {
         Ok(_) => {}
         // Names of extras that a PLY cannot hold.
         Err(error) if error.to_string().starts_with("extra = ") => return,

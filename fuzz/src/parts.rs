@@ -97,7 +97,7 @@ pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byt
         return;
     }
     let (mut at_once, mut in_parts) = (Vec::new(), Vec::new());
-    let written = ply::write_to(&mut at_once, &whole.to_splats()).map_err(|e| e.to_string());
+    let written = ply::write(&mut at_once, &whole.clone().into_splats()).map_err(|e| e.to_string());
     let undone = stream::decompress(&chunks, &mut in_parts, &Silent).map_err(|e| e.to_string());
     assert_eq!(written, undone);
     assert!(at_once == in_parts, "decompressed in parts differs");

@@ -12,7 +12,7 @@ use lexisplat_sample::{SampleOptions, scene};
 /// Draws `model` by every path that this GPU has and compares with the processor.
 fn check(gpu: &Gpu, model: &Model, cameras: &[Camera], case: &str) {
     let mut renderer = GpuRenderer::new(gpu).unwrap();
-    let dense = model.to_splats();
+    let dense = model.clone().into_splats();
     let options = RenderOptions::default().with_background([0.2, 0.5, 1.0]);
     for path in ShPath::ALL {
         let uploaded = match GpuScene::new(gpu, &Scene::from(model), path) {

@@ -16,7 +16,7 @@ fn codes_draw_as_their_dense_scene() {
         (4, 144, true),
     ] {
         let model = made::model(ShDegree::new(degree).unwrap(), atoms, half);
-        let splats = model.to_splats();
+        let splats = model.clone().into_splats();
         let (sparse, dense) = (Scene::from(&model), Scene::from(&splats));
         assert_eq!((sparse.len(), sparse.degree()), (dense.len(), dense.degree()));
         for seed in 0..3 {
@@ -34,7 +34,7 @@ fn codes_draw_as_their_dense_scene() {
 #[test]
 fn colours_agree_gaussian_by_gaussian() {
     let model = made::model(ShDegree::THREE, 90, true);
-    let splats = model.to_splats();
+    let splats = model.clone().into_splats();
     let (sparse, dense) = (Radiance::new(&Scene::from(&model)), Radiance::new(&Scene::from(&splats)));
     let mut random = made::Random::new(4);
     let mut differ = 0;
@@ -54,7 +54,7 @@ fn colours_agree_gaussian_by_gaussian() {
 #[test]
 fn bands_above_the_degree_asked_for_are_left_out() {
     let model = made::model(ShDegree::THREE, 90, true);
-    let whole = model.to_splats();
+    let whole = model.clone().into_splats();
     let (sparse, dense) = (Scene::from(&model), Scene::from(&whole));
     let direction = glam::Vec3::new(0.3, -0.5, 0.8).normalize().to_array();
     for degree in (0..=4).map(|d| ShDegree::new(d).unwrap()) {

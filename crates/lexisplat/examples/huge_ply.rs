@@ -62,7 +62,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         let keep: Vec<bool> = (0..part.len()).map(|i| copy * model.len() + i < count).collect();
         part.retain(&keep);
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &part)?;
+        ply::write(&mut bytes, &part)?;
         let end = b"end_header\n";
         let data = bytes.windows(end.len()).position(|w| w == end).ok_or("no header")? + end.len();
         if copy == 0 {

@@ -137,7 +137,7 @@ fn a_cap_lifts_the_promise_and_is_counted() {
     let options = options(|o| o.max_nonzeros = Some(1));
     let (model, report) = compress(splats.clone(), &options, &Silent).unwrap();
     assert!(model.codes().counts().iter().all(|&c| c <= 1));
-    let decoded = model.to_splats();
+    let decoded = model.clone().into_splats();
     let over = (0..splats.len()).filter(|&i| {
         let squares = splats.rest(i).iter().zip(decoded.rest(i)).map(|(x, y)| f64::from(x - y).powi(2));
         squares.sum::<f64>().sqrt() > 0.1
@@ -257,7 +257,10 @@ fn no_layout_is_refused() {
         for codes in [CodeLayout::Compact, CodeLayout::Paper] {
             let bytes = written(&model, codes);
             let read = lexi::read_bytes("m", &bytes, &Limits::default()).unwrap();
-            assert_eq!((read.to_splats(), read.record()), (model.to_splats(), model.record()));
+            assert_eq!(
+                (read.clone().into_splats(), read.record()),
+                (model.clone().into_splats(), model.record())
+            );
         }
     }
 }
@@ -316,7 +319,7 @@ fn sources_of_every_kind_give_the_same_bytes() {
         bytes
     };
     let mut ply = Vec::new();
-    ply::write_to(&mut ply, &splats).unwrap();
+    ply::write(&mut ply, &splats).unwrap();
     let ply = PlySource::open("t.ply", &ply, &ReadOptions::default(), &Silent).unwrap();
     let bytes = compressed(&splats);
     assert!(bytes == compressed(&ply));

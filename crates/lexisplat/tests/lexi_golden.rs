@@ -82,7 +82,7 @@ fn a_dictionary_travels_alone() {
 #[test]
 fn dense_values_are_the_sum_of_atoms() {
     for (name, _, model) in models() {
-        let Splats { sh_rest, degree, .. } = model.to_splats();
+        let Splats { sh_rest, degree, .. } = model.clone().into_splats();
         let dim = degree.rest();
         let mut k = 0;
         for (i, &count) in model.codes().counts().iter().enumerate() {

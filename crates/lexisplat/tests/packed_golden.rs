@@ -26,7 +26,7 @@ fn decoded(name: &str) -> Model {
 
 fn ply_bytes(splats: &Splats) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, splats).unwrap();
+    ply::write(&mut bytes, splats).unwrap();
     bytes
 }
 

@@ -69,12 +69,12 @@ fn an_exact_file_made_and_undone_part_by_part_is_that_of_the_whole_scene() {
     let bytes = Input::open(&path("out.lexi")).unwrap();
     let chunks = LexiReader::open("out.lexi", &bytes, &Limits::default()).unwrap();
     let mut expected = Vec::new();
-    ply::write_to(&mut expected, &model.to_splats()).unwrap();
+    ply::write(&mut expected, &model.clone().into_splats()).unwrap();
     let written = stream::decompress(&chunks, &path("back.ply"), &Silent).unwrap();
     assert_eq!(written, expected.len() as u64);
     assert!(std::fs::read(path("back.ply")).unwrap() == expected);
     let survey = stream::survey(&chunks, folder.path()).unwrap();
-    assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
+    assert_eq!(survey.lint, stats::lint(&model.clone().into_splats()).unwrap());
     assert_eq!(survey.nonzeros, model.codes().nonzeros() as u64);
     assert_eq!(survey.resident_sh_bytes, model.resident_sh_bytes() as u64);
     assert_eq!(survey.nonzero_histogram.iter().sum::<u64>() + survey.escapes, GAUSSIANS as u64);
@@ -97,7 +97,7 @@ fn escapes_and_pointers_are_found_in_every_part() {
         assert_eq!(report.escapes, 6);
         let (mut bytes, mut expected, mut found) = (Vec::new(), Vec::new(), Vec::new());
         lexi::LexiWriter::exact(&model, layout.codes()).unwrap().write(&mut bytes, &Silent).unwrap();
-        ply::write_to(&mut expected, &model.into_splats()).unwrap();
+        ply::write(&mut expected, &model.into_splats()).unwrap();
         let chunks = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
         assert_eq!(stream::decompress(&chunks, &mut found, &Silent).unwrap(), expected.len() as u64);
         assert!(found == expected, "{layout}");
@@ -121,11 +121,11 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
         assert_eq!(chunks.order_kept(), keep_order);
         assert_eq!(chunks.attribute_bytes(), lexi::LexiWriter::packed(&packed).attribute_bytes());
         let (mut expected, mut found) = (Vec::new(), Vec::new());
-        ply::write_to(&mut expected, &model.to_splats()).unwrap();
+        ply::write(&mut expected, &model.clone().into_splats()).unwrap();
         stream::decompress(&chunks, &mut found, &Silent).unwrap();
         assert!(found == expected, "{keep_order}");
         let survey = stream::survey(&chunks, folder.path()).unwrap();
-        assert_eq!(survey.lint, stats::lint(&model.to_splats()).unwrap());
+        assert_eq!(survey.lint, stats::lint(&model.clone().into_splats()).unwrap());
         assert_eq!(survey.stream_bits, packed.stream_bits().unwrap());
         assert_eq!(survey.resident_sh_bytes, model.resident_sh_bytes() as u64);
         assert_eq!(files(folder.path()), 0);
@@ -139,7 +139,7 @@ fn a_ply_is_refused_left_out_and_looked_over_as_when_read_whole() {
         whole.geometry.scales[i][2] = f32::INFINITY;
     }
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, &whole).unwrap();
+    ply::write(&mut bytes, &whole).unwrap();
     let strict = ReadOptions::default();
     let expected = ply::read_bytes("t.ply", &bytes, &strict).unwrap_err();
     let found = PlySource::open("t.ply", &bytes, &strict, &Silent).unwrap_err();
@@ -168,7 +168,7 @@ fn a_ply_is_refused_left_out_and_looked_over_as_when_read_whole() {
 fn ascii_rows_are_found_at_any_place() {
     let whole = scene(&SampleOptions::new(2500, 1)).with_degree_cut(lexisplat::ShDegree::new(1).unwrap());
     let mut binary = Vec::new();
-    ply::write_to(&mut binary, &whole).unwrap();
+    ply::write(&mut binary, &whole).unwrap();
     let end = binary.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     let mut ascii =
         String::from_utf8(binary[..end].to_vec()).unwrap().replace("binary_little_endian", "ascii");

@@ -19,7 +19,7 @@ fn sample(count: usize, degree: u8) -> Splats {
 
 fn file(splats: &Splats) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, splats).unwrap();
+    ply::write(&mut bytes, splats).unwrap();
     bytes
 }
 

@@ -76,7 +76,7 @@ fn degrees() -> impl Iterator<Item = ShDegree> {
 fn plys(root: &Path) -> Done {
     for degree in degrees() {
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &with_extras(sample(3, degree)))?;
+        ply::write(&mut bytes, &with_extras(sample(3, degree)))?;
         save(root, "ply", &format!("binary-{degree}"), &bytes)?;
     }
     // The same Gaussians as other trainers write them.

@@ -46,7 +46,9 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let (name, bytes) = input(&args.input, common)?;
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let bars = Bars::new(common.quiet);
-    let source = PlySource::open(&name, &bytes, &read, &bars)?;
+    let whole = compression.holds_whole(bytes.len() as u64);
+    let open = if whole { PlySource::open_whole } else { PlySource::open };
+    let source = open(&name, &bytes, &read, &bars)?;
     warn(&name, source.warnings());
     let opened = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {

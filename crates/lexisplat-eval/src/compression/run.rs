@@ -15,6 +15,13 @@ use super::views::PackingViews;
 use crate::error::Result;
 
 impl Compression {
+    /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once. Such a source is best
+    /// opened with [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
+    #[must_use]
+    pub fn holds_whole(&self, source_bytes: u64) -> bool {
+        matches!(self, Self::Packed(packing) if packing.is_whole(source_bytes).is_ok_and(|whole| whole))
+    }
+
     /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. `progress` is told
     /// of every step and may cancel. Nothing is left of a file that was cancelled.
     ///

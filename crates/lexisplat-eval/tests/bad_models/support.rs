@@ -43,7 +43,7 @@ pub(crate) fn cameras() -> Vec<Camera> {
 /// What `splats` become on their way through a PLY.
 pub(crate) fn through_ply(splats: &Splats, drop_invalid: bool) -> lexisplat::Result<ply::PlyRead> {
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, splats).unwrap();
+    ply::write(&mut bytes, splats).unwrap();
     ply::read_bytes("bad.ply", &bytes, &ply::ReadOptions::default().with_drop_invalid(drop_invalid))
 }
 

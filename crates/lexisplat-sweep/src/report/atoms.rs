@@ -17,7 +17,7 @@ impl Usage {
     pub(super) fn of(model: &Model) -> Self {
         let mut users = vec![0_u64; model.dictionary().len()];
         let indices = model.codes().indices();
-        for k in 0..indices.len() {
+        for k in 0..model.codes().nonzeros() {
             if let Some(users) = users.get_mut(indices.get(k)) {
                 *users += 1;
             }

@@ -8,6 +8,8 @@ use crate::support::error::{Error, FormatError, Result};
 const SPLAT_EXTENSION: &str = ".splat";
 /// Extension of the files that [`Unsupported::Ksplat`] means. Their bytes have no mark.
 const KSPLAT_EXTENSION: &str = ".ksplat";
+/// What to do with most kinds of file that are not read.
+const CONVERT: &str = "convert it to PLY first, for example with splat-transform";
 /// Where the JSON header of a safetensors file begins: after its length, a u64.
 const JSON_OFFSET: usize = 8;
 
@@ -106,46 +108,49 @@ impl fmt::Display for FileKind {
 }
 
 impl Unsupported {
+    /// What it is, and what to do instead of reading it.
+    fn texts(self) -> [&'static str; 2] {
+        match self {
+            Self::Gzip => ["a gzip file (SPZ?)", CONVERT],
+            Self::Zip => ["a zip archive (SOG?)", CONVERT],
+            Self::Spz => ["SPZ, version 4", CONVERT],
+            Self::Splat => ["a .splat file", CONVERT],
+            Self::Ksplat => ["a .ksplat file", CONVERT],
+            Self::Pickle => [
+                "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)",
+                "it is never read here: load it where it was made and write a PLY, for EAGLES with \
+                 load_compressed_pkl and save_ply",
+            ],
+            Self::CompressedPly => [
+                "a PlayCanvas compressed.ply",
+                "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start from the \
+                 trainer's own PLY",
+            ],
+            Self::Anchors => [
+                "a Scaffold-GS anchor model",
+                "its Gaussians come out of a network; export them as plain 3DGS first",
+            ],
+            Self::PointCloud => [
+                "a point cloud, not a Gaussian scene (no opacity)",
+                "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
+            ],
+            Self::TwoDimensional => [
+                "a 2D Gaussian Splatting model (no scale_2)",
+                "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20",
+            ],
+        }
+    }
+
     /// What to do instead of reading the file.
     #[must_use]
     pub fn advice(self) -> &'static str {
-        match self {
-            Self::Gzip | Self::Zip | Self::Spz | Self::Splat | Self::Ksplat => {
-                "convert it to PLY first, for example with splat-transform"
-            }
-            Self::Pickle => {
-                "it is never read here: load it where it was made and write a PLY, for EAGLES with \
-                 load_compressed_pkl and save_ply"
-            }
-            Self::CompressedPly => {
-                "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start from the \
-                 trainer's own PLY"
-            }
-            Self::Anchors => "its Gaussians come out of a network; export them as plain 3DGS first",
-            Self::PointCloud => "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
-            Self::TwoDimensional => {
-                "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20"
-            }
-        }
+        self.texts()[1]
     }
 }
 
 impl fmt::Display for Unsupported {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Gzip => "a gzip file (SPZ?)",
-            Self::Zip => "a zip archive (SOG?)",
-            Self::Spz => "SPZ, version 4",
-            Self::Pickle => {
-                "a Python pickle, which can run any code when it is read (EAGLES' point_cloud_compressed.pkl?)"
-            }
-            Self::Splat => "a .splat file",
-            Self::Ksplat => "a .ksplat file",
-            Self::CompressedPly => "a PlayCanvas compressed.ply",
-            Self::Anchors => "a Scaffold-GS anchor model",
-            Self::PointCloud => "a point cloud, not a Gaussian scene (no opacity)",
-            Self::TwoDimensional => "a 2D Gaussian Splatting model (no scale_2)",
-        })
+        f.write_str(self.texts()[0])
     }
 }
 

@@ -1,6 +1,6 @@
 //! Puts unpacked Gaussians back in the order of their source.
 
-use crate::scene::splats::for_extra;
+use crate::scene::extra::for_extra;
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};

@@ -2,8 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
-use crate::scene::splats::{Extra, SceneMeta};
+use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
 use crate::support::limits::Limits;
 use crate::support::spill::Spilled;

@@ -1,6 +1,7 @@
 //! Extras of a scene that comes part after part.
 
-use crate::scene::splats::{Extra, Geometry, for_extra};
+use crate::scene::extra::{Extra, for_extra};
+use crate::scene::splats::Geometry;
 use crate::support::error::Result;
 use crate::support::spill::{Spill, SpillTo, Spilled};
 

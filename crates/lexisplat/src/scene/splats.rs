@@ -1,5 +1,6 @@
 //! A trained scene as arrays, in the units of its PLY.
 
+use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
 
@@ -22,104 +23,6 @@ pub struct Geometry {
     pub rotations: Vec<[f32; 4]>,
     /// Per-Gaussian properties that no layout defines, in file order.
     pub extras: Vec<Extra>,
-}
-
-/// A per-Gaussian property that 3DGS does not define, kept under its own name and type.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Extra {
-    /// Property name in the PLY.
-    pub name: String,
-    /// One value a Gaussian.
-    pub values: ExtraValues,
-}
-
-/// Values of an [`Extra`] in the type the file gave them.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub enum ExtraValues {
-    /// `char` or `int8`.
-    I8(Vec<i8>),
-    /// `uchar` or `uint8`.
-    U8(Vec<u8>),
-    /// `short` or `int16`.
-    I16(Vec<i16>),
-    /// `ushort` or `uint16`.
-    U16(Vec<u16>),
-    /// `int` or `int32`.
-    I32(Vec<i32>),
-    /// `uint` or `uint32`.
-    U32(Vec<u32>),
-    /// `float` or `float32`.
-    F32(Vec<f32>),
-    /// `double` or `float64`.
-    F64(Vec<f64>),
-}
-
-/// Calls `$body` with `$v` bound to the vector inside an [`ExtraValues`].
-macro_rules! for_extra {
-    ($values:expr, $v:ident => $body:expr) => {
-        match $values {
-            $crate::scene::splats::ExtraValues::I8($v) => $body,
-            $crate::scene::splats::ExtraValues::U8($v) => $body,
-            $crate::scene::splats::ExtraValues::I16($v) => $body,
-            $crate::scene::splats::ExtraValues::U16($v) => $body,
-            $crate::scene::splats::ExtraValues::I32($v) => $body,
-            $crate::scene::splats::ExtraValues::U32($v) => $body,
-            $crate::scene::splats::ExtraValues::F32($v) => $body,
-            $crate::scene::splats::ExtraValues::F64($v) => $body,
-        }
-    };
-}
-pub(crate) use for_extra;
-
-macro_rules! values_from {
-    ($($variant:ident: $type:ty),+) => {
-        impl ExtraValues {
-            /// Appends values of the same type.
-            fn append(&mut self, other: Self) {
-                match (self, other) {
-                    $((Self::$variant(to), Self::$variant(from)) => to.extend(from),)+
-                    _ => debug_assert!(false, "extras of different types"),
-                }
-            }
-        }
-        $(impl From<Vec<$type>> for ExtraValues {
-            fn from(values: Vec<$type>) -> Self {
-                Self::$variant(values)
-            }
-        })+
-    };
-}
-values_from!(I8: i8, U8: u8, I16: i16, U16: u16, I32: i32, U32: u32, F32: f32, F64: f64);
-
-impl Extra {
-    /// The values of Gaussians `range`, which are all there, under the same name.
-    pub(crate) fn slice(&self, range: std::ops::Range<usize>) -> Self {
-        Self { name: self.name.clone(), values: for_extra!(&self.values, v => v[range].to_vec().into()) }
-    }
-}
-
-impl ExtraValues {
-    /// Number of values.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        for_extra!(self, v => v.len())
-    }
-
-    /// Whether there are no values.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// Bytes of one value.
-    #[must_use]
-    pub fn width(&self) -> usize {
-        fn width<T>(_: &[T]) -> usize {
-            size_of::<T>()
-        }
-        for_extra!(self, v => width(v))
-    }
 }
 
 /// What the file of a scene says about it beside its Gaussians. It is kept from PLY to .lexi and back.
@@ -201,15 +104,20 @@ impl Geometry {
     /// # Errors
     /// [`Error::Parameter`] naming the array and the first value that is not.
     pub(crate) fn validate_values(&self) -> Result<()> {
-        let arrays: [(&'static str, &[f32]); 6] = [
-            ("positions", self.positions.as_flattened()),
-            ("normals", self.normals.as_flattened()),
-            ("dc", self.dc.as_flattened()),
-            ("opacities", &self.opacities),
-            ("scales", self.scales.as_flattened()),
-            ("rotations", self.rotations.as_flattened()),
-        ];
-        all_finite(arrays)
+        let names = ["positions", "dc", "opacities", "scales", "rotations", "normals"];
+        all_finite(names.into_iter().zip(self.floats()))
+    }
+
+    /// The values of positions, base colours, opacities, scales, rotations and normals.
+    pub(crate) fn floats(&self) -> [&[f32]; 6] {
+        [
+            self.positions.as_flattened(),
+            self.dc.as_flattened(),
+            &self.opacities,
+            self.scales.as_flattened(),
+            self.rotations.as_flattened(),
+            self.normals.as_flattened(),
+        ]
     }
 
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.

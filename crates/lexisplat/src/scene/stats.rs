@@ -7,7 +7,8 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use crate::scene::splats::{Splats, for_extra};
+use crate::scene::extra::for_extra;
+use crate::scene::splats::Splats;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in
@@ -82,7 +83,8 @@ pub struct Linter {
     gaussians: u64,
     view_dependent: bool,
     counts: Counts,
-    columns: Vec<Column>,
+    /// Name, range and sum of each property.
+    columns: Vec<(String, Span)>,
 }
 
 impl Linter {
@@ -100,12 +102,12 @@ impl Linter {
         self.view_dependent = splats.degree.get() > 0;
         let columns = columns(splats);
         // An empty part may lack properties that the others have.
-        if self.columns.iter().all(|c| c.whole.count == 0) && self.columns.len() <= columns.len() {
-            self.columns = columns;
-        } else {
-            self.columns.iter_mut().zip(columns).for_each(|(all, part)| all.parts.extend(part.parts));
+        if self.columns.iter().all(|(_, whole)| whole.count == 0) && self.columns.len() <= columns.len() {
+            self.columns = columns.iter().map(|(name, _)| (name.clone(), Span::EMPTY)).collect();
         }
-        self.columns.iter_mut().for_each(Column::join);
+        for ((_, whole), (_, parts)) in self.columns.iter_mut().zip(columns) {
+            parts.into_iter().for_each(|part| whole.add(part));
+        }
         Ok(())
     }
 
@@ -113,16 +115,17 @@ impl Linter {
     #[must_use]
     pub fn finish(self) -> Lint {
         let (n, counts) = (self.gaussians, self.counts);
+        let [zero_rest, zero_quaternions, non_unit_quaternions, huge_scales, never_drawn] = counts.odd;
         let mut lint = Lint {
             gaussians: n,
-            attributes: self.columns.into_iter().map(Column::into_report).collect(),
+            attributes: self.columns.into_iter().map(|(name, whole)| whole.into_report(name)).collect(),
             rest_norms: counts.rest_norms,
             mean_rest_norm: if n == 0 { 0.0 } else { counts.norm_sum / n as f64 },
-            zero_rest: counts.zero_rest,
-            zero_quaternions: counts.zero_quaternions,
-            non_unit_quaternions: counts.non_unit_quaternions,
-            huge_scales: counts.huge_scales,
-            never_drawn: counts.never_drawn,
+            zero_rest,
+            zero_quaternions,
+            non_unit_quaternions,
+            huge_scales,
+            never_drawn,
             warnings: Vec::new(),
         };
         lint.warnings = warnings(&lint, self.view_dependent);
@@ -158,11 +161,8 @@ fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
 struct Counts {
     rest_norms: [u64; NORM_BINS.len()],
     norm_sum: f64,
-    zero_rest: u64,
-    zero_quaternions: u64,
-    non_unit_quaternions: u64,
-    huge_scales: u64,
-    never_drawn: u64,
+    /// [`Lint::zero_rest`] and the four counts that follow it.
+    odd: [u64; 5],
 }
 
 impl Counts {
@@ -177,36 +177,24 @@ impl Counts {
             let bin = NORM_BINS.iter().rposition(|&edge| length >= edge).unwrap_or(0);
             counts.rest_norms[bin] += 1;
             counts.norm_sum += length;
-            counts.zero_rest += u64::from(rest.iter().all(|&v| v == 0.0));
-            let length = norm(&geometry.rotations[i]);
-            counts.zero_quaternions += u64::from(length == 0.0);
-            counts.non_unit_quaternions += u64::from(length != 0.0 && (length - 1.0).abs() > UNIT_TOLERANCE);
-            counts.huge_scales += u64::from(geometry.scales[i].iter().any(|&s| s > HUGE_LOG_SCALE));
-            counts.never_drawn += u64::from(geometry.opacities[i] < NEVER_DRAWN_OPACITY);
+            let turn = norm(&geometry.rotations[i]);
+            let odd = [
+                rest.iter().all(|&v| v == 0.0),
+                turn == 0.0,
+                turn != 0.0 && (turn - 1.0).abs() > UNIT_TOLERANCE,
+                geometry.scales[i].iter().any(|&s| s > HUGE_LOG_SCALE),
+                geometry.opacities[i] < NEVER_DRAWN_OPACITY,
+            ];
+            counts.odd.iter_mut().zip(odd).for_each(|(count, odd)| *count += u64::from(odd));
         }
         counts
     }
 
     fn add(&mut self, other: &Self) {
-        for (a, b) in self.rest_norms.iter_mut().zip(other.rest_norms) {
-            *a += b;
-        }
+        self.rest_norms.iter_mut().zip(other.rest_norms).for_each(|(a, b)| *a += b);
+        self.odd.iter_mut().zip(other.odd).for_each(|(a, b)| *a += b);
         self.norm_sum += other.norm_sum;
-        self.zero_rest += other.zero_rest;
-        self.zero_quaternions += other.zero_quaternions;
-        self.non_unit_quaternions += other.non_unit_quaternions;
-        self.huge_scales += other.huge_scales;
-        self.never_drawn += other.never_drawn;
     }
-}
-
-/// Range and sum of one property.
-#[derive(Debug)]
-struct Column {
-    name: String,
-    whole: Span,
-    /// Spans of chunks that are not yet added to the whole, in order.
-    parts: Vec<Span>,
 }
 
 /// Range, sum and number of values.
@@ -220,37 +208,29 @@ struct Span {
 
 impl Span {
     const EMPTY: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0 };
-}
 
-impl Column {
-    fn join(&mut self) {
-        for part in self.parts.drain(..) {
-            let whole = &mut self.whole;
-            *whole = Span {
-                min: whole.min.min(part.min),
-                max: whole.max.max(part.max),
-                sum: whole.sum + part.sum,
-                count: whole.count + part.count,
-            };
-        }
+    fn add(&mut self, next: Self) {
+        self.min = self.min.min(next.min);
+        self.max = self.max.max(next.max);
+        self.sum += next.sum;
+        self.count += next.count;
     }
 
-    fn into_report(self) -> AttributeStats {
-        let Span { min, max, sum, count } = self.whole;
-        match count {
-            0 => AttributeStats { name: self.name, min: 0.0, max: 0.0, mean: 0.0 },
-            _ => AttributeStats { name: self.name, min, max, mean: sum / count as f64 },
+    fn into_report(self, name: String) -> AttributeStats {
+        match self.count {
+            0 => AttributeStats { name, min: 0.0, max: 0.0, mean: 0.0 },
+            count => AttributeStats { name, min: self.min, max: self.max, mean: self.sum / count as f64 },
         }
     }
 }
 
-/// All properties of some Gaussians.
-fn columns(splats: &Splats) -> Vec<Column> {
+/// All properties of some Gaussians, in spans of [`GAUSSIANS_PER_TASK`].
+fn columns(splats: &Splats) -> Vec<(String, Vec<Span>)> {
     let geometry = &splats.geometry;
     let mut out = Vec::new();
     let mut columns = |names: &[&str], values: &[f32]| {
         for (column, name) in names.iter().enumerate() {
-            out.push(spans(name, values, column, names.len()));
+            out.push(((*name).to_owned(), spans(values, column, names.len())));
         }
     };
     columns(&["x", "y", "z"], geometry.positions.as_flattened());
@@ -265,29 +245,23 @@ fn columns(splats: &Splats) -> Vec<Column> {
     columns(&["scale_0", "scale_1", "scale_2"], geometry.scales.as_flattened());
     columns(&["rot_0", "rot_1", "rot_2", "rot_3"], geometry.rotations.as_flattened());
     for extra in &geometry.extras {
-        for_extra!(&extra.values, v => out.push(spans(&extra.name, v, 0, 1)));
+        out.push((extra.name.clone(), for_extra!(&extra.values, v => spans(v, 0, 1))));
     }
     out
 }
 
 /// Every `width`-th value from `column` on.
-fn spans<T: Copy + Into<f64> + Sync>(name: &str, values: &[T], column: usize, width: usize) -> Column {
-    let parts = map_chunks(values.len() / width, GAUSSIANS_PER_TASK, |rows| {
-        let mut part = Span::EMPTY;
+fn spans<T: Copy + Into<f64> + Sync>(values: &[T], column: usize, width: usize) -> Vec<Span> {
+    map_chunks(values.len() / width, GAUSSIANS_PER_TASK, |rows| {
+        let mut span = Span::EMPTY;
         for row in rows {
             let value: f64 = values[row * width + column].into();
             if !value.is_nan() {
-                part = Span {
-                    min: part.min.min(value),
-                    max: part.max.max(value),
-                    sum: part.sum + value,
-                    count: part.count + 1,
-                };
+                span.add(Span { min: value, max: value, sum: value, count: 1 });
             }
         }
-        part
-    });
-    Column { name: name.to_owned(), whole: Span::EMPTY, parts }
+        span
+    })
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Sparse codes: for every Gaussian a few (atom, value) pairs, which are a sparse column of a matrix.
 
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::pursuit::ValueType;
@@ -35,18 +36,11 @@ impl Indices {
     }
 
     /// Number of indices.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::U8(v) => v.len(),
             Self::U16(v) => v.len(),
         }
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Index at `k`.
@@ -59,6 +53,14 @@ impl Indices {
         match self {
             Self::U8(v) => usize::from(v[k]),
             Self::U16(v) => usize::from(v[k]),
+        }
+    }
+
+    /// All indices as they lie in memory.
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::U8(v) => v,
+            Self::U16(v) => bytemuck::cast_slice(v),
         }
     }
 
@@ -92,18 +94,11 @@ impl Values {
     }
 
     /// Number of values.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         match self {
             Self::F32(v) => v.len(),
             Self::F16(v) => v.len(),
         }
-    }
-
-    /// Whether there are none.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// Value at `k`.
@@ -116,6 +111,15 @@ impl Values {
         match self {
             Self::F32(v) => v[k],
             Self::F16(v) => v[k].to_f32(),
+        }
+    }
+
+    /// All values as they lie in memory.
+    pub(crate) fn as_bytes(&self) -> &[u8] {
+        match self {
+            Self::F32(v) => bytemuck::cast_slice(v),
+            // `bytemuck` knows half floats as integers.
+            Self::F16(v) => bytemuck::cast_slice::<u16, u8>(v.reinterpret_cast()),
         }
     }
 

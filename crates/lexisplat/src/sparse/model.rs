@@ -178,17 +178,6 @@ impl Model {
         rest
     }
 
-    /// A dense copy of the scene.
-    #[must_use]
-    pub fn to_splats(&self) -> Splats {
-        Splats {
-            geometry: self.geometry.clone(),
-            degree: self.degree(),
-            sh_rest: self.dense_rest(),
-            meta: self.meta.clone(),
-        }
-    }
-
     /// The dense scene.
     #[must_use]
     pub fn into_splats(self) -> Splats {

@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn the_bytes_are_those_of_the_whole_scene_in_every_layout() {
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &scene()).unwrap();
+        ply::write(&mut bytes, &scene()).unwrap();
         for layout in [Layout::F16, Layout::F32, Layout::Paper] {
             let options = quick(layout);
             let expected = in_memory(&bytes, &options, false);
@@ -159,7 +159,7 @@ mod tests {
             splats.geometry.scales[i][1] = f32::NAN;
         }
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &splats).unwrap();
+        ply::write(&mut bytes, &splats).unwrap();
         let (options, codes) = quick(Layout::F16);
         let options = (options.with_max_nonzeros(3), codes);
         // The only Gaussian with a normal is among those left out.
@@ -172,7 +172,7 @@ mod tests {
             let full = crate::support::testing::scene(count, 1);
             let splats = full.with_degree_cut(crate::ShDegree::new(degree).unwrap());
             let mut bytes = Vec::new();
-            ply::write_to(&mut bytes, &splats).unwrap();
+            ply::write(&mut bytes, &splats).unwrap();
             let options = quick(Layout::F16);
             let expected = in_memory(&bytes, &options, false);
             assert!(streamed(&bytes, &options, false, GAUSSIANS_PER_TASK) == expected, "{count} {degree}");
@@ -182,7 +182,7 @@ mod tests {
     #[test]
     fn no_temporary_file_stays_after_an_error() {
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &scene()).unwrap();
+        ply::write(&mut bytes, &scene()).unwrap();
         let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");

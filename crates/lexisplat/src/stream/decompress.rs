@@ -2,7 +2,7 @@
 
 use super::source_order::in_source_order;
 use crate::formats::lexi::LexiReader;
-use crate::formats::ply::{PlyWriter, check, file_bytes};
+use crate::formats::ply::write_parts;
 use crate::scene::source::SplatSource;
 use crate::support::error::Result;
 use crate::support::progress::Progress;
@@ -21,13 +21,10 @@ pub fn decompress<'a>(
 ) -> Result<u64> {
     let sink = sink.into();
     let folder = sink.spill_folder()?;
-    let like = lexi.empty();
-    check(&like)?;
-    sink.write(file_bytes(&like, lexi.len()), progress, |writer, named| {
-        let mut ply = PlyWriter::begin(writer, &like, lexi.len()).map_err(named)?;
+    write_parts(sink, &lexi.empty(), lexi.len(), progress, |write| {
         in_source_order(lexi, &folder, &mut |splats| {
             progress.check()?;
-            ply.write(&splats).map_err(named)
+            write(&splats)
         })
     })
 }

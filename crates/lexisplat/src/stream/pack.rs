@@ -115,7 +115,7 @@ mod tests {
 
     fn streamed(splats: &Splats, importance: Importance<'_>, sizes: Sizes) -> Result<(Vec<u8>, PackedFile)> {
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, splats).unwrap();
+        ply::write(&mut bytes, splats).unwrap();
         let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");

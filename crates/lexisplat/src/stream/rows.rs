@@ -1,6 +1,7 @@
 //! Gaussians as rows of bytes, for temporary files.
 
-use crate::scene::splats::{Extra, Splats, for_extra};
+use crate::scene::extra::{Extra, for_extra};
+use crate::scene::splats::Splats;
 use crate::support::parallel::for_each_chunk_mut;
 
 /// Rows that one thread converts at a time.

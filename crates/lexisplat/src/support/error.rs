@@ -82,12 +82,6 @@ pub enum FormatError {
         /// Bytes there are.
         found: u64,
     },
-    /// Bytes follow the last one the header accounts for.
-    #[error("{extra} bytes follow the end of the data")]
-    TrailingBytes {
-        /// How many.
-        extra: u64,
-    },
     /// A property that every Gaussian needs does not exist.
     #[error("property '{name}' is missing{hint}")]
     MissingProperty {
@@ -148,11 +142,6 @@ impl Error {
     /// An [`Error::Io`] about `file`.
     pub fn io(file: impl AsRef<Path>, source: std::io::Error) -> Self {
         Self::Io { file: file.as_ref().display().to_string(), source }
-    }
-
-    /// An [`Error::Writer`].
-    pub(crate) fn writer(source: std::io::Error) -> Self {
-        Self::Writer { source }
     }
 
     /// An [`Error::TemporaryFile`] in `folder`.

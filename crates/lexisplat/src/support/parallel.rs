@@ -11,18 +11,7 @@ pub(crate) const GAUSSIANS_PER_TASK: usize = 2048;
 
 /// Calls `f` with consecutive ranges of at most `chunk` that cover `0..len`; results in order.
 pub(crate) fn map_chunks<T: Send>(len: usize, chunk: usize, f: impl Fn(Range<usize>) -> T + Sync) -> Vec<T> {
-    let range = |c: usize| c * chunk..((c + 1) * chunk).min(len);
-    let count = len.div_ceil(chunk);
-    #[cfg(feature = "parallel")]
-    {
-        use rayon::prelude::*;
-        let simd = crate::simd::Simd::current();
-        (0..count).into_par_iter().map(|c| simd.scope(|| f(range(c)))).collect()
-    }
-    #[cfg(not(feature = "parallel"))]
-    {
-        (0..count).map(|c| f(range(c))).collect()
-    }
+    map_vec((0..len).step_by(chunk).collect(), |start| f(start..len.min(start.saturating_add(chunk))))
 }
 
 /// Calls `f(chunk number, chunk)` for consecutive pieces of `values`.

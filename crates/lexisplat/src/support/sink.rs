@@ -83,14 +83,9 @@ impl Sink<'_> {
             Ok(counted.bytes)
         };
         let written = match self.0 {
-            Target::Writer(writer) => fill(writer, &Error::writer)?,
+            Target::Writer(writer) => fill(writer, &|source| Error::Writer { source })?,
             Target::File(output) => {
-                let mut written = 0;
-                write_whole(output.of_bytes(bytes), |writer| {
-                    written = fill(writer, &|e| Error::io(output.path(), e))?;
-                    Ok(())
-                })?;
-                written
+                write_whole(output.of_bytes(bytes), |writer| fill(writer, &|e| Error::io(output.path(), e)))?
             }
         };
         progress.end();

@@ -110,13 +110,12 @@ impl Spilled {
 
     /// All bytes.
     pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
-        let mut bytes = Vec::new();
-        match self.file.file.into_inner() {
+        let mut file = match self.file.file.into_inner() {
             SpooledData::InMemory(memory) => return Ok(memory.into_inner()),
-            SpooledData::OnDisk(mut file) => {
-                file.read_to_end(&mut bytes).map_err(|e| Error::temporary_file(&self.file.name, e))?;
-            }
-        }
+            SpooledData::OnDisk(file) => file,
+        };
+        let mut bytes = Vec::new();
+        file.read_to_end(&mut bytes).map_err(|e| Error::temporary_file(&self.file.name, e))?;
         Ok(bytes)
     }
 

@@ -26,7 +26,7 @@ pub(crate) fn rich(gaussians: usize, large: f32) -> Splats {
 
 pub(crate) fn as_ply(splats: &Splats) -> Vec<u8> {
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, splats).unwrap();
+    ply::write(&mut bytes, splats).unwrap();
     bytes
 }
 

@@ -18,7 +18,7 @@ fn key(splats: &Splats, i: usize) -> Vec<u8> {
     let mut one = splats.clone();
     one.retain(&(0..splats.len()).map(|k| k == i).collect::<Vec<bool>>());
     let mut bytes = Vec::new();
-    ply::write_to(&mut bytes, &one).unwrap();
+    ply::write(&mut bytes, &one).unwrap();
     bytes
 }
 

@@ -127,7 +127,7 @@ fn a_written_scene_is_the_inria_bytes() {
     for degree in 0..=4 {
         let splats = scene(degree, ROWS, 9);
         let mut written = Vec::new();
-        let size = ply::write_to(&mut written, &splats).unwrap();
+        let size = ply::write(&mut written, &splats).unwrap();
         assert_eq!(size, written.len() as u64);
         assert!(written == inria(&splats).bytes(), "degree {degree}");
     }
@@ -168,7 +168,7 @@ fn the_antialiasing_mark_travels() {
         splats.meta.comments = comments.iter().map(|&c| c.to_owned()).collect();
         splats.meta.antialiased = antialiased;
         let mut bytes = Vec::new();
-        ply::write_to(&mut bytes, &splats).unwrap();
+        ply::write(&mut bytes, &splats).unwrap();
         let found = ply::read_bytes("t.ply", &bytes, &ReadOptions::default()).unwrap();
         assert_eq!(found.splats.meta.antialiased, antialiased, "{comments:?}");
         found

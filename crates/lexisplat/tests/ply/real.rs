@@ -21,7 +21,7 @@ fn every_real_file_keeps_its_bits() {
         let original = std::fs::read(&path).unwrap();
         let read = ply::read(&path, &ply::ReadOptions::default()).unwrap();
         let mut written = Vec::new();
-        let bytes = ply::write_to(&mut written, &read.splats).unwrap();
+        let bytes = ply::write(&mut written, &read.splats).unwrap();
         assert_eq!(bytes, written.len() as u64);
         let again = ply::read_bytes("again", &written, &ply::ReadOptions::default()).unwrap();
         assert_eq!(again.splats, read.splats, "{}", path.display());

@@ -6,7 +6,7 @@ use std::ops::Range;
 use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
 use safetensors::{Dtype, SafeTensors};
 
-use super::schema::{LENGTH_BYTES, MAX_VERSION, key, tensor};
+use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
@@ -24,7 +24,7 @@ pub(super) struct Checked<'a> {
     data_start: usize,
     tensors: Metadata,
     /// Names of all tensors, sorted.
-    names: Vec<String>,
+    pub(super) names: Vec<String>,
     metadata: BTreeMap<String, String>,
 }
 
@@ -48,28 +48,27 @@ impl<'a> Checked<'a> {
     ) -> Result<Self> {
         let bytes: &[u8] = (*shared).as_ref();
         FileKind::Lexi.expect(&file, bytes)?;
-        let format = |problem| Error::format(file.as_str(), problem);
-        let malformed = |text: String| Error::malformed(file.as_str(), text);
-        let Some(length) = bytes.first_chunk::<LENGTH_BYTES>() else {
-            let what = "the header's length".to_owned();
-            let problem =
-                FormatError::Truncated { what, expected: LENGTH_BYTES as u64, found: bytes.len() as u64 };
-            return Err(format(problem));
+        let truncated = |what: &str, expected: u64| {
+            let (what, found) = (what.to_owned(), bytes.len() as u64);
+            Error::format(file.as_str(), FormatError::Truncated { what, expected, found })
         };
+        let length = bytes
+            .first_chunk::<LENGTH_BYTES>()
+            .ok_or_else(|| truncated("the header's length", LENGTH_BYTES as u64))?;
         let length = u64::from_le_bytes(*length);
         limits.check_header(&file, length)?;
         let end = length + LENGTH_BYTES as u64;
-        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end)).ok_or_else(|| {
-            let found = bytes.len() as u64;
-            format(FormatError::Truncated { what: "the header".to_owned(), expected: end, found })
+        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
+        let header = header.ok_or_else(|| truncated("the header", end))?;
+        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(|error| {
+            let text = match error {
+                SafeTensorError::MetadataIncompleteBuffer => {
+                    format!("truncated or too long: {} bytes do not match the header", bytes.len())
+                }
+                other => format!("not a valid safetensors file: {other}"),
+            };
+            Error::malformed(file.as_str(), text)
         })?;
-        let explain = |error: SafeTensorError| match error {
-            SafeTensorError::MetadataIncompleteBuffer => {
-                malformed(format!("truncated or too long: {} bytes do not match the header", bytes.len()))
-            }
-            other => malformed(format!("not a valid safetensors file: {other}")),
-        };
-        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(explain)?;
         let header_checksum = crc32fast::hash(header);
         let data_start = header.len();
         let metadata: BTreeMap<String, String> =
@@ -102,11 +101,9 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        let sums: BTreeMap<String, String> = serde_json::from_str(self.text(key::CHECKSUMS)?)
-            .map_err(|e| self.malformed(format!("metadata 'checksums': {e}")))?;
-        let mut names = self.names();
-        names.retain(|&name| name != tensor::HEADER_CHECKSUM);
-        if let Some(name) = sums.keys().find(|name| names.binary_search(&name.as_str()).is_err()) {
+        let sums: BTreeMap<String, String> = self.json(key::CHECKSUMS)?;
+        let names: Vec<&String> = self.names.iter().filter(|&name| name != tensor::HEADER_CHECKSUM).collect();
+        if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
         }
         let found = map_chunks(names.len(), 1, |range| {
@@ -126,11 +123,6 @@ impl<'a> Checked<'a> {
 
     pub(super) fn malformed(&self, text: impl Into<String>) -> Error {
         Error::malformed(&self.file, text)
-    }
-
-    /// Names of all tensors, sorted.
-    pub(super) fn names(&self) -> Vec<&str> {
-        self.names.iter().map(String::as_str).collect()
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
@@ -153,7 +145,17 @@ impl<'a> Checked<'a> {
 
     /// The metadata entry `key`, if it is there.
     pub(super) fn optional<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>> {
-        if self.metadata.contains_key(key) { self.number(key).map(Some) } else { Ok(None) }
+        self.has_text(key).then(|| self.number(key)).transpose()
+    }
+
+    /// Whether there is a metadata entry `key`.
+    pub(super) fn has_text(&self, key: &str) -> bool {
+        self.metadata.contains_key(key)
+    }
+
+    /// The JSON in the metadata entry `key`.
+    pub(super) fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<T> {
+        serde_json::from_str(self.text(key)?).map_err(|e| self.malformed(format!("metadata '{key}': {e}")))
     }
 
     /// All bytes of the file.
@@ -167,6 +169,23 @@ impl<'a> Checked<'a> {
             self.tensors.info(name).ok_or_else(missing)?;
         let data = self.bytes().get(self.data_start + start..self.data_start + end).ok_or_else(missing)?;
         Ok(View { dtype: *dtype, shape, data })
+    }
+
+    /// The length of the tensor `name`, which must have one dimension.
+    pub(super) fn list_len(&self, name: &str) -> Result<usize> {
+        match self.view(name)?.shape {
+            [len] => Ok(*len),
+            shape => Err(self.malformed(format!("tensor '{name}' has shape {shape:?}"))),
+        }
+    }
+
+    /// Refuses tensors that are neither `known` nor to be ignored. `whose` ends the message.
+    pub(super) fn refuse_unknown(&self, known: impl Fn(&str) -> bool, whose: &str) -> Result<()> {
+        let ignored = |name: &str| name == tensor::HEADER_CHECKSUM || name.starts_with(IGNORED_PREFIX);
+        match self.names.iter().find(|name| !ignored(name) && !known(name)) {
+            Some(name) => Err(self.malformed(format!("tensor '{name}' is not known {whose}"))),
+            None => Ok(()),
+        }
     }
 
     /// The bytes of the tensor `name`, which must have this type and shape.

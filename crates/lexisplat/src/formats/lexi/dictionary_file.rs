@@ -8,7 +8,7 @@ use super::checked::Checked;
 use super::exact::refuse_unknown;
 use super::fields;
 use super::layout::Layout;
-use super::schema::{DICTIONARY_FORMAT, FORMAT, IGNORED_PREFIX, VERSION, key, tensor};
+use super::schema::{DICTIONARY_FORMAT, FORMAT, VERSION, key, tensor};
 use super::tensors::{Source, Tensor, preamble};
 use super::write::LexiWriter;
 use crate::packed::Decoder;
@@ -47,12 +47,7 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
         }
         refuse_unknown(&checked, layout, degree)?;
     } else {
-        let known = |name: &str| {
-            [tensor::DICTIONARY, tensor::HEADER_CHECKSUM].contains(&name) || name.starts_with(IGNORED_PREFIX)
-        };
-        if let Some(name) = checked.names().iter().find(|name| !known(name)) {
-            return Err(checked.malformed(format!("tensor '{name}' is not known in a dictionary")));
-        }
+        checked.refuse_unknown(|name| name == tensor::DICTIONARY, "in a dictionary")?;
     }
     fields::dictionary(&checked, degree, limits)
 }
@@ -66,7 +61,7 @@ pub fn write_dictionary<'a>(sink: impl Into<Sink<'a>>, dictionary: &Dictionary) 
         return Err(Error::parameter("dictionary", "empty", "a scene with view-dependent colour"));
     }
     let mut metadata = preamble(DICTIONARY_FORMAT, VERSION);
-    metadata.insert(key::DEGREE.to_owned(), dictionary.degree().to_string());
+    metadata.insert(key::DEGREE, dictionary.degree().to_string());
     let shape = [dictionary.len(), dictionary.dim()];
     let atoms = Source::of(dictionary.as_slice());
     let tensor = Tensor::new(tensor::DICTIONARY, Dtype::F32, &shape, atoms);

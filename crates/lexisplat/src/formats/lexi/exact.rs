@@ -8,7 +8,7 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::fields::{degree, dictionary, extras, layout, meta, record};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, tensor};
+use super::schema::{EXTRA_PREFIX, GEOMETRY, geometry_shape, tensor};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
@@ -26,12 +26,14 @@ const BLOCK: usize = 65_536;
 #[derive(Debug)]
 pub(super) struct Exact<'a> {
     pub(super) checked: Checked<'a>,
-    gaussians: usize,
+    /// Number of Gaussians.
+    pub(super) gaussians: usize,
     layout: Layout,
     pub(super) record: Record,
     pub(super) meta: SceneMeta,
     pub(super) dictionary: Dictionary,
-    normals: bool,
+    /// Whether the file holds normals.
+    pub(super) normals: bool,
     nonzeros: usize,
     escapes: usize,
     /// Nonzeros before each [`BLOCK`] of Gaussians.
@@ -78,10 +80,7 @@ impl<'a> Exact<'a> {
         let n = self.gaussians;
         let checked = &self.checked;
         self.dictionary = dictionary(checked, degree, &self.limits)?;
-        self.nonzeros = match checked.view(tensor::VALUES)?.shape {
-            [nonzeros] => *nonzeros,
-            shape => return Err(checked.malformed(format!("tensor 'codes.values' has shape {shape:?}"))),
-        };
+        self.nonzeros = checked.list_len(tensor::VALUES)?;
         let paper = self.layout == Layout::Paper;
         if paper && checked.part::<i32>(tensor::POINTERS, Dtype::I32, &[n + 1], &(0..1))? != [0] {
             return Err(checked.malformed("tensor 'codes.pointers' does not begin with 0"));
@@ -109,10 +108,7 @@ impl<'a> Exact<'a> {
         if !checked.has(tensor::ESCAPED) {
             return Ok(());
         }
-        self.escapes = match checked.view(tensor::ESCAPED)?.shape {
-            [count] => *count,
-            shape => return Err(checked.malformed(format!("tensor 'escapes.gaussians' has shape {shape:?}"))),
-        };
+        self.escapes = checked.list_len(tensor::ESCAPED)?;
         self.escaped(0..0)?;
         checked.data(tensor::ESCAPE_ROWS, Dtype::F32, &[self.escapes, self.dictionary.dim()])?;
         let mut last = None;
@@ -129,23 +125,8 @@ impl<'a> Exact<'a> {
         Ok(())
     }
 
-    /// Number of Gaussians.
-    pub(super) fn len(&self) -> usize {
-        self.gaussians
-    }
-
-    /// Whether the file holds normals.
-    pub(super) fn has_normals(&self) -> bool {
-        self.normals
-    }
-
     /// Gaussians `range`. Escapes are numbered from its start.
     pub(super) fn part(&self, range: Range<usize>) -> Result<Model> {
-        let (geometry, codes) = self.geometry_and_codes(range)?;
-        Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
-    }
-
-    fn geometry_and_codes(&self, range: Range<usize>) -> Result<(Geometry, SparseCodes)> {
         let (checked, n) = (&self.checked, self.gaussians);
         let budget = self.budget_for_geometry(range.len())?;
         let geometry = Geometry {
@@ -160,11 +141,11 @@ impl<'a> Exact<'a> {
             rotations: checked.part(tensor::ROTATION, Dtype::F32, &[n, 4], &range)?,
             extras: extras(checked, n, &range)?,
         };
+        let none = Values::empty(self.layout.values());
         if self.dictionary.is_empty() {
-            let none = Values::empty(self.layout.values());
             let (counts, indices) = (vec![0; range.len()], Indices::for_atoms(0));
             let codes = SparseCodes::new(&self.dictionary, counts, indices, none, Escapes::default())?;
-            return Ok((geometry, codes));
+            return self.model(geometry, codes);
         }
         let block = range.start / BLOCK;
         let before = self.counts(block * BLOCK..range.start)?;
@@ -172,14 +153,18 @@ impl<'a> Exact<'a> {
         let sum = |counts: &[u8]| counts.iter().map(|&c| usize::from(c)).sum::<usize>();
         let start = self.offsets.get(block).copied().unwrap_or(self.nonzeros) + sum(&before);
         let escaped = self.escaped_of(&range)?;
-        let width = Indices::for_atoms(self.dictionary.len()).width() + self.value_width();
+        let width = Indices::for_atoms(self.dictionary.len()).width() + none.width();
         budget.take(sum(&counts), width)?;
         budget.take(escaped.len(), size_of::<u32>() + self.dictionary.dim() * size_of::<f32>())?;
         let (indices, values) = self.read_codes(start..start + sum(&counts))?;
         let escapes = self.escapes(&range, &escaped)?;
         let codes = SparseCodes::part(&self.dictionary, range.start, counts, indices, values, escapes)
             .map_err(|e| checked.malformed(e.to_string()))?;
-        Ok((geometry, codes))
+        self.model(geometry, codes)
+    }
+
+    fn model(&self, geometry: Geometry, codes: SparseCodes) -> Result<Model> {
+        Model::new(geometry, self.meta.clone(), self.dictionary.clone(), codes, self.record.clone())
     }
 
     /// What the limits leave for codes after everything else of `count` Gaussians.
@@ -190,11 +175,6 @@ impl<'a> Exact<'a> {
         let budget = MemoryBudget::new(&self.limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(count, GEOMETRY_BYTES + COUNT_BYTES + normals + extras)?;
         Ok(budget)
-    }
-
-    /// Bytes of a value in memory.
-    fn value_width(&self) -> usize {
-        if self.layout.values() == ValueType::F16 { size_of::<f16>() } else { size_of::<f32>() }
     }
 
     /// Nonzeros of Gaussians `range`.
@@ -273,15 +253,6 @@ impl<'a> Exact<'a> {
     }
 }
 
-/// Names and widths of the tensors of geometry, in the order in which errors name them.
-const GEOMETRY: [(&str, usize); 6] = [
-    (tensor::POSITION, 3),
-    (tensor::NORMAL, 3),
-    (tensor::DC, 3),
-    (tensor::OPACITY, 1),
-    (tensor::SCALE, 3),
-    (tensor::ROTATION, 4),
-];
 const CODES: [&str; 3] = [tensor::DICTIONARY, tensor::INDICES, tensor::VALUES];
 const ESCAPES: [&str; 2] = [tensor::ESCAPED, tensor::ESCAPE_ROWS];
 
@@ -291,40 +262,24 @@ pub(super) fn refuse_unknown(checked: &Checked<'_>, layout: Layout, degree: ShDe
     let coded = degree != ShDegree::ZERO;
     let known = |name: &str| {
         GEOMETRY.iter().any(|g| g.0 == name)
-            || name == tensor::HEADER_CHECKSUM
             || (coded && (name == counts || CODES.contains(&name)))
             || (coded && checked.has(tensor::ESCAPED) && ESCAPES.contains(&name))
             || name.starts_with(EXTRA_PREFIX)
-            || name.starts_with(IGNORED_PREFIX)
     };
-    match checked.names().iter().find(|name| !known(name)) {
-        None => Ok(()),
-        Some(name) => {
-            let text = format!("tensor '{name}' is not known for layout '{layout}' and degree {degree}");
-            Err(checked.malformed(text))
-        }
-    }
+    checked.refuse_unknown(known, &format!("for layout '{layout}' and degree {degree}"))
 }
 
 /// Refuses NaN and infinity in geometry. Extras may hold anything.
 fn all_finite(checked: &Checked<'_>, n: usize, normals: bool) -> Result<()> {
-    for (name, width) in GEOMETRY {
-        if name == tensor::NORMAL && !normals {
-            continue;
-        }
-        let shape = [n, width];
-        let shape = if width == 1 { &shape[..1] } else { &shape };
-        checked.data(name, Dtype::F32, shape)?;
+    let arrays = GEOMETRY.into_iter().filter(|&(name, _)| normals || name != tensor::NORMAL);
+    let arrays = arrays.map(|(name, width)| (name, width, geometry_shape(n, width)));
+    for (name, _, shape) in arrays.clone() {
+        checked.data(name, Dtype::F32, &shape)?;
     }
-    for (name, width) in GEOMETRY {
-        if name == tensor::NORMAL && !normals {
-            continue;
-        }
-        let shape = [n, width];
-        let shape = if width == 1 { &shape[..1] } else { &shape };
+    for (name, width, shape) in arrays {
         let (mut count, mut first) = (0_u64, None);
         for start in (0..n).step_by(BLOCK) {
-            let values: Vec<f32> = checked.part(name, Dtype::F32, shape, &(start..n.min(start + BLOCK)))?;
+            let values: Vec<f32> = checked.part(name, Dtype::F32, &shape, &(start..n.min(start + BLOCK)))?;
             let bad = values.chunks_exact(width).enumerate();
             for (i, _) in bad.filter(|(_, row)| row.iter().any(|v| !v.is_finite())) {
                 count += 1;

@@ -7,8 +7,9 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, PACKED_VERSION, key, tensor};
+use crate::scene::extra::{Extra, ScalarType, with_scalar};
 use crate::scene::sh::ShDegree;
-use crate::scene::splats::{Extra, ExtraValues, SceneMeta};
+use crate::scene::splats::SceneMeta;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Pursuit, Record};
 use crate::support::error::Result;
@@ -36,9 +37,7 @@ pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
 }
 
 pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
-    let comments = serde_json::from_str(checked.text(key::COMMENTS)?)
-        .map_err(|e| checked.malformed(format!("metadata 'comments': {e}")))?;
-    Ok(SceneMeta { comments, antialiased: checked.number(key::ANTIALIASED)? })
+    Ok(SceneMeta { comments: checked.json(key::COMMENTS)?, antialiased: checked.number(key::ANTIALIASED)? })
 }
 
 /// The dictionary of a scene or of a dictionary file.
@@ -85,21 +84,12 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
 /// Properties that 3DGS does not define, of Gaussians `range` of `n`.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
-    for full in checked.names() {
+    for full in &checked.names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         let dtype = checked.view(full)?.dtype;
-        let shape = [n];
-        let values: ExtraValues = match dtype {
-            Dtype::I8 => checked.part::<i8>(full, dtype, &shape, range)?.into(),
-            Dtype::U8 => checked.part::<u8>(full, dtype, &shape, range)?.into(),
-            Dtype::I16 => checked.part::<i16>(full, dtype, &shape, range)?.into(),
-            Dtype::U16 => checked.part::<u16>(full, dtype, &shape, range)?.into(),
-            Dtype::I32 => checked.part::<i32>(full, dtype, &shape, range)?.into(),
-            Dtype::U32 => checked.part::<u32>(full, dtype, &shape, range)?.into(),
-            Dtype::F32 => checked.part::<f32>(full, dtype, &shape, range)?.into(),
-            Dtype::F64 => checked.part::<f64>(full, dtype, &shape, range)?.into(),
-            other => return Err(checked.malformed(format!("tensor '{full}' has type {other:?}"))),
-        };
+        let ty = ScalarType::of_dtype(dtype)
+            .ok_or_else(|| checked.malformed(format!("tensor '{full}' has type {dtype:?}")))?;
+        let values = with_scalar!(ty, T => checked.part::<T>(full, dtype, &[n], range)?.into());
         out.push(Extra { name: name.to_owned(), values });
     }
     Ok(out)

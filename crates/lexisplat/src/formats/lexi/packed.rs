@@ -4,8 +4,8 @@ use safetensors::Dtype;
 
 use super::checked::Checked;
 use super::fields::{degree, extras, meta, record};
-use super::schema::{EXTRA_PREFIX, IGNORED_PREFIX, key, tensor};
-use crate::packed::{CHUNK, Packed, PackedHead, TargetRecord};
+use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
+use crate::packed::{CHUNK, Packed, PackedHead};
 use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
@@ -58,26 +58,13 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let atoms = checked.number(key::ATOMS)?;
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    let mut known =
-        vec![tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::HEADER_CHECKSUM];
-    if checked.has(tensor::ORDER) {
-        known.push(tensor::ORDER);
-        if !is_permutation(checked, gaussians)? {
-            return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
-        }
+    if checked.has(tensor::ORDER) && !is_permutation(checked, gaussians)? {
+        return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
     }
-    let ignored = |name: &str| name.starts_with(EXTRA_PREFIX) || name.starts_with(IGNORED_PREFIX);
-    if let Some(name) = checked.names().iter().find(|name| !known.contains(name) && !ignored(name)) {
-        return Err(checked.malformed(format!("tensor '{name}' is not known for layout 'packed'")));
-    }
+    let known = |name: &str| PACKED.contains(&name) || name.starts_with(EXTRA_PREFIX);
+    checked.refuse_unknown(known, "for layout 'packed'")?;
     let chunks = gaussians.div_ceil(CHUNK);
-    let target = match checked.optional::<String>(key::PROMISE)? {
-        None => None,
-        Some(text) => Some(
-            serde_json::from_str::<TargetRecord>(&text)
-                .map_err(|e| checked.malformed(format!("metadata 'promise': {e}")))?,
-        ),
-    };
+    let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE)).transpose()?;
     extras(checked, gaussians, &(0..0))?;
     data(checked)?;
     Ok(PackedHead {

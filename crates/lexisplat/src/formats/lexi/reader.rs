@@ -9,11 +9,12 @@ use super::checked::{Checked, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, FORMAT, LENGTH_BYTES, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, tensor};
 use crate::packed::{CHUNK, Decoder, Packed, PackedHead, StreamBits};
+use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
-use crate::scene::splats::{Extra, Geometry, SceneMeta, Splats};
+use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Record};
 use crate::support::error::Result;
@@ -95,7 +96,7 @@ impl<'a> LexiReader<'a> {
             (Kind::Packed(Box::new(PackedFile { checked, head, decoder })), extras)
         } else {
             let exact = Exact::open(checked, limits)?;
-            let extras = extras(&exact.checked, exact.len(), &(0..0))?;
+            let extras = extras(&exact.checked, exact.gaussians, &(0..0))?;
             (Kind::Exact(Box::new(exact)), extras)
         };
         Ok(Self { kind, layout, limits: *limits, extras, attribute_bytes })
@@ -105,7 +106,7 @@ impl<'a> LexiReader<'a> {
     #[must_use]
     pub fn len(&self) -> usize {
         match &self.kind {
-            Kind::Exact(exact) => exact.len(),
+            Kind::Exact(exact) => exact.gaussians,
             Kind::Packed(packed) => packed.head.len(),
         }
     }
@@ -158,16 +159,20 @@ impl<'a> LexiReader<'a> {
     /// What a packed file says of itself; `None` for exact layouts.
     #[must_use]
     pub fn packed_head(&self) -> Option<&PackedHead> {
+        self.packed_file().map(|packed| &packed.head)
+    }
+
+    fn packed_file(&self) -> Option<&PackedFile<'a>> {
         match &self.kind {
             Kind::Exact(_) => None,
-            Kind::Packed(packed) => Some(&packed.head),
+            Kind::Packed(packed) => Some(packed),
         }
     }
 
     /// Whether a packed file holds the order of its source.
     #[must_use]
     pub fn order_kept(&self) -> bool {
-        matches!(&self.kind, Kind::Packed(packed) if packed.checked.has(tensor::ORDER))
+        self.packed_file().is_some_and(|packed| packed.checked.has(tensor::ORDER))
     }
 
     /// Bytes of each tensor in the file, and of the header under `header`, as
@@ -206,7 +211,7 @@ impl<'a> LexiReader<'a> {
     /// As [`read`].
     pub fn model(&self) -> Result<Model> {
         match &self.kind {
-            Kind::Exact(exact) => exact.part(0..exact.len()),
+            Kind::Exact(exact) => exact.part(0..exact.gaussians),
             Kind::Packed(packed) => super::packed::packed(&packed.checked, &self.limits)?.unpack(),
         }
     }
@@ -216,10 +221,7 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// [`crate::Error::Format`] for damage, [`crate::Error::Limit`] for a scene too large to hold.
     pub fn packed(&self) -> Result<Option<Packed>> {
-        match &self.kind {
-            Kind::Exact(_) => Ok(None),
-            Kind::Packed(packed) => super::packed::packed(&packed.checked, &self.limits).map(Some),
-        }
+        self.packed_file().map(|packed| super::packed::packed(&packed.checked, &self.limits)).transpose()
     }
 
     /// Hands all Gaussians to `take`, part after part in the order of the file: the number of the first one,
@@ -228,8 +230,7 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// As [`read`], and what `take` returns.
     pub fn each(&self, take: &mut dyn FnMut(usize, Model) -> Result<()>) -> Result<()> {
-        self.parts(false, take)?;
-        Ok(())
+        self.parts(false, take).map(drop)
     }
 
     /// [`Self::each`] with parts of `at_once` Gaussians for exact layouts, for the fuzz targets.
@@ -271,8 +272,8 @@ fn exact_parts(
     at_once: usize,
     take: &mut dyn FnMut(usize, Model) -> Result<()>,
 ) -> Result<()> {
-    for start in (0..exact.len()).step_by(at_once) {
-        take(start, exact.part(start..exact.len().min(start + at_once))?)?;
+    for start in (0..exact.gaussians).step_by(at_once) {
+        take(start, exact.part(start..exact.gaussians.min(start + at_once))?)?;
     }
     Ok(())
 }
@@ -321,7 +322,7 @@ impl SplatSource for LexiReader<'_> {
     }
 
     fn has_normals(&self) -> bool {
-        matches!(&self.kind, Kind::Exact(exact) if exact.has_normals())
+        matches!(&self.kind, Kind::Exact(exact) if exact.normals)
     }
 
     fn row_bytes(&self) -> u64 {
@@ -357,10 +358,6 @@ impl SplatSource for LexiReader<'_> {
 /// Bytes of all tensors that are not to be ignored, in the order in which writers list them, and of the
 /// header.
 fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
-    const FIRST: [&str; 6] =
-        [tensor::POSITION, tensor::DC, tensor::OPACITY, tensor::SCALE, tensor::ROTATION, tensor::NORMAL];
-    const PACKED: [&str; 5] =
-        [tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
     const LAST: [&str; 7] = [
         tensor::DICTIONARY,
         tensor::VALUES,
@@ -370,11 +367,11 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
         tensor::ESCAPED,
         tensor::ESCAPE_ROWS,
     ];
-    let names = checked.names();
-    let extras = names.iter().copied().filter(|name| name.starts_with(EXTRA_PREFIX));
-    let order = FIRST.into_iter().chain(PACKED).chain(extras).chain(LAST);
+    let extras = checked.names.iter().map(String::as_str).filter(|name| name.starts_with(EXTRA_PREFIX));
+    let geometry = GEOMETRY.into_iter().map(|(name, _)| name);
+    let order = geometry.chain(PACKED).chain(extras).chain(LAST);
     let mut out = Vec::new();
-    for name in order.filter(|name| names.contains(name)) {
+    for name in order.filter(|name| checked.has(name)) {
         out.push((name.to_owned(), checked.view(name)?.data.len() as u64));
     }
     let length = checked.bytes().first_chunk::<LENGTH_BYTES>().map_or(0, |l| u64::from_le_bytes(*l));

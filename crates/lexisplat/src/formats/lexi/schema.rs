@@ -22,6 +22,26 @@ pub(super) const EXTRA_PREFIX: &str = "extra.";
 /// Prefix of tensors a reader may ignore.
 pub(super) const IGNORED_PREFIX: &str = "x-";
 
+/// Names and widths of the tensors of geometry, in the order of [`Geometry::floats`](crate::Geometry::floats). A file
+/// may lack the last one, the normals.
+pub(super) const GEOMETRY: [(&str, usize); 6] = [
+    (tensor::POSITION, 3),
+    (tensor::DC, 3),
+    (tensor::OPACITY, 1),
+    (tensor::SCALE, 3),
+    (tensor::ROTATION, 4),
+    (tensor::NORMAL, 3),
+];
+
+/// Names of the tensors of a packed file, in the order in which sizes are listed.
+pub(super) const PACKED: [&str; 5] =
+    [tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
+
+/// The shape of a tensor of geometry of `n` Gaussians.
+pub(super) fn geometry_shape(n: usize, width: usize) -> Vec<usize> {
+    if width == 1 { vec![n] } else { vec![n, width] }
+}
+
 /// Names of tensors.
 pub(super) mod tensor {
     pub(crate) const POSITION: &str = "position";

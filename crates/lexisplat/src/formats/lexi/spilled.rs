@@ -1,14 +1,14 @@
 //! An exact file made part after part: its arrays are spilled until all sizes are known.
 
 use super::layout::{CodeLayout, Layout};
+use super::schema::GEOMETRY;
 use super::tensors::Source;
 use super::write::{
-    ExactTensors, as_bits, check_pointers, extra_tensor, paper_indices, paper_pointers, paper_values,
+    ExactTensors, check_pointers, extra_tensor, geometry_tensors, paper_indices, paper_pointers, paper_values,
 };
 use crate::scene::source::SplatSource;
 use crate::scene::spilled::SpilledExtras;
 use crate::scene::splats::Geometry;
-use crate::sparse::codes::{Indices, Values};
 use crate::sparse::compress::Coded;
 use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
@@ -21,12 +21,8 @@ pub(crate) struct SpilledModel {
     gaussians: usize,
     nonzeros: u64,
     escapes: usize,
-    position: Spill,
-    dc: Spill,
-    opacity: Spill,
-    scale: Spill,
-    rotation: Spill,
-    normal: Option<Spill>,
+    /// The arrays of [`GEOMETRY`], without the normals if there are none.
+    geometry: Vec<Spill>,
     extras: SpilledExtras,
     /// Counts, or the pointers of layout `paper`.
     counts: Spill,
@@ -45,6 +41,7 @@ impl SpilledModel {
         values: ValueType,
     ) -> Result<Self> {
         let spill = || Spill::new(to);
+        let arrays = if source.has_normals() { GEOMETRY.len() } else { GEOMETRY.len() - 1 };
         let mut counts = spill()?;
         if codes == CodeLayout::Paper {
             counts.push(&[0_i32])?;
@@ -54,12 +51,7 @@ impl SpilledModel {
             gaussians: 0,
             nonzeros: 0,
             escapes: 0,
-            position: spill()?,
-            dc: spill()?,
-            opacity: spill()?,
-            scale: spill()?,
-            rotation: spill()?,
-            normal: if source.has_normals() { Some(spill()?) } else { None },
+            geometry: (0..arrays).map(|_| spill()).collect::<Result<_>>()?,
             extras: SpilledExtras::new(to, source.empty().geometry)?,
             counts,
             indices: spill()?,
@@ -72,13 +64,8 @@ impl SpilledModel {
     /// Appends the next Gaussians and their codes.
     pub(crate) fn push(&mut self, geometry: &Geometry, coded: &Coded) -> Result<()> {
         self.gaussians += geometry.len();
-        self.position.push(&geometry.positions)?;
-        self.dc.push(&geometry.dc)?;
-        self.opacity.push(&geometry.opacities)?;
-        self.scale.push(&geometry.scales)?;
-        self.rotation.push(&geometry.rotations)?;
-        if let Some(normal) = &mut self.normal {
-            normal.push(&geometry.normals)?;
+        for (spill, values) in self.geometry.iter_mut().zip(geometry.floats()) {
+            spill.push(values)?;
         }
         self.extras.push(geometry)?;
         self.push_codes(coded)
@@ -97,14 +84,8 @@ impl SpilledModel {
             self.indices.push(&paper_indices(&coded.indices).collect::<Vec<u32>>())?;
             return self.values.push(&paper_values(&coded.values).collect::<Vec<u32>>());
         }
-        match &coded.indices {
-            Indices::U8(v) => self.indices.push(v)?,
-            Indices::U16(v) => self.indices.push(v)?,
-        }
-        match &coded.values {
-            Values::F16(v) => self.values.push(as_bits(v))?,
-            Values::F32(v) => self.values.push(v)?,
-        }
+        self.indices.push(coded.indices.as_bytes())?;
+        self.values.push(coded.values.as_bytes())?;
         self.counts.push(&coded.counts)
     }
 
@@ -112,19 +93,16 @@ impl SpilledModel {
     pub(super) fn finish<'a>(self) -> Result<ExactTensors<'a>> {
         let n = self.gaussians;
         let source = |spill: Spill| spill.finish().map(Source::Spilled);
+        let arrays = self.geometry.into_iter().map(source).collect::<Result<Vec<_>>>()?;
+        let mut geometry: Vec<_> = geometry_tensors(n, arrays).collect();
         let extras = self.extras.finish()?.into_iter();
+        geometry.extend(extras.map(|(extra, values)| extra_tensor(&extra, n, Source::Spilled(values))));
         Ok(ExactTensors {
+            geometry,
             gaussians: n,
             nonzeros: usize::try_from(self.nonzeros)
                 .map_err(|_| Error::parameter("codes", self.nonzeros, "as many nonzeros as memory counts"))?,
             escapes: self.escapes,
-            position: source(self.position)?,
-            dc: source(self.dc)?,
-            opacity: source(self.opacity)?,
-            scale: source(self.scale)?,
-            rotation: source(self.rotation)?,
-            normal: self.normal.map(source).transpose()?,
-            extras: extras.map(|(extra, v)| extra_tensor(&extra, n, Source::Spilled(v))).collect(),
             counts: source(self.counts)?,
             indices: source(self.indices)?,
             values: source(self.values)?,

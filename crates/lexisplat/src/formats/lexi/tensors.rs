@@ -14,6 +14,9 @@ compile_error!("tensors are little-endian and written as they lie in memory");
 /// Words made at a time.
 const BLOCK: usize = 1 << 14;
 
+/// What a file says of itself, by key.
+pub(super) type Metadata = BTreeMap<&'static str, String>;
+
 /// One tensor to write.
 #[derive(Debug)]
 pub(super) struct Tensor<'a> {
@@ -91,7 +94,7 @@ pub(super) struct Draft<'a> {
 
 impl<'a> Draft<'a> {
     /// Puts `tensors` in order of alignment, computes all checksums and makes the header.
-    pub(super) fn new(mut metadata: BTreeMap<String, String>, mut tensors: Vec<Tensor<'a>>) -> Self {
+    pub(super) fn new(mut metadata: Metadata, mut tensors: Vec<Tensor<'a>>) -> Self {
         // Each tensor then starts at a multiple of its entry size, and there are no holes.
         tensors.sort_by_key(|t| std::cmp::Reverse(t.dtype.bitsize()));
         let mut sums = BTreeMap::new();
@@ -110,7 +113,7 @@ impl<'a> Draft<'a> {
             }
             sums.insert(tensor.name.clone(), format!("{:08x}", crc.finalize()));
         }
-        metadata.insert(key::CHECKSUMS.to_owned(), json(&sums));
+        metadata.insert(key::CHECKSUMS, json(&sums));
         let mut text = format!("{{\"__metadata__\":{}", json(&metadata));
         let mut offset = 0;
         let sum_shape: &[usize] = &[1];
@@ -169,15 +172,15 @@ impl<'a> Draft<'a> {
 }
 
 /// JSON of a value that cannot fail to serialise: strings, numbers, lists and maps of them.
-fn json<T: serde::Serialize + ?Sized>(value: &T) -> String {
+pub(super) fn json<T: serde::Serialize + ?Sized>(value: &T) -> String {
     serde_json::to_string(value).unwrap_or_default()
 }
 
 /// The metadata every file begins with.
-pub(super) fn preamble(format: &str, version: u64) -> BTreeMap<String, String> {
+pub(super) fn preamble(format: &str, version: u64) -> Metadata {
     BTreeMap::from([
-        (key::FORMAT.to_owned(), format.to_owned()),
-        (key::VERSION.to_owned(), version.to_string()),
-        (key::GENERATOR.to_owned(), "lexisplat".to_owned()),
+        (key::FORMAT, format.to_owned()),
+        (key::VERSION, version.to_string()),
+        (key::GENERATOR, "lexisplat".to_owned()),
     ])
 }

@@ -1,16 +1,15 @@
 //! Writing .lexi files of every layout.
 
-use std::collections::BTreeMap;
-
 use safetensors::Dtype;
 
 use super::layout::{CodeLayout, Layout};
-use super::schema::{EXTRA_PREFIX, FORMAT, PACKED_VERSION, VERSION, key, tensor};
+use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor};
 use super::spilled::SpilledModel;
-use super::tensors::{Draft, Source, Tensor, preamble};
+use super::tensors::{Draft, Metadata, Source, Tensor, json, preamble};
 use crate::packed::{Packed, PackedHead, SpilledPacked};
+use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sh::ShDegree;
-use crate::scene::splats::{Extra, ExtraValues, SceneMeta, for_extra};
+use crate::scene::splats::SceneMeta;
 use crate::sparse::codes::{Indices, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Pursuit, Record};
@@ -46,7 +45,8 @@ impl<'a> LexiWriter<'a> {
         }
         let layout = Layout::of(codes, model.codes().values().value_type());
         let tensors = ExactTensors::of_model(model, codes).list(model.dictionary(), layout);
-        Ok(Self::of_exact(layout, model.record(), model.meta(), model.degree(), tensors))
+        let metadata = scene_metadata(VERSION, layout, model.degree(), model.record(), model.meta());
+        Ok(Self::new(metadata, tensors))
     }
 
     /// The file of `packed`.
@@ -66,7 +66,7 @@ impl<'a> LexiWriter<'a> {
     ) -> Result<Self> {
         let layout = spilled.layout;
         let tensors = spilled.finish()?.list(dictionary, layout);
-        Ok(Self::of_exact(layout, record, meta, dictionary.degree(), tensors))
+        Ok(Self::new(scene_metadata(VERSION, layout, dictionary.degree(), record, meta), tensors))
     }
 
     /// The file of a packed scene that was spilled.
@@ -78,16 +78,6 @@ impl<'a> LexiWriter<'a> {
         Self::of_packed(head, Source::Spilled(spilled.data), order, extras.collect())
     }
 
-    fn of_exact(
-        layout: Layout,
-        record: &Record,
-        meta: &SceneMeta,
-        degree: ShDegree,
-        tensors: Vec<Tensor<'a>>,
-    ) -> Self {
-        Self::new(scene_metadata(VERSION, layout, degree, record, meta), tensors)
-    }
-
     fn of_packed(
         head: &'a PackedHead,
         data: Source<'a>,
@@ -96,34 +86,27 @@ impl<'a> LexiWriter<'a> {
     ) -> Self {
         let degree = head.degree();
         let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, head.record(), head.meta());
-        let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
-        put(key::GAUSSIANS, head.len().to_string());
-        put(key::ATOMS, head.atoms().to_string());
-        put(key::ATOM_BITS, head.atom_bits.to_string());
-        if let Some(target) = head.target() {
-            put(key::PROMISE, serde_json::to_string(target).unwrap_or_default());
-        }
-        if let Some(device) = head.device() {
-            put(key::DRAWN_ON, device.to_owned());
-        }
+        metadata.extend([
+            (key::GAUSSIANS, head.len().to_string()),
+            (key::ATOMS, head.atoms().to_string()),
+            (key::ATOM_BITS, head.atom_bits.to_string()),
+        ]);
+        metadata.extend(head.target().map(|target| (key::PROMISE, json(target))));
+        metadata.extend(head.device().map(|device| (key::DRAWN_ON, device.to_owned())));
         let bytes = head.lengths.iter().map(|&l| l as usize).sum();
+        let list = |name, dtype, len, source| Tensor::new(name, dtype, &[len], source);
         let mut tensors = vec![
-            Tensor::new(
-                tensor::PARAMETERS,
-                Dtype::F32,
-                &[head.parameters.len()],
-                Source::of(&head.parameters),
-            ),
-            Tensor::new(tensor::LENGTHS, Dtype::U32, &[head.lengths.len()], Source::of(&head.lengths)),
-            Tensor::new(tensor::TABLES, Dtype::U8, &[head.tables.len()], Source::of(&head.tables)),
-            Tensor::new(tensor::DATA, Dtype::U8, &[bytes], data),
+            list(tensor::PARAMETERS, Dtype::F32, head.parameters.len(), Source::of(&head.parameters)),
+            list(tensor::LENGTHS, Dtype::U32, head.lengths.len(), Source::of(&head.lengths)),
+            list(tensor::TABLES, Dtype::U8, head.tables.len(), Source::of(&head.tables)),
+            list(tensor::DATA, Dtype::U8, bytes, data),
         ];
-        tensors.extend(order.map(|order| Tensor::new(tensor::ORDER, Dtype::U32, &[head.len()], order)));
+        tensors.extend(order.map(|order| list(tensor::ORDER, Dtype::U32, head.len(), order)));
         tensors.extend(extras);
         Self::new(metadata, tensors)
     }
 
-    pub(super) fn new(metadata: BTreeMap<String, String>, tensors: Vec<Tensor<'a>>) -> Self {
+    pub(super) fn new(metadata: Metadata, tensors: Vec<Tensor<'a>>) -> Self {
         let mut sizes: Vec<_> = tensors.iter().map(|t| (t.name.clone(), t.bytes() as u64)).collect();
         let draft = Draft::new(metadata, tensors);
         sizes.push(("header".to_owned(), draft.header_bytes()));
@@ -172,40 +155,32 @@ fn scene_metadata(
     degree: ShDegree,
     record: &Record,
     meta: &SceneMeta,
-) -> BTreeMap<String, String> {
+) -> Metadata {
     let mut metadata = preamble(FORMAT, version);
-    let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
-    put(key::DEGREE, degree.to_string());
-    put(key::LAYOUT, layout.to_string());
-    // The key is mandatory. In packed files its value means nothing.
-    put(key::PURSUIT, record.pursuit.unwrap_or(Pursuit::Omp).to_string());
-    put(key::SEED, record.seed.to_string());
-    put(key::MAX_RESIDUAL, record.max_residual.to_string());
-    put(key::RMS_RESIDUAL, record.rms_residual.to_string());
-    put(key::OVER_TOLERANCE, record.over_tolerance.to_string());
-    put(key::ANTIALIASED, meta.antialiased.to_string());
-    put(key::COMMENTS, serde_json::to_string(&meta.comments).unwrap_or_default());
-    if let Some(tolerance) = record.tolerance {
-        put(key::TOLERANCE, tolerance.to_string());
-    }
-    if let Some(cap) = record.max_nonzeros {
-        put(key::MAX_NONZEROS, cap.to_string());
-    }
+    metadata.extend([
+        (key::DEGREE, degree.to_string()),
+        (key::LAYOUT, layout.to_string()),
+        // The key is mandatory. In packed files its value means nothing.
+        (key::PURSUIT, record.pursuit.unwrap_or(Pursuit::Omp).to_string()),
+        (key::SEED, record.seed.to_string()),
+        (key::MAX_RESIDUAL, record.max_residual.to_string()),
+        (key::RMS_RESIDUAL, record.rms_residual.to_string()),
+        (key::OVER_TOLERANCE, record.over_tolerance.to_string()),
+        (key::ANTIALIASED, meta.antialiased.to_string()),
+        (key::COMMENTS, json(&meta.comments)),
+    ]);
+    metadata.extend(record.tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
+    metadata.extend(record.max_nonzeros.map(|cap| (key::MAX_NONZEROS, cap.to_string())));
     metadata
 }
 
-/// The bytes of every array of an exact file.
+/// The arrays of an exact file.
 pub(super) struct ExactTensors<'a> {
+    /// Geometry and extras, in the order in which sizes are listed.
+    pub(super) geometry: Vec<Tensor<'a>>,
     pub(super) gaussians: usize,
     pub(super) nonzeros: usize,
     pub(super) escapes: usize,
-    pub(super) position: Source<'a>,
-    pub(super) dc: Source<'a>,
-    pub(super) opacity: Source<'a>,
-    pub(super) scale: Source<'a>,
-    pub(super) rotation: Source<'a>,
-    pub(super) normal: Option<Source<'a>>,
-    pub(super) extras: Vec<Tensor<'a>>,
     /// Counts, or the pointers of layout `paper`.
     pub(super) counts: Source<'a>,
     pub(super) indices: Source<'a>,
@@ -216,18 +191,12 @@ pub(super) struct ExactTensors<'a> {
 
 impl<'a> ExactTensors<'a> {
     fn of_model(model: &'a Model, layout: CodeLayout) -> Self {
-        let (g, codes) = (model.geometry(), model.codes());
+        let (n, g, codes) = (model.len(), model.geometry(), model.codes());
         let (counts, indices, values) = match layout {
             CodeLayout::Compact => (
                 Source::of(codes.counts()),
-                match codes.indices() {
-                    Indices::U8(v) => Source::of(v),
-                    Indices::U16(v) => Source::of(v),
-                },
-                match codes.values() {
-                    Values::F16(v) => Source::of(as_bits(v)),
-                    Values::F32(v) => Source::of(v),
-                },
+                Source::Bytes(codes.indices().as_bytes()),
+                Source::Bytes(codes.values().as_bytes()),
             ),
             CodeLayout::Paper => (
                 Source::words(move || std::iter::once(0).chain(paper_pointers(codes.counts(), 0))),
@@ -235,17 +204,14 @@ impl<'a> ExactTensors<'a> {
                 Source::words(move || paper_values(codes.values())),
             ),
         };
+        let arrays = if g.normals.is_empty() { GEOMETRY.len() - 1 } else { GEOMETRY.len() };
+        let geometry = geometry_tensors(n, g.floats().into_iter().take(arrays).map(Source::of));
+        let extras = g.extras.iter().map(|extra| extra_tensor(extra, n, bytes_of(extra)));
         Self {
-            gaussians: model.len(),
+            geometry: geometry.chain(extras).collect(),
+            gaussians: n,
             nonzeros: codes.nonzeros(),
             escapes: codes.escapes().gaussians.len(),
-            position: Source::of(&g.positions),
-            dc: Source::of(&g.dc),
-            opacity: Source::of(&g.opacities),
-            scale: Source::of(&g.scales),
-            rotation: Source::of(&g.rotations),
-            normal: (!g.normals.is_empty()).then(|| Source::of(&g.normals)),
-            extras: g.extras.iter().map(|extra| extra_tensor(extra, model.len(), bytes_of(extra))).collect(),
             counts,
             indices,
             values,
@@ -256,53 +222,47 @@ impl<'a> ExactTensors<'a> {
 
     /// The tensors in the order in which sizes are listed.
     fn list(self, dictionary: &'a Dictionary, layout: Layout) -> Vec<Tensor<'a>> {
-        let (n, nonzeros) = (self.gaussians, self.nonzeros);
-        let mut out = vec![
-            Tensor::new(tensor::POSITION, Dtype::F32, &[n, 3], self.position),
-            Tensor::new(tensor::DC, Dtype::F32, &[n, 3], self.dc),
-            Tensor::new(tensor::OPACITY, Dtype::F32, &[n], self.opacity),
-            Tensor::new(tensor::SCALE, Dtype::F32, &[n, 3], self.scale),
-            Tensor::new(tensor::ROTATION, Dtype::F32, &[n, 4], self.rotation),
-        ];
-        out.extend(self.normal.map(|normal| Tensor::new(tensor::NORMAL, Dtype::F32, &[n, 3], normal)));
-        out.extend(self.extras);
+        let (n, nonzeros, escapes) = (self.gaussians, self.nonzeros, self.escapes);
+        let mut out = self.geometry;
         let dim = dictionary.dim();
         if dim == 0 {
             return out;
         }
-        let shape = [dictionary.len(), dim];
-        out.push(Tensor::new(tensor::DICTIONARY, Dtype::F32, &shape, Source::of(dictionary.as_slice())));
+        let mut put = |name: &str, dtype: Dtype, shape: &[usize], source: Source<'a>| {
+            out.push(Tensor::new(name, dtype, shape, source));
+        };
+        put(tensor::DICTIONARY, Dtype::F32, &[dictionary.len(), dim], Source::of(dictionary.as_slice()));
         let value = if layout.values() == ValueType::F16 { Dtype::F16 } else { Dtype::F32 };
-        out.push(Tensor::new(tensor::VALUES, value, &[nonzeros], self.values));
+        put(tensor::VALUES, value, &[nonzeros], self.values);
         if layout == Layout::Paper {
-            out.push(Tensor::new(tensor::POINTERS, Dtype::I32, &[n + 1], self.counts));
-            out.push(Tensor::new(tensor::INDICES, Dtype::I32, &[nonzeros], self.indices));
+            put(tensor::POINTERS, Dtype::I32, &[n + 1], self.counts);
+            put(tensor::INDICES, Dtype::I32, &[nonzeros], self.indices);
         } else {
             let small = matches!(Indices::for_atoms(dictionary.len()), Indices::U8(_));
-            let index = if small { Dtype::U8 } else { Dtype::U16 };
-            out.push(Tensor::new(tensor::INDICES, index, &[nonzeros], self.indices));
-            out.push(Tensor::new(tensor::COUNTS, Dtype::U8, &[n], self.counts));
+            put(tensor::INDICES, if small { Dtype::U8 } else { Dtype::U16 }, &[nonzeros], self.indices);
+            put(tensor::COUNTS, Dtype::U8, &[n], self.counts);
         }
-        if self.escapes > 0 {
-            out.push(Tensor::new(tensor::ESCAPED, Dtype::U32, &[self.escapes], self.escaped));
-            out.push(Tensor::new(tensor::ESCAPE_ROWS, Dtype::F32, &[self.escapes, dim], self.escape_rows));
+        if escapes > 0 {
+            put(tensor::ESCAPED, Dtype::U32, &[escapes], self.escaped);
+            put(tensor::ESCAPE_ROWS, Dtype::F32, &[escapes, dim], self.escape_rows);
         }
         out
     }
 }
 
+/// The tensors of the geometry of `n` Gaussians. `arrays` are in the order of [`GEOMETRY`] and may lack the normals.
+pub(super) fn geometry_tensors<'a>(
+    n: usize,
+    arrays: impl IntoIterator<Item = Source<'a>>,
+) -> impl Iterator<Item = Tensor<'a>> {
+    let tensor =
+        move |((name, width), source)| Tensor::new(name, Dtype::F32, &geometry_shape(n, width), source);
+    GEOMETRY.into_iter().zip(arrays).map(tensor)
+}
+
 /// The tensor of a property that 3DGS does not define.
 pub(super) fn extra_tensor<'a>(extra: &Extra, n: usize, source: Source<'a>) -> Tensor<'a> {
-    let dtype = match extra.values {
-        ExtraValues::I8(_) => Dtype::I8,
-        ExtraValues::U8(_) => Dtype::U8,
-        ExtraValues::I16(_) => Dtype::I16,
-        ExtraValues::U16(_) => Dtype::U16,
-        ExtraValues::I32(_) => Dtype::I32,
-        ExtraValues::U32(_) => Dtype::U32,
-        ExtraValues::F32(_) => Dtype::F32,
-        ExtraValues::F64(_) => Dtype::F64,
-    };
+    let dtype = extra.values.scalar_type().dtype();
     Tensor::new(&format!("{EXTRA_PREFIX}{}", extra.name), dtype, &[n], source)
 }
 
@@ -321,21 +281,13 @@ pub(super) fn paper_pointers(counts: &[u8], before: i32) -> impl Iterator<Item =
 
 /// Indices as i32.
 pub(super) fn paper_indices(indices: &Indices) -> impl Iterator<Item = u32> + '_ {
-    (0..indices.len()).map(|k| match indices {
-        Indices::U8(v) => u32::from(v[k]),
-        Indices::U16(v) => u32::from(v[k]),
-    })
+    #[expect(clippy::cast_possible_truncation, reason = "an index is a u16 at most")]
+    (0..indices.len()).map(|k| indices.get(k) as u32)
 }
 
 /// The bits of values as f32.
 pub(super) fn paper_values(values: &Values) -> impl Iterator<Item = u32> + '_ {
     (0..values.len()).map(|k| values.get(k).to_bits())
-}
-
-/// The bits of half floats, which `bytemuck` knows as integers.
-pub(super) fn as_bits(values: &[half::f16]) -> &[u16] {
-    use half::slice::HalfFloatSliceExt;
-    values.reinterpret_cast()
 }
 
 /// Refuses more nonzeros than the pointers of layout `paper` count.

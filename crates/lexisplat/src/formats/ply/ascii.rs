@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use super::header::{Header, Kind};
+use super::header::Header;
 use super::names::shown;
 use super::rows::ROWS_PER_TASK;
-use super::scalar::{Scalar, ScalarType, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::{ScalarType, with_scalar};
 use crate::support::error::{Error, FormatError, Result};
 
 /// The vertex lines of an ASCII file.
@@ -30,14 +31,7 @@ impl<'a> AsciiRows<'a> {
         data: &'a [u8],
     ) -> Result<Self> {
         let vertex = &header.elements[index];
-        let types: Vec<ScalarType> = vertex
-            .properties
-            .iter()
-            .filter_map(|p| match p.kind {
-                Kind::Scalar(ty) => Some(ty),
-                Kind::List { .. } => None,
-            })
-            .collect();
+        let types: Vec<ScalarType> = vertex.properties.iter().filter_map(|p| p.kind.scalar()).collect();
         // Each value takes at least a digit and a separator; the last separator may be missing. Without this check a
         // few short lines could ask for many wide rows.
         let expected = vertex.count.saturating_mul(2 * types.len() as u64).saturating_sub(1);

@@ -1,10 +1,13 @@
 //! A PLY read a part at a time, for scenes larger than memory.
 
+use std::borrow::Cow;
 use std::ops::Range;
+use std::sync::{Mutex, PoisonError};
 
 use super::columns::Packed;
 use super::file::PlyFile;
-use super::fill::{Bad, empty, fill, fill_normals};
+use super::fill::{Found, empty};
+use super::layout::REST;
 use super::read::ReadOptions;
 use super::rows::ROWS_PER_TASK;
 use super::summary::PlySummary;
@@ -12,7 +15,7 @@ use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::Result;
-use crate::support::progress::{Progress, Stage};
+use crate::support::progress::{Progress, Silent, Stage};
 
 /// Rows read together when a file is opened.
 const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
@@ -21,11 +24,13 @@ const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 /// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
-    source: PlyFile<'a>,
+    pub(super) file: PlyFile<'a>,
     /// Rows left out, ascending.
     dropped: Vec<usize>,
     /// Whether any Gaussian has a normal.
     normals: bool,
+    /// The scene, until it is taken, if it was read when the file was opened.
+    whole: Mutex<Option<Splats>>,
 }
 
 impl<'a> PlySource<'a> {
@@ -40,48 +45,87 @@ impl<'a> PlySource<'a> {
         options: &ReadOptions,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let mut source = PlyFile::open(name, bytes, options)?;
-        let (mut bad, mut normals, mut sure) = (Vec::<Bad>::new(), false, 0);
-        source.check_memory(source.count.min(SCAN_ROWS), false)?;
-        let mut scratch = empty(&source.layout);
-        progress.begin(Stage::Read, source.count as u64 * source.layout.row_bytes as u64);
-        for start in (0..source.count).step_by(SCAN_ROWS) {
-            progress.check()?;
-            let range = start..(start + SCAN_ROWS).min(source.count);
-            progress.advance(range.len() as u64 * source.layout.row_bytes as u64);
-            let found = fill(&source.rows, &source.layout, name, range, &mut scratch)?;
-            bad.extend(found.bad);
-            normals |= found.normals;
-            sure += found.sure;
+        Ok(Self::look(name, bytes, options, SCAN_ROWS, progress)?.0)
+    }
+
+    /// [`Self::open`] that keeps what it reads, for the first call of [`SplatSource::whole`]. Use it if the whole scene
+    /// will be held anyway. The file is then read once instead of twice.
+    ///
+    /// # Errors
+    /// As [`Self::open`].
+    pub fn open_whole(
+        name: &'a str,
+        bytes: &'a [u8],
+        options: &ReadOptions,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let (mut source, mut splats) = Self::look(name, bytes, options, usize::MAX, progress)?;
+        source.file.check_memory(source.file.count, source.normals)?;
+        source.finish(0..source.file.count, &mut splats)?;
+        splats.meta = source.file.meta.clone();
+        source.whole = Mutex::new(Some(splats));
+        Ok(source)
+    }
+
+    /// Looks at all values, `at_once` rows at a time. Returns also the last rows looked at, without normals.
+    fn look(
+        name: &'a str,
+        bytes: &'a [u8],
+        options: &ReadOptions,
+        at_once: usize,
+        progress: &dyn Progress,
+    ) -> Result<(Self, Splats)> {
+        let mut file = PlyFile::open(name, bytes, options)?;
+        file.check_memory(file.count.min(at_once), false)?;
+        let (mut found, mut splats) = (Found::default(), empty(&file.layout));
+        progress.begin(Stage::Read, file.count as u64 * file.layout.row_bytes as u64);
+        for start in (0..file.count).step_by(at_once) {
+            let range = start..start.saturating_add(at_once).min(file.count);
+            found.add(file.fill(range, &mut splats, progress)?);
         }
         progress.end();
-        source.report(&bad, sure, options)?;
-        let dropped = bad.into_iter().flat_map(|b| b.rows).collect();
-        Ok(Self { source, dropped, normals })
+        file.report(&found, options)?;
+        let Found { bad: dropped, normals, .. } = found;
+        Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
+    }
+
+    /// Adds the normals to `splats`, which hold rows `rows`, and leaves out those dropped.
+    fn finish(&self, rows: Range<usize>, splats: &mut Splats) -> Result<()> {
+        if self.normals {
+            self.file.fill_normals(rows.clone(), splats)?;
+        }
+        let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
+        let dropped = &self.dropped[from(rows.start)..from(rows.end)];
+        if !dropped.is_empty() {
+            let mut keep = vec![true; rows.len()];
+            dropped.iter().for_each(|&row| keep[row - rows.start] = false);
+            splats.retain(&keep);
+        }
+        Ok(())
     }
 
     /// SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
-        self.source.layout.degree
+        self.file.layout.degree
     }
 
     /// Comments and marks.
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
-        &self.source.meta
+        &self.file.meta
     }
 
     /// Oddities that did not prevent reading, one plain sentence each.
     #[must_use]
     pub fn warnings(&self) -> &[String] {
-        &self.source.warnings
+        &self.file.warnings
     }
 
     /// What the file was like.
     #[must_use]
     pub fn summary(&self) -> &PlySummary {
-        &self.source.summary
+        &self.file.summary
     }
 
     /// The row of Gaussian `gaussian`.
@@ -103,11 +147,11 @@ impl<'a> PlySource<'a> {
 impl SplatSource for PlySource<'_> {
     /// Number of Gaussians, without those left out.
     fn len(&self) -> usize {
-        self.source.count - self.dropped.len()
+        self.file.count - self.dropped.len()
     }
 
     fn empty(&self) -> Splats {
-        Splats { meta: self.source.meta.clone(), ..empty(&self.source.layout) }
+        Splats { meta: self.file.meta.clone(), ..empty(&self.file.layout) }
     }
 
     fn has_normals(&self) -> bool {
@@ -115,15 +159,15 @@ impl SplatSource for PlySource<'_> {
     }
 
     fn row_bytes(&self) -> u64 {
-        self.source.summary.row_bytes
+        self.file.summary.row_bytes
     }
 
     fn source_bytes(&self) -> u64 {
-        self.source.summary.file_bytes
+        self.file.summary.file_bytes
     }
 
     fn warnings(&self) -> &[String] {
-        &self.source.warnings
+        &self.file.warnings
     }
 
     fn read(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
@@ -132,20 +176,19 @@ impl SplatSource for PlySource<'_> {
             Some(last) if last >= range.start => self.row(range.start)..self.row(last) + 1,
             _ => 0..0,
         };
-        self.source.check_memory(rows.len(), self.normals)?;
-        fill(&self.source.rows, &self.source.layout, self.source.name, rows.clone(), splats)?;
-        if self.normals {
-            fill_normals(&self.source.rows, &self.source.layout, rows.clone(), splats)?;
+        self.file.check_memory(rows.len(), self.normals)?;
+        self.file.fill(rows.clone(), splats, &Silent)?;
+        self.finish(rows, splats)
+    }
+
+    fn whole(&self) -> Result<Cow<'_, Splats>> {
+        let kept = self.whole.lock().unwrap_or_else(PoisonError::into_inner).take();
+        if let Some(splats) = kept {
+            return Ok(Cow::Owned(splats));
         }
-        if rows.len() > range.len() {
-            let first = self.dropped.partition_point(|&row| row < rows.start);
-            let mut keep = vec![true; rows.len()];
-            for &row in self.dropped[first..].iter().take_while(|&&row| row < rows.end) {
-                keep[row - rows.start] = false;
-            }
-            splats.retain(&keep);
-        }
-        Ok(())
+        let mut splats = self.empty();
+        self.read(0..self.len(), &mut splats)?;
+        Ok(Cow::Owned(splats))
     }
 
     fn read_rest(&self, gaussians: &[usize], out: &mut Vec<f32>) -> Result<()> {
@@ -160,16 +203,66 @@ impl SplatSource for PlySource<'_> {
         let mut order: Vec<(usize, usize)> =
             gaussians.iter().enumerate().map(|(k, &gaussian)| (self.row(gaussian), k)).collect();
         order.sort_unstable();
-        let row_bytes = self.source.layout.row_bytes;
+        let row_bytes = self.file.layout.row_bytes;
         for group in order.chunk_by(|a, b| a.0 / ROWS_PER_TASK == b.0 / ROWS_PER_TASK) {
             let (Some(&(first, _)), Some(&(last, _))) = (group.first(), group.last()) else { continue };
-            let (bytes, big) = self.source.rows.packed(first..last + 1)?;
+            let (bytes, big) = self.file.rows.packed(first..last + 1)?;
             for &(row, k) in group {
                 let bytes = &bytes[(row - first) * row_bytes..][..row_bytes];
                 let out = &mut out[k * dim..(k + 1) * dim];
-                self.source.layout.rest.read(Packed { bytes, row_bytes, big }, out);
+                self.file.layout.groups[REST].read(Packed { bytes, row_bytes, big }, out);
             }
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::ply::{read_bytes, write};
+
+    /// The first `whole` gives what was read when the file was opened, the second reads the file.
+    #[test]
+    fn a_file_opened_whole_gives_the_same_as_one_read_in_parts() {
+        let count = 2 * ROWS_PER_TASK + 7;
+        let mut splats = crate::support::testing::scene(count, 3);
+        splats.geometry.normals = vec![[0.0; 3]; count];
+        splats.geometry.normals[count - 1] = [0.0, 1.0, 0.0];
+        for bad in [0, ROWS_PER_TASK, count - 2] {
+            splats.geometry.scales[bad][1] = f32::NAN;
+        }
+        splats.geometry.opacities[5] = f32::INFINITY;
+        let mut bytes = Vec::new();
+        write(&mut bytes, &splats).unwrap();
+        let refused = PlySource::open_whole("t", &bytes, &ReadOptions::default(), &Silent).unwrap_err();
+        let in_parts = PlySource::open("t", &bytes, &ReadOptions::default(), &Silent).unwrap_err();
+        assert_eq!(refused.to_string(), in_parts.to_string());
+        let options = ReadOptions::default().with_drop_invalid(true);
+        let expected = read_bytes("t", &bytes, &options).unwrap();
+        assert_eq!(expected.splats.len(), count - 3);
+        let opened = PlySource::open_whole("t", &bytes, &options, &Silent).unwrap();
+        let in_parts = PlySource::open("t", &bytes, &options, &Silent).unwrap();
+        assert_eq!((opened.warnings(), opened.summary()), (in_parts.warnings(), in_parts.summary()));
+        assert_eq!((opened.warnings(), opened.len()), (&*expected.warnings, expected.splats.len()));
+        for source in [&opened, &opened, &in_parts] {
+            assert_eq!(*source.whole().unwrap(), expected.splats);
+        }
+    }
+
+    #[test]
+    fn opening_a_file_whole_can_be_cancelled() {
+        struct Cancelled;
+        impl Progress for Cancelled {
+            fn is_cancelled(&self) -> bool {
+                true
+            }
+        }
+        let mut bytes = Vec::new();
+        write(&mut bytes, &crate::support::testing::scene(3, 3)).unwrap();
+        for open in [PlySource::open, PlySource::open_whole] {
+            let error = open("t", &bytes, &ReadOptions::default(), &Cancelled).unwrap_err();
+            assert!(matches!(error, crate::Error::Cancelled), "{error}");
+        }
     }
 }

@@ -1,6 +1,7 @@
 //! Copies columns out of packed rows. Type and byte order are looked up before the loop over rows.
 
-use super::scalar::{Scalar, ScalarType, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::{ScalarType, with_scalar};
 
 /// Packed rows of one size and byte order.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +26,8 @@ pub(super) struct Field {
 /// Properties that become one array of f32 with `width` values a Gaussian.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
-    width: usize,
+    /// Values a Gaussian.
+    pub(super) width: usize,
     runs: Vec<Run>,
 }
 
@@ -54,11 +56,6 @@ impl Group {
             }
         }
         Self { width: fields.len(), runs }
-    }
-
-    /// Values a Gaussian.
-    pub(super) fn width(&self) -> usize {
-        self.width
     }
 
     /// Fills `out`, `width` values a row of `rows`.

@@ -1,6 +1,6 @@
 //! A PLY whose header was read and whose values were not.
 
-use super::fill::{Bad, SURE_OPACITY};
+use super::fill::{Found, SURE_OPACITY};
 use super::header::Header;
 use super::layout::Layout;
 use super::marks::marks;
@@ -32,8 +32,8 @@ impl<'a> PlyFile<'a> {
     /// Reads the header of `bytes`, which messages call `name`.
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
         let header = Header::parse(name, bytes, &options.limits)?;
-        let layout = Layout::new(name, &header)?;
-        let summary = PlySummary::new(&header, bytes.len() as u64, layout.row_bytes as u64);
+        let layout = Layout::new(&header).map_err(|problem| Error::format(name, problem))?;
+        let summary = PlySummary::new(&header, &layout, bytes.len() as u64);
         options.limits.check_gaussians(name, summary.vertices)?;
         let marks = marks(&header.comments);
         let mut warnings = layout.warnings.clone();
@@ -41,7 +41,7 @@ impl<'a> PlyFile<'a> {
             let said = "comments contradict each other about anti-aliasing; taken as anti-aliased";
             warnings.push(said.to_owned());
         }
-        let rows = Rows::locate(name, &header, layout.row_bytes, &bytes[header.bytes..], &mut warnings)?;
+        let rows = Rows::locate(name, &header, &layout, &bytes[header.bytes..], &mut warnings)?;
         let count = usize::try_from(summary.vertices).map_err(|_| {
             Error::malformed(name, format!("{} vertices do not fit in memory", summary.vertices))
         })?;
@@ -60,24 +60,24 @@ impl<'a> PlyFile<'a> {
         budget.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
     }
 
-    /// Refuses the file if there are `bad` rows, or adds a warning that they are dropped. Adds a warning about `sure`
+    /// Refuses the file if bad rows were `found`, or adds a warning that they are dropped. Adds a warning about
     /// infinite opacities.
-    pub(super) fn report(&mut self, bad: &[Bad], sure: usize, options: &ReadOptions) -> Result<()> {
-        if sure > 0 {
+    pub(super) fn report(&mut self, found: &Found, options: &ReadOptions) -> Result<()> {
+        if found.sure > 0 {
             self.warnings.push(format!(
-                "{sure} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)"
+                "{} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)",
+                found.sure
             ));
         }
-        let Some(first) = bad.first() else { return Ok(()) };
-        let dropped: usize = bad.iter().map(|b| b.rows.len()).sum();
-        let (row, property) = (first.rows.first().copied().unwrap_or(0), first.property.clone());
+        let (Some(&row), Some(property)) = (found.bad.first(), &found.bad_property) else { return Ok(()) };
+        let (count, first) = (found.bad.len() as u64, row as u64);
         if !options.drop_invalid {
-            let problem = FormatError::NotFinite { count: dropped as u64, first: row as u64, property };
+            let problem = FormatError::NotFinite { count, first, property: property.clone() };
             return Err(Error::format(self.name, problem));
         }
-        self.summary.dropped = dropped as u64;
+        self.summary.dropped = count;
         self.warnings.push(format!(
-            "dropped {dropped} of {} Gaussians with NaN or infinite values, the first is number {row} \
+            "dropped {count} of {} Gaussians with NaN or infinite values, the first is number {first} \
              (property '{property}')",
             self.count
         ));

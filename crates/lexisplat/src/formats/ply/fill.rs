@@ -3,13 +3,15 @@
 use std::ops::Range;
 
 use super::columns::{Packed, any_not_finite, read_column};
-use super::layout::{Layout, rest_name};
+use super::file::PlyFile;
+use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, REST, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
-use super::rows::{ROWS_PER_TASK, Rows};
-use super::scalar::{Scalar, with_scalar};
-use crate::scene::splats::{Extra, Geometry, SceneMeta, Splats, for_extra};
+use super::rows::ROWS_PER_TASK;
+use crate::scene::extra::{Extra, for_extra, with_scalar};
+use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
+use crate::support::progress::Progress;
 
 /// Replaces an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid; in f32 the sigmoid of
 /// this value is 1 and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply)
@@ -20,7 +22,7 @@ pub(super) const SURE_OPACITY: f32 = 100.0;
 pub(super) fn empty(layout: &Layout) -> Splats {
     let extras = layout.extras.iter().map(|(name, field)| Extra {
         name: name.clone(),
-        values: with_scalar!(field.ty, T => T::no_values()),
+        values: with_scalar!(field.ty, T => Vec::<T>::new().into()),
     });
     let geometry = Geometry { extras: extras.collect(), ..Geometry::default() };
     Splats { geometry, degree: layout.degree, sh_rest: Vec::new(), meta: SceneMeta::default() }
@@ -59,117 +61,131 @@ fn resize(file: &str, layout: &Layout, count: usize, splats: &mut Splats) -> Res
     Ok(())
 }
 
-/// Gaussians of one chunk that hold NaN or infinite values.
-#[derive(Debug)]
-pub(super) struct Bad {
-    /// Their rows in the file, ascending; at least one.
-    pub(super) rows: Vec<usize>,
-    /// The first such property of the first one, in INRIA's order.
-    pub(super) property: String,
-}
-
 /// Fills one extra for one chunk of rows.
 type ExtraFill<'a> = Box<dyn FnMut(Packed<'_>) + Send + 'a>;
 
 /// One chunk of rows and the parts of the arrays that it fills.
 struct Piece<'a> {
     rows: Range<usize>,
-    positions: &'a mut [f32],
-    dc: &'a mut [f32],
-    rest: &'a mut [f32],
-    opacities: &'a mut [f32],
-    scales: &'a mut [f32],
-    rotations: &'a mut [f32],
+    /// Parts of the arrays of floats, in the order of [`Layout::groups`]. That of the normals is empty.
+    floats: [&'a mut [f32]; GROUPS],
     extras: Vec<ExtraFill<'a>>,
 }
 
-/// What [`fill_piece`] found.
-struct Found {
-    bad: Option<Bad>,
-    normals: bool,
-    /// Number of infinite opacities.
-    sure: usize,
-}
-
-/// What [`fill`] found.
+/// What [`PlyFile::fill`] found.
 #[derive(Debug, Default)]
-pub(super) struct Filled {
-    /// Chunks with values that are not finite, in order.
-    pub(super) bad: Vec<Bad>,
+pub(super) struct Found {
+    /// Rows with NaN or infinite values, ascending.
+    pub(super) bad: Vec<usize>,
+    /// The first such property of the first one, in INRIA's order.
+    pub(super) bad_property: Option<String>,
     /// Whether any Gaussian whose values are all finite has a normal.
     pub(super) normals: bool,
     /// Number of infinite opacities.
     pub(super) sure: usize,
 }
 
-/// Fills all arrays of `splats` but the normals with rows `range`. `splats` came from [`empty`] and may have been
-/// filled before.
-pub(super) fn fill(
-    rows: &Rows<'_>,
-    layout: &Layout,
-    file: &str,
-    range: Range<usize>,
-    splats: &mut Splats,
-) -> Result<Filled> {
-    resize(file, layout, range.len(), splats)?;
-    let mut filled = Filled::default();
-    for found in map_vec(pieces(splats, layout, range.start), |piece| fill_piece(rows, layout, piece)) {
-        let found = found?;
-        filled.bad.extend(found.bad);
-        filled.normals |= found.normals;
-        filled.sure += found.sure;
+impl Found {
+    /// Adds what was found in the next rows.
+    pub(super) fn add(&mut self, next: Self) {
+        self.bad.extend(next.bad);
+        self.bad_property = self.bad_property.take().or(next.bad_property);
+        self.normals |= next.normals;
+        self.sure += next.sure;
     }
-    Ok(filled)
 }
 
-/// Fills the normals. Few files have any, so they get a second pass, and scenes without normals need no array.
-pub(super) fn fill_normals(
-    rows: &Rows<'_>,
-    layout: &Layout,
-    range: Range<usize>,
-    splats: &mut Splats,
-) -> Result<()> {
-    let Some(group) = &layout.normal else { return Ok(()) };
-    splats.geometry.normals = vec![[0.0; 3]; range.len()];
-    let parts = splats.geometry.normals.chunks_mut(ROWS_PER_TASK).enumerate().collect();
-    let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
-        let start = range.start + c * ROWS_PER_TASK;
-        let (bytes, big) = rows.packed(start..start + part.len())?;
-        group.read(Packed { bytes: &bytes, row_bytes: layout.row_bytes, big }, part.as_flattened_mut());
-        Ok(())
-    });
-    done.into_iter().collect()
+impl PlyFile<'_> {
+    /// Fills all arrays of `splats` but the normals with rows `range`. `splats` came from [`empty`] and may have been
+    /// filled before. Advances `progress` by the bytes of the rows.
+    pub(super) fn fill(
+        &self,
+        range: Range<usize>,
+        splats: &mut Splats,
+        progress: &dyn Progress,
+    ) -> Result<Found> {
+        resize(self.name, &self.layout, range.len(), splats)?;
+        let mut found = Found::default();
+        let parts = map_vec(pieces(splats, &self.layout, range.start), |piece| {
+            progress.check()?;
+            progress.advance(piece.rows.len() as u64 * self.layout.row_bytes as u64);
+            self.fill_piece(piece)
+        });
+        for part in parts {
+            found.add(part?);
+        }
+        Ok(found)
+    }
+
+    /// Fills the normals. Few files have any, so they get a second pass, and scenes without normals need no array.
+    pub(super) fn fill_normals(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
+        let width = self.layout.groups[NORMALS].width;
+        if width == 0 {
+            return Ok(());
+        }
+        splats.geometry.normals = vec![[0.0; 3]; range.len()];
+        let parts = splats.geometry.normals.chunks_mut(ROWS_PER_TASK).enumerate().collect();
+        let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
+            let start = range.start + c * ROWS_PER_TASK;
+            let (bytes, big) = self.rows.packed(start..start + part.len())?;
+            let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
+            self.layout.groups[NORMALS].read(packed, part.as_flattened_mut());
+            Ok(())
+        });
+        done.into_iter().collect()
+    }
+
+    fn fill_piece(&self, piece: Piece<'_>) -> Result<Found> {
+        let Piece { rows, mut floats, mut extras } = piece;
+        let (bytes, big) = self.rows.packed(rows.clone())?;
+        let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
+        let mut normals = vec![0.0; self.layout.groups[NORMALS].width * rows.len()];
+        floats[NORMALS] = &mut normals;
+        for (group, values) in self.layout.groups.iter().zip(&mut floats) {
+            group.read(packed, values);
+        }
+        extras.iter_mut().for_each(|fill| fill(packed));
+        let mut found = Found::default();
+        for opacity in floats[OPACITIES].iter_mut().filter(|v| v.is_infinite()) {
+            *opacity = SURE_OPACITY.copysign(*opacity);
+            found.sure += 1;
+        }
+        let floats = floats.each_ref().map(|values| &**values);
+        if floats.iter().any(|values| any_not_finite(values)) {
+            (found.bad, found.bad_property) = bad_rows(&rows, floats);
+        }
+        // A negative zero counts as a normal, because a value must keep all its bits.
+        let any_bits = |values: &[f32]| values.iter().fold(0, |any, v| any | v.to_bits()) != 0;
+        found.normals = if found.bad.is_empty() {
+            any_bits(floats[NORMALS])
+        } else {
+            let mut normals = floats[NORMALS].chunks_exact(NORMAL.len()).zip(rows);
+            normals.any(|(normal, row)| any_bits(normal) && found.bad.binary_search(&row).is_err())
+        };
+        Ok(found)
+    }
 }
 
 /// Cuts the arrays of `splats`, whose first Gaussian is row `first`, into chunks of rows.
 fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<Piece<'a>> {
-    fn take<'a, T>(left: &mut &'a mut [T], len: usize) -> &'a mut [T] {
-        let (head, tail) = std::mem::take(left).split_at_mut(len);
-        *left = tail;
-        head
-    }
     let count = splats.len();
-    let dim = splats.degree.rest();
     let geometry = &mut splats.geometry;
-    let mut positions = geometry.positions.as_flattened_mut();
-    let mut dc = geometry.dc.as_flattened_mut();
-    let mut rest = splats.sh_rest.as_mut_slice();
-    let mut opacities = geometry.opacities.as_mut_slice();
-    let mut scales = geometry.scales.as_flattened_mut();
-    let mut rotations = geometry.rotations.as_flattened_mut();
+    let mut left = [
+        geometry.positions.as_flattened_mut(),
+        &mut [],
+        geometry.dc.as_flattened_mut(),
+        &mut splats.sh_rest,
+        &mut geometry.opacities,
+        geometry.scales.as_flattened_mut(),
+        geometry.rotations.as_flattened_mut(),
+    ];
     let mut pieces: Vec<Piece<'a>> = Vec::with_capacity(count.div_ceil(ROWS_PER_TASK));
     for start in (0..count).step_by(ROWS_PER_TASK) {
         let n = ROWS_PER_TASK.min(count - start);
-        pieces.push(Piece {
-            rows: first + start..first + start + n,
-            positions: take(&mut positions, 3 * n),
-            dc: take(&mut dc, 3 * n),
-            rest: take(&mut rest, dim * n),
-            opacities: take(&mut opacities, n),
-            scales: take(&mut scales, 3 * n),
-            rotations: take(&mut rotations, 4 * n),
-            extras: Vec::with_capacity(layout.extras.len()),
-        });
+        let floats =
+            std::array::from_fn(|k| left[k].split_off_mut(..layout.groups[k].width * n).unwrap_or_default());
+        let extras = Vec::with_capacity(layout.extras.len());
+        pieces.push(Piece { rows: first + start..first + start + n, floats, extras });
     }
     for (extra, (_, field)) in geometry.extras.iter_mut().zip(&layout.extras) {
         let offset = field.offset;
@@ -182,58 +198,20 @@ fn pieces<'a>(splats: &'a mut Splats, layout: &'a Layout, first: usize) -> Vec<P
     pieces
 }
 
-fn fill_piece(rows: &Rows<'_>, layout: &Layout, mut piece: Piece<'_>) -> Result<Found> {
-    let (bytes, big) = rows.packed(piece.rows.clone())?;
-    let packed = Packed { bytes: &bytes, row_bytes: layout.row_bytes, big };
-    layout.position.read(packed, piece.positions);
-    layout.dc.read(packed, piece.dc);
-    layout.rest.read(packed, piece.rest);
-    layout.opacity.read(packed, piece.opacities);
-    let mut sure = 0;
-    for opacity in piece.opacities.iter_mut().filter(|v| v.is_infinite()) {
-        *opacity = SURE_OPACITY.copysign(*opacity);
-        sure += 1;
-    }
-    layout.scale.read(packed, piece.scales);
-    layout.rotation.read(packed, piece.rotations);
-    piece.extras.iter_mut().for_each(|fill| fill(packed));
-    let mut normals = Vec::new();
-    if let Some(group) = &layout.normal {
-        normals.resize(group.width() * piece.rows.len(), 0.0);
-        group.read(packed, &mut normals);
-    }
-    let bad = bad_rows(&piece, &normals);
-    // A negative zero counts as a normal, because a value must keep all its bits.
-    let any_bits = |values: &[f32]| values.iter().fold(0, |any, v| any | v.to_bits()) != 0;
-    let any_normal = match &bad {
-        None => any_bits(&normals),
-        Some(bad) => normals
-            .chunks_exact(NORMAL.len())
-            .zip(piece.rows.clone())
-            .any(|(normal, row)| any_bits(normal) && bad.rows.binary_search(&row).is_err()),
-    };
-    Ok(Found { bad, normals: any_normal, sure })
-}
-
-/// Finds the Gaussians of `piece` with NaN or infinite values.
-fn bad_rows(piece: &Piece<'_>, normals: &[f32]) -> Option<Bad> {
-    let count = piece.rows.len();
-    let groups: [&[f32]; 7] =
-        [piece.positions, normals, piece.dc, piece.rest, piece.opacities, piece.scales, piece.rotations];
-    if !groups.iter().any(|values| any_not_finite(values)) {
-        return None;
-    }
-    let rest_names: Vec<String> = (0..piece.rest.len() / count).map(rest_name).collect();
+/// The Gaussians with NaN or infinite values among `rows`, whose values are `floats`, and the first such property.
+fn bad_rows(rows: &Range<usize>, floats: [&[f32]; GROUPS]) -> (Vec<usize>, Option<String>) {
+    let count = rows.len();
+    let rest_names: Vec<String> = (0..floats[REST].len() / count).map(rest_name).collect();
     let rest_names: Vec<&str> = rest_names.iter().map(String::as_str).collect();
-    let names: [&[&str]; 7] = [&POSITION, &NORMAL, &DC, &rest_names, &OPACITY, &SCALE, &ROTATION];
+    let names: [&[&str]; GROUPS] = [&POSITION, &NORMAL, &DC, &rest_names, &OPACITY, &SCALE, &ROTATION];
     let first_bad = |row: usize| {
-        groups.iter().zip(names).find_map(|(values, names)| {
+        floats.iter().zip(names).find_map(|(values, names)| {
             let width = values.len() / count;
             let values = &values[row * width..(row + 1) * width];
             values.iter().zip(names).find(|(v, _)| !v.is_finite()).map(|(_, &name)| name)
         })
     };
-    let rows: Vec<usize> = (0..count).filter(|&row| first_bad(row).is_some()).collect();
-    let property = rows.first().and_then(|&row| first_bad(row)).unwrap_or_default().to_owned();
-    Some(Bad { rows: rows.into_iter().map(|row| piece.rows.start + row).collect(), property })
+    let bad: Vec<usize> = (0..count).filter(|&row| first_bad(row).is_some()).collect();
+    let property = bad.first().and_then(|&row| first_bad(row)).map(str::to_owned);
+    (bad.into_iter().map(|row| rows.start + row).collect(), property)
 }

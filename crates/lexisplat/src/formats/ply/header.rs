@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::names::shown;
-use super::scalar::ScalarType;
 use crate::formats::kind::FileKind;
+use crate::scene::extra::ScalarType;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 
@@ -32,6 +32,16 @@ pub(super) enum Kind {
     List { count: ScalarType, item: ScalarType },
 }
 
+impl Kind {
+    /// The type of a single value.
+    pub(super) fn scalar(self) -> Option<ScalarType> {
+        match self {
+            Self::Scalar(ty) => Some(ty),
+            Self::List { .. } => None,
+        }
+    }
+}
+
 /// A named column of an element.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Property {
@@ -50,13 +60,7 @@ pub(super) struct Element {
 impl Element {
     /// Bytes of one binary row; `None` if a list makes rows differ.
     pub(super) fn row_bytes(&self) -> Option<usize> {
-        self.properties
-            .iter()
-            .map(|p| match p.kind {
-                Kind::Scalar(ty) => Some(ty.bytes()),
-                Kind::List { .. } => None,
-            })
-            .sum()
+        self.properties.iter().map(|p| p.kind.scalar().map(ScalarType::bytes)).sum()
     }
 }
 
@@ -125,7 +129,10 @@ impl Header {
     }
 }
 
-fn parse_format<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::Result<Format, &'static str> {
+/// What a line says, or what is wrong with it.
+type Parsed<T> = Result<T, &'static str>;
+
+fn parse_format<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Format> {
     let format = match words.next() {
         Some("ascii") => Format::Ascii,
         Some("binary_little_endian") => Format::BinaryLittleEndian,
@@ -138,7 +145,7 @@ fn parse_format<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::Re
     }
 }
 
-fn parse_element<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::Result<Element, &'static str> {
+fn parse_element<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Element> {
     match (words.next(), words.next().map(str::parse), words.next()) {
         (Some(name), Some(Ok(count)), None) => {
             Ok(Element { name: name.to_owned(), count, properties: Vec::new() })
@@ -147,9 +154,7 @@ fn parse_element<'a>(mut words: impl Iterator<Item = &'a str>) -> std::result::R
     }
 }
 
-fn parse_property<'a>(
-    mut words: impl Iterator<Item = &'a str>,
-) -> std::result::Result<Property, &'static str> {
+fn parse_property<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Property> {
     let ty = |word: Option<&str>| word.and_then(ScalarType::parse).ok_or("unknown type");
     let kind = match words.next() {
         Some("list") => {

@@ -3,26 +3,32 @@
 use std::collections::HashMap;
 
 use super::columns::{Field, Group};
-use super::header::{Element, Header, Kind};
+use super::header::{Element, Header};
 use super::names::{DC, NORMAL, OPACITY, POSITION, REST_PREFIX, ROTATION, SCALE, VERTEX, listed, shown};
-use super::scalar::ScalarType;
 use crate::formats::kind::Unsupported;
+use crate::scene::extra::ScalarType;
 use crate::scene::sh::ShDegree;
-use crate::support::error::{Error, FormatError, Result};
+use crate::support::error::{FormatError, Result};
+
+/// Number of arrays of floats: positions, normals, base colours, SH-rest, opacities, scales, rotations.
+pub(super) const GROUPS: usize = 7;
+/// Where the normals, SH-rest and the opacities are among them.
+pub(super) const NORMALS: usize = 1;
+pub(super) const REST: usize = 3;
+pub(super) const OPACITIES: usize = 4;
+
+/// What a header says, or why the file is refused.
+type Accepted<T> = Result<T, FormatError>;
 
 /// Where each property lies in a vertex row.
 #[derive(Debug)]
 pub(super) struct Layout {
+    /// The index of the vertex element in the header.
+    pub(super) vertex: usize,
     pub(super) row_bytes: usize,
     pub(super) degree: ShDegree,
-    pub(super) position: Group,
-    /// The three normals, if all exist.
-    pub(super) normal: Option<Group>,
-    pub(super) dc: Group,
-    pub(super) rest: Group,
-    pub(super) opacity: Group,
-    pub(super) scale: Group,
-    pub(super) rotation: Group,
+    /// The properties of each array of floats, in INRIA's order. Those of the normals are empty unless all three exist.
+    pub(super) groups: [Group; GROUPS],
     /// Properties that 3DGS does not define, in file order.
     pub(super) extras: Vec<(String, Field)>,
     /// Oddities of the properties, one plain sentence each.
@@ -31,68 +37,58 @@ pub(super) struct Layout {
 
 impl Layout {
     /// Finds the layout of the vertices of `header`.
-    pub(super) fn new(file: &str, header: &Header) -> Result<Self> {
-        let refuse = |problem| Error::format(file, problem);
-        let vertex = vertex(header).map_err(refuse)?;
-        let mut columns = Columns::new(vertex).map_err(refuse)?;
-        refuse_other_kinds(&columns).map_err(refuse)?;
-
-        let position = columns.group(&POSITION, "").map_err(refuse)?;
-        let dc = columns
-            .group(&DC, "; colours as red, green and blue alone are no spherical harmonics")
-            .map_err(refuse)?;
-        let opacity = columns.group(&OPACITY, "").map_err(refuse)?;
-        let scale = columns.group(&SCALE, "").map_err(refuse)?;
-        let rotation = columns.group(&ROTATION, "").map_err(refuse)?;
-        let rest_names = rest_names(&columns).map_err(refuse)?;
-        let degree = ShDegree::from_rest(rest_names.len()).unwrap_or(ShDegree::ZERO);
-        let rest = columns.group(&rest_names, "").map_err(refuse)?;
+    pub(super) fn new(header: &Header) -> Accepted<Self> {
+        let vertex = vertex_index(header)?;
+        let mut columns = Columns::new(&header.elements[vertex])?;
+        refuse_other_kinds(&columns)?;
+        let position = columns.group(&POSITION, "")?;
+        let dc = columns.group(&DC, "; colours as red, green and blue alone are no spherical harmonics")?;
+        let opacity = columns.group(&OPACITY, "")?;
+        let scale = columns.group(&SCALE, "")?;
+        let rotation = columns.group(&ROTATION, "")?;
+        let (degree, rest_names) = rest_names(&columns)?;
+        let rest = columns.group(&rest_names, "")?;
 
         let mut warnings = Vec::new();
-        let normals: Vec<&str> = NORMAL.into_iter().filter(|n| columns.fields.contains_key(n)).collect();
-        let normal = if normals.len() == NORMAL.len() {
-            Some(columns.group(&NORMAL, "").map_err(refuse)?)
-        } else {
-            if !normals.is_empty() {
-                warnings.push(format!("only part of a normal is there, dropped: {}", listed(&normals)));
+        let mut normals: Vec<&str> = NORMAL.into_iter().filter(|n| columns.fields.contains_key(n)).collect();
+        if !normals.is_empty() && normals.len() < NORMAL.len() {
+            warnings.push(format!("only part of a normal is there, dropped: {}", listed(&normals)));
+            for name in normals.drain(..) {
+                columns.fields.remove(name);
             }
-            for name in normals {
-                columns.take(name);
-            }
-            None
-        };
+        }
+        let normal = columns.group(&normals, "")?;
         if !columns.converted.is_empty() {
             warnings.push(format!("converted to 32-bit float: {}", listed(&columns.converted)));
         }
-        let extras = columns.rest();
+        let row_bytes = columns.row_bytes;
+        // The properties that are left, in file order.
+        let mut extras: Vec<_> = columns.fields.into_iter().map(|(n, f)| (n.to_owned(), f)).collect();
+        extras.sort_by_key(|(_, field)| field.offset);
         if !extras.is_empty() {
             let names: Vec<&str> = extras.iter().map(|(name, _)| name.as_str()).collect();
             warnings.push(format!("extra properties kept: {}", listed(&names)));
         }
-        let row_bytes = columns.row_bytes;
-        Ok(Self { row_bytes, degree, position, normal, dc, rest, opacity, scale, rotation, extras, warnings })
+        let groups = [position, normal, dc, rest, opacity, scale, rotation];
+        Ok(Self { vertex, row_bytes, degree, groups, extras, warnings })
     }
 }
 
 /// Returns the index of the vertex element in `header.elements`.
-pub(super) fn vertex_index(header: &Header) -> Option<usize> {
-    header.elements.iter().position(|e| e.name == VERTEX)
-}
-
-fn vertex(header: &Header) -> std::result::Result<&Element, FormatError> {
-    let has = |name: &str| header.elements.iter().any(|e| e.name == name);
-    let compressed = |e: &Element| e.properties.iter().any(|p| p.name == "packed_position");
-    if has("chunk") || header.elements.iter().any(compressed) {
+fn vertex_index(header: &Header) -> Accepted<usize> {
+    let compressed =
+        |e: &Element| e.name == "chunk" || e.properties.iter().any(|p| p.name == "packed_position");
+    if header.elements.iter().any(compressed) {
         return Err(FormatError::Unsupported { kind: Unsupported::CompressedPly });
     }
-    let mut found = header.elements.iter().filter(|e| e.name == VERTEX);
+    let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
+    let mut found = (0..names.len()).filter(|&i| names[i] == VERTEX);
     match (found.next(), found.next()) {
-        (Some(vertex), None) => Ok(vertex),
+        (Some(index), None) => Ok(index),
         (Some(_), Some(_)) => {
             Err(FormatError::Malformed("element 'vertex' is declared more than once".to_owned()))
         }
         (None, _) => {
-            let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
             let found = if names.is_empty() { "none".to_owned() } else { listed(&names) };
             Err(FormatError::Malformed(format!("no element 'vertex'; elements found: {found}")))
         }
@@ -100,7 +96,7 @@ fn vertex(header: &Header) -> std::result::Result<&Element, FormatError> {
 }
 
 /// Refuses relatives of 3DGS, recognised by the properties they have or lack.
-fn refuse_other_kinds(columns: &Columns<'_>) -> std::result::Result<(), FormatError> {
+fn refuse_other_kinds(columns: &Columns<'_>) -> Accepted<()> {
     let has = |name: &str| columns.fields.contains_key(name);
     let shaped = has(SCALE[0]) && has(ROTATION[0]);
     let kind = if has("f_anchor_feat_0") {
@@ -115,8 +111,8 @@ fn refuse_other_kinds(columns: &Columns<'_>) -> std::result::Result<(), FormatEr
     Err(FormatError::Unsupported { kind })
 }
 
-/// Returns the names from `f_rest_0` to the highest. Their number must be that of an SH degree.
-fn rest_names(columns: &Columns<'_>) -> std::result::Result<Vec<String>, FormatError> {
+/// Returns the SH degree and the names from `f_rest_0` to the highest.
+fn rest_names(columns: &Columns<'_>) -> Accepted<(ShDegree, Vec<String>)> {
     let number = |name: &str| -> Option<usize> {
         let digits = name.strip_prefix(REST_PREFIX)?;
         let number = digits.parse().ok()?;
@@ -126,17 +122,16 @@ fn rest_names(columns: &Columns<'_>) -> std::result::Result<Vec<String>, FormatE
     numbers.sort_unstable();
     let count = numbers.len();
     let expected = "expected f_rest_0 onwards, 0, 9, 24, 45 or 72 of them (SH degree 0 to 4)";
-    let gap = numbers.iter().enumerate().find(|&(i, &n)| i != n).map(|(i, _)| i);
-    match (gap, numbers.last()) {
-        (Some(missing), Some(last)) => Err(FormatError::Malformed(format!(
+    let gap = (0..count).find(|&i| numbers[i] != i);
+    if let (Some(missing), Some(last)) = (gap, numbers.last()) {
+        return Err(FormatError::Malformed(format!(
             "property 'f_rest_{missing}' is missing: {count} f_rest properties found, the highest is \
              f_rest_{last}; {expected}"
-        ))),
-        _ if ShDegree::from_rest(count).is_none() => {
-            Err(FormatError::Malformed(format!("{count} f_rest properties found; {expected}")))
-        }
-        _ => Ok((0..count).map(rest_name).collect()),
+        )));
     }
+    let degree = ShDegree::from_rest(count)
+        .ok_or_else(|| FormatError::Malformed(format!("{count} f_rest properties found; {expected}")))?;
+    Ok((degree, (0..count).map(rest_name).collect()))
 }
 
 /// Returns the name of SH-rest coefficient `number`.
@@ -153,40 +148,26 @@ struct Columns<'a> {
 }
 
 impl<'a> Columns<'a> {
-    fn new(vertex: &'a Element) -> std::result::Result<Self, FormatError> {
+    fn new(vertex: &'a Element) -> Accepted<Self> {
         let (mut fields, mut row_bytes) = (HashMap::with_capacity(vertex.properties.len()), 0);
         for property in &vertex.properties {
             let name = property.name.as_str();
-            let Kind::Scalar(ty) = property.kind else {
-                return Err(FormatError::Malformed(format!(
-                    "vertex property '{}' is a list; a Gaussian's properties are single values",
-                    shown(name)
-                )));
-            };
+            let refuse = |what| FormatError::Malformed(format!("vertex property '{}' {what}", shown(name)));
+            let ty = property.kind.scalar();
+            let ty = ty.ok_or_else(|| refuse("is a list; a Gaussian's properties are single values"))?;
             if fields.insert(name, Field { offset: row_bytes, ty }).is_some() {
-                return Err(FormatError::Malformed(format!(
-                    "vertex property '{}' is declared twice",
-                    shown(name)
-                )));
+                return Err(refuse("is declared twice"));
             }
             row_bytes += ty.bytes();
         }
         Ok(Self { fields, row_bytes, converted: Vec::new() })
     }
 
-    fn take(&mut self, name: &str) -> Option<Field> {
-        self.fields.remove(name)
-    }
-
     /// Claims the properties `names`, which become one array. `hint` is for the error if one is missing.
-    fn group<S: AsRef<str>>(
-        &mut self,
-        names: &[S],
-        hint: &'static str,
-    ) -> std::result::Result<Group, FormatError> {
+    fn group<S: AsRef<str>>(&mut self, names: &[S], hint: &'static str) -> Accepted<Group> {
         let mut fields = Vec::with_capacity(names.len());
         for name in names.iter().map(AsRef::as_ref) {
-            let Some(field) = self.take(name) else {
+            let Some(field) = self.fields.remove(name) else {
                 return Err(FormatError::MissingProperty { name: name.to_owned(), hint });
             };
             if field.ty != ScalarType::F32 {
@@ -195,12 +176,5 @@ impl<'a> Columns<'a> {
             fields.push(field);
         }
         Ok(Group::new(&fields))
-    }
-
-    /// Returns the properties that are left, in file order.
-    fn rest(&mut self) -> Vec<(String, Field)> {
-        let mut left: Vec<(String, Field)> = self.fields.drain().map(|(n, f)| (n.to_owned(), f)).collect();
-        left.sort_by_key(|(_, field)| field.offset);
-        left
     }
 }

@@ -12,16 +12,8 @@ pub(super) fn mark(comment: &str) -> Option<bool> {
     let mut words =
         lower.split(|c: char| c.is_whitespace() || c == ':' || c == '=').filter(|w| !w.is_empty());
     match (words.next()?, words.next()?, words.next()) {
-        ("splatrendermode", mode, None) => match mode {
-            "mip" => Some(true),
-            "default" => Some(false),
-            _ => None,
-        },
-        ("antialiased", value, None) => match value {
-            "1" | "true" => Some(true),
-            "0" | "false" => Some(false),
-            _ => None,
-        },
+        ("splatrendermode", "mip", None) | ("antialiased", "1" | "true", None) => Some(true),
+        ("splatrendermode", "default", None) | ("antialiased", "0" | "false", None) => Some(false),
         _ => None,
     }
 }

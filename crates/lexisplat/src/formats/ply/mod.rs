@@ -28,7 +28,7 @@
 //!     meta: SceneMeta::default(),
 //! };
 //! let mut bytes = Vec::new();
-//! ply::write_to(&mut bytes, &one)?;
+//! ply::write(&mut bytes, &one)?;
 //! let read = ply::read_bytes("one.ply", &bytes, &ply::ReadOptions::default())?;
 //! assert_eq!(read.splats, one);
 //! assert!(read.warnings.is_empty());
@@ -51,10 +51,10 @@ mod scalar;
 mod summary;
 mod write;
 
+pub use crate::scene::extra::ScalarType;
 pub use chunks::PlySource;
 pub use header::Format;
 pub use read::{PlyRead, ReadOptions, read, read_bytes};
-pub use scalar::ScalarType;
 pub use summary::{Dialect, PlySummary};
-pub(crate) use write::{PlyWriter, check, file_bytes};
-pub use write::{write, write_to};
+pub use write::write;
+pub(crate) use write::write_parts;

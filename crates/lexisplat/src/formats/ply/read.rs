@@ -2,14 +2,16 @@
 
 use std::path::Path;
 
+use super::chunks::PlySource;
 use super::file::PlyFile;
-use super::fill::{empty, fill, fill_normals};
 use super::summary::PlySummary;
+use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::support::builder::builder_methods;
 use crate::support::error::Result;
 use crate::support::input::Input;
 use crate::support::limits::Limits;
+use crate::support::progress::Silent;
 
 /// How to read a PLY.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -56,20 +58,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 /// [`ReadOptions::drop_invalid`] is not set. [`crate::Error::Limit`] if the file asks for more than
 /// [`ReadOptions::limits`] allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
-    let mut file = PlyFile::open(name, bytes, options)?;
-    file.check_memory(file.count, false)?;
-    let mut splats = empty(&file.layout);
-    let found = fill(&file.rows, &file.layout, name, 0..file.count, &mut splats)?;
-    file.report(&found.bad, found.sure, options)?;
-    if found.normals {
-        file.check_memory(file.count, true)?;
-        fill_normals(&file.rows, &file.layout, 0..file.count, &mut splats)?;
-    }
-    if !found.bad.is_empty() {
-        let mut keep = vec![true; file.count];
-        found.bad.iter().flat_map(|b| &b.rows).for_each(|&row| keep[row] = false);
-        splats.retain(&keep);
-    }
-    splats.meta = file.meta;
-    Ok(PlyRead { splats, warnings: file.warnings, summary: file.summary })
+    let source = PlySource::open_whole(name, bytes, options, &Silent)?;
+    let splats = source.whole()?.into_owned();
+    let PlyFile { warnings, summary, .. } = source.file;
+    Ok(PlyRead { splats, warnings, summary })
 }

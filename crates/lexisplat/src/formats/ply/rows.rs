@@ -6,9 +6,10 @@ use std::ops::Range;
 use super::ascii::AsciiRows;
 use super::columns::Packed;
 use super::header::{Element, Format, Header, Kind};
-use super::layout::vertex_index;
+use super::layout::Layout;
 use super::names::shown;
-use super::scalar::{Scalar, with_scalar};
+use super::scalar::Scalar;
+use crate::scene::extra::with_scalar;
 use crate::support::error::{Error, FormatError, Result};
 
 /// Rows that one task copies, one run of columns after another. At 248 bytes a row they stay in a core's second-level
@@ -30,13 +31,11 @@ impl<'a> Rows<'a> {
     pub(super) fn locate(
         file: &'a str,
         header: &Header,
-        row_bytes: usize,
+        layout: &Layout,
         data: &'a [u8],
         warnings: &mut Vec<String>,
     ) -> Result<Self> {
-        let Some(index) = vertex_index(header) else {
-            return Err(Error::malformed(file, "no element 'vertex'"));
-        };
+        let &Layout { vertex: index, row_bytes, .. } = layout;
         let big = match header.format {
             Format::Ascii => return AsciiRows::locate(file, header, index, row_bytes, data).map(Self::Ascii),
             Format::BinaryLittleEndian => false,
@@ -127,6 +126,6 @@ fn warn_about_the_end(after: &[Element], left: u64, warnings: &mut Vec<String>) 
         }
     }
     if left > needed {
-        warnings.push(format!("ignored: {}", FormatError::TrailingBytes { extra: left - needed }));
+        warnings.push(format!("ignored: {} bytes follow the end of the data", left - needed));
     }
 }

@@ -2,11 +2,11 @@
 
 use serde::Serialize;
 
-use super::header::{Format, Header, Kind};
-use super::layout::vertex_index;
+use super::header::{Format, Header, Property};
+use super::layout::Layout;
 use super::marks::mark;
 use super::names::{DC, NORMAL, POSITION};
-use super::scalar::ScalarType;
+use crate::scene::extra::ScalarType;
 
 /// The program that probably wrote a file, judged by its comments and the order of its properties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -53,22 +53,18 @@ pub struct PlySummary {
 
 impl PlySummary {
     /// Summarises a file of `file_bytes` with this header. The caller sets `dropped`.
-    pub(super) fn new(header: &Header, file_bytes: u64, row_bytes: u64) -> Self {
-        let vertex = vertex_index(header).map(|i| &header.elements[i]);
-        let mut properties = Vec::new();
-        for property in vertex.iter().flat_map(|v| &v.properties) {
-            if let Kind::Scalar(ty) = property.kind {
-                properties.push((property.name.clone(), ty));
-            }
-        }
-        let others = header.elements.iter().filter(|e| Some(*e) != vertex);
+    pub(super) fn new(header: &Header, layout: &Layout, file_bytes: u64) -> Self {
+        let vertex = &header.elements[layout.vertex];
+        let scalar = |p: &Property| Some((p.name.clone(), p.kind.scalar()?));
+        let properties: Vec<_> = vertex.properties.iter().filter_map(scalar).collect();
+        let others = header.elements.iter().filter(|e| e.name != vertex.name);
         Self {
             dialect: dialect(&header.comments, &properties),
             format: header.format,
             file_bytes,
             header_bytes: header.bytes as u64,
-            row_bytes,
-            vertices: vertex.map_or(0, |v| v.count),
+            row_bytes: layout.row_bytes as u64,
+            vertices: vertex.count,
             dropped: 0,
             other_elements: others.map(|e| e.name.clone()).collect(),
             properties,

@@ -80,10 +80,7 @@ pub(crate) fn take_first<T>(mut list: Vec<T>, wanted: usize, compare: impl Fn(&T
 pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training: &Training, vectors: &[f32]) {
     let dim = training.dim;
     let count = atoms.len() / dim;
-    let mut users = vec![0; count];
-    for &atom in &training.atoms {
-        users[usize::from(atom)] += 1;
-    }
+    let users = training.usage(count);
     let useless: Vec<usize> = (0..count)
         .filter(|&j| {
             let rank = |k: usize| (users[k], Reverse(k));
@@ -119,12 +116,8 @@ pub(super) fn canonical(dictionary: &Dictionary, usage: &[usize]) -> Vec<f32> {
     let mut out = Vec::with_capacity(dictionary.as_slice().len());
     for j in order {
         let atom = dictionary.atom(j);
-        let mut largest = 0.0_f32;
-        for &x in atom {
-            if x.abs() > largest.abs() {
-                largest = x;
-            }
-        }
+        let larger = |largest: f32, &x: &f32| if x.abs() > largest.abs() { x } else { largest };
+        let largest = atom.iter().fold(0.0, larger);
         let sign = if largest < 0.0 { -1.0 } else { 1.0 };
         out.extend(atom.iter().map(|x| sign * x));
     }

@@ -247,8 +247,8 @@ impl Learner<'_> {
     /// The best dictionary, in an order and with signs that do not depend on the way it was found.
     fn canonical(&self) -> Result<Dictionary> {
         let best = &self.best.1;
-        let coder = self.coder(best);
-        let usage = training::usage(&coder, self.sample.validation(), best);
+        let training = Training::code(&self.coder(best), self.sample.validation(), best.dim());
+        let usage = training.usage(best.len());
         Dictionary::new(best.degree(), atom_replacement::canonical(best, &usage))
     }
 }

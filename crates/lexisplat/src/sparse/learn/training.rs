@@ -1,6 +1,5 @@
 //! The coded sample: which vectors use which atom, and the residual of each vector.
 
-use crate::sparse::dictionary::Dictionary;
 use crate::sparse::pursuit::{Coder, Encoded};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
@@ -61,6 +60,13 @@ impl Training {
         self.starts.len() - 1
     }
 
+    /// Number of uses of each of `atoms` atoms.
+    pub(super) fn usage(&self, atoms: usize) -> Vec<usize> {
+        let mut usage = vec![0; atoms];
+        self.atoms.iter().for_each(|&atom| usage[usize::from(atom)] += 1);
+        usage
+    }
+
     /// The uses of each of `atoms` atoms, by ascending vector.
     pub(super) fn uses(&self, atoms: usize) -> Vec<Vec<Use>> {
         let mut uses = vec![Vec::new(); atoms];
@@ -100,14 +106,4 @@ pub(super) fn cost(coder: &Coder, vectors: &[f32], dim: usize) -> Cost {
         nonzeros: parts.iter().map(|p| p.0).sum::<usize>() as f64 * scale,
         squared_error: parts.iter().map(|p| p.1).sum::<f64>() * scale,
     }
-}
-
-/// Counts for each atom how many of `vectors` use it.
-pub(super) fn usage(coder: &Coder, vectors: &[f32], dictionary: &Dictionary) -> Vec<usize> {
-    let training = Training::code(coder, vectors, dictionary.dim());
-    let mut usage = vec![0; dictionary.len()];
-    for &atom in &training.atoms {
-        usage[usize::from(atom)] += 1;
-    }
-    usage
 }

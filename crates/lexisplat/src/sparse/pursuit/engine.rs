@@ -54,12 +54,6 @@ impl StopRule {
         self.tolerance
     }
 
-    /// The cap on nonzeros, if any.
-    #[must_use]
-    pub fn max_nonzeros(&self) -> Option<u8> {
-        self.max_nonzeros
-    }
-
     /// The rule without the cap; unchanged if it has no tolerance.
     #[must_use]
     pub fn without_cap(self) -> Self {
@@ -115,9 +109,9 @@ impl<F: FnMut(Visit<'_>)> pulp::NullaryFnOnce for Job<'_, F> {
     #[inline(always)]
     fn call(self) {
         let Self { coder, signals, scratch, code, sink } = self;
-        for signal in signals.chunks_exact(coder.plan.dim()) {
+        for signal in signals.chunks_exact(coder.plan.dim) {
             let outcome = coder.encode_one(scratch, signal, code);
-            sink(Visit { signal, code, outcome, reconstruction: scratch.reconstruction() });
+            sink(Visit { signal, code, outcome, reconstruction: &scratch.reconstruction });
         }
     }
 }
@@ -145,7 +139,7 @@ impl Coder {
     /// If the dictionary is empty (degree 0).
     pub fn encode(&self, signals: &[f32], mut sink: impl FnMut(Visit<'_>)) {
         let mut scratch = self.plan.scratch();
-        let mut code = Vec::with_capacity(self.plan.dim());
+        let mut code = Vec::with_capacity(self.plan.dim);
         // The loop is compiled once for each vector width; the arithmetic is the same in each.
         Simd::current().run(Job {
             coder: self,
@@ -168,7 +162,7 @@ impl Coder {
         if energy.is_nan() || energy > MAX_ENERGY {
             return Encoded::Escape;
         }
-        let cap = self.stop.max_nonzeros.map_or(self.plan.dim(), usize::from);
+        let cap = self.stop.max_nonzeros.map_or(self.plan.dim, usize::from);
         let target = (promise * promise).max(energy * NOISE_FLOOR);
         self.plan.start(s, signal, energy);
         loop {
@@ -176,8 +170,8 @@ impl Coder {
             // type raised the error above the tolerance.
             let mut exhausted = false;
             loop {
-                exhausted |= s.len() >= cap || !self.plan.step(s, self.pursuit);
-                if exhausted || s.energy() <= target {
+                exhausted |= s.len >= cap || !self.plan.step(s, self.pursuit);
+                if exhausted || s.energy <= target {
                     break;
                 }
             }

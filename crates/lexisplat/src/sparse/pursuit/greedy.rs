@@ -8,6 +8,8 @@ use crate::sparse::model::Pursuit;
 /// An atom whose squared distance to the chosen span is below this counts as part of the span, because the f32
 /// recurrences hold only noise about its direction.
 const MIN_SPAN_DISTANCE: f32 = 1e-5;
+/// A lane of ones.
+const ONES: Lane = Lane([1.0; LANES]);
 
 /// A dictionary prepared for pursuit: its transpose, its Gram matrix, and padded atoms.
 #[derive(Debug)]
@@ -16,7 +18,7 @@ pub(super) struct Plan {
     blocks: usize,
     /// Lanes of one atom.
     atom_blocks: usize,
-    dim: usize,
+    pub(super) dim: usize,
     /// `dim` rows of `blocks` lanes: entry (d, j) is coefficient d of atom j.
     transposed: Vec<Lane>,
     /// `atoms` rows of `blocks` lanes: inner products of atoms, 0 in the padding.
@@ -40,12 +42,14 @@ pub(super) struct Scratch {
     diagonal: [f32; MAX_REST],
     /// Coordinates of the signal in the orthonormal basis.
     amplitudes: [f32; MAX_REST],
-    chosen: [u16; MAX_REST],
-    len: usize,
+    /// The atoms chosen so far, in order, and their number.
+    pub(super) chosen: [u16; MAX_REST],
+    pub(super) len: usize,
     /// Squared norm of the residual, by the recurrence.
-    energy: f64,
+    pub(super) energy: f64,
     work: [f32; MAX_REST],
-    reconstruction: [f32; MAX_REST.next_multiple_of(LANES)],
+    /// The vector that [`Plan::error`] reconstructed last, padded with zeros.
+    pub(super) reconstruction: [f32; MAX_REST.next_multiple_of(LANES)],
 }
 
 impl Plan {
@@ -93,7 +97,7 @@ impl Plan {
     pub(super) fn start(&self, s: &mut Scratch, signal: &[f32], energy: f64) {
         s.correlations.fill(ZERO);
         accumulate(&mut s.correlations, signal, &self.transposed, self.blocks, |sum, x, t| sum + x * t);
-        s.distances.fill(Lane([1.0; LANES]));
+        s.distances.fill(ONES);
         s.len = 0;
         s.energy = energy;
     }
@@ -106,8 +110,9 @@ impl Plan {
             return false;
         }
         let Some(best) = (match pursuit {
-            Pursuit::Ols => best_ratio(&s.correlations, &s.distances),
-            Pursuit::Omp => best_correlation(&s.correlations),
+            Pursuit::Ols => best_ratio(&s.correlations, s.distances.iter()),
+            // The largest correlation alone. Atoms in the span have 0.
+            Pursuit::Omp => best_ratio(&s.correlations, std::iter::repeat(&ONES)),
         }) else {
             return false;
         };
@@ -200,36 +205,11 @@ impl Plan {
             out.copy_from_slice(&sum.0);
         }
     }
-
-    pub(super) fn dim(&self) -> usize {
-        self.dim
-    }
-}
-
-impl Scratch {
-    pub(super) fn energy(&self) -> f64 {
-        self.energy
-    }
-
-    pub(super) fn len(&self) -> usize {
-        self.len
-    }
-
-    /// The atoms chosen so far, in order.
-    #[cfg(test)]
-    pub(super) fn chosen(&self) -> &[u16] {
-        &self.chosen[..self.len]
-    }
-
-    /// The vector that [`Plan::error`] reconstructed last, padded with zeros.
-    pub(super) fn reconstruction(&self) -> &[f32] {
-        &self.reconstruction
-    }
 }
 
 /// Returns the sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
 #[inline(always)]
-pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
+fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     const PARTS: usize = 8;
     let mut sums = [0.0_f64; PARTS];
     let b = &b[..a.len()];
@@ -247,11 +227,11 @@ pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     ((sums[0] + sums[4]) + (sums[2] + sums[6])) + ((sums[1] + sums[5]) + (sums[3] + sums[7]))
 }
 
-/// Returns the atom with the largest `correlation^2 / distance`, which lowers the residual most.
+/// Returns the atom with the largest `correlation^2 / distance`, which lowers the residual most, if that is above 0.
 ///
 /// Lanes compare by cross-multiplication, which is cheaper than a division for every entry.
 #[inline(always)]
-fn best_ratio(correlations: &[Lane], distances: &[Lane]) -> Option<usize> {
+fn best_ratio<'a>(correlations: &[Lane], distances: impl Iterator<Item = &'a Lane>) -> Option<usize> {
     let mut gains = [0.0_f32; LANES];
     let mut spans = [1.0_f32; LANES];
     let mut blocks = [0_u32; LANES];
@@ -267,27 +247,5 @@ fn best_ratio(correlations: &[Lane], distances: &[Lane]) -> Option<usize> {
     for i in 0..LANES {
         gains[i] /= spans[i];
     }
-    positive(first_maximum(&gains, &blocks))
-}
-
-/// Returns the atom with the largest `correlation^2`. Atoms in the span have 0.
-#[inline(always)]
-fn best_correlation(correlations: &[Lane]) -> Option<usize> {
-    let mut gains = [0.0_f32; LANES];
-    let mut blocks = [0_u32; LANES];
-    for (number, r) in (0_u32..).zip(correlations) {
-        for i in 0..LANES {
-            let gain = r.0[i] * r.0[i];
-            let better = gain > gains[i];
-            gains[i] = if better { gain } else { gains[i] };
-            blocks[i] = if better { number } else { blocks[i] };
-        }
-    }
-    positive(first_maximum(&gains, &blocks))
-}
-
-/// The atom of a gain, if the gain is above 0.
-#[inline(always)]
-fn positive(best: Option<(f32, usize)>) -> Option<usize> {
-    best.filter(|&(gain, _)| gain > 0.0).map(|(_, atom)| atom)
+    first_maximum(&gains, &blocks).filter(|&(gain, _)| gain > 0.0).map(|(_, atom)| atom)
 }

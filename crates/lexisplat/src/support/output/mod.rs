@@ -118,40 +118,41 @@ pub(crate) fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// Writes a file with `write`. The file appears under its name only when it is whole and on the disk.
+/// Writes a file with `write` and returns what it returns. The file appears under its name only when it is whole and on the disk.
 ///
 /// An existing file is replaced in one step, or refused: see [`Existing`]. An error leaves nothing behind. A pipe
 /// or a device such as `/dev/null` is written to directly.
 ///
 /// # Errors
 /// [`Error::Io`] that names the output, or any error of `write`.
-pub fn write_whole<'a>(
+pub fn write_whole<'a, T>(
     output: impl Into<Output<'a>>,
-    write: impl FnOnce(&mut BufWriter<File>) -> Result<()>,
-) -> Result<()> {
+    write: impl FnOnce(&mut BufWriter<File>) -> Result<T>,
+) -> Result<T> {
     let output = output.into();
     let group = output.group.cloned().unwrap_or_default();
     let io = |source| Error::io(output.path, source);
     let fill = |file| {
         let mut writer = BufWriter::with_capacity(BUFFER, file);
-        write(&mut writer)?;
-        writer.into_inner().map_err(|e| io(e.into_error()))
+        let done = write(&mut writer)?;
+        Ok((writer.into_inner().map_err(|e| io(e.into_error()))?, done))
     };
     let whole = || match place(&output)? {
         Place::Special => {
             let file = OpenOptions::new().write(true).open(output.path).map_err(io)?;
-            fill(file)?;
-            group.count().map_err(io)
+            let (_, done) = fill(file)?;
+            group.count().map_err(io)?;
+            Ok(done)
         }
         Place::File(target) => {
             let folder = folder_of(&target);
             let (file, temporary) =
                 Temporary::create(folder, &group).map_err(|e| io(in_folder(folder, e)))?;
-            let file = fill(file)?;
+            let (file, done) = fill(file)?;
             file.sync_all().map_err(io)?;
             temporary.name(file, &target, output.existing).map_err(io)?;
             sync_folder(folder);
-            Ok(())
+            Ok(done)
         }
     };
     whole().map_err(|e| output.explained(e))

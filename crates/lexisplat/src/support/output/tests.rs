@@ -46,7 +46,7 @@ fn an_error_of_the_writer_leaves_what_was_there() {
     let path = folder.path().join("a");
     put((&path).into(), "old").unwrap();
     for existing in [Existing::Replace, Existing::Refuse] {
-        let done = write_whole(Output::new(&path, existing), |writer| {
+        let done: Result<()> = write_whole(Output::new(&path, existing), |writer| {
             writer.write_all(&[0; 3 << 20]).unwrap();
             Err(Error::io("x", io::ErrorKind::Other.into()))
         });
