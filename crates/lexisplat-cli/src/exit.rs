@@ -156,13 +156,10 @@ fn render(error: &lexisplat_render::Error) -> Blame {
     use lexisplat_render::Error;
     match error {
         Error::Codec(e) => codec(e),
-        Error::Io { source, .. } => io(source),
-        Error::Format { .. } => (Kind::Format, None),
         Error::Parameter { name: "device", .. } => {
             (Kind::Parameter, Some("`lexisplat devices` lists the devices".into()))
         }
         Error::Parameter { .. } => (Kind::Parameter, None),
-        Error::Limit { .. } => (Kind::Limit, None),
         Error::GpuLimit { .. } => {
             (Kind::Limit, Some("--device cpu draws without the limits of a GPU".into()))
         }

@@ -54,11 +54,11 @@ pub enum Error {
         /// Bytes that are allowed.
         allowed: u64,
     },
-    /// A scene could not be read or written, or the caller's [`Progress`](lexisplat::Progress) cancelled the
-    /// work.
+    /// A scene could not be read or written, a camera file could not be read, or the caller's
+    /// [`Progress`](lexisplat::Progress) cancelled the work.
     #[error(transparent)]
     Codec(#[from] lexisplat::Error),
-    /// A camera file could not be read, or a picture not be made.
+    /// A camera is not valid, or a picture could not be made.
     #[error(transparent)]
     Render(lexisplat_render::Error),
 }

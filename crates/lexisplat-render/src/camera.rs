@@ -42,6 +42,21 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// Returns a camera whose numbers are rounded to single precision, without a split. `size` is width and height,
+    /// `focal` the focal lengths along x and y. What overflows becomes infinite, which [`Self::validate`] refuses.
+    #[must_use]
+    pub fn rounded(
+        name: String,
+        [width, height]: [u32; 2],
+        focal: [f64; 2],
+        position: [f64; 3],
+        rotation: [[f64; 3]; 3],
+    ) -> Self {
+        let [fx, fy] = focal.map(single);
+        let (position, rotation) = (position.map(single), rotation.map(|row| row.map(single)));
+        Self { name, width, height, fx, fy, position, rotation, split: None }
+    }
+
     /// Returns this camera with pictures at most `width` pixels wide and the same field of view. A wider picture is
     /// scaled down, and its height rounded to whole pixels.
     #[must_use]
@@ -53,17 +68,18 @@ impl Camera {
         let (from_width, from_height) = (u64::from(self.width), u64::from(self.height));
         let height = (from_height * u64::from(width) + from_width / 2) / from_width;
         // The new height is below the old one, which fits.
-        let height = u32::try_from(height).unwrap_or(self.height).max(1);
-        let ratio = |new: u32, old: u32| f64::from(new) / f64::from(old);
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-        let scale = |focal: f32, ratio: f64| (f64::from(focal) * ratio) as f32;
-        Self {
-            width,
-            height,
-            fx: scale(self.fx, ratio(width, self.width)),
-            fy: scale(self.fy, ratio(height, self.height)),
-            ..self.clone()
-        }
+        self.resized(width, u32::try_from(height).unwrap_or(self.height).max(1))
+    }
+
+    /// Returns this camera with pictures of exactly this size and the same field of view. The aspect must be nearly
+    /// the same.
+    #[must_use]
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        let scale = |focal: f32, new: u32, old: u32| {
+            single(f64::from(focal) * (f64::from(new) / f64::from(old.max(1))))
+        };
+        let (fx, fy) = (scale(self.fx, width, self.width), scale(self.fy, height, self.height));
+        Self { width, height, fx, fy, ..self.clone() }
     }
 
     /// Returns `point`, in world units, in this camera's view space: x right, y down, z forward.
@@ -108,6 +124,12 @@ impl Camera {
         }
         Ok(())
     }
+}
+
+/// Rounds to f32; what overflows becomes infinite.
+#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
+pub(crate) fn single(value: f64) -> f32 {
+    value as f32
 }
 
 #[cfg(test)]

@@ -2,14 +2,11 @@
 //! `rotation`, `fx` and `fy` (`gaussian-splatting/utils/camera_utils.py`, `camera_to_JSON`). A field
 //! `split` of `"train"` or `"test"` is this project's addition; other fields are ignored.
 
-use std::fmt;
-
-use serde::de::{DeserializeSeed, Deserializer, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
+use serde::de::MapAccess;
 
 use crate::camera::{Camera, Split};
 use crate::error::{Error, Result};
-use crate::orbit::single;
-use crate::view_files::MAX_CAMERAS_BYTES;
+use crate::json::{self, Fields, List, Object, required, set};
 
 /// Most cameras in a file.
 pub const MAX_CAMERAS: usize = 100_000;
@@ -19,115 +16,72 @@ pub(crate) const MAX_NAME: usize = 1024;
 /// Returns the cameras in `bytes`, in order. `file` names them in errors.
 ///
 /// # Errors
-/// [`Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
-/// a list, a value is out of range, or it is over [`MAX_CAMERAS_BYTES`] or [`MAX_CAMERAS`].
+/// [`lexisplat::Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
+/// a list, a value is out of range, or it is over [`crate::MAX_CAMERAS_BYTES`] or [`MAX_CAMERAS`].
 pub fn read_cameras_bytes(file: &str, bytes: &[u8]) -> Result<Vec<Camera>> {
-    if u64::try_from(bytes.len()).is_ok_and(|len| len > MAX_CAMERAS_BYTES) {
-        return Err(Error::format(file, format!("over the limit of {MAX_CAMERAS_BYTES} bytes")));
-    }
-    let mut json = serde_json::Deserializer::from_slice(bytes);
-    let cameras = json.deserialize_seq(CameraList).map_err(|e| Error::format(file, e.to_string()))?;
-    json.end().map_err(|e| Error::format(file, e.to_string()))?;
-    Ok(cameras)
+    let list = List {
+        expected: "a list of cameras as INRIA's cameras.json".to_owned(),
+        most: MAX_CAMERAS,
+        what: "cameras",
+        element: |index| Object::<CameraFields>::element("camera", index),
+    };
+    json::parse(bytes, list).map_err(|problem| Error::format(file, problem))
 }
 
-struct CameraList;
-
-impl<'de> Visitor<'de> for CameraList {
-    type Value = Vec<Camera>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a list of cameras as INRIA's cameras.json")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Self::Value, A::Error> {
-        let mut cameras = Vec::new();
-        while let Some(camera) = list.next_element_seed(CameraAt(cameras.len()))? {
-            if cameras.len() == MAX_CAMERAS {
-                return Err(A::Error::custom(format!("over the limit of {MAX_CAMERAS} cameras")));
-            }
-            cameras.push(camera);
-        }
-        Ok(cameras)
-    }
+#[derive(Default)]
+struct CameraFields {
+    name: Option<String>,
+    width: Option<f64>,
+    height: Option<f64>,
+    fx: Option<f64>,
+    fy: Option<f64>,
+    position: Option<[f64; 3]>,
+    rotation: Option<[[f64; 3]; 3]>,
+    split: Option<String>,
 }
 
-/// The camera at a position of the list.
-struct CameraAt(usize);
-
-impl<'de> DeserializeSeed<'de> for CameraAt {
+impl Fields for CameraFields {
     type Value = Camera;
 
-    fn deserialize<D: Deserializer<'de>>(self, json: D) -> Result<Camera, D::Error> {
-        json.deserialize_map(self)
-    }
-}
-
-impl<'de> Visitor<'de> for CameraAt {
-    type Value = Camera;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "camera {} as an object", self.0)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Camera, A::Error> {
-        let index = self.0;
-        let mut name: Option<String> = None;
-        let (mut width, mut height): (Option<f64>, Option<f64>) = (None, None);
-        let (mut fx, mut fy): (Option<f64>, Option<f64>) = (None, None);
-        let mut position: Option<[f64; 3]> = None;
-        let mut rotation: Option<[[f64; 3]; 3]> = None;
-        let mut split: Option<Option<String>> = None;
-        while let Some(key) = map.next_key::<String>()? {
-            let read = match key.as_str() {
-                "img_name" => map.next_value().map(|v| name = Some(v)),
-                "width" => map.next_value().map(|v| width = Some(v)),
-                "height" => map.next_value().map(|v| height = Some(v)),
-                "fx" => map.next_value().map(|v| fx = Some(v)),
-                "fy" => map.next_value().map(|v| fy = Some(v)),
-                "position" => map.next_value().map(|v| position = Some(v)),
-                "rotation" => map.next_value().map(|v| rotation = Some(v)),
-                "split" => map.next_value().map(|v| split = Some(v)),
-                _ => map.next_value::<IgnoredAny>().map(|_| ()),
-            };
-            read.map_err(|e| A::Error::custom(format!("camera {index}: field '{key}': {e}")))?;
+    fn read<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
+        match key {
+            "img_name" => set(self.name.get_or_insert_default(), map),
+            "width" => set(self.width.get_or_insert_default(), map),
+            "height" => set(self.height.get_or_insert_default(), map),
+            "fx" => set(self.fx.get_or_insert_default(), map),
+            "fy" => set(self.fy.get_or_insert_default(), map),
+            "position" => set(self.position.get_or_insert_default(), map),
+            "rotation" => set(self.rotation.get_or_insert_default(), map),
+            "split" => set(&mut self.split, map),
+            _ => Ok(false),
         }
-        let missing = |field: &str| A::Error::custom(format!("camera {index}: field '{field}' is missing"));
-        let name = name.ok_or_else(|| missing("img_name"))?;
+    }
+
+    fn finish(self, about: &str) -> Result<Camera, String> {
+        let name = required(self.name, "img_name", about)?;
         if name.len() > MAX_NAME {
-            let text = format!("camera {index}: field 'img_name' is over the limit of {MAX_NAME} bytes");
-            return Err(A::Error::custom(text));
+            return Err(format!("{about}field 'img_name' is over the limit of {MAX_NAME} bytes"));
         }
         let side = |field: &str, value: Option<f64>| {
-            let value = value.ok_or_else(|| missing(field))?;
-            whole(value).ok_or_else(|| {
-                let text =
-                    format!("camera {index}: field '{field}' is {value}, not a whole number of pixels");
-                A::Error::custom(text)
-            })
+            let value = required(value, field, about)?;
+            whole(value)
+                .ok_or_else(|| format!("{about}field '{field}' is {value}, not a whole number of pixels"))
         };
-        let split = match split.flatten().as_deref() {
+        let split = match self.split.as_deref() {
             None => None,
             Some("train") => Some(Split::Train),
             Some("test") => Some(Split::Test),
             Some(other) => {
-                let text = format!("camera {index}: field 'split' is '{other}', expected 'train' or 'test'");
-                return Err(A::Error::custom(text));
+                return Err(format!("{about}field 'split' is '{other}', expected 'train' or 'test'"));
             }
         };
-        let camera = Camera {
-            width: side("width", width)?,
-            height: side("height", height)?,
-            fx: single(fx.ok_or_else(|| missing("fx"))?),
-            fy: single(fy.ok_or_else(|| missing("fy"))?),
-            position: position.ok_or_else(|| missing("position"))?.map(single),
-            rotation: rotation.ok_or_else(|| missing("rotation"))?.map(|row| row.map(single)),
-            name,
-            split,
-        };
-        camera
-            .validate()
-            .map_err(|e| A::Error::custom(format!("camera {index} ('{}'): {e}", camera.name)))?;
+        let size = [side("width", self.width)?, side("height", self.height)?];
+        let focal = [required(self.fx, "fx", about)?, required(self.fy, "fy", about)?];
+        let position = required(self.position, "position", about)?;
+        let rotation = required(self.rotation, "rotation", about)?;
+        let camera = Camera { split, ..Camera::rounded(name, size, focal, position, rotation) };
+        let index = about.trim_end_matches(": ");
+        camera.validate().map_err(|e| format!("{index} ('{}'): {e}", camera.name))?;
         Ok(camera)
     }
 }
@@ -194,10 +148,10 @@ mod tests {
     #[test]
     fn other_texts_are_refused() {
         for text in ["", "{}", "[1]", "[", "[] x", "[{]"] {
-            assert!(matches!(parse(text), Err(Error::Format { .. })), "{text}");
+            assert!(matches!(parse(text), Err(Error::Codec(lexisplat::Error::Format { .. }))), "{text}");
         }
         let missing = crate::read_cameras("no/such/cameras.json").unwrap_err();
-        assert!(matches!(missing, Error::Io { .. }));
+        assert!(matches!(missing, Error::Codec(lexisplat::Error::Io { .. })));
         assert!(missing.to_string().starts_with("no/such/cameras.json"));
     }
 

@@ -9,27 +9,11 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The operating system refused a read. Retry or fix permissions.
-    #[error("{file}: {source}")]
-    Io {
-        /// The file, as the caller named it.
-        file: String,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The codec's error: the arrays of a scene do not fit one another, or the caller's
-    /// [`Progress`](lexisplat::Progress) cancelled the work.
+    /// The codec's error: a file cannot be read, is not what it claims to be or has too much of something, the
+    /// arrays of a scene do not fit one another, or the caller's [`Progress`](lexisplat::Progress) cancelled the
+    /// work.
     #[error(transparent)]
     Codec(#[from] lexisplat::Error),
-    /// The bytes are not what they claim to be. The file is at fault; the text names the camera, the
-    /// field and the value.
-    #[error("{file}: {problem}")]
-    Format {
-        /// The file, as the caller named it.
-        file: String,
-        /// What is wrong with it.
-        problem: String,
-    },
     /// An argument is out of range. The caller is at fault.
     #[error("{name} = {value}: expected {expected}")]
     Parameter {
@@ -39,16 +23,6 @@ pub enum Error {
         value: String,
         /// What would have been accepted.
         expected: String,
-    },
-    /// A file has more of something than a limit allows.
-    #[error("{what}: {found} is over the limit of {limit}")]
-    Limit {
-        /// What there is too much of.
-        what: String,
-        /// How much there is.
-        found: u64,
-        /// The most allowed.
-        limit: u64,
     },
     /// Something is larger than this GPU can hold. The CPU renderer has no such limit.
     #[error("{what}: {found} is over the limit of {limit}")]
@@ -69,14 +43,25 @@ pub enum Error {
 }
 
 impl Error {
-    /// An [`Error::Io`] about `file`.
+    /// A [`lexisplat::Error::Io`] about `file`.
     pub(crate) fn io(file: impl AsRef<Path>, source: std::io::Error) -> Self {
-        Self::Io { file: file.as_ref().display().to_string(), source }
+        lexisplat::Error::io(file, source).into()
     }
 
-    /// An [`Error::Format`] about `file`.
+    /// A [`lexisplat::Error::Format`] about `file`.
     pub(crate) fn format(file: impl Into<String>, problem: impl Into<String>) -> Self {
-        Self::Format { file: file.into(), problem: problem.into() }
+        lexisplat::Error::malformed(file, problem).into()
+    }
+
+    /// A [`lexisplat::Error::Limit`] that is fixed.
+    pub(crate) fn limit(what: String, found: u64, limit: u64) -> Self {
+        lexisplat::Error::Limit { what, found, limit, name: None }.into()
+    }
+
+    /// An [`Error::GpuLimit`].
+    #[cfg(feature = "gpu")]
+    pub(crate) fn gpu_limit(what: impl Into<String>, found: impl Into<u64>, limit: u64) -> Self {
+        Self::GpuLimit { what: what.into(), found: found.into(), limit }
     }
 
     /// An [`Error::Parameter`].

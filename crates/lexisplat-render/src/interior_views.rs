@@ -176,7 +176,7 @@ fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::orbit::single;
+    use crate::camera::single;
 
     fn put(g: &mut Geometry, at: [f64; 3], scale: f64, opacity: f32) {
         g.positions.push(at.map(single));

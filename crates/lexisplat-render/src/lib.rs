@@ -49,6 +49,7 @@ mod error;
 pub mod gpu;
 mod image;
 mod interior_views;
+mod json;
 mod object;
 mod orbit;
 mod parallel;
@@ -75,7 +76,7 @@ pub use object::{object, subject};
 pub use orbit::{bulk, orbit};
 pub use radiance::Radiance;
 #[cfg(not(target_family = "wasm"))]
-pub use read_views::{read_cameras, read_colmap, read_nerf, read_transforms, read_views};
+pub use read_views::{read_cameras, read_colmap, read_views};
 pub use read_views::{read_view_files, read_views_bytes};
 pub use renderer::{Device, Prepared, Renderer};
 pub use scene::Scene;

@@ -44,7 +44,7 @@ mod tests {
             let around = (1.0 - y * y).sqrt();
             let (radius, scale) = if i % 2 == 0 { (1.0, -4.0) } else { (far, 0.0) };
             let p = glam::DVec3::new(around * (t * 2.4).cos(), y, around * (t * 2.4).sin()) * radius;
-            g.positions.push((p + glam::DVec3::new(5.0, -2.0, 7.0)).to_array().map(crate::orbit::single));
+            g.positions.push((p + glam::DVec3::new(5.0, -2.0, 7.0)).to_array().map(crate::camera::single));
             g.scales.push([scale; 3]);
             g.opacities.push(2.0);
             g.rotations.push([1.0, 0.0, 0.0, 0.0]);

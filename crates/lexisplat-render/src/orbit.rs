@@ -64,16 +64,8 @@ pub(crate) fn axes(forward: DVec3, up: DVec3) -> [DVec3; 3] {
 /// Returns the generated camera with this width and height and this focal length, in pixels. `axes` are its
 /// right, down and forward.
 pub(crate) fn pinhole(name: String, size: [u32; 2], focal: f64, position: DVec3, axes: [DVec3; 3]) -> Camera {
-    Camera {
-        name,
-        width: size[0],
-        height: size[1],
-        fx: single(focal),
-        fy: single(focal),
-        position: position.to_array().map(single),
-        rotation: std::array::from_fn(|row| axes.map(|axis| single(axis[row]))),
-        split: None,
-    }
+    let rotation = std::array::from_fn(|row| axes.map(|axis| axis[row]));
+    Camera::rounded(name, size, [focal; 2], position.to_array(), rotation)
 }
 
 /// Returns the centre and radius, in world units, of where most of the opacity is. The radius is above 0.
@@ -113,12 +105,6 @@ fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [
         });
         found.or(sorted.last()).map_or(0.0, |(value, _)| *value)
     })
-}
-
-/// Rounds to f32; what overflows becomes infinite, which [`Camera::validate`] refuses.
-#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
-pub(crate) fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

@@ -22,8 +22,8 @@ const JSON_FILES: [&str; 2] = ["transforms.json", "cameras.json"];
 /// `colmap/sparse/0`; `transforms_train.json` with `transforms_test.json`; `transforms.json`; `cameras.json`.
 ///
 /// # Errors
-/// [`Error::Format`] if there is none of these, or a file is damaged; [`Error::Limit`] if it has too much of
-/// something; [`Error::Io`] if it cannot be read.
+/// [`lexisplat::Error::Format`] if there is none of these, or a file is damaged; [`lexisplat::Error::Limit`] if it has too much of
+/// something; [`lexisplat::Error::Io`] if it cannot be read.
 pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) -> Result<ViewSet> {
     if let Some(model) = colmap::find(files) {
         return colmap::read(files, &model);
@@ -45,7 +45,7 @@ pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) ->
 /// [`read_transforms_bytes`]. `file` stands for them in errors.
 ///
 /// # Errors
-/// [`Error::Format`] if they are neither; otherwise as those two.
+/// [`lexisplat::Error::Format`] if they are neither; otherwise as those two.
 pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
     match bytes.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'[') => Ok(ViewSet { cameras: read_cameras_bytes(file, bytes)?, warnings: Vec::new() }),
@@ -83,38 +83,19 @@ pub fn read_views(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet
 /// Reads a `cameras.json`. See [`read_cameras_bytes`].
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; otherwise as [`read_cameras_bytes`].
+/// [`lexisplat::Error::Io`] if the file cannot be read; otherwise as [`read_cameras_bytes`].
 #[cfg(not(target_family = "wasm"))]
 pub fn read_cameras(path: impl AsRef<Path>) -> Result<Vec<Camera>> {
     let (file, bytes) = crate::view_files::open(path.as_ref())?.read_limited()?;
     read_cameras_bytes(&file, &bytes)
 }
 
-/// Reads a `transforms.json`. See [`read_transforms_bytes`].
-///
-/// # Errors
-/// [`Error::Io`] if the file cannot be read; otherwise as [`read_transforms_bytes`].
-#[cfg(not(target_family = "wasm"))]
-pub fn read_transforms(path: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
-    let (file, bytes) = crate::view_files::open(path.as_ref())?.read_limited()?;
-    read_transforms_bytes(&file, &bytes, size_of)
-}
-
-/// Reads a `NeRF` synthetic folder. Each split has a `transforms_SPLIT.json` in it.
-///
-/// # Errors
-/// As [`read_transforms`].
-#[cfg(not(target_family = "wasm"))]
-pub fn read_nerf(folder: impl AsRef<Path>, size_of: SizeOf<'_>) -> Result<ViewSet> {
-    transforms::read_nerf_files(folder.as_ref(), size_of)
-}
-
 /// Reads the COLMAP model of `folder`, or of its `sparse/0`, `sparse` or `colmap/sparse/0`: the binary files if
 /// both are there, otherwise the text files. See [`crate::read_colmap_binary`].
 ///
 /// # Errors
-/// [`Error::Io`] if a file cannot be read; [`Error::Format`] if there is no model, or as
-/// [`crate::read_colmap_binary`]; [`Error::Limit`] if a file is over [`crate::MAX_COLMAP_BYTES`].
+/// [`lexisplat::Error::Io`] if a file cannot be read; [`lexisplat::Error::Format`] if there is no model, or as
+/// [`crate::read_colmap_binary`]; [`lexisplat::Error::Limit`] if a file is over [`crate::MAX_COLMAP_BYTES`].
 #[cfg(not(target_family = "wasm"))]
 pub fn read_colmap(folder: impl AsRef<Path>) -> Result<ViewSet> {
     let folder = folder.as_ref();
@@ -138,13 +119,13 @@ mod tests {
             "position": [0, 0, 0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]"#;
         let mut files = BTreeMap::new();
         let read = |files: &BTreeMap<String, Vec<u8>>| read_view_files(files, &mut |_| None);
-        assert!(matches!(read(&files), Err(Error::Format { .. })));
+        assert!(matches!(read(&files), Err(Error::Codec(lexisplat::Error::Format { .. }))));
         files.insert("cameras.json".to_owned(), list.as_bytes().to_vec());
         assert_eq!(read(&files).unwrap().cameras[0].name, "a");
         let model =
             [("cameras.txt", "1 PINHOLE 64 48 60 60 32 24\n"), ("images.txt", "1 1 0 0 0 0 0 2 1 b\n\n")];
         files.extend(model.map(|(name, text)| (format!("sparse/0/{name}"), text.as_bytes().to_vec())));
         assert_eq!(read(&files).unwrap().cameras[0].name, "b");
-        assert!(matches!(files.open("images.bin"), Err(Error::Io { .. })));
+        assert!(matches!(files.open("images.bin"), Err(Error::Codec(lexisplat::Error::Io { .. }))));
     }
 }

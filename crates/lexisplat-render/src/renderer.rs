@@ -8,7 +8,7 @@ use crate::camera::Camera;
 use crate::cpu::{RenderOptions, render, sensitivity};
 use crate::error::{Error, Result};
 #[cfg(feature = "gpu")]
-use crate::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use crate::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use crate::image::Image;
 use crate::scene::Scene;
 #[cfg(not(target_family = "wasm"))]
@@ -26,31 +26,6 @@ pub enum Device {
     Gpu,
     /// The GPU at this place in `gpu::adapters`.
     Index(usize),
-}
-
-#[cfg(feature = "gpu")]
-impl Device {
-    /// Opens the GPU that this means; `None` if it means the processor.
-    ///
-    /// # Errors
-    /// As [`Renderer::open_async`].
-    pub async fn open_gpu_async(self) -> Result<Option<Gpu>> {
-        match self {
-            Self::Cpu => Ok(None),
-            Self::Auto => Gpu::find_async(GpuChoice::Hardware).await,
-            Self::Gpu => Gpu::open_async(GpuChoice::Best).await.map(Some),
-            Self::Index(index) => Gpu::open_async(GpuChoice::Index(index)).await.map(Some),
-        }
-    }
-
-    /// Blocks on [`Self::open_gpu_async`].
-    ///
-    /// # Errors
-    /// As [`Renderer::open_async`].
-    #[cfg(not(target_family = "wasm"))]
-    pub fn open_gpu(self) -> Result<Option<Gpu>> {
-        pollster::block_on(self.open_gpu_async())
-    }
 }
 
 impl FromStr for Device {

@@ -58,10 +58,9 @@ impl<'a> Scene<'a> {
     /// # Errors
     /// [`Error::Codec`](crate::Error::Codec) naming the array and its length.
     pub fn validate(&self) -> Result<()> {
-        match self {
-            Self::Dense(splats) => splats.validate()?,
-            // A model checks its arrays when it is made.
-            Self::Sparse(_) => {}
+        // A model checks its arrays when it is made.
+        if let Self::Dense(splats) = self {
+            splats.validate()?;
         }
         Ok(())
     }

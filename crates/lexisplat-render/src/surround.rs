@@ -71,7 +71,7 @@ pub(crate) fn detail(geometry: &Geometry) -> (DVec3, DVec3) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::orbit::single;
+    use crate::camera::single;
 
     #[test]
     fn views_surround_the_detail_and_look_at_it() {

@@ -20,7 +20,7 @@ pub trait ViewFiles {
     /// Opens `file`.
     ///
     /// # Errors
-    /// [`Error::Io`] if there is no such file, or it cannot be read.
+    /// [`lexisplat::Error::Io`] if there is no such file, or it cannot be read.
     fn open(&self, file: &str) -> Result<ViewFile<'_>>;
 }
 

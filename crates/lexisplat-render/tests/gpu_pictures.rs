@@ -152,7 +152,7 @@ fn what_cannot_be_drawn_is_refused() {
     let bad = Camera { fx: f32::NAN, ..made::straight(8, 8, 8.0) };
     let refused = renderer.render(&scene, &bad, &RenderOptions::default()).unwrap_err();
     assert!(refused.to_string().starts_with("fx"), "{refused}");
-    let other = adapter::opened(lexisplat_render::gpu::Gpu::open(Default::default())).unwrap();
+    let other = adapter::opened(adapter::best()).unwrap();
     let elsewhere = GpuScene::new(&other, &Scene::from(&splats), ShPath::DenseF32).unwrap();
     let refused = renderer.render(&elsewhere, &made::straight(8, 8, 8.0), &RenderOptions::default());
     assert!(refused.unwrap_err().to_string().starts_with("scene"));

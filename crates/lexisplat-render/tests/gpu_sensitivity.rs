@@ -2,10 +2,10 @@
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use crate::adapter::{gpu, opened};
+use crate::adapter::{best, gpu, opened};
 use crate::made;
 use lexisplat::{Progress, Sensitivity, ShDegree, Silent, Splats};
-use lexisplat_render::gpu::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Error, Scene, sensitivity, surround};
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -123,7 +123,7 @@ fn nothing_gives_nothing() {
 #[test]
 fn buffers_are_given_back_and_other_geometry_is_refused() {
     // One of its own: the other tests' buffers would be counted too.
-    let Some(gpu) = opened(Gpu::open(GpuChoice::Best)) else { return };
+    let Some(gpu) = opened(best()) else { return };
     let splats = made::scene(4, 300, ShDegree::ONE, false);
     let cameras = [made::camera(4, 80, 60)];
     let scene = GpuScene::new(&gpu, &Scene::from(&splats), ShPath::DenseF32).unwrap();

@@ -29,7 +29,7 @@ fn put(root: &Path, file: &str, text: &str) {
 fn sources_are_told_apart_by_content() {
     let folder = tempfile::tempdir().unwrap();
     let root = folder.path();
-    assert!(matches!(read(&root.join("gone")), Err(Error::Io { .. })));
+    assert!(matches!(read(&root.join("gone")), Err(Error::Codec(lexisplat::Error::Io { .. }))));
     let nothing = read(root).unwrap_err().to_string();
     assert!(nothing.contains("no cameras here"), "{nothing}");
     // Each of these is preferred to those before it.
@@ -61,7 +61,7 @@ fn sources_are_told_apart_by_content() {
     put(root, "any", CAMERAS_JSON);
     assert_eq!(read(&root.join("any")).unwrap().cameras[0].name, "a");
     put(root, "any", "ply");
-    assert!(matches!(read(&root.join("any")), Err(Error::Format { .. })));
+    assert!(matches!(read(&root.join("any")), Err(Error::Codec(lexisplat::Error::Format { .. }))));
     let empty = read_colmap(root.join("colmap")).unwrap().cameras.len();
     assert_eq!(empty, 1);
 }

@@ -1,8 +1,8 @@
 //! The window: takes events of its threads and keys, shows its parts, and continues the script.
 
 use std::collections::VecDeque;
-use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
 use eframe::egui;
@@ -45,9 +45,6 @@ pub(crate) struct Message {
     pub(crate) is_error: bool,
 }
 
-/// Errors that graphics drivers report. They may come at any time and on any thread.
-pub(crate) type DriverErrors = Arc<Mutex<VecDeque<String>>>;
-
 /// The window.
 pub(crate) struct App {
     pub(crate) options: Options,
@@ -62,7 +59,8 @@ pub(crate) struct App {
     pub(crate) last_id: u64,
     pub(crate) notifier: Notifier,
     finished: Receiver<FinishedJob>,
-    driver: DriverErrors,
+    /// Errors that the graphics driver reports. They may come at any time and on any thread.
+    driver_errors: Receiver<String>,
     pub(crate) render_thread: RenderThread,
     pub(crate) presenter: Arc<Presenter>,
     pub(crate) frame: Option<Frame>,
@@ -87,7 +85,8 @@ pub(crate) struct App {
     scripted: bool,
     /// Whether the window closes after this frame.
     pub(crate) quit: bool,
-    outcome: Arc<Mutex<Option<Error>>>,
+    /// Takes the errors that the program ends with; the first counts.
+    failures: Sender<Error>,
 }
 
 impl App {
@@ -97,15 +96,16 @@ impl App {
         options: Options,
         given: Option<Vec<Camera>>,
         script: Script,
-        outcome: Arc<Mutex<Option<Error>>>,
+        failures: Sender<Error>,
     ) -> Result<Self> {
         let Some(graphics) = &creation.wgpu_render_state else { return Err(Error::NoAdapter) };
         let context = creation.egui_ctx.clone();
         let wake: Arc<dyn Fn() + Send + Sync> = Arc::new(move || context.request_repaint());
-        let driver = DriverErrors::default();
-        let (errors, wake_window) = (Arc::clone(&driver), Arc::clone(&wake));
+        let (errors, driver_errors) = channel();
+        let wake_window = Arc::clone(&wake);
         graphics.device.on_uncaptured_error(Arc::new(move |error: wgpu::Error| {
-            errors.lock().unwrap_or_else(PoisonError::into_inner).push_back(error.to_string());
+            // There is no receiver after the window has closed.
+            let _ = errors.send(error.to_string());
             wake_window();
         }));
         let (renderer, gpu_error) = renderer(options.device, graphics)?;
@@ -127,9 +127,9 @@ impl App {
             last_id: 0,
             notifier: Notifier { sender, wake },
             finished,
-            driver,
+            driver_errors,
             render_thread,
-            presenter: Arc::new(Presenter::new(&graphics.device, graphics.target_format)),
+            presenter: Arc::new(Presenter::new(graphics.device.clone(), graphics.target_format)),
             frame: None,
             score: None,
             drawing: false,
@@ -143,7 +143,7 @@ impl App {
             scripted: !script.is_empty(),
             script,
             quit: false,
-            outcome,
+            failures,
             options,
         };
         if let Some(error) = gpu_error {
@@ -183,8 +183,8 @@ impl App {
 
     /// Ends the program with `error`.
     fn fail(&mut self, error: Error) {
-        let mut outcome = self.outcome.lock().unwrap_or_else(PoisonError::into_inner);
-        outcome.get_or_insert(error);
+        // There is always a receiver: the function that opened the window.
+        let _ = self.failures.send(error);
         self.quit = true;
     }
 
@@ -238,26 +238,24 @@ impl App {
         let events: Vec<RenderEvent> = self.render_thread.events().collect();
         for event in events {
             match event {
-                RenderEvent::Frame(frame) => {
+                RenderEvent::Frame(Ok(frame)) => {
                     self.drawing = false;
                     self.adapt_scale(&frame);
                     self.score = frame.score.or(self.score);
                     self.frame = Some(*frame);
                 }
-                RenderEvent::Saved(file) => {
+                RenderEvent::Saved(saved) => {
                     self.saving = self.saving.saturating_sub(1);
-                    let file = file.canonicalize().unwrap_or(file);
-                    self.show_message(format!("saved {}", file.display()));
-                }
-                RenderEvent::SaveFailed(error) => {
-                    self.saving = self.saving.saturating_sub(1);
-                    self.show_error(error);
+                    match saved.map(|file| file.canonicalize().unwrap_or(file)) {
+                        Ok(file) => self.show_message(format!("saved {}", file.display())),
+                        Err(error) => self.show_error(error),
+                    }
                 }
                 RenderEvent::ModelFailed(slot, error) => {
                     self.set_model(slot, None);
                     self.show_error(error);
                 }
-                RenderEvent::FrameFailed(error) => {
+                RenderEvent::Frame(Err(error)) => {
                     self.drawing = false;
                     self.failed = self.wanted_view();
                     self.show_error(error);
@@ -267,9 +265,7 @@ impl App {
         if !self.render_thread.is_alive() && !self.quit {
             self.fail(Error::Device("the render thread has stopped".to_owned()));
         }
-        loop {
-            let error = self.driver.lock().unwrap_or_else(PoisonError::into_inner).pop_front();
-            let Some(error) = error else { break };
+        while let Ok(error) = self.driver_errors.try_recv() {
             self.show_error(Error::Device(error));
         }
     }
@@ -294,8 +290,13 @@ impl App {
         let camera = self.state.camera(self.area.0, self.area.1)?;
         // Without motion both models are drawn, so that they can be compared and switched at once.
         let needs = if self.is_moving() { self.state.arrangement.mode.needs() } else { [true; 2] };
-        let models = [0, 1].map(|i| self.models[i].as_ref().filter(|_| needs[i]).map(|m| m.id));
-        models.iter().any(Option::is_some).then_some(View { camera, options: self.state.options, models })
+        Some(View { camera, options: self.state.options, models: self.open_ids(needs)? })
+    }
+
+    /// Returns the ids of the open models of those that are needed; `None` if there are none.
+    pub(crate) fn open_ids(&self, needs: [bool; 2]) -> Option<[Option<u64>; 2]> {
+        let ids = [0, 1].map(|i| self.models[i].as_ref().filter(|_| needs[i]).map(|m| m.id));
+        ids.iter().any(Option::is_some).then_some(ids)
     }
 
     /// Returns whether the frame on screen is `view` in full resolution.

@@ -118,36 +118,15 @@ impl CameraController {
 
     /// Returns the camera for a picture of `width * height` pixels.
     pub(crate) fn camera(&self, width: u32, height: u32) -> Camera {
-        let focal = single(self.focal * f64::from(width.min(height)));
-        let rows = self.axes.transpose().to_cols_array_2d();
-        Camera {
-            name: "free".to_owned(),
-            width,
-            height,
-            fx: focal,
-            fy: focal,
-            position: self.position.to_array().map(single),
-            rotation: std::array::from_fn(|row| std::array::from_fn(|k| single(rows[row][k]))),
-            split: None,
-        }
+        let focal = self.focal * f64::from(width.min(height));
+        let rotation = self.axes.transpose().to_cols_array_2d();
+        Camera::rounded("free".to_owned(), [width, height], [focal; 2], self.position.to_array(), rotation)
     }
 }
 
 /// Returns column `k` of the camera's rotation: right, down or forward.
 fn column(camera: &Camera, k: usize) -> DVec3 {
     DVec3::from_array(camera.rotation.map(|row| f64::from(row[k]))).normalize_or_zero()
-}
-
-/// Returns `camera` with a picture of exactly this size, which must have nearly the same aspect.
-pub(crate) fn resized(camera: &Camera, width: u32, height: u32) -> Camera {
-    let ratio = |new: u32, old: u32| f64::from(new) / f64::from(old.max(1));
-    Camera {
-        width,
-        height,
-        fx: single(f64::from(camera.fx) * ratio(width, camera.width)),
-        fy: single(f64::from(camera.fy) * ratio(height, camera.height)),
-        ..camera.clone()
-    }
 }
 
 /// Returns the largest size with `aspect` (width over height) within `width * height` pixels.
@@ -163,11 +142,6 @@ pub(crate) fn fitted(aspect: f64, width: u32, height: u32) -> (u32, u32) {
     } else {
         (width.max(1), whole(f64::from(width) / aspect, height))
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "cameras are f32 by design")]
-fn single(value: f64) -> f32 {
-    value as f32
 }
 
 #[cfg(test)]

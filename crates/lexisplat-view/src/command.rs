@@ -18,10 +18,7 @@ impl Slot {
 
     /// Returns the index in arrays of two.
     pub(crate) fn index(self) -> usize {
-        match self {
-            Self::First => 0,
-            Self::Second => 1,
-        }
+        self as usize
     }
 
     pub(crate) fn other(self) -> Self {

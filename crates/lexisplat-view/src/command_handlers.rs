@@ -33,8 +33,8 @@ impl App {
             Command::Screenshot(file) => self.screenshot(file)?,
             Command::Report => self.report()?,
             Command::Quit => self.quit = true,
-            Command::Camera(index) if index >= self.state.cameras().len() => {
-                let expected = format!("a camera from 0 to {}", self.state.cameras().len().saturating_sub(1));
+            Command::Camera(index) if index >= self.state.cameras.len() => {
+                let expected = format!("a camera from 0 to {}", self.state.cameras.len().saturating_sub(1));
                 return Err(lexisplat::Error::parameter("camera", index, expected).into());
             }
             command => self.state.apply(&command),
@@ -103,10 +103,7 @@ impl App {
         let arrangement = self.state.arrangement;
         let (width, height) = self.area;
         let camera = self.state.screenshot_camera(width, height, self.options.max_width);
-        let needs = arrangement.mode.needs();
-        let models: [Option<u64>; 2] =
-            [0, 1].map(|i| self.models[i].as_ref().filter(|_| needs[i]).map(|m| m.id));
-        let (Some(camera), true) = (camera, models.iter().any(Option::is_some)) else {
+        let (Some(camera), Some(models)) = (camera, self.open_ids(arrangement.mode.needs())) else {
             return Err(Error::Device("there is no picture to save yet".to_owned()));
         };
         let file = match file {

@@ -18,15 +18,13 @@ pub(crate) type Rgb8Image = (u32, u32, Vec<[u8; 3]>);
 /// Draws arrangements off screen with the shader of the window.
 #[derive(Debug)]
 pub(crate) struct Composer {
-    device: wgpu::Device,
-    queue: wgpu::Queue,
-    presenter: Presenter,
+    pub(crate) presenter: Presenter,
+    pub(crate) queue: wgpu::Queue,
 }
 
 impl Composer {
     pub(crate) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
-        let presenter = Presenter::new(&device, FORMAT);
-        Self { device, queue, presenter }
+        Self { presenter: Presenter::new(device, FORMAT), queue }
     }
 
     /// Draws `composition` at its own size.
@@ -34,8 +32,8 @@ impl Composer {
     /// # Errors
     /// [`Error::Device`] if a picture is missing, or too large for the device.
     pub(crate) fn compose(&self, composition: &Composition) -> Result<Rgb8Image> {
-        let device = &self.device;
-        let bound = self.presenter.bind(device, composition);
+        let device = &self.presenter.device;
+        let bound = self.presenter.bind(composition);
         let (Some(bound), Some((width, height))) = (bound, composition.size()) else {
             return Err(Error::Device("there is no picture to save".to_owned()));
         };

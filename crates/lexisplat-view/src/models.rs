@@ -215,14 +215,12 @@ pub(crate) fn open(
     size: OrbitSize,
     notifier: Notifier,
 ) -> Job {
-    let progress = Arc::new(JobProgress::default());
-    progress.start("reading", 0);
     let name = path.display().to_string();
-    spawn(id, slot, notifier, move || {
+    spawn(id, slot, name, notifier, move |progress| {
+        progress.start("reading", 0);
         let scene = SceneFile::read(&path, &ReadOptions::default().with_limits(limits))?;
         OpenModel::new(id, scene, Some(path), size)
-    });
-    Job { id, name, progress }
+    })
 }
 
 /// Starts a job that makes the second model by compressing `original`, which must be a PLY. Sensitivity is
@@ -235,18 +233,16 @@ pub(crate) fn compress_to(
     size: OrbitSize,
     notifier: Notifier,
 ) -> Job {
-    let progress = Arc::new(JobProgress::default());
     let name = format!("{} ({quality})", original.short_name());
-    let (reported, title) = (Arc::clone(&progress), name.clone());
-    spawn(id, Slot::Second, notifier, move || {
+    let title = name.clone();
+    spawn(id, Slot::Second, name, notifier, move |progress| {
         let Some(splats) = original.splats() else {
             let expected = "a PLY; a compressed scene cannot be compressed again";
             return Err(lexisplat::Error::parameter("scene", &original.scene.name, expected).into());
         };
-        let scene = compressed(splats, &title, quality, cameras.as_deref(), &reported)?;
+        let scene = compressed(splats, &title, quality, cameras.as_deref(), progress)?;
         OpenModel::new(id, scene, None, size)
-    });
-    Job { id, name, progress }
+    })
 }
 
 /// Compresses `splats` as `lexisplat compress` does with this preset or tolerance.
@@ -274,19 +270,26 @@ fn compressed(
     Ok(SceneFile::read_bytes(name, &file, &ReadOptions::default())?)
 }
 
-fn spawn(id: u64, slot: Slot, notifier: Notifier, work: impl FnOnce() -> Result<OpenModel> + Send + 'static) {
-    let again = notifier.clone();
+/// Starts a thread that makes the model of `slot` by `work`.
+fn spawn(
+    id: u64,
+    slot: Slot,
+    name: String,
+    notifier: Notifier,
+    work: impl FnOnce(&JobProgress) -> Result<OpenModel> + Send + 'static,
+) -> Job {
+    let progress = Arc::new(JobProgress::default());
+    let (again, reported, simd) = (notifier.clone(), Arc::clone(&progress), Simd::current());
     let tell = move |notifier: &Notifier, result| {
         // There is no receiver after the window has closed.
         let _ = notifier.sender.send(FinishedJob { id, slot, result });
         (notifier.wake)();
     };
-    let simd = Simd::current();
-    let started =
-        std::thread::Builder::new().name("model".into()).spawn(move || tell(&notifier, simd.scope(work)));
-    if let Err(error) = started {
+    let run = move || tell(&notifier, simd.scope(|| work(&reported)));
+    if let Err(error) = std::thread::Builder::new().name("model".into()).spawn(run) {
         tell(&again, Err(Error::Window(format!("cannot start a thread: {error}"))));
     }
+    Job { id, name, progress }
 }
 
 #[cfg(test)]

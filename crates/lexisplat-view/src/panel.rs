@@ -187,7 +187,7 @@ fn view(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
 }
 
 fn cameras(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
-    let (cameras, free) = (app.state.cameras(), app.state.is_free());
+    let (cameras, free) = (&app.state.cameras, app.state.is_free());
     heading(ui, if app.given.is_some() { "CAMERAS" } else { "ORBIT" });
     ui.horizontal(|ui| {
         ui.add_enabled_ui(!cameras.is_empty(), |ui| {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui_wgpu::{CallbackResources, CallbackTrait, ScreenDescriptor};
+use eframe::egui_wgpu::{CallbackResources, CallbackTrait};
 use wgpu::util::DeviceExt;
 
 use crate::command::{Mode, Slot};
@@ -54,33 +54,17 @@ impl Composition {
 /// The pipeline for one texture format.
 #[derive(Debug)]
 pub(crate) struct Presenter {
+    pub(crate) device: wgpu::Device,
     pipeline: wgpu::RenderPipeline,
-    layout: wgpu::BindGroupLayout,
     encodes: bool,
 }
 
 impl Presenter {
-    pub(crate) fn new(device: &wgpu::Device, format: wgpu::TextureFormat) -> Self {
-        let entry = |binding, ty| wgpu::BindGroupLayoutEntry {
-            binding,
-            visibility: wgpu::ShaderStages::FRAGMENT,
-            ty: wgpu::BindingType::Buffer { ty, has_dynamic_offset: false, min_binding_size: None },
-            count: None,
-        };
-        let storage = wgpu::BufferBindingType::Storage { read_only: true };
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some("present"),
-            entries: &[entry(0, wgpu::BufferBindingType::Uniform), entry(1, storage), entry(2, storage)],
-        });
+    pub(crate) fn new(device: wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::include_wgsl!("present.wgsl"));
-        let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("present"),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("present"),
-            layout: Some(&pipeline_layout),
+            layout: None,
             vertex: wgpu::VertexState {
                 module: &module,
                 entry_point: Some("corner"),
@@ -99,11 +83,11 @@ impl Presenter {
             multiview_mask: None,
             cache: None,
         });
-        Self { pipeline, layout, encodes: format.is_srgb() }
+        Self { device, pipeline, encodes: format.is_srgb() }
     }
 
     /// Returns the bind group that shows `composition`, or `None` if a picture is missing.
-    pub(crate) fn bind(&self, device: &wgpu::Device, composition: &Composition) -> Option<wgpu::BindGroup> {
+    pub(crate) fn bind(&self, composition: &Composition) -> Option<wgpu::BindGroup> {
         let [left, right] = composition.sides()?;
         let uniform = Uniform {
             size: [left.width, left.height],
@@ -118,14 +102,14 @@ impl Presenter {
             gain: composition.arrangement.gain,
             padding: [0.0; 2],
         };
-        let uniform = device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
+        let uniform = self.device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
             label: Some("arrangement"),
             contents: bytemuck::bytes_of(&uniform),
             usage: wgpu::BufferUsages::UNIFORM,
         });
-        Some(device.create_bind_group(&wgpu::BindGroupDescriptor {
+        Some(self.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("present"),
-            layout: &self.layout,
+            layout: &self.pipeline.get_bind_group_layout(0),
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: uniform.as_entire_binding() },
                 wgpu::BindGroupEntry { binding: 1, resource: left.pixels.as_entire_binding() },
@@ -145,33 +129,17 @@ impl Presenter {
 /// Shows a composition inside egui.
 pub(crate) struct PresentCallback {
     pub(crate) presenter: Arc<Presenter>,
-    pub(crate) composition: Composition,
+    /// The bind group of the composition.
+    pub(crate) bound: wgpu::BindGroup,
 }
 
-/// The bind group of the current frame. One is enough, because one composition is shown.
-struct CurrentBindGroup(Option<wgpu::BindGroup>);
-
 impl CallbackTrait for PresentCallback {
-    fn prepare(
-        &self,
-        device: &wgpu::Device,
-        _: &wgpu::Queue,
-        _: &ScreenDescriptor,
-        _: &mut wgpu::CommandEncoder,
-        resources: &mut CallbackResources,
-    ) -> Vec<wgpu::CommandBuffer> {
-        resources.insert(CurrentBindGroup(self.presenter.bind(device, &self.composition)));
-        Vec::new()
-    }
-
     fn paint(
         &self,
         _: eframe::egui::PaintCallbackInfo,
         pass: &mut wgpu::RenderPass<'static>,
-        resources: &CallbackResources,
+        _: &CallbackResources,
     ) {
-        if let Some(CurrentBindGroup(Some(bound))) = resources.get() {
-            self.presenter.draw(pass, bound);
-        }
+        self.presenter.draw(pass, &self.bound);
     }
 }

@@ -10,7 +10,7 @@ use lexisplat::output::{self, Output, OutputGroup};
 use lexisplat::simd::Simd;
 use lexisplat_eval::metrics::psnr;
 use lexisplat_eval::png;
-use lexisplat_render::{Camera, RenderOptions};
+use lexisplat_render::{Camera, Image, RenderOptions};
 
 use crate::command::{Mode, Slot};
 use crate::compose::{Composer, Rgb8Image};
@@ -80,16 +80,12 @@ pub(crate) struct Frame {
 /// The result of a [`RenderRequest`].
 #[derive(Debug)]
 pub(crate) enum RenderEvent {
-    /// A view was drawn.
-    Frame(Box<Frame>),
-    /// A screenshot was saved to this file.
-    Saved(PathBuf),
-    /// The view could not be drawn.
-    FrameFailed(Error),
+    /// The frame of a view, or why it could not be drawn.
+    Frame(Result<Box<Frame>>),
+    /// The file that a screenshot was saved to, or why it could not be drawn or saved.
+    Saved(Result<PathBuf>),
     /// A model does not fit on the device.
     ModelFailed(Slot, Error),
-    /// A screenshot could not be drawn or saved.
-    SaveFailed(Error),
 }
 
 /// A handle to the render thread. Dropping it ends the thread.
@@ -118,8 +114,8 @@ impl RenderThread {
         let name = renderer.name();
         let (requests, requested) = channel();
         let (sender, events) = channel();
-        let composer = Composer::new(device.clone(), queue.clone());
-        let mut worker = RenderWorker { renderer, device, queue, composer, outputs, last_comparison: None };
+        let composer = Composer::new(device, queue);
+        let mut worker = RenderWorker { renderer, composer, outputs, last_comparison: None };
         let simd = Simd::current();
         let work = move || {
             while let Ok(first) = requested.recv() {
@@ -188,8 +184,6 @@ struct RenderWorker {
     /// The group of saved pictures.
     outputs: OutputGroup,
     renderer: Box<dyn SceneRenderer>,
-    device: wgpu::Device,
-    queue: wgpu::Queue,
     composer: Composer,
     /// Time of the last comparison of pictures.
     last_comparison: Option<Instant>,
@@ -202,17 +196,13 @@ impl RenderWorker {
                 let error = self.renderer.set(slot, model).err();
                 error.map(|error| RenderEvent::ModelFailed(slot, error))
             }
-            RenderRequest::View(view, scale) => Some(match self.draw_frame(view, scale) {
-                Ok(frame) => RenderEvent::Frame(Box::new(frame)),
-                Err(error) => RenderEvent::FrameFailed(error),
-            }),
+            RenderRequest::View(view, scale) => {
+                Some(RenderEvent::Frame(self.draw_frame(view, scale).map(Box::new)))
+            }
             RenderRequest::Screenshot { view, arrangement, file } => {
                 let saved =
                     self.picture(&view, arrangement).and_then(|picture| save(&self.outputs, &file, &picture));
-                Some(match saved {
-                    Ok(()) => RenderEvent::Saved(file),
-                    Err(error) => RenderEvent::SaveFailed(error),
-                })
+                Some(RenderEvent::Saved(saved.map(|()| file)))
             }
         }
     }
@@ -236,8 +226,7 @@ impl RenderWorker {
         let due = scale >= 1.0 || self.last_comparison.is_none_or(|last| last.elapsed() >= COMPARE_EVERY);
         let mut score = None;
         if let ([Some(first), Some(second)], true) = (&pictures, due) {
-            let image = |picture: &Picture| picture.to_image(&self.device, &self.queue);
-            let decibels = psnr(&image(first)?, &image(second)?)?;
+            let decibels = psnr(&self.image(first)?, &self.image(second)?)?;
             score = Some(decibels.map_or(Score::Identical, Score::Decibels));
             self.last_comparison = Some(Instant::now());
         }
@@ -252,11 +241,15 @@ impl RenderWorker {
         })
     }
 
+    fn image(&self, picture: &Picture) -> Result<Image> {
+        picture.to_image(&self.composer.presenter.device, &self.composer.queue)
+    }
+
     /// Returns the picture of a screenshot: the renderer's own if one model is shown, else the arrangement on screen.
     fn picture(&mut self, view: &View, arrangement: Arrangement) -> Result<Rgb8Image> {
         let pictures = self.draw_models(view, &view.camera)?;
         if let (Mode::One(_), Some(picture)) = (arrangement.mode, pictures.iter().flatten().next()) {
-            let image = picture.to_image(&self.device, &self.queue)?;
+            let image = self.image(picture)?;
             return Ok((image.width, image.height, image.to_8bit()));
         }
         self.composer.compose(&Composition { arrangement, pictures })

@@ -2,7 +2,7 @@
 
 use lexisplat_render::{Camera, RenderOptions};
 
-use crate::camera_controller::{CameraController, SceneBounds, fitted, resized};
+use crate::camera_controller::{CameraController, SceneBounds, fitted};
 use crate::command::{Command, Mode, Slot};
 
 /// Amplification of differences: the initial value, and the range.
@@ -30,7 +30,7 @@ impl Arrangement {
 #[derive(Debug)]
 pub(crate) struct State {
     /// Cameras to step through.
-    cameras: Vec<Camera>,
+    pub(crate) cameras: Vec<Camera>,
     /// Whether the cameras come from a file. Else they are a generated orbit, whose picture size is arbitrary.
     given: bool,
     bounds: SceneBounds,
@@ -71,10 +71,6 @@ impl State {
         self.given = given;
         self.bounds = bounds;
         self.reset();
-    }
-
-    pub(crate) fn cameras(&self) -> &[Camera] {
-        &self.cameras
     }
 
     /// Sets which models are open. The mode becomes a wipe when the second of them is opened.
@@ -174,7 +170,7 @@ impl State {
         let camera = self.cameras.get(self.index)?;
         let aspect = f64::from(camera.width) / f64::from(camera.height.max(1));
         let (width, height) = fitted(aspect, width, height);
-        Some(resized(camera, width, height))
+        Some(camera.resized(width, height))
     }
 
     /// Returns the camera of a screenshot: the chosen one at its own size, or the free one at its size on screen.

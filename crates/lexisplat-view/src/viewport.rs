@@ -37,13 +37,11 @@ impl App {
             ui.painter().rect_filled(whole, CornerRadius::ZERO, BEHIND);
             let picture = self.composition().and_then(|composition| {
                 let place = self.place(&composition, whole, per_point)?;
-                let mode = composition.arrangement.mode;
                 let presenter = Arc::clone(&self.presenter);
-                ui.painter().add(egui_wgpu::Callback::new_paint_callback(
-                    place,
-                    PresentCallback { presenter, composition },
-                ));
-                Some((place, mode))
+                let bound = presenter.bind(&composition)?;
+                let callback = PresentCallback { presenter, bound };
+                ui.painter().add(egui_wgpu::Callback::new_paint_callback(place, callback));
+                Some((place, composition.arrangement.mode))
             });
             let response = ui.interact(whole, ui.scope_id().with("viewport"), Sense::click_and_drag());
             match picture {

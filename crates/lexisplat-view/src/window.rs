@@ -1,6 +1,7 @@
 //! Opening the window.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
+use std::sync::mpsc::channel;
 
 use eframe::{egui, egui_wgpu};
 use lexisplat::Geometry;
@@ -63,21 +64,19 @@ pub fn run(options: Options) -> Result<()> {
         ..Default::default()
     };
     native.wgpu_options.wgpu_setup = setup.into();
-    let outcome = Arc::new(Mutex::new(None));
-    let result = Arc::clone(&outcome);
+    let (failures, failed) = channel();
     let ran = eframe::run_native(
         "lexisplat",
         native,
         Box::new(move |creation| {
             creation.egui_ctx.set_theme(egui::Theme::Dark);
-            Ok(Box::new(App::new(creation, options, given, script, outcome)?))
+            Ok(Box::new(App::new(creation, options, given, script, failures)?))
         }),
     );
-    let failure = result.lock().unwrap_or_else(PoisonError::into_inner).take();
-    match (failure, ran) {
-        (Some(error), _) => Err(error),
-        (None, Ok(())) => Ok(()),
-        (None, Err(error)) => Err(Error::Window(error.to_string())),
+    match (failed.try_recv(), ran) {
+        (Ok(error), _) => Err(error),
+        (_, Ok(())) => Ok(()),
+        (_, Err(error)) => Err(Error::Window(error.to_string())),
     }
 }
 

@@ -63,7 +63,7 @@ impl<'a, R: BufRead + Seek> BinaryReader<'a, R> {
         }
         if count > MAX_CAMERAS as u64 {
             let what = format!("{}: {what}", self.file);
-            return Err(Error::Limit { what, found: count, limit: MAX_CAMERAS as u64 });
+            return Err(Error::limit(what, count, MAX_CAMERAS as u64));
         }
         Ok(count)
     }

@@ -1,7 +1,7 @@
 //! Reads the lines of a text file. Of a long line no more than a limit is held in memory.
 
 use std::fmt::Display;
-use std::io::BufRead;
+use std::io::{BufRead, Read};
 
 use crate::error::{Error, Result};
 
@@ -27,26 +27,19 @@ impl<'a, R: BufRead> Lines<'a, R> {
         Error::format(self.file, format!("line {}: {problem}", self.number))
     }
 
-    /// Returns an [`Error::Limit`] on the number of `what`.
+    /// Returns an [`lexisplat::Error::Limit`] on the number of `what`.
     pub(super) fn too_many(&self, what: &str, limit: usize) -> Error {
-        Error::Limit { what: format!("{}: {what}", self.file), found: limit as u64 + 1, limit: limit as u64 }
+        Error::limit(format!("{}: {what}", self.file), limit as u64 + 1, limit as u64)
     }
 
     /// Reads the next line, without white space at its ends; `None` after the last.
     pub(super) fn line(&mut self) -> Result<Option<String>> {
-        self.bytes.clear();
-        let mut long = false;
-        let bytes = &mut self.bytes;
-        let any = each_piece(&mut self.reader, |piece| {
-            let room = MAX_LINE.saturating_sub(bytes.len());
-            long |= piece.len() > room;
-            bytes.extend_from_slice(&piece[..piece.len().min(room)]);
-        });
-        if !any.map_err(|e| Error::io(self.file, e))? {
+        if !self.read_piece(MAX_LINE + 1)? {
             return Ok(None);
         }
         self.number += 1;
-        if long {
+        if self.bytes.len() > MAX_LINE && !self.bytes.ends_with(b"\n") {
+            self.reader.skip_until(b'\n').map_err(|e| Error::io(self.file, e))?;
             return Err(self.wrong(format!("over the limit of {MAX_LINE} bytes")));
         }
         match std::str::from_utf8(&self.bytes) {
@@ -57,39 +50,28 @@ impl<'a, R: BufRead> Lines<'a, R> {
 
     /// Counts the words of the next line, however long it is.
     pub(super) fn words_of_next(&mut self) -> Result<u64> {
-        let (mut words, mut inside) = (0_u64, false);
-        let any = each_piece(&mut self.reader, |piece| {
-            for byte in piece {
+        let (mut words, mut inside, mut any) = (0_u64, false, false);
+        while self.read_piece(MAX_LINE)? {
+            any = true;
+            for byte in &self.bytes {
                 let word = !byte.is_ascii_whitespace();
                 words += u64::from(word && !inside);
                 inside = word;
             }
-        });
-        self.number += u64::from(any.map_err(|e| Error::io(self.file, e))?);
+            if self.bytes.ends_with(b"\n") {
+                break;
+            }
+        }
+        self.number += u64::from(any);
         Ok(words)
     }
-}
 
-/// Calls `f` with the pieces of the next line, without its end. Returns whether there was a line.
-fn each_piece(reader: &mut impl BufRead, mut f: impl FnMut(&[u8])) -> std::io::Result<bool> {
-    let mut any = false;
-    loop {
-        let buffer = match reader.fill_buf() {
-            Ok(buffer) => buffer,
-            Err(e) if e.kind() == std::io::ErrorKind::Interrupted => continue,
-            Err(e) => return Err(e),
-        };
-        if buffer.is_empty() {
-            return Ok(any);
-        }
-        any = true;
-        let end = buffer.iter().position(|byte| *byte == b'\n');
-        f(&buffer[..end.unwrap_or(buffer.len())]);
-        let used = end.map_or(buffer.len(), |end| end + 1);
-        reader.consume(used);
-        if end.is_some() {
-            return Ok(true);
-        }
+    /// Reads at most `most` bytes of what is left of a line, and its end. Returns whether there was any.
+    fn read_piece(&mut self, most: usize) -> Result<bool> {
+        self.bytes.clear();
+        let mut piece = self.reader.by_ref().take(most as u64);
+        let read = piece.read_until(b'\n', &mut self.bytes).map_err(|e| Error::io(self.file, e))?;
+        Ok(read > 0)
     }
 }
 

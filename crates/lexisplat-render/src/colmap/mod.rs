@@ -54,14 +54,14 @@ pub(crate) fn find<F: ViewFiles + ?Sized>(files: &F) -> Option<ModelFiles> {
 /// with folders and extension; no split is set.
 ///
 /// # Errors
-/// [`Error::Io`] if a file cannot be read; [`Error::Limit`] if it is over [`MAX_COLMAP_BYTES`]; otherwise as
+/// [`lexisplat::Error::Io`] if a file cannot be read; [`lexisplat::Error::Limit`] if it is over [`MAX_COLMAP_BYTES`]; otherwise as
 /// [`read_colmap_binary`].
 pub(crate) fn read<F: ViewFiles + ?Sized>(files: &F, model: &ModelFiles) -> Result<ViewSet> {
     let open = |file: &str| {
         let file = files.open(file)?;
         if file.len > MAX_COLMAP_BYTES {
             let what = format!("{}: bytes", file.name);
-            return Err(Error::Limit { what, found: file.len, limit: MAX_COLMAP_BYTES });
+            return Err(Error::limit(what, file.len, MAX_COLMAP_BYTES));
         }
         Ok(file)
     };
@@ -72,9 +72,9 @@ pub(crate) fn read<F: ViewFiles + ?Sized>(files: &F, model: &ModelFiles) -> Resu
 /// errors.
 ///
 /// # Errors
-/// [`Error::Format`] naming the file, the image or camera and the value, for: bytes that are cut off, a count
+/// [`lexisplat::Error::Format`] naming the file, the image or camera and the value, for: bytes that are cut off, a count
 /// that the bytes cannot hold, a model other than `PINHOLE` and `SIMPLE_PINHOLE`, an image whose camera is
-/// missing, numbers that are not a pose. [`Error::Limit`] if there are over [`crate::MAX_CAMERAS`].
+/// missing, numbers that are not a pose. [`lexisplat::Error::Limit`] if there are over [`crate::MAX_CAMERAS`].
 pub fn read_colmap_binary(name: &str, cameras: &[u8], images: &[u8]) -> Result<ViewSet> {
     let file = |file, bytes| ViewFile::from_bytes(within(name, file), bytes);
     join(true, file("cameras.bin", cameras), file("images.bin", images))

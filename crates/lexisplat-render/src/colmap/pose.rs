@@ -5,7 +5,6 @@ use glam::{DMat3, DQuat, DVec3};
 use super::intrinsics::Intrinsics;
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::orbit::single;
 
 /// An image: its name, its camera's number, and where it was taken.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,18 +31,11 @@ impl Posed {
         }
         let to_camera = DMat3::from_quat(quaternion.normalize());
         let position = -(to_camera.transpose() * DVec3::from_array(self.translation));
-        let [fx, fy] = intrinsics.focal;
-        let camera = Camera {
-            name: self.name.clone(),
-            width: intrinsics.width,
-            height: intrinsics.height,
-            fx: single(fx),
-            fy: single(fy),
-            position: position.to_array().map(single),
-            // Columns of the rotation to the camera are rows of the one to the world.
-            rotation: to_camera.to_cols_array_2d().map(|row| row.map(single)),
-            split: None,
-        };
+        let size = [intrinsics.width, intrinsics.height];
+        // Columns of the rotation to the camera are rows of the one to the world.
+        let rotation = to_camera.to_cols_array_2d();
+        let camera =
+            Camera::rounded(self.name.clone(), size, intrinsics.focal, position.to_array(), rotation);
         camera.validate().map_err(|e| e.to_string())?;
         Ok(camera)
     }

@@ -186,7 +186,10 @@ fn counts_are_not_believed() {
             [cameras.clone(), with(&images, 0, count)],
             [cameras.clone(), with(&images, points, count)],
         ] {
-            assert!(matches!(read_binary(&files), Err(Error::Format { .. })), "{count}");
+            assert!(
+                matches!(read_binary(&files), Err(Error::Codec(lexisplat::Error::Format { .. }))),
+                "{count}"
+            );
         }
     }
     // Enough bytes for more images than are allowed.
@@ -194,7 +197,7 @@ fn counts_are_not_believed() {
     let mut bytes = many.to_le_bytes().to_vec();
     bytes.resize(8 + 73 * (crate::MAX_CAMERAS + 1), 0);
     assert!(
-        matches!(read_binary(&[cameras.clone(), bytes]), Err(Error::Limit { found, .. }) if found == many)
+        matches!(read_binary(&[cameras.clone(), bytes]), Err(Error::Codec(lexisplat::Error::Limit { found, .. })) if found == many)
     );
     let long = [cameras, [images, vec![0]].concat()];
     assert!(read_binary(&long).unwrap_err().to_string().contains("1 bytes follow"));

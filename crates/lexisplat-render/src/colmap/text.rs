@@ -38,25 +38,22 @@ fn camera(line: &str) -> Result<(u32, Intrinsics), String> {
         return Err("not a camera: expected number, model, width, height and parameters".into());
     };
     let number: u32 = parsed("number of the camera", number)?;
-    let about = |problem: String| format!("camera {number}: {problem}");
-    let model = Pinhole::named(model).map_err(about)?;
-    let (width, height) = (parsed("width", width).map_err(about)?, parsed("height", height).map_err(about)?);
-    let numbers: Vec<f64> = parameters
-        .iter()
-        .map(|word| parsed("parameter", word))
-        .collect::<Result<_, String>>()
-        .map_err(about)?;
-    let (focal, centre) = match (model, numbers.as_slice()) {
-        (Pinhole::Simple, &[f, cx, cy]) => ([f; 2], [cx, cy]),
-        (Pinhole::Two, &[fx, fy, cx, cy]) => ([fx, fy], [cx, cy]),
-        (Pinhole::Simple, other) => {
-            return Err(about(format!("{} parameters, expected f, cx, cy", other.len())));
-        }
-        (Pinhole::Two, other) => {
-            return Err(about(format!("{} parameters, expected fx, fy, cx, cy", other.len())));
-        }
+    let intrinsics = || {
+        let model = Pinhole::named(model)?;
+        let (width, height) = (parsed("width", width)?, parsed("height", height)?);
+        let numbers: Vec<f64> =
+            parameters.iter().map(|word| parsed("parameter", word)).collect::<Result<_, String>>()?;
+        let (focal, centre) = match (model, numbers.as_slice()) {
+            (Pinhole::Simple, &[f, cx, cy]) => ([f; 2], [cx, cy]),
+            (Pinhole::Two, &[fx, fy, cx, cy]) => ([fx, fy], [cx, cy]),
+            (model, other) => {
+                let expected = if model == Pinhole::Simple { "f, cx, cy" } else { "fx, fy, cx, cy" };
+                return Err(format!("{} parameters, expected {expected}", other.len()));
+            }
+        };
+        Intrinsics::new(width, height, focal, centre)
     };
-    Ok((number, Intrinsics::new(width, height, focal, centre).map_err(about)?))
+    Ok((number, intrinsics().map_err(|problem| format!("camera {number}: {problem}"))?))
 }
 
 /// The images, and a warning if the file says that there are more or fewer.

@@ -31,7 +31,7 @@ impl Buffer {
 /// Bytes on the GPU, counted until this is dropped.
 #[derive(Debug)]
 pub(super) struct Counted {
-    size: u64,
+    pub(super) size: u64,
     total: Arc<AtomicU64>,
 }
 
@@ -40,10 +40,6 @@ impl Counted {
     pub(super) fn new(size: u64, total: &Arc<AtomicU64>) -> Self {
         total.fetch_add(size, Relaxed);
         Self { size, total: Arc::clone(total) }
-    }
-
-    pub(super) fn size(&self) -> u64 {
-        self.size
     }
 }
 
@@ -62,7 +58,7 @@ impl Gpu {
         let size = size.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT).max(MIN_BUFFER);
         let limit = self.limits().max_buffer_size;
         if size > limit {
-            return Err(Error::GpuLimit { what: format!("bytes of GPU buffer {label}"), found: size, limit });
+            return Err(Error::gpu_limit(format!("bytes of GPU buffer {label}"), size, limit));
         }
         let descriptor =
             wgpu::BufferDescriptor { label: Some(label), size, usage, mapped_at_creation: false };
@@ -105,6 +101,11 @@ impl Gpu {
             }
         }
         Ok(())
+    }
+
+    /// Makes what records work for the queue.
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
+        self.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
     }
 
     /// The first `size` bytes of a [`readable`](Self::readable) buffer, once all submitted work is done.

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::error::{Error, Result};
+use crate::renderer::Device;
 use crate::wait::answer;
 
 use super::buffer::Counted;
@@ -14,7 +15,7 @@ const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and 
 /// An adapter that this machine offers.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct AdapterSummary {
-    /// Its place in the list, best first: the number that [`GpuChoice::Index`] takes.
+    /// Its place in the list, best first: the number that [`Device::Index`] takes.
     pub index: usize,
     /// The name that the driver gives it.
     pub name: String,
@@ -28,18 +29,6 @@ pub struct AdapterSummary {
     pub max_binding: u64,
     /// Whether stages can be timed.
     pub timestamps: bool,
-}
-
-/// Which adapter to open.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum GpuChoice {
-    /// The best one that is not software.
-    Hardware,
-    /// The best one of any kind.
-    #[default]
-    Best,
-    /// The one at this place in the list of [`adapters_async`].
-    Index(usize),
 }
 
 /// An open GPU. Clones share it.
@@ -63,10 +52,7 @@ struct Shared {
 
 /// Drivers that are looked for. OpenGL is not among them: it lacks what the kernels need, and its loaders
 /// print on start.
-const BACKENDS: wgpu::Backends = wgpu::Backends::VULKAN
-    .union(wgpu::Backends::METAL)
-    .union(wgpu::Backends::DX12)
-    .union(wgpu::Backends::BROWSER_WEBGPU);
+const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 fn instance() -> wgpu::Instance {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
@@ -120,61 +106,58 @@ pub fn adapters() -> Vec<AdapterSummary> {
     pollster::block_on(adapters_async())
 }
 
-impl Gpu {
-    /// Opens an adapter.
+impl Device {
+    /// Opens the GPU that this means; `None` if it means the processor.
     ///
     /// # Errors
-    /// [`Error::Gpu`] if there is none or it refuses; [`Error::Parameter`] for an index out of range.
-    pub async fn open_async(choice: GpuChoice) -> Result<Self> {
-        Self::find_async(choice).await?.ok_or_else(|| Error::Gpu { problem: NO_ADAPTER.to_owned() })
+    /// As [`Renderer::open_async`](crate::Renderer::open_async).
+    pub async fn open_gpu_async(self) -> Result<Option<Gpu>> {
+        self.open_gpu_with(|_| {}).await
     }
 
-    /// Opens an adapter as [`Self::open_async`] does; returns `None` if there is no such adapter.
+    /// Blocks on [`Self::open_gpu_async`].
     ///
     /// # Errors
-    /// [`Error::Gpu`] if there is one but it refuses; [`Error::Parameter`] for an index out of range, where
-    /// there are any adapters.
-    pub async fn find_async(choice: GpuChoice) -> Result<Option<Self>> {
-        Self::find_with(choice, |_| {}).await
-    }
-
-    /// Blocks on [`Self::open_async`].
-    ///
-    /// # Errors
-    /// As [`Self::open_async`].
+    /// As [`Self::open_gpu_async`].
     #[cfg(not(target_family = "wasm"))]
-    pub fn open(choice: GpuChoice) -> Result<Self> {
-        pollster::block_on(Self::open_async(choice))
+    pub fn open_gpu(self) -> Result<Option<Gpu>> {
+        pollster::block_on(self.open_gpu_async())
     }
 
-    /// [`Self::find_async`] that asks the device for what `reduce` leaves of the limits.
-    pub(super) async fn find_with(
-        choice: GpuChoice,
-        reduce: impl FnOnce(&mut wgpu::Limits),
-    ) -> Result<Option<Self>> {
-        let found = sorted_adapters().await;
-        let index = match choice {
-            GpuChoice::Index(index) if index < found.len() => Some(index),
-            GpuChoice::Index(index) if !found.is_empty() => {
-                let expected = format!("an adapter's number, 0 to {}", found.len() - 1);
-                return Err(Error::parameter("device", index, expected));
-            }
-            GpuChoice::Best | GpuChoice::Index(_) => Some(0),
-            GpuChoice::Hardware => {
-                found.iter().position(|adapter| adapter.get_info().device_type != wgpu::DeviceType::Cpu)
-            }
-        };
-        let Some((index, adapter)) = index.and_then(|index| Some((index, found.get(index)?))) else {
+    /// [`Self::open_gpu_async`] that asks the device for what `reduce` leaves of the limits.
+    pub(super) async fn open_gpu_with(self, reduce: impl FnOnce(&mut wgpu::Limits)) -> Result<Option<Gpu>> {
+        if self == Self::Cpu {
             return Ok(None);
+        }
+        let found = sorted_adapters().await;
+        let index = match self {
+            Self::Index(index) => index,
+            _ => 0,
         };
-        let mut descriptor = Self::descriptor(adapter);
+        let Some(adapter) = found.get(index) else {
+            return match self {
+                Self::Auto => Ok(None),
+                Self::Index(_) if !found.is_empty() => {
+                    let expected = format!("an adapter's number, 0 to {}", found.len() - 1);
+                    Err(Error::parameter("device", index, expected))
+                }
+                _ => Err(Error::Gpu { problem: NO_ADAPTER.to_owned() }),
+            };
+        };
+        // Software comes last.
+        if self == Self::Auto && adapter.get_info().device_type == wgpu::DeviceType::Cpu {
+            return Ok(None);
+        }
+        let mut descriptor = Gpu::descriptor(adapter);
         reduce(&mut descriptor.required_limits);
         let opened = adapter.request_device(&descriptor).await;
         let (device, queue) = opened
             .map_err(|error| Error::Gpu { problem: format!("{}: {error}", adapter.get_info().name) })?;
-        Ok(Some(Self::new(summarise(index, adapter), device, queue)))
+        Ok(Some(Gpu::new(summarise(index, adapter), device, queue)))
     }
+}
 
+impl Gpu {
     /// Returns what this renderer asks of a device that is made elsewhere, such as by a window.
     ///
     /// The limits are WebGPU's defaults, which every adapter has, except sizes, which are the adapter's own.

@@ -46,7 +46,7 @@ pub use wgpu;
 
 #[cfg(not(target_family = "wasm"))]
 pub use device::adapters;
-pub use device::{AdapterSummary, Gpu, GpuChoice, adapters_async, rank};
+pub use device::{AdapterSummary, Gpu, adapters_async, rank};
 pub use path::ShPath;
 pub use plan::DrawStage;
 pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};

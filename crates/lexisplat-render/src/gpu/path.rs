@@ -35,14 +35,7 @@ impl ShPath {
     /// Its name in reports and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::DenseF32 => "dense-f32",
-            Self::DenseF16 => "dense-f16",
-            Self::Sparse => "sparse",
-            Self::SparseOrdered => "sparse-ordered",
-            Self::SparseShared => "sparse-shared",
-            Self::SparseTable => "sparse-table",
-        }
+        ["dense-f32", "dense-f16", "sparse", "sparse-ordered", "sparse-shared", "sparse-table"][self as usize]
     }
 
     /// Whether it needs a compressed scene.

@@ -1,5 +1,6 @@
 //! Plans a picture: which kernels run, in which order, and on which buffers.
 
+use std::num::NonZeroU64;
 use std::sync::{Arc, Weak};
 
 use crate::error::Result;
@@ -8,7 +9,7 @@ use super::buffer::Buffer;
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
 use super::device::Gpu;
 use super::scene::GpuScene;
-use super::shaders::{Bound, Kernels, bind};
+use super::shaders::{Kernels, all_from, bind};
 use super::uniforms::{Band, Pass, Scan};
 use super::work::{PIXEL, Work};
 
@@ -40,14 +41,7 @@ impl DrawStage {
     /// Its name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Cull => "cull",
-            Self::Project => "project",
-            Self::Radiance => "radiance",
-            Self::Sort => "sort",
-            Self::Tiles => "tiles",
-            Self::Blend => "blend",
-        }
+        ["cull", "project", "radiance", "sort", "tiles", "blend"][self as usize]
     }
 }
 
@@ -163,14 +157,6 @@ impl Plan {
     }
 }
 
-/// Binds all of each buffer, the first at binding `first`, the others after it.
-fn all_from<'a>(
-    first: u32,
-    buffers: impl IntoIterator<Item = &'a Buffer>,
-) -> impl Iterator<Item = (u32, Bound<'a>)> {
-    (first..).zip(buffers).map(|(binding, buffer)| (binding, Bound::All(&buffer.raw)))
-}
-
 impl Planner<'_> {
     fn plan(mut self, scene: &GpuScene, shape: Shape) -> Result<Plan> {
         let mut by_depth = 0;
@@ -195,13 +181,13 @@ impl Planner<'_> {
         let band = self.gpu.uniform("rows in view", &Band { first, rows, tiles, padding: 0 })?;
         for chunk in &scene.chunks {
             let bound = [&work.frame, &chunk.uniform, &chunk.bodies, &work.masks, &work.starts, &band];
-            self.step(&kernels.cull, all_from(0, bound), Size::Groups(chunk.blocks));
+            self.step(&kernels["cull"], all_from(0, bound), Size::Groups(chunk.blocks));
         }
         self.scan(&work.starts, Counter::Found, Some(scene.blocks() + 1), None)?;
         let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
-        self.step(&kernels.compact, all_from(0, bound), Size::Groups(scene.blocks()));
+        self.step(&kernels["compact"], all_from(0, bound), Size::Groups(scene.blocks()));
         let bound = [&work.frame, &work.starts, &scene.chunk_blocks, &work.counters, &work.dispatches];
-        self.step(&kernels.plan_slots, all_from(0, bound), Size::Groups(1));
+        self.step(&kernels["plan_slots"], all_from(0, bound), Size::Groups(1));
         self.end(DrawStage::Cull);
 
         for (chunk, k) in scene.chunks.iter().zip(0..) {
@@ -209,7 +195,7 @@ impl Planner<'_> {
             let shape = [&chunk.bodies, &chunk.shapes];
             let written = [&work.centres, &work.conics, &work.slot_keys[0], &work.rects];
             let bound = all_from(0, read.into_iter().chain(shape).chain(written));
-            self.step(&kernels.project, bound, Size::chunk(k));
+            self.step(&kernels["project"], bound, Size::chunk(k));
         }
         self.end(DrawStage::Project);
 
@@ -257,15 +243,15 @@ impl Planner<'_> {
             &work.conics,
             &work.offsets,
         ];
-        self.step(&kernels.count_tiles, all_from(0, common), Size::of(Dispatch::SlotsAndEnd));
+        self.step(&kernels["count_tiles"], all_from(0, common), Size::of(Dispatch::SlotsAndEnd));
         self.scan(&work.offsets, Counter::SlotsAndEnd, None, Some(Dispatch::SlotScan))?;
         let bound =
             all_from(0, [&work.frame]).chain(all_from(3, [&work.counters, &work.dispatches, &work.offsets]));
-        self.step(&kernels.plan_entries, bound, Size::Groups(1));
-        let measuring = kernels.moments.as_ref().zip(work.moments.as_ref());
-        let listed_slots = measuring.map_or(&work.entry_values[0], |(_, moments)| &moments.listed_slots);
+        self.step(&kernels["plan_entries"], bound, Size::Groups(1));
+        let listed_slots =
+            work.moments.as_ref().map_or(&work.entry_values[0], |moments| &moments.listed_slots);
         let bound = all_from(0, common).chain(all_from(8, [&work.entry_keys[0], listed_slots]));
-        self.step(&kernels.list_tiles, bound, Size::of(Dispatch::SlotsAndEnd));
+        self.step(&kernels["list_tiles"], bound, Size::of(Dispatch::SlotsAndEnd));
         let by_tile = self.sort(&Sorting {
             keys: work.entry_keys.each_ref(),
             values: work.entry_values.each_ref(),
@@ -276,18 +262,18 @@ impl Planner<'_> {
             digits: Counter::EntryDigits,
             groups: Dispatch::EntryBlocks,
             scan_groups: Dispatch::EntryDigits,
-            identity: measuring.is_some(),
+            identity: work.moments.is_some(),
         })?;
         let sorted = &work.entry_values[by_tile];
         let mut entry_slots = sorted;
-        if let Some((kernels, moments)) = measuring {
+        if let Some(moments) = &work.moments {
             // The sort no longer needs the other buffer.
             entry_slots = &work.entry_values[1 - by_tile];
             let bound = all_from(0, [&work.counters, sorted, &moments.listed_slots, entry_slots]);
-            self.step(&kernels.slots_of_entries, bound, Size::of(Dispatch::Entries));
+            self.step(&kernels["slots_of_entries"], bound, Size::of(Dispatch::Entries));
         }
         let bound = all_from(0, [&band, &work.counters, &work.entry_keys[by_tile], &work.ranges]);
-        self.step(&kernels.find_ranges, bound, Size::of(Dispatch::Entries));
+        self.step(&kernels["find_ranges"], bound, Size::of(Dispatch::Entries));
         self.end(DrawStage::Tiles);
 
         let tile = u64::try_from(TILE).unwrap_or(u64::MAX);
@@ -295,17 +281,20 @@ impl Planner<'_> {
         let top = u64::from(first) * tile;
         let lines = (u64::from(rows) * tile).min(u64::from(shape.height) - top);
         // WebGPU wants offsets that are multiples of 256 bytes; a row of tiles is one.
-        let pixels = |binding| [(binding, Bound::Part(&work.pixels.raw, top * line, lines * line))];
+        let (buffer, size) = (&work.pixels.raw, NonZeroU64::new(lines * line));
+        let resource =
+            wgpu::BindingResource::Buffer(wgpu::BufferBinding { buffer, offset: top * line, size });
+        let pixels = |binding| [wgpu::BindGroupEntry { binding, resource: resource.clone() }];
         let tile =
             [&work.frame, &band, &work.ranges, entry_slots, &work.centres, &work.conics, &work.colours];
-        self.step(&kernels.blend, all_from(0, tile).chain(pixels(7)), Size::Groups(tiles));
-        if let Some((kernels, moments)) = measuring {
+        self.step(&kernels["blend"], all_from(0, tile).chain(pixels(7)), Size::Groups(tiles));
+        if let Some(moments) = &work.moments {
             let bound = all_from(0, tile.into_iter().chain([sorted])).chain(pixels(8));
             let bound = bound.chain(all_from(9, [&moments.of_entries]));
-            self.step(&kernels.tile_moments, bound, Size::Groups(tiles));
+            self.step(&kernels["tile_moments"], bound, Size::Groups(tiles));
             let read = [&work.frame, &work.counters, order, &work.offsets];
             let bound = all_from(0, read.into_iter().chain([&moments.of_entries, &moments.of_slots]));
-            self.step(&kernels.gather_moments, bound, Size::of(Dispatch::SlotsAndEnd));
+            self.step(&kernels["gather_moments"], bound, Size::of(Dispatch::SlotsAndEnd));
         }
         self.end(DrawStage::Blend);
         self.uniforms.push(band);
@@ -315,7 +304,7 @@ impl Planner<'_> {
     fn step<'b>(
         &mut self,
         pipeline: &wgpu::ComputePipeline,
-        bound: impl IntoIterator<Item = (u32, Bound<'b>)>,
+        bound: impl IntoIterator<Item = wgpu::BindGroupEntry<'b>>,
         size: Size,
     ) {
         let bindings = bind(self.gpu, pipeline, bound);
@@ -343,10 +332,10 @@ impl Planner<'_> {
             Some(dispatch) => Size::of(dispatch),
             None => Size::Groups(fixed.unwrap_or(0).div_ceil(SCAN_BLOCK)),
         };
-        self.step(&kernels.scan_reduce, all_from(0, bound), size());
+        self.step(&kernels["scan_reduce"], all_from(0, bound), size());
         let spine = all_from(0, [&uniform, &work.counters]).chain(all_from(3, [&work.sums]));
-        self.step(&kernels.scan_spine, spine, Size::Groups(1));
-        self.step(&kernels.scan_spread, all_from(0, bound), size());
+        self.step(&kernels["scan_spine"], spine, Size::Groups(1));
+        self.step(&kernels["scan_spread"], all_from(0, bound), size());
         self.uniforms.push(uniform);
         Ok(())
     }
@@ -365,11 +354,11 @@ impl Planner<'_> {
             };
             let uniform = self.gpu.uniform("pass", &pass)?;
             let common = [&uniform, &work.counters, sorting.keys[from_buffer], &work.histogram];
-            self.step(&kernels.sort_count, all_from(0, common), Size::of(sorting.groups));
+            self.step(&kernels["sort_count"], all_from(0, common), Size::of(sorting.groups));
             self.scan(&work.histogram, sorting.digits, None, Some(sorting.scan_groups))?;
             let moved = [sorting.values[from_buffer], sorting.keys[to], sorting.values[to]];
             let bound = all_from(0, common.into_iter().chain(moved));
-            self.step(&kernels.sort_scatter, bound, Size::of(sorting.groups));
+            self.step(&kernels["sort_scatter"], bound, Size::of(sorting.groups));
             self.uniforms.push(uniform);
         }
         Ok((passes % 2) as usize)

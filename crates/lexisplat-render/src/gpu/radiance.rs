@@ -54,25 +54,18 @@ pub(super) fn radiance_text(sh: &ShData<'_>, path: ShPath) -> String {
         }
         ShData::Codes(model) => {
             let dictionary = model.dictionary();
-            let entry = match path {
-                ShPath::SparseOrdered => concat!(
-                    include_str!("kernels/radiance_cached.wgsl"),
-                    include_str!("kernels/radiance_ordered.wgsl")
-                ),
-                ShPath::SparseShared => include_str!("kernels/radiance_shared.wgsl"),
-                ShPath::SparseTable => concat!(
-                    include_str!("kernels/radiance_table.wgsl"),
-                    include_str!("kernels/radiance_codes.wgsl")
-                ),
-                _ => concat!(
-                    include_str!("kernels/radiance_cached.wgsl"),
-                    include_str!("kernels/radiance_codes.wgsl")
-                ),
+            let (cached, coloured) =
+                (include_str!("kernels/radiance_cached.wgsl"), include_str!("kernels/radiance_codes.wgsl"));
+            let parts = match path {
+                ShPath::SparseOrdered => [cached, include_str!("kernels/radiance_ordered.wgsl")],
+                ShPath::SparseShared => ["", include_str!("kernels/radiance_shared.wgsl")],
+                ShPath::SparseTable => [include_str!("kernels/radiance_table.wgsl"), coloured],
+                _ => [cached, coloured],
             };
             let (index, value) = (model.codes().indices().width(), model.codes().values().width());
             let per_channel = dictionary.degree().rest_per_channel();
             let codes = codes.replace("// ATOM_TERMS", &atom_terms(per_channel));
-            let entry = entry.replace("// SHARED_TERMS", &shared_atom_terms(per_channel));
+            let entry = parts.concat().replace("// SHARED_TERMS", &shared_atom_terms(per_channel));
             format!(
                 "const INDEX_BYTES: u32 = {index}u;\nconst INDEX_MASK: u32 = {}u;\n\
                  const VALUE_BYTES: u32 = {value}u;\nconst ATOMS: u32 = {}u;\nconst DIM: u32 = {}u;\n\

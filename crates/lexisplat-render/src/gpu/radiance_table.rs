@@ -8,6 +8,7 @@
 use half::f16;
 use lexisplat::Dictionary;
 use lexisplat::sh::rest_basis;
+use wgpu::util::DeviceExt;
 
 use crate::error::{Error, Result};
 use crate::parallel::*;
@@ -15,17 +16,19 @@ use crate::parallel::*;
 use super::buffer::Counted;
 use super::constants::TABLE_SIDE;
 use super::device::Gpu;
-use super::shaders::Bound;
 
 /// Faces of a cube: +x, -x, +y, -y, +z, -z.
 const FACES: u32 = 6;
+/// Numbers of a texel: red, green, blue, and one that is not used.
+const TEXEL: usize = 4;
 
 /// The table on the GPU.
 #[derive(Debug)]
 pub(super) struct RadianceTable {
     pub(super) view: wgpu::TextureView,
     pub(super) sampler: wgpu::Sampler,
-    bytes: Counted,
+    /// Bytes of the texels.
+    pub(super) bytes: Counted,
 }
 
 impl RadianceTable {
@@ -39,7 +42,6 @@ impl RadianceTable {
             return Err(Error::parameter("dictionary", format!("{layers} atoms"), expected));
         }
         let size = wgpu::Extent3d { width: FACES * side, height: side, depth_or_array_layers: layers };
-        let texel = size_of::<[f16; 4]>();
         let descriptor = wgpu::TextureDescriptor {
             label: Some("atom radiance"),
             size,
@@ -50,22 +52,14 @@ impl RadianceTable {
             usage: wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST,
             view_formats: &[],
         };
-        let texture = gpu.checked("radiance table", || Ok(gpu.device().create_texture(&descriptor))).await?;
-        let texels: Vec<u16> = texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
-        let per_row = u32::try_from(texel).unwrap_or(0) * size.width;
-        if !dictionary.is_empty() {
-            gpu.queue().write_texture(
-                texture.as_image_copy(),
-                bytemuck::cast_slice(&texels),
-                wgpu::TexelCopyBufferLayout {
-                    offset: 0,
-                    bytes_per_row: Some(per_row),
-                    rows_per_image: Some(side),
-                },
-                size,
-            );
-        }
-        let bytes = gpu.count(u64::from(per_row) * u64::from(side) * u64::from(layers));
+        let mut texels: Vec<u16> = texels(dictionary).iter().flatten().map(|v| v.to_bits()).collect();
+        // An empty dictionary has a layer too.
+        texels.resize((FACES * side * side * layers) as usize * TEXEL, 0);
+        let data = bytemuck::cast_slice(&texels);
+        let make =
+            || Ok(gpu.device().create_texture_with_data(gpu.queue(), &descriptor, Default::default(), data));
+        let texture = gpu.checked("radiance table", make).await?;
+        let bytes = gpu.count(size_of_val(texels.as_slice()) as u64);
         let view = texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
             ..wgpu::TextureViewDescriptor::default()
@@ -78,14 +72,13 @@ impl RadianceTable {
         Ok(Self { view, sampler, bytes })
     }
 
-    /// Bytes of the texels.
-    pub(super) fn bytes(&self) -> u64 {
-        self.bytes.size()
-    }
-
     /// What is bound to the radiance kernel after the buffers.
-    pub(super) fn bound(&self) -> [(u32, Bound<'_>); 2] {
-        [(10, Bound::Texture(&self.view)), (11, Bound::Sampler(&self.sampler))]
+    pub(super) fn bound(&self) -> [wgpu::BindGroupEntry<'_>; 2] {
+        let entry = |binding, resource| wgpu::BindGroupEntry { binding, resource };
+        [
+            entry(10, wgpu::BindingResource::TextureView(&self.view)),
+            entry(11, wgpu::BindingResource::Sampler(&self.sampler)),
+        ]
     }
 }
 

@@ -15,7 +15,7 @@ use super::device::Gpu;
 use super::path::ShPath;
 use super::plan::{DrawStage, Plan, Shape, Size, dimensions};
 use super::scene::GpuScene;
-use super::shaders::Kernels;
+use super::shaders::{DRAWING, Kernels, kernels};
 use super::timestamps::Timestamps;
 use super::uniforms::FrameUniform;
 use super::work::{Capacity, ENTRY_ELEMENT, PIXEL, SLOT_ELEMENT, Work};
@@ -74,6 +74,8 @@ pub struct FrameStats {
 pub struct GpuRenderer {
     pub(super) gpu: Gpu,
     pub(super) kernels: Kernels,
+    /// Whether it also works out moments.
+    pub(super) measuring: bool,
     pub(super) work: Option<Work>,
     /// The plans of the last scenes and sizes, the latest last.
     pub(super) plans: Vec<Plan>,
@@ -133,7 +135,8 @@ impl GpuRenderer {
         };
         Ok(Self {
             gpu: gpu.clone(),
-            kernels: Kernels::new(gpu).await?,
+            kernels: kernels(gpu, &DRAWING).await?,
+            measuring: false,
             work: None,
             plans: Vec::new(),
             timestamps: Timestamps::new(gpu, MAX_TIMED).await?,
@@ -166,8 +169,7 @@ impl GpuRenderer {
         camera: &Camera,
         options: &RenderOptions,
     ) -> Result<(Image, FrameStats)> {
-        let gpu = self.gpu.clone();
-        gpu.block_on(self.render_async(scene, camera, options))
+        self.gpu.clone().block_on(self.render_async(scene, camera, options))
     }
 
     /// Draws `scene` as `camera` sees it and brings the picture back.
@@ -192,8 +194,7 @@ impl GpuRenderer {
     pub async fn read_async(&self, frame: &Frame) -> Result<Image> {
         let size = u64::from(frame.width) * u64::from(frame.height) * PIXEL;
         let back = self.gpu.checked("pixels back", || self.gpu.readable("pixels back", size)).await?;
-        let mut encoder =
-            self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.gpu.encoder();
         encoder.copy_buffer_to_buffer(&frame.pixels, 0, &back.raw, 0, size);
         self.gpu.queue().submit([encoder.finish()]);
         let pixels: Vec<[f32; 4]> = self.gpu.read(&back, size).await?;
@@ -207,8 +208,7 @@ impl GpuRenderer {
     /// As [`Self::draw_async`].
     #[cfg(not(target_family = "wasm"))]
     pub fn draw(&mut self, scene: &GpuScene, camera: &Camera, options: &RenderOptions) -> Result<Frame> {
-        let gpu = self.gpu.clone();
-        gpu.block_on(self.draw_async(scene, camera, options))
+        self.gpu.clone().block_on(self.draw_async(scene, camera, options))
     }
 
     /// Draws `scene` as `camera` sees it. The picture stays on the GPU.
@@ -236,11 +236,11 @@ impl GpuRenderer {
         loop {
             let shape = self.shape(scene, camera)?;
             self.make_room(scene, shape, None).await?;
-            let (frame, found) = self.attempt(scene, camera, options, degree, shape).await?;
+            let (mut frame, found) = self.attempt(scene, camera, options, degree, shape).await?;
             match self.missing(found, shape)? {
                 None => {
-                    let stats = FrameStats { retries, ..frame.stats };
-                    return Ok(Frame { stats, ..frame });
+                    frame.stats.retries = retries;
+                    return Ok(frame);
                 }
                 Some(Missing::Capacity { slots, entries }) => {
                     self.make_room(scene, shape, Some([slots, entries])).await?;
@@ -262,8 +262,7 @@ impl GpuRenderer {
         let line = u64::from(camera.width) * PIXEL * u64::from(tile);
         let fit = u32::try_from(self.limits.pixels / line).unwrap_or(u32::MAX);
         if fit == 0 {
-            let what = "bytes of a row of tiles".to_owned();
-            return Err(Error::GpuLimit { what, found: line, limit: self.limits.pixels });
+            return Err(Error::gpu_limit("bytes of a row of tiles", line, self.limits.pixels));
         }
         if self.cuts.len() > MAX_CUTS {
             self.cuts.clear();
@@ -303,7 +302,7 @@ impl GpuRenderer {
             // The old buffers are freed first, since both together may not fit.
             self.plans.clear();
             self.work = None;
-            self.work = Some(Work::new(&self.gpu, capacity, self.kernels.moments.is_some()).await?);
+            self.work = Some(Work::new(&self.gpu, capacity, self.measuring).await?);
         }
         Ok(())
     }
@@ -329,17 +328,10 @@ impl GpuRenderer {
             Some(place) => self.plans.remove(place),
             None => Plan::new(gpu, &self.kernels, scene, work, shape).await?,
         };
-        if self.plans.len() >= MAX_PLANS {
-            self.plans.remove(0);
-        }
-        self.plans.push(plan);
-        let Some(plan) = self.plans.last() else {
-            return Err(Error::Gpu { problem: "no plan".to_owned() });
-        };
         let uniform = frame_uniform(scene, camera, options, degree, shape, work.capacity);
         gpu.queue().write_buffer(&work.frame.raw, 0, bytemuck::bytes_of(&uniform));
 
-        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = gpu.encoder();
         encoder.clear_buffer(&work.counters.raw, 0, None);
         if let Some(moments) = &work.moments {
             encoder.clear_buffer(&moments.of_slots.raw, 0, None);
@@ -397,6 +389,10 @@ impl GpuRenderer {
             total,
         };
         let pixels = work.pixels.raw.clone();
+        if self.plans.len() >= MAX_PLANS {
+            self.plans.remove(0);
+        }
+        self.plans.push(plan);
         Ok((Frame { pixels, width: shape.width, height: shape.height, stats }, found))
     }
 
@@ -427,9 +423,9 @@ impl GpuRenderer {
             }
             // Moments are summed over bands by slot, so slots must be the same in all bands.
             let one = shape.bands_see && shape.band_rows == 1;
-            if one || self.kernels.moments.is_some() {
-                let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" }.to_owned();
-                return Err(Error::GpuLimit { what, found: slots.into(), limit: self.limits.slots });
+            if one || self.measuring {
+                let what = if one { "Gaussians in one row of tiles" } else { "Gaussians in view" };
+                return Err(Error::gpu_limit(what, slots, self.limits.slots));
             }
             return Ok(Some(Missing::Bands { see: true }));
         }
@@ -442,8 +438,8 @@ impl GpuRenderer {
                 }));
             }
             if shape.band_rows == 1 {
-                let what = "pairs of a Gaussian and a tile in one row of tiles".to_owned();
-                return Err(Error::GpuLimit { what, found: entries.into(), limit: self.limits.entries });
+                let what = "pairs of a Gaussian and a tile in one row of tiles";
+                return Err(Error::gpu_limit(what, entries, self.limits.entries));
             }
             return Ok(Some(Missing::Bands { see: false }));
         }
@@ -503,7 +499,7 @@ fn frame_uniform(
         forward: column(2),
         rows: shape.rows,
         position: camera.position,
-        antialiased: scene.antialiased().into(),
+        antialiased: scene.antialiased.into(),
         background: options.background,
         slots: capacity.slots,
         tangents: [size[0] / (2.0 * camera.fx), size[1] / (2.0 * camera.fy)],

@@ -45,7 +45,7 @@ pub struct GpuScene {
     path: ShPath,
     len: u32,
     degree: ShDegree,
-    antialiased: bool,
+    pub(super) antialiased: bool,
     bytes: SceneBytes,
     /// Those of the bytes for SH that all Gaussians share: dictionary and table.
     shared_bytes: u64,
@@ -83,33 +83,35 @@ impl GpuScene {
     /// 2^32 - 2; [`Error::Gpu`] if memory runs out.
     pub async fn new_async(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
         scene.validate()?;
-        let len =
-            u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| Error::GpuLimit {
-                what: "Gaussians of a scene on the GPU".to_owned(),
-                found: scene.len() as u64,
-                limit: u64::from(u32::MAX) - 1,
-            })?;
-        let model = match scene {
-            Scene::Sparse(model) => Some(*model),
-            Scene::Dense(_) => None,
-        };
-        let sh = match (path.is_sparse(), model) {
-            (false, _) => ShData::Dense { scene, half: path == ShPath::DenseF16 },
-            (true, Some(model)) => ShData::Codes(model),
-            (true, None) => {
+        let len = u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| {
+            let (found, limit) = (scene.len() as u64, u64::from(u32::MAX) - 1);
+            Error::gpu_limit("Gaussians of a scene on the GPU", found, limit)
+        })?;
+        let sh = match scene {
+            _ if !path.is_sparse() => ShData::Dense { scene, half: path == ShPath::DenseF16 },
+            Scene::Sparse(model) => ShData::Codes(model),
+            Scene::Dense(_) => {
                 return Err(Error::parameter("path", path.name(), "a compressed scene for a sparse path"));
             }
         };
-        let table = match (path, model) {
-            (ShPath::SparseTable, Some(model)) => Some(RadianceTable::new(gpu, model.dictionary()).await?),
+        let table = match (path, &sh) {
+            (ShPath::SparseTable, ShData::Codes(model)) => {
+                Some(RadianceTable::new(gpu, model.dictionary()).await?)
+            }
             _ => None,
         };
         let radiance = radiance_pipeline(gpu, &sh, path).await?;
+        let ranges = sh.chunks(scene.len(), gpu.max_binding())?;
+        // Numbers of Gaussians fit in 32 bits, as checked above.
+        let ends =
+            ranges.iter().map(|range| u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
+        let chunk_blocks: Vec<u32> = std::iter::once(0).chain(ends).collect();
+        let shared_bytes = table.as_ref().map_or(0, |table| table.bytes.size);
         let mut this = Self {
             id: NEXT_ID.fetch_add(1, Relaxed),
             lives: Arc::default(),
             chunks: Vec::new(),
-            chunk_blocks: gpu.upload::<u32>("chunk blocks", &[0]).await?,
+            chunk_blocks: gpu.upload("chunk blocks", &chunk_blocks).await?,
             radiance,
             bounds: None,
             gpu: gpu.clone(),
@@ -117,21 +119,18 @@ impl GpuScene {
             len,
             degree: scene.degree(),
             antialiased: scene.meta().antialiased,
-            bytes: SceneBytes { geometry: 0, sh: table.as_ref().map_or(0, |t| t.bytes()) },
-            shared_bytes: table.as_ref().map_or(0, |t| t.bytes()),
+            bytes: SceneBytes { geometry: 0, sh: shared_bytes },
+            shared_bytes,
             table,
         };
-        let mut chunk_blocks = vec![0];
         let mut nonzero = 0;
-        for range in sh.chunks(scene.len(), gpu.max_binding())? {
+        for range in ranges {
             this.add(scene.geometry(), &sh, range.clone(), nonzero).await?;
             if let ShData::Codes(model) = sh {
                 nonzero +=
                     model.codes().counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
             }
-            chunk_blocks.push(u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
         }
-        this.chunk_blocks = gpu.upload("chunk blocks", &chunk_blocks).await?;
         gpu.wait_async().await?;
         Ok(this)
     }
@@ -245,10 +244,6 @@ impl GpuScene {
     #[must_use]
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
-    }
-
-    pub(super) fn antialiased(&self) -> bool {
-        self.antialiased
     }
 
     pub(super) fn blocks(&self) -> u32 {

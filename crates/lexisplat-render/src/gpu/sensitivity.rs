@@ -8,9 +8,10 @@ use crate::camera::Camera;
 use crate::cpu::{Moments, Projection, RenderOptions, carry};
 use crate::error::{Error, Result};
 
-use super::moments::{MOMENTS_BYTES, MomentKernels, most_entries, most_slots};
+use super::moments::{MAX_BYTES, MOMENTS_BYTES};
 use super::renderer::{CapacityLimits, GpuRenderer};
 use super::scene::GpuScene;
+use super::shaders::{self, MEASURING};
 use super::work::WORD;
 
 impl GpuRenderer {
@@ -26,8 +27,7 @@ impl GpuRenderer {
         cameras: &[Camera],
         progress: &dyn Progress,
     ) -> Result<Sensitivity> {
-        let gpu = self.gpu.clone();
-        gpu.block_on(self.sensitivity_async(scene, geometry, cameras, progress))
+        self.gpu.clone().block_on(self.sensitivity_async(scene, geometry, cameras, progress))
     }
 
     /// Measures on the GPU what [`crate::sensitivity`] measures on the processor. `scene` was made of a scene
@@ -59,7 +59,7 @@ impl GpuRenderer {
             progress.check()?;
             let frame = measuring.draw_async(scene, camera, &RenderOptions::default()).await?;
             let (gaussians, moments) = measuring.read_moments(frame.stats.visible).await?;
-            let projection = Projection::new(camera, scene.antialiased());
+            let projection = Projection::new(camera, scene.antialiased);
             carry(&mut total, &projection, geometry, cameras.len(), &moments, |k| gaussians[k] as usize);
             progress.advance(1);
         }
@@ -73,15 +73,17 @@ impl GpuRenderer {
         self.plans.clear();
         self.work = None;
         let mut kernels = self.kernels.clone();
-        kernels.moments = Some(MomentKernels::new(&self.gpu).await?);
+        kernels.extend(shaders::kernels(&self.gpu, &MEASURING).await?);
+        let binding = self.gpu.max_binding();
         let limits = CapacityLimits {
-            slots: self.limits.slots.min(most_slots(&self.gpu)),
-            entries: self.limits.entries.min(most_entries(&self.gpu)),
+            slots: self.limits.slots.min(binding / MOMENTS_BYTES),
+            entries: self.limits.entries.min(binding.min(MAX_BYTES) / MOMENTS_BYTES),
             ..self.limits
         };
         Ok(Self {
             gpu: self.gpu.clone(),
             kernels,
+            measuring: true,
             work: None,
             plans: Vec::new(),
             timestamps: None,
@@ -97,8 +99,7 @@ impl GpuRenderer {
             return Ok((Vec::new(), Vec::new()));
         };
         let sizes = [u64::from(slots) * WORD, u64::from(slots) * MOMENTS_BYTES];
-        let mut encoder =
-            self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder = self.gpu.encoder();
         let (from, to) = (&work.gaussians.raw, &moments.gaussians_back.raw);
         encoder.copy_buffer_to_buffer(from, 0, to, 0, sizes[0]);
         let (from, to) = (&moments.of_slots.raw, &moments.of_slots_back.raw);

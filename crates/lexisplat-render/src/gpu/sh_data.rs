@@ -62,8 +62,7 @@ impl ShData<'_> {
             used = with(used);
             if !fits(used) {
                 let found = used.into_iter().max().unwrap_or(0);
-                let what = "bytes of 256 Gaussians on the GPU".to_owned();
-                return Err(Error::GpuLimit { what, found, limit });
+                return Err(Error::gpu_limit("bytes of 256 Gaussians on the GPU", found, limit));
             }
         }
         if start < len {

@@ -1,87 +1,57 @@
 //! Compiles kernels and binds buffers to them.
 
+use std::collections::HashMap;
+
 use crate::error::Result;
 
+use super::buffer::Buffer;
 use super::constants::declarations;
 use super::device::Gpu;
-use super::moments::MomentKernels;
 
-/// Every kernel but radiance, which depends on the scene.
-#[derive(Debug, Clone)]
-pub(super) struct Kernels {
-    pub(super) cull: wgpu::ComputePipeline,
-    pub(super) compact: wgpu::ComputePipeline,
-    pub(super) plan_slots: wgpu::ComputePipeline,
-    pub(super) plan_entries: wgpu::ComputePipeline,
-    pub(super) scan_reduce: wgpu::ComputePipeline,
-    pub(super) scan_spine: wgpu::ComputePipeline,
-    pub(super) scan_spread: wgpu::ComputePipeline,
-    pub(super) project: wgpu::ComputePipeline,
-    pub(super) sort_count: wgpu::ComputePipeline,
-    pub(super) sort_scatter: wgpu::ComputePipeline,
-    pub(super) count_tiles: wgpu::ComputePipeline,
-    pub(super) list_tiles: wgpu::ComputePipeline,
-    pub(super) find_ranges: wgpu::ComputePipeline,
-    pub(super) blend: wgpu::ComputePipeline,
-    /// There only while sensitivities are measured.
-    pub(super) moments: Option<MomentKernels>,
-}
+/// Kernels by the names of their entry points.
+pub(super) type Kernels = HashMap<&'static str, wgpu::ComputePipeline>;
+
+/// The name of a module, its entry points, and the parts of its text.
+pub(super) type ModuleText = (&'static str, &'static [&'static str], &'static [&'static str]);
 
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 const TILE: &str = include_str!("kernels/tile.wgsl");
 
-/// The texts of all kernels but radiance, by name.
-pub(super) const TEXTS: [(&str, &[&str]); 12] = [
-    ("cull", &[FRAME, include_str!("kernels/cull.wgsl")]),
-    ("compact", &[FRAME, include_str!("kernels/compact.wgsl")]),
-    ("plan", &[FRAME, include_str!("kernels/plan.wgsl")]),
-    ("scan", &[FRAME, include_str!("kernels/scan.wgsl")]),
-    ("project", &[FRAME, include_str!("kernels/project.wgsl")]),
-    ("sort", &[FRAME, include_str!("kernels/sort.wgsl")]),
-    ("tiles", &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")]),
-    ("ranges", &[FRAME, include_str!("kernels/ranges.wgsl")]),
-    ("blend", &[FRAME, TILE, include_str!("kernels/blend.wgsl")]),
-    ("slots_of_entries", &[FRAME, include_str!("kernels/slots_of_entries.wgsl")]),
-    ("moments", &[FRAME, TILE, include_str!("kernels/moments.wgsl")]),
-    ("gather_moments", &[FRAME, include_str!("kernels/gather_moments.wgsl")]),
+/// All kernels that drawing needs but radiance, which depends on the scene.
+pub(super) const DRAWING: [ModuleText; 9] = [
+    ("cull", &["cull"], &[FRAME, include_str!("kernels/cull.wgsl")]),
+    ("compact", &["compact"], &[FRAME, include_str!("kernels/compact.wgsl")]),
+    ("plan", &["plan_slots", "plan_entries"], &[FRAME, include_str!("kernels/plan.wgsl")]),
+    ("scan", &["scan_reduce", "scan_spine", "scan_spread"], &[FRAME, include_str!("kernels/scan.wgsl")]),
+    ("project", &["project"], &[FRAME, include_str!("kernels/project.wgsl")]),
+    ("sort", &["sort_count", "sort_scatter"], &[FRAME, include_str!("kernels/sort.wgsl")]),
+    (
+        "tiles",
+        &["count_tiles", "list_tiles"],
+        &[FRAME, include_str!("kernels/tiles.wgsl"), include_str!("kernels/list_tiles.wgsl")],
+    ),
+    ("ranges", &["find_ranges"], &[FRAME, include_str!("kernels/ranges.wgsl")]),
+    ("blend", &["blend"], &[FRAME, TILE, include_str!("kernels/blend.wgsl")]),
 ];
 
-impl Kernels {
-    /// Compiles them.
-    pub(super) async fn new(gpu: &Gpu) -> Result<Self> {
-        let alone = |name: &str, entry: &str| pipeline(gpu, &kernel(gpu, name), entry);
-        let make = || {
-            let [plan, scan, sort, tiles] = ["plan", "scan", "sort", "tiles"].map(|name| kernel(gpu, name));
-            Ok(Self {
-                cull: alone("cull", "cull"),
-                compact: alone("compact", "compact"),
-                plan_slots: pipeline(gpu, &plan, "plan_slots"),
-                plan_entries: pipeline(gpu, &plan, "plan_entries"),
-                scan_reduce: pipeline(gpu, &scan, "scan_reduce"),
-                scan_spine: pipeline(gpu, &scan, "scan_spine"),
-                scan_spread: pipeline(gpu, &scan, "scan_spread"),
-                project: alone("project", "project"),
-                sort_count: pipeline(gpu, &sort, "sort_count"),
-                sort_scatter: pipeline(gpu, &sort, "sort_scatter"),
-                count_tiles: pipeline(gpu, &tiles, "count_tiles"),
-                list_tiles: pipeline(gpu, &tiles, "list_tiles"),
-                find_ranges: alone("ranges", "find_ranges"),
-                blend: alone("blend", "blend"),
-                moments: None,
-            })
-        };
-        gpu.checked("kernels", make).await
-    }
+/// Kernels that only measuring sensitivities needs.
+pub(super) const MEASURING: [ModuleText; 3] = [
+    ("slots_of_entries", &["slots_of_entries"], &[FRAME, include_str!("kernels/slots_of_entries.wgsl")]),
+    ("moments", &["tile_moments"], &[FRAME, TILE, include_str!("kernels/moments.wgsl")]),
+    ("gather_moments", &["gather_moments"], &[FRAME, include_str!("kernels/gather_moments.wgsl")]),
+];
+
+/// Compiles all kernels of `modules`.
+pub(super) async fn kernels(gpu: &Gpu, modules: &[ModuleText]) -> Result<Kernels> {
+    let of_module = |(name, entries, parts): &ModuleText| {
+        let module = compile(gpu, name, &parts.concat());
+        entries.iter().map(move |&entry| (entry, pipeline(gpu, &module, entry)))
+    };
+    gpu.checked("kernels", || Ok(modules.iter().flat_map(of_module).collect())).await
 }
 
-/// The module of the kernel called `name`. What the device has against it is reported by the
-/// [`checked`](Gpu::checked) around it, as for [`compile`], [`pipeline`] and [`bind`].
-pub(super) fn kernel(gpu: &Gpu, name: &str) -> wgpu::ShaderModule {
-    let parts = TEXTS.iter().find(|(found, _)| *found == name).map_or(&[][..], |(_, parts)| parts);
-    compile(gpu, name, &parts.concat())
-}
-
-/// A module of `text` after the shared declarations.
+/// A module of `text` after the shared declarations. What the device has against it is reported by the
+/// [`checked`](Gpu::checked) around it, as for [`pipeline`] and [`bind`].
 pub(super) fn compile(gpu: &Gpu, name: &str, text: &str) -> wgpu::ShaderModule {
     let source = format!("{}\n{text}", declarations());
     gpu.device().create_shader_module(wgpu::ShaderModuleDescriptor {
@@ -106,43 +76,27 @@ pub(super) fn pipeline(gpu: &Gpu, module: &wgpu::ShaderModule, entry: &str) -> w
     })
 }
 
-/// What is bound to a kernel at one binding.
-pub(super) enum Bound<'a> {
-    /// All of a buffer.
-    All(&'a wgpu::Buffer),
-    /// A part of a buffer: its first byte, and the number of bytes.
-    Part(&'a wgpu::Buffer, u64, u64),
-    /// A texture.
-    Texture(&'a wgpu::TextureView),
-    /// A sampler for a texture.
-    Sampler(&'a wgpu::Sampler),
+/// Binds all of each buffer, the first at binding `first`, the others after it.
+pub(super) fn all_from<'a>(
+    first: u32,
+    buffers: impl IntoIterator<Item = &'a Buffer>,
+) -> impl Iterator<Item = wgpu::BindGroupEntry<'a>> {
+    let entry = |(binding, buffer): (u32, &'a Buffer)| wgpu::BindGroupEntry {
+        binding,
+        resource: buffer.raw.as_entire_binding(),
+    };
+    (first..).zip(buffers).map(entry)
 }
 
 /// Binds `entries` to the one group of `pipeline`.
 pub(super) fn bind<'a>(
     gpu: &Gpu,
     pipeline: &wgpu::ComputePipeline,
-    entries: impl IntoIterator<Item = (u32, Bound<'a>)>,
+    entries: impl IntoIterator<Item = wgpu::BindGroupEntry<'a>>,
 ) -> wgpu::BindGroup {
-    let entries: Vec<wgpu::BindGroupEntry<'_>> = entries
-        .into_iter()
-        .map(|(binding, bound)| wgpu::BindGroupEntry {
-            binding,
-            resource: match bound {
-                Bound::All(buffer) => buffer.as_entire_binding(),
-                Bound::Part(buffer, offset, size) => wgpu::BindingResource::Buffer(wgpu::BufferBinding {
-                    buffer,
-                    offset,
-                    size: std::num::NonZeroU64::new(size),
-                }),
-                Bound::Texture(view) => wgpu::BindingResource::TextureView(view),
-                Bound::Sampler(sampler) => wgpu::BindingResource::Sampler(sampler),
-            },
-        })
-        .collect();
     gpu.device().create_bind_group(&wgpu::BindGroupDescriptor {
         label: None,
         layout: &pipeline.get_bind_group_layout(0),
-        entries: &entries,
+        entries: &entries.into_iter().collect::<Vec<_>>(),
     })
 }

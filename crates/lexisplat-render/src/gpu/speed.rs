@@ -7,7 +7,7 @@ use crate::error::Result;
 use super::constants::{GROUP, MULTIPLY_ADDS};
 use super::device::Gpu;
 use super::plan::dimensions;
-use super::shaders::{Bound, bind, compile, pipeline};
+use super::shaders::{all_from, bind, compile, pipeline};
 use super::timestamps::Timestamps;
 
 /// Measured rates of a GPU.
@@ -52,9 +52,9 @@ pub async fn measure_speed_async(gpu: &Gpu) -> Result<Speed> {
         let module = compile(gpu, "speed", include_str!("kernels/speed.wgsl"));
         let (from, to) = (gpu.storage("from", size)?, gpu.storage("to", size)?);
         let copy = pipeline(gpu, &module, "copy_vectors");
-        let copied = bind(gpu, &copy, [(0, Bound::All(&from.raw)), (1, Bound::All(&to.raw))]);
+        let copied = bind(gpu, &copy, all_from(0, [&from, &to]));
         let work = pipeline(gpu, &module, "multiply_add");
-        let worked = bind(gpu, &work, [(1, Bound::All(&to.raw))]);
+        let worked = bind(gpu, &work, all_from(1, [&to]));
         Ok([(copy, copied), (work, worked)])
     };
     let [(copy, copied), (work, worked)] = gpu.checked("speed", make).await?;
@@ -87,38 +87,32 @@ impl Stopwatch<'_> {
         bound: &wgpu::BindGroup,
         groups: u32,
     ) -> Result<f64> {
+        let gpu = self.gpu;
+        let (x, y) = dimensions(groups);
         let mut best = f64::INFINITY;
         for _ in 0..TIMES {
-            best = best.min(self.run(pipeline, bound, groups).await?);
-        }
-        Ok(best)
-    }
-
-    async fn run(
-        &self,
-        pipeline: &wgpu::ComputePipeline,
-        bound: &wgpu::BindGroup,
-        groups: u32,
-    ) -> Result<f64> {
-        let gpu = self.gpu;
-        let mut encoder = gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        {
             let timestamp_writes = self.timestamps.as_ref().and_then(|timestamps| timestamps.writes(0));
+            let mut encoder = gpu.encoder();
             let mut pass =
                 encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label: None, timestamp_writes });
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, bound, &[]);
-            let (x, y) = dimensions(groups);
             pass.dispatch_workgroups(x, y, 1);
+            drop(pass);
+            if let Some(timestamps) = &self.timestamps {
+                timestamps.resolve(&mut encoder, 1);
+            }
+            let clock = Instant::now();
+            gpu.queue().submit([encoder.finish()]);
+            gpu.wait_async().await?;
+            let seconds = match &self.timestamps {
+                None => clock.elapsed().as_secs_f64(),
+                Some(timestamps) => {
+                    timestamps.read(gpu, 1).await?.first().map_or(0.0, |[start, end]| end - start) / 1e3
+                }
+            };
+            best = best.min(seconds);
         }
-        if let Some(timestamps) = &self.timestamps {
-            timestamps.resolve(&mut encoder, 1);
-        }
-        let clock = Instant::now();
-        gpu.queue().submit([encoder.finish()]);
-        gpu.wait_async().await?;
-        let Some(timestamps) = &self.timestamps else { return Ok(clock.elapsed().as_secs_f64()) };
-        let milliseconds = timestamps.read(gpu, 1).await?.first().map_or(0.0, |[start, end]| end - start);
-        Ok(milliseconds / 1e3)
+        Ok(best)
     }
 }

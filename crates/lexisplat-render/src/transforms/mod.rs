@@ -18,7 +18,6 @@ use std::collections::HashSet;
 use crate::camera::{Camera, Split};
 use crate::cameras_json::{MAX_NAME, whole};
 use crate::error::{Error, Result};
-use crate::orbit::single;
 use crate::view_files::ViewFiles;
 use crate::view_set::{PrincipalPoints, SizeOf, ViewSet};
 use file::{Frame, Lens, Transforms};
@@ -42,7 +41,7 @@ pub(crate) fn is_nerf<F: ViewFiles + ?Sized>(files: &F) -> bool {
 /// Every camera is marked with its split. These files name no size, so `size_of` has to know it.
 ///
 /// # Errors
-/// [`Error::Io`] if a file cannot be read; otherwise as [`read_transforms_bytes`].
+/// [`lexisplat::Error::Io`] if a file cannot be read; otherwise as [`read_transforms_bytes`].
 pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) -> Result<ViewSet> {
     let mut all = ViewSet::default();
     for (index, (file, split)) in NERF_FILES.into_iter().enumerate() {
@@ -67,7 +66,7 @@ pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<
 /// as test, as in nerfstudio's own evaluation.
 ///
 /// # Errors
-/// [`Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
+/// [`lexisplat::Error::Format`] naming the frame and the field, if the text is no such object, a value is out of
 /// range, a size is not known, the lens is not a pinhole's, or it is over [`crate::MAX_CAMERAS_BYTES`] or
 /// [`crate::MAX_CAMERAS`].
 pub fn read_transforms_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
@@ -115,25 +114,17 @@ fn camera(
             "the file has no 'w' and 'h', and the photo that would tell the size is not known; name the folder of the photos",
         )?,
     };
-    let (along_x, along_y) = (frame.lens.focal_x(width)?, frame.lens.focal_y(height)?);
-    let (all_x, all_y) = (global.focal_x(width)?, global.focal_y(height)?);
+    let (along_x, along_y) = (frame.lens.focal(0, width)?, frame.lens.focal(1, height)?);
+    let (all_x, all_y) = (global.focal(0, width)?, global.focal(1, height)?);
     let fx = along_x
         .or(all_x)
         .ok_or("neither 'fl_x' nor 'camera_angle_x' is there, so its focal length is not known")?;
     // A frame's own focal length is not mixed with the file's for the other axis.
     let fy = along_y.or(if along_x.is_some() { None } else { all_y }).unwrap_or(fx);
     let [right, up, back, position] = frame.columns()?;
-    let rotation = std::array::from_fn(|row| [right[row], -up[row], -back[row]].map(single));
-    let camera = Camera {
-        name: frame.path.clone(),
-        width,
-        height,
-        fx: single(fx),
-        fy: single(fy),
-        position: position.map(single),
-        rotation,
-        split,
-    };
+    let rotation = std::array::from_fn(|row| [right[row], -up[row], -back[row]]);
+    let camera = Camera::rounded(frame.path.clone(), [width, height], [fx, fy], position, rotation);
+    let camera = Camera { split, ..camera };
     camera.validate().map_err(|e| e.to_string())?;
     let centre = [(frame.lens.cx.or(global.cx), width), (frame.lens.cy.or(global.cy), height)];
     points.see(centre.map(|(at, side)| at.unwrap_or(f64::from(side) / 2.0)), width, height);

@@ -108,7 +108,7 @@ fn errors_name_the_frame_and_the_field() {
     for text in
         ["", "[]", "{}", "{\"frames\": 1}", "{\"frames\": [{}]}", "{\"frames\": []} x", "{\"frames\": [1]}"]
     {
-        assert!(matches!(parse(text), Err(Error::Format { .. })), "{text}");
+        assert!(matches!(parse(text), Err(Error::Codec(lexisplat::Error::Format { .. }))), "{text}");
     }
     assert!(parse("{\"frames\": []}").unwrap().cameras.is_empty());
 }

@@ -3,7 +3,7 @@
 use lexisplat::ShDegree;
 
 use super::super::renderer::CapacityLimits;
-use super::super::{FrameStats, Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use super::super::{FrameStats, Gpu, GpuRenderer, GpuScene, ShPath};
 use super::{adapter, bits, gpu, made};
 use crate::camera::Camera;
 use crate::cpu::RenderOptions;
@@ -96,7 +96,7 @@ fn a_fuller_view_is_tried_again_once() {
 
 #[test]
 fn bytes_are_counted_and_given_back() {
-    let Some(gpu) = adapter::opened(Gpu::open(GpuChoice::Best)) else { return };
+    let Some(gpu) = adapter::opened(adapter::best()) else { return };
     assert_eq!((gpu.bytes(), gpu.most_bytes()), (0, 0));
     let model = made::model(ShDegree::THREE, 90, true);
     for path in ShPath::ALL {

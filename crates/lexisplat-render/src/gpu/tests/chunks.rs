@@ -4,10 +4,11 @@ use lexisplat::ShDegree;
 
 use super::super::constants::GROUP;
 use super::super::sh_data::ShData;
-use super::super::{Gpu, GpuChoice, GpuRenderer, GpuScene, ShPath};
+use super::super::{Gpu, GpuRenderer, GpuScene, ShPath};
 use super::{adapter, bits, gpu, made};
 use crate::cpu::RenderOptions;
 use crate::error::Error;
+use crate::renderer::Device;
 use crate::scene::Scene;
 
 /// Bytes of an atom or exact row: 15 coefficients of three channels fill twelve vectors.
@@ -15,11 +16,8 @@ const ROW: u64 = 192;
 
 /// A GPU whose kernels see only `binding` bytes at once.
 fn narrow(binding: u64) -> Option<Gpu> {
-    let reduced = Gpu::find_with(GpuChoice::Best, |limits| limits.max_storage_buffer_binding_size = binding);
-    adapter::opened(
-        pollster::block_on(reduced)
-            .and_then(|gpu| gpu.ok_or_else(|| Error::Gpu { problem: "there is no adapter".to_owned() })),
-    )
+    let reduced = Device::Gpu.open_gpu_with(|limits| limits.max_storage_buffer_binding_size = binding);
+    adapter::opened(pollster::block_on(reduced).map(Option::unwrap))
 }
 
 #[test]

@@ -7,7 +7,7 @@
 
 use super::super::constants::{COUNTERS, GROUP, SCAN_BLOCK, SORT_BLOCK};
 use super::super::plan::dimensions;
-use super::super::shaders::Kernels;
+use super::super::shaders::{DRAWING, Kernels, kernels};
 use super::super::tests::{Random, gpu};
 use super::super::uniforms::FrameUniform;
 use super::super::work::{Capacity, Work};
@@ -25,7 +25,7 @@ impl Bench {
         let capacity = Capacity { blocks: slots, chunks: 0, slots, entries: slots, tiles: 1, pixels: 1 };
         Self {
             gpu: gpu.clone(),
-            kernels: gpu.block_on(Kernels::new(gpu)).unwrap(),
+            kernels: gpu.block_on(kernels(gpu, &DRAWING)).unwrap(),
             work: gpu.block_on(Work::new(gpu, capacity, false)).unwrap(),
         }
     }
@@ -72,7 +72,7 @@ impl Bench {
         let frame = FrameUniform { slots: work.capacity.slots, ..FrameUniform::default() };
         self.gpu.block_on(self.gpu.write(&work.frame, bytemuck::bytes_of(&frame))).unwrap();
         let bound = [&work.frame, &work.starts, &work.masks, &work.counters, &work.dispatches];
-        planner.step(&self.kernels.plan_slots, all_from(0, bound), Size::Groups(1));
+        planner.step(&self.kernels["plan_slots"], all_from(0, bound), Size::Groups(1));
     }
 }
 
@@ -107,7 +107,7 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     let mut planner = bench.planner();
     let work = &bench.work;
     let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
-    planner.step(&bench.kernels.compact, all_from(0, bound), Size::Groups(blocks));
+    planner.step(&bench.kernels["compact"], all_from(0, bound), Size::Groups(blocks));
     bench.run(&planner.steps);
     let found: Vec<u32> = gpu.read_back(&work.gaussians);
     assert!(found[..marked.len()] == marked);
