@@ -9,7 +9,9 @@ use anyhow::Result;
 use lexisplat::output::{Existing, Output, OutputGroup};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input, Sink};
-use lexisplat_eval::SceneFile;
+use lexisplat_eval::{SceneFile, png};
+use lexisplat_render::Image;
+use serde::Serialize;
 
 use crate::args::Common;
 use crate::exit::{Misuse, OutputExists};
@@ -54,7 +56,16 @@ pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
 
 /// Returns the output of a command that turns the scene `input` into a file of the kind `extension`: `output` if
 /// it is given, otherwise the input's name with that extension.
-pub(crate) fn output_path(input: &Path, output: Option<&Path>, extension: &str) -> Result<PathBuf> {
+pub(crate) fn output_path(
+    input: &Path,
+    output: Option<&Path>,
+    extension: &str,
+    common: &Common,
+) -> Result<PathBuf> {
+    if common.json && is_pipe(output.unwrap_or(input)) {
+        let expected = "a file: with --json standard output carries the report";
+        return Err(Error::parameter("output", "-", expected).into());
+    }
     let Some(path) = output else {
         let path = if is_pipe(input) { input.to_owned() } else { input.with_extension(extension) };
         return if path == input && !is_pipe(input) { Err(already(input, extension)) } else { Ok(path) };
@@ -171,6 +182,11 @@ pub(crate) fn write_bytes(path: &Path, bytes: &[u8], overwrite: bool) -> Result<
     })?)
 }
 
+/// Writes `image` as a PNG file.
+pub(crate) fn write_picture(path: &Path, image: &Image, overwrite: bool) -> Result<()> {
+    write_bytes(path, &png(image.width, image.height, &image.to_8bit())?, overwrite)
+}
+
 /// Lets `write` write an output: a file, or standard output. Returns what `write` does.
 pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     output: &Path,
@@ -190,20 +206,15 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     Ok(done)
 }
 
-/// Tells what was done: as JSON or text on standard output, as text on standard error if standard output carries
-/// `output`, or not at all.
+/// Tells what was done, as JSON or as text on standard output, or not at all.
 pub(crate) fn tell(
     common: &Common,
-    output: &Path,
-    json: impl FnOnce() -> Result<serde_json::Value>,
+    json: impl Serialize,
     text: impl FnOnce() -> Result<String>,
 ) -> Result<()> {
     if common.json {
-        print_json(&json()?)
+        print_json(&serde_json::to_value(json)?)
     } else if common.quiet {
-        Ok(())
-    } else if is_pipe(output) {
-        text()?.lines().for_each(note);
         Ok(())
     } else {
         print(&text()?)

@@ -3,6 +3,7 @@
 //! Every view is drawn repeatedly after a warm-up, and only drawing is timed, as the field does (INRIA
 //! `gaussian-splatting` issues 349 and 351). A GPU is timed by its own time stamps.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use lexisplat::{Model, Progress, Stage};
@@ -33,7 +34,7 @@ impl BenchOptions {
 }
 
 /// Median, tenth and ninetieth percentile, in milliseconds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Spread {
     /// Half of the values are below.
     pub median: f64,
@@ -58,7 +59,7 @@ impl Spread {
 }
 
 /// Times and bytes of one way to hold the scene.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[non_exhaustive]
 pub struct PathTimes {
     /// `dense-f32`, `sparse` and so on; on the processor `cpu-dense` or `cpu-sparse`.
@@ -67,10 +68,10 @@ pub struct PathTimes {
     pub frame: Spread,
     /// Frames in a second: views over the sum of their mean times.
     pub fps: f64,
-    /// Milliseconds of each stage.
-    pub stages: Vec<(String, Spread)>,
+    /// Milliseconds of each stage, by name.
+    pub stages: BTreeMap<String, Spread>,
     /// Milliseconds of each view, by name.
-    pub views: Vec<(String, Spread)>,
+    pub views: BTreeMap<String, Spread>,
     /// Gaussians shaded, on average over views.
     pub visible: f64,
     /// Pairs of a Gaussian and a tile, on average over views; 0 on the processor.
@@ -91,7 +92,7 @@ impl PathTimes {
     /// Returns the median milliseconds of the stage `name`, or 0 if there is none.
     #[must_use]
     pub fn stage(&self, name: &str) -> f64 {
-        self.stages.iter().find(|(found, _)| found == name).map_or(0.0, |(_, spread)| spread.median)
+        self.stages.get(name).map_or(0.0, |spread| spread.median)
     }
 
     /// Returns the bytes in a second that the radiance stage moved.
@@ -122,8 +123,8 @@ fn run(
         return Err(Error::parameter("cameras", "none", "at least one view"));
     }
     let mut all = Vec::new();
-    let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
-    let mut views = Vec::new();
+    let mut stages: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+    let mut views = BTreeMap::new();
     let (mut means, mut visible, mut entries) = (0.0, 0.0, 0.0);
     progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {
@@ -136,16 +137,13 @@ fn run(
             let sample = frame(camera)?;
             times.push(sample.total);
             for (name, time) in sample.stages {
-                match stages.iter_mut().find(|(found, _)| *found == name) {
-                    Some((_, list)) => list.push(time),
-                    None => stages.push((name, vec![time])),
-                }
+                stages.entry(name).or_default().push(time);
             }
             (visible, entries) = (visible + sample.visible, entries + sample.entries);
         }
         means += times.iter().sum::<f64>() / times.len() as f64;
         all.extend_from_slice(&times);
-        views.push((camera.name.clone(), Spread::of(times)));
+        views.insert(camera.name.clone(), Spread::of(times));
         progress.advance(1);
     }
     progress.end();
@@ -158,11 +156,7 @@ fn run(
         views,
         visible: visible / frames,
         entries: entries / frames,
-        geometry_bytes: 0,
-        sh_bytes: 0,
-        shading_bytes: 0.0,
-        shading_bytes_per_frame: 0.0,
-        geometry_bytes_per_frame: 0.0,
+        ..PathTimes::default()
     })
 }
 
@@ -318,7 +312,7 @@ mod tests {
         assert_eq!(times.sh_bytes, 500 * 192);
         assert!(times.visible > 10.0 && times.visible <= 500.0);
         assert!(times.frame.p10 <= times.frame.median && times.frame.median <= times.frame.p90);
-        let stages: f64 = times.stages.iter().map(|(_, spread)| spread.median).sum();
+        let stages: f64 = times.stages.values().map(|spread| spread.median).sum();
         assert!(stages > 0.0 && times.fps > 0.0);
         assert!(bench_cpu(&Scene::from(&splats), &[], &BenchOptions::new(0, 1), &Silent).is_err());
     }

@@ -64,7 +64,13 @@ pub struct Summary {
     pub max: Option<f64>,
 }
 
+/// The name of a part of a summary, and how to get it.
+type Part = (&'static str, fn(&Summary) -> Option<f64>);
+
 impl Summary {
+    /// The names of the parts, and how to get them.
+    pub const PARTS: [Part; 3] = [("mean", |s| s.mean), ("minimum", |s| s.min), ("maximum", |s| s.max)];
+
     /// Returns the summary of `values`.
     #[must_use]
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {

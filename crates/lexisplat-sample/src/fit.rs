@@ -1,6 +1,6 @@
 //! SH coefficients of a colour that depends on the direction, by least squares.
 
-use crate::math::{GOLDEN_TURN, Vec3, sin_cos_turns};
+use crate::math::{GOLDEN_TURN, Vec3, dvec3, sin_cos_turns};
 use crate::random::Random;
 use lexisplat::ShDegree;
 use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET, rest_basis};
@@ -28,9 +28,9 @@ impl Fit {
             let y = 1.0 - 2.0 * (f64::from(k) + 0.5) / f64::from(DIRECTIONS);
             let level = (1.0 - y * y).sqrt();
             let (sin, cos) = sin_cos_turns(f64::from(k) * GOLDEN_TURN);
-            let direction = [level * cos, y, level * sin];
+            let direction = dvec3(level * cos, y, level * sin);
             #[expect(clippy::cast_possible_truncation, reason = "the basis is f32 by design")]
-            let rest = rest_basis(ShDegree::THREE, direction.map(|v| v as f32));
+            let rest = rest_basis(ShDegree::THREE, direction.to_array().map(|v| v as f32));
             let mut row = [f64::from(C0); COEFFICIENTS];
             for (value, rest) in row[1..].iter_mut().zip(rest) {
                 *value = f64::from(rest);
@@ -46,7 +46,7 @@ impl Fit {
     pub(crate) fn project(&self, colour: impl Fn(Vec3) -> Vec3) -> ([f64; CHANNELS], [f64; REST]) {
         let mut sums = [[0.0; COEFFICIENTS]; CHANNELS];
         for (direction, weights) in self.directions.iter().zip(&self.weights) {
-            let value = colour(*direction);
+            let value = colour(*direction).to_array();
             for (sums, value) in sums.iter_mut().zip(value) {
                 let value = value - f64::from(COLOUR_OFFSET);
                 for (sum, weight) in sums.iter_mut().zip(weights) {
@@ -114,11 +114,12 @@ mod tests {
         let coefficient = |c: usize, k: usize| (c as f64 + 1.0) * (k as f64 - 6.5) / 40.0;
         let colour = |d: Vec3| {
             #[expect(clippy::cast_possible_truncation, reason = "the basis is f32 by design")]
-            let basis = rest_basis(ShDegree::THREE, d.map(|v| v as f32));
-            std::array::from_fn(|c| {
+            let basis = rest_basis(ShDegree::THREE, d.to_array().map(|v| v as f32));
+            let channel = |c: usize| {
                 let rest: f64 = (0..15).map(|k| f64::from(basis[k]) * coefficient(c, k + 1)).sum();
                 0.5 + f64::from(C0) * coefficient(c, 0) + rest
-            })
+            };
+            Vec3::from([0, 1, 2].map(channel))
         };
         let (dc, rest) = Fit::new().project(colour);
         for c in 0..3 {

@@ -1,7 +1,7 @@
 //! The studio: its lamps, the bodies that block light, and the light that leaves a surface.
 
 use crate::material::{Material, Surface};
-use crate::math::{Vec3, add, dot, frame, mix, mul, norm, scale, smoothstep, spiral, sub, unit};
+use crate::math::{Vec3, dvec3, frame, mix, smoothstep, spiral};
 use crate::random::Random;
 use crate::shapes::{UP, block_axes, reflect};
 
@@ -79,7 +79,11 @@ pub(crate) struct Lit<'a> {
 
 impl Studio {
     pub(crate) fn new(bodies: Vec<(Body, &Material)>) -> Self {
-        let lamp = |to, colour, width| Lamp { to: unit(to), colour, width };
+        let lamp = |to: [f64; 3], colour: [f64; 3], width| Lamp {
+            to: Vec3::from(to).normalize(),
+            colour: colour.into(),
+            width,
+        };
         Self {
             bodies: bodies.into_iter().map(|(body, material)| (body, material.mean())).collect(),
             lamps: [
@@ -93,27 +97,27 @@ impl Studio {
 
     /// Returns the light of the studio's wall in `direction`: the colours of dusk, by height.
     pub(crate) fn wall(direction: Vec3) -> Vec3 {
-        let height = dot(direction, UP);
-        let low = mix([0.012, 0.022, 0.045], [0.10, 0.15, 0.22], smoothstep(-0.9, -0.05, height));
-        let high = mix(low, [0.52, 0.40, 0.34], smoothstep(-0.25, 0.18, height));
-        let top = mix(high, [0.09, 0.17, 0.34], smoothstep(0.1, 0.75, height));
+        let height = direction.dot(UP);
+        let low = mix(dvec3(0.012, 0.022, 0.045), dvec3(0.10, 0.15, 0.22), smoothstep(-0.9, -0.05, height));
+        let high = mix(low, dvec3(0.52, 0.40, 0.34), smoothstep(-0.25, 0.18, height));
+        let top = mix(high, dvec3(0.09, 0.17, 0.34), smoothstep(0.1, 0.75, height));
         // One side is warmer, so that a turn of the camera shows.
-        let warm = smoothstep(-0.4, 1.0, direction[0] * 0.8 - direction[2] * 0.6);
-        mul(top, mix([0.8, 0.95, 1.15], [1.25, 1.0, 0.85], warm))
+        let warm = smoothstep(-0.4, 1.0, direction.x * 0.8 - direction.z * 0.6);
+        top * mix(dvec3(0.8, 0.95, 1.15), dvec3(1.25, 1.0, 0.85), warm)
     }
 
     /// Returns the light of lamps and wall from `direction`, blurred by `roughness`. `seen` and `open` are the visible
     /// shares.
     fn surroundings(&self, direction: Vec3, roughness: f64, seen: &[f64; 4], open: f64) -> Vec3 {
         let spread = roughness * roughness;
-        let mut light = scale(Self::wall(direction), open);
+        let mut light = Self::wall(direction) * open;
         for (lamp, &seen) in self.lamps.iter().zip(seen) {
             let width = lamp.width + 0.5 * spread;
-            let off = (1.0 - dot(direction, lamp.to)) / width;
+            let off = (1.0 - direction.dot(lamp.to)) / width;
             // A lamp that lights a white surface facing it to 1 sends pi into a solid angle of 2 pi width PROFILE.
             // Roughness widens the lamp and does not change its light.
             let strength = 0.5 / (PROFILE * width);
-            light = add(light, scale(lamp.colour, seen * strength / ((1.0 + off * off) * (1.0 + off))));
+            light += lamp.colour * (seen * strength / ((1.0 + off * off) * (1.0 + off)));
         }
         light
     }
@@ -137,11 +141,11 @@ impl Studio {
 
     /// Estimates the diffuse light that leaves a surface, as if nothing blocked the lamps and the wall.
     fn rough_guess(&self, normal: Vec3, albedo: Vec3) -> Vec3 {
-        let mut light = scale(Self::wall(normal), 0.5);
+        let mut light = Self::wall(normal) * 0.5;
         for lamp in &self.lamps {
-            light = add(light, scale(lamp.colour, 0.55 * dot(normal, lamp.to).max(0.0)));
+            light += lamp.colour * (0.55 * normal.dot(lamp.to).max(0.0));
         }
-        mul(light, albedo)
+        light * albedo
     }
 
     /// Lights the point of `surface` at `position`.
@@ -152,28 +156,24 @@ impl Studio {
         surface: Surface,
         random: &mut Random,
     ) -> Lit<'_> {
-        let origin = add(position, scale(normal, LIFT));
+        let origin = position + normal * LIFT;
         let (side, other) = frame(normal);
-        let mut light = [0.0; 3];
+        let mut light = Vec3::ZERO;
         let mut open = 0.0;
         let turn = random.uniform();
         // The directions are cosine-weighted.
         for (share, sin, cos) in spiral(turn, GATHER_RAYS) {
             let flat = share.sqrt();
-            let direction = add(
-                add(scale(side, flat * cos), scale(other, flat * sin)),
-                scale(normal, (1.0 - share).sqrt()),
-            );
-            let from = match self.hit(origin, direction) {
-                Some((_, n, colour)) => scale(self.rough_guess(n, colour), BOUNCE),
+            let direction = side * (flat * cos) + other * (flat * sin) + normal * (1.0 - share).sqrt();
+            light += match self.hit(origin, direction) {
+                Some((_, n, colour)) => self.rough_guess(n, colour) * BOUNCE,
                 None => {
                     open += 1.0;
                     Self::wall(direction)
                 }
             };
-            light = add(light, from);
         }
-        light = scale(light, 1.0 / GATHER_RAYS as f64);
+        light *= 1.0 / GATHER_RAYS as f64;
         open /= GATHER_RAYS as f64;
         let mut seen = [0.0; 4];
         for (lamp, seen) in self.lamps.iter().zip(&mut seen) {
@@ -182,16 +182,16 @@ impl Studio {
             let mut sum = 0.0;
             for (share, sin, cos) in spiral(turn, SHADOW_RAYS) {
                 let flat = (2.0 * lamp.width * share).sqrt();
-                let to = add(lamp.to, add(scale(side, flat * cos), scale(other, flat * sin)));
-                let facing = dot(normal, to);
-                if facing > 0.0 && !self.blocked(origin, unit(to)) {
+                let to = lamp.to + (side * (flat * cos) + other * (flat * sin));
+                let facing = normal.dot(to);
+                if facing > 0.0 && !self.blocked(origin, to.normalize()) {
                     sum += 1.0;
-                    light = add(light, scale(lamp.colour, facing / SHADOW_RAYS as f64));
+                    light += lamp.colour * (facing / SHADOW_RAYS as f64);
                 }
             }
             *seen = sum / SHADOW_RAYS as f64;
         }
-        let diffuse = mul(light, surface.albedo);
+        let diffuse = light * surface.albedo;
         Lit { studio: self, position: origin, normal, surface, diffuse, seen, open }
     }
 }
@@ -200,15 +200,14 @@ impl Lit<'_> {
     /// Returns the display colour, 0 to 1, seen by a viewer in the unit direction `to_viewer`. The back of the surface
     /// shows the mirror image of its front, so that the colour is continuous.
     pub(crate) fn colour(&self, to_viewer: Vec3) -> Vec3 {
-        let facing = dot(to_viewer, self.normal);
-        let to_viewer =
-            if facing < 0.0 { sub(to_viewer, scale(self.normal, 2.0 * facing)) } else { to_viewer };
+        let facing = to_viewer.dot(self.normal);
+        let to_viewer = if facing < 0.0 { to_viewer - self.normal * (2.0 * facing) } else { to_viewer };
         let facing = facing.abs();
         let Surface { mirror, roughness, .. } = self.surface;
         // Schlick's Fresnel term, reduced on rough surfaces.
         let grazing = (1.0 - facing) * (1.0 - facing);
         let grazing = grazing * grazing * (1.0 - facing) * (1.0 - roughness) * (1.0 - roughness);
-        let strength = mix(mirror, [1.0; 3], grazing);
+        let strength = mix(mirror, Vec3::ONE, grazing);
         let direction = reflect(to_viewer, self.normal);
         let traced = roughness < TRACED_ROUGHNESS;
         let hit = if traced { self.studio.hit(self.position, direction) } else { None };
@@ -219,7 +218,7 @@ impl Lit<'_> {
                 self.studio.surroundings(direction, roughness, &self.seen, open)
             }
         };
-        tone(add(mul(self.diffuse, sub([1.0; 3], strength)), mul(reflected, strength)))
+        tone(self.diffuse * (Vec3::ONE - strength) + reflected * strength)
     }
 }
 
@@ -234,14 +233,14 @@ pub(crate) fn tone(light: Vec3) -> Vec3 {
 
 /// Returns the distance to a ball on a ray, and the normal there.
 fn hit_ball(origin: Vec3, direction: Vec3, centre: Vec3, radius: f64) -> Option<(f64, Vec3)> {
-    let to = sub(centre, origin);
-    let along = dot(to, direction);
-    let off = dot(to, to) - along * along;
+    let to = centre - origin;
+    let along = to.dot(direction);
+    let off = to.dot(to) - along * along;
     if along < 0.0 || off > radius * radius {
         return None;
     }
     let t = along - (radius * radius - off).sqrt();
-    (t > 0.0).then(|| (t, unit(sub(scale(direction, t), to))))
+    (t > 0.0).then(|| (t, (direction * t - to).normalize()))
 }
 
 impl Body {
@@ -249,33 +248,33 @@ impl Body {
         match self {
             Self::Ball { centre, radius } => hit_ball(origin, direction, *centre, *radius),
             Self::Beads { centre, bound, beads, radius } => {
-                let to = sub(*centre, origin);
-                let along = dot(to, direction);
-                let apart = dot(to, to) - bound * bound;
+                let to = *centre - origin;
+                let along = to.dot(direction);
+                let apart = to.dot(to) - bound * bound;
                 // The ray starts outside of the bound and does not enter it.
-                if apart > 0.0 && (along < 0.0 || dot(to, to) - along * along > bound * bound) {
+                if apart > 0.0 && (along < 0.0 || to.dot(to) - along * along > bound * bound) {
                     return None;
                 }
                 let hits = beads.iter().filter_map(|bead| hit_ball(origin, direction, *bead, *radius));
                 hits.min_by(|a, b| a.0.total_cmp(&b.0))
             }
             Self::Disc { centre, radius } => {
-                let t = (centre[1] - origin[1]) / direction[1];
-                let at = sub(add(origin, scale(direction, t)), *centre);
-                let inside = t > 0.0 && t.is_finite() && norm([at[0], 0.0, at[2]]) < *radius;
+                let t = (centre.y - origin.y) / direction.y;
+                let at = origin + direction * t - *centre;
+                let inside = t > 0.0 && t.is_finite() && dvec3(at.x, 0.0, at.z).length() < *radius;
                 inside.then_some((t, UP))
             }
             Self::Block { centre, half, right } => {
                 let axes = block_axes(*right);
-                let from = sub(origin, *centre);
+                let from = origin - *centre;
                 let (mut near, mut far, mut face) = (0.0, f64::INFINITY, None);
-                for (axis, half) in axes.iter().zip(half) {
-                    let (start, step) = (dot(from, *axis), dot(direction, *axis));
+                for (&axis, half) in axes.iter().zip(half.to_array()) {
+                    let (start, step) = (from.dot(axis), direction.dot(axis));
                     let (a, b) = ((-half - start) / step, (half - start) / step);
                     let (enter, leave) = if a < b { (a, b) } else { (b, a) };
                     if enter > near {
                         near = enter;
-                        face = Some(scale(*axis, if step > 0.0 { -1.0 } else { 1.0 }));
+                        face = Some(axis * if step > 0.0 { -1.0 } else { 1.0 });
                     }
                     far = if leave < far { leave } else { far };
                 }

@@ -1,51 +1,20 @@
 //! Vectors of three numbers, and the transcendental functions that the scene needs.
 //!
 //! The last bit of `f64::sin`, `cos` and `ln` depends on the platform's library. The functions here use only operations
-//! that IEEE 754 rounds exactly, so that the scene is the same everywhere.
+//! that IEEE 754 rounds exactly, as `glam` does for vectors of `f64`, so that the scene is the same everywhere.
 
-/// A point or direction in world units.
-pub(crate) type Vec3 = [f64; 3];
+/// A point or direction in world units, or a colour.
+pub(crate) use glam::DVec3 as Vec3;
+pub(crate) use glam::dvec3;
 
 /// Terms of each Taylor series; the last one is below 1e-17 on the reduced range.
 const TERMS: u32 = 10;
 /// The golden angle in turns. Its multiples spread directions evenly.
 pub(crate) const GOLDEN_TURN: f64 = 0.381_966_011_250_105_1;
 
-pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
-    [a[0] * s, a[1] * s, a[2] * s]
-}
-
-pub(crate) fn mul(a: Vec3, b: Vec3) -> Vec3 {
-    [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
-}
-
-pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-pub(crate) fn norm(a: Vec3) -> f64 {
-    dot(a, a).sqrt()
-}
-
-pub(crate) fn unit(a: Vec3) -> Vec3 {
-    scale(a, 1.0 / norm(a))
-}
-
 /// Returns the linear interpolation from `a` at 0 to `b` at 1.
 pub(crate) fn mix(a: Vec3, b: Vec3, t: f64) -> Vec3 {
-    add(a, scale(sub(b, a), t))
+    a + (b - a) * t
 }
 
 /// Returns 0 below `low`, 1 above `high`, and a smooth transition between.
@@ -56,19 +25,19 @@ pub(crate) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
 
 /// Returns the part of `a` perpendicular to the unit vector `n`, scaled to unit length.
 pub(crate) fn tangent(a: Vec3, n: Vec3) -> Vec3 {
-    unit(sub(a, scale(n, dot(a, n))))
+    (a - n * a.dot(n)).normalize()
 }
 
 /// Returns a unit vector perpendicular to the unit vector `n`.
 pub(crate) fn any_tangent(n: Vec3) -> Vec3 {
-    let axis = if n[0].abs() < 0.6 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let axis = if n.x.abs() < 0.6 { Vec3::X } else { Vec3::Y };
     tangent(axis, n)
 }
 
 /// Returns two unit vectors perpendicular to the unit vector `n` and to each other.
 pub(crate) fn frame(n: Vec3) -> (Vec3, Vec3) {
     let side = any_tangent(n);
-    (side, cross(n, side))
+    (side, n.cross(side))
 }
 
 /// Returns `count` points of a spiral that starts at the angle `turn`: the share of the points so far, 0 to 1, and sine

@@ -1,5 +1,7 @@
 //! Seeded random numbers. Each Gaussian has a stream of its own, so that they do not depend on threads.
 
+use crate::math::Vec3;
+
 /// Step of the `SplitMix64` state (Steele, Lea, Flood 2014): 2^64 over the golden ratio.
 const GAMMA: u64 = 0x9e37_79b9_7f4a_7c15;
 /// Number of uniform numbers that add up to a nearly normal one of variance 1.
@@ -45,8 +47,8 @@ impl Random {
 }
 
 /// Returns smooth noise in \[0, 1) with features of unit size, which interpolates random values on the integer lattice.
-pub(crate) fn value_noise(p: [f64; 3]) -> f64 {
-    let cell = p.map(f64::floor);
+pub(crate) fn value_noise(p: Vec3) -> f64 {
+    let cell = p.floor();
     let blend: [f64; 3] = std::array::from_fn(|i| {
         let t = p[i] - cell[i];
         t * t * (3.0 - 2.0 * t)
@@ -70,6 +72,7 @@ pub(crate) fn value_noise(p: [f64; 3]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::dvec3;
 
     #[test]
     fn streams_are_uniform_and_unrelated() {
@@ -87,8 +90,8 @@ mod tests {
     #[test]
     fn noise_is_continuous() {
         for i in 0..100 {
-            let p = [f64::from(i) * 0.37, 2.0, f64::from(i)];
-            let q = [p[0] + 1e-9, p[1] - 1e-9, p[2] - 1e-9];
+            let p = dvec3(f64::from(i) * 0.37, 2.0, f64::from(i));
+            let q = p + dvec3(1e-9, -1e-9, -1e-9);
             assert!((value_noise(p) - value_noise(q)).abs() < 1e-7);
             assert!((0.0..1.0).contains(&value_noise(p)));
         }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::fit::{self, Fit, REST};
 use crate::light::{Studio, tone};
 use crate::material::Material;
-use crate::math::{add, cross, ln, scale, sin_cos_turns, tangent, unit};
+use crate::math::{ln, sin_cos_turns, tangent};
 use crate::random::Random;
 use crate::shapes::{self, Edge, quaternion};
 use crate::still_life::{self, Thing};
@@ -135,22 +135,22 @@ fn gaussian(
     let mut random = Random::new(seed, stream as u64);
     let point = thing.shape.point(index, count);
     let spacing = (thing.shape.area() / count as f64).sqrt();
-    let side = cross(point.normal, point.tangent);
-    let along = |a: f64, b: f64| add(scale(point.tangent, a), scale(side, b));
+    let side = point.normal.cross(point.tangent);
+    let along = |a: f64, b: f64| point.tangent * a + side * b;
     let stray = along(spacing * STRAY * random.signed(), spacing * STRAY * random.signed());
-    let position = add(point.position, stray);
+    let position = point.position + stray;
     let tilt = along(TILT * random.normal(), TILT * random.normal());
-    let normal = unit(add(point.normal, tilt));
+    let normal = (point.normal + tilt).normalize();
 
-    let mut surface = thing.material.at(add(point.local, stray), point.normal, shapes::UP);
+    let mut surface = thing.material.at(point.local + stray, point.normal, shapes::UP);
     surface.roughness = (surface.roughness * (1.0 + UNEVEN * random.signed())).clamp(0.02, 1.0);
     let is_wall = matches!(thing.material, Material::Backdrop);
     let (dc, mut rest) = if is_wall {
-        let colour = tone(Studio::wall(unit(position)));
+        let colour = tone(Studio::wall(position.normalize()));
         fit.project(|_| colour)
     } else {
         let lit = studio.light(position, normal, surface, &mut random);
-        fit.project(|direction| lit.colour(scale(direction, -1.0)))
+        fit.project(|direction| lit.colour(-direction))
     };
     fit::add_training_noise(&mut rest, if is_wall { WALL_NOISE } else { 1.0 }, &mut random);
 
@@ -167,10 +167,10 @@ fn gaussian(
         short = (edge.distance / REACH).max(spread * MIN_SHORT);
     }
     let x = tangent(x, normal);
-    let y = cross(normal, x);
+    let y = normal.cross(x);
     let opacity = opacity(&mut random);
     Gaussian {
-        position: single(position),
+        position: single(position.to_array()),
         dc: single(dc),
         opacity: narrow(ln(opacity / (1.0 - opacity))),
         scales: single([long, short, spread * THICKNESS].map(ln)),

@@ -1,9 +1,9 @@
 //! Surfaces, and points that cover them evenly.
 
-use crate::math::{Vec3, add, any_tangent, cross, dot, norm, scale, sin_cos_turns, sub, tangent, unit};
+use crate::math::{Vec3, any_tangent, dvec3, sin_cos_turns, tangent};
 
 /// Up in the world: y points down, as in scenes trained from COLMAP's cameras.
-pub(crate) const UP: Vec3 = [0.0, -1.0, 0.0];
+pub(crate) const UP: Vec3 = Vec3::NEG_Y;
 /// The fractional part of the golden ratio. Its multiples fill the unit interval most evenly, and a lattice made with
 /// them stays even if it is stretched.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -84,7 +84,7 @@ impl Shape {
             Self::Rim { radius, thickness, .. } => TAU * radius * thickness,
             Self::Torus { ring, tube, .. } => TAU * ring * TAU * tube,
             Self::Knot { size, tube, .. } => knot_length(*size) * TAU * tube,
-            Self::Block { half, .. } => faces(half).iter().map(|f| f.area).sum(),
+            Self::Block { half, .. } => faces(*half).iter().map(|f| f.area).sum(),
         }
     }
 
@@ -96,42 +96,41 @@ impl Shape {
                 let y = 1.0 - 2.0 * u;
                 let (sin, cos) = sin_cos_turns(v);
                 let level = (1.0 - y * y).sqrt();
-                let out = [level * cos, y, level * sin];
-                let normal = if *inward { scale(out, -1.0) } else { out };
-                on(*centre, scale(out, *radius), normal, any_tangent(out))
+                let out = dvec3(level * cos, y, level * sin);
+                on(*centre, out * *radius, if *inward { -out } else { out }, any_tangent(out))
             }
             Self::Disc { centre, radius } => {
                 let (sin, cos) = sin_cos_turns(v);
                 let r = radius * u.sqrt();
-                let edge = Some(Edge { distance: radius - r, along: [-sin, 0.0, cos] });
-                Point { edge, ..on(*centre, [r * cos, 0.0, r * sin], UP, [cos, 0.0, sin]) }
+                let edge = Some(Edge { distance: radius - r, along: dvec3(-sin, 0.0, cos) });
+                Point { edge, ..on(*centre, dvec3(r * cos, 0.0, r * sin), UP, dvec3(cos, 0.0, sin)) }
             }
             Self::Rim { centre, radius, thickness } => {
                 let (sin, cos) = sin_cos_turns(u);
-                let out = [cos, 0.0, sin];
+                let out = dvec3(cos, 0.0, sin);
                 let down = thickness * v;
-                let along = [-sin, 0.0, cos];
+                let along = dvec3(-sin, 0.0, cos);
                 let edge = Some(Edge { distance: down.min(thickness - down), along });
-                Point { edge, ..on(*centre, add(scale(out, *radius), scale(UP, -down)), out, along) }
+                Point { edge, ..on(*centre, out * *radius - UP * down, out, along) }
             }
             Self::Torus { centre, ring, tube } => {
                 let (sin, cos) = sin_cos_turns(u);
-                let out = [cos, 0.0, sin];
+                let out = dvec3(cos, 0.0, sin);
                 let (lift, away) = sin_cos_turns(even_round_tube(v, tube / ring));
-                let normal = add(scale(out, away), scale(UP, lift));
-                on(*centre, add(scale(out, *ring), scale(normal, *tube)), normal, [-sin, 0.0, cos])
+                let normal = out * away + UP * lift;
+                on(*centre, out * *ring + normal * *tube, normal, dvec3(-sin, 0.0, cos))
             }
             Self::Knot { centre, size, tube } => {
                 let (curve, along, side) = knot(knot_at_length(u), *size);
                 let (sin, cos) = sin_cos_turns(v);
-                let normal = add(scale(side, cos), scale(cross(along, side), sin));
-                on(*centre, add(curve, scale(normal, *tube)), normal, along)
+                let normal = side * cos + along.cross(side) * sin;
+                on(*centre, curve + normal * *tube, normal, along)
             }
             Self::Block { centre, half, right } => {
                 let axes = block_axes(*right);
                 let mut start = 0.0;
                 let total = self.area();
-                let sides = faces(half);
+                let sides = faces(*half);
                 let face = sides.iter().find(|face| {
                     let found = u * total < start + face.area;
                     if !found {
@@ -141,17 +140,17 @@ impl Shape {
                 });
                 let Some(face) = face.or(sides.last()) else { unreachable!("a box has five faces") };
                 let along = ((u * total - start) / face.area).clamp(0.0, 1.0);
-                let mut local = [0.0; 3];
+                let mut local = Vec3::ZERO;
                 local[face.axis] = face.sign * half[face.axis];
                 local[face.u] = half[face.u] * (2.0 * along - 1.0);
                 local[face.v] = half[face.v] * (2.0 * v - 1.0);
-                let offset = (0..3).fold([0.0; 3], |sum, a| add(sum, scale(axes[a], local[a])));
-                let normal = scale(axes[face.axis], face.sign);
+                let offset = (0..3).fold(Vec3::ZERO, |sum, a| sum + axes[a] * local[a]);
+                let normal = axes[face.axis] * face.sign;
                 let end = |axis: usize, along: usize| {
                     Some(Edge { distance: half[axis] - local[axis].abs(), along: axes[along] })
                 };
                 let edge = Edge::nearer(end(face.u, face.v), end(face.v, face.u));
-                Point { position: add(*centre, offset), normal, tangent: axes[face.u], local, edge }
+                Point { position: *centre + offset, normal, tangent: axes[face.u], local, edge }
             }
         }
     }
@@ -159,7 +158,7 @@ impl Shape {
 
 /// Returns a point without an edge.
 fn on(centre: Vec3, local: Vec3, normal: Vec3, tangent: Vec3) -> Point {
-    Point { position: add(centre, local), normal, tangent, local, edge: None }
+    Point { position: centre + local, normal, tangent, local, edge: None }
 }
 
 /// A face of a box: the axis and sign of its normal, its own two axes, and its area.
@@ -173,11 +172,11 @@ struct Face {
 
 /// Returns the axes of a block with this direction to the right.
 pub(crate) fn block_axes(right: Vec3) -> [Vec3; 3] {
-    [right, UP, cross(right, UP)]
+    [right, UP, right.cross(UP)]
 }
 
 /// Returns all faces except the bottom, which is never visible.
-fn faces(half: &Vec3) -> [Face; 5] {
+fn faces(half: Vec3) -> [Face; 5] {
     [(1, 1.0), (0, 1.0), (0, -1.0), (2, 1.0), (2, -1.0)].map(|(axis, sign)| {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         Face { axis, sign, u, v, area: 4.0 * half[u] * half[v] }
@@ -200,15 +199,15 @@ fn knot(t: f64, size: f64) -> (Vec3, Vec3, Vec3) {
     let (sin2, cos2) = sin_cos_turns(2.0 * t);
     let (sin3, cos3) = sin_cos_turns(3.0 * t);
     // The knot is upright: x to the right, y vertical, z to the viewer.
-    let point = [(2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3];
-    let along = [
+    let point = dvec3((2.0 + cos3) * cos2, (2.0 + cos3) * sin2, sin3);
+    let along = dvec3(
         -3.0 * sin3 * cos2 - 2.0 * (2.0 + cos3) * sin2,
         -3.0 * sin3 * sin2 + 2.0 * (2.0 + cos3) * cos2,
         3.0 * cos3,
-    ];
-    let along = unit(along);
-    let side = tangent([cos3 * cos2, cos3 * sin2, sin3], along);
-    (scale(point, size), along, side)
+    );
+    let along = along.normalize();
+    let side = tangent(dvec3(cos3 * cos2, cos3 * sin2, sin3), along);
+    (point * size, along, side)
 }
 
 /// Returns the length of the knot's curve.
@@ -222,7 +221,7 @@ fn knot_lengths() -> Vec<f64> {
     let mut sum = 0.0;
     (0..KNOT_PIECES)
         .map(|i| {
-            sum += norm(sub(at(i + 1), at(i)));
+            sum += at(i + 1).distance(at(i));
             sum
         })
         .collect()
@@ -241,7 +240,7 @@ fn knot_at_length(u: f64) -> f64 {
 
 /// Returns the centres of `count` balls along the knot.
 pub(crate) fn knot_beads(centre: Vec3, size: f64, count: usize) -> Vec<Vec3> {
-    (0..count).map(|i| add(centre, knot(knot_at_length(share(i, count)), size).0)).collect()
+    (0..count).map(|i| centre + knot(knot_at_length(share(i, count)), size).0).collect()
 }
 
 /// Returns the centres of `count` balls around the torus.
@@ -249,7 +248,7 @@ pub(crate) fn torus_beads(centre: Vec3, ring: f64, count: usize) -> Vec<Vec3> {
     (0..count)
         .map(|i| {
             let (sin, cos) = sin_cos_turns(share(i, count));
-            add(centre, [ring * cos, 0.0, ring * sin])
+            centre + dvec3(ring * cos, 0.0, ring * sin)
         })
         .collect()
 }
@@ -257,12 +256,12 @@ pub(crate) fn torus_beads(centre: Vec3, ring: f64, count: usize) -> Vec<Vec3> {
 /// Returns the unit quaternion (w, x, y, z) of the rotation with these columns.
 pub(crate) fn quaternion(x: Vec3, y: Vec3, z: Vec3) -> [f64; 4] {
     // Shepperd's method divides by the largest component.
-    let trace = x[0] + y[1] + z[2];
+    let trace = x.x + y.y + z.z;
     let of = |diagonal: f64| 1.0 + 2.0 * diagonal - trace;
-    let squares = [1.0 + trace, of(x[0]), of(y[1]), of(z[2])];
+    let squares = [1.0 + trace, of(x.x), of(y.y), of(z.z)];
     let largest = (0..4).fold(0, |best, i| if squares[i] > squares[best] { i } else { best });
-    let (a, b, c) = (y[2] - z[1], z[0] - x[2], x[1] - y[0]);
-    let (d, e, f) = (x[1] + y[0], z[0] + x[2], y[2] + z[1]);
+    let (a, b, c) = (y.z - z.y, z.x - x.z, x.y - y.x);
+    let (d, e, f) = (x.y + y.x, z.x + x.z, y.z + z.y);
     let raw = match largest {
         0 => [squares[0], a, b, c],
         1 => [a, squares[1], d, e],
@@ -275,7 +274,7 @@ pub(crate) fn quaternion(x: Vec3, y: Vec3, z: Vec3) -> [f64; 4] {
 
 /// Returns `v` mirrored at the axis `n`.
 pub(crate) fn reflect(v: Vec3, n: Vec3) -> Vec3 {
-    sub(scale(n, 2.0 * dot(v, n)), v)
+    n * (2.0 * v.dot(n)) - v
 }
 
 #[cfg(test)]
@@ -283,14 +282,14 @@ mod tests {
     use super::*;
 
     fn shapes() -> Vec<Shape> {
-        let centre = [0.3, -0.7, 1.1];
+        let centre = dvec3(0.3, -0.7, 1.1);
         vec![
             Shape::Sphere { centre, radius: 0.8, inward: false },
             Shape::Disc { centre, radius: 1.3 },
             Shape::Rim { centre, radius: 1.3, thickness: 0.2 },
             Shape::Torus { centre, ring: 1.0, tube: 0.4 },
             Shape::Knot { centre, size: 0.5, tube: 0.2 },
-            Shape::Block { centre, half: [0.4, 0.2, 0.9], right: unit([1.0, 0.0, 0.5]) },
+            Shape::Block { centre, half: dvec3(0.4, 0.2, 0.9), right: dvec3(1.0, 0.0, 0.5).normalize() },
         ]
     }
 
@@ -304,7 +303,7 @@ mod tests {
                 .map(|i| {
                     let others = (0..count).filter(|&j| j != i);
                     others
-                        .map(|j| norm(sub(points[i].position, points[j].position)))
+                        .map(|j| points[i].position.distance(points[j].position))
                         .fold(f64::INFINITY, f64::min)
                 })
                 .collect();
@@ -312,8 +311,8 @@ mod tests {
             assert!(nearest[100] > 0.5 * spacing, "{shape:?}: too close {} {spacing}", nearest[100]);
             assert!(nearest[1900] < 1.2 * spacing, "{shape:?}: too far {} {spacing}", nearest[1900]);
             for p in points {
-                assert!((norm(p.normal) - 1.0).abs() < 1e-12 && (norm(p.tangent) - 1.0).abs() < 1e-12);
-                assert!(dot(p.normal, p.tangent).abs() < 1e-9, "{shape:?}");
+                assert!((p.normal.length() - 1.0).abs() < 1e-12 && (p.tangent.length() - 1.0).abs() < 1e-12);
+                assert!(p.normal.dot(p.tangent).abs() < 1e-9, "{shape:?}");
             }
         }
     }
@@ -321,13 +320,13 @@ mod tests {
     #[test]
     fn quaternions_turn_the_axes() {
         for (x, n) in [([1.0, 2.0, 3.0], [0.3, -1.0, 0.2]), ([-1.0, 0.1, 0.0], [0.0, 0.0, -1.0])] {
-            let z = unit(n);
-            let x = tangent(x, z);
-            let y = cross(z, x);
+            let z = Vec3::from(n).normalize();
+            let x = tangent(Vec3::from(x), z);
+            let y = z.cross(x);
             let [w, i, j, k] = quaternion(x, y, z);
-            let turned_x = [1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j + w * k), 2.0 * (i * k - w * j)];
-            let turned_z = [2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j)];
-            assert!(norm(sub(turned_x, x)) < 1e-12 && norm(sub(turned_z, z)) < 1e-12);
+            let turned_x = dvec3(1.0 - 2.0 * (j * j + k * k), 2.0 * (i * j + w * k), 2.0 * (i * k - w * j));
+            let turned_z = dvec3(2.0 * (i * k + w * j), 2.0 * (j * k - w * i), 1.0 - 2.0 * (i * i + j * j));
+            assert!(turned_x.distance(x) < 1e-12 && turned_z.distance(z) < 1e-12);
         }
     }
 }

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::cache::write_whole;
-use super::{
-    PictureFiles, Results, Setting, SweepPicture, figures, long_csv, paper, survey, sweep_html,
-    sweep_markdown, tables,
-};
+use super::figures::figures;
+use super::long_csv::long_csv;
+use super::markdown::sweep_markdown;
+use super::page::sweep_html;
+use super::survey::survey;
+use super::{PictureFiles, Results, Setting, SweepPicture, paper, tables};
 use lexisplat::output::OutputGroup;
 use lexisplat_eval::{Error, Result};
 

@@ -66,16 +66,13 @@ impl<'a> Grid<'a> {
             }
             headings.push(heading);
         }
-        let mut settings: Vec<Setting> = Vec::new();
-        for point in results.scenes.iter().flat_map(|scene| &scene.points) {
-            if !settings.contains(&point.setting) {
-                settings.push(point.setting);
-            }
-        }
+        let points = results.scenes.iter().flat_map(|scene| &scene.points);
+        let mut settings: Vec<Setting> = points.map(|point| point.setting).collect();
         settings.sort_by(|a, b| {
             let (a, b) = (order(*a), order(*b));
             a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))
         });
+        settings.dedup();
         let methods = Method::ALL
             .into_iter()
             .filter(|method| results.scenes.iter().any(|scene| scene.method == *method))
@@ -102,7 +99,7 @@ impl<'a> Grid<'a> {
         setting: Setting,
     ) -> Option<(&'a SceneResult, &'a Point)> {
         let scene = self.scene(method, column)?;
-        Some((scene, scene.points.iter().find(|point| point.setting == setting)?))
+        Some((scene, scene.point(setting)?))
     }
 
     /// All models of a method at one setting, in the order of columns.
@@ -145,13 +142,12 @@ impl<'a> Grid<'a> {
     /// A measure of a method in each column, then the mean. Without a setting it is that of the models as trained.
     pub(super) fn measured(&self, measure: Measure, method: Method, setting: Option<Setting>) -> Vec<Cell> {
         self.across(|column| {
-            let found = match setting {
-                Some(setting) => {
-                    self.point(method, column, setting).map(|(scene, point)| (scene, Some(point)))
-                }
-                None => self.scene(method, column).map(|scene| (scene, None)),
-            };
-            found.map_or(Cell::Missing, |(scene, point)| measure.cell(scene, point))
+            let Some(scene) = self.scene(method, column) else { return Cell::Missing };
+            match setting.map(|setting| scene.point(setting)) {
+                None => measure.cell(scene, None),
+                Some(Some(point)) => measure.cell(scene, Some(point)),
+                Some(None) => Cell::Missing,
+            }
         })
     }
 
@@ -201,8 +197,7 @@ pub(super) fn mean(cells: &[Cell]) -> Cell {
     let number = cells.iter().find(|cell| matches!(cell, Cell::Number { .. }));
     let identical = || cells.iter().find(|cell| **cell == Cell::text(IDENTICAL));
     match number.or_else(identical) {
-        Some(&Cell::Number { digits, signed: true, .. }) => Cell::change(Some(mean), digits),
-        Some(&Cell::Number { digits, .. }) => Cell::number(Some(mean), digits),
+        Some(&Cell::Number { digits, signed, .. }) => Cell::Number { value: mean, digits, signed },
         other => other.cloned().unwrap_or(Cell::Missing),
     }
 }

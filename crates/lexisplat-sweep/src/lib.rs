@@ -13,7 +13,7 @@ mod measure;
 mod notes;
 mod options;
 mod page;
-pub mod paper;
+mod paper;
 mod picture;
 pub mod report;
 mod results;
@@ -21,24 +21,21 @@ mod saturation;
 mod scene;
 mod survey;
 mod sweep;
-pub mod table;
-pub mod tables;
+mod table;
+mod tables;
 #[cfg(test)]
 mod testing;
 
-pub use figures::{Figure, figures};
 pub use folder::write_report;
-pub use long_csv::long_csv;
 pub use manifest::{Entry, parse_manifest, read_manifest};
-pub use markdown::sweep_markdown;
-pub use notes::{NOTES, Note};
 pub use options::{SweepOptions, SweepProgress};
-pub use page::sweep_html;
-pub use picture::{Picture, PictureFiles, SweepPicture};
+pub use picture::{Picture, PictureFiles};
 pub use results::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
-pub use saturation::saturation;
-pub use survey::survey;
 pub use sweep::sweep;
+
+use figures::Figure;
+use notes::NOTES;
+use picture::SweepPicture;
 
 /// `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
 fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {

@@ -15,8 +15,7 @@ type Value = [String; 4];
 /// One number on each line. `setting` is `original` for the model itself. `against` is `original` or `photos` for
 /// scores, with `view` a view's name or `mean`; for sizes, speeds and the rest both are empty. The PSNR of
 /// identical pictures is `inf`; the mean is over the views that are not identical.
-#[must_use]
-pub fn long_csv(results: &Results) -> String {
+pub(crate) fn long_csv(results: &Results) -> String {
     let mut lines: Vec<Vec<String>> = vec![HEADER.map(str::to_owned).into()];
     for scene in &results.scenes {
         let mut add = |setting: &str, values: Vec<Value>| {

@@ -1,5 +1,6 @@
 //! `scenes.toml`: the models of a sweep with their cameras and photos.
 
+use std::collections::HashSet;
 use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
@@ -32,19 +33,10 @@ pub struct Entry {
     /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_eval::views::ViewOptions`].
     pub resolution: Option<u32>,
     /// Which of the cameras to use. The default is the test split.
-    #[serde(with = "SplitName", default = "test_split")]
+    #[serde(default = "test_split")]
     pub split: SplitFilter,
     /// A file that is shipped in place of the model. It is counted, not read.
     pub shipped: Option<PathBuf>,
-}
-
-/// The names of splits.
-#[derive(Deserialize)]
-#[serde(remote = "SplitFilter", rename_all = "snake_case")]
-enum SplitName {
-    All,
-    Train,
-    Test,
 }
 
 fn test_split() -> SplitFilter {
@@ -118,13 +110,12 @@ pub fn parse_manifest(file: &Path, text: &str, root: &Path) -> Result<Vec<Entry>
     if entries.is_empty() {
         return Err(Error::format(file, "no [[scene]] in it"));
     }
-    for i in 0..entries.len() {
-        let (before, entry) = (&entries[..i], &entries[i]);
+    let mut seen = HashSet::new();
+    for entry in &entries {
         if entry.name.trim().is_empty() {
             return Err(Error::format(file, "a scene's `name` is empty"));
         }
-        let key = |e: &Entry| (e.dataset.clone(), e.name.clone(), e.method);
-        if before.iter().any(|other| key(other) == key(entry)) {
+        if !seen.insert((&entry.dataset, &entry.name, entry.method)) {
             let problem = format!(
                 "scene '{}' by '{}' is there twice: two entries must differ in dataset, name or method",
                 entry.name, entry.method

@@ -2,12 +2,12 @@
 
 use std::fmt::Write;
 
+use super::saturation::saturation;
 use super::table::{Table, escape_markdown as escape};
-use super::{Figure, NOTES, Results, saturation, tables};
+use super::{Figure, NOTES, Results, tables};
 
 /// A report in Markdown: the main tables, and each of `figures`, which are in the folder `figures` beside it.
-#[must_use]
-pub fn sweep_markdown(results: &Results, figures: &[Figure], date: Option<&str>) -> String {
+pub(crate) fn sweep_markdown(results: &Results, figures: &[Figure], date: Option<&str>) -> String {
     let mut out = String::from("# Results of a sweep\n\n");
     if results.scenes.is_empty() {
         out.push_str("Nothing was evaluated.\n\n");

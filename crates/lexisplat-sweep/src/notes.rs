@@ -9,15 +9,15 @@ const HEADING: &str = "\n## ";
 
 /// One thing to know before comparing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Note {
+pub(crate) struct Note {
     /// In a few words.
-    pub title: &'static str,
+    pub(crate) title: &'static str,
     /// The whole, as plain text.
-    pub text: &'static str,
+    pub(crate) text: &'static str,
 }
 
 /// What differs between the paper's way of counting and ours.
-pub static NOTES: LazyLock<Vec<Note>> = LazyLock::new(|| {
+pub(crate) static NOTES: LazyLock<Vec<Note>> = LazyLock::new(|| {
     let notes = TEXT.split(HEADING).skip(1).filter_map(|note| note.split_once('\n'));
     notes.map(|(title, text)| Note { title, text: text.trim() }).collect()
 });

@@ -4,9 +4,9 @@ use lexisplat::output::OutputGroup;
 use lexisplat::{Layout, Limits, Progress, Pursuit};
 use lexisplat_render::gpu::Gpu;
 
+use super::paper;
 use super::results::Setting;
-use lexisplat_eval::views::{DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, SceneKind};
-use lexisplat_eval::{Error, Result};
+use lexisplat_eval::{DrawOptions, Error, Result, ViewOptions};
 
 /// Options of a sweep.
 #[derive(Debug, Clone)]
@@ -20,20 +20,12 @@ pub struct SweepOptions {
     pub layout: Layout,
     /// Seed of learning samples.
     pub seed: u64,
-    /// Whether pictures are rounded to 8 bits before scoring, as when they are saved and read back.
-    pub eight_bit: bool,
+    /// How pictures are drawn.
+    pub drawing: DrawOptions,
     /// Whether to measure frames a second.
     pub fps: bool,
-    /// Colour behind scenes: red, green, blue in 0..1.
-    pub background: [f32; 3],
-    /// Largest width of a picture, in pixels.
-    pub max_width: u32,
-    /// Every `hold`-th camera in order of names is a test camera, if no camera is marked as one.
-    pub hold: usize,
-    /// The kind of scene that views are generated for, where a model has no cameras.
-    pub kind: SceneKind,
-    /// Number of generated views.
-    pub generated: u16,
+    /// The views of models. Their cameras, photos, resolution and split are those of each [`Entry`](crate::Entry).
+    pub views: ViewOptions,
     /// The GPU that draws. `None` stands for the processor.
     pub gpu: Option<Gpu>,
     /// Limits on the size of models.
@@ -51,17 +43,13 @@ pub struct SweepOptions {
 impl Default for SweepOptions {
     fn default() -> Self {
         Self {
-            settings: [0.03, 0.05, 0.1, 0.2].map(Setting::Tolerance).to_vec(),
+            settings: paper::TOLERANCES.map(Setting::Tolerance).to_vec(),
             pursuit: Pursuit::Ols,
             layout: Layout::F16,
             seed: 0,
-            eight_bit: false,
+            drawing: DrawOptions::default(),
             fps: true,
-            background: [0.0; 3],
-            max_width: DEFAULT_MAX_WIDTH,
-            hold: DEFAULT_HOLD,
-            kind: SceneKind::Auto,
-            generated: DEFAULT_ORBIT,
+            views: ViewOptions::default(),
             gpu: None,
             limits: Limits::default(),
             pictures: 1,
@@ -102,20 +90,12 @@ impl SweepOptions {
 
 /// Receives reports from a sweep, and may cancel it. Every method does nothing by default.
 pub trait SweepProgress: Progress {
-    /// The sweep starts and has `parts` parts.
-    fn start(&self, parts: u64) {
-        let _ = parts;
-    }
-    /// A part begins. `what` names model and setting.
-    fn part(&self, what: &str) {
-        let _ = what;
-    }
-    /// `parts` more parts are done. They are `reused` if an earlier run had finished them.
-    fn done(&self, parts: u64, reused: bool) {
-        let _ = (parts, reused);
-    }
+    /// The sweep starts and has so many parts.
+    fn start(&self, _parts: u64) {}
+    /// A part begins. The text names model and setting.
+    fn part(&self, _what: &str) {}
+    /// One more part is done. It is `reused` if an earlier run had finished it.
+    fn done(&self, _reused: bool) {}
     /// A warning about a model.
-    fn warn(&self, model: &str, warning: &str) {
-        let _ = (model, warning);
-    }
+    fn warn(&self, _model: &str, _warning: &str) {}
 }

@@ -26,7 +26,7 @@ pub struct Picture<T> {
 /// Pictures as the paths of files.
 pub type PictureFiles = Picture<PathBuf>;
 /// Pictures as the bytes of files.
-pub type SweepPicture = Picture<Vec<u8>>;
+pub(crate) type SweepPicture = Picture<Vec<u8>>;
 
 impl PictureFiles {
     /// Reads the files.

@@ -11,30 +11,27 @@ use lexisplat_eval::{Comparison, Error, Result};
 
 /// Who trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Method {
     /// The 3DGS authors' trainer.
     #[serde(rename = "3dgs")]
     Gs3d,
     /// 3DGS-MCMC.
-    #[serde(rename = "mcmc")]
     Mcmc,
     /// Pixel-GS.
     #[serde(rename = "pixelgs")]
     PixelGs,
     /// EAGLES, decoded to a PLY: the paper's competitor, with scalar quantisation.
-    #[serde(rename = "eagles")]
     Eagles,
     /// EAGLES trained without scalar quantisation.
-    #[serde(rename = "eagles-no-sq")]
     EaglesNoSq,
     /// Anything else.
-    #[serde(rename = "other")]
     Other,
 }
 
 impl Method {
     /// All of them, in the paper's order.
-    pub const ALL: [Self; 6] =
+    pub(crate) const ALL: [Self; 6] =
         [Self::Gs3d, Self::Mcmc, Self::PixelGs, Self::Eagles, Self::EaglesNoSq, Self::Other];
 
     /// The name in files and manifests, and the name for people, as the paper prints it.
@@ -50,20 +47,17 @@ impl Method {
     }
 
     /// Name in files and manifests.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         self.names().0
     }
 
     /// Name for people, as the paper prints it.
-    #[must_use]
-    pub fn title(self) -> &'static str {
+    pub(crate) fn title(self) -> &'static str {
         self.names().1
     }
 
     /// Whether the method compresses by itself, so that its models are only scored, not compressed.
-    #[must_use]
-    pub fn is_competitor(self) -> bool {
+    pub(crate) fn is_competitor(self) -> bool {
         matches!(self, Self::Eagles | Self::EaglesNoSq)
     }
 }
@@ -205,6 +199,13 @@ pub struct SceneResult {
     pub fps: Option<f64>,
     /// One for each setting.
     pub points: Vec<Point>,
+}
+
+impl SceneResult {
+    /// The point at a setting.
+    pub(crate) fn point(&self, setting: Setting) -> Option<&Point> {
+        self.points.iter().find(|point| point.setting == setting)
+    }
 }
 
 /// A model that could not be evaluated.

@@ -54,8 +54,7 @@ fn cost(slope: f64) -> String {
 /// One paragraph for each method: what a doubling of the ratio costs in PSNR along tolerances and along capped
 /// nonzeros, the PSNR with at most one nonzero in every Gaussian and without SH, and how speed changes. Plain
 /// text. Methods with too few settings are left out.
-#[must_use]
-pub fn saturation(results: &Results) -> Vec<String> {
+pub(crate) fn saturation(results: &Results) -> Vec<String> {
     let grid = Grid::new(results);
     grid.methods.iter().filter_map(|&method| paragraph(&grid, method)).collect()
 }

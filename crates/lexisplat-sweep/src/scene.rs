@@ -1,18 +1,15 @@
 //! One model of a sweep. Each part of its results is stored as soon as it is finished.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lexisplat::ply::{self, ReadOptions};
-use lexisplat::{Sensitivity, Splats};
+use lexisplat::{Input, Layout, Sensitivity, Splats};
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    BenchOptions, Comparison, DrawOptions, Error, Result, Scorer, bench_cpu, bench_gpu, draw_views, png,
-    score_views,
+    BenchOptions, Comparison, Error, Result, Scorer, bench_cpu, bench_gpu, draw_views, png, score_views,
 };
 use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};
@@ -32,8 +29,10 @@ const GPU_REPEAT: u32 = 100;
 const CPU_REPEAT: u32 = 3;
 /// Frames drawn from each view before timing.
 const WARMUP: u32 = 1;
-/// Bytes read at once for a checksum.
-const READ_BYTES: usize = 1 << 20;
+/// What names of files call pictures of a model as trained.
+const ORIGINAL: &str = "original";
+/// What names of files call photos.
+const PHOTO: &str = "photo";
 
 /// The settings that a model is compressed at.
 pub(super) fn settings<'a>(entry: &Entry, options: &'a SweepOptions) -> &'a [Setting] {
@@ -172,17 +171,15 @@ impl Evaluator<'_> {
     }
 
     fn view_options(&self, entry: &Entry) -> ViewOptions {
-        let mut options = ViewOptions::default();
-        options.cameras.clone_from(&entry.cameras);
+        let mut options = ViewOptions {
+            cameras: entry.cameras.clone(),
+            images: entry.images.clone(),
+            resolution: entry.resolution,
+            ..self.options.views.clone()
+        };
         if entry.cameras.is_some() {
             options.split = entry.split;
         }
-        options.hold = self.options.hold;
-        options.kind = self.options.kind;
-        options.count = self.options.generated;
-        options.max_width = self.options.max_width;
-        options.images.clone_from(&entry.images);
-        options.resolution = entry.resolution;
         options
     }
 
@@ -197,9 +194,9 @@ impl Evaluator<'_> {
             env!("CARGO_PKG_VERSION"),
             self.scorer.metrics(),
             o.fingerprint,
-            o.eight_bit,
+            o.drawing.eight_bit,
             o.fps,
-            o.background,
+            o.drawing.background,
             self.renderer.name(),
             o.pursuit,
             o.layout,
@@ -207,80 +204,89 @@ impl Evaluator<'_> {
         ))
     }
 
-    /// The stored part `name`, if `key` is the same and its pictures still exist.
-    fn find<T: DeserializeOwned>(&self, name: &str, key: &str, pictures: &[PathBuf]) -> Option<T> {
-        let part = self.cache.find(name, key).filter(|_| pictures.iter().all(|path| path.is_file()))?;
-        self.progress.done(1, true);
-        Some(part)
-    }
-
-    fn store(&self, name: &str, key: &str, part: &impl Serialize) -> Part<()> {
-        self.cache.store(name, key, part).map_err(Failure::Sweep)?;
-        self.progress.done(1, false);
-        Ok(())
+    /// A part of a scene: its point at the setting `label`, or without a label what is known of the original. It is the
+    /// stored part if that was made from the same and its pictures still exist, or else what `make` makes.
+    fn part<T: Serialize + DeserializeOwned>(
+        &mut self,
+        subject: &mut Subject,
+        label: Option<&str>,
+        make: impl FnOnce(&mut Self, &mut Subject, &References) -> Part<T>,
+    ) -> Part<T> {
+        let (name, key) = (&subject.name, &subject.key);
+        let (name, key) = match label {
+            Some(label) => (format!("{name}-{}", file_name(label)), format!("{key}; {label}")),
+            None => (name.clone(), key.clone()),
+        };
+        let is_saved = |&view: &usize| self.picture(subject, view, label.unwrap_or(ORIGINAL)).is_file();
+        if let Some(part) = self.cache.find(&name, &key).filter(|_| subject.shown.iter().all(is_saved)) {
+            self.progress.done(true);
+            return Ok(part);
+        }
+        let references = match subject.references.take() {
+            Some(references) => references,
+            None => self.references(subject)?,
+        };
+        let part = make(self, subject, &references)?;
+        subject.references = Some(references);
+        self.cache.store(&name, &key, &part).map_err(Failure::Sweep)?;
+        self.progress.done(false);
+        Ok(part)
     }
 
     fn original(&mut self, subject: &mut Subject) -> Part<Original> {
-        let shown: Vec<PathBuf> =
-            subject.shown.iter().map(|&view| self.picture(subject, view, "original")).collect();
-        if let Some(original) = self.find(&subject.name, &subject.key, &shown) {
-            return Ok(original);
-        }
-        let References { originals, photos } = self.references(subject)?;
-        for (&view, path) in subject.shown.iter().zip(&shown) {
-            self.save(path, &originals[view])?;
-            if let Some(photo) = photos.get(view) {
-                self.save(&self.picture(subject, view, "photo"), photo)?;
+        self.part(subject, None, |this, subject, References { originals, photos }| {
+            for &view in &subject.shown {
+                this.save(subject, view, ORIGINAL, &originals[view])?;
+                if let Some(photo) = photos.get(view) {
+                    this.save(subject, view, PHOTO, photo)?;
+                }
             }
-        }
-        let to_photos = self.score_photos(subject, &photos, &originals)?;
-        let fps = self.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-        let original = Original { to_photos, fps };
-        subject.references = Some(References { originals, photos });
-        self.store(&subject.name, &subject.key, &original)?;
-        Ok(original)
+            let to_photos = this.score_photos(subject, photos, originals)?;
+            let fps = this.fps(&Scene::from(&subject.splats), &subject.cameras)?;
+            Ok(Original { to_photos, fps })
+        })
     }
 
     fn point(&mut self, subject: &mut Subject, setting: Setting) -> Part<Point> {
         let label = setting.label();
-        let name = format!("{}-{}", subject.name, file_name(&label));
-        let key = format!("{}; {label}", subject.key);
-        let shown: Vec<PathBuf> =
-            subject.shown.iter().map(|&view| self.picture(subject, view, &label)).collect();
-        if let Some(point) = self.find(&name, &key, &shown) {
-            return Ok(point);
-        }
-        let References { originals, photos } = self.references(subject)?;
-        let Subject { splats, sensitivity, .. } = subject;
-        let (model, compressed) =
-            compress_scene(splats, setting, self.options, &mut self.renderer, sensitivity, self.progress)?;
-        let scene = Scene::from(&model);
-        let drawn = self.draw(&scene, &subject.cameras)?;
-        for (&view, path) in subject.shown.iter().zip(&shown) {
-            self.save(path, &drawn[view])?;
-            let apart = difference(&originals[view], &drawn[view]);
-            self.save(&self.picture(subject, view, &format!("{label} difference")), &apart)?;
-        }
-        // Dense and sparse are timed one right after the other, so that other load on the machine slows both.
-        let dense = self.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-        let fps = dense.zip(self.fps(&scene, &subject.cameras)?).map(|(dense, sparse)| Fps { dense, sparse });
-        let point = Point {
-            to_original: score_views(self.scorer, &subject.cameras, &originals, &drawn)?,
-            to_photos: self.score_photos(subject, &photos, &drawn)?,
-            fps,
-            ..compressed
-        };
-        subject.references = Some(References { originals, photos });
-        self.store(&name, &key, &point)?;
-        Ok(point)
+        self.part(subject, Some(&label), |this, subject, References { originals, photos }| {
+            let Subject { splats, sensitivity, .. } = subject;
+            let (renderer, progress) = (&mut this.renderer, this.progress);
+            let (model, report) =
+                compress_scene(splats, setting, this.options, renderer, sensitivity, progress)?;
+            let scene = Scene::from(&model);
+            let drawn = this.draw(&scene, &subject.cameras)?;
+            for &view in &subject.shown {
+                this.save(subject, view, &label, &drawn[view])?;
+                let apart = difference(&originals[view], &drawn[view]);
+                this.save(subject, view, &difference_of(&label), &apart)?;
+            }
+            // Dense and sparse are timed one right after the other, so that other load on the machine slows both.
+            let dense = this.fps(&Scene::from(&subject.splats), &subject.cameras)?;
+            let fps = dense.zip(this.fps(&scene, &subject.cameras)?);
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a file's bytes")]
+            let sh_bytes = report.sh_bytes.round() as u64;
+            Ok(Point {
+                setting,
+                file_bytes: report.file_bytes,
+                sh_bytes,
+                resident_sh_bytes: model.resident_sh_bytes() as u64,
+                atoms: model.dictionary().len(),
+                mean_nonzeros: report.mean_nonzeros,
+                coefficient_ratio: report.coefficient_ratio,
+                max_residual: (report.layout != Layout::Packed).then_some(report.record.max_residual),
+                over_tolerance: report.record.over_tolerance,
+                to_original: score_views(this.scorer, &subject.cameras, originals, &drawn)?,
+                to_photos: this.score_photos(subject, photos, &drawn)?,
+                fps: fps.map(|(dense, sparse)| Fps { dense, sparse }),
+                seconds: report.look_seconds + report.pack_seconds,
+            })
+        })
     }
 
-    /// Takes the pictures to compare with out of `subject`, or makes them.
-    fn references(&mut self, subject: &mut Subject) -> Result<References> {
-        if let Some(references) = subject.references.take() {
-            return Ok(references);
-        }
-        let read = |view: &View| photo(view, self.options.background);
+    /// Draws the original, and reads the photos.
+    fn references(&mut self, subject: &Subject) -> Result<References> {
+        let read = |view: &View| photo(view, self.options.drawing.background);
         let photos = subject.photos.iter().map(read).collect::<Result<_>>()?;
         let originals = self.draw(&Scene::from(&subject.splats), &subject.cameras)?;
         Ok(References { originals, photos })
@@ -293,15 +299,12 @@ impl Evaluator<'_> {
         photos: &[Image],
         pictures: &[Image],
     ) -> Result<Option<Comparison>> {
-        if photos.is_empty() {
-            return Ok(None);
-        }
-        score_views(self.scorer, &subject.cameras, photos, pictures).map(Some)
+        let score = || score_views(self.scorer, &subject.cameras, photos, pictures);
+        (!photos.is_empty()).then(score).transpose()
     }
 
     fn draw(&mut self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Vec<Image>> {
-        let options = DrawOptions::new(self.options.background, self.options.eight_bit);
-        draw_views(&mut self.renderer, scene, cameras, &options, self.progress)
+        draw_views(&mut self.renderer, scene, cameras, &self.options.drawing, self.progress)
     }
 
     fn fps(&self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Option<f64>> {
@@ -310,7 +313,7 @@ impl Evaluator<'_> {
         }
         let repeat = if self.options.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
         let mut options = BenchOptions::new(WARMUP, repeat);
-        options.background = self.options.background;
+        options.background = self.options.drawing.background;
         let times = match &self.options.gpu {
             Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, self.progress)?,
             None => bench_cpu(scene, cameras, &options, self.progress)?,
@@ -323,23 +326,30 @@ impl Evaluator<'_> {
         self.pictures.join(format!("{}-{view:03}-{}.png", subject.name, file_name(what)))
     }
 
-    fn save(&self, path: &Path, image: &Image) -> Part<()> {
+    fn save(&self, subject: &Subject, view: usize, what: &str, image: &Image) -> Part<()> {
         let bytes = png(image.width, image.height, &image.to_8bit())?;
-        write_whole(&self.options.outputs, path, &bytes).map_err(Failure::Sweep)
+        let path = self.picture(subject, view, what);
+        write_whole(&self.options.outputs, &path, &bytes).map_err(Failure::Sweep)
     }
 
     fn files(&self, subject: &Subject, scene: usize, view: usize, setting: Setting) -> PictureFiles {
         let label = setting.label();
+        let picture = |what: &str| self.picture(subject, view, what);
         PictureFiles {
             scene,
             view: subject.cameras[view].name.clone(),
-            original: self.picture(subject, view, "original"),
-            compressed: self.picture(subject, view, &label),
-            difference: self.picture(subject, view, &format!("{label} difference")),
-            photo: (!subject.photos.is_empty()).then(|| self.picture(subject, view, "photo")),
+            original: picture(ORIGINAL),
+            compressed: picture(&label),
+            difference: picture(&difference_of(&label)),
+            photo: (!subject.photos.is_empty()).then(|| picture(PHOTO)),
             setting: label,
         }
     }
+}
+
+/// What names of files call the difference of pictures at the setting `label`.
+fn difference_of(label: &str) -> String {
+    format!("{label} difference")
 }
 
 /// Start of the names of an entry's files. No two entries share one.
@@ -350,16 +360,6 @@ pub(super) fn file_start(entry: &Entry) -> String {
 
 /// Length and checksum of a file.
 fn fingerprint(path: &Path) -> Result<String> {
-    let mut file = File::open(path).map_err(|e| Error::io(path, e))?;
-    let mut sum = crc32fast::Hasher::new();
-    let mut chunk = vec![0; READ_BYTES];
-    let mut length = 0_u64;
-    loop {
-        let count = file.read(&mut chunk).map_err(|e| Error::io(path, e))?;
-        if count == 0 {
-            return Ok(format!("{length}:{:08x}", sum.finalize()));
-        }
-        sum.update(&chunk[..count]);
-        length += count as u64;
-    }
+    let bytes = Input::open(path)?;
+    Ok(format!("{}:{:08x}", bytes.len(), crc32fast::hash(&bytes)))
 }

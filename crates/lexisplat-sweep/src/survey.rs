@@ -16,8 +16,7 @@ const NO_DATASET: &str = "other";
 /// Files of the survey's layout: relative path and content. Scenes without photos are left out. The LPIPS column
 /// is the 3DGS repository's, as the survey's numbers are; it is empty where that was not measured. The PSNR of
 /// identical pictures is `inf`.
-#[must_use]
-pub fn survey(results: &Results) -> Vec<(String, String)> {
+pub(crate) fn survey(results: &Results) -> Vec<(String, String)> {
     let mut files: Vec<(String, &SceneResult, Vec<Vec<String>>)> = Vec::new();
     for scene in &results.scenes {
         let lines = lines(scene);

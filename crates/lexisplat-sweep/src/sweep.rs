@@ -1,5 +1,6 @@
 //! All models of a sweep, one after the other.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use lexisplat_eval::{Error, Result, Scorer};
@@ -27,8 +28,9 @@ pub fn sweep(
     progress: &dyn SweepProgress,
 ) -> Result<(Results, Vec<PictureFiles>)> {
     options.check()?;
-    for (i, entry) in entries.iter().enumerate() {
-        if entries[..i].iter().any(|other| file_start(other) == file_start(entry)) {
+    let mut names = HashSet::new();
+    for entry in entries {
+        if !names.insert(file_start(entry)) {
             let expected = "another name or method: two models have these";
             return Err(Error::parameter("models", format!("{} by {}", entry.name, entry.method), expected));
         }
@@ -47,7 +49,7 @@ pub fn sweep(
         version: env!("CARGO_PKG_VERSION").to_owned(),
         pursuit: options.pursuit.name().to_owned(),
         layout: options.layout.name().to_owned(),
-        eight_bit: options.eight_bit,
+        eight_bit: options.drawing.eight_bit,
         ..Results::default()
     };
     let mut files = Vec::new();

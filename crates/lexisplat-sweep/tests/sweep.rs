@@ -43,9 +43,9 @@ impl SweepProgress for Seen {
         self.all.add(parts);
     }
 
-    fn done(&self, parts: u64, reused: bool) {
+    fn done(&self, reused: bool) {
         let count = if reused { &self.reused } else { &self.made };
-        count.add(parts);
+        count.add(1);
     }
 
     fn warn(&self, model: &str, warning: &str) {
@@ -56,8 +56,8 @@ impl SweepProgress for Seen {
 fn options() -> SweepOptions {
     let mut options = SweepOptions::default();
     options.settings = vec![Setting::Tolerance(0.1), Setting::MaxNonzeros(1), Setting::Preset(Preset::Small)];
-    options.max_width = 96;
-    options.generated = 3;
+    options.views.max_width = 96;
+    options.views.count = 3;
     options.fps = false;
     options
 }
@@ -136,7 +136,7 @@ fn another_model_or_option_is_another_point() {
     run(&[entry(folder.path(), "a", 0)], &one, &out);
     let changed = [entry(folder.path(), "a", 5)];
     assert_eq!(run(&changed, &one, &out).2.reused.get(), 0);
-    one.eight_bit = true;
+    one.drawing.eight_bit = true;
     assert_eq!(run(&changed, &one, &out).2.reused.get(), 0);
     assert_eq!(run(&changed, &one, &out).2.reused.get(), 2);
     one.fingerprint = "other weights".to_owned();

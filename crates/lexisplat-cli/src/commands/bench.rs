@@ -3,10 +3,11 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use lexisplat::Model;
 use lexisplat_eval::{
     BenchOptions, PathTimes, RadianceModel, Spread, bench_cpu, bench_gpu, busy_lanes, format,
 };
-use lexisplat_render::gpu::{DrawStage, Gpu, ShPath, Speed, measure_speed};
+use lexisplat_render::gpu::{AdapterSummary, DrawStage, Gpu, ShPath, Speed, measure_speed};
 use lexisplat_render::{Camera, Device, Scene};
 use serde_json::{Value, json};
 
@@ -57,16 +58,8 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
         options.repeat = args.cpu_repeat;
         results.push(bench_cpu(&scene, &cameras, &options, &bars)?);
     }
-    let report = Report {
-        args,
-        name: &input.name,
-        scene,
-        cameras: &cameras,
-        device: gpu.as_ref().map(|gpu| (gpu.summary().name.clone(), gpu.summary().driver.clone())),
-        most_bytes: gpu.as_ref().map(Gpu::most_bytes),
-        speed,
-        results: &results,
-    };
+    let gpu = gpu.as_ref().zip(speed);
+    let report = Report { args, name: &input.name, scene, cameras: &cameras, gpu, results: &results };
     if common.json {
         return print_json(&report.json());
     }
@@ -87,19 +80,23 @@ struct Report<'a> {
     name: &'a str,
     scene: Scene<'a>,
     cameras: &'a [Camera],
-    /// Name and driver of the GPU.
-    device: Option<(String, String)>,
-    most_bytes: Option<u64>,
-    speed: Option<Speed>,
+    /// The GPU, and how fast it is.
+    gpu: Option<(&'a Gpu, Speed)>,
     results: &'a [PathTimes],
 }
 
 impl Report<'_> {
+    fn model(&self) -> Option<&Model> {
+        if let Scene::Sparse(model) = self.scene { Some(model) } else { None }
+    }
+
     fn nonzeros(&self) -> Option<f64> {
-        match self.scene {
-            Scene::Sparse(model) => Some(model.codes().nonzeros() as f64 / model.len().max(1) as f64),
-            Scene::Dense(_) => None,
-        }
+        self.model().map(|model| model.codes().nonzeros() as f64 / model.len().max(1) as f64)
+    }
+
+    /// The shares of [`LANES`] that work: as the codes are stored, and if they were ordered.
+    fn busy(&self) -> Option<[f64; 2]> {
+        self.model().map(|model| busy_lanes(model, LANES, ORDER_BLOCK))
     }
 
     fn find(&self, path: ShPath) -> Option<&PathTimes> {
@@ -108,38 +105,27 @@ impl Report<'_> {
 
     /// Returns the paper's model for every path measured on the GPU.
     fn models(&self) -> Vec<(&PathTimes, RadianceModel)> {
-        let Some(speed) = &self.speed else { return Vec::new() };
-        let on_gpu = |times: &&PathTimes| ShPath::ALL.iter().any(|path| path.name() == times.path);
-        let nonzeros =
-            |times: &PathTimes| if times.path.starts_with("sparse") { self.nonzeros() } else { None };
-        self.results
-            .iter()
-            .filter(on_gpu)
-            .map(|times| (times, RadianceModel::new(times, nonzeros(times), speed)))
-            .collect()
+        let Some((_, speed)) = &self.gpu else { return Vec::new() };
+        let on_gpu = self.results.iter().filter(|times| !times.path.starts_with("cpu"));
+        let model = |times: &PathTimes| {
+            let nonzeros = self.nonzeros().filter(|_| times.path.starts_with("sparse"));
+            RadianceModel::new(times, nonzeros, speed)
+        };
+        on_gpu.map(|times| (times, model(times))).collect()
     }
 
     fn json(&self) -> Value {
-        let paths: Vec<Value> = self
-            .results
-            .iter()
-            .map(|times| {
-                let mut value = json!(times);
-                value["radiance_bytes_per_second"] = json!(times.radiance_bandwidth());
-                let named = |list: &[(String, Spread)]| -> Value {
-                    list.iter().map(|(name, spread)| (name.clone(), json!(spread))).collect()
-                };
-                value["stages"] = named(&times.stages);
-                value["views"] = named(&times.views);
-                value
-            })
-            .collect();
-        let models: serde_json::Map<String, Value> =
-            self.models().into_iter().map(|(times, model)| (times.path.clone(), json!(model))).collect();
-        let busy = match self.scene {
-            Scene::Sparse(model) => Some(busy_lanes(model, LANES, ORDER_BLOCK)),
-            Scene::Dense(_) => None,
+        let path = |times: &PathTimes| {
+            let mut value = json!(times);
+            value["radiance_bytes_per_second"] = json!(times.radiance_bandwidth());
+            value
         };
+        let models = self.models().into_iter().map(|(times, model)| (times.path.clone(), json!(model)));
+        let speedups = self.speedups().into_iter().map(|(path, [radiance, frame, limit])| {
+            (path, json!({ "radiance": radiance, "frame": frame, "frame_limit": limit }))
+        });
+        let gpu = self.gpu.map(|(gpu, _)| gpu);
+        let speed = self.gpu.map(|(_, speed)| speed);
         json!({
             "file": self.name,
             "gaussians": self.scene.len(),
@@ -149,17 +135,15 @@ impl Report<'_> {
             "warmup": self.args.warmup,
             "repeat": self.args.repeat,
             "cpu_repeat": self.args.cpu_repeat,
-            "device": self.device.as_ref().map(|d| &d.0),
-            "driver": self.device.as_ref().map(|d| &d.1),
-            "most_gpu_bytes": self.most_bytes,
-            "copy_bytes_per_second": self.speed.map(|s| s.copy),
-            "operations_per_second": self.speed.map(|s| s.arithmetic),
-            "paths": paths,
-            "radiance_model": models,
-            "speedups": self.speedups().into_iter().map(|(path, s)| (path, json!({
-                "radiance": s[0], "frame": s[1], "frame_limit": s[2],
-            }))).collect::<serde_json::Map<String, Value>>(),
-            "busy_lanes": busy.map(|[stored, ordered]| json!({ "as_stored": stored, "ordered": ordered })),
+            "device": gpu.map(|gpu| &gpu.summary().name),
+            "driver": gpu.map(|gpu| &gpu.summary().driver),
+            "most_gpu_bytes": gpu.map(Gpu::most_bytes),
+            "copy_bytes_per_second": speed.map(|speed| speed.copy),
+            "operations_per_second": speed.map(|speed| speed.arithmetic),
+            "paths": self.results.iter().map(path).collect::<Value>(),
+            "radiance_model": models.collect::<Value>(),
+            "speedups": speedups.collect::<Value>(),
+            "busy_lanes": self.busy().map(|[stored, ordered]| json!({ "as_stored": stored, "ordered": ordered })),
         })
     }
 
@@ -197,13 +181,14 @@ impl Report<'_> {
         }
         let first = self.cameras.first().map_or((0, 0), |c| (c.width, c.height));
         writeln!(out, "\n{} views, the first {} x {}", self.cameras.len(), first.0, first.1)?;
-        if let (Some((name, driver)), Some(speed)) = (&self.device, self.speed) {
+        if let Some((gpu, speed)) = self.gpu {
+            let AdapterSummary { name, driver, .. } = gpu.summary();
             writeln!(
                 out,
                 "{name} ({driver}): copies {:.0} GB/s, {:.2} Tflop/s; at most {} of its memory was used",
                 speed.copy / 1e9,
                 speed.arithmetic / 1e12,
-                format::bytes(self.most_bytes.unwrap_or(0))
+                format::bytes(gpu.most_bytes())
             )?;
         }
         let stages = DrawStage::ALL.map(DrawStage::name);
@@ -246,7 +231,7 @@ impl Report<'_> {
     }
 
     fn model_text(&self, out: &mut String) -> Result<()> {
-        let Some(speed) = self.speed else { return Ok(()) };
+        let Some((_, speed)) = self.gpu else { return Ok(()) };
         writeln!(out, "\nradiance        B/Gaussian  flop/Gaussian  model ms  measured ms  of copy rate")?;
         for (times, model) in self.models() {
             let share = times.radiance_bandwidth().map_or(0.0, |rate| 100.0 * rate / speed.copy);
@@ -266,8 +251,7 @@ impl Report<'_> {
                 "{path} is faster than dense-f32: radiance {radiance:.2}x, frame {frame:.3}x (with radiance in no time {limit:.3}x)"
             )?;
         }
-        if let Scene::Sparse(model) = self.scene {
-            let [stored, ordered] = busy_lanes(model, LANES, ORDER_BLOCK).map(|v| 100.0 * v);
+        if let Some([stored, ordered]) = self.busy().map(|shares| shares.map(|share| 100.0 * share)) {
             writeln!(
                 out,
                 "busy lanes of {LANES} while codes are summed: {stored:.0} % as stored, {ordered:.0} % if ordered by nonzeros in blocks of {ORDER_BLOCK}"

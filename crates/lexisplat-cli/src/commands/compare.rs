@@ -3,12 +3,14 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, format, montage, png};
 use serde_json::json;
 
+use super::scores::ScoreTable;
 use crate::args::{Common, Compare};
 use crate::device::open_renderer;
-use crate::files::{check_free, load, make_folder, print, print_json, view_name, warn_of, write_bytes};
+use crate::files::{check_free, load, make_folder, tell, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -40,8 +42,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             let (width, height, pixels) = montage::montage(image_a, image_b);
             write_bytes(path, &png(width, height, &pixels)?, common.overwrite)
         })?;
-    if common.json {
-        return print_json(&json!({
+    let json = json!({
             "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
             "b": { "file": b.name, "bytes": b.bytes, "gaussians": scene_b.len() },
             "ratio": if b.bytes > 0 { Some(a.bytes as f64 / b.bytes as f64) } else { None },
@@ -52,12 +53,8 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             "ssim": comparison.ssim,
             "views": comparison.views,
             "saved": saved.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
-        }));
-    }
-    if common.quiet {
-        return Ok(());
-    }
-    print(&table(&a, &b, &comparison, args, renderer.name())?)
+    });
+    tell(common, json, || table(&a, &b, &comparison, args, renderer.name()))
 }
 
 fn table(
@@ -68,31 +65,19 @@ fn table(
     device: &str,
 ) -> Result<String> {
     let mut out = String::new();
-    let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
-    writeln!(out, "{:<width$}  {:>11}  {:>10}  {:>8}", "view", "size", "PSNR", "SSIM")?;
-    for view in &comparison.views {
-        let size = format!("{}x{}", view.width, view.height);
-        writeln!(
-            out,
-            "{:<width$}  {size:>11}  {:>10}  {:>8.5}",
-            format::escape(&view.name),
-            format::decibels(view.psnr),
-            view.ssim
-        )?;
-    }
+    let scores = ScoreTable::new(
+        comparison,
+        |metric| if metric == Metric::Psnr { 10 } else { 8 },
+        |metric, value| match metric {
+            Metric::Psnr => format::decibels(value),
+            _ => format!("{:.5}", value.unwrap_or(1.0)),
+        },
+    );
+    scores.views(&mut out)?;
     if comparison.identical {
         writeln!(out, "all views are identical")?;
     } else {
-        let (psnr, ssim) = (comparison.psnr, comparison.ssim);
-        let rows = [
-            ("mean", psnr.mean, ssim.mean),
-            ("minimum", psnr.min, ssim.min),
-            ("maximum", psnr.max, ssim.max),
-        ];
-        for (label, psnr, ssim) in rows {
-            let (psnr, ssim) = (format::decibels(psnr), ssim.unwrap_or(1.0));
-            writeln!(out, "{label:<width$}  {:>11}  {psnr:>10}  {ssim:>8.5}", "")?;
-        }
+        scores.summary(&mut out)?;
     }
     for input in [a, b] {
         writeln!(out, "{:>10}  {}", format::bytes(input.bytes), input.name)?;

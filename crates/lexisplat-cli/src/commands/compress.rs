@@ -7,14 +7,14 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::packed::{PackOptions, TargetRecord};
 use lexisplat::ply::{PlySource, ReadOptions};
-use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Error, Layout, Limits, Record, lexi};
+use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Layout, Limits, Record, lexi};
 use lexisplat_eval::compression::SensitivitySource;
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
-use crate::files::{check_output, input, is_pipe, new_output, output_path, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, new_output, note, output_path, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -23,11 +23,7 @@ const LEVELS: f32 = 255.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let start = Instant::now();
-    let output = output_path(&args.input, args.output.as_deref(), "lexi")?;
-    if is_pipe(&output) && common.json {
-        let expected = "a file: with --json standard output carries the report";
-        return Err(Error::parameter("output", "-", expected).into());
-    }
+    let output = output_path(&args.input, args.output.as_deref(), "lexi", common)?;
     let mut inputs = vec![args.input.as_path()];
     inputs.extend(args.dictionary.as_deref());
     check_output(&output, &inputs, common.overwrite)?;
@@ -62,12 +58,16 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
     report.read_seconds += opened;
     report.total_seconds = start.elapsed().as_secs_f64();
-    let json = || {
-        let mut value = serde_json::to_value(&report)?;
-        value["output"] = output.display().to_string().into();
-        Ok(value)
-    };
-    tell(common, &output, json, || text(&report, &output))
+    if is_pipe(&output) {
+        // Standard output carries the file.
+        if !common.quiet {
+            text(&report, &output)?.lines().for_each(note);
+        }
+        return Ok(());
+    }
+    let mut json = serde_json::to_value(&report)?;
+    json["output"] = output.display().to_string().into();
+    tell(common, json, || text(&report, &output))
 }
 
 /// The choices of the library that the options mean.
@@ -76,11 +76,11 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     if layout != Layout::Packed {
         return Ok(Compression::Exact(exact(args, layout, limits)?, layout.codes()));
     }
-    let mut options = PackOptions::default();
-    options.tolerance = args.tol;
-    options.atoms = args.atoms;
-    options.keep_order = args.keep_order;
-    options.seed = args.seed;
+    let options = PackOptions::default()
+        .with_tolerance(args.tol)
+        .with_atoms(args.atoms)
+        .with_keep_order(args.keep_order)
+        .with_seed(args.seed);
     let preset = args.preset.unwrap_or_default();
     if args.guess {
         return Ok(Compression::Heuristic(preset, options));
@@ -109,19 +109,15 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
 
 fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOptions> {
     let mut options = CompressOptions::default();
-    options.tolerance = match (args.tol, args.max_nnz) {
-        (None, Some(_)) => None,
-        (tol, _) => Some(tol.unwrap_or(DEFAULT_TOLERANCE)),
-    };
+    options.tolerance = args.tol.or_else(|| args.max_nnz.is_none().then_some(DEFAULT_TOLERANCE));
     options.max_nonzeros = args.max_nnz;
     options.atoms = args.atoms;
     options.pursuit = args.pursuit.unwrap_or(options.pursuit);
     options.values = layout.values();
     options.sample = args.sample.unwrap_or(options.sample);
     options.seed = args.seed;
-    if let Some(path) = &args.dictionary {
-        options.dictionary = Some(lexi::read_dictionary(path, limits)?);
-    }
+    let read = |path| lexi::read_dictionary(path, limits);
+    options.dictionary = args.dictionary.as_deref().map(read).transpose()?;
     Ok(options)
 }
 

@@ -4,23 +4,19 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::lexi::LexiReader;
-use lexisplat::{Error, stream};
+use lexisplat::stream;
 use serde_json::json;
 
 use lexisplat_eval::format;
 
 use crate::args::{Common, Decompress};
-use crate::files::{check_output, input, is_pipe, output_path, print, print_json, write_output};
+use crate::files::{check_output, input, is_pipe, output_path, tell, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
 pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let start = Instant::now();
-    let output = output_path(&args.input, args.output.as_deref(), "ply")?;
-    if is_pipe(&output) && common.json {
-        let expected = "a file: with --json standard output carries the report";
-        return Err(Error::parameter("output", "-", expected).into());
-    }
+    let output = output_path(&args.input, args.output.as_deref(), "ply", common)?;
     check_output(&output, &[&args.input], common.overwrite)?;
     stop::while_writing(if is_pipe(&output) { Work::Stream } else { Work::Files(1) });
     let (name, bytes) = input(&args.input, common)?;
@@ -29,22 +25,19 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let bytes = write_output(&output, common.overwrite, |sink| stream::decompress(&lexi, sink, &bars))?;
     let seconds = start.elapsed().as_secs_f64();
     let name = output.display();
-    if common.json {
-        print_json(&json!({
-            "output": name.to_string(),
-            "gaussians": lexi.len(),
-            "sh_degree": lexi.degree().get(),
-            "ply_bytes": bytes,
-            "total_seconds": seconds,
-        }))
-    } else if common.quiet || is_pipe(&output) {
-        Ok(())
-    } else {
-        let count = format::count(lexi.len() as u64);
-        print(&format!(
-            "wrote {name}: {count} Gaussians, SH degree {}, {}, {seconds:.1} s\n",
-            lexi.degree(),
-            format::bytes(bytes)
-        ))
+    if is_pipe(&output) {
+        return Ok(());
     }
+    let json = json!({
+        "output": name.to_string(),
+        "gaussians": lexi.len(),
+        "sh_degree": lexi.degree().get(),
+        "ply_bytes": bytes,
+        "total_seconds": seconds,
+    });
+    tell(common, json, || {
+        let count = format::count(lexi.len() as u64);
+        let (degree, bytes) = (lexi.degree(), format::bytes(bytes));
+        Ok(format!("wrote {name}: {count} Gaussians, SH degree {degree}, {bytes}, {seconds:.1} s\n"))
+    })
 }

@@ -8,7 +8,6 @@ use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, lexi, ply};
 use lexisplat_eval::{
     Comparison, Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing, compare, format, montage,
-    png,
 };
 use lexisplat_render::{Camera, Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -17,7 +16,7 @@ use serde_json::json;
 
 use super::compress::error_line;
 use crate::args::{Common, Demo};
-use crate::files::{check_free, make_folder, new_output, note, print, print_json, view_name, write_bytes};
+use crate::files::{check_free, make_folder, new_output, note, tell, view_name, write_bytes, write_picture};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -27,29 +26,6 @@ const VIEWS: usize = 6;
 const FILES: [&str; 4] = ["scene.ply", "scene.lexi", "scene-exact.lexi", "report.html"];
 /// The pictures of a view.
 const PARTS: [&str; 3] = ["original", "compressed", "difference"];
-
-/// One view: the JPEG files of its pictures, in the order of [`PARTS`].
-struct Drawn {
-    name: String,
-    jpegs: [Vec<u8>; PARTS.len()],
-}
-
-impl Drawn {
-    /// Writes the pictures of a view as PNG files to `folder`.
-    fn save(folder: &Path, index: usize, name: &str, original: &Image, compressed: &Image) -> Result<Self> {
-        let difference = montage::difference(original, compressed);
-        let mut jpegs = [const { Vec::new() }; PARTS.len()];
-        for ((image, part), bytes) in
-            [original, compressed, &difference].into_iter().zip(PARTS).zip(&mut jpegs)
-        {
-            let file = folder.join(view_name(index, VIEWS, &format!("{name}_{part}")));
-            // The folder belongs to the demo, whose other files were free or may be replaced.
-            write_bytes(&file, &png(image.width, image.height, &image.to_8bit())?, true)?;
-            *bytes = jpeg(image)?;
-        }
-        Ok(Self { name: name.to_owned(), jpegs })
-    }
-}
 
 pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let start = Instant::now();
@@ -73,8 +49,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let ply_bytes = ply::write(new_output(&ply_path, common.overwrite), &splats)?;
 
     say("2. packing it: measuring what pictures depend on, rounding everything to that, entropy coding");
-    let mut packing = PackOptions::default();
-    packing.seed = args.seed;
+    let packing = PackOptions::default().with_seed(args.seed);
     let write = |compression: Compression, path: &Path| -> Result<(CompressionReport, Model)> {
         let report = compression.run(&splats, new_output(path, common.overwrite), &bars)?;
         Ok((report, lexi::read(path, &Limits::default())?))
@@ -82,29 +57,26 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     let (packed_report, packed) = write(Packing::default().with_options(packing).into(), &packed_path)?;
 
     say("3. compressing it with exact geometry: learning a dictionary, coding, checking every error");
-    let mut options = CompressOptions::default();
-    options.seed = args.seed;
-    let (report, exact) = write(options.into(), &exact_path)?;
+    let (report, exact) = write(CompressOptions::default().with_seed(args.seed).into(), &exact_path)?;
 
     say("4. drawing all three, the compressed ones straight from their codes, and comparing");
     let cameras = orbit(&splats.geometry, VIEWS, ORBIT_SIZE.0, ORBIT_SIZE.1);
-    let mut drawn: Vec<Drawn> = Vec::new();
+    let mut pictures: Vec<Picture> = Vec::new();
     let packed_scores = compared(&splats, &packed, &cameras, &bars, |name, original, compressed| {
-        drawn.push(Drawn::save(&views_folder, drawn.len(), name, original, compressed)?);
+        let difference = montage::difference(original, compressed);
+        let images = [original, compressed, &difference];
+        for (image, part) in images.into_iter().zip(PARTS) {
+            let file = views_folder.join(view_name(pictures.len(), VIEWS, &format!("{name}_{part}")));
+            // The folder belongs to the demo, whose other files were free or may be replaced.
+            write_picture(&file, image, true)?;
+        }
+        let [original, compressed, difference] = [jpeg(original)?, jpeg(compressed)?, jpeg(&difference)?];
+        pictures.push(Picture { name: name.to_owned(), original, compressed, difference });
         Ok(())
     })?;
     let exact_scores = compared(&splats, &exact, &cameras, &bars, |_, _, _| Ok(()))?;
 
     say("5. writing the report");
-    let pictures: Vec<Picture<'_>> = drawn
-        .iter()
-        .map(|Drawn { name, jpegs: [original, compressed, difference] }| Picture {
-            name,
-            original,
-            compressed,
-            difference,
-        })
-        .collect();
     let page = page(&Report {
         title: "lexisplat demo",
         command: "lexisplat demo",
@@ -125,31 +97,25 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         learn_seconds: report.learn_seconds,
         code_seconds: report.code_seconds,
         pictures: &pictures,
-        amplification: montage::AMPLIFICATION,
     });
     write_bytes(&page_path, page.as_bytes(), common.overwrite)?;
 
     let seconds = start.elapsed().as_secs_f64();
-    if common.json {
-        let file = |name: &str, bytes: u64, scores: &Comparison| json!({ "file": name, "bytes": bytes, "psnr": scores.psnr, "ssim": scores.ssim });
-        let mut exact_file = file(FILES[2], report.file_bytes, &exact_scores);
-        exact_file["mean_nonzeros"] = json!(report.mean_nonzeros);
-        exact_file["coefficient_ratio"] = json!(report.coefficient_ratio);
-        exact_file["sh_bytes"] = json!(report.sh_bytes);
-        exact_file["max_residual"] = json!(exact.record().max_residual);
-        exact_file["rms_residual"] = json!(exact.record().rms_residual);
-        return print_json(&json!({
+    let file = |name: &str, bytes: u64, scores: &Comparison| json!({ "file": name, "bytes": bytes, "psnr": scores.psnr, "ssim": scores.ssim });
+    let mut exact_file = file(FILES[2], report.file_bytes, &exact_scores);
+    exact_file["mean_nonzeros"] = json!(report.mean_nonzeros);
+    exact_file["coefficient_ratio"] = json!(report.coefficient_ratio);
+    exact_file["sh_bytes"] = json!(report.sh_bytes);
+    exact_file["max_residual"] = json!(exact.record().max_residual);
+    exact_file["rms_residual"] = json!(exact.record().rms_residual);
+    let json = json!({
             "folder": folder.display().to_string(),
             "gaussians": exact.len(),
             "ply_bytes": ply_bytes,
             "packed": file(FILES[1], packed_report.file_bytes, &packed_scores),
             "exact": exact_file,
             "total_seconds": seconds,
-        }));
-    }
-    if common.quiet {
-        return Ok(());
-    }
+    });
     let line = |name: &str, bytes: u64, what: &str, scores: &Comparison| {
         format!(
             "{name:<17} {}, {} smaller, {what}: pictures {} on average, {} at worst, over {} views\n",
@@ -160,17 +126,19 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
             scores.views.len(),
         )
     };
-    print(&format!(
-        "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser ({seconds:.0} s in all).\n",
-        FILES[0],
-        format::bytes(ply_bytes),
-        format::count(exact.len() as u64),
-        line(FILES[1], packed_report.file_bytes, "packed", &packed_scores),
-        line(FILES[2], report.file_bytes, "geometry exact", &exact_scores),
-        "",
-        error_line(exact.record()),
-        page_path.display(),
-    ))
+    tell(common, json, || {
+        Ok(format!(
+            "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser ({seconds:.0} s in all).\n",
+            FILES[0],
+            format::bytes(ply_bytes),
+            format::count(exact.len() as u64),
+            line(FILES[1], packed_report.file_bytes, "packed", &packed_scores),
+            line(FILES[2], report.file_bytes, "geometry exact", &exact_scores),
+            "",
+            error_line(exact.record()),
+            page_path.display(),
+        ))
+    })
 }
 
 /// Compares `compressed` with `original`. `draw` gets the name and both pictures of each view.

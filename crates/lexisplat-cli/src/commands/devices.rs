@@ -12,26 +12,12 @@ use crate::files::{print, print_json};
 
 pub(crate) fn run(common: &Common) -> Result<()> {
     let found = adapters();
-    if common.json {
-        let list: Vec<_> = found
-            .iter()
-            .map(|a| {
-                json!({
-                    "index": a.index,
-                    "name": a.name,
-                    "driver": a.driver,
-                    "backend": a.backend,
-                    "software": a.software,
-                    "max_binding_bytes": a.max_binding,
-                    "timestamps": a.timestamps,
-                })
-            })
-            .collect();
-        let available: Vec<_> = Simd::available().into_iter().map(Simd::name).collect();
-        let processor = json!({ "simd": Simd::current().name(), "available": available });
-        return print_json(&json!({ "devices": list, "processor": processor }));
-    }
     let simd = Simd::current().name();
+    if common.json {
+        let available: Vec<_> = Simd::available().into_iter().map(Simd::name).collect();
+        let processor = json!({ "simd": simd, "available": available });
+        return print_json(&json!({ "devices": found, "processor": processor }));
+    }
     if found.is_empty() {
         return print(&format!(
             "no GPU was found: everything is drawn on the CPU (cpu, {simd})\n\

@@ -4,22 +4,24 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
 use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, Summary, draw_views, format, misfit, montage, png,
-    score_views,
+    Comparison, DrawOptions, SceneFile, Scorer, draw_views, format, misfit, montage, png, score_views,
 };
 use lexisplat_render::{Camera, Image};
 use serde::Serialize;
 
+use super::scores::ScoreTable;
 use crate::args::{Common, Eval, Measures};
 use crate::device::open_renderer;
 use crate::files::{
-    check_free, check_output, load, make_folder, print, print_json, view_name, warn, warn_of, write_bytes,
+    check_free, check_output, load, make_folder, tell, view_name, warn, warn_of, write_bytes,
 };
 use crate::progress::Bars;
 use crate::stop::{self, Work};
+
+/// Narrowest column of scores, in characters.
+const LEAST_COLUMN: usize = 9;
 
 /// The scores of models.
 #[derive(Serialize)]
@@ -126,10 +128,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         models,
         warnings,
     };
-    if common.json {
-        return print_json(&serde_json::to_value(&report)?);
-    }
-    if common.quiet { Ok(()) } else { print(&table(&report)?) }
+    tell(common, &report, || table(&report))
 }
 
 /// Returns the scorer that the options mean.
@@ -198,7 +197,15 @@ fn table(report: &Report<'_>) -> Result<String> {
     for model in &report.models {
         for (against, comparison) in model.comparisons() {
             writeln!(out, "{} against {against}", model.file)?;
-            one(&mut out, comparison)?;
+            let scores = ScoreTable::new(
+                comparison,
+                |m| m.title().len().max(LEAST_COLUMN),
+                |metric, value| {
+                    value.map_or_else(|| "identical".to_owned(), |v| format!("{v:.*}", metric.digits()))
+                },
+            );
+            scores.views(&mut out)?;
+            scores.summary(&mut out)?;
             writeln!(out)?;
         }
         let (bytes, count) = (format::bytes(model.bytes), format::count(model.gaussians as u64));
@@ -210,42 +217,4 @@ fn table(report: &Report<'_>) -> Result<String> {
     let rounded = if report.eight_bit { "rounded to 8 bits" } else { "not rounded" };
     writeln!(out, "{:>10}  {rounded} before scoring", "pictures")?;
     Ok(out)
-}
-
-/// Writes a line for each view, and the mean, minimum and maximum.
-fn one(out: &mut String, comparison: &Comparison) -> Result<()> {
-    let metrics: Vec<Metric> = comparison.metrics().collect();
-    let width = comparison.views.iter().map(|v| v.name.chars().count()).max().unwrap_or(0).max(8);
-    let columns: Vec<usize> = metrics.iter().map(|m| m.title().chars().count().max(9)).collect();
-    write!(out, "{:<width$}  {:>11}", "view", "size")?;
-    for (metric, column) in metrics.iter().zip(&columns) {
-        write!(out, "  {:>column$}", metric.title())?;
-    }
-    writeln!(out)?;
-    for view in &comparison.views {
-        let size = format!("{}x{}", view.width, view.height);
-        write!(out, "{:<width$}  {size:>11}", format::escape(&view.name))?;
-        for (&metric, column) in metrics.iter().zip(&columns) {
-            write!(out, "  {:>column$}", number(metric, view.get(metric)))?;
-        }
-        writeln!(out)?;
-    }
-    for label in ["mean", "minimum", "maximum"] {
-        let pick = |summary: &Summary| match label {
-            "mean" => summary.mean,
-            "minimum" => summary.min,
-            _ => summary.max,
-        };
-        write!(out, "{label:<width$}  {:>11}", "")?;
-        for (&metric, column) in metrics.iter().zip(&columns) {
-            let value = comparison.get(metric).as_ref().and_then(pick);
-            write!(out, "  {:>column$}", number(metric, value))?;
-        }
-        writeln!(out)?;
-    }
-    Ok(())
-}
-
-fn number(metric: Metric, value: Option<f64>) -> String {
-    value.map_or_else(|| "identical".to_owned(), |v| format!("{v:.*}", metric.digits()))
 }

@@ -11,6 +11,7 @@ mod devices;
 mod eval;
 mod info;
 mod render;
+mod scores;
 mod sweep;
 #[cfg(feature = "view")]
 mod view;

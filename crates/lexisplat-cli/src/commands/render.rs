@@ -5,15 +5,12 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::png;
 use lexisplat_render::RenderOptions;
 use serde_json::json;
 
 use crate::args::{Common, Render};
 use crate::device::open_renderer;
-use crate::files::{
-    check_free, is_pipe, load, make_folder, print, print_json, view_name, warn_of, write_bytes,
-};
+use crate::files::{check_free, is_pipe, load, make_folder, tell, view_name, warn_of, write_picture};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -46,7 +43,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         let picture = renderer.render(&prepared, camera, &options)?;
         let seconds = clock.elapsed().as_secs_f64();
         drawing += seconds;
-        write_bytes(path, &png(picture.width, picture.height, &picture.to_8bit())?, common.overwrite)?;
+        write_picture(path, &picture, common.overwrite)?;
         bars.advance(1);
         done.push(json!({
             "camera": camera.name,
@@ -57,19 +54,11 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
         }));
     }
     bars.end();
-    if common.json {
-        return print_json(&json!({ "scene": input.name, "device": renderer.name(), "views": done }));
-    }
-    if common.quiet {
-        return Ok(());
-    }
-    let each = drawing * 1000.0 / cameras.len() as f64;
-    print(&format!(
-        "wrote {} pictures to {}, each drawn in {each:.0} ms on average ({})\n",
-        cameras.len(),
-        folder.display(),
-        renderer.name()
-    ))
+    let (count, folder, device) = (cameras.len(), folder.display(), renderer.name());
+    let each = drawing * 1000.0 / count as f64;
+    tell(common, json!({ "scene": input.name, "device": device, "views": done }), || {
+        Ok(format!("wrote {count} pictures to {folder}, each drawn in {each:.0} ms on average ({device})\n"))
+    })
 }
 
 /// Returns the folder for the pictures of the scene `file` if none is given.

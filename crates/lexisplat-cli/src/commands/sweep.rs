@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use lexisplat::Progress;
-use lexisplat_eval::{Comparison, Error, SplitFilter, format};
+use lexisplat_eval::{Comparison, DrawOptions, Error, SplitFilter, format};
 use lexisplat_sweep::{
     Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, sweep, write_report,
 };
@@ -16,12 +16,10 @@ use super::eval::scorer;
 use crate::args::{Common, Sweep};
 use crate::device::open_gpu;
 use crate::exit::OutputExists;
-use crate::files::{make_folder, outputs, print, print_json};
+use crate::files::{make_folder, outputs, tell};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
-/// The paper's tolerances.
-const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
 /// The folder of finished parts. A folder that has it is the output of a sweep.
 const PARTS: &str = "points";
 /// Columns of the summary with text. The others have numbers.
@@ -42,19 +40,14 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let (mut results, pictures) = outcome?;
     results.command = command();
     let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
-    if common.json {
-        return print_json(&json!({
+    let json = json!({
             "output": folder.display().to_string(),
             "files": files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
             "parts_reused": progress.reused,
             "parts_made": progress.made,
             "results": results,
-        }));
-    }
-    if common.quiet {
-        return Ok(());
-    }
-    print(&summary(folder, &results, &progress)?)
+    });
+    tell(common, json, || summary(folder, &results, &progress))
 }
 
 /// Refuses folders that hold something other than a sweep.
@@ -91,22 +84,19 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
 fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     let mut options = SweepOptions::default();
     options.limits = common.limits()?;
-    let given = [args.max_nnz.is_empty(), args.presets.is_empty()];
-    let tolerances: &[f64] =
-        if args.tol.is_empty() && given == [true, true] { &TOLERANCES } else { &args.tol };
-    options.settings = tolerances.iter().copied().map(Setting::Tolerance).collect();
-    options.settings.extend(args.max_nnz.iter().copied().map(Setting::MaxNonzeros));
-    options.settings.extend(args.presets.iter().copied().map(Setting::Preset));
+    let is_default = args.max_nnz.is_empty() && args.presets.is_empty() && args.tol.is_empty();
+    if !is_default {
+        let tolerances = args.tol.iter().copied().map(Setting::Tolerance);
+        let caps = args.max_nnz.iter().copied().map(Setting::MaxNonzeros);
+        let presets = args.presets.iter().copied().map(Setting::Preset);
+        options.settings = tolerances.chain(caps).chain(presets).collect();
+    }
     options.pursuit = args.pursuit;
     options.layout = args.layout;
     options.seed = args.seed;
-    options.eight_bit = args.measures.eight_bit;
+    options.drawing = DrawOptions::new(args.views.background, args.measures.eight_bit);
     options.fps = !args.no_fps;
-    options.background = args.views.background;
-    options.max_width = args.views.width;
-    options.generated = args.views.orbit;
-    options.kind = args.views.scene;
-    options.hold = args.views.hold;
+    options.views = args.views.options(None);
     options.gpu = open_gpu(args.views.device)?;
     options.pictures = args.pictures;
     options.resume = !args.fresh;
@@ -152,10 +142,10 @@ impl SweepProgress for Shown {
         self.bars.say(what);
     }
 
-    fn done(&self, parts: u64, reused: bool) {
+    fn done(&self, reused: bool) {
         let count = if reused { &self.reused } else { &self.made };
-        count.fetch_add(parts, Ordering::Relaxed);
-        self.bars.advance(parts);
+        count.fetch_add(1, Ordering::Relaxed);
+        self.bars.advance(1);
     }
 
     fn warn(&self, model: &str, warning: &str) {

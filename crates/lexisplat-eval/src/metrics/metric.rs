@@ -38,32 +38,29 @@ impl Metric {
         Self::LpipsAlexInria,
     ];
 
+    /// The name in files, and the name for people.
+    fn names(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Psnr => ("psnr", "PSNR"),
+            Self::Ssim => ("ssim", "SSIM"),
+            Self::Flip => ("flip", "FLIP"),
+            Self::LpipsVgg => ("lpips_vgg", "LPIPS (VGG)"),
+            Self::LpipsVggInria => ("lpips_vgg_inria", "LPIPS (VGG, as 3DGS)"),
+            Self::LpipsAlex => ("lpips_alex", "LPIPS (Alex)"),
+            Self::LpipsAlexInria => ("lpips_alex_inria", "LPIPS (Alex, 0..1)"),
+        }
+    }
+
     /// Returns the name in files, such as `lpips_vgg_inria`.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Psnr => "psnr",
-            Self::Ssim => "ssim",
-            Self::Flip => "flip",
-            Self::LpipsVgg => "lpips_vgg",
-            Self::LpipsVggInria => "lpips_vgg_inria",
-            Self::LpipsAlex => "lpips_alex",
-            Self::LpipsAlexInria => "lpips_alex_inria",
-        }
+        self.names().0
     }
 
     /// Returns the name for people.
     #[must_use]
     pub fn title(self) -> &'static str {
-        match self {
-            Self::Psnr => "PSNR",
-            Self::Ssim => "SSIM",
-            Self::Flip => "FLIP",
-            Self::LpipsVgg => "LPIPS (VGG)",
-            Self::LpipsVggInria => "LPIPS (VGG, as 3DGS)",
-            Self::LpipsAlex => "LPIPS (Alex)",
-            Self::LpipsAlexInria => "LPIPS (Alex, 0..1)",
-        }
+        self.names().1
     }
 
     /// Returns the number of digits after the point in tables.

@@ -1,6 +1,7 @@
 //! Training and test views.
 
 use lexisplat_render::{Camera, Split};
+use serde::Deserialize;
 
 use crate::error::{Error, Result};
 
@@ -9,7 +10,8 @@ use crate::error::{Error, Result};
 pub const DEFAULT_HOLD: usize = 8;
 
 /// The views of a source that are used.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SplitFilter {
     /// All views.
     #[default]

@@ -13,7 +13,7 @@ use super::buffer::Counted;
 const NO_ADAPTER: &str = "no GPU adapter was found; install a Vulkan driver and loader (Debian and Ubuntu: mesa-vulkan-drivers and libvulkan1), or draw with the CPU renderer";
 
 /// An adapter that this machine offers.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 pub struct AdapterSummary {
     /// Its place in the list, best first: the number that [`Device::Index`] takes.
     pub index: usize,
@@ -26,6 +26,7 @@ pub struct AdapterSummary {
     /// Whether it is software on the processor, such as lavapipe.
     pub software: bool,
     /// Largest part of a buffer that a kernel can see at once, in bytes.
+    #[serde(rename = "max_binding_bytes")]
     pub max_binding: u64,
     /// Whether stages can be timed.
     pub timestamps: bool,

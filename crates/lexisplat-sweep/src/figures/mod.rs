@@ -18,17 +18,17 @@ use super::{Method, Results, Setting, unique};
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Figure {
+pub(crate) struct Figure {
     /// Name for files, without extension; safe on every system and unique among the figures of a sweep.
-    pub name: String,
+    pub(crate) name: String,
     /// What the figure shows, in a few words.
-    pub title: String,
+    pub(crate) title: String,
     /// How to read it.
-    pub caption: String,
+    pub(crate) caption: String,
     /// An SVG document.
-    pub svg: String,
+    pub(crate) svg: String,
     /// The same picture as a PNG file.
-    pub png: Vec<u8>,
+    pub(crate) png: Vec<u8>,
 }
 
 /// Start of the ids in SVG by `kuva`; a number follows.
@@ -101,7 +101,7 @@ fn dash_key(text: &str, dash: &'static str) -> LegendEntry {
 ///
 /// # Errors
 /// [`Error::Parameter`](lexisplat_eval::Error::Parameter) if a chart cannot be drawn.
-pub fn figures(results: &Results) -> Result<Vec<Figure>> {
+pub(crate) fn figures(results: &Results) -> Result<Vec<Figure>> {
     let grid = Grid::new(results);
     let charts = [quality(&grid, None), speed(&grid), bytes(&grid)];
     let scenes = (0..grid.headings.len()).map(|column| quality(&grid, Some(column)));
@@ -159,7 +159,7 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
     if !series.is_empty() {
         let mut keys = Vec::new();
         for method in [Method::Gs3d, Method::Mcmc, Method::PixelGs] {
-            let mean = |quantity| Some(paper::mean(paper::Experiment::Main, method, quantity)?.computed);
+            let mean = |quantity| paper::mean(paper::Experiment::Main, method, quantity);
             if let Some(point) = mean(Quantity::Ratio).zip(mean(Quantity::Psnr)) {
                 let mark = Some(Mark::Cross);
                 series.push(Series { mark, joined: false, ..line(method, SOLID, vec![point]) });

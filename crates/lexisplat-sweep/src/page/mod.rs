@@ -4,57 +4,39 @@
 //! Without scripts it still shows everything. It follows the reader's light or dark theme.
 
 mod cards;
+mod parts;
 mod sections;
 
-use maud::{PreEscaped, html};
+use maud::html;
+
+pub(crate) use parts::{card, decibels, document, image, scores, section};
 
 use super::grid::Grid;
 use super::{Figure, Results, SweepPicture};
 
-/// The style sheet of the report about one scene. [`STYLE`] extends it.
-const BASE_STYLE: &str = include_str!("../report/page.css");
 const STYLE: &str = include_str!("sweep.css");
 const SCRIPT: &str = include_str!("sweep.js");
-const POLICY: &str =
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 
 /// The page as UTF-8 text; the same input gives the same page. `date` is printed as it is.
-#[must_use]
-pub fn sweep_html(
+pub(crate) fn sweep_html(
     results: &Results,
     figures: &[Figure],
     pictures: &[SweepPicture],
     date: Option<&str>,
 ) -> String {
-    let grid = Grid::new(results);
-    html! {
-        (PreEscaped("<!doctype html>\n"))
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(POLICY);
-                title { "Sweep \u{b7} lexisplat" }
-                style { "\n" (PreEscaped(BASE_STYLE)) (PreEscaped(STYLE)) }
-            }
-            "\n"
-            body {
-                (sections::header(&grid, date))
-                main {
-                    (sections::pictures(results, pictures))
-                    (sections::figures(figures))
-                    (sections::saturation(results, figures))
-                    (sections::tables(results))
-                    (sections::paper(results))
-                    (sections::details(results, figures))
-                }
-                (sections::footer(results, date))
-                script { "\n" (PreEscaped(SCRIPT)) }
-            }
+    let body = html! {
+        (sections::header(&Grid::new(results), date))
+        main {
+            (sections::pictures(results, pictures))
+            (sections::figures(figures))
+            (sections::saturation(results, figures))
+            (sections::tables(results))
+            (sections::paper(results))
+            (sections::details(results, figures))
         }
-        "\n"
-    }
-    .into_string()
+        (sections::footer(results, date))
+    };
+    document("Sweep", STYLE, &body, SCRIPT)
 }
 
 #[cfg(test)]
@@ -124,7 +106,7 @@ mod tests {
         for note in super::super::NOTES.iter() {
             assert!(page.contains(&escape(note.title)), "{}", note.title);
         }
-        for paragraph in super::super::saturation(&results) {
+        for paragraph in crate::saturation::saturation(&results) {
             assert!(page.contains(&escape(&paragraph)));
         }
         // 42 dB of bonsai by two methods' means: (42 + 44 + 40) / 3; garden is identical.

@@ -1,16 +1,16 @@
 //! The page's sections, from top to bottom.
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use lexisplat_eval::format;
 use lexisplat_eval::montage::AMPLIFICATION;
 use maud::{Markup, PreEscaped, html};
 
 use super::cards::cards;
+use super::{image, scores, section};
 use crate::grid::Grid;
 use crate::measure::Measure;
+use crate::saturation::saturation as paragraphs;
 use crate::table::Table;
-use crate::{Figure, NOTES, Results, SweepPicture, saturation as paragraphs, tables};
+use crate::{Figure, NOTES, Results, SweepPicture, tables};
 
 /// Most rows of the table of single views on the page.
 const MOST_VIEW_ROWS: usize = 1500;
@@ -25,11 +25,6 @@ const SCENE: &str = "scene-";
 fn plural(count: usize, one: &str) -> String {
     let s = if count == 1 { "" } else { "s" };
     format!("{} {one}{s}", format::count(count as u64))
-}
-
-/// A section with a heading. `id` is the id of the heading.
-fn section(id: &str, heading: &str, content: &Markup) -> Markup {
-    html! { section aria-labelledby=(id) { h2 id=(id) { (heading) } "\n" (content) } "\n" }
 }
 
 pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
@@ -58,30 +53,21 @@ pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
     }
 }
 
-/// A picture that is part of the page.
-fn image(class: &str, alt: &str, png: &[u8]) -> Markup {
-    html! { img class=(class) alt=(alt) src={ "data:image/png;base64," (BASE64_STANDARD.encode(png)) }; }
-}
-
 /// One view of one model at one setting.
 fn view(results: &Results, picture: &SweepPicture) -> Option<Markup> {
     let scene = results.scenes.get(picture.scene)?;
     let model = format!("{}, {}", scene.name, scene.method.title());
     let (setting, name) = (&picture.setting, format!("{model}, {}", picture.view));
     let point = scene.points.iter().find(|point| point.setting.label() == *setting);
-    let score =
-        point.and_then(|point| point.to_original.views.iter().find(|score| score.name == picture.view));
-    let score = score.map(|score| match score.psnr {
-        Some(psnr) => format!(" \u{b7} PSNR {psnr:.2}\u{a0}dB \u{b7} SSIM {:.4}", score.ssim),
-        None => " \u{b7} identical".to_owned(),
-    });
+    let score = point.map(|point| scores(&point.to_original, &picture.view));
+    let image = |class, alt: &str, png: &[u8]| image("png", class, &format!("{name}: {alt}"), png);
     Some(html! {
         figure class="view" data-scene=(model) data-setting=(setting) data-view=(picture.view) {
             div class="stage" {
-                (image("before", &format!("{name}: original"), &picture.original))
-                @if let Some(photo) = &picture.photo { (image("photo", &format!("{name}: photo"), photo)) }
-                (image("after", &format!("{name}: compressed, {setting}"), &picture.compressed))
-                (image("difference", &format!("{name}: amplified difference"), &picture.difference))
+                (image("before", "original", &picture.original))
+                @if let Some(photo) = &picture.photo { (image("photo", "photo", photo)) }
+                (image("after", &format!("compressed, {setting}"), &picture.compressed))
+                (image("difference", "amplified difference", &picture.difference))
                 span class="tag left" { "original" }
                 span class="tag right" { (setting) }
             }

@@ -1,5 +1,3 @@
-"use strict";
-document.documentElement.classList.add("js");
 
 // Tables: keep all columns that name a row in sight where they leave room for the others.
 const pin = grid => {
@@ -18,20 +16,12 @@ document.querySelectorAll("details").forEach(details => details.addEventListener
 addEventListener("resize", pinAll);
 pinAll();
 
-// Pictures: one at a time, original left of the line and compressed right of it.
-const views = [...document.querySelectorAll(".view")];
+// Pictures: one at a time, of the scene, the setting and the view that are chosen.
 if (views.length) {
   const picks = ["scene", "setting", "view"].map(id => document.getElementById(id));
-  const range = document.getElementById("at");
-  const differ = document.getElementById("differ");
   const photo = document.getElementById("photo");
-  const stages = views.map(view => view.querySelector(".stage"));
   let shown = views[0];
 
-  const place = percent => {
-    range.value = percent;
-    stages.forEach(stage => stage.style.setProperty("--at", percent + "%"));
-  };
   // Each list offers what there is for the choices before it, and keeps its own if it can.
   const choose = () => {
     let left = views;
@@ -48,29 +38,13 @@ if (views.length) {
   const update = () => {
     const stage = shown.querySelector(".stage");
     const has = stage.querySelector(".photo") !== null;
-    const real = has && photo.getAttribute("aria-pressed") === "true";
+    const real = has && isPressed(photo);
     photo.disabled = !has;
     stage.classList.toggle("real", real);
-    stage.classList.toggle("differs", differ.getAttribute("aria-pressed") === "true");
     stage.querySelector(".tag.left").textContent = real ? "photo" : "original";
   };
-  stages.forEach(stage => {
-    const follow = event => {
-      if (event.type === "pointermove" && event.pointerType !== "mouse" && !event.buttons) return;
-      const box = stage.getBoundingClientRect();
-      place(Math.min(100, Math.max(0, (event.clientX - box.left) / box.width * 100)));
-    };
-    stage.addEventListener("pointerdown", follow);
-    stage.addEventListener("pointermove", follow);
-    stage.addEventListener("dragstart", event => event.preventDefault());
-  });
-  [differ, photo].forEach(button => button.addEventListener("click", () => {
-    button.setAttribute("aria-pressed", button.getAttribute("aria-pressed") !== "true");
-    update();
-  }));
+  toggles(photo, update);
   picks.forEach(pick => pick.addEventListener("change", choose));
-  range.addEventListener("input", () => place(range.value));
   photo.hidden = stages.every(stage => stage.querySelector(".photo") === null);
-  place(50);
   choose();
 }

@@ -5,7 +5,8 @@ use lexisplat_eval::format;
 use maud::{Markup, PreEscaped, html};
 
 use super::atoms::{self, Usage};
-use super::{Report, card, packed, smaller, text};
+use super::{Report, packed, smaller, text};
+use crate::page::{card, section};
 
 /// What several parts need.
 pub(super) struct Facts<'a> {
@@ -28,33 +29,31 @@ impl<'a> Facts<'a> {
     pub(super) fn summary(&self) -> Markup {
         let (before, after) =
             (packed::ply_groups(self.report)[0], packed::lexi_groups(&self.report.exact)[0]);
-        html! {
-            section aria-labelledby="exact" {
-                h2 #exact { "When geometry must not change: the exact layout" }
-                p {
-                    "The second file, " (self.report.exact.name) ", rewrites view-dependent colour alone. Places, \
-                     sizes, rotations, opacities and base colours are bit for bit those of the original."
-                }
-                dl.cards {
-                    (card(smaller(self.report.ply_bytes, self.report.exact.bytes), "smaller: the whole file"))
-                    @if self.dim > 0 {
-                        (card(text::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
-                        (card(
-                            html! { (format!("{:.1} ", self.mean_nonzeros)) small { "of " (self.dim) } },
-                            "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
-                        ))
-                    }
-                    (packed::quality(self.report.exact.comparison))
-                }
+        let content = html! {
+            p {
+                "The second file, " (self.report.exact.name) ", rewrites view-dependent colour alone. Places, \
+                 sizes, rotations, opacities and base colours are bit for bit those of the original."
+            }
+            dl.cards {
+                (card(smaller(self.report.ply_bytes, self.report.exact.bytes), "smaller: the whole file"))
                 @if self.dim > 0 {
-                    p.note {
-                        "Papers often count coefficients alone, without indices and without the rest of the file: "
-                        (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, text::ratio(self.dim as f64, self.mean_nonzeros)))
-                        " here."
-                    }
+                    (card(text::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
+                    (card(
+                        html! { (format!("{:.1} ", self.mean_nonzeros)) small { "of " (self.dim) } },
+                        "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
+                    ))
+                }
+                (packed::quality(self.report.exact.comparison))
+            }
+            @if self.dim > 0 {
+                p.note {
+                    "Papers often count coefficients alone, without indices and without the rest of the file: "
+                    (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, text::ratio(self.dim as f64, self.mean_nonzeros)))
+                    " here."
                 }
             }
-        }
+        };
+        section("exact", "When geometry must not change: the exact layout", &content)
     }
 
     pub(super) fn steps(&self) -> Markup {
@@ -77,37 +76,35 @@ impl<'a> Facts<'a> {
             (None, None) => "until nothing is left".to_owned(),
         };
         let seconds = |s: f64| if s.is_finite() { format!(" It took {s:.1}\u{a0}s.") } else { String::new() };
-        html! {
-            section aria-labelledby="how" {
-                h2 #how { "How the exact file is made" }
-                ol.steps {
-                    li {
-                        strong { "Look" } "Each Gaussian has " (self.dim) " numbers (spherical harmonics of degree "
-                        (model.degree()) ") that say how its colour changes with direction"
-                        @if packed::ply_groups(report)[0] > report.ply_bytes as f64 / 2.0 { ": most of the PLY" } "."
-                    }
-                    li {
-                        strong { "Learn" } "From a sample of them, " (format::count(model.dictionary().len() as u64))
-                        " typical patterns were learnt: the dictionary\u{2019}s atoms." (seconds(report.learn_seconds))
-                    }
-                    li {
-                        strong { "Code" }
-                        @match self.record.pursuit { Some(Pursuit::Omp) => "Orthogonal matching pursuit", _ => "Orthogonal least squares" }
-                        " picked a few atoms and their amounts for every Gaussian, one by one, " (stop) "."
-                        (seconds(report.code_seconds))
-                    }
-                    li {
-                        strong { "Check" } "Every Gaussian was put together again from what the file holds, in double \
-                         precision, and measured. "
-                        @match model.codes().escapes().gaussians.len() {
-                            0 => "All of them are within the bound.",
-                            1 => "One that did not fit is stored exactly.",
-                            n => { (format::count(n as u64)) " that did not fit are stored exactly." }
-                        }
+        let content = html! {
+            ol.steps {
+                li {
+                    strong { "Look" } "Each Gaussian has " (self.dim) " numbers (spherical harmonics of degree "
+                    (model.degree()) ") that say how its colour changes with direction"
+                    @if packed::ply_groups(report)[0] > report.ply_bytes as f64 / 2.0 { ": most of the PLY" } "."
+                }
+                li {
+                    strong { "Learn" } "From a sample of them, " (format::count(model.dictionary().len() as u64))
+                    " typical patterns were learnt: the dictionary\u{2019}s atoms." (seconds(report.learn_seconds))
+                }
+                li {
+                    strong { "Code" }
+                    @match self.record.pursuit { Some(Pursuit::Omp) => "Orthogonal matching pursuit", _ => "Orthogonal least squares" }
+                    " picked a few atoms and their amounts for every Gaussian, one by one, " (stop) "."
+                    (seconds(report.code_seconds))
+                }
+                li {
+                    strong { "Check" } "Every Gaussian was put together again from what the file holds, in double \
+                     precision, and measured. "
+                    @match model.codes().escapes().gaussians.len() {
+                        0 => "All of them are within the bound.",
+                        1 => "One that did not fit is stored exactly.",
+                        n => { (format::count(n as u64)) " that did not fit are stored exactly." }
                     }
                 }
             }
-        }
+        };
+        section("how", "How the exact file is made", &content)
     }
 
     /// Returns the tolerance if every Gaussian is within it.
@@ -120,12 +117,10 @@ impl<'a> Facts<'a> {
         if self.dim == 0 {
             return html! {};
         }
-        html! {
-            section aria-labelledby="bound" {
-                h2 #bound { "The bound on the error" }
-                @match self.kept() { Some(tolerance) => (self.kept_bound(tolerance)), None => (self.lifted_bound()) }
-            }
-        }
+        let content = html! {
+            @match self.kept() { Some(tolerance) => (self.kept_bound(tolerance)), None => (self.lifted_bound()) }
+        };
+        section("bound", "The bound on the error", &content)
     }
 
     fn kept_bound(&self, tolerance: f64) -> Markup {
@@ -203,27 +198,25 @@ impl<'a> Facts<'a> {
         let total = counts.iter().sum::<u64>().max(1) as f64;
         let mean = format!("mean {:.2}", self.mean_nonzeros);
         let mean_at = (self.mean_nonzeros + 0.5) / used as f64 * 100.0;
-        html! {
-            section aria-labelledby="need" {
-                h2 #need { "Each takes what it needs" }
-                p {
-                    "A matt surface takes an atom or two, a shiny one takes more. The height is the number of Gaussians that \
-                     need that many atoms; the number of atoms grows from left to right."
-                }
-                .panel {
-                    .histogram role="img" aria-label=(format!("How many Gaussians need how many atoms; {mean}")) {
-                        @for (k, &n) in counts[..used].iter().enumerate() {
-                            span title=(format!("{k} atoms: {} Gaussians ({:.1}%)", format::count(n), n as f64 / total * 100.0)) {
-                                i.g-codes style=(format!("height:{:.2}%", n as f64 / tallest * 100.0)) {}
-                                small { @if k.is_multiple_of(5) { (k) } }
-                            }
+        let content = html! {
+            p {
+                "A matt surface takes an atom or two, a shiny one takes more. The height is the number of Gaussians that \
+                 need that many atoms; the number of atoms grows from left to right."
+            }
+            .panel {
+                .histogram role="img" aria-label=(format!("How many Gaussians need how many atoms; {mean}")) {
+                    @for (k, &n) in counts[..used].iter().enumerate() {
+                        span title=(format!("{k} atoms: {} Gaussians ({:.1}%)", format::count(n), n as f64 / total * 100.0)) {
+                            i.g-codes style=(format!("height:{:.2}%", n as f64 / tallest * 100.0)) {}
+                            small { @if k.is_multiple_of(5) { (k) } }
                         }
-                        // The text stands on the side that has more room.
-                        b.mean.left[mean_at > 50.0] style=(format!("left:{mean_at:.2}%")) { (mean) }
                     }
+                    // The text stands on the side that has more room.
+                    b.mean.left[mean_at > 50.0] style=(format!("left:{mean_at:.2}%")) { (mean) }
                 }
             }
-        }
+        };
+        section("need", "Each takes what it needs", &content)
     }
 
     pub(super) fn dictionary(&self) -> Markup {
@@ -238,28 +231,26 @@ impl<'a> Facts<'a> {
         } else {
             format!("The {shown} most used of the {all} atoms")
         };
-        html! {
-            section aria-labelledby="atoms-title" {
-                h2 #atoms-title { "The dictionary" }
-                p {
-                    (which) ", each drawn as a ball: every side shows the colour the atom adds when the Gaussian is seen from \
-                     there, grey where it adds nothing. The share of Gaussians that use it stands below each. Drag, or use the \
-                     arrow keys, to turn them all."
-                }
-                noscript { p.note { "The page\u{2019}s script draws the balls." } }
-                .panel {
-                    #atoms tabindex="0" role="img" aria-label=(format!("{which} as balls")) {
-                        @for (atom, users) in usage.shown() {
-                            figure title=(format!("atom {atom}: {} Gaussians", format::count(*users))) {
-                                canvas {}
-                                figcaption { (format!("{:.1}%", *users as f64 / self.gaussians.max(1) as f64 * 100.0)) }
-                            }
+        let content = html! {
+            p {
+                (which) ", each drawn as a ball: every side shows the colour the atom adds when the Gaussian is seen from \
+                 there, grey where it adds nothing. The share of Gaussians that use it stands below each. Drag, or use the \
+                 arrow keys, to turn them all."
+            }
+            noscript { p.note { "The page\u{2019}s script draws the balls." } }
+            .panel {
+                #atoms tabindex="0" role="img" aria-label=(format!("{which} as balls")) {
+                    @for (atom, users) in usage.shown() {
+                        figure title=(format!("atom {atom}: {} Gaussians", format::count(*users))) {
+                            canvas {}
+                            figcaption { (format!("{:.1}%", *users as f64 / self.gaussians.max(1) as f64 * 100.0)) }
                         }
                     }
                 }
-                script #atom-data type="application/json" { (PreEscaped(atoms::json(model, &usage))) }
             }
-        }
+            script #atom-data type="application/json" { (PreEscaped(atoms::json(model, &usage))) }
+        };
+        section("atoms-title", "The dictionary", &content)
     }
 
     pub(super) fn footer(&self) -> Markup {

@@ -10,20 +10,16 @@ mod exact;
 mod packed;
 mod text;
 
-use base64::Engine;
-use base64::engine::general_purpose::STANDARD;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use lexisplat::Model;
 use lexisplat_eval::{Comparison, Error, Result};
 use lexisplat_render::Image;
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::html;
 
-const STYLE: &str = include_str!("page.css");
+use crate::page::document;
+
 const SCRIPT: &str = include_str!("page.js");
-/// Forbids every request: all that the page needs is in it.
-const SECURITY_POLICY: &str =
-    "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'";
 /// Quality of the pictures in the page, 1 to 100. Six views of the demo, 960 x 640 pixels and three pictures
 /// each, take about 2 MB with it.
 const JPEG_QUALITY: u8 = 85;
@@ -48,9 +44,7 @@ pub struct Report<'a> {
     /// Seconds spent on coding the exact file.
     pub code_seconds: f64,
     /// Pictures of the packed file; may be fewer than the views compared.
-    pub pictures: &'a [Picture<'a>],
-    /// What [`Picture::difference`] multiplies differences by.
-    pub amplification: f32,
+    pub pictures: &'a [Picture],
 }
 
 /// One compressed file of the scene.
@@ -68,16 +62,16 @@ pub struct CompressedFile<'a> {
 }
 
 /// One view of the original and of the packed scene, as JPEG files of one size: see [`jpeg`].
-#[derive(Debug, Clone, Copy)]
-pub struct Picture<'a> {
+#[derive(Debug, Clone)]
+pub struct Picture {
     /// The view's name, as in [`CompressedFile::comparison`].
-    pub name: &'a str,
+    pub name: String,
     /// The original scene.
-    pub original: &'a [u8],
+    pub original: Vec<u8>,
     /// The packed scene.
-    pub compressed: &'a [u8],
-    /// Their amplified difference.
-    pub difference: &'a [u8],
+    pub compressed: Vec<u8>,
+    /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
+    pub difference: Vec<u8>,
 }
 
 /// `image` as the bytes of a JPEG file of the quality that the page uses.
@@ -98,50 +92,27 @@ pub fn jpeg(image: &Image) -> Result<Vec<u8>> {
 #[must_use]
 pub fn page(report: &Report<'_>) -> String {
     let exact = exact::Facts::new(report);
-    let markup = html! {
-        (DOCTYPE)
-        html lang="en" {
-            head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta http-equiv="Content-Security-Policy" content=(SECURITY_POLICY);
-                title { (report.title) " \u{b7} lexisplat" }
-                style { (PreEscaped(STYLE)) }
-            }
-            body {
-                (packed::header(report))
-                main {
-                    (packed::pictures(report))
-                    (packed::steps())
-                    (packed::sizes(report))
-                    (exact.summary())
-                    (exact.steps())
-                    (exact.bound())
-                    (exact.nonzeros())
-                    (exact.dictionary())
-                    (packed::views(report))
-                }
-                (exact.footer())
-                script { (PreEscaped(SCRIPT)) }
-            }
+    let body = html! {
+        (packed::header(report))
+        main {
+            (packed::pictures(report))
+            (packed::steps())
+            (packed::sizes(report))
+            (exact.summary())
+            (exact.steps())
+            (exact.bound())
+            (exact.nonzeros())
+            (exact.dictionary())
+            (packed::views(report))
         }
+        (exact.footer())
     };
-    markup.into_string()
-}
-
-/// One figure of the summary at the top of a section.
-fn card(value: impl maud::Render, what: &str) -> Markup {
-    html! { div.card { dt { (what) } dd { (value) } } }
+    document(report.title, "", &body, SCRIPT)
 }
 
 /// Bytes of `before` over bytes of `after`, as `24.50×`.
 fn smaller(before: u64, after: u64) -> String {
     text::ratio(before as f64, after as f64)
-}
-
-/// An image whose file is `jpeg`, in the page itself.
-fn embedded(class: &str, alt: &str, jpeg: &[u8]) -> Markup {
-    html! { img class=(class) alt=(alt) src=(format!("data:image/jpeg;base64,{}", STANDARD.encode(jpeg))); }
 }
 
 #[cfg(test)]
@@ -221,7 +192,8 @@ mod tests {
     fn page(model: &Model, comparison: &Comparison, name: &str) -> String {
         let attributes = [("position", 48.0), ("codes.values", 6.0), ("header", 900.0)];
         let attributes = attributes.map(|(name, bytes)| (name.to_owned(), bytes));
-        let picture = Picture { name, original: b"one", compressed: b"two", difference: b"three" };
+        let [original, compressed, difference] = ["one", "two", "three"].map(Vec::from);
+        let picture = Picture { name: name.to_owned(), original, compressed, difference };
         let exact = CompressedFile { name: "exact.lexi", bytes: 954, attributes: &attributes, comparison };
         super::page(&Report {
             title: "a <b>scene</b> & more",
@@ -238,7 +210,6 @@ mod tests {
             learn_seconds: 0.5,
             code_seconds: f64::NAN,
             pictures: &[picture],
-            amplification: 16.0,
         })
     }
 
@@ -251,7 +222,7 @@ mod tests {
         let scores = Comparison::of(vec![view("front", Some(45.25)), view("b<a>ck", None)]);
         let page = page(&model(ShDegree::THREE), &scores, "front");
         check_nesting(&page);
-        assert!(page.starts_with("<!DOCTYPE html>") && page.ends_with("</html>"));
+        assert!(page.starts_with("<!doctype html>") && page.ends_with("</html>\n"));
         for outside in ["http://", "https://", "url(", "@import", "<link"] {
             assert!(!page.contains(outside), "{outside}");
         }

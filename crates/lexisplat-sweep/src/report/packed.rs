@@ -1,10 +1,12 @@
 //! The parts of the page about the packed file, and those that show both files beside each other.
 
 use lexisplat::sh::CHANNELS;
-use lexisplat_eval::{Comparison, format};
+use lexisplat_eval::montage::AMPLIFICATION;
+use lexisplat_eval::{Comparison, Summary, format};
 use maud::{Markup, html};
 
-use super::{CompressedFile, Picture, Report, card, embedded, smaller, text};
+use super::{CompressedFile, Picture, Report, smaller, text};
+use crate::page::{card, decibels, image, scores, section};
 
 /// Bytes of a value in a PLY: every known trainer writes floats.
 const PLY_VALUE: u64 = 4;
@@ -79,13 +81,12 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
 
 /// The cards that say how close a file's pictures are to the original's.
 pub(super) fn quality(comparison: &Comparison) -> Markup {
-    let decibels = |value: f64| html! { (format!("{value:.1} ")) small { "dB" } };
     html! {
         @if comparison.identical {
             (card("identical", "every compared view"))
         } @else if let (Some(mean), Some(min)) = (comparison.psnr.mean, comparison.psnr.min) {
-            (card(decibels(mean), "mean PSNR against the original\u{2019}s pictures; more is closer"))
-            (card(decibels(min), "PSNR of the worst of the views"))
+            (card(decibels(&format!("{mean:.1}")), "mean PSNR against the original\u{2019}s pictures; more is closer"))
+            (card(decibels(&format!("{min:.1}")), "PSNR of the worst of the views"))
         }
     }
 }
@@ -94,64 +95,50 @@ pub(super) fn pictures(report: &Report<'_>) -> Markup {
     if report.pictures.is_empty() {
         return html! {};
     }
-    html! {
-        section aria-labelledby="see" {
-            h2 #see { "Can you tell?" }
-            p {
-                "Left of the line is the original, right of it the packed file, drawn straight from its codes. Drag \
-                 the line. The pictures are JPEGs to keep this page small; the scores are of the exact pictures."
-            }
-            .panel {
-                @for Picture { name, original, compressed, difference } in report.pictures {
-                    figure.view data-name=(name) {
-                        .stage {
-                            (embedded("before", &format!("{name}, original"), original))
-                            (embedded("after", &format!("{name}, compressed"), compressed))
-                            (embedded("difference", &format!("{name}, amplified difference"), difference))
-                            span."tag left" { "original" }
-                            span."tag right" { "compressed" }
-                        }
-                        figcaption {
-                            (name)
-                            @if let Some(score) = report.packed.comparison.views.iter().find(|view| view.name == *name) {
-                                @if score.identical {
-                                    " \u{b7} identical"
-                                } @else {
-                                    " \u{b7} PSNR " (text::number(score.psnr, 2)) "\u{a0}dB \u{b7} SSIM "
-                                    (format!("{:.4}", score.ssim))
-                                }
-                            }
-                        }
-                    }
-                }
-                .controls {
-                    label for="at" { "Line " input #at type="range" min="0" max="100" step="0.5" value="50"; }
-                    button #differ type="button" aria-pressed="false" {
-                        "Difference, \u{d7}" (report.amplification) " brighter"
-                    }
-                }
-                .thumbs role="group" aria-label="Views" {}
-            }
+    let content = html! {
+        p {
+            "Left of the line is the original, right of it the packed file, drawn straight from its codes. Drag \
+             the line. The pictures are JPEGs to keep this page small; the scores are of the exact pictures."
         }
-    }
+        .panel {
+            @for Picture { name, original, compressed, difference } in report.pictures {
+                figure.view data-name=(name) {
+                    .stage {
+                        (image("jpeg", "before", &format!("{name}, original"), original))
+                        (image("jpeg", "after", &format!("{name}, compressed"), compressed))
+                        (image("jpeg", "difference", &format!("{name}, amplified difference"), difference))
+                        span."tag left" { "original" }
+                        span."tag right" { "compressed" }
+                    }
+                    figcaption { (name) (scores(report.packed.comparison, name)) }
+                }
+            }
+            .controls {
+                label for="at" { "Line " input #at type="range" min="0" max="100" step="0.5" value="50"; }
+                button #differ type="button" aria-pressed="false" {
+                    "Difference, \u{d7}" (AMPLIFICATION) " brighter"
+                }
+            }
+            .thumbs role="group" aria-label="Views" {}
+        }
+    };
+    section("see", "Can you tell?", &content)
 }
 
 pub(super) fn steps() -> Markup {
-    html! {
-        section aria-labelledby="packing" {
-            h2 #packing { "How the packed file is made" }
-            ol.steps {
-                li { strong { "Look" } "The scene is drawn from generated views, and for each number of each Gaussian it is \
-                     measured how much the pictures change with it." }
-                li { strong { "Round" } "Each number is rounded to a step that follows from that: fine where pictures \
-                     depend on it, coarse where they do not." }
-                li { strong { "Learn" } "View-dependent colour is written as a few atoms of a dictionary that is learnt \
-                     from the scene." }
-                li { strong { "Code" } "What is left is predicted from its neighbours and entropy-coded: what is likely \
-                     takes few bits." }
-            }
+    let content = html! {
+        ol.steps {
+            li { strong { "Look" } "The scene is drawn from generated views, and for each number of each Gaussian it is \
+                 measured how much the pictures change with it." }
+            li { strong { "Round" } "Each number is rounded to a step that follows from that: fine where pictures \
+                 depend on it, coarse where they do not." }
+            li { strong { "Learn" } "View-dependent colour is written as a few atoms of a dictionary that is learnt \
+                 from the scene." }
+            li { strong { "Code" } "What is left is predicted from its neighbours and entropy-coded: what is likely \
+                 takes few bits." }
         }
-    }
+    };
+    section("packing", "How the packed file is made", &content)
 }
 
 /// A bar as long as its share of `longest`, in parts as long as theirs.
@@ -176,53 +163,54 @@ fn whole(bytes: f64) -> u64 {
     whole
 }
 
+/// The headings of a table.
+fn head(names: [&str; 6]) -> Markup {
+    html! { thead { tr { @for name in names { th scope="col" { (name) } } } } }
+}
+
 pub(super) fn sizes(report: &Report<'_>) -> Markup {
     let Report { ply_bytes, packed, exact, .. } = report;
     let columns = [ply_groups(report), lexi_groups(packed), lexi_groups(exact)];
     let longest = (*ply_bytes).max(packed.bytes).max(exact.bytes).max(1) as f64;
-    html! {
-        section aria-labelledby="bytes" {
-            h2 #bytes { "Where the bytes are" }
-            p { "The packed file is " (packed.name) "; " (exact.name) " is the exact one described below." }
-            .panel {
-                (bar("PLY", *ply_bytes, &columns[0], longest))
-                (bar("packed", packed.bytes, &columns[1], longest))
-                (bar("exact", exact.bytes, &columns[2], longest))
-                .scroll {
-                    table {
-                        thead {
-                            tr { @for name in ["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"] { th scope="col" { (name) } } }
-                        }
-                        tbody {
-                            @for (k, (what, class, _)) in GROUPS.iter().enumerate() {
-                                @let before = columns[0][k];
-                                tr {
-                                    th scope="row" { span class=(format!("key {class}")) {} (what) }
-                                    td { (text::bytes(whole(before))) }
-                                    @for after in [columns[1][k], columns[2][k]] {
-                                        td { (text::bytes(whole(after))) }
-                                        // Headers hold no numbers of the scene, so they have no ratio.
-                                        td { (text::ratio(before, if k == OTHER { 0.0 } else { after })) }
-                                    }
+    let content = html! {
+        p { "The packed file is " (packed.name) "; " (exact.name) " is the exact one described below." }
+        .panel {
+            (bar("PLY", *ply_bytes, &columns[0], longest))
+            (bar("packed", packed.bytes, &columns[1], longest))
+            (bar("exact", exact.bytes, &columns[2], longest))
+            .scroll {
+                table {
+                    (head(["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"]))
+                    tbody {
+                        @for (k, (what, class, _)) in GROUPS.iter().enumerate() {
+                            @let before = columns[0][k];
+                            tr {
+                                th scope="row" { span class=(format!("key {class}")) {} (what) }
+                                td { (text::bytes(whole(before))) }
+                                @for after in [columns[1][k], columns[2][k]] {
+                                    td { (text::bytes(whole(after))) }
+                                    // Headers hold no numbers of the scene, so they have no ratio.
+                                    td { (text::ratio(before, if k == OTHER { 0.0 } else { after })) }
                                 }
                             }
                         }
-                        tfoot {
-                            tr {
-                                th scope="row" { "Whole file" }
-                                td { (text::bytes(*ply_bytes)) }
-                                @for file in [packed, exact] {
-                                    td { (text::bytes(file.bytes)) }
-                                    td { (smaller(*ply_bytes, file.bytes)) }
-                                }
+                    }
+                    tfoot {
+                        tr {
+                            th scope="row" { "Whole file" }
+                            td { (text::bytes(*ply_bytes)) }
+                            @for file in [packed, exact] {
+                                td { (text::bytes(file.bytes)) }
+                                td { (smaller(*ply_bytes, file.bytes)) }
                             }
                         }
                     }
                 }
             }
-            p.note { "The ratios count every byte; a megabyte is 10" sup { "6" } " bytes." }
         }
-    }
+        p.note { "The ratios count every byte; a megabyte is 10" sup { "6" } " bytes." }
+    };
+    section("bytes", "Where the bytes are", &content)
 }
 
 pub(super) fn views(report: &Report<'_>) -> Markup {
@@ -230,57 +218,44 @@ pub(super) fn views(report: &Report<'_>) -> Markup {
     if files[0].views.is_empty() {
         return html! {};
     }
-    let summaries = files.map(|file| {
-        [
-            ("Mean", file.psnr.mean, file.ssim.mean),
-            ("Lowest", file.psnr.min, file.ssim.min),
-            ("Highest", file.psnr.max, file.ssim.max),
-        ]
-    });
-    html! {
-        section aria-labelledby="views" {
-            h2 #views { "View by view" }
-            p {
-                "All scenes were drawn by the same renderer from the same cameras. PSNR and SSIM say how close the \
-                 pictures are to the original\u{2019}s: at 40\u{a0}dB they are off by 1\u{a0}% of the range (root mean \
-                 square), at 50\u{a0}dB by 0.3\u{a0}%; an SSIM of 1 is a perfect match."
-            }
-            .panel.scroll {
-                table {
-                    thead {
+    let content = html! {
+        p {
+            "All scenes were drawn by the same renderer from the same cameras. PSNR and SSIM say how close the \
+             pictures are to the original\u{2019}s: at 40\u{a0}dB they are off by 1\u{a0}% of the range (root mean \
+             square), at 50\u{a0}dB by 0.3\u{a0}%; an SSIM of 1 is a perfect match."
+        }
+        .panel.scroll {
+            table {
+                (head(["View", "Size", "Packed: PSNR, dB", "SSIM", "Exact: PSNR, dB", "SSIM"]))
+                tbody {
+                    @for (i, view) in files[0].views.iter().enumerate() {
                         tr {
-                            @for name in ["View", "Size", "Packed: PSNR, dB", "SSIM", "Exact: PSNR, dB", "SSIM"] { th scope="col" { (name) } }
-                        }
-                    }
-                    tbody {
-                        @for (i, view) in files[0].views.iter().enumerate() {
-                            tr {
-                                th scope="row" { (view.name) }
-                                td { (view.width) "\u{d7}" (view.height) }
-                                @for score in files.iter().filter_map(|file| file.views.get(i)) {
-                                    td { @if score.identical { "identical" } @else { (text::number(score.psnr, 2)) } }
-                                    td { (format!("{:.5}", score.ssim)) }
-                                }
+                            th scope="row" { (view.name) }
+                            td { (view.width) "\u{d7}" (view.height) }
+                            @for score in files.iter().filter_map(|file| file.views.get(i)) {
+                                td { @if score.identical { "identical" } @else { (text::number(score.psnr, 2)) } }
+                                td { (format!("{:.5}", score.ssim)) }
                             }
                         }
                     }
-                    tfoot {
-                        @for k in 0..summaries[0].len() {
-                            tr {
-                                th scope="row" { (summaries[0][k].0) }
-                                td {}
-                                @for (_, psnr, ssim) in summaries.map(|file| file[k]) {
-                                    td { (text::number(psnr, 2)) }
-                                    td { (text::number(ssim, 5)) }
-                                }
+                }
+                tfoot {
+                    @for (name, (_, part)) in ["Mean", "Lowest", "Highest"].into_iter().zip(Summary::PARTS) {
+                        tr {
+                            th scope="row" { (name) }
+                            td {}
+                            @for file in files {
+                                td { (text::number(part(&file.psnr), 2)) }
+                                td { (text::number(part(&file.ssim), 5)) }
                             }
                         }
                     }
                 }
             }
-            @if files.iter().any(|file| file.views.iter().any(|view| view.identical)) {
-                p.note { "Identical views have no PSNR; means are over the others." }
-            }
         }
-    }
+        @if files.iter().any(|file| file.views.iter().any(|view| view.identical)) {
+            p.note { "Identical views have no PSNR; means are over the others." }
+        }
+    };
+    section("views", "View by view", &content)
 }

@@ -1,48 +1,22 @@
-"use strict";
-document.documentElement.classList.add("js");
 
-// Pictures: one view at a time, original left of the line and compressed right of it.
-const views = [...document.querySelectorAll(".view")];
-const range = document.getElementById("at");
-const differ = document.getElementById("differ");
-const thumbs = document.querySelector(".thumbs");
-
-function place(percent) {
-  range.value = percent;
-  views.forEach(view => view.querySelector(".stage").style.setProperty("--at", percent + "%"));
-}
-function show(number) {
-  views.forEach((view, i) => { view.hidden = i !== number; });
-  [...thumbs.children].forEach((button, i) => button.setAttribute("aria-pressed", i === number));
-}
+// Views: one at a time, chosen by small pictures.
 if (views.length) {
+  const thumbs = document.querySelector(".thumbs");
+  const show = number => {
+    views.forEach((view, i) => { view.hidden = i !== number; });
+    [...thumbs.children].forEach((button, i) => button.setAttribute("aria-pressed", i === number));
+  };
   views.forEach((view, i) => {
-    const stage = view.querySelector(".stage");
-    const follow = event => {
-      if (event.type === "pointermove" && event.pointerType !== "mouse" && !event.buttons) return;
-      const box = stage.getBoundingClientRect();
-      place(Math.min(100, Math.max(0, (event.clientX - box.left) / box.width * 100)));
-    };
-    stage.addEventListener("pointerdown", follow);
-    stage.addEventListener("pointermove", follow);
-    stage.addEventListener("dragstart", event => event.preventDefault());
     const button = document.createElement("button");
     button.type = "button";
     const image = document.createElement("img");
-    image.src = stage.querySelector(".before").src;
+    image.src = view.querySelector(".before").src;
     image.alt = "Show " + view.dataset.name;
     button.append(image);
     button.addEventListener("click", () => show(i));
     thumbs.append(button);
   });
-  range.addEventListener("input", () => place(range.value));
-  if (differ) differ.addEventListener("click", () => {
-    const pressed = differ.getAttribute("aria-pressed") !== "true";
-    differ.setAttribute("aria-pressed", pressed);
-    views.forEach(view => view.querySelector(".stage").classList.toggle("differs", pressed));
-  });
   thumbs.hidden = views.length < 2;
-  place(50);
   show(0);
 }
 

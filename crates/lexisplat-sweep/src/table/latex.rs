@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::{Cell, Row, Style, Table, one_line};
+use super::{Cell, Row, Style, Table, escaped};
 
 /// Width of the text in points: the `article` class at 10 pt in one column.
 const TEXT_WIDTH: f64 = 345.0;
@@ -14,32 +14,26 @@ const COLUMN_GAP: f64 = 6.0;
 /// Smallest scale at which text stays readable. A table that needs a smaller one is split.
 const LEAST_SCALE: f64 = 0.7;
 
+/// Characters that LaTeX has words for. What this crate writes beyond ASCII needs no other engine so.
+const WORDS: [(char, &str); 13] = [
+    ('\\', "\\textbackslash{}"),
+    ('~', "\\textasciitilde{}"),
+    ('^', "\\textasciicircum{}"),
+    ('<', "\\textless{}"),
+    ('>', "\\textgreater{}"),
+    ('|', "\\textbar{}"),
+    ('"', "\\char34{}"),
+    ('\u{2013}', "--"),
+    ('\u{2212}', "$-$"),
+    ('\u{d7}', "$\\times$"),
+    ('\u{201c}', "``"),
+    ('\u{201d}', "''"),
+    ('\u{a0}', "~"),
+];
+
 /// `text` with every character that has a meaning in LaTeX replaced.
 fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in one_line(text).chars() {
-        match c {
-            '\\' => out.push_str("\\textbackslash{}"),
-            '~' => out.push_str("\\textasciitilde{}"),
-            '^' => out.push_str("\\textasciicircum{}"),
-            '<' => out.push_str("\\textless{}"),
-            '>' => out.push_str("\\textgreater{}"),
-            '|' => out.push_str("\\textbar{}"),
-            '"' => out.push_str("\\char34{}"),
-            '\u{2013}' => out.push_str("--"),
-            '\u{2212}' => out.push_str("$-$"),
-            '\u{d7}' => out.push_str("$\\times$"),
-            '\u{201c}' => out.push_str("``"),
-            '\u{201d}' => out.push_str("''"),
-            '\u{a0}' => out.push('~'),
-            '&' | '%' | '$' | '#' | '_' | '{' | '}' => {
-                out.push('\\');
-                out.push(c);
-            }
-            c => out.push(c),
-        }
-    }
-    out
+    escaped(text, "&%$#_{}", &WORDS)
 }
 
 /// A cell in LaTeX.

@@ -2,24 +2,11 @@
 
 use std::fmt::Write;
 
-use super::{Style, Table, one_line};
+use super::{Style, Table, escaped};
 
 /// `text` with every character that has a meaning in a Markdown table escaped.
 pub(crate) fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in one_line(text).chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '\\' | '|' | '*' | '_' | '`' | '[' | ']' | '~' | '$' | '#' => {
-                out.push('\\');
-                out.push(c);
-            }
-            c => out.push(c),
-        }
-    }
-    out
+    escaped(text, r"\|*_`[]~$#", &[('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;")])
 }
 
 pub(super) fn write(table: &Table) -> String {

@@ -13,7 +13,7 @@ const DASH: &str = "\u{2013}";
 
 /// One cell.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Cell {
+pub(crate) enum Cell {
     /// Words.
     Text(String),
     /// A finite number. CSV has it in full.
@@ -33,14 +33,12 @@ pub enum Cell {
 
 impl Cell {
     /// Words.
-    #[must_use]
-    pub fn text(text: impl Into<String>) -> Self {
+    pub(crate) fn text(text: impl Into<String>) -> Self {
         Self::Text(text.into())
     }
 
     /// A number. `None` and numbers that are not finite are missing.
-    #[must_use]
-    pub fn number(value: Option<f64>, digits: usize) -> Self {
+    pub(crate) fn number(value: Option<f64>, digits: usize) -> Self {
         value.filter(|v| v.is_finite()).map_or(Self::Missing, |value| Self::Number {
             value,
             digits,
@@ -49,8 +47,7 @@ impl Cell {
     }
 
     /// A difference, printed with its sign. `None` and numbers that are not finite are missing.
-    #[must_use]
-    pub fn change(value: Option<f64>, digits: usize) -> Self {
+    pub(crate) fn change(value: Option<f64>, digits: usize) -> Self {
         match Self::number(value, digits) {
             Self::Number { value, digits, .. } => Self::Number { value, digits, signed: true },
             missing => missing,
@@ -58,8 +55,7 @@ impl Cell {
     }
 
     /// The number in the cell.
-    #[must_use]
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         match self {
             Self::Number { value, .. } => Some(*value),
             Self::Count(count) => Some(*count as f64),
@@ -68,8 +64,7 @@ impl Cell {
     }
 
     /// The text for people, not escaped for any format.
-    #[must_use]
-    pub fn shown(&self) -> String {
+    pub(crate) fn shown(&self) -> String {
         match self {
             Self::Text(text) => one_line(text),
             Self::Number { value, digits, signed: true } => format!("{value:+.digits$}"),
@@ -102,9 +97,26 @@ fn one_line(text: &str) -> String {
     text.replace(char::is_control, " ")
 }
 
+/// `text` on one line, with each character that has one of `words` replaced by it, and a backslash before each of
+/// `marks`.
+fn escaped(text: &str, marks: &str, words: &[(char, &str)]) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in one_line(text).chars() {
+        if let Some((_, word)) = words.iter().find(|word| word.0 == c) {
+            out.push_str(word);
+            continue;
+        }
+        if marks.contains(c) {
+            out.push('\\');
+        }
+        out.push(c);
+    }
+    out
+}
+
 /// The kind of a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Style {
+pub(crate) enum Style {
     /// Measured values.
     #[default]
     Plain,
@@ -116,19 +128,22 @@ pub enum Style {
 
 /// One row.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Row {
+pub(crate) struct Row {
     /// One cell for each column. Missing ones are printed as dashes.
-    pub cells: Vec<Cell>,
+    pub(crate) cells: Vec<Cell>,
     /// The kind of the row.
-    pub style: Style,
+    pub(crate) style: Style,
     /// Whether a line above separates the row from the rows before it.
-    pub rule: bool,
+    pub(crate) rule: bool,
 }
 
 impl Row {
     /// A row of `labels`, then `cells`.
-    pub(crate) fn new<const N: usize>(labels: [&str; N], cells: impl IntoIterator<Item = Cell>) -> Self {
-        Self { cells: labels.map(Cell::text).into_iter().chain(cells).collect(), ..Self::default() }
+    pub(crate) fn new<'a>(
+        labels: impl IntoIterator<Item = &'a str>,
+        cells: impl IntoIterator<Item = Cell>,
+    ) -> Self {
+        Self { cells: labels.into_iter().map(Cell::text).chain(cells).collect(), ..Self::default() }
     }
 
     /// The row with another style.
@@ -144,11 +159,11 @@ impl Row {
 
 /// One column.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Column {
+pub(crate) struct Column {
     /// Heading over this column and neighbours of the same group; may be empty.
-    pub group: String,
+    pub(crate) group: String,
     /// Heading of the column alone, with its unit.
-    pub heading: String,
+    pub(crate) heading: String,
 }
 
 impl Column {
@@ -168,19 +183,19 @@ pub(crate) type Field<'a, R> = (&'a str, &'a str, &'a dyn Fn(&R) -> Cell);
 
 /// A table.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Table {
+pub(crate) struct Table {
     /// Name for files: lower case, digits, `-`.
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// What the table shows, in a few words.
-    pub title: String,
+    pub(crate) title: String,
     /// How to read it; may be empty.
-    pub caption: String,
+    pub(crate) caption: String,
     /// From left to right.
-    pub columns: Vec<Column>,
+    pub(crate) columns: Vec<Column>,
     /// How many columns, from the left, name the row.
-    pub labels: usize,
+    pub(crate) labels: usize,
     /// From top to bottom.
-    pub rows: Vec<Row>,
+    pub(crate) rows: Vec<Row>,
 }
 
 impl Table {
@@ -227,8 +242,7 @@ impl Table {
     }
 
     /// Whether there are no rows.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
@@ -242,14 +256,12 @@ impl Table {
     }
 
     /// A Markdown table of the GitHub kind, without title and caption.
-    #[must_use]
-    pub fn to_markdown(&self) -> String {
+    pub(crate) fn to_markdown(&self) -> String {
         markdown::write(self)
     }
 
     /// CSV with a header line. Numbers are written in full, missing ones are empty.
-    #[must_use]
-    pub fn to_csv(&self) -> String {
+    pub(crate) fn to_csv(&self) -> String {
         let header = self.columns.iter().map(Column::full).collect();
         let cells = |row: &Row| (0..self.columns.len()).map(|column| row.cell(column).in_full()).collect();
         csv_text(std::iter::once(header).chain(self.rows.iter().map(cells)))
@@ -258,14 +270,12 @@ impl Table {
     /// A `table` environment for a document that uses `booktabs` and `graphicx`. It is never wider than the text:
     /// it is scaled down, and if that would make it too small to read, split into several parts. Letters beyond
     /// what the document's fonts have need another engine, such as `XeLaTeX`.
-    #[must_use]
-    pub fn to_latex(&self) -> String {
+    pub(crate) fn to_latex(&self) -> String {
         latex::write(self)
     }
 
     /// A `table` element, caption included.
-    #[must_use]
-    pub fn to_html(&self) -> String {
+    pub(crate) fn to_html(&self) -> String {
         html::write(self).into_string()
     }
 }

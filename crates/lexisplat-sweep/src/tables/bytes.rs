@@ -32,8 +32,7 @@ struct File<'a> {
 }
 
 /// Every scene at every setting: bytes of files, of view-dependent colour alone, and resident while drawing.
-#[must_use]
-pub fn bytes(results: &Results) -> Table {
+pub(crate) fn bytes(results: &Results) -> Table {
     let grid = Grid::new(results);
     let blocks = grid.scenes().map(|(heading, scene)| {
         let shipped = scene.shipped_bytes.map(|bytes| File { heading, scene, point: None, bytes });

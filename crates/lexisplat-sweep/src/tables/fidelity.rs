@@ -3,7 +3,7 @@
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, Summary};
 
-use super::paper_row;
+use super::beside_paper;
 use crate::grid::Grid;
 use crate::measure::{IDENTICAL, Measure};
 use crate::paper::{self, Experiment};
@@ -23,8 +23,7 @@ fn about_identical(grid: &Grid<'_>) -> &'static str {
 
 /// The paper's Table 1: every method at one tolerance, scene by scene. `tolerance` is the one nearest to 0.1
 /// unless given.
-#[must_use]
-pub fn main(results: &Results, tolerance: Option<f64>) -> Table {
+pub(crate) fn main(results: &Results, tolerance: Option<f64>) -> Table {
     let grid = Grid::new(results);
     let Some(setting) = tolerance.map(Setting::Tolerance).or_else(|| grid.main_setting()) else {
         return Table::default();
@@ -42,23 +41,17 @@ pub fn main(results: &Results, tolerance: Option<f64>) -> Table {
     );
     let title = format!("Compressed at {} against the original's pictures", setting.label());
     let mut table = Table::new("main", title, caption).with_columns(2, grid.columns(&["Method", "Metric"]));
+    let experiment = setting.is_tolerance(paper::TOLERANCE).then_some(Experiment::Main);
     for &method in grid.methods.iter().filter(|&&method| grid.points(method, setting).next().is_some()) {
-        table.push_block(measures.iter().flat_map(|&measure| {
-            let heading = measure.heading(device);
-            let ours = Row::new([method.title(), &heading], grid.measured(measure, method, Some(setting)));
-            let labels = [&*format!("{}, paper", method.title()), &heading];
-            let theirs = setting
-                .is_tolerance(paper::TOLERANCE)
-                .then(|| paper_row(labels, &grid, Experiment::Main, method, measure));
-            [Some(ours), theirs.flatten()].into_iter().flatten()
-        }));
+        let measures = measures.iter().copied();
+        let names = (method.title(), None);
+        table.push_block(beside_paper(&grid, method, Some(setting), names, measures, experiment));
     }
     table
 }
 
 /// Every method at every setting against the original's pictures, scene by scene.
-#[must_use]
-pub fn settings(results: &Results) -> Table {
+pub(crate) fn settings(results: &Results) -> Table {
     let grid = Grid::new(results);
     let mut measures = grid.scores(Measure::ToOriginal);
     measures.push(Measure::CoefficientRatio);
@@ -81,8 +74,7 @@ pub fn settings(results: &Results) -> Table {
 }
 
 /// Every single view, then mean, minimum and maximum over the views.
-#[must_use]
-pub fn views(results: &Results) -> Table {
+pub(crate) fn views(results: &Results) -> Table {
     let grid = Grid::new(results);
     let (original, photos) = (grid.scores(Measure::ToOriginal), grid.scores(Measure::ToPhotos));
     let is_measured = |&metric: &Metric| {
@@ -113,12 +105,11 @@ pub fn views(results: &Results) -> Table {
             };
             let views =
                 comparison.views.iter().map(|view| row(&view.name, &|m| (view.identical, view.get(m))));
-            let total = |name, pick: fn(Summary) -> Option<f64>| {
-                let value = |metric| (comparison.identical, comparison.get(metric).and_then(pick));
+            let total = |name, pick: fn(&Summary) -> Option<f64>| {
+                let value = |metric| (comparison.identical, comparison.get(metric).as_ref().and_then(pick));
                 row(name, &value).styled(Style::Total)
             };
-            let totals =
-                [total("mean", |s| s.mean), total("minimum", |s| s.min), total("maximum", |s| s.max)];
+            let totals = Summary::PARTS.map(|(name, pick)| total(name, pick));
             table.push_block(views.chain(totals));
         }
     }

@@ -6,21 +6,20 @@ mod scenes;
 mod vs_paper;
 mod vs_photos;
 
-pub use bytes::bytes;
-pub use fidelity::{main, settings, views};
-pub use scenes::{models, skipped, summary};
-pub use vs_paper::{nonzeros, psnr};
-pub use vs_photos::{drops, vs_photos};
+pub(crate) use bytes::bytes;
+pub(crate) use fidelity::{main, settings, views};
+pub(crate) use scenes::{models, skipped, summary};
+pub(crate) use vs_paper::{nonzeros, psnr};
+pub(crate) use vs_photos::{drops, vs_photos};
 
 use super::grid::Grid;
 use super::measure::Measure;
 use super::paper::{self, Experiment};
 use super::table::{Cell, Row, Style, Table};
-use super::{Method, Results};
+use super::{Method, Results, Setting};
 
 /// Every table that has rows, most important first.
-#[must_use]
-pub fn all(results: &Results) -> Vec<Table> {
+pub(crate) fn all(results: &Results) -> Vec<Table> {
     let tables = [
         summary(results),
         main(results, None),
@@ -37,19 +36,34 @@ pub fn all(results: &Results) -> Vec<Table> {
     tables.into_iter().filter(|table| !table.is_empty()).collect()
 }
 
-/// A row of the paper's numbers for the scenes that are the paper's too. `None` if there are none.
-fn paper_row<const N: usize>(
-    labels: [&str; N],
+/// A row for each of `measures` of a method, named `name` and `kind`. Below each stand the paper's numbers of
+/// `experiment`, if it has any of these scenes.
+fn beside_paper(
     grid: &Grid<'_>,
-    experiment: Experiment,
     method: Method,
-    measure: Measure,
-) -> Option<Row> {
-    let quantity = measure.in_paper()?;
-    let value = |column| paper::value(experiment, method, quantity, grid.name(column));
-    let cells = grid.across(|column| Cell::number(value(column), measure.digits()));
-    let any = cells.iter().any(|cell| *cell != Cell::Missing);
-    any.then(|| Row::new(labels, cells).styled(Style::Paper))
+    setting: Option<Setting>,
+    (name, kind): (&str, Option<&str>),
+    measures: impl IntoIterator<Item = Measure>,
+    experiment: Option<Experiment>,
+) -> Vec<Row> {
+    let mut rows = Vec::new();
+    for measure in measures {
+        let heading = measure.heading(grid.device());
+        let row = |name, cells| Row::new([Some(name), kind, Some(&*heading)].into_iter().flatten(), cells);
+        rows.push(row(name, grid.measured(measure, method, setting)));
+        let Some((experiment, quantity)) = experiment.zip(measure.in_paper()) else { continue };
+        let value = |column| paper::value(experiment, method, quantity, grid.name(column));
+        let theirs = grid.across(|column| Cell::number(value(column), measure.digits()));
+        if is_any(&theirs) {
+            rows.push(row(&format!("{name}, paper"), theirs).styled(Style::Paper));
+        }
+    }
+    rows
+}
+
+/// Whether any of `cells` has a value.
+fn is_any(cells: &[Cell]) -> bool {
+    cells.iter().any(|cell| *cell != Cell::Missing)
 }
 
 #[cfg(test)]

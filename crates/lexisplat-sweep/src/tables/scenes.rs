@@ -6,8 +6,7 @@ use crate::table::{Cell, Column, Row, Table};
 use crate::{Results, SceneResult, Skipped};
 
 /// Every method at every setting, averaged over its scenes.
-#[must_use]
-pub fn summary(results: &Results) -> Table {
+pub(crate) fn summary(results: &Results) -> Table {
     let grid = Grid::new(results);
     let device = grid.device();
     let mut measures: Vec<(&str, String, Measure)> = Vec::new();
@@ -53,8 +52,7 @@ pub fn summary(results: &Results) -> Table {
 }
 
 /// Every model that was evaluated.
-#[must_use]
-pub fn models(results: &Results) -> Table {
+pub(crate) fn models(results: &Results) -> Table {
     let grid = Grid::new(results);
     let dataset = |scene: &SceneResult| match &*scene.dataset {
         "" => Cell::Missing,
@@ -83,8 +81,7 @@ pub fn models(results: &Results) -> Table {
 }
 
 /// What could not be evaluated, and why.
-#[must_use]
-pub fn skipped(results: &Results) -> Table {
+pub(crate) fn skipped(results: &Results) -> Table {
     Table::new("skipped", "Skipped", "").with_records::<&Skipped>(
         4,
         &[

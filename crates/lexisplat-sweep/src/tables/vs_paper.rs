@@ -12,8 +12,7 @@ use crate::{Method, Point, Results, SceneResult};
 const METHODS: [Method; 3] = [Method::Gs3d, Method::Mcmc, Method::PixelGs];
 
 /// PSNR against the original at the paper's tolerances, above the paper's rows.
-#[must_use]
-pub fn psnr(results: &Results) -> Table {
+pub(crate) fn psnr(results: &Results) -> Table {
     let grid = Grid::new(results);
     let caption = "Compare with the paper's MCMC and PixelGS rows: its 3DGS rows have a floor of about 44 dB that does not come \
                    from compression. A mean is over the numbers in its row.";
@@ -28,13 +27,13 @@ pub fn psnr(results: &Results) -> Table {
         let compressed = grid.methods.iter().filter(|&&method| grid.points(method, setting).next().is_some());
         let ours = compressed.map(|&method| {
             let cells = grid.measured(Measure::ToOriginal(Metric::Psnr), method, Some(setting));
-            Row::new([&label, method.title()], cells.into_iter().chain([Cell::Missing]))
+            Row::new([&*label, method.title()], cells.into_iter().chain([Cell::Missing]))
         });
         let theirs = METHODS.map(|method| {
             let experiment = Experiment::Tolerance(tolerance);
             let value = |column| paper::value(experiment, method, Quantity::Psnr, grid.name(column));
             let cells = grid.across(|column| Cell::number(value(column), DIGITS));
-            let all = paper::mean(experiment, method, Quantity::Psnr).map(|mean| mean.computed);
+            let all = paper::mean(experiment, method, Quantity::Psnr);
             let labels = [&*label, &format!("{}, paper", method.title())];
             Row::new(labels, cells.into_iter().chain([Cell::number(all, DIGITS)])).styled(Style::Paper)
         });
@@ -62,14 +61,13 @@ impl Compressed<'_> {
 }
 
 /// Mean nonzeros at the paper's main tolerance beside the paper's.
-#[must_use]
-pub fn nonzeros(results: &Results) -> Table {
+pub(crate) fn nonzeros(results: &Results) -> Table {
     let grid = Grid::new(results);
     let rows = grid.scenes().filter_map(|(heading, scene)| {
         let point = scene.points.iter().find(|point| point.setting.is_tolerance(paper::TOLERANCE))?;
         let (experiment, quantity) = (Experiment::Main, Quantity::Ratio);
         let of_scene = paper::value(experiment, scene.method, quantity, &scene.name);
-        let of_all = paper::mean(experiment, scene.method, quantity).map(|mean| mean.computed);
+        let of_all = paper::mean(experiment, scene.method, quantity);
         let scope = match (of_scene, of_all) {
             (Some(_), _) => Cell::text("this scene"),
             (None, Some(_)) => Cell::text("mean of 13"),

@@ -1,6 +1,6 @@
 //! Against photos: the paper's table, and how much compressing loses there.
 
-use super::paper_row;
+use super::{beside_paper, is_any};
 use crate::grid::Grid;
 use crate::measure::{DIGITS, Measure};
 use crate::paper::{self, Experiment, Quantity};
@@ -8,8 +8,7 @@ use crate::table::{Cell, Row, Style, Table};
 use crate::{Method, Results, Setting};
 
 /// The paper's table against photos: models as trained, and compressed at the tolerance nearest to 0.1.
-#[must_use]
-pub fn vs_photos(results: &Results) -> Table {
+pub(crate) fn vs_photos(results: &Results) -> Table {
     let grid = Grid::new(results);
     let setting = grid.main_setting();
     let at = setting.map_or_else(String::new, |setting| format!(" Comp. is at {}.", setting.label()));
@@ -24,11 +23,16 @@ pub fn vs_photos(results: &Results) -> Table {
             Method::EaglesNoSq => (Method::Eagles.title(), "No SQ"),
             _ => (method.title(), "Base."),
         };
-        table.push_block(rows(&grid, method, [name, base], None, Experiment::Base));
+        let rows = |kind, setting, experiment| {
+            let has = |measure: &Measure| is_any(&grid.measured(*measure, method, setting));
+            let measures = grid.scores(Measure::ToPhotos).into_iter().filter(has);
+            beside_paper(&grid, method, setting, (name, Some(kind)), measures, Some(experiment))
+        };
+        table.push_block(rows(base, None, Experiment::Base));
         if let Some(setting) = setting.filter(|_| !method.is_competitor()) {
-            let mut block = rows(&grid, method, [name, "Comp."], Some(setting), Experiment::Compressed);
+            let mut block = rows("Comp.", Some(setting), Experiment::Compressed);
             let change = grid.measured(Measure::PhotoChange, method, Some(setting));
-            if change.iter().any(|cell| *cell != Cell::Missing) {
+            if is_any(&change) {
                 let labels = [name, "Comp. \u{2212} Base.", &Measure::PhotoChange.heading("")];
                 block.push(Row::new(labels, change).styled(Style::Total));
             }
@@ -36,27 +40,6 @@ pub fn vs_photos(results: &Results) -> Table {
         }
     }
     table
-}
-
-/// One row for each metric that was measured, each above the paper's.
-fn rows(
-    grid: &Grid<'_>,
-    method: Method,
-    [name, kind]: [&str; 2],
-    setting: Option<Setting>,
-    experiment: Experiment,
-) -> Vec<Row> {
-    let mut rows = Vec::new();
-    for measure in grid.scores(Measure::ToPhotos) {
-        let cells = grid.measured(measure, method, setting);
-        if cells.iter().any(|cell| *cell != Cell::Missing) {
-            let heading = measure.heading("");
-            rows.push(Row::new([name, kind, &heading], cells));
-            let labels = [&*format!("{name}, paper"), kind, &heading];
-            rows.extend(paper_row(labels, grid, experiment, method, measure));
-        }
-    }
-    rows
 }
 
 /// Changes of PSNR against photos by compressing models of one method at one setting.
@@ -78,7 +61,7 @@ fn paper_drop(method: Method) -> Option<(f64, f64, &'static str)> {
         let value = |experiment| paper::value(experiment, method, Quantity::Psnr, scene);
         Some((value(Experiment::Compressed)? - value(Experiment::Base)?, scene))
     };
-    let changes: Vec<(f64, &str)> = paper::SCENES.into_iter().filter_map(change).collect();
+    let changes: Vec<(f64, &str)> = paper::SCENES.iter().copied().filter_map(change).collect();
     let (worst, scene) = changes.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     Some((changes.iter().map(|change| change.0).sum::<f64>() / changes.len() as f64, worst, scene))
 }
@@ -97,8 +80,7 @@ fn drop_at<'a>(grid: &'a Grid<'_>, method: Method, setting: Setting) -> Option<D
 }
 
 /// How much PSNR against photos changes by compressing: mean and worst scene, beside the paper's.
-#[must_use]
-pub fn drops(results: &Results) -> Table {
+pub(crate) fn drops(results: &Results) -> Table {
     let grid = Grid::new(results);
     let blocks = grid
         .methods

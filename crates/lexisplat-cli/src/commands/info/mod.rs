@@ -14,7 +14,7 @@ use serde::Serialize;
 
 use self::codes::LexiFacts;
 use crate::args::{Common, Info};
-use crate::files::{input, print, print_json, warn};
+use crate::files::{input, tell, warn};
 use crate::progress::Bars;
 
 /// Width of the longest bar of a histogram, in characters.
@@ -87,11 +87,10 @@ impl<'a> Facts<'a> {
     }
 
     fn print(&self, common: &Common) -> Result<()> {
-        if common.json {
-            return print_json(&serde_json::to_value(self)?);
+        if !common.json {
+            warn(self.file, &self.statistics.warnings);
         }
-        warn(self.file, &self.statistics.warnings);
-        if common.quiet { Ok(()) } else { print(&self.text()?) }
+        tell(common, self, || self.text())
     }
 
     fn text(&self) -> Result<String> {
