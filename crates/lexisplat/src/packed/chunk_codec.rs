@@ -133,9 +133,8 @@ impl<'p> ChunkCodec<'p> {
         let mut features: [f32; FEATURES] = [1.0, 0.0, f32::from(colour), f32::from(shape), 0.0, 0.0, 0.0];
         let mut values = [0.0; AVERAGES];
         let class = usize::from(shape);
-        for k in 0..3 {
+        for (k, stream) in Stream::SCALES.into_iter().enumerate() {
             features[1] = around[k];
-            let stream = Stream::axis([Stream::Scale0, Stream::Scale1, Stream::Scale2], k);
             let prediction = p.predict(k, &features);
             let step = p.scale_step(k, shape);
             let value = difference(s, stream, class, prediction, step, target.map(|t| t.scales[k]));
@@ -163,8 +162,7 @@ impl<'p> ChunkCodec<'p> {
             axes.map(|axis| dot(axis, offset))
         });
         let mut position = centre;
-        for k in 0..3 {
-            let stream = Stream::axis([Stream::Position0, Stream::Position1, Stream::Position2], k);
+        for (k, stream) in Stream::POSITIONS.into_iter().enumerate() {
             let along =
                 difference(s, stream, fineness(p.cell / steps[k]), 0.0, steps[k], offset.map(|o| o[k]));
             for (x, axis) in position.iter_mut().zip(axes[k]) {
@@ -175,9 +173,8 @@ impl<'p> ChunkCodec<'p> {
         let position = position.map(|v| v as f32);
 
         let step = p.dc_step(colour);
-        for k in 0..3 {
+        for (k, stream) in Stream::DC.into_iter().enumerate() {
             features[1] = around[4 + k];
-            let stream = Stream::axis([Stream::Dc0, Stream::Dc1, Stream::Dc2], k);
             let prediction = p.predict(4 + k, &features);
             values[4 + k] =
                 difference(s, stream, usize::from(colour), prediction, step, target.map(|t| t.dc[k]));

@@ -28,7 +28,7 @@ pub enum Pursuit {
 }
 
 /// How a [`Model`] was made and what it promises.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Record {
     /// Un-squared L2 norm of the SH-rest error. `None` if only `max_nonzeros` ended the pursuit.
     pub tolerance: Option<f64>,

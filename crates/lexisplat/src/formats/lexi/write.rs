@@ -71,7 +71,7 @@ impl<'a> LexiWriter<'a> {
 
     /// The file of a packed scene that was spilled.
     pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Self {
-        let n = head.len();
+        let n = head.gaussians;
         let extras = spilled.extras.into_iter();
         let extras = extras.map(|(extra, values)| extra_tensor(&extra, n, Source::Spilled(values)));
         let order = spilled.order.map(Source::Spilled);
@@ -94,17 +94,17 @@ impl<'a> LexiWriter<'a> {
         order: Option<Source<'a>>,
         extras: Vec<Tensor<'a>>,
     ) -> Self {
-        let degree = head.degree();
-        let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, head.record(), head.meta());
+        let degree = head.degree;
+        let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, &head.record, &head.meta);
         let mut put = |key: &str, value: String| metadata.insert(key.to_owned(), value);
-        put(key::GAUSSIANS, head.len().to_string());
-        put(key::ATOMS, head.atoms().to_string());
+        put(key::GAUSSIANS, head.gaussians.to_string());
+        put(key::ATOMS, head.atoms.to_string());
         put(key::ATOM_BITS, head.atom_bits.to_string());
-        if let Some(target) = head.target() {
+        if let Some(target) = &head.target {
             put(key::PROMISE, serde_json::to_string(target).unwrap_or_default());
         }
-        if let Some(device) = head.device() {
-            put(key::DRAWN_ON, device.to_owned());
+        if let Some(device) = &head.device {
+            put(key::DRAWN_ON, device.clone());
         }
         let bytes = head.lengths.iter().map(|&l| l as usize).sum();
         let mut tensors = vec![
@@ -118,7 +118,7 @@ impl<'a> LexiWriter<'a> {
             Tensor::new(tensor::TABLES, Dtype::U8, &[head.tables.len()], Source::of(&head.tables)),
             Tensor::new(tensor::DATA, Dtype::U8, &[bytes], data),
         ];
-        tensors.extend(order.map(|order| Tensor::new(tensor::ORDER, Dtype::U32, &[head.len()], order)));
+        tensors.extend(order.map(|order| Tensor::new(tensor::ORDER, Dtype::U32, &[head.gaussians], order)));
         tensors.extend(extras);
         Self::new(metadata, tensors)
     }
