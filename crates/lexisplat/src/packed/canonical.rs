@@ -116,17 +116,13 @@ impl Grid {
             at
         }))
     }
-}
 
-/// All Gaussians in the order of their cells.
-pub(super) fn placed(geometry: &Geometry, grid: &Grid) -> Vec<MortonKey> {
-    // Scenes have at most 2^32 - 2 Gaussians.
-    let mut all: Vec<MortonKey> = (0_u32..)
-        .zip(&geometry.positions)
-        .map(|(source, &position)| MortonKey { cell: grid.cell(position), source })
-        .collect();
-    all.sort_unstable();
-    all
+    /// The places of all Gaussians, in the order of `geometry`.
+    pub(super) fn keys(&self, geometry: &Geometry) -> Vec<MortonKey> {
+        // Scenes have at most 2^32 - 2 Gaussians.
+        let key = |(source, &position)| MortonKey { cell: self.cell(position), source };
+        (0_u32..).zip(&geometry.positions).map(key).collect()
+    }
 }
 
 /// Gaussian `i` in canonical form.

@@ -97,7 +97,7 @@ impl<'p> ChunkCodec<'p> {
         Self {
             parameters,
             dim,
-            neighbours: Neighbours::new(),
+            neighbours: Neighbours::default(),
             cell: 0,
             gap_bits: 0,
             code: Vec::with_capacity(dim),
@@ -185,9 +185,8 @@ impl<'p> ChunkCodec<'p> {
         values[COLOUR] = f32::from(colour);
         values[SHAPE] = f32::from(shape) - f32::from(colour);
         #[expect(clippy::cast_precision_loss, reason = "at most 72")]
-        {
-            values[NONZEROS] = self.code.len() as f32;
-        }
+        let nonzeros = self.code.len() as f32;
+        values[NONZEROS] = nonzeros;
         self.neighbours.push(position, values);
         let decoded = Decoded {
             position,

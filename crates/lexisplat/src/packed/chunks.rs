@@ -50,19 +50,6 @@ pub(super) struct Piece {
     pub(super) bit_counts: BitCounts,
 }
 
-/// Geometry of `n` Gaussians, all zeros.
-pub(super) fn zeros(n: usize) -> Geometry {
-    Geometry {
-        positions: vec![[0.0; 3]; n],
-        normals: Vec::new(),
-        dc: vec![[0.0; 3]; n],
-        opacities: vec![0.0; n],
-        scales: vec![[0.0; 3]; n],
-        rotations: vec![[0.0; 4]; n],
-        extras: Vec::new(),
-    }
-}
-
 /// The places of all chunks.
 pub(super) fn places<'a>(g: &'a mut Geometry, counts: &'a mut [u8]) -> impl Iterator<Item = Place<'a>> {
     g.positions
@@ -136,7 +123,7 @@ impl Decoder {
     ) -> Result<(Geometry, SparseCodes, BitCounts)> {
         let first = c * CHUNK;
         let n = self.gaussians.saturating_sub(first).min(CHUNK);
-        let (mut g, mut counts) = (zeros(n), vec![0; n]);
+        let (mut g, mut counts) = (Geometry::zeros(n), vec![0; n]);
         let place = places(&mut g, &mut counts).next().ok_or_else(|| self.bad_chunk(c))?;
         let piece = self.piece(data, c, 0, place, budget, count_bits)?;
         let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));

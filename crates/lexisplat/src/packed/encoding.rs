@@ -3,7 +3,7 @@
 use super::coder::ChunkCoder;
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::pack::PackOptions;
-use super::scene::PackedHead;
+use super::scene::{PackedHead, UNNAMED};
 use super::stream::{BitCounts, Stream, StreamBits, SymbolEncoder};
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
@@ -65,6 +65,7 @@ pub(super) struct Encoding {
     dictionary: SymbolEncoder,
     pub(super) counts: Counts,
     learn_seconds: f64,
+    /// Runs since learning began.
     clock: Stopwatch,
 }
 
@@ -78,15 +79,14 @@ pub(super) struct Finished {
 
 impl Encoding {
     /// Begins with a coder that has learned since the start of `clock`, and the symbols of its dictionary.
-    pub(super) fn new((coder, dictionary): (ChunkCoder, SymbolEncoder), clock: &Stopwatch) -> Self {
+    pub(super) fn new((coder, dictionary): (ChunkCoder, SymbolEncoder), clock: Stopwatch) -> Self {
         let counts = Counts::of(Tally::new(coder.dictionary.dim()), &dictionary);
-        Self { coder, dictionary, counts, learn_seconds: clock.seconds(), clock: Stopwatch::start() }
+        Self { coder, dictionary, counts, learn_seconds: clock.seconds(), clock }
     }
 
-    /// Counts the time since the start as time spent on learning.
+    /// Counts all time so far as time spent on learning.
     pub(super) fn end_learning(&mut self) {
-        self.learn_seconds += self.clock.seconds();
-        self.clock = Stopwatch::start();
+        self.learn_seconds = self.clock.seconds();
     }
 
     /// Codes everything, when all chunks of the `gaussians` Gaussians are counted.
@@ -116,10 +116,10 @@ impl Encoding {
         write(dictionary.finish(&tables))?;
         code_chunks(&coder, &tables, &mut write)?;
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
-        let seconds = [learn_seconds, clock.seconds()];
+        let seconds = [learn_seconds, clock.seconds() - learn_seconds];
         let (record, report) = counts.tally.into_report(record, gaussians, None, seconds);
         let head = PackedHead {
-            file: PackedHead::unnamed(),
+            file: UNNAMED.to_owned(),
             degree: coder.dictionary.degree(),
             gaussians,
             atoms: coder.dictionary.len(),

@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::CHUNK;
-use super::canonical::{Grid, MortonKey, placed};
+use super::canonical::{Grid, MortonKey};
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
@@ -93,7 +93,8 @@ impl<S: Borrow<Splats>> Packer<S> {
         options.check()?;
         let g = &splats.borrow().geometry;
         let grid = Grid::fit(&g.positions);
-        let scene = placed(g, &grid);
+        let mut scene = grid.keys(g);
+        scene.sort_unstable();
         let fit = Fit::new(g, sensitivity, &scene, &grid);
         Ok(Self { splats, options: options.clone(), scene, fit })
     }
@@ -128,7 +129,7 @@ impl<S: Borrow<Splats>> Packer<S> {
         let view = View { splats, scene: &self.scene, classes: &self.fit.classes };
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, &self.fit, step, &self.options, progress)?;
-        let mut encoding = Encoding::new(coder, &clock);
+        let mut encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
         let codes = (0..n.div_ceil(CHUNK)).map(|c| {

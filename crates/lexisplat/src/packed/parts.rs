@@ -41,9 +41,9 @@ pub(crate) struct PartPacker {
     fit: Fit,
     encoding: Encoding,
     gaussians: usize,
-    symbols: Spill,
-    raw: Spill,
-    /// Of each chunk the number of symbols and of bytes in `raw`.
+    /// Of each chunk its symbols, and then its raw bits.
+    chunks: Spill,
+    /// Of each chunk the number of symbols and of bytes of raw bits.
     lengths: Vec<[usize; 2]>,
     order: Option<Spill>,
     extras: SpilledExtras,
@@ -62,8 +62,7 @@ impl PartPacker {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let Whole { gaussians: total, grid, decibels } = scene;
-        let placed = |(source, &position): (u32, &[f32; 3])| MortonKey { cell: grid.cell(position), source };
-        let scene: Vec<MortonKey> = (0..).zip(&sample.geometry.positions).map(placed).collect();
+        let scene = grid.keys(&sample.geometry);
         let fit = Fit::new(&sample.geometry, sensitivity, &scene, &grid);
         let view = View { splats: sample, scene: &scene, classes: &fit.classes };
         let clock = Stopwatch::start();
@@ -72,14 +71,13 @@ impl PartPacker {
         Ok(Self {
             options: options.clone(),
             gaussians: total,
-            symbols: Spill::new(to)?,
-            raw: Spill::new(to)?,
+            chunks: Spill::new(to)?,
             lengths: Vec::new(),
             order: if options.keep_order { Some(Spill::new(to)?) } else { None },
             extras: SpilledExtras::new(to, sample.empty().geometry)?,
             meta: sample.meta.clone(),
             fit,
-            encoding: Encoding::new(coder, &clock),
+            encoding: Encoding::new(coder, clock),
         })
     }
 
@@ -99,8 +97,8 @@ impl PartPacker {
             self.encoding.counts.add(&Counts::of(tally, &symbols));
             let (symbols, raw) = symbols.set_aside();
             self.lengths.push([symbols.len(), raw.len()]);
-            self.symbols.push(&symbols)?;
-            self.raw.push(&raw)?;
+            self.chunks.push(&symbols)?;
+            self.chunks.push(&raw)?;
         }
         if let Some(order) = &mut self.order {
             order.push(&places.iter().map(|p| p.source).collect::<Vec<u32>>())?;
@@ -116,13 +114,13 @@ impl PartPacker {
         device: Option<&str>,
         progress: &dyn Progress,
     ) -> Result<(PackedHead, SpilledPacked, CompressReport, Vec<StreamBits>)> {
-        let (mut symbols, mut raw) = (self.symbols.finish()?, self.raw.finish()?);
+        let mut spilled = self.chunks.finish()?;
         let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
             for batch in self.lengths.chunks(CHUNKS_AT_ONCE) {
                 progress.check()?;
                 let mut chunks = Vec::with_capacity(batch.len());
                 for &[entries, bytes] in batch {
-                    chunks.push((symbols.take::<[u16; 2]>(entries)?, raw.take::<u8>(bytes)?));
+                    chunks.push((spilled.take::<[u16; 2]>(entries)?, spilled.take::<u8>(bytes)?));
                 }
                 let parts = map_vec(chunks, |(symbols, raw)| [code_symbols(&symbols, tables), raw]);
                 parts.into_iter().try_for_each(&mut *write)?;

@@ -9,7 +9,7 @@ use crate::support::limits::Limits;
 use crate::support::spill::Spilled;
 
 /// What errors call a packed scene that was not read from a file.
-const UNNAMED: &str = "the packed scene";
+pub(super) const UNNAMED: &str = "the packed scene";
 
 /// Everything of a packed scene that is not as long as the scene.
 #[derive(Debug, Clone)]
@@ -53,13 +53,6 @@ impl PartialEq for PackedHead {
                 == (&other.record, &other.meta, &other.target, &other.device)
             && (&self.parameters, &self.tables, &self.lengths)
                 == (&other.parameters, &other.tables, &other.lengths)
-    }
-}
-
-impl PackedHead {
-    /// The name of scenes that were not read from a file.
-    pub(super) fn unnamed() -> String {
-        UNNAMED.to_owned()
     }
 }
 

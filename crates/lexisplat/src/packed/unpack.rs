@@ -1,7 +1,7 @@
 //! Decoding a packed scene as a whole.
 
 use super::CHUNK;
-use super::chunks::{Decoder, indices, places, zeros};
+use super::chunks::{Decoder, indices, places};
 use super::scene::Packed;
 use super::stream::{BitCounts, StreamBits};
 use crate::scene::splats::Geometry;
@@ -64,7 +64,7 @@ impl Packed {
         let mut bit_counts = decoder.dictionary_bits;
         let n = self.len();
         let budget = self.budget()?;
-        let mut g = Geometry { extras: self.extras().to_vec(), ..zeros(n) };
+        let mut g = Geometry { extras: self.extras().to_vec(), ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let work = places(&mut g, &mut counts).enumerate().collect();

@@ -4,12 +4,11 @@ use std::ops::Range;
 
 use half::f16;
 
-use crate::scene::sh::ShDegree;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::learn::{DEFAULT_SAMPLE, Fetch, LearnOptions, Learned, learn_from};
+use crate::sparse::learn::{DEFAULT_SAMPLE, LearnOptions, Learned, learn_from};
 use crate::sparse::model::{Model, Pursuit, Record};
 use crate::sparse::pursuit::{self, Coder, StopRule, ValueType, Visit};
 use crate::sparse::tally::{CompressReport, Tally};
@@ -122,8 +121,7 @@ pub(crate) fn encode(
     let n = source.len();
     Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     let clock = Stopwatch::start();
-    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
-    let (encoder, learned) = Encoder::new(source.empty().degree, n, &mut fetch, options, progress)?;
+    let (encoder, learned) = Encoder::new(source, options, progress)?;
     let learn_seconds = clock.seconds();
     let clock = Stopwatch::start();
     let mut coded = encoder.no_codes();
@@ -154,14 +152,13 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
-    /// Checks `options` and learns the dictionary from `vectors` rows of SH-rest, unless one is given.
+    /// Checks `options` and learns the dictionary from rows of `source`, unless one is given.
     fn new(
-        degree: ShDegree,
-        vectors: usize,
-        fetch: &mut Fetch<'_>,
+        source: &dyn SplatSource,
         options: &CompressOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, Option<Learned>)> {
+        let degree = source.empty().degree;
         let stop = StopRule::new(options.tolerance, options.max_nonzeros)?;
         let (dictionary, learned) = match &options.dictionary {
             Some(given) if given.degree() != degree => {
@@ -173,12 +170,12 @@ impl Encoder {
                 let learn_options = LearnOptions {
                     atoms: options.atoms,
                     pursuit: options.pursuit,
-                    stop,
                     seed: options.seed,
                     sample: options.sample,
                     ..LearnOptions::new(stop)
                 };
-                let learned = learn_from(degree, vectors, fetch, &learn_options, progress)?;
+                let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
+                let learned = learn_from(degree, source.len(), &mut fetch, &learn_options, progress)?;
                 (learned.dictionary.clone(), Some(learned))
             }
         };
@@ -231,10 +228,10 @@ impl Encoder {
             progress.advance(piece.len() as u64);
             Ok(part)
         });
-        parts.into_iter().try_for_each(|part| {
+        for part in parts {
             coded.append(part?);
-            Ok(())
-        })
+        }
+        Ok(())
     }
 }
 

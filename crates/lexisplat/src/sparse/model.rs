@@ -65,7 +65,10 @@ macro_rules! named {
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($name => Ok(Self::$variant),)+
-                    _ => Err(crate::support::error::Error::parameter($what, text, concat!("one of", $(" ", $name),+))),
+                    _ => {
+                        let names = format!("one of {}", [$($name),+].join(", "));
+                        Err(crate::support::error::Error::parameter($what, text, names))
+                    }
                 }
             }
         }

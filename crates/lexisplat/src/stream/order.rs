@@ -76,7 +76,7 @@ impl Ordered {
         let (mut bounds, mut total) = (None::<Bounds>, 0.0);
         let mut looked = Vec::with_capacity(sizes.looked_at.min(n));
         let mut look = stratified(n, sizes.looked_at, seed).peekable();
-        let each_chunk = |splats: &mut Splats, f: &mut dyn FnMut(usize, &Splats) -> Result<()>| {
+        let each_chunk = |splats: &mut Splats, f: &mut dyn FnMut(usize, &mut Splats) -> Result<()>| {
             for start in (0..n).step_by(sizes.at_once) {
                 let range = start..n.min(start + sizes.at_once);
                 progress.check()?;
