@@ -12,7 +12,7 @@ use super::prune::Pruned;
 ///
 /// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
 /// fields that are renamed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CompressionReport {
     /// Number of Gaussians in the file.
@@ -112,35 +112,23 @@ impl CompressionReport {
         Self {
             gaussians,
             sh_degree: degree.get(),
-            atoms: 0,
             layout,
             record: record.clone(),
             mean_nonzeros: report.mean_nonzeros,
             coefficient_ratio: report.coefficient_ratio(),
             nonzero_histogram: report.nonzero_histogram.clone(),
             escapes: report.escapes,
-            source_bytes: 0,
             file_bytes: tensors.iter().map(|t| t.1).sum(),
             sh_bytes: sh_bytes(&parts),
             dense_sh_bytes: (gaussians * degree.rest() * size_of::<f32>()) as u64,
             attribute_bytes: parts,
-            target: None,
-            importance: None,
-            device: None,
-            pruned: None,
-            in_parts: false,
             learn_rounds: report.learned.as_ref().map(|l| l.rounds),
             learn_sample: report.learned.as_ref().map(|l| l.sample),
             held_out_nonzeros: report.learned.as_ref().map(|l| l.held_out_nonzeros),
-            read_seconds: 0.0,
-            look_seconds: 0.0,
             learn_seconds: report.learn_seconds,
             code_seconds: report.code_seconds,
             pack_seconds: report.learn_seconds + report.code_seconds,
-            write_seconds: 0.0,
-            total_seconds: 0.0,
-            warnings: Vec::new(),
-            dictionary: None,
+            ..Self::default()
         }
     }
 

@@ -6,7 +6,7 @@ use half::f16;
 
 use super::CHUNK;
 use super::bits::{unzigzag, zigzag};
-use super::chunk_codec::ChunkCodec;
+use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::entropy::Tables;
 use super::parameters::Parameters;
 use super::scene::PackedHead;
@@ -151,12 +151,13 @@ impl Decoder {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let mut piece = Piece::default();
         let mut walk = ChunkCodec::new(parameters, dictionary.dim());
+        let unknown = GaussianValues::default();
         let mut code = Vec::with_capacity(dictionary.dim());
         let width = indices(dictionary, Vec::new()).width() + size_of::<f16>();
         let row = size_of::<u32>() + dictionary.dim() * size_of::<f32>();
         let (mut nonzeros, mut rows) = (0, 0);
         for i in 0..place.counts.len() {
-            let decoded = walk.step(&mut player, None).ok_or_else(damaged)?;
+            let decoded = walk.step(&mut player, &unknown).ok_or_else(damaged)?;
             place.positions[i] = decoded.position;
             place.dc[i] = decoded.dc;
             place.opacities[i] = decoded.opacity;
@@ -225,7 +226,7 @@ fn dictionary(
     }
     let mut player = SymbolDecoder::new(tables, symbols, raw)?;
     player.bit_counts = Some(BitCounts::default());
-    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, None);
+    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, &[]);
     if !player.exhausted() {
         return None;
     }
@@ -233,13 +234,13 @@ fn dictionary(
 }
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
-/// the encoder's.
+/// the encoder's; decoders have none.
 pub(super) fn code_dictionary<S: Symbols>(
     s: &mut S,
     degree: ShDegree,
     atoms: usize,
     bits: u32,
-    target: Option<&[f32]>,
+    target: &[f32],
 ) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let steps = f64::from(1_u32 << bits);
@@ -251,7 +252,7 @@ pub(super) fn code_dictionary<S: Symbols>(
             let context = (d % per_channel + 1).isqrt() - 1;
             let coded = s.integer(Stream::Dictionary, context, || {
                 #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
-                let whole = target.map_or(0, |t| (f64::from(t[j * dim + d]) * steps).round() as i64);
+                let whole = (f64::from(target[j * dim + d]) * steps).round() as i64;
                 zigzag(whole)
             });
             #[expect(clippy::cast_precision_loss, reason = "small, or the norm check refuses it")]

@@ -3,7 +3,7 @@
 use half::f16;
 
 use super::canonical::{MortonKey, canonical};
-use super::chunk_codec::{ChunkCodec, Code, GaussianValues};
+use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::fit::Fit;
@@ -130,14 +130,14 @@ impl ChunkCoder {
             let (rows, costs) = coder.learn(view, total, options, progress)?;
             coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
             let atoms = rows.len() / dim;
-            let rounded = code_dictionary(&mut symbols, degree, atoms, coder.atom_bits, Some(&rows));
+            let rounded = code_dictionary(&mut symbols, degree, atoms, coder.atom_bits, &rows);
             coder.dictionary = Dictionary::new(degree, rounded.clone())?;
             coder.book = Some(Codebook::new(dim, rounded, costs));
         } else if dim > 0 {
             // A scene without Gaussians still needs one atom to be valid.
             let mut atom = vec![0.0; dim];
             atom[0] = 1.0;
-            let rounded = code_dictionary(&mut symbols, degree, 1, 0, Some(&atom));
+            let rounded = code_dictionary(&mut symbols, degree, 1, 0, &atom);
             coder.dictionary = Dictionary::new(degree, rounded)?;
         }
         Ok((coder, symbols))
@@ -198,36 +198,26 @@ impl ChunkCoder {
         let mut rebuilt = vec![0.0_f32; dim];
         for i in 0..view.len() {
             let placed = view.scene[i];
-            let g = canonical(&view.splats.geometry, placed.index());
+            let form = canonical(&view.splats.geometry, placed.index());
             let classes = view.classes[i];
-            let row = view.row(i);
-            let mut code = Code::Atoms(&[]);
+            let mut target = GaussianValues { cell: placed.cell, classes, form, code: &[], exact: &[] };
             if dim > 0 {
                 resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
                 let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
                 reconstruct(dictionary, pairs, &mut rebuilt);
+                let row = view.row(i);
                 let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
                 let error = squares.sum::<f64>().sqrt();
                 let storable = values.iter().all(|v| v.1.is_finite());
                 if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
-                    code = Code::Atoms(codes.row(i));
+                    target.code = codes.row(i);
                     tally.code(values.len(), error, None);
                 } else {
-                    code = Code::Exact(row);
+                    target.exact = row;
                     tally.escapes += 1;
                 }
             }
-            let target = GaussianValues {
-                cell: placed.cell,
-                classes,
-                scales: g.scales,
-                axes: g.axes,
-                position: g.position,
-                log_opacity: g.log_opacity,
-                dc: parameters.dc_coordinates(g.dc),
-                code,
-            };
-            walk.step(&mut symbols, Some(&target)).ok_or_else(too_large)?;
+            walk.step(&mut symbols, &target).ok_or_else(too_large)?;
         }
         Ok((tally, symbols))
     }
