@@ -116,7 +116,7 @@ fn dialect(dialect: Dialect) -> String {
 fn guarantee(model: &Model, packed: Option<&Packed>) -> Option<String> {
     let record = model.record();
     let mut parts = Vec::new();
-    if let Some(p) = packed.and_then(|packed| packed.head().target()) {
+    if let Some(p) = packed.and_then(|packed| packed.head().target.as_ref()) {
         parts.push(format!("{:.2} dB mean, {:.2} dB worst of {} views", p.mean_psnr, p.min_psnr, p.views));
     }
     match (record.tolerance, record.max_nonzeros) {

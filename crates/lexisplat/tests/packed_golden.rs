@@ -103,28 +103,28 @@ fn golden_files_are_the_same_on_any_number_of_threads() {
 #[test]
 fn golden_files_say_how_they_were_made() {
     let (packed, model) = (opened("packed"), decoded("packed"));
-    assert_eq!((packed.len(), packed.head().degree(), model.len()), (300, ShDegree::THREE, 300));
-    assert_eq!(packed.head().target(), Some(&promise()));
-    assert_eq!(packed.head().meta().comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
+    assert_eq!((packed.len(), packed.head().degree, model.len()), (300, ShDegree::THREE, 300));
+    assert_eq!(packed.head().target.as_ref(), Some(&promise()));
+    assert_eq!(packed.head().meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
     assert!(
-        packed.head().meta().antialiased
+        packed.head().meta.antialiased
             && packed.order().is_some()
-            && packed.head().record().tolerance.is_none()
+            && packed.head().record.tolerance.is_none()
     );
-    assert_eq!(model.meta(), packed.head().meta());
+    assert_eq!(model.meta(), &packed.head().meta);
     // Back in the source's order they count up again.
     let [label, time] = model.geometry().extras.as_slice() else { panic!("two extras") };
     assert_eq!((label.name.as_str(), time.name.as_str()), ("label", "time"));
     assert_eq!(time.values, ExtraValues::F32((0..300_u16).map(f32::from).collect()));
 
     let (packed, model) = (opened("packed_degree0"), decoded("packed_degree0"));
-    assert_eq!((packed.len(), packed.head().atoms(), packed.head().record().seed), (40, 0, 7));
-    assert!(packed.head().target().is_none() && packed.order().is_none() && model.dictionary().is_empty());
+    assert_eq!((packed.len(), packed.head().atoms, packed.head().record.seed), (40, 0, 7));
+    assert!(packed.head().target.is_none() && packed.order().is_none() && model.dictionary().is_empty());
 
     let (packed, model) = (opened("packed_escapes"), decoded("packed_escapes"));
-    assert_eq!((packed.len(), packed.head().degree()), (80, ShDegree::ONE));
-    assert_eq!((packed.head().record().tolerance, packed.head().record().over_tolerance), (Some(0.05), 0));
-    assert!((0.01..=0.05).contains(&packed.head().record().max_residual));
+    assert_eq!((packed.len(), packed.head().degree), (80, ShDegree::ONE));
+    assert_eq!((packed.head().record.tolerance, packed.head().record.over_tolerance), (Some(0.05), 0));
+    assert!((0.01..=0.05).contains(&packed.head().record.max_residual));
     let escapes = model.codes().escapes();
     assert!(escapes.gaussians.len() >= 3 && model.codes().nonzeros() > 80);
     assert!(escapes.rows.chunks_exact(9).filter(|row| **row == [1e6; 9]).count() == 3);

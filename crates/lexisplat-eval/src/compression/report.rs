@@ -1,8 +1,8 @@
 //! What a compression did: the facts that programs print as text and as JSON.
 
-use lexisplat::packed::{PackReport, PackedHead, StreamBits, TargetRecord};
+use lexisplat::packed::{PackedHead, StreamBits, TargetRecord};
 use lexisplat::stream::Compressed;
-use lexisplat::{Dictionary, Layout, Record, ShDegree};
+use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
 use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
@@ -12,7 +12,7 @@ use super::prune::Pruned;
 ///
 /// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
 /// fields that are renamed.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct CompressionReport {
     /// Number of Gaussians in the file.
@@ -97,118 +97,65 @@ pub enum SensitivitySource {
     Heuristic,
 }
 
-/// What the reports of the exact and of the packed codec share.
-struct Coding<'a> {
-    layout: Layout,
-    record: &'a Record,
-    mean_nonzeros: f64,
-    nonzero_histogram: &'a [u64],
-    escapes: u64,
-    learn_seconds: f64,
-    code_seconds: f64,
-}
-
 impl CompressionReport {
+    /// Returns what the reports of all layouts have in common.
     fn new(
+        layout: Layout,
         gaussians: usize,
         degree: ShDegree,
-        atoms: usize,
-        coding: &Coding<'_>,
+        record: &Record,
+        report: &CompressReport,
         tensors: &[(String, u64)],
         streams: &[StreamBits],
     ) -> Self {
-        let &Coding {
-            layout,
-            record,
-            mean_nonzeros,
-            nonzero_histogram,
-            escapes,
-            learn_seconds,
-            code_seconds,
-        } = coding;
-        let (parts, dim) = (part_bytes(tensors, streams), degree.rest());
+        let parts = part_bytes(tensors, streams);
         Self {
             gaussians,
             sh_degree: degree.get(),
-            atoms,
             layout,
             record: record.clone(),
-            mean_nonzeros,
-            coefficient_ratio: (mean_nonzeros > 0.0).then(|| dim as f64 / mean_nonzeros),
-            nonzero_histogram: nonzero_histogram.to_vec(),
-            escapes,
-            source_bytes: 0,
+            mean_nonzeros: report.mean_nonzeros,
+            coefficient_ratio: report.coefficient_ratio(),
+            nonzero_histogram: report.nonzero_histogram.clone(),
+            escapes: report.escapes,
             file_bytes: tensors.iter().map(|t| t.1).sum(),
             sh_bytes: sh_bytes(&parts),
-            dense_sh_bytes: (gaussians * dim * size_of::<f32>()) as u64,
+            dense_sh_bytes: (gaussians * degree.rest() * size_of::<f32>()) as u64,
             attribute_bytes: parts,
-            target: None,
-            importance: None,
-            device: None,
-            pruned: None,
-            in_parts: false,
-            learn_rounds: None,
-            learn_sample: None,
-            held_out_nonzeros: None,
-            read_seconds: 0.0,
-            look_seconds: 0.0,
-            learn_seconds,
-            code_seconds,
-            pack_seconds: learn_seconds + code_seconds,
-            write_seconds: 0.0,
-            total_seconds: 0.0,
-            warnings: Vec::new(),
-            dictionary: None,
+            learn_rounds: report.learned.as_ref().map(|l| l.rounds),
+            learn_sample: report.learned.as_ref().map(|l| l.sample),
+            held_out_nonzeros: report.learned.as_ref().map(|l| l.held_out_nonzeros),
+            learn_seconds: report.learn_seconds,
+            code_seconds: report.code_seconds,
+            pack_seconds: report.learn_seconds + report.code_seconds,
+            ..Self::default()
         }
     }
 
     /// Returns the report of a file with exact geometry.
-    pub(super) fn exact(done: &Compressed, layout: Layout) -> Self {
+    pub(super) fn exact(done: Compressed, layout: Layout) -> Self {
         let Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds, .. } = done;
-        let coding = Coding {
-            layout,
-            record,
-            mean_nonzeros: report.mean_nonzeros,
-            nonzero_histogram: &report.nonzero_histogram,
-            escapes: report.escapes,
-            learn_seconds: report.learn_seconds,
-            code_seconds: report.code_seconds,
-        };
-        let learned = report.learned.as_ref();
-        let (degree, atoms) = (dictionary.degree(), dictionary.len());
-        Self {
-            learn_rounds: learned.map(|l| l.rounds),
-            learn_sample: learned.map(|l| l.sample),
-            held_out_nonzeros: learned.map(|l| l.held_out_nonzeros),
-            write_seconds: *write_seconds,
-            dictionary: Some(dictionary.clone()),
-            ..Self::new(*gaussians, degree, atoms, &coding, attribute_bytes, &[])
-        }
+        let shared =
+            Self::new(layout, gaussians, dictionary.degree(), &record, &report, &attribute_bytes, &[]);
+        Self { atoms: dictionary.len(), write_seconds, dictionary: Some(dictionary), ..shared }
     }
 
     /// Returns the report of a packed file, whose tensors take the bytes in `tensors` and whose streams the
     /// bits in `streams`.
     pub(super) fn packed(
         head: &PackedHead,
-        report: &PackReport,
+        report: &CompressReport,
         tensors: &[(String, u64)],
         streams: &[StreamBits],
         importance: SensitivitySource,
     ) -> Self {
-        let coding = Coding {
-            layout: Layout::Packed,
-            record: head.record(),
-            mean_nonzeros: report.mean_nonzeros,
-            nonzero_histogram: &report.nonzero_histogram,
-            escapes: report.escapes,
-            learn_seconds: report.learn_seconds,
-            code_seconds: report.code_seconds,
-        };
+        let (gaussians, degree, record) = (head.gaussians, head.degree, &head.record);
         Self {
-            target: head.target().cloned(),
+            atoms: head.atoms,
+            target: head.target.clone(),
             importance: Some(importance),
-            device: Some(head.device().unwrap_or("cpu").to_owned()),
-            ..Self::new(head.len(), head.degree(), head.atoms(), &coding, tensors, streams)
+            device: Some(head.device.as_deref().unwrap_or("cpu").to_owned()),
+            ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors, streams)
         }
     }
 }
@@ -221,11 +168,15 @@ fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Err
     RecordReport::from(record).serialize(serializer)
 }
 
+/// Streams are not whole bytes; sums of their bits are exact to an eighth of one.
+fn rounded(bytes: f64) -> ByteCount {
+    ByteCount::from((bytes * 8.0).round() / 8.0)
+}
+
 fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-    ByteCount::from((bytes * 8.0).round() / 8.0).serialize(serializer)
+    rounded(*bytes).serialize(serializer)
 }
 
 fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
-    serializer
-        .collect_map(parts.iter().map(|(name, bytes)| (name, ByteCount::from((bytes * 8.0).round() / 8.0))))
+    serializer.collect_map(parts.iter().map(|(name, bytes)| (name, rounded(*bytes))))
 }

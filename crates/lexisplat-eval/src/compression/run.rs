@@ -44,7 +44,7 @@ impl Compression {
         let mut report = match self {
             Self::Exact(options, codes) => {
                 let done = stream::compress(source, options, *codes, sink, progress)?;
-                CompressionReport::exact(&done, Layout::of(*codes, options.values))
+                CompressionReport::exact(done, Layout::of(*codes, options.values))
             }
             Self::Heuristic(preset, options) => in_parts(options, *preset, None, source, sink, progress)?,
             Self::Packed(packing) => packing.run(source, sink, progress)?,

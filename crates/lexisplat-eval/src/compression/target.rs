@@ -3,8 +3,8 @@
 use std::borrow::Borrow;
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{PackReport, Packed, Packer, TargetRecord};
-use lexisplat::{Progress, Splats};
+use lexisplat::packed::{Packed, Packer, TargetRecord};
+use lexisplat::{CompressReport, Progress, Splats};
 
 use super::judge::Judge;
 use crate::error::{Error, Result};
@@ -126,7 +126,7 @@ pub fn pack_to_target(
     target: Target,
     source_bytes: u64,
     progress: &dyn Progress,
-) -> Result<(Packed, PackReport)> {
+) -> Result<(Packed, CompressReport)> {
     target.check()?;
     let recorded = target.recorded(source_bytes);
     let asked = recorded.asked();
@@ -141,7 +141,7 @@ pub fn pack_to_target(
         libm::log2(packer.step_for(wanted))
     };
     let mut tries: Vec<Try> = Vec::new();
-    let mut best: Option<(f64, Packed, PackReport, Option<[f64; 2]>)> = None;
+    let mut best: Option<(f64, Packed, CompressReport, Option<[f64; 2]>)> = None;
     for _ in 0..MAX_TRIES {
         progress.check()?;
         log_step = log_step.clamp(libm::log2(STEPS[0]), libm::log2(STEPS[1]));

@@ -20,15 +20,16 @@ const CELLS_PER_GAUSSIAN: f64 = 3000.0;
 const TRIM: f64 = 0.01;
 
 /// One Gaussian in canonical form.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Canonical {
-    /// Longest first.
+    /// Natural logarithms of the standard deviations, longest first.
     pub(super) scales: Vec3,
     /// The axis of the source that each is.
     pub(super) order: [usize; 3],
     /// In that order, right-handed.
     pub(super) axes: [Vec3; 3],
     pub(super) position: Vec3,
+    /// Natural logarithm of the opacity after the sigmoid.
     pub(super) log_opacity: f32,
     pub(super) dc: Vec3,
 }
@@ -116,17 +117,13 @@ impl Grid {
             at
         }))
     }
-}
 
-/// All Gaussians in the order of their cells.
-pub(super) fn placed(geometry: &Geometry, grid: &Grid) -> Vec<MortonKey> {
-    // Scenes have at most 2^32 - 2 Gaussians.
-    let mut all: Vec<MortonKey> = (0_u32..)
-        .zip(&geometry.positions)
-        .map(|(source, &position)| MortonKey { cell: grid.cell(position), source })
-        .collect();
-    all.sort_unstable();
-    all
+    /// The places of all Gaussians, in the order of `geometry`.
+    pub(super) fn keys(&self, geometry: &Geometry) -> Vec<MortonKey> {
+        // Scenes have at most 2^32 - 2 Gaussians.
+        let key = |(source, &position)| MortonKey { cell: self.cell(position), source };
+        (0_u32..).zip(&geometry.positions).map(key).collect()
+    }
 }
 
 /// Gaussian `i` in canonical form.

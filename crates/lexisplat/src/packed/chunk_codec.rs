@@ -5,6 +5,7 @@
 //! the decoder, so errors do not add up.
 
 use super::bits::{unzigzag, zigzag};
+use super::canonical::Canonical;
 use super::codebook::COUNT_CLASSES;
 use super::morton;
 use super::neighbours::{AVERAGES, Neighbours};
@@ -38,31 +39,18 @@ const COLOUR: usize = TARGETS;
 const SHAPE: usize = TARGETS + 1;
 const NONZEROS: usize = TARGETS + 2;
 
-/// A Gaussian to be coded. Only the encoder has it.
-#[derive(Debug, Clone, Copy)]
+/// A Gaussian to be coded. Decoders have none and look at no value of it: they pass the default.
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct GaussianValues<'a> {
     /// Number of its cell on the Morton curve. It is not below that of the last Gaussian.
     pub(super) cell: u64,
     /// Colour and shape class, at most [`LAST_CLASS`].
     pub(super) classes: [u8; 2],
-    /// Natural logarithms of the standard deviations, longest first.
-    pub(super) scales: Vec3,
-    /// The axes in that order, right-handed.
-    pub(super) axes: [Vec3; 3],
-    pub(super) position: Vec3,
-    /// Natural logarithm of the opacity after the sigmoid.
-    pub(super) log_opacity: f32,
-    /// Base colour in the file's coordinates.
-    pub(super) dc: Vec3,
-    /// Pairs (atom, value in steps) with values that are not zero, largest first; or the exact row.
-    pub(super) code: Code<'a>,
-}
-
-/// What stands for SH-rest.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Code<'a> {
-    Atoms(&'a [(u16, i32)]),
-    Exact(&'a [f32]),
+    pub(super) form: Canonical,
+    /// Pairs (atom, value in steps) with values that are not zero, largest first.
+    pub(super) code: &'a [(u16, i32)],
+    /// The exact row, if it has no code; otherwise empty.
+    pub(super) exact: &'a [f32],
 }
 
 /// A decoded Gaussian. Its code is in [`ChunkCodec::code`].
@@ -97,7 +85,7 @@ impl<'p> ChunkCodec<'p> {
         Self {
             parameters,
             dim,
-            neighbours: Neighbours::new(),
+            neighbours: Neighbours::default(),
             cell: 0,
             gap_bits: 0,
             code: Vec::with_capacity(dim),
@@ -105,18 +93,12 @@ impl<'p> ChunkCodec<'p> {
         }
     }
 
-    /// Codes one Gaussian. `target` is `None` in the decoder. Returns `None` for impossible values, which only
-    /// damaged files hold.
+    /// Codes one Gaussian. Returns `None` for impossible values, which only damaged files hold.
     #[inline]
-    pub(super) fn step<S: Symbols>(
-        &mut self,
-        s: &mut S,
-        target: Option<&GaussianValues<'_>>,
-    ) -> Option<Decoded> {
+    pub(super) fn step<S: Symbols>(&mut self, s: &mut S, target: &GaussianValues<'_>) -> Option<Decoded> {
         let p = self.parameters;
-        let gap = s.integer(Stream::Cell, self.gap_bits.min(GAP_CONTEXTS) as usize, || {
-            target.map_or(0, |t| t.cell.wrapping_sub(self.cell))
-        });
+        let context = self.gap_bits.min(GAP_CONTEXTS) as usize;
+        let gap = s.integer(Stream::Cell, context, || target.cell.wrapping_sub(self.cell));
         self.cell = self.cell.checked_add(gap)?;
         self.gap_bits = u64::BITS - gap.leading_zeros();
         let centre = p.centre(morton::decode(self.cell)?);
@@ -133,40 +115,29 @@ impl<'p> ChunkCodec<'p> {
         let mut features: [f32; FEATURES] = [1.0, 0.0, f32::from(colour), f32::from(shape), 0.0, 0.0, 0.0];
         let mut values = [0.0; AVERAGES];
         let class = usize::from(shape);
-        for k in 0..3 {
+        for (k, stream) in Stream::SCALES.into_iter().enumerate() {
             features[1] = around[k];
-            let stream = Stream::axis([Stream::Scale0, Stream::Scale1, Stream::Scale2], k);
             let prediction = p.predict(k, &features);
             let step = p.scale_step(k, shape);
-            let value = difference(s, stream, class, prediction, step, target.map(|t| t.scales[k]));
+            let value = difference(s, stream, class, prediction, step, || target.form.scales[k]);
             features[4 + k] = value;
             values[k] = value;
         }
         let scales: Vec3 = [values[0], values[1], values[2]];
         features[1] = around[3];
         let step = p.opacity_step(shape);
-        let log_opacity = difference(
-            s,
-            Stream::Opacity,
-            class,
-            p.predict(3, &features),
-            step,
-            target.map(|t| t.log_opacity),
-        );
+        let log_opacity =
+            difference(s, Stream::Opacity, class, p.predict(3, &features), step, || target.form.log_opacity);
         values[3] = log_opacity.min(MAX_LOG_OPACITY);
 
-        let axes = rotation(s, p.rotation_steps(shape, scales), scales, target.map(|t| &t.axes));
+        let axes = rotation(s, p.rotation_steps(shape, scales), scales, &target.form.axes);
         let steps = p.position_steps(shape, scales);
-        let offset = target.map(|t| {
-            #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-            let offset: Vec3 = std::array::from_fn(|k| (f64::from(t.position[k]) - centre[k]) as f32);
-            axes.map(|axis| dot(axis, offset))
-        });
+        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
+        let offset = || std::array::from_fn(|k| (f64::from(target.form.position[k]) - centre[k]) as f32);
         let mut position = centre;
-        for k in 0..3 {
-            let stream = Stream::axis([Stream::Position0, Stream::Position1, Stream::Position2], k);
-            let along =
-                difference(s, stream, fineness(p.cell / steps[k]), 0.0, steps[k], offset.map(|o| o[k]));
+        for (k, stream) in Stream::POSITIONS.into_iter().enumerate() {
+            let context = fineness(p.cell / steps[k]);
+            let along = difference(s, stream, context, 0.0, steps[k], || dot(axes[k], offset()));
             for (x, axis) in position.iter_mut().zip(axes[k]) {
                 *x += f64::from(along) * f64::from(axis);
             }
@@ -175,12 +146,12 @@ impl<'p> ChunkCodec<'p> {
         let position = position.map(|v| v as f32);
 
         let step = p.dc_step(colour);
-        for k in 0..3 {
+        for (k, stream) in Stream::DC.into_iter().enumerate() {
             features[1] = around[4 + k];
-            let stream = Stream::axis([Stream::Dc0, Stream::Dc1, Stream::Dc2], k);
             let prediction = p.predict(4 + k, &features);
-            values[4 + k] =
-                difference(s, stream, usize::from(colour), prediction, step, target.map(|t| t.dc[k]));
+            values[4 + k] = difference(s, stream, usize::from(colour), prediction, step, || {
+                p.dc_coordinates(target.form.dc)[k]
+            });
         }
         let dc = p.dc_of([values[4], values[5], values[6]]);
         self.sh(s, target, colour, around[NONZEROS])?;
@@ -188,9 +159,8 @@ impl<'p> ChunkCodec<'p> {
         values[COLOUR] = f32::from(colour);
         values[SHAPE] = f32::from(shape) - f32::from(colour);
         #[expect(clippy::cast_precision_loss, reason = "at most 72")]
-        {
-            values[NONZEROS] = self.code.len() as f32;
-        }
+        let nonzeros = self.code.len() as f32;
+        values[NONZEROS] = nonzeros;
         self.neighbours.push(position, values);
         let decoded = Decoded {
             position,
@@ -209,7 +179,7 @@ impl<'p> ChunkCodec<'p> {
     fn sh<S: Symbols>(
         &mut self,
         s: &mut S,
-        target: Option<&GaussianValues<'_>>,
+        target: &GaussianValues<'_>,
         colour: u8,
         around: f32,
     ) -> Option<()> {
@@ -221,17 +191,12 @@ impl<'p> ChunkCodec<'p> {
         // A count above that of the longest code marks a row that is stored exactly.
         let escape = u64::try_from(self.dim).ok()? + 1;
         let context = 2 * usize::from(colour).min(COUNT_CLASSES - 1) + usize::from(around > 1.0);
-        let count = s.integer(Stream::Count, context, || match target.map(|t| t.code) {
-            Some(Code::Atoms(code)) => code.len() as u64,
-            Some(Code::Exact(_)) => escape,
-            None => 0,
+        let count = s.integer(Stream::Count, context, || {
+            if target.exact.is_empty() { target.code.len() as u64 } else { escape }
         });
         if count == escape {
             for k in 0..self.dim {
-                let bits = s.bits(Stream::Value, 32, || match target.map(|t| t.code) {
-                    Some(Code::Exact(row)) => u64::from(row[k].to_bits()),
-                    _ => 0,
-                });
+                let bits = s.bits(Stream::Value, 32, || u64::from(target.exact[k].to_bits()));
                 self.exact.push(f32::from_bits(u32::try_from(bits).ok()?));
             }
             return self.exact.iter().all(|v| v.is_finite()).then_some(());
@@ -241,18 +206,13 @@ impl<'p> ChunkCodec<'p> {
         }
         let mut last = None;
         for k in 0..usize::try_from(count).ok()? {
-            let given = target.and_then(|t| match t.code {
-                Code::Atoms(code) => code.get(k).copied(),
-                Code::Exact(_) => None,
-            });
-            let atom = s.symbol(Stream::Atom, usize::from(k > 0), || given.map_or(0, |g| g.0));
+            let atom = s.symbol(Stream::Atom, usize::from(k > 0), || target.code[k].0);
             let context = match last {
                 None => usize::try_from(count - 1).ok()?.min(7),
                 Some(size) => 8 + usize::try_from(size).ok()?.min(15),
             };
-            let size =
-                s.integer(Stream::Value, context, || given.map_or(0, |g| u64::from(g.1.unsigned_abs()) - 1));
-            let negative = s.bits(Stream::Value, 1, || given.map_or(0, |g| u64::from(g.1 < 0)));
+            let size = s.integer(Stream::Value, context, || u64::from(target.code[k].1.unsigned_abs()) - 1);
+            let negative = s.bits(Stream::Value, 1, || u64::from(target.code[k].1 < 0));
             let value = i32::try_from(size.checked_add(1)?).ok()?;
             self.code.push((atom, if negative == 1 { -value } else { value }));
             last = Some(size);
@@ -264,19 +224,19 @@ impl<'p> ChunkCodec<'p> {
 /// Colour and shape class.
 fn classes<S: Symbols>(
     s: &mut S,
-    target: Option<&GaussianValues<'_>>,
+    target: &GaussianValues<'_>,
     around: &[f32; AVERAGES],
     known: bool,
 ) -> Option<[u8; 2]> {
     let context = if known { 1 + level(around[COLOUR]) } else { 0 };
-    let colour = s.symbol(Stream::ColourClass, context, || target.map_or(0, |t| u16::from(t.classes[0])));
+    let colour = s.symbol(Stream::ColourClass, context, || u16::from(target.classes[0]));
     let colour = u8::try_from(colour).ok()?;
     let expected = (f32::from(colour) + around[SHAPE]).clamp(0.0, f32::from(LAST_CLASS));
     // In halves, so that the context also says on which side of the rounded value the class may lie.
     let context = if known { level(2.0 * (expected - (expected - 0.25).floor())) + 1 } else { 0 };
     let nearest = level(expected);
     let shape = s.integer(Stream::ShapeClass, context, || {
-        target.map_or(0, |t| zigzag(i64::from(t.classes[1]) - i64::try_from(nearest).unwrap_or(0)))
+        zigzag(i64::from(target.classes[1]) - i64::try_from(nearest).unwrap_or(0))
     });
     let shape = i64::try_from(nearest).ok()?.checked_add(unzigzag(shape))?;
     let shape = u8::try_from(shape).ok()?;
@@ -299,7 +259,7 @@ fn fineness(steps: f32) -> usize {
     (2 * octaves + u32::from(half)) as usize
 }
 
-/// Codes `value` as `prediction` plus whole steps, and returns the value that is decoded.
+/// Codes a value as `prediction` plus whole steps, and returns the value that is decoded.
 #[inline]
 fn difference<S: Symbols>(
     s: &mut S,
@@ -307,15 +267,13 @@ fn difference<S: Symbols>(
     context: usize,
     prediction: f32,
     step: f32,
-    value: Option<f32>,
+    value: impl FnOnce() -> f32,
 ) -> f32 {
     let steps = s.integer(stream, context, || {
-        value.map_or(0, |value| {
-            let steps = ((value - prediction) / step).clamp(-MAX_STEPS, MAX_STEPS);
-            #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-            let whole = (steps.abs() + 0.5 - DEAD_ZONE).floor() as i64;
-            zigzag(if steps < 0.0 { -whole } else { whole })
-        })
+        let steps = ((value() - prediction) / step).clamp(-MAX_STEPS, MAX_STEPS);
+        #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+        let whole = (steps.abs() + 0.5 - DEAD_ZONE).floor() as i64;
+        zigzag(if steps < 0.0 { -whole } else { whole })
     });
     #[expect(clippy::cast_precision_loss, reason = "the same in encoder and decoder")]
     let steps = unzigzag(steps) as f32;
@@ -323,42 +281,38 @@ fn difference<S: Symbols>(
 }
 
 /// Codes the axes: the one that matters least as a point on a sphere, and the others as a turn about it.
-fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: Option<&[Vec3; 3]>) -> [Vec3; 3] {
+fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: &[Vec3; 3]) -> [Vec3; 3] {
     // A needle hardly changes when turned about its longest axis, and a disc about its shortest.
     let needle = scales[0] - scales[1] >= scales[1] - scales[2];
     let (main, other) = if needle { (0, 1) } else { (2, 0) };
     let across: Vec<f32> = (0..3).filter(|&k| k != main).map(|k| steps[k]).collect();
     let step = (across[0] * across[1]).sqrt();
     let count = bits_for(2.0 * SQUARE_ANGLE / step);
-    let size = power(count);
-    let cell = |x: f32| -> u64 {
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let cell = ((x + 1.0) * 0.5 * size).floor().clamp(0.0, size - 1.0) as u64;
-        cell
-    };
-    let point = target.map(|axes| square_of_axis(axes[main]));
     let coordinates: [f32; 2] = std::array::from_fn(|k| {
-        let cell = s.bits(Stream::Rotation, count, || point.map_or(0, |p| cell(p[k])));
-        #[expect(clippy::cast_precision_loss, reason = "at most 15 bits")]
-        let cell = cell as f32;
-        (cell + 0.5) / size * 2.0 - 1.0
+        share(s, count, || (square_of_axis(target[main])[k] + 1.0) * 0.5) * 2.0 - 1.0
     });
     let u = axis_of_square(coordinates);
     let [first, second] = frame(u);
-    let count = bits_for(HALF_TURN / steps[main]);
-    let size = power(count);
-    let turn = s.bits(Stream::Rotation, count, || {
-        target.map_or(0, |axes| {
-            let angle = atan2(dot(axes[other], second), dot(axes[other], first));
-            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-            let turn = (angle.rem_euclid(HALF_TURN) / HALF_TURN * size).floor().clamp(0.0, size - 1.0) as u64;
-            turn
-        })
+    let turn = share(s, bits_for(HALF_TURN / steps[main]), || {
+        let angle = atan2(dot(target[other], second), dot(target[other], first));
+        angle.rem_euclid(HALF_TURN) / HALF_TURN
     });
-    #[expect(clippy::cast_precision_loss, reason = "at most 15 bits")]
-    let (sine, cosine) = sin_cos((turn as f32 + 0.5) / size * HALF_TURN);
+    let (sine, cosine) = sin_cos(turn * HALF_TURN);
     let v: Vec3 = std::array::from_fn(|k| cosine * first[k] + sine * second[k]);
     if needle { [u, v, cross(u, v)] } else { [v, cross(u, v), u] }
+}
+
+/// Codes a number from 0 to 1 in `count` bits, and returns the one that is decoded.
+fn share<S: Symbols>(s: &mut S, count: u32, value: impl FnOnce() -> f32) -> f32 {
+    let size = power(count);
+    let cell = s.bits(Stream::Rotation, count, || {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let cell = (value() * size).floor().clamp(0.0, size - 1.0) as u64;
+        cell
+    });
+    #[expect(clippy::cast_precision_loss, reason = "at most 15 bits")]
+    let cell = cell as f32;
+    (cell + 0.5) / size
 }
 
 /// Bits for about `values` different values.

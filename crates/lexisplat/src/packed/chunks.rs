@@ -6,12 +6,11 @@ use half::f16;
 
 use super::CHUNK;
 use super::bits::{unzigzag, zigzag};
-use super::chunk_codec::ChunkCodec;
+use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::entropy::Tables;
 use super::parameters::Parameters;
 use super::scene::PackedHead;
-use super::stream::{Stream, SymbolDecoder, Symbols};
-use super::unpack::StreamBits;
+use super::stream::{BitCounts, Stream, SymbolDecoder, Symbols};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
@@ -47,38 +46,8 @@ pub(super) struct Place<'a> {
 pub(super) struct Piece {
     pub(super) atoms: Vec<u16>,
     pub(super) values: Vec<f16>,
-    pub(super) escaped: Vec<u32>,
-    pub(super) rows: Vec<f32>,
+    pub(super) escapes: Escapes,
     pub(super) bit_counts: BitCounts,
-}
-
-/// Why a chunk is not decoded.
-enum Refusal {
-    /// No encoder writes it so.
-    Damage,
-    /// Its codes do not fit in the memory budget.
-    MemoryBudget,
-    /// The Gaussian of this number in the chunk has this many nonzeros, more than the limits allow.
-    Nonzeros(usize, u64),
-}
-
-impl From<std::num::TryFromIntError> for Refusal {
-    fn from(_: std::num::TryFromIntError) -> Self {
-        Self::Damage
-    }
-}
-
-/// Geometry of `n` Gaussians, all zeros.
-pub(super) fn zeros(n: usize) -> Geometry {
-    Geometry {
-        positions: vec![[0.0; 3]; n],
-        normals: Vec::new(),
-        dc: vec![[0.0; 3]; n],
-        opacities: vec![0.0; n],
-        scales: vec![[0.0; 3]; n],
-        rotations: vec![[0.0; 4]; n],
-        extras: Vec::new(),
-    }
 }
 
 /// The places of all chunks.
@@ -108,28 +77,6 @@ pub(super) fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {
     }
 }
 
-/// Bits each stream took.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct BitCounts(pub(super) [f64; Stream::ALL.len()]);
-
-impl BitCounts {
-    pub(crate) fn add(&mut self, more: &Self) {
-        for (a, b) in self.0.iter_mut().zip(more.0) {
-            *a += b;
-        }
-    }
-
-    /// With the streams' names.
-    pub(crate) fn named(&self) -> Vec<StreamBits> {
-        let stream = |(stream, bits): (Stream, f64)| StreamBits {
-            name: format!("{stream:?}"),
-            attribute: stream.attribute(),
-            bits,
-        };
-        Stream::ALL.into_iter().zip(self.0).map(stream).collect()
-    }
-}
-
 /// What all chunks of a packed scene are decoded with, and where they are.
 #[derive(Debug)]
 pub(crate) struct Decoder {
@@ -137,7 +84,7 @@ pub(crate) struct Decoder {
     file: String,
     limits: Limits,
     pub(crate) dictionary: Dictionary,
-    dictionary_bits: BitCounts,
+    pub(crate) dictionary_bits: BitCounts,
     parameters: Parameters,
     tables: Tables,
     /// The parts of the data: two for the dictionary and two for each chunk.
@@ -165,11 +112,6 @@ impl Decoder {
         bad(&self.file, &format!("chunk {c}"))
     }
 
-    /// Bits the dictionary took.
-    pub(crate) fn dictionary_bits(&self) -> BitCounts {
-        self.dictionary_bits
-    }
-
     /// Decodes chunk `c` of `data` without extras. Escapes are numbered from its start. `budget` already holds
     /// everything except its codes. Its bits are counted if `count_bits`.
     pub(crate) fn chunk(
@@ -181,12 +123,11 @@ impl Decoder {
     ) -> Result<(Geometry, SparseCodes, BitCounts)> {
         let first = c * CHUNK;
         let n = self.gaussians.saturating_sub(first).min(CHUNK);
-        let (mut g, mut counts) = (zeros(n), vec![0; n]);
+        let (mut g, mut counts) = (Geometry::zeros(n), vec![0; n]);
         let place = places(&mut g, &mut counts).next().ok_or_else(|| self.bad_chunk(c))?;
         let piece = self.piece(data, c, 0, place, budget, count_bits)?;
-        let escapes = Escapes { gaussians: piece.escaped, rows: piece.rows };
         let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
-        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, escapes)
+        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, piece.escapes)
             .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
         Ok((g, codes, piece.bit_counts))
     }
@@ -201,38 +142,22 @@ impl Decoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
+        let damaged = || self.bad_chunk(c);
         let part = |k: usize| self.parts.get(k).and_then(|range| data.get(range.clone()));
         let parts = part(2 * c + 2).zip(part(2 * c + 3));
         let player = parts.and_then(|(symbols, raw)| SymbolDecoder::new(&self.tables, symbols, raw));
-        let mut player = player.ok_or_else(|| self.bad_chunk(c))?;
-        player.bit_counts = count_bits.then_some([0.0; Stream::ALL.len()]);
-        self.play(player, first, place, budget).map_err(|refusal| match refusal {
-            Refusal::Damage => self.bad_chunk(c),
-            Refusal::MemoryBudget => budget.full(),
-            Refusal::Nonzeros(i, found) => {
-                let over = self.limits.check_nonzeros(&self.file, c * CHUNK + i, found);
-                over.err().unwrap_or_else(|| self.bad_chunk(c))
-            }
-        })
-    }
-
-    /// Decodes the chunk of `player`, whose first Gaussian is number `first`.
-    fn play(
-        &self,
-        mut player: SymbolDecoder<'_>,
-        first: usize,
-        place: Place<'_>,
-        budget: &MemoryBudget<'_>,
-    ) -> std::result::Result<Piece, Refusal> {
+        let mut player = player.ok_or_else(damaged)?;
+        player.bit_counts = count_bits.then(BitCounts::default);
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let mut piece = Piece::default();
         let mut walk = ChunkCodec::new(parameters, dictionary.dim());
+        let unknown = GaussianValues::default();
         let mut code = Vec::with_capacity(dictionary.dim());
         let width = indices(dictionary, Vec::new()).width() + size_of::<f16>();
         let row = size_of::<u32>() + dictionary.dim() * size_of::<f32>();
         let (mut nonzeros, mut rows) = (0, 0);
         for i in 0..place.counts.len() {
-            let decoded = walk.step(&mut player, None).ok_or(Refusal::Damage)?;
+            let decoded = walk.step(&mut player, &unknown).ok_or_else(damaged)?;
             place.positions[i] = decoded.position;
             place.dc[i] = decoded.dc;
             place.opacities[i] = decoded.opacity;
@@ -240,18 +165,18 @@ impl Decoder {
             place.rotations[i] = decoded.rotation;
             if !walk.exact.is_empty() {
                 rows += 1;
-                piece.escaped.push(u32::try_from(first + i)?);
-                piece.rows.extend_from_slice(&walk.exact);
+                piece.escapes.gaussians.push(u32::try_from(first + i).map_err(|_| damaged())?);
+                piece.escapes.rows.extend_from_slice(&walk.exact);
             }
             resident(&walk.code, parameters.value_step(decoded.colour_class), &mut code);
-            place.counts[i] = u8::try_from(code.len())?;
+            place.counts[i] = u8::try_from(code.len()).map_err(|_| damaged())?;
             if code.len() as u64 > self.limits.nonzeros {
-                return Err(Refusal::Nonzeros(i, code.len() as u64));
+                self.limits.check_nonzeros(&self.file, c * CHUNK + i, code.len() as u64)?;
             }
             nonzeros += code.len();
             for &(atom, value) in &code {
                 if usize::from(atom) >= dictionary.len() || !value.is_finite() {
-                    return Err(Refusal::Damage);
+                    return Err(damaged());
                 }
                 piece.atoms.push(atom);
                 piece.values.push(value);
@@ -259,19 +184,16 @@ impl Decoder {
             // A damaged file could decode to more than it holds, or to more than fits in memory.
             if i % LOOK_AFTER == LOOK_AFTER - 1 || i + 1 == place.counts.len() {
                 if player.overrun() {
-                    return Err(Refusal::Damage);
+                    return Err(damaged());
                 }
                 if !(budget.grow(nonzeros, width) && budget.grow(rows, row)) {
-                    return Err(Refusal::MemoryBudget);
+                    return Err(budget.full());
                 }
                 (nonzeros, rows) = (0, 0);
             }
         }
-        if !player.exhausted() {
-            return Err(Refusal::Damage);
-        }
-        piece.bit_counts = BitCounts(player.bit_counts.unwrap_or_default());
-        Ok(piece)
+        piece.bit_counts = player.bit_counts.unwrap_or_default();
+        if player.exhausted() { Ok(piece) } else { Err(damaged()) }
     }
 }
 
@@ -303,22 +225,22 @@ fn dictionary(
         return None;
     }
     let mut player = SymbolDecoder::new(tables, symbols, raw)?;
-    player.bit_counts = Some([0.0; Stream::ALL.len()]);
-    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, None);
+    player.bit_counts = Some(BitCounts::default());
+    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, &[]);
     if !player.exhausted() {
         return None;
     }
-    Some((Dictionary::new(head.degree, rows).ok()?, BitCounts(player.bit_counts.unwrap_or_default())))
+    Some((Dictionary::new(head.degree, rows).ok()?, player.bit_counts.unwrap_or_default()))
 }
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
-/// the encoder's.
+/// the encoder's; decoders have none.
 pub(super) fn code_dictionary<S: Symbols>(
     s: &mut S,
     degree: ShDegree,
     atoms: usize,
     bits: u32,
-    target: Option<&[f32]>,
+    target: &[f32],
 ) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let steps = f64::from(1_u32 << bits);
@@ -330,7 +252,7 @@ pub(super) fn code_dictionary<S: Symbols>(
             let context = (d % per_channel + 1).isqrt() - 1;
             let coded = s.integer(Stream::Dictionary, context, || {
                 #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
-                let whole = target.map_or(0, |t| (f64::from(t[j * dim + d]) * steps).round() as i64);
+                let whole = (f64::from(target[j * dim + d]) * steps).round() as i64;
                 zigzag(whole)
             });
             #[expect(clippy::cast_precision_loss, reason = "small, or the norm check refuses it")]

@@ -3,18 +3,17 @@
 use half::f16;
 
 use super::canonical::{MortonKey, canonical};
-use super::chunk_codec::{ChunkCodec, Code, GaussianValues};
+use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
-use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::fit::Fit;
-use super::pack::{PackOptions, PackReport};
+use super::pack::PackOptions;
 use super::parameters::Parameters;
-use super::stream::{Stream, SymbolEncoder};
+use super::stream::SymbolEncoder;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::Record;
+use crate::sparse::tally::Tally;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
@@ -84,15 +83,13 @@ pub(super) struct ChunkCoder {
     pub(super) parameters: Parameters,
     pub(super) dictionary: Dictionary,
     pub(super) atom_bits: u32,
-    /// The dictionary's symbols.
-    pub(super) first: SymbolEncoder,
     book: Option<Codebook>,
     stop: StopRule,
     tolerance: Option<f64>,
 }
 
 impl ChunkCoder {
-    /// Learns from the Gaussians of `view` how to code the `total` of a scene.
+    /// Learns from the Gaussians of `view` how to code the `total` of a scene. Returns also the dictionary's symbols.
     pub(super) fn new(
         view: View<'_>,
         total: usize,
@@ -100,50 +97,50 @@ impl ChunkCoder {
         step: f64,
         options: &PackOptions,
         progress: &dyn Progress,
-    ) -> Result<Self> {
+    ) -> Result<(Self, SymbolEncoder)> {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
         let mut parameters = fit.with_step(step);
-        #[expect(clippy::cast_possible_truncation, reason = "a step is f32")]
+        let mut stop = StopRule::Balanced;
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a step is f32, and so is a share of the tolerance"
+        )]
         if let Some(tol) = options.tolerance {
             let step = tol * VALUE_STEP_PER_TOLERANCE;
             parameters.promised = step.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32;
+            stop = StopRule::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE);
         }
         if Parameters::from_list(&parameters.to_list()).is_none() {
             return Err(too_large());
         }
         let degree = view.splats.degree;
         let dim = degree.rest();
-        let stop = match options.tolerance {
-            #[expect(clippy::cast_possible_truncation, reason = "a share of the tolerance, in steps")]
-            Some(_) => StopRule::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE),
-            None => StopRule::Balanced,
-        };
         let mut coder = Self {
             parameters,
             dictionary: Dictionary::empty(),
             atom_bits: 0,
-            first: SymbolEncoder::default(),
             book: None,
             stop,
             tolerance: options.tolerance,
         };
+        let mut symbols = SymbolEncoder::default();
         if dim > 0 && view.len() > 0 {
             let (rows, costs) = coder.learn(view, total, options, progress)?;
             coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
             let atoms = rows.len() / dim;
-            let rounded = code_dictionary(&mut coder.first, degree, atoms, coder.atom_bits, Some(&rows));
+            let rounded = code_dictionary(&mut symbols, degree, atoms, coder.atom_bits, &rows);
             coder.dictionary = Dictionary::new(degree, rounded.clone())?;
             coder.book = Some(Codebook::new(dim, rounded, costs));
         } else if dim > 0 {
             // A scene without Gaussians still needs one atom to be valid.
             let mut atom = vec![0.0; dim];
             atom[0] = 1.0;
-            let rounded = code_dictionary(&mut coder.first, degree, 1, 0, Some(&atom));
+            let rounded = code_dictionary(&mut symbols, degree, 1, 0, &atom);
             coder.dictionary = Dictionary::new(degree, rounded)?;
         }
-        Ok(coder)
+        Ok((coder, symbols))
     }
 
     fn learn(
@@ -191,137 +188,38 @@ impl ChunkCoder {
         book.encode(&rows, &classes, self.stop)
     }
 
-    /// Codes a chunk, all of `view`.
-    pub(super) fn record(&self, view: View<'_>, codes: &Codes) -> Chunk {
+    /// Codes a chunk, all of `view`. Returns its counts and its symbols; an error if a decoder would refuse them.
+    pub(super) fn record(&self, view: View<'_>, codes: &Codes) -> Result<(Tally, SymbolEncoder)> {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let dim = dictionary.dim();
         let mut walk = ChunkCodec::new(parameters, dim);
-        let mut chunk = Chunk { tally: Tally::new(dim), ..Chunk::default() };
-        let tally = &mut chunk.tally;
+        let (mut tally, mut symbols) = (Tally::new(dim), SymbolEncoder::default());
         let mut values: Vec<(u16, f16)> = Vec::new();
         let mut rebuilt = vec![0.0_f32; dim];
         for i in 0..view.len() {
             let placed = view.scene[i];
-            let g = canonical(&view.splats.geometry, placed.index());
+            let form = canonical(&view.splats.geometry, placed.index());
             let classes = view.classes[i];
-            let row = view.row(i);
-            let mut code = Code::Atoms(if dim > 0 { codes.row(i) } else { &[] });
-            if let Code::Atoms(pairs) = code
-                && dim > 0
-            {
-                resident(pairs, parameters.value_step(classes[0]), &mut values);
+            let mut target = GaussianValues { cell: placed.cell, classes, form, code: &[], exact: &[] };
+            if dim > 0 {
+                resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
                 let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
                 reconstruct(dictionary, pairs, &mut rebuilt);
+                let row = view.row(i);
                 let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
                 let error = squares.sum::<f64>().sqrt();
                 let storable = values.iter().all(|v| v.1.is_finite());
-                let most = self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR);
-                if !storable || error > most {
-                    code = Code::Exact(row);
-                    tally.escapes += 1;
+                if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
+                    target.code = codes.row(i);
+                    tally.code(values.len(), error, None);
                 } else {
-                    tally.max_error = tally.max_error.max(error);
-                    tally.squared_error += error * error;
-                    tally.nonzeros += values.len() as u64;
-                    tally.histogram[values.len().min(dim)] += 1;
+                    target.exact = row;
+                    tally.escapes += 1;
                 }
             }
-            let target = GaussianValues {
-                cell: placed.cell,
-                classes,
-                scales: g.scales,
-                axes: g.axes,
-                position: g.position,
-                log_opacity: g.log_opacity,
-                dc: parameters.dc_coordinates(g.dc),
-                code,
-            };
-            chunk.impossible |= walk.step(&mut chunk.recorder, Some(&target)).is_none();
+            walk.step(&mut symbols, &target).ok_or_else(too_large)?;
         }
-        chunk
-    }
-}
-
-/// The symbols of one chunk, and what it adds to the report.
-#[derive(Debug, Default)]
-pub(super) struct Chunk {
-    recorder: SymbolEncoder,
-    tally: Tally,
-    /// A decoder would refuse it.
-    impossible: bool,
-}
-
-impl Chunk {
-    /// Its counts and its symbols; an error if a decoder would refuse them.
-    pub(super) fn into_parts(self) -> Result<(Tally, SymbolEncoder)> {
-        if self.impossible { Err(too_large()) } else { Ok((self.tally, self.recorder)) }
-    }
-}
-
-/// Empty histograms of every stream in every context.
-pub(super) fn no_symbols() -> Vec<Histogram> {
-    vec![Histogram::default(); Stream::ALL.len() * CONTEXTS]
-}
-
-/// Makes the tables from histograms.
-pub(super) fn tables(histograms: &[Histogram]) -> Result<Tables> {
-    Tables::new(histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))
-}
-
-/// The length of a part of a chunk, as it is written.
-pub(super) fn length(part: &[u8]) -> Result<u32> {
-    u32::try_from(part.len()).map_err(|_| Error::parameter("chunk", part.len(), "parts of less than 4 GiB"))
-}
-
-/// What is counted while coding.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Tally {
-    histogram: Vec<u64>,
-    escapes: u64,
-    max_error: f64,
-    squared_error: f64,
-    nonzeros: u64,
-}
-
-impl Tally {
-    pub(super) fn new(dim: usize) -> Self {
-        Self { histogram: vec![0; dim + 1], ..Self::default() }
-    }
-
-    pub(super) fn add(&mut self, part: &Self) {
-        self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
-        self.escapes += part.escapes;
-        self.max_error = self.max_error.max(part.max_error);
-        self.squared_error += part.squared_error;
-        self.nonzeros += part.nonzeros;
-    }
-
-    /// The record and the report of `gaussians` Gaussians; `seconds` are those of learning and of coding.
-    pub(super) fn into_report(
-        self,
-        options: &PackOptions,
-        gaussians: usize,
-        seconds: [f64; 2],
-    ) -> (Record, PackReport) {
-        let count = gaussians.max(1) as f64;
-        let dim = self.histogram.len() as u64 - 1;
-        let record = Record {
-            tolerance: options.tolerance,
-            max_nonzeros: None,
-            pursuit: None,
-            seed: options.seed,
-            max_residual: self.max_error,
-            rms_residual: (self.squared_error / count).sqrt(),
-            over_tolerance: 0,
-        };
-        let report = PackReport {
-            mean_nonzeros: (self.nonzeros + self.escapes * dim) as f64 / count,
-            nonzero_histogram: self.histogram,
-            escapes: self.escapes,
-            learn_seconds: seconds[0],
-            code_seconds: seconds[1],
-        };
-        (record, report)
+        Ok((tally, symbols))
     }
 }
 

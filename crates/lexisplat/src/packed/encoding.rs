@@ -1,17 +1,15 @@
 //! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
 
-use super::chunks::BitCounts;
-use super::coder::{Chunk, ChunkCoder, Tally, View, length, no_symbols, tables};
+use super::coder::ChunkCoder;
 use super::entropy::{CONTEXTS, Histogram, Tables};
-use super::fit::Fit;
-use super::pack::{PackOptions, PackReport};
-use super::scene::PackedHead;
-use super::stream::{Stream, SymbolEncoder};
-use super::unpack::StreamBits;
+use super::pack::PackOptions;
+use super::scene::{PackedHead, UNNAMED};
+use super::stream::{BitCounts, Stream, StreamBits, SymbolEncoder};
 use crate::scene::splats::SceneMeta;
-use crate::support::error::Result;
+use crate::sparse::model::Record;
+use crate::sparse::tally::{CompressReport, Tally};
+use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
-use crate::support::progress::Progress;
 use crate::support::spill::{Spill, SpillTo, Spilled};
 use crate::support::stopwatch::Stopwatch;
 
@@ -20,31 +18,30 @@ use crate::support::stopwatch::Stopwatch;
 pub(super) struct Counts {
     tally: Tally,
     histograms: Vec<Histogram>,
-    raw_bits: [u64; Stream::ALL.len()],
+    raw_bits: BitCounts,
 }
 
 impl Counts {
-    /// The counts of one chunk, and its symbols.
-    pub(super) fn of(chunk: Chunk) -> Result<(Self, SymbolEncoder)> {
-        let (tally, symbols) = chunk.into_parts()?;
-        let mut counts = Self { tally, histograms: no_symbols(), raw_bits: symbols.raw_bits() };
-        symbols.count(&mut counts.histograms);
-        Ok((counts, symbols))
+    /// The counts of one chunk or of the dictionary.
+    pub(super) fn of(tally: Tally, symbols: &SymbolEncoder) -> Self {
+        let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
+        symbols.count(&mut histograms);
+        Self { tally, histograms, raw_bits: symbols.raw_bits }
     }
 
     /// Adds the counts of other chunks.
     pub(super) fn add(&mut self, other: &Self) {
         self.tally.add(&other.tally);
         self.histograms.iter_mut().zip(&other.histograms).for_each(|(sum, more)| sum.merge(more));
-        self.raw_bits.iter_mut().zip(other.raw_bits).for_each(|(sum, bits)| *sum += bits);
+        self.raw_bits.add(&other.raw_bits);
     }
 
     /// Bits of all streams.
     fn bits(&self, tables: &Tables) -> BitCounts {
-        let mut bit_counts = BitCounts::default();
-        let streams = bit_counts.0.iter_mut().zip(self.raw_bits).zip(self.histograms.chunks(CONTEXTS));
-        for (stream, ((sum, raw), contexts)) in streams.enumerate() {
-            *sum = raw as f64;
+        let mut bit_counts = self.raw_bits;
+        for (stream, (sum, contexts)) in
+            bit_counts.0.iter_mut().zip(self.histograms.chunks(CONTEXTS)).enumerate()
+        {
             for (context, histogram) in contexts.iter().enumerate() {
                 if let Some(table) = tables.table(stream, context) {
                     *sum += histogram.bits(table);
@@ -68,6 +65,7 @@ pub(super) struct Encoding {
     dictionary: SymbolEncoder,
     pub(super) counts: Counts,
     learn_seconds: f64,
+    /// Runs since learning began.
     clock: Stopwatch,
 }
 
@@ -75,35 +73,20 @@ pub(super) struct Encoding {
 pub(super) struct Finished {
     pub(super) head: PackedHead,
     pub(super) data: Spilled,
-    pub(super) report: PackReport,
+    pub(super) report: CompressReport,
     pub(super) stream_bits: Vec<StreamBits>,
 }
 
 impl Encoding {
-    /// Learns from the Gaussians of `view` how to code the `total` Gaussians of a scene.
-    pub(super) fn new(
-        view: View<'_>,
-        total: usize,
-        fit: &Fit,
-        step: f64,
-        options: &PackOptions,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let clock = Stopwatch::start();
-        let mut coder = ChunkCoder::new(view, total, fit, step, options, progress)?;
-        let dictionary = std::mem::take(&mut coder.first);
-        let tally = Tally::new(coder.dictionary.dim());
-        let mut counts = Counts { tally, histograms: no_symbols(), raw_bits: dictionary.raw_bits() };
-        dictionary.count(&mut counts.histograms);
-        progress.check()?;
-        let learn_seconds = clock.seconds();
-        Ok(Self { coder, dictionary, counts, learn_seconds, clock: Stopwatch::start() })
+    /// Begins with a coder that has learned since the start of `clock`, and the symbols of its dictionary.
+    pub(super) fn new((coder, dictionary): (ChunkCoder, SymbolEncoder), clock: Stopwatch) -> Self {
+        let counts = Counts::of(Tally::new(coder.dictionary.dim()), &dictionary);
+        Self { coder, dictionary, counts, learn_seconds: clock.seconds(), clock }
     }
 
-    /// Counts the time since the start as time spent on learning.
+    /// Counts all time so far as time spent on learning.
     pub(super) fn end_learning(&mut self) {
-        self.learn_seconds += self.clock.seconds();
-        self.clock = Stopwatch::start();
+        self.learn_seconds = self.clock.seconds();
     }
 
     /// Codes everything, when all chunks of the `gaussians` Gaussians are counted.
@@ -116,22 +99,27 @@ impl Encoding {
         code_chunks: &mut CodeChunks<'_>,
     ) -> Result<Finished> {
         let Self { coder, dictionary, counts, learn_seconds, clock } = self;
-        let tables = tables(&counts.histograms)?;
+        let tables = Tables::new(&counts.histograms)
+            .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
         let stream_bits = counts.bits(&tables).named();
         let mut data = Spill::new(to)?;
         let mut lengths = Vec::new();
         let mut write = |parts: [Vec<u8>; 2]| -> Result<()> {
             for part in parts {
-                lengths.push(length(&part)?);
+                let length = u32::try_from(part.len());
+                let too_long = |_| Error::parameter("chunk", part.len(), "parts of less than 4 GiB");
+                lengths.push(length.map_err(too_long)?);
                 data.push(&part)?;
             }
             Ok(())
         };
         write(dictionary.finish(&tables))?;
         code_chunks(&coder, &tables, &mut write)?;
-        let (record, report) = counts.tally.into_report(options, gaussians, [learn_seconds, clock.seconds()]);
+        let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
+        let seconds = [learn_seconds, clock.seconds() - learn_seconds];
+        let (record, report) = counts.tally.into_report(record, gaussians, None, seconds);
         let head = PackedHead {
-            file: PackedHead::unnamed(),
+            file: UNNAMED.to_owned(),
             degree: coder.dictionary.degree(),
             gaussians,
             atoms: coder.dictionary.len(),

@@ -50,18 +50,15 @@ impl Fit {
         scene: &[MortonKey],
         grid: &Grid,
     ) -> Self {
-        let kinds = [
-            Classes::fit(scene.iter().map(|g| sensitivity.colour[g.index()])),
-            Classes::fit(scene.iter().map(|g| sensitivity.opacity[g.index()])),
-        ];
         let weights = |g: &MortonKey| [sensitivity.colour[g.index()], sensitivity.opacity[g.index()]];
-        let classes: Vec<[u8; 2]> = scene.iter().map(|g| of(kinds, weights(g))).collect();
+        let weights: Vec<[f32; 2]> = scene.iter().map(weights).collect();
+        let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
+        let classes = classes_of(kinds, &weights);
         let (dc_mean, dc_axes) = colour_axes(geometry, scene);
         let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
         let mut parameters = Parameters {
             origin: grid.origin,
             cell: grid.cell,
-            base: [1.0, 1.0],
             factors: [
                 DC_FACTOR / C0,
                 VALUE_FACTOR / C0,
@@ -71,13 +68,11 @@ impl Fit {
                 single(libm::exp2(scale_rows[1][0])),
                 single(libm::exp2(scale_rows[2][0])),
             ],
-            promised: 0.0,
             rotation: rotation.map(|row| row.map(single)),
             position: position.map(|row| row.map(single)),
             dc_mean,
             dc_axes,
-            means: [0.0; TARGETS],
-            predictors: [[0.0; FEATURES]; TARGETS],
+            ..Parameters::default()
         };
         predictors(geometry, scene, &classes, &mut parameters);
         Self { parameters, classes, kinds }
@@ -86,7 +81,7 @@ impl Fit {
     /// Colour and shape class of each Gaussian of another part of the scene. `weights` are its sensitivities to
     /// colour and opacity.
     pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
-        weights.iter().map(|&weights| of(self.kinds, weights)).collect()
+        classes_of(self.kinds, weights)
     }
 
     /// The parameters for an overall step: about the square root of the mean squared error of pictures
@@ -97,9 +92,9 @@ impl Fit {
     }
 }
 
-/// Colour and shape class of a Gaussian of these sensitivities to colour and opacity.
-fn of(kinds: [Classes; 2], [colour, opacity]: [f32; 2]) -> [u8; 2] {
-    [kinds[0].of(colour), kinds[1].of(opacity)]
+/// Colour and shape class of Gaussians of these sensitivities to colour and opacity.
+fn classes_of(kinds: [Classes; 2], weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
+    weights.iter().map(|w| [kinds[0].of(w[0]), kinds[1].of(w[1])]).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]
@@ -165,8 +160,7 @@ fn colour_axes(geometry: &Geometry, scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
 fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKey]) -> [[[f64; 4]; 3]; 3] {
     let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
     let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
-    let mut equations: [[Equations<4>; 3]; 3] =
-        std::array::from_fn(|_| std::array::from_fn(|_| Equations::new()));
+    let mut equations = [[Equations::<4>::NONE; 3]; 3];
     for placed in scene.iter().filter(|g| weights[g.index()] > least) {
         let by_opacity = weights[placed.index()];
         let g = canonical(geometry, placed.index());
@@ -181,7 +175,7 @@ fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKe
             };
             for (by_axis, equations) in by_axis[kind].iter().zip(equations) {
                 let by_axis = f64::from(by_axis.max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
-                equations.add(features, -0.5 * libm::log2(by_axis / by_opacity), 1.0);
+                equations.add(features, -0.5 * libm::log2(by_axis / by_opacity));
             }
         }
     }
@@ -219,8 +213,8 @@ fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], par
         [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
     };
     let mut sums = [0.0_f64; TARGETS];
-    let mut equations: [Equations<FEATURES>; TARGETS] = std::array::from_fn(|_| Equations::new());
-    let mut neighbours = Neighbours::new();
+    let mut equations = [Equations::<FEATURES>::NONE; TARGETS];
+    let mut neighbours = Neighbours::default();
     for (placed, class) in scene.iter().zip(classes) {
         let g = canonical(geometry, placed.index());
         let values = values(&g, parameters);
@@ -229,17 +223,10 @@ fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], par
         }
         if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
             for (t, equations) in equations.iter_mut().enumerate() {
-                let known = |k: usize| if t > k { f64::from(values[k]) } else { 0.0 };
-                let features = [
-                    1.0,
-                    f64::from(around[t]),
-                    f64::from(class[0]),
-                    f64::from(class[1]),
-                    known(0),
-                    known(1),
-                    known(2),
-                ];
-                equations.add(features, f64::from(values[t]), 1.0);
+                let [colour, shape] = class.map(f32::from);
+                let known = |k: usize| if t > k { values[k] } else { 0.0 };
+                let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
+                equations.add(features.map(f64::from), f64::from(values[t]));
             }
         }
         let mut pushed = [0.0; AVERAGES];
@@ -254,22 +241,21 @@ fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], par
 }
 
 /// Least squares by normal equations.
+#[derive(Clone, Copy)]
 struct Equations<const N: usize> {
     matrix: [[f64; N]; N],
     right: [f64; N],
 }
 
 impl<const N: usize> Equations<N> {
-    fn new() -> Self {
-        Self { matrix: [[0.0; N]; N], right: [0.0; N] }
-    }
+    const NONE: Self = Self { matrix: [[0.0; N]; N], right: [0.0; N] };
 
-    fn add(&mut self, features: [f64; N], value: f64, weight: f64) {
+    fn add(&mut self, features: [f64; N], value: f64) {
         for i in 0..N {
             for j in 0..N {
-                self.matrix[i][j] += weight * features[i] * features[j];
+                self.matrix[i][j] += features[i] * features[j];
             }
-            self.right[i] += weight * features[i] * value;
+            self.right[i] += features[i] * value;
         }
     }
 

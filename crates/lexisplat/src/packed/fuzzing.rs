@@ -2,7 +2,7 @@
 
 use super::Packed;
 use super::entropy::{CONTEXTS, Histogram, SymbolReader, Tables};
-use super::stream::{Stream, SymbolDecoder, SymbolEncoder, Symbols};
+use super::stream::{BitCounts, Stream, SymbolDecoder, SymbolEncoder, Symbols};
 
 /// Symbols of the widest alphabet, that of atoms.
 const SYMBOLS: u64 = 1 << 10;
@@ -36,12 +36,12 @@ pub fn decode(tables: &[u8], symbols: &[u8], raw: &[u8], script: &[u8]) -> bool 
     let again = Tables::read(&written, Stream::ALL.len()).map(|tables| tables.write());
     assert_eq!(again.as_deref(), Some(written.as_slice()), "tables change as they are written");
     let Some(mut player) = SymbolDecoder::new(&tables, symbols, raw) else { return false };
-    player.bit_counts = Some([0.0; Stream::ALL.len()]);
+    player.bit_counts = Some(BitCounts::default());
     for &what in script.as_chunks::<2>().0 {
         ask(&mut player, what, 0);
     }
     assert!(
-        player.bit_counts.is_some_and(|bit_counts| bit_counts.iter().all(|b| b.is_finite() && *b >= 0.0))
+        player.bit_counts.is_some_and(|bit_counts| bit_counts.0.iter().all(|b| b.is_finite() && *b >= 0.0))
     );
     player.exhausted() && !player.overrun()
 }

@@ -31,15 +31,16 @@ mod stream;
 mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
-pub(crate) use chunks::{BitCounts, Decoder};
+pub(crate) use chunks::Decoder;
 pub(crate) use pack::check;
 pub(crate) use parts::{PartPacker, Whole};
 pub(crate) use scene::SpilledPacked;
+pub(crate) use stream::BitCounts;
 
-pub use pack::{PackOptions, PackReport, Packer};
+pub use pack::{PackOptions, Packer};
 pub use preset::Preset;
 pub use scene::{Packed, PackedHead, TargetRecord};
-pub use unpack::StreamBits;
+pub use stream::StreamBits;
 
 /// Gaussians of a chunk. Chunks are decoded independently of each other, so that decoding is parallel and a
 /// viewer need not wait for the whole file.

@@ -10,7 +10,7 @@ const WINDOW: usize = 16;
 pub(super) const AVERAGES: usize = TARGETS + 3;
 
 /// The last few Gaussians of a chunk.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Neighbours {
     positions: [Vec3; WINDOW],
     values: [[f32; AVERAGES]; WINDOW],
@@ -19,10 +19,6 @@ pub(super) struct Neighbours {
 }
 
 impl Neighbours {
-    pub(super) fn new() -> Self {
-        Self { positions: [[0.0; 3]; WINDOW], values: [[0.0; AVERAGES]; WINDOW], seen: 0 }
-    }
-
     /// Averages around `centre`, weighted by the inverse squared distance, which is taken to be at least
     /// `near`. `None` before the first Gaussian.
     pub(super) fn average(&self, centre: Vec3, near: f32) -> Option<[f32; AVERAGES]> {

@@ -4,7 +4,7 @@ use std::borrow::Borrow;
 use std::ops::Range;
 
 use super::CHUNK;
-use super::canonical::{Grid, MortonKey, placed};
+use super::canonical::{Grid, MortonKey};
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
@@ -15,12 +15,14 @@ use super::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::{Splats, all_finite};
+use crate::sparse::tally::CompressReport;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
 use crate::support::parallel::map_chunks;
 use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
+use crate::support::stopwatch::Stopwatch;
 
 /// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
 /// next three constants are fitted to held-out views of the models in docs/METHOD.md, which they miss by up to
@@ -55,9 +57,7 @@ impl PackOptions {
         with_keep_order(keep_order: bool),
         with_seed(seed: u64),
     );
-}
 
-impl PackOptions {
     /// Refuses options out of range.
     pub(crate) fn check(&self) -> Result<()> {
         if let Some(atoms) = self.atoms
@@ -72,22 +72,6 @@ impl PackOptions {
         }
         Ok(())
     }
-}
-
-/// What packing did.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct PackReport {
-    /// Mean nonzeros a Gaussian, an escape counting as a full row.
-    pub mean_nonzeros: f64,
-    /// Gaussians by number of nonzeros, without escapes.
-    pub nonzero_histogram: Vec<u64>,
-    /// Gaussians whose SH are stored exactly.
-    pub escapes: u64,
-    /// Seconds spent learning (0 where there is no clock).
-    pub learn_seconds: f64,
-    /// Seconds spent on everything else.
-    pub code_seconds: f64,
 }
 
 /// A scene prepared for packing at any quality. `S` owns or borrows the scene.
@@ -110,7 +94,8 @@ impl<S: Borrow<Splats>> Packer<S> {
         options.check()?;
         let g = &splats.borrow().geometry;
         let grid = Grid::fit(&g.positions);
-        let scene = placed(g, &grid);
+        let mut scene = grid.keys(g);
+        scene.sort_unstable();
         let fit = Fit::new(g, sensitivity, &scene, &grid);
         Ok(Self { splats, options: options.clone(), scene, fit })
     }
@@ -140,10 +125,13 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// # Errors
     /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
     /// leave f32; [`Error::Cancelled`].
-    pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, PackReport)> {
+    pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         let (splats, n) = (self.splats.borrow(), self.len());
         let view = View { splats, scene: &self.scene, classes: &self.fit.classes };
-        let mut encoding = Encoding::new(view, n, &self.fit, step, &self.options, progress)?;
+        let clock = Stopwatch::start();
+        let coder = ChunkCoder::new(view, n, &self.fit, step, &self.options, progress)?;
+        let mut encoding = Encoding::new(coder, clock);
+        progress.check()?;
         progress.begin(Stage::Code, n as u64);
         let codes = (0..n.div_ceil(CHUNK)).map(|c| {
             progress.check()?;
@@ -159,15 +147,17 @@ impl<S: Borrow<Splats>> Packer<S> {
         // symbols in memory would take more than the scene's geometry.
         let record = |coder: &ChunkCoder, range: Range<usize>| {
             progress.check()?;
-            Ok(coder.record(view.part(range.clone()), &codes[range.start / CHUNK]))
+            coder.record(view.part(range.clone()), &codes[range.start / CHUNK])
         };
-        let chunks = map_chunks(n, CHUNK, |range| Ok(Counts::of(record(&encoding.coder, range)?)?.0));
+        let chunks = map_chunks(n, CHUNK, |range| {
+            let (tally, symbols) = record(&encoding.coder, range)?;
+            Ok(Counts::of(tally, &symbols))
+        });
         for chunk in chunks {
             encoding.counts.add(&chunk?);
         }
         let mut code_chunks = |coder: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts =
-                map_chunks(n, CHUNK, |range| Ok(record(coder, range)?.into_parts()?.1.finish(tables)));
+            let parts = map_chunks(n, CHUNK, |range| Ok(record(coder, range)?.1.finish(tables)));
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = splats.meta.clone();

@@ -1,5 +1,7 @@
 //! The parameters of a file: steps, predictors, the grid. They are a fixed list of f32.
 
+use std::slice::from_mut;
+
 use crate::support::maths::{Vec3, exp, exp2};
 
 /// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
@@ -20,7 +22,7 @@ const MAX_ANGLE_STEP: f32 = 1.2;
 const MAX_POSITION_STEP: f32 = 2.0;
 
 /// Steps and predictors of a file.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Parameters {
     /// Corner of the grid, in world units.
     pub(super) origin: Vec3,
@@ -47,56 +49,40 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    /// Number of values in the list.
-    pub(super) const LEN: usize = 3 + 1 + 2 + 6 + 1 + 24 + 3 + 9 + TARGETS + TARGETS * FEATURES;
+    /// All values in the order of the list.
+    fn fields(&mut self) -> [&mut [f32]; 11] {
+        [
+            &mut self.origin,
+            from_mut(&mut self.cell),
+            &mut self.base,
+            &mut self.factors,
+            from_mut(&mut self.promised),
+            self.rotation.as_flattened_mut(),
+            self.position.as_flattened_mut(),
+            &mut self.dc_mean,
+            self.dc_axes.as_flattened_mut(),
+            &mut self.means,
+            self.predictors.as_flattened_mut(),
+        ]
+    }
 
     /// All values in order.
     pub(super) fn to_list(&self) -> Vec<f32> {
-        let mut list = Vec::with_capacity(Self::LEN);
-        list.extend(self.origin);
-        list.push(self.cell);
-        list.extend(self.base);
-        list.extend(self.factors);
-        list.push(self.promised);
-        list.extend(self.rotation.as_flattened());
-        list.extend(self.position.as_flattened());
-        list.extend(self.dc_mean);
-        list.extend(self.dc_axes.as_flattened());
-        list.extend(self.means);
-        list.extend(self.predictors.as_flattened());
-        list
+        self.clone().fields().concat()
     }
 
     /// Inverse of [`Self::to_list`]; `None` if the length differs or a value is not finite.
     pub(super) fn from_list(list: &[f32]) -> Option<Self> {
-        if list.len() != Self::LEN || list.iter().any(|v| !v.is_finite()) {
+        let mut parameters = Self::default();
+        let mut rest = list;
+        for field in parameters.fields() {
+            let (values, tail) = rest.split_at_checked(field.len())?;
+            field.copy_from_slice(values);
+            rest = tail;
+        }
+        if !rest.is_empty() || list.iter().any(|v| !v.is_finite()) {
             return None;
         }
-        let mut rest = list;
-        fn take<const N: usize>(rest: &mut &[f32]) -> Option<[f32; N]> {
-            let (head, tail) = rest.split_first_chunk::<N>()?;
-            *rest = tail;
-            Some(*head)
-        }
-        let parameters = Self {
-            origin: take(&mut rest)?,
-            cell: take::<1>(&mut rest)?[0],
-            base: take(&mut rest)?,
-            factors: take(&mut rest)?,
-            promised: take::<1>(&mut rest)?[0],
-            rotation: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
-            position: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
-            dc_mean: take(&mut rest)?,
-            dc_axes: [take(&mut rest)?, take(&mut rest)?, take(&mut rest)?],
-            means: take(&mut rest)?,
-            predictors: {
-                let mut rows = [[0.0; FEATURES]; TARGETS];
-                for row in &mut rows {
-                    *row = take(&mut rest)?;
-                }
-                rows
-            },
-        };
         let steps = [parameters.base[0], parameters.base[1], parameters.cell];
         let valid = steps.iter().chain(&parameters.factors).all(|&v| v > 0.0) && parameters.promised >= 0.0;
         valid.then_some(parameters)

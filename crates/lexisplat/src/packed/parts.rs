@@ -6,18 +6,19 @@ use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
 use super::entropy::Tables;
 use super::fit::Fit;
-use super::pack::{PackOptions, PackReport, expected_step};
+use super::pack::{PackOptions, expected_step};
 use super::scene::{PackedHead, SpilledPacked};
-use super::stream::SymbolEncoder;
-use super::unpack::StreamBits;
+use super::stream::{StreamBits, code_symbols};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::scene::spilled::SpilledExtras;
 use crate::scene::splats::{SceneMeta, Splats};
+use crate::sparse::tally::CompressReport;
 use crate::support::error::Result;
 use crate::support::parallel::{map_chunks, map_vec};
 use crate::support::progress::Progress;
 use crate::support::spill::{Spill, SpillTo};
+use crate::support::stopwatch::Stopwatch;
 
 /// Chunks whose symbols are coded before they are written.
 const CHUNKS_AT_ONCE: usize = 16;
@@ -40,9 +41,9 @@ pub(crate) struct PartPacker {
     fit: Fit,
     encoding: Encoding,
     gaussians: usize,
-    symbols: Spill,
-    raw: Spill,
-    /// Of each chunk the number of entries in `symbols` and of bytes in `raw`.
+    /// Of each chunk its symbols, and then its raw bits.
+    chunks: Spill,
+    /// Of each chunk the number of symbols and of bytes of raw bits.
     lengths: Vec<[usize; 2]>,
     order: Option<Spill>,
     extras: SpilledExtras,
@@ -61,44 +62,43 @@ impl PartPacker {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let Whole { gaussians: total, grid, decibels } = scene;
-        let placed = |(source, &position): (u32, &[f32; 3])| MortonKey { cell: grid.cell(position), source };
-        let scene: Vec<MortonKey> = (0..).zip(&sample.geometry.positions).map(placed).collect();
+        let scene = grid.keys(&sample.geometry);
         let fit = Fit::new(&sample.geometry, sensitivity, &scene, &grid);
         let view = View { splats: sample, scene: &scene, classes: &fit.classes };
-        let encoding = Encoding::new(view, total, &fit, expected_step(total, decibels), options, progress)?;
+        let clock = Stopwatch::start();
+        let coder = ChunkCoder::new(view, total, &fit, expected_step(total, decibels), options, progress)?;
+        progress.check()?;
         Ok(Self {
             options: options.clone(),
-            gaussians: 0,
-            symbols: Spill::new(to)?,
-            raw: Spill::new(to)?,
+            gaussians: total,
+            chunks: Spill::new(to)?,
             lengths: Vec::new(),
             order: if options.keep_order { Some(Spill::new(to)?) } else { None },
             extras: SpilledExtras::new(to, sample.empty().geometry)?,
             meta: sample.meta.clone(),
             fit,
-            encoding,
+            encoding: Encoding::new(coder, clock),
         })
     }
 
     /// Codes the next Gaussians: whole chunks, unless they are the last ones. `weights` are the sensitivities of
     /// each to colour and opacity, and `places` its cell and its place in the source. The caller has checked all.
     pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[MortonKey]) -> Result<()> {
-        self.gaussians += splats.len();
         let classes = self.fit.classes_of(weights);
         let scene: Vec<MortonKey> = (0..).zip(places).map(|(source, p)| MortonKey { source, ..*p }).collect();
         let view = View { splats, scene: &scene, classes: &classes };
         let coder = &self.encoding.coder;
         let chunks = map_chunks(splats.len(), CHUNK, |range| {
             let part = view.part(range);
-            Counts::of(coder.record(part, &coder.codes(part)))
+            coder.record(part, &coder.codes(part))
         });
         for chunk in chunks {
-            let (counts, symbols) = chunk?;
-            self.encoding.counts.add(&counts);
+            let (tally, symbols) = chunk?;
+            self.encoding.counts.add(&Counts::of(tally, &symbols));
             let (symbols, raw) = symbols.set_aside();
             self.lengths.push([symbols.len(), raw.len()]);
-            self.symbols.push(&symbols)?;
-            self.raw.push(&raw)?;
+            self.chunks.push(&symbols)?;
+            self.chunks.push(&raw)?;
         }
         if let Some(order) = &mut self.order {
             order.push(&places.iter().map(|p| p.source).collect::<Vec<u32>>())?;
@@ -113,17 +113,16 @@ impl PartPacker {
         to: SpillTo<'_>,
         device: Option<&str>,
         progress: &dyn Progress,
-    ) -> Result<(PackedHead, SpilledPacked, PackReport, Vec<StreamBits>)> {
-        let (mut symbols, mut raw) = (self.symbols.finish()?, self.raw.finish()?);
+    ) -> Result<(PackedHead, SpilledPacked, CompressReport, Vec<StreamBits>)> {
+        let mut spilled = self.chunks.finish()?;
         let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
             for batch in self.lengths.chunks(CHUNKS_AT_ONCE) {
                 progress.check()?;
                 let mut chunks = Vec::with_capacity(batch.len());
                 for &[entries, bytes] in batch {
-                    chunks.push((symbols.take::<u16>(entries)?, raw.take::<u8>(bytes)?));
+                    chunks.push((spilled.take::<[u16; 2]>(entries)?, spilled.take::<u8>(bytes)?));
                 }
-                let parts =
-                    map_vec(chunks, |(symbols, raw)| SymbolEncoder::finish_later(&symbols, raw, tables));
+                let parts = map_vec(chunks, |(symbols, raw)| [code_symbols(&symbols, tables), raw]);
                 parts.into_iter().try_for_each(&mut *write)?;
             }
             Ok(())

@@ -1,6 +1,6 @@
 //! Presets of quality.
 
-use crate::support::error::{Error, Result};
+use crate::sparse::model::named;
 
 /// A quality of packed files.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -20,17 +20,6 @@ impl Preset {
     /// All of them, smallest files first.
     pub const ALL: [Self; 4] = [Self::Small, Self::Balanced, Self::High, Self::Archive];
 
-    /// Its name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Small => "small",
-            Self::Balanced => "balanced",
-            Self::High => "high",
-            Self::Archive => "archive",
-        }
-    }
-
     /// The expected average PSNR in dB, for [`Packer::step_for`](super::Packer::step_for).
     #[must_use]
     pub fn decibels(self) -> f64 {
@@ -43,18 +32,4 @@ impl Preset {
     }
 }
 
-impl std::fmt::Display for Preset {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.pad(self.name())
-    }
-}
-
-impl std::str::FromStr for Preset {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        let names = || Self::ALL.map(Self::name).join(", ");
-        let found = Self::ALL.into_iter().find(|preset| preset.name() == text);
-        found.ok_or_else(|| Error::parameter("preset", text, format!("one of {}", names())))
-    }
-}
+named!(Preset, "preset", Small => "small", Balanced => "balanced", High => "high", Archive => "archive");

@@ -1,7 +1,11 @@
 //! Puts unpacked Gaussians back in the order of their source.
 
+use half::f16;
+
+use super::chunks::indices;
 use crate::scene::extra::for_extra;
-use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
+use crate::sparse::codes::{CodedRest, Escapes, SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 
@@ -45,38 +49,24 @@ pub(super) fn gather<T: Copy>(values: &mut Vec<T>, from: impl Iterator<Item = us
     }
 }
 
-fn codes_reordered(
-    codes: &SparseCodes,
-    from: &[usize],
-    dictionary: &crate::sparse::dictionary::Dictionary,
-) -> Result<SparseCodes> {
-    let counts = codes.counts();
-    let mut starts = Vec::with_capacity(counts.len());
-    let mut start = 0;
-    for &count in counts {
-        starts.push(start);
-        start += usize::from(count);
-    }
-    let spans = || from.iter().map(|&k| starts[k]..starts[k] + usize::from(counts[k]));
-    let indices = match codes.indices() {
-        Indices::U8(v) => Indices::U8(spans().flat_map(|span| &v[span]).copied().collect()),
-        Indices::U16(v) => Indices::U16(spans().flat_map(|span| &v[span]).copied().collect()),
-    };
-    let values = match codes.values() {
-        Values::F16(v) => Values::F16(spans().flat_map(|span| &v[span]).copied().collect()),
-        Values::F32(v) => Values::F32(spans().flat_map(|span| &v[span]).copied().collect()),
-    };
+fn codes_reordered(codes: &SparseCodes, from: &[usize], dictionary: &Dictionary) -> Result<SparseCodes> {
+    let (mut atoms, mut values) =
+        (Vec::with_capacity(codes.nonzeros()), Vec::with_capacity(codes.nonzeros()));
     let mut escapes = Escapes::default();
-    let old = codes.escapes();
-    if !old.gaussians.is_empty() {
-        let dim = dictionary.dim();
-        for (to, &k) in (0_u32..).zip(from) {
-            if let Ok(at) = old.gaussians.binary_search_by(|&g| (g as usize).cmp(&k)) {
+    for (to, &k) in (0..).zip(from) {
+        match codes.row(k) {
+            CodedRest::Code(column) => {
+                for (atom, value) in column.iter() {
+                    atoms.push(u16::try_from(atom).unwrap_or(u16::MAX));
+                    values.push(f16::from_f32(value));
+                }
+            }
+            CodedRest::Exact(row) => {
                 escapes.gaussians.push(to);
-                escapes.rows.extend_from_slice(&old.rows[at * dim..(at + 1) * dim]);
+                escapes.rows.extend_from_slice(row);
             }
         }
     }
-    let counts = from.iter().map(|&k| counts[k]).collect();
-    SparseCodes::new(dictionary, counts, indices, values, escapes)
+    let counts = from.iter().map(|&k| codes.counts()[k]).collect();
+    SparseCodes::new(dictionary, counts, indices(dictionary, atoms), Values::F16(values), escapes)
 }

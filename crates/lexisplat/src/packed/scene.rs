@@ -10,22 +10,30 @@ use crate::support::limits::Limits;
 use crate::support::spill::Spilled;
 
 /// What errors call a packed scene that was not read from a file.
-const UNNAMED: &str = "the packed scene";
+pub(super) const UNNAMED: &str = "the packed scene";
 
 /// Everything of a packed scene that is not as long as the scene.
 #[derive(Debug, Clone)]
 pub struct PackedHead {
     /// The file, as the caller named it.
     pub(crate) file: String,
-    pub(crate) degree: ShDegree,
-    pub(crate) gaussians: usize,
-    pub(crate) atoms: usize,
+    /// SH degree.
+    pub degree: ShDegree,
+    /// Number of Gaussians.
+    pub gaussians: usize,
+    /// Number of atoms; 0 for degree 0.
+    pub atoms: usize,
     /// Coefficients of atoms are multiples of 2 to the power of minus this.
     pub(crate) atom_bits: u32,
-    pub(crate) record: Record,
-    pub(crate) meta: SceneMeta,
-    pub(crate) target: Option<TargetRecord>,
-    pub(crate) device: Option<String>,
+    /// How it was made and what it promises.
+    pub record: Record,
+    /// Comments and marks of the source.
+    pub meta: SceneMeta,
+    /// What a search for a quality or a size asked for and reached, if there was one.
+    pub target: Option<TargetRecord>,
+    /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
+    /// everywhere.
+    pub device: Option<String>,
     /// Steps and predictors.
     pub(crate) parameters: Vec<f32>,
     /// Probabilities of all symbols.
@@ -46,62 +54,6 @@ impl PartialEq for PackedHead {
                 == (&other.record, &other.meta, &other.target, &other.device)
             && (&self.parameters, &self.tables, &self.lengths)
                 == (&other.parameters, &other.tables, &other.lengths)
-    }
-}
-
-impl PackedHead {
-    /// The name of scenes that were not read from a file.
-    pub(super) fn unnamed() -> String {
-        UNNAMED.to_owned()
-    }
-
-    /// Number of Gaussians.
-    #[must_use]
-    pub fn len(&self) -> usize {
-        self.gaussians
-    }
-
-    /// Whether there are no Gaussians.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
-        self.gaussians == 0
-    }
-
-    /// SH degree.
-    #[must_use]
-    pub fn degree(&self) -> ShDegree {
-        self.degree
-    }
-
-    /// Number of atoms; 0 for degree 0.
-    #[must_use]
-    pub fn atoms(&self) -> usize {
-        self.atoms
-    }
-
-    /// How it was made and what it promises.
-    #[must_use]
-    pub fn record(&self) -> &Record {
-        &self.record
-    }
-
-    /// Comments and marks of the source.
-    #[must_use]
-    pub fn meta(&self) -> &SceneMeta {
-        &self.meta
-    }
-
-    /// What a search for a quality or a size asked for and reached, if there was one.
-    #[must_use]
-    pub fn target(&self) -> Option<&TargetRecord> {
-        self.target.as_ref()
-    }
-
-    /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
-    /// everywhere.
-    #[must_use]
-    pub fn device(&self) -> Option<&str> {
-        self.device.as_deref()
     }
 }
 

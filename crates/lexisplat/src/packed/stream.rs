@@ -1,81 +1,94 @@
 //! The streams of a chunk, and their encoder and decoder.
 
 use super::bits::{BitReader, BitWriter, extra_bits, join, split};
-use super::entropy::{CONTEXTS, Histogram, SymbolReader, Table, Tables, encode};
+use super::entropy::{CONTEXTS, Histogram, SymbolReader, Tables, encode};
 
-/// The attributes, in the order of their tables.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub(super) enum Stream {
+/// Defines [`Stream`] from the names of the streams and of the attributes that they belong to.
+macro_rules! streams {
+    ($($(#[$doc:meta])* $stream:ident => $attribute:literal,)+) => {
+        /// The streams, in the order of their tables.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u8)]
+        pub(super) enum Stream {
+            $($(#[$doc])* $stream),+
+        }
+
+        impl Stream {
+            pub(super) const ALL: [Self; 18] = [$(Self::$stream),+];
+
+            /// The attribute that it belongs to, by the name in reports.
+            fn attribute(self) -> &'static str {
+                match self { $(Self::$stream => $attribute),+ }
+            }
+        }
+    };
+}
+streams! {
     /// Gaps between cells along the Morton curve.
-    Cell,
+    Cell => "position",
     /// Step class of the colour.
-    ColourClass,
+    ColourClass => "classes",
     /// Step class of the shape.
-    ShapeClass,
+    ShapeClass => "classes",
     /// Logarithms of the standard deviations, longest axis first.
-    Scale0,
-    Scale1,
-    Scale2,
+    Scale0 => "scale",
+    Scale1 => "scale",
+    Scale2 => "scale",
     /// Direction of the axis about which turning matters least, and the turn about it.
-    Rotation,
+    Rotation => "rotation",
     /// Position within the cell along the Gaussian's own axes.
-    Position0,
-    Position1,
-    Position2,
-    Opacity,
-    Dc0,
-    Dc1,
-    Dc2,
+    Position0 => "position",
+    Position1 => "position",
+    Position2 => "position",
+    Opacity => "opacity",
+    Dc0 => "dc",
+    Dc1 => "dc",
+    Dc2 => "dc",
     /// Nonzeros.
-    Count,
-    Atom,
-    Value,
+    Count => "codes.counts",
+    Atom => "codes.indices",
+    Value => "codes.values",
     /// Coefficients of the atoms.
-    Dictionary,
+    Dictionary => "dictionary",
 }
 
 impl Stream {
-    pub(super) const ALL: [Self; 18] = [
-        Self::Cell,
-        Self::ColourClass,
-        Self::ShapeClass,
-        Self::Scale0,
-        Self::Scale1,
-        Self::Scale2,
-        Self::Rotation,
-        Self::Position0,
-        Self::Position1,
-        Self::Position2,
-        Self::Opacity,
-        Self::Dc0,
-        Self::Dc1,
-        Self::Dc2,
-        Self::Count,
-        Self::Atom,
-        Self::Value,
-        Self::Dictionary,
-    ];
+    pub(super) const SCALES: [Self; 3] = [Self::Scale0, Self::Scale1, Self::Scale2];
+    pub(super) const POSITIONS: [Self; 3] = [Self::Position0, Self::Position1, Self::Position2];
+    pub(super) const DC: [Self; 3] = [Self::Dc0, Self::Dc1, Self::Dc2];
+}
 
-    /// The attribute that it belongs to, by the name in reports.
-    pub(super) fn attribute(self) -> &'static str {
-        match self {
-            Self::Cell | Self::Position0 | Self::Position1 | Self::Position2 => "position",
-            Self::ColourClass | Self::ShapeClass => "classes",
-            Self::Scale0 | Self::Scale1 | Self::Scale2 => "scale",
-            Self::Rotation => "rotation",
-            Self::Opacity => "opacity",
-            Self::Dc0 | Self::Dc1 | Self::Dc2 => "dc",
-            Self::Count => "codes.counts",
-            Self::Atom => "codes.indices",
-            Self::Value => "codes.values",
-            Self::Dictionary => "dictionary",
+/// Size of one stream.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct StreamBits {
+    /// The stream's name.
+    pub name: String,
+    /// The attribute it belongs to.
+    pub attribute: &'static str,
+    /// Bits in all.
+    pub bits: f64,
+}
+
+/// Bits each stream took.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct BitCounts(pub(super) [f64; Stream::ALL.len()]);
+
+impl BitCounts {
+    pub(crate) fn add(&mut self, more: &Self) {
+        for (a, b) in self.0.iter_mut().zip(more.0) {
+            *a += b;
         }
     }
 
-    /// Number `k` of three streams.
-    pub(super) fn axis(streams: [Self; 3], k: usize) -> Self {
-        streams[k.min(2)]
+    /// With the streams' names.
+    pub(crate) fn named(&self) -> Vec<StreamBits> {
+        let named = |(stream, bits): (Stream, f64)| StreamBits {
+            name: format!("{stream:?}"),
+            attribute: stream.attribute(),
+            bits,
+        };
+        Stream::ALL.into_iter().zip(self.0).map(named).collect()
     }
 }
 
@@ -94,9 +107,11 @@ pub(super) trait Symbols {
 /// The encoder of a chunk. It keeps all symbols until the tables are known.
 #[derive(Debug, Default)]
 pub(super) struct SymbolEncoder {
-    symbols: Vec<(u16, u16)>,
+    /// Contexts of all streams, and symbols.
+    symbols: Vec<[u16; 2]>,
     raw: BitWriter,
-    raw_bits: [u64; Stream::ALL.len()],
+    /// Raw bits of each stream so far.
+    pub(super) raw_bits: BitCounts,
 }
 
 fn index(stream: Stream, context: usize) -> u16 {
@@ -108,21 +123,21 @@ impl Symbols for SymbolEncoder {
     fn integer(&mut self, stream: Stream, context: usize, value: impl FnOnce() -> u64) -> u64 {
         let value = value();
         let (token, count, extra) = split(value);
-        self.symbols.push((index(stream, context), token));
+        self.symbols.push([index(stream, context), token]);
         self.bits(stream, count, || extra);
         value
     }
 
     fn symbol(&mut self, stream: Stream, context: usize, value: impl FnOnce() -> u16) -> u16 {
         let value = value();
-        self.symbols.push((index(stream, context), value));
+        self.symbols.push([index(stream, context), value]);
         value
     }
 
     fn bits(&mut self, stream: Stream, count: u32, value: impl FnOnce() -> u64) -> u64 {
         let value = value();
         self.raw.put(count, value);
-        self.raw_bits[stream as usize] += u64::from(count);
+        self.raw_bits.0[stream as usize] += f64::from(count);
         value
     }
 }
@@ -130,38 +145,28 @@ impl Symbols for SymbolEncoder {
 impl SymbolEncoder {
     /// Adds the chunk's symbols to the file's statistics.
     pub(super) fn count(&self, histograms: &mut [Histogram]) {
-        for &(context, symbol) in &self.symbols {
+        for &[context, symbol] in &self.symbols {
             histograms[usize::from(context)].add(symbol);
         }
     }
 
-    /// Raw bits each stream has so far.
-    pub(super) fn raw_bits(&self) -> [u64; Stream::ALL.len()] {
-        self.raw_bits
-    }
-
-    /// Everything that [`Self::finish_later`] needs: symbols with their contexts, and raw bits.
-    pub(super) fn set_aside(self) -> (Vec<u16>, Vec<u8>) {
-        (self.symbols.iter().flat_map(|&(context, symbol)| [context, symbol]).collect(), self.raw.finish())
-    }
-
-    /// The two parts of a chunk that was [set aside](Self::set_aside).
-    pub(super) fn finish_later(symbols: &[u16], raw: Vec<u8>, tables: &Tables) -> [Vec<u8>; 2] {
-        let symbols = symbols.as_chunks::<2>().0.iter().map(|&[context, symbol]| (context, symbol)).collect();
-        let [coded, _] = Self { symbols, ..Self::default() }.finish(tables);
-        [coded, raw]
+    /// Symbols with their contexts, to be [coded](code_symbols) later, and raw bits.
+    pub(super) fn set_aside(self) -> (Vec<[u16; 2]>, Vec<u8>) {
+        (self.symbols, self.raw.finish())
     }
 
     /// The chunk's two parts: modelled symbols and raw bits.
     pub(super) fn finish(self, tables: &Tables) -> [Vec<u8>; 2] {
-        let table = |context: u16| {
-            let context = usize::from(context);
-            tables.table(context / CONTEXTS, context % CONTEXTS)
-        };
-        let symbols: Vec<(&Table, u16)> =
-            self.symbols.iter().filter_map(|&(context, symbol)| Some((table(context)?, symbol))).collect();
-        [encode(symbols.into_iter()), self.raw.finish()]
+        [code_symbols(&self.symbols, tables), self.raw.finish()]
     }
+}
+
+/// Codes the symbols of a chunk, each after its context.
+pub(super) fn code_symbols(symbols: &[[u16; 2]], tables: &Tables) -> Vec<u8> {
+    encode(symbols.iter().filter_map(|&[context, symbol]| {
+        let context = usize::from(context);
+        Some((tables.table(context / CONTEXTS, context % CONTEXTS)?, symbol))
+    }))
 }
 
 /// The decoder of a chunk.
@@ -171,7 +176,7 @@ pub(super) struct SymbolDecoder<'a> {
     symbols: SymbolReader,
     raw: BitReader<'a>,
     /// Bits of each stream, if they are counted.
-    pub(super) bit_counts: Option<[f64; Stream::ALL.len()]>,
+    pub(super) bit_counts: Option<BitCounts>,
     missing: bool,
 }
 
@@ -200,7 +205,7 @@ impl<'a> SymbolDecoder<'a> {
         };
         let symbol = self.symbols.take(table);
         if let Some(bit_counts) = &mut self.bit_counts {
-            bit_counts[stream as usize] += table.bits(symbol);
+            bit_counts.0[stream as usize] += table.bits(symbol);
         }
         symbol
     }
@@ -223,7 +228,7 @@ impl Symbols for SymbolDecoder<'_> {
     #[inline]
     fn bits(&mut self, stream: Stream, count: u32, _: impl FnOnce() -> u64) -> u64 {
         if let Some(bit_counts) = &mut self.bit_counts {
-            bit_counts[stream as usize] += f64::from(count);
+            bit_counts.0[stream as usize] += f64::from(count);
         }
         self.raw.take(count)
     }

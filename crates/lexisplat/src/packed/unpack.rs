@@ -1,8 +1,9 @@
 //! Decoding a packed scene as a whole.
 
 use super::CHUNK;
-use super::chunks::{BitCounts, Decoder, indices, places, zeros};
+use super::chunks::{Decoder, indices, places};
 use super::scene::Packed;
+use super::stream::{BitCounts, StreamBits};
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{Escapes, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
@@ -10,18 +11,6 @@ use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 use crate::support::parallel::map_vec;
-
-/// Size of one stream.
-#[derive(Debug, Clone, PartialEq)]
-#[non_exhaustive]
-pub struct StreamBits {
-    /// The stream's name.
-    pub name: String,
-    /// The attribute it belongs to.
-    pub attribute: &'static str,
-    /// Bits in all.
-    pub bits: f64,
-}
 
 impl Packed {
     /// Decodes the scene, whose SH stay sparse codes, in the order of its source if that was kept.
@@ -72,10 +61,10 @@ impl Packed {
     fn decode(&self, count_bits: bool) -> Result<(Model, BitCounts)> {
         let head = self.head();
         let decoder = Decoder::new(head, self.data())?;
-        let mut bit_counts = decoder.dictionary_bits();
+        let mut bit_counts = decoder.dictionary_bits;
         let n = self.len();
         let budget = self.budget()?;
-        let mut g = Geometry { extras: self.extras().to_vec(), ..zeros(n) };
+        let mut g = Geometry { extras: self.extras().to_vec(), ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let work = places(&mut g, &mut counts).enumerate().collect();
@@ -88,8 +77,8 @@ impl Packed {
             bit_counts.add(&piece.bit_counts);
             atoms.extend(piece.atoms);
             values.extend(piece.values);
-            escapes.gaussians.extend(piece.escaped);
-            escapes.rows.extend(piece.rows);
+            escapes.gaussians.extend(piece.escapes.gaussians);
+            escapes.rows.extend(piece.escapes.rows);
         }
         let dictionary = decoder.dictionary;
         let indices = indices(&dictionary, atoms);

@@ -59,6 +59,18 @@ pub(crate) fn all_finite<'a>(arrays: impl IntoIterator<Item = (&'static str, &'a
 }
 
 impl Geometry {
+    /// `n` Gaussians of zeros, without normals and extras.
+    pub(crate) fn zeros(n: usize) -> Self {
+        Self {
+            positions: vec![[0.0; 3]; n],
+            dc: vec![[0.0; 3]; n],
+            opacities: vec![0.0; n],
+            scales: vec![[0.0; 3]; n],
+            rotations: vec![[0.0; 4]; n],
+            ..Self::default()
+        }
+    }
+
     /// Number of Gaussians.
     #[must_use]
     pub fn len(&self) -> usize {

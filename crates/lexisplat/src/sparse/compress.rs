@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use half::f16;
 
-use crate::scene::sh::ShDegree;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::learn::{DEFAULT_SAMPLE, Fetch, LearnOptions, Learned, learn_from};
+use crate::sparse::learn::{DEFAULT_SAMPLE, LearnOptions, Learned, learn_from};
 use crate::sparse::model::{Model, Pursuit, Record};
-use crate::sparse::pursuit::{self, Coder, StopRule, ValueType};
+use crate::sparse::pursuit::{self, Coder, StopRule, ValueType, Visit};
+use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
@@ -74,33 +74,6 @@ impl Default for CompressOptions {
     }
 }
 
-/// What compressing did.
-#[derive(Debug, Clone)]
-#[non_exhaustive]
-pub struct CompressReport {
-    /// How learning went; `None` with a given dictionary.
-    pub learned: Option<Learned>,
-    /// Mean nonzeros a Gaussian, an escape counting as a full vector.
-    pub mean_nonzeros: f64,
-    /// Gaussians by number of nonzeros, from 0 to the dimension; escapes not among them.
-    pub nonzero_histogram: Vec<u64>,
-    /// Gaussians stored exactly.
-    pub escapes: u64,
-    /// Seconds spent learning (0 where there is no clock, as in a browser).
-    pub learn_seconds: f64,
-    /// Seconds spent coding and verifying.
-    pub code_seconds: f64,
-}
-
-impl CompressReport {
-    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` when nothing is coded.
-    #[must_use]
-    pub fn coefficient_ratio(&self) -> Option<f64> {
-        let dim = self.nonzero_histogram.len().saturating_sub(1);
-        (self.mean_nonzeros > 0.0).then(|| dim as f64 / self.mean_nonzeros)
-    }
-}
-
 /// Compresses `splats`, which are consumed so that the geometry need not exist twice.
 ///
 /// # Errors
@@ -148,18 +121,25 @@ pub(crate) fn encode(
     let n = source.len();
     Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
     let clock = Stopwatch::start();
-    let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
-    let (encoder, learned) = Encoder::new(source.empty().degree, n, &mut fetch, options, progress)?;
+    let (encoder, learned) = Encoder::new(source, options, progress)?;
     let learn_seconds = clock.seconds();
     let clock = Stopwatch::start();
-    let mut coded = Coded::empty(&encoder.dictionary, options.values);
+    let mut coded = encoder.no_codes();
     progress.begin(Stage::Code, n as u64);
     for start in (0..n).step_by(at_once) {
         progress.check()?;
         code_part(&encoder, start..n.min(start + at_once), &mut coded)?;
     }
     progress.end();
-    let (record, report) = coded.tally.to_report(options, n, learned, [learn_seconds, clock.seconds()]);
+    let record = Record {
+        tolerance: options.tolerance,
+        max_nonzeros: options.max_nonzeros,
+        pursuit: Some(options.pursuit),
+        seed: options.seed,
+        ..Record::default()
+    };
+    let tally = std::mem::take(&mut coded.tally);
+    let (record, report) = tally.into_report(record, n, learned, [learn_seconds, clock.seconds()]);
     Ok(Encoded { dictionary: encoder.dictionary, coded, record, report })
 }
 
@@ -172,14 +152,13 @@ pub(crate) struct Encoder {
 }
 
 impl Encoder {
-    /// Checks `options` and learns the dictionary from `vectors` rows of SH-rest, unless one is given.
+    /// Checks `options` and learns the dictionary from rows of `source`, unless one is given.
     fn new(
-        degree: ShDegree,
-        vectors: usize,
-        fetch: &mut Fetch<'_>,
+        source: &dyn SplatSource,
         options: &CompressOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, Option<Learned>)> {
+        let degree = source.empty().degree;
         let stop = StopRule::new(options.tolerance, options.max_nonzeros)?;
         let (dictionary, learned) = match &options.dictionary {
             Some(given) if given.degree() != degree => {
@@ -191,18 +170,34 @@ impl Encoder {
                 let learn_options = LearnOptions {
                     atoms: options.atoms,
                     pursuit: options.pursuit,
-                    stop,
                     seed: options.seed,
                     sample: options.sample,
                     ..LearnOptions::new(stop)
                 };
-                let learned = learn_from(degree, vectors, fetch, &learn_options, progress)?;
+                let mut fetch = |numbers: &[usize], out: &mut Vec<f32>| source.read_rest(numbers, out);
+                let learned = learn_from(degree, source.len(), &mut fetch, &learn_options, progress)?;
                 (learned.dictionary.clone(), Some(learned))
             }
         };
         let values = options.values;
         let coder = (degree.rest() > 0).then(|| Coder::new(&dictionary, options.pursuit, stop, values));
         Ok((Self { dictionary, coder, tolerance: stop.tolerance(), values }, learned))
+    }
+
+    fn no_codes(&self) -> Coded {
+        Coded {
+            counts: Vec::new(),
+            indices: Indices::for_atoms(self.dictionary.len()),
+            values: Values::empty(self.values),
+            escapes: Escapes::default(),
+            tally: Tally::new(self.dictionary.dim()),
+        }
+    }
+
+    /// Removes the codes from `coded` and keeps the counts.
+    pub(crate) fn clear(&self, coded: &mut Coded) {
+        let tally = std::mem::take(&mut coded.tally);
+        *coded = Coded { tally, ..self.no_codes() };
     }
 
     /// Codes `rest`, the SH-rest of Gaussians `range`, and appends the codes to `coded`.
@@ -225,160 +220,78 @@ impl Encoder {
         };
         let parts = map_chunks(range.len(), GAUSSIANS_PER_TASK, |piece| {
             progress.check()?;
-            let mut part = Coded::empty(&self.dictionary, self.values);
+            let mut part = Part { tally: Tally::new(dim), ..Part::default() };
             let start = range.start + piece.start;
             let rest = &rest[piece.start * dim..piece.end * dim];
             all_finite([("sh_rest", rest)])?;
-            coder.encode(rest, |visit| {
-                part.push(start, visit.signal, visit.code, visit.outcome, self.tolerance);
-            });
+            coder.encode(rest, |visit| part.push(start, &visit, self.tolerance));
             progress.advance(piece.len() as u64);
             Ok(part)
         });
-        parts.into_iter().try_for_each(|part| {
+        for part in parts {
             coded.append(part?);
-            Ok(())
-        })
+        }
+        Ok(())
     }
 }
 
-/// What is counted while coding.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Tally {
-    pub(crate) nonzeros: u64,
-    pub(crate) escapes: u64,
-    /// Gaussians by number of nonzeros; escapes not among them.
-    histogram: Vec<u64>,
-    max_error: f64,
-    squared_error: f64,
-    over_tolerance: u64,
+/// Codes of a run of Gaussians, with room for atoms and values of any type.
+#[derive(Debug, Default)]
+struct Part {
+    counts: Vec<u8>,
+    pairs: Vec<(u16, f32)>,
+    escapes: Escapes,
+    tally: Tally,
 }
 
-impl Tally {
-    fn add(&mut self, part: &Self) {
-        self.nonzeros += part.nonzeros;
-        self.escapes += part.escapes;
-        self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
-        self.max_error = self.max_error.max(part.max_error);
-        self.squared_error += part.squared_error;
-        self.over_tolerance += part.over_tolerance;
-    }
-
-    /// The record and the report of `gaussians` Gaussians; `seconds` are those of learning and of coding.
-    fn to_report(
-        &self,
-        options: &CompressOptions,
-        gaussians: usize,
-        learned: Option<Learned>,
-        seconds: [f64; 2],
-    ) -> (Record, CompressReport) {
-        let count = gaussians.max(1) as f64;
-        let dim = self.histogram.len() as u64 - 1;
-        let record = Record {
-            tolerance: options.tolerance,
-            max_nonzeros: options.max_nonzeros,
-            pursuit: Some(options.pursuit),
-            seed: options.seed,
-            max_residual: self.max_error,
-            rms_residual: (self.squared_error / count).sqrt(),
-            over_tolerance: self.over_tolerance,
+impl Part {
+    /// Appends the next code. Escapes are numbered from `start`.
+    fn push(&mut self, start: usize, visit: &Visit<'_>, tolerance: Option<f64>) {
+        let code = match visit.outcome {
+            pursuit::Encoded::Code { error } => {
+                self.tally.code(visit.code.len(), error, tolerance);
+                visit.code
+            }
+            pursuit::Encoded::Escape => {
+                #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
+                self.escapes.gaussians.push((start + self.counts.len()) as u32);
+                self.escapes.rows.extend_from_slice(visit.signal);
+                self.tally.escapes += 1;
+                &[]
+            }
         };
-        let report = CompressReport {
-            learned,
-            mean_nonzeros: (self.nonzeros + self.escapes * dim) as f64 / count,
-            nonzero_histogram: self.histogram.clone(),
-            escapes: self.escapes,
-            learn_seconds: seconds[0],
-            code_seconds: seconds[1],
-        };
-        (record, report)
+        #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
+        self.counts.push(code.len() as u8);
+        self.pairs.extend_from_slice(code);
     }
 }
 
-/// The codes of a run of Gaussians, as they grow.
+/// The codes of a run of Gaussians as a file holds them.
 #[derive(Debug)]
 pub(crate) struct Coded {
     pub(crate) counts: Vec<u8>,
     pub(crate) indices: Indices,
     pub(crate) values: Values,
     pub(crate) escapes: Escapes,
-    pub(crate) tally: Tally,
+    tally: Tally,
 }
 
 impl Coded {
-    fn empty(dictionary: &Dictionary, values: ValueType) -> Self {
-        Self {
-            counts: Vec::new(),
-            indices: Indices::for_atoms(dictionary.len()),
-            values: Values::empty(values),
-            escapes: Escapes::default(),
-            tally: Tally { histogram: vec![0; dictionary.dim() + 1], ..Tally::default() },
-        }
-    }
-
-    fn push(
-        &mut self,
-        start: usize,
-        signal: &[f32],
-        code: &[(u16, f32)],
-        outcome: pursuit::Encoded,
-        tolerance: Option<f64>,
-    ) {
-        let pursuit::Encoded::Code { error } = outcome else {
-            #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
-            self.escapes.gaussians.push((start + self.counts.len()) as u32);
-            self.escapes.rows.extend_from_slice(signal);
-            self.counts.push(0);
-            self.tally.escapes += 1;
-            return;
-        };
-        #[expect(clippy::cast_possible_truncation, reason = "checked before coding")]
-        self.counts.push(code.len() as u8);
+    /// Appends `part`.
+    fn append(&mut self, part: Part) {
+        let Part { counts, pairs, escapes, tally } = part;
+        self.counts.extend(counts);
         match &mut self.indices {
             #[expect(clippy::cast_possible_truncation, reason = "chosen for at most 256 atoms")]
-            Indices::U8(indices) => indices.extend(code.iter().map(|p| p.0 as u8)),
-            Indices::U16(indices) => indices.extend(code.iter().map(|p| p.0)),
+            Indices::U8(indices) => indices.extend(pairs.iter().map(|p| p.0 as u8)),
+            Indices::U16(indices) => indices.extend(pairs.iter().map(|p| p.0)),
         }
         match &mut self.values {
-            Values::F32(values) => values.extend(code.iter().map(|p| p.1)),
-            Values::F16(values) => values.extend(code.iter().map(|p| f16::from_f32(p.1))),
+            Values::F32(values) => values.extend(pairs.iter().map(|p| p.1)),
+            Values::F16(values) => values.extend(pairs.iter().map(|p| f16::from_f32(p.1))),
         }
-        self.tally.nonzeros += code.len() as u64;
-        self.tally.histogram[code.len()] += 1;
-        self.tally.max_error = self.tally.max_error.max(error);
-        self.tally.squared_error += error * error;
-        self.tally.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
-    }
-
-    /// Removes the codes and keeps the counts.
-    pub(crate) fn clear(&mut self) {
-        self.counts.clear();
-        match &mut self.indices {
-            Indices::U8(v) => v.clear(),
-            Indices::U16(v) => v.clear(),
-        }
-        match &mut self.values {
-            Values::F32(v) => v.clear(),
-            Values::F16(v) => v.clear(),
-        }
-        self.escapes.gaussians.clear();
-        self.escapes.rows.clear();
-    }
-
-    fn append(&mut self, part: Self) {
-        self.counts.extend_from_slice(&part.counts);
-        match (&mut self.indices, part.indices) {
-            (Indices::U8(a), Indices::U8(b)) => a.extend_from_slice(&b),
-            (Indices::U16(a), Indices::U16(b)) => a.extend_from_slice(&b),
-            _ => unreachable!("all parts come from one dictionary"),
-        }
-        match (&mut self.values, part.values) {
-            (Values::F32(a), Values::F32(b)) => a.extend_from_slice(&b),
-            (Values::F16(a), Values::F16(b)) => a.extend_from_slice(&b),
-            _ => unreachable!("all parts have one value type"),
-        }
-        self.escapes.gaussians.extend_from_slice(&part.escapes.gaussians);
-        self.escapes.rows.extend_from_slice(&part.escapes.rows);
-        self.tally.add(&part.tally);
+        self.escapes.gaussians.extend(escapes.gaussians);
+        self.escapes.rows.extend(escapes.rows);
+        self.tally.add(&tally);
     }
 }

@@ -6,3 +6,4 @@ pub(crate) mod dictionary;
 pub mod learn;
 pub(crate) mod model;
 pub mod pursuit;
+pub(crate) mod tally;

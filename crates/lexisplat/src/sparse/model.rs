@@ -28,7 +28,7 @@ pub enum Pursuit {
 }
 
 /// How a [`Model`] was made and what it promises.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Record {
     /// Un-squared L2 norm of the SH-rest error. `None` if only `max_nonzeros` ended the pursuit.
     pub tolerance: Option<f64>,
@@ -65,7 +65,10 @@ macro_rules! named {
             fn from_str(text: &str) -> Result<Self, Self::Err> {
                 match text {
                     $($name => Ok(Self::$variant),)+
-                    _ => Err(crate::support::error::Error::parameter($what, text, concat!("one of", $(" ", $name),+))),
+                    _ => {
+                        let names = format!("one of {}", [$($name),+].join(", "));
+                        Err(crate::support::error::Error::parameter($what, text, names))
+                    }
                 }
             }
         }

@@ -2,9 +2,10 @@
 
 use crate::formats::lexi::{CodeLayout, LexiWriter, SpilledModel, sh_bytes};
 use crate::scene::source::SplatSource;
-use crate::sparse::compress::{AT_ONCE, CompressOptions, CompressReport, Encoded, encode};
+use crate::sparse::compress::{AT_ONCE, CompressOptions, Encoded, encode};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Record;
+use crate::sparse::tally::CompressReport;
 use crate::support::error::Result;
 use crate::support::progress::Progress;
 use crate::support::sink::Sink;
@@ -75,7 +76,7 @@ fn run(
             source.read(range.clone(), &mut splats)?;
             encoder.code(&splats.sh_rest, range, coded, progress)?;
             spilled.push(&splats.geometry, coded)?;
-            coded.clear();
+            encoder.clear(coded);
             Ok(())
         })?;
     let clock = Stopwatch::start();

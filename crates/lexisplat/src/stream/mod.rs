@@ -42,3 +42,28 @@ pub use importance::Importance;
 pub use pack::{PackedFile, pack};
 pub use source_order::in_source_order;
 pub use survey::{Survey, lint, survey};
+
+use crate::scene::source::SplatSource;
+use crate::scene::splats::Splats;
+use crate::support::error::Result;
+use crate::support::progress::Progress;
+
+/// Reads `source` into `splats`, `at_once` Gaussians at a time, and hands `take` the number of the first of them each
+/// time. Reports the bytes read to `progress`.
+fn each_part(
+    source: &dyn SplatSource,
+    at_once: usize,
+    splats: &mut Splats,
+    progress: &dyn Progress,
+    take: &mut dyn FnMut(usize, &mut Splats) -> Result<()>,
+) -> Result<()> {
+    let n = source.len();
+    for start in (0..n).step_by(at_once) {
+        progress.check()?;
+        let range = start..n.min(start + at_once);
+        source.read(range.clone(), splats)?;
+        take(start, splats)?;
+        progress.advance(range.len() as u64 * source.row_bytes());
+    }
+    Ok(())
+}

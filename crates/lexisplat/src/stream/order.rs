@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::buckets::Buckets;
+use super::each_part;
 use super::importance::Importance;
 use super::rows::RowLayout;
 use crate::packed::{Bounds, Grid, MortonKey, check};
@@ -70,24 +71,12 @@ impl Ordered {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = source.len();
-        let row_bytes = source.row_bytes();
-        progress.begin(Stage::Read, 2 * n as u64 * row_bytes);
+        progress.begin(Stage::Read, 2 * n as u64 * source.row_bytes());
         let mut splats = source.empty();
         let (mut bounds, mut total) = (None::<Bounds>, 0.0);
         let mut looked = Vec::with_capacity(sizes.looked_at.min(n));
         let mut look = stratified(n, sizes.looked_at, seed).peekable();
-        let each_chunk = |splats: &mut Splats, f: &mut dyn FnMut(usize, &Splats) -> Result<()>| {
-            for start in (0..n).step_by(sizes.at_once) {
-                let range = start..n.min(start + sizes.at_once);
-                progress.check()?;
-                source.read(range.clone(), splats)?;
-                splats.geometry.normals = Vec::new();
-                f(start, splats)?;
-                progress.advance(range.len() as u64 * row_bytes);
-            }
-            Ok::<(), Error>(())
-        };
-        each_chunk(&mut splats, &mut |start, splats| {
+        each_part(source, sizes.at_once, &mut splats, progress, &mut |start, splats| {
             let geometry = &splats.geometry;
             let part = Bounds::of(&geometry.positions);
             bounds.get_or_insert(part).add(part);
@@ -114,7 +103,7 @@ impl Ordered {
         let rows = RowLayout::new(source.empty());
         let mut buckets = Buckets::new(folder, bucket_ends.len() + 1)?;
         let mut bytes = Vec::new();
-        each_chunk(&mut splats, &mut |start, splats| {
+        each_part(source, sizes.at_once, &mut splats, progress, &mut |start, splats| {
             rows.pack(splats, &mut bytes);
             for (i, row) in bytes.chunks_exact(rows.bytes()).enumerate() {
                 let key = placed(&grid, splats.geometry.positions[i], start + i);

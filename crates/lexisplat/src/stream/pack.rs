@@ -3,9 +3,10 @@
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::{CHUNK, PackOptions, PackReport, PackedHead, PartPacker, StreamBits, Whole};
+use crate::packed::{CHUNK, PackOptions, PackedHead, PartPacker, StreamBits, Whole};
 use crate::scene::source::SplatSource;
 use crate::sparse::compress::AT_ONCE;
+use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
@@ -23,7 +24,7 @@ pub struct PackedFile {
     /// Everything of the packed scene that is not as long as the scene.
     pub head: PackedHead,
     /// How packing went.
-    pub report: PackReport,
+    pub report: CompressReport,
     /// Sizes of the streams.
     pub stream_bits: Vec<StreamBits>,
     /// Bytes of each tensor and of the header, as [`LexiWriter::attribute_bytes`].
@@ -175,7 +176,7 @@ mod tests {
         let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
         let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
         assert_eq!(moved.count(), 0);
-        assert_eq!(done.head.len(), splats.len());
+        assert_eq!(done.head.gaussians, splats.len());
         assert_eq!(
             done.report.nonzero_histogram.iter().sum::<u64>() + done.report.escapes,
             splats.len() as u64

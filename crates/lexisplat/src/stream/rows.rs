@@ -1,7 +1,7 @@
 //! Gaussians as rows of bytes, for temporary files.
 
 use crate::scene::extra::{Extra, for_extra};
-use crate::scene::splats::Splats;
+use crate::scene::splats::{Geometry, Splats};
 use crate::support::parallel::for_each_chunk_mut;
 
 /// Rows that one thread converts at a time.
@@ -30,8 +30,8 @@ impl RowLayout {
         self.widths.iter().sum()
     }
 
-    /// Replaces `rows` by the rows of `splats`.
-    pub(super) fn pack(&self, splats: &Splats, rows: &mut Vec<u8>) {
+    /// Replaces `rows` by the rows of `splats`, which is left as it is.
+    pub(super) fn pack(&self, splats: &mut Splats, rows: &mut Vec<u8>) {
         rows.clear();
         rows.resize(splats.len() * self.bytes(), 0);
         let columns = columns(splats);
@@ -51,18 +51,13 @@ impl RowLayout {
     pub(super) fn unpack(&self, rows: &[u8]) -> Splats {
         let n = rows.len() / self.bytes();
         let mut splats = self.like.clone();
-        let g = &mut splats.geometry;
-        g.positions = vec![[0.0; 3]; n];
-        g.dc = vec![[0.0; 3]; n];
         splats.sh_rest = vec![0.0; n * splats.degree.rest()];
-        g.opacities = vec![0.0; n];
-        g.scales = vec![[0.0; 3]; n];
-        g.rotations = vec![[0.0; 4]; n];
-        for Extra { values, .. } in &mut g.extras {
+        splats.geometry = Geometry { extras: splats.geometry.extras, ..Geometry::zeros(n) };
+        for Extra { values, .. } in &mut splats.geometry.extras {
             for_extra!(values, v => v.resize(n, Default::default()));
         }
         let mut offset = 0;
-        for (column, &width) in columns_mut(&mut splats).into_iter().zip(&self.widths) {
+        for (column, &width) in columns(&mut splats).into_iter().zip(&self.widths) {
             // Scenes of degree 0 have no SH-rest.
             for_each_chunk_mut(column, (width * CHUNK_ROWS).max(1), |chunk, values| {
                 let rows = rows[chunk * CHUNK_ROWS * self.bytes()..].chunks_exact(self.bytes());
@@ -77,22 +72,7 @@ impl RowLayout {
 }
 
 /// The bytes of every array in the order of a row.
-fn columns(splats: &Splats) -> Vec<&[u8]> {
-    let g = &splats.geometry;
-    let mut out: Vec<&[u8]> = vec![
-        bytemuck::cast_slice(&g.positions),
-        bytemuck::cast_slice(&g.dc),
-        bytemuck::cast_slice(&splats.sh_rest),
-        bytemuck::cast_slice(&g.opacities),
-        bytemuck::cast_slice(&g.scales),
-        bytemuck::cast_slice(&g.rotations),
-    ];
-    out.extend(g.extras.iter().map(|extra| for_extra!(&extra.values, v => bytemuck::cast_slice(v))));
-    out
-}
-
-/// [`columns`] to be filled.
-fn columns_mut(splats: &mut Splats) -> Vec<&mut [u8]> {
+fn columns(splats: &mut Splats) -> Vec<&mut [u8]> {
     let g = &mut splats.geometry;
     let mut out: Vec<&mut [u8]> = vec![
         bytemuck::cast_slice_mut(&mut g.positions),
@@ -126,7 +106,7 @@ mod tests {
             splats.meta.comments = vec!["a".into()];
             let layout = RowLayout::new(splats.empty());
             let mut rows = vec![1];
-            layout.pack(&splats, &mut rows);
+            layout.pack(&mut splats, &mut rows);
             assert_eq!(rows.len(), count * layout.bytes());
             assert_eq!(layout.unpack(&rows), splats);
         }

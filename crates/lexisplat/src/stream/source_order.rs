@@ -63,8 +63,8 @@ fn by_buckets(
     let mut bytes = Vec::new();
     let bits = lexi.parts(count_bits, &mut |first, model| {
         see(&model);
-        let splats = model.into_splats();
-        rows.pack(&splats, &mut bytes);
+        let mut splats = model.into_splats();
+        rows.pack(&mut splats, &mut bytes);
         let places = lexi.order(first..first + splats.len())?;
         for (row, place) in bytes.chunks_exact(rows.bytes()).zip(places) {
             buckets.push(place as usize / bucket_len, &[&place.to_le_bytes(), row])?;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::each_part;
 use super::source_order::parts_and_source_order;
 use crate::formats::lexi::LexiReader;
 use crate::packed::StreamBits;
@@ -42,15 +43,8 @@ pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     let mut linter = Linter::default();
     let mut splats = source.empty();
     linter.add(&splats)?;
-    let n = source.len();
-    progress.begin(Stage::Read, n as u64 * source.row_bytes());
-    for start in (0..n).step_by(AT_ONCE) {
-        let range = start..n.min(start + AT_ONCE);
-        progress.check()?;
-        progress.advance(range.len() as u64 * source.row_bytes());
-        source.read(range, &mut splats)?;
-        linter.add(&splats)?;
-    }
+    progress.begin(Stage::Read, source.len() as u64 * source.row_bytes());
+    each_part(source, AT_ONCE, &mut splats, progress, &mut |_, splats| linter.add(splats))?;
     progress.end();
     Ok(linter.finish())
 }

@@ -43,10 +43,7 @@ fn no_view_dependence_takes_no_codes() {
     let (splats, back) = changed(500, |s| s.sh_rest.fill(0.0));
     assert!(back.sh_rest.iter().all(|&v| v == 0.0));
     let (packed, report) = pack(&splats, STEP, &PackOptions::default());
-    assert_eq!(
-        (packed.head().atoms(), report.mean_nonzeros, packed.head().record().max_residual),
-        (1, 0.0, 0.0)
-    );
+    assert_eq!((packed.head().atoms, report.mean_nonzeros, packed.head().record.max_residual), (1, 0.0, 0.0));
 }
 
 /// 0.9999 is the most that is kept apart from opaque; what is too faint to see is as good as 1e-9.

@@ -1,12 +1,12 @@
 //! A tolerance holds for every Gaussian, measured in f64 on the values that come back.
 
+use lexisplat::CompressReport;
 use lexisplat::Splats;
-use lexisplat::packed::PackReport;
 
 use super::support::{STEP, options, pack, returned, row_errors, sample};
 
 /// Packs with a tolerance; the promise holds and the record says by how much.
-fn assert_kept(splats: &Splats, tolerance: f64, atoms: Option<usize>) -> PackReport {
+fn assert_kept(splats: &Splats, tolerance: f64, atoms: Option<usize>) -> CompressReport {
     let options = options(|o| {
         o.tolerance = Some(tolerance);
         o.keep_order = true;
@@ -16,7 +16,7 @@ fn assert_kept(splats: &Splats, tolerance: f64, atoms: Option<usize>) -> PackRep
     let errors = row_errors(splats, &returned(splats, STEP, &options));
     let worst = errors.iter().copied().fold(0.0, f64::max);
     assert!(worst <= tolerance, "tolerance {tolerance}: {worst}");
-    let record = packed.head().record();
+    let record = &packed.head().record;
     assert!((worst - record.max_residual).abs() <= 1e-12 * worst, "{worst} {record:?}");
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
     assert!((rms - record.rms_residual).abs() <= 1e-9 * rms, "{rms} {record:?}");
@@ -76,7 +76,7 @@ fn huge_rows_are_exact_and_spoil_no_others() {
     let options = options(|o| o.keep_order = true);
     let (packed, report) = pack(&huge, STEP, &options);
     assert_eq!(report.escapes, norms.len() as u64);
-    assert!(packed.head().record().max_residual < 1.0, "{}", packed.head().record().max_residual);
+    assert!(packed.head().record.max_residual < 1.0, "{}", packed.head().record.max_residual);
     let back = packed.unpack().unwrap().into_splats();
     assert!((0..norms.len()).all(|i| back.rest(i) == huge.rest(i)), "an escape is exact");
 }

@@ -44,8 +44,8 @@ fn the_most_atoms_there_may_be_work() {
     let splats = sample(600, 53, 1);
     for atoms in [1, 256, 257, 1024] {
         let (packed, _) = pack(&splats, STEP, &options(|o| o.atoms = Some(atoms)));
-        assert!((1..=atoms).contains(&packed.head().atoms()));
-        assert_eq!(packed.unpack().unwrap().dictionary().len(), packed.head().atoms());
+        assert!((1..=atoms).contains(&packed.head().atoms));
+        assert_eq!(packed.unpack().unwrap().dictionary().len(), packed.head().atoms);
     }
 }
 

@@ -14,8 +14,8 @@ fn assert_travels(packed: &Packed, what: &str) {
     assert_eq!(reader.layout(), Layout::Packed, "{what}");
     let model = lexi::read_bytes("p.lexi", &bytes, &Limits::default()).unwrap();
     assert_eq!(model, packed.unpack().unwrap(), "{what}");
-    assert_eq!((model.len(), model.degree()), (packed.len(), packed.head().degree()), "{what}");
-    assert_eq!((model.meta(), model.record()), (packed.head().meta(), packed.head().record()), "{what}");
+    assert_eq!((model.len(), model.degree()), (packed.len(), packed.head().degree), "{what}");
+    assert_eq!((model.meta(), model.record()), (&packed.head().meta, &packed.head().record), "{what}");
     assert_eq!(&packed.unpack_dictionary().unwrap(), model.dictionary(), "{what}");
     let writer = LexiWriter::packed(packed);
     assert_eq!(writer.file_bytes(), bytes.len() as u64, "{what}");
@@ -29,8 +29,8 @@ fn every_degree_travels() {
             let splats = with_extras(sample(700, 1, degree));
             let (packed, report) = pack(&splats, STEP, &options(|o| o.tolerance = tolerance));
             assert_travels(&packed, &format!("degree {degree}, {tolerance:?}"));
-            assert_eq!(packed.head().degree().get(), degree);
-            assert_eq!(packed.head().atoms() == 0, degree == 0);
+            assert_eq!(packed.head().degree.get(), degree);
+            assert_eq!(packed.head().atoms == 0, degree == 0);
             let counted: u64 = report.nonzero_histogram.iter().sum();
             assert_eq!(counted + report.escapes, if degree == 0 { 0 } else { 700 });
         }
@@ -53,7 +53,7 @@ fn a_file_holds_comments_marks_and_promise() {
     let owned = Input::open(&path).unwrap();
     let reader: LexiReader<'static> = LexiReader::open("p.lexi", owned, &Limits::default()).unwrap();
     let head = reader.packed_head().unwrap();
-    assert_eq!((head.meta(), head.target()), (&splats.meta, packed.head().target()));
+    assert_eq!((&head.meta, head.target.as_ref()), (&splats.meta, packed.head().target.as_ref()));
     assert_eq!(lexi::read(&path, &Limits::default()).unwrap().meta(), &splats.meta);
 }
 
@@ -88,7 +88,7 @@ fn more_than_a_chunk_travels() {
     let back = packed.unpack().unwrap().into_splats();
     assert_eq!(back.geometry.extras, splats.geometry.extras);
     let worst = row_errors(&splats, &back).into_iter().fold(0.0, f64::max);
-    assert!((worst - packed.head().record().max_residual).abs() < 1e-12);
+    assert!((worst - packed.head().record.max_residual).abs() < 1e-12);
 }
 
 fn packed_on(threads: usize, splats: &Splats, options: &PackOptions) -> Vec<u8> {

@@ -1,6 +1,7 @@
 //! Scenes to pack, and the errors of what comes back.
 
-use lexisplat::packed::{PackOptions, PackReport, Packed, Packer};
+use lexisplat::CompressReport;
+use lexisplat::packed::{PackOptions, Packed, Packer};
 use lexisplat::{Extra, ExtraValues, Geometry, Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -60,7 +61,7 @@ pub(crate) fn options(change: impl FnOnce(&mut PackOptions)) -> PackOptions {
     options
 }
 
-pub(crate) fn pack(splats: &Splats, step: f64, options: &PackOptions) -> (Packed, PackReport) {
+pub(crate) fn pack(splats: &Splats, step: f64, options: &PackOptions) -> (Packed, CompressReport) {
     let sensitivity = Sensitivity::heuristic(&splats.geometry);
     Packer::new(splats, &sensitivity, options).unwrap().pack(step, &Silent).unwrap()
 }

@@ -72,8 +72,8 @@ impl<'a> LexiFacts<'a> {
         let each = |value: f64| value / gaussians.max(1) as f64;
         let streams = &survey.stream_bits;
         let packed = lexi.packed_head().map(|head| PackedFacts {
-            promise: head.target(),
-            device: head.device().unwrap_or(CPU),
+            promise: head.target.as_ref(),
+            device: head.device.as_deref().unwrap_or(CPU),
             order_kept: lexi.order_kept(),
             stream_bits_per_gaussian: streams.iter().map(|s| (s.name.as_str(), each(s.bits))).collect(),
             streams,

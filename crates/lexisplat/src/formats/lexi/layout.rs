@@ -4,7 +4,7 @@ use crate::sparse::model::named;
 use crate::sparse::pursuit::ValueType;
 
 /// Layout of a .lexi file, by the name in its header.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
 pub enum Layout {
     /// Exact geometry, [`CodeLayout::Compact`] codes with f32 values.
@@ -14,6 +14,7 @@ pub enum Layout {
     /// Exact geometry, [`CodeLayout::Paper`] codes.
     Paper,
     /// Everything quantised and entropy-coded, geometry included ([`crate::packed`]).
+    #[default]
     Packed,
 }
 named!(Layout, "layout", F32 => "f32", F16 => "f16", Paper => "paper", Packed => "packed");

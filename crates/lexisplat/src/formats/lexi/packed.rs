@@ -17,7 +17,7 @@ const GAUSSIANS_PER_BYTE: u64 = 3;
 /// The packed scene of a file whose checksums hold.
 pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
     let head = head(checked, limits)?;
-    let n = head.len();
+    let n = head.gaussians;
     let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
     let lists = (head.parameters.len() + head.lengths.len(), size_of::<u32>());
     for (count, each) in [lists, (head.tables.len(), 1), (data(checked)?.len(), 1)] {

@@ -92,7 +92,7 @@ impl<'a> LexiReader<'a> {
         let (kind, extras) = if layout == Layout::Packed {
             let head = super::packed::head(&checked, limits)?;
             let decoder = Decoder::new(&head, super::packed::data(&checked)?)?;
-            let extras = extras(&checked, head.len(), &(0..0))?;
+            let extras = extras(&checked, head.gaussians, &(0..0))?;
             (Kind::Packed(Box::new(PackedFile { checked, head, decoder })), extras)
         } else {
             let exact = Exact::open(checked, limits)?;
@@ -107,7 +107,7 @@ impl<'a> LexiReader<'a> {
     pub fn len(&self) -> usize {
         match &self.kind {
             Kind::Exact(exact) => exact.gaussians,
-            Kind::Packed(packed) => packed.head.len(),
+            Kind::Packed(packed) => packed.head.gaussians,
         }
     }
 
@@ -134,7 +134,7 @@ impl<'a> LexiReader<'a> {
     pub fn meta(&self) -> &SceneMeta {
         match &self.kind {
             Kind::Exact(exact) => &exact.meta,
-            Kind::Packed(packed) => packed.head.meta(),
+            Kind::Packed(packed) => &packed.head.meta,
         }
     }
 
@@ -143,7 +143,7 @@ impl<'a> LexiReader<'a> {
     pub fn record(&self) -> &Record {
         match &self.kind {
             Kind::Exact(exact) => &exact.record,
-            Kind::Packed(packed) => packed.head.record(),
+            Kind::Packed(packed) => &packed.head.record,
         }
     }
 
@@ -196,7 +196,7 @@ impl<'a> LexiReader<'a> {
     pub fn order(&self, range: Range<usize>) -> Result<Vec<u32>> {
         match &self.kind {
             Kind::Packed(packed) => {
-                packed.checked.part(tensor::ORDER, Dtype::U32, &[packed.head.len()], &range)
+                packed.checked.part(tensor::ORDER, Dtype::U32, &[packed.head.gaussians], &range)
             }
             Kind::Exact(exact) => {
                 let text = "only packed files hold an order; this one is in the order of its source";
@@ -255,8 +255,8 @@ impl<'a> LexiReader<'a> {
                 Ok(Vec::new())
             }
             Kind::Packed(packed) => {
-                let mut bit_counts = packed.decoder.dictionary_bits();
-                let chunks = packed.head.len().div_ceil(CHUNK);
+                let mut bit_counts = packed.decoder.dictionary_bits;
+                let chunks = packed.head.gaussians.div_ceil(CHUNK);
                 for first in (0..chunks).step_by(CHUNKS_AT_ONCE) {
                     let at_once = first..chunks.min(first + CHUNKS_AT_ONCE);
                     bit_counts.add(&packed.chunks(at_once, &self.extras, &self.limits, count_bits, take)?);
@@ -288,7 +288,7 @@ impl PackedFile<'_> {
         count_bits: bool,
         take: &mut dyn FnMut(usize, Model) -> Result<()>,
     ) -> Result<crate::packed::BitCounts> {
-        let n = self.head.len();
+        let n = self.head.gaussians;
         let extra_bytes = like.iter().map(|e| e.values.width()).sum::<usize>();
         let held = n.min(chunks.end * CHUNK) - chunks.start * CHUNK;
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
@@ -304,8 +304,8 @@ impl PackedFile<'_> {
             let range = c * CHUNK..n.min((c + 1) * CHUNK);
             let start = range.start;
             geometry.extras = extras(&self.checked, n, &range)?;
-            let (meta, dictionary) = (self.head.meta().clone(), self.decoder.dictionary.clone());
-            take(start, Model::new(geometry, meta, dictionary, codes, self.head.record().clone())?)?;
+            let (meta, dictionary) = (self.head.meta.clone(), self.decoder.dictionary.clone());
+            take(start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
         }
         Ok(bit_counts)
     }

@@ -71,7 +71,7 @@ impl<'a> LexiWriter<'a> {
 
     /// The file of a packed scene that was spilled.
     pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Self {
-        let n = head.len();
+        let n = head.gaussians;
         let extras = spilled.extras.into_iter();
         let extras = extras.map(|(extra, values)| extra_tensor(&extra, n, Source::Spilled(values)));
         let order = spilled.order.map(Source::Spilled);
@@ -84,15 +84,15 @@ impl<'a> LexiWriter<'a> {
         order: Option<Source<'a>>,
         extras: Vec<Tensor<'a>>,
     ) -> Self {
-        let degree = head.degree();
-        let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, head.record(), head.meta());
+        let degree = head.degree;
+        let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, &head.record, &head.meta);
         metadata.extend([
-            (key::GAUSSIANS, head.len().to_string()),
-            (key::ATOMS, head.atoms().to_string()),
+            (key::GAUSSIANS, head.gaussians.to_string()),
+            (key::ATOMS, head.atoms.to_string()),
             (key::ATOM_BITS, head.atom_bits.to_string()),
         ]);
-        metadata.extend(head.target().map(|target| (key::PROMISE, json(target))));
-        metadata.extend(head.device().map(|device| (key::DRAWN_ON, device.to_owned())));
+        metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
+        metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
         let bytes = head.lengths.iter().map(|&l| l as usize).sum();
         let list = |name, dtype, len, source| Tensor::new(name, dtype, &[len], source);
         let mut tensors = vec![
@@ -101,7 +101,7 @@ impl<'a> LexiWriter<'a> {
             list(tensor::TABLES, Dtype::U8, head.tables.len(), Source::of(&head.tables)),
             list(tensor::DATA, Dtype::U8, bytes, data),
         ];
-        tensors.extend(order.map(|order| list(tensor::ORDER, Dtype::U32, head.len(), order)));
+        tensors.extend(order.map(|order| list(tensor::ORDER, Dtype::U32, head.gaussians, order)));
         tensors.extend(extras);
         Self::new(metadata, tensors)
     }

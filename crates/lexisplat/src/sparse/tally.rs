@@ -1,0 +1,97 @@
+//! What coding counts, and the report that is made of it.
+
+use crate::sparse::learn::Learned;
+use crate::sparse::model::Record;
+
+/// What compressing did, to an exact layout or to a packed scene.
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub struct CompressReport {
+    /// How learning went; `None` with a given dictionary and for packed scenes.
+    pub learned: Option<Learned>,
+    /// Mean nonzeros a Gaussian, an escape counting as a full vector.
+    pub mean_nonzeros: f64,
+    /// Gaussians by number of nonzeros, from 0 to the dimension; escapes not among them.
+    pub nonzero_histogram: Vec<u64>,
+    /// Gaussians whose SH are stored exactly.
+    pub escapes: u64,
+    /// Seconds spent learning (0 where there is no clock, as in a browser).
+    pub learn_seconds: f64,
+    /// Seconds spent coding and verifying; of packed scenes, on everything but learning.
+    pub code_seconds: f64,
+}
+
+impl CompressReport {
+    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` when nothing is coded.
+    #[must_use]
+    pub fn coefficient_ratio(&self) -> Option<f64> {
+        let dim = self.nonzero_histogram.len().saturating_sub(1);
+        (self.mean_nonzeros > 0.0).then(|| dim as f64 / self.mean_nonzeros)
+    }
+}
+
+/// What is counted while coding.
+#[derive(Debug, Default)]
+pub(crate) struct Tally {
+    /// Gaussians by number of nonzeros; escapes not among them.
+    pub(crate) histogram: Vec<u64>,
+    pub(crate) escapes: u64,
+    nonzeros: u64,
+    max_error: f64,
+    squared_error: f64,
+    over_tolerance: u64,
+}
+
+impl Tally {
+    /// Nothing yet of vectors of length `dim`.
+    pub(crate) fn new(dim: usize) -> Self {
+        Self { histogram: vec![0; dim + 1], ..Self::default() }
+    }
+
+    /// Counts a code with this many nonzeros and this error. `tolerance` is the error that it should not exceed.
+    pub(crate) fn code(&mut self, nonzeros: usize, error: f64, tolerance: Option<f64>) {
+        self.histogram[nonzeros] += 1;
+        self.nonzeros += nonzeros as u64;
+        self.max_error = self.max_error.max(error);
+        self.squared_error += error * error;
+        self.over_tolerance += u64::from(tolerance.is_some_and(|t| error > t));
+    }
+
+    /// Adds what was counted in the next part of the scene.
+    pub(crate) fn add(&mut self, part: &Self) {
+        self.histogram.iter_mut().zip(&part.histogram).for_each(|(a, b)| *a += b);
+        self.escapes += part.escapes;
+        self.nonzeros += part.nonzeros;
+        self.max_error = self.max_error.max(part.max_error);
+        self.squared_error += part.squared_error;
+        self.over_tolerance += part.over_tolerance;
+    }
+
+    /// `record` with the errors, and the report, of `gaussians` Gaussians. `seconds` are those of learning and of
+    /// coding.
+    pub(crate) fn into_report(
+        self,
+        record: Record,
+        gaussians: usize,
+        learned: Option<Learned>,
+        seconds: [f64; 2],
+    ) -> (Record, CompressReport) {
+        let count = gaussians.max(1) as f64;
+        let dim = self.histogram.len() as u64 - 1;
+        let record = Record {
+            max_residual: self.max_error,
+            rms_residual: (self.squared_error / count).sqrt(),
+            over_tolerance: self.over_tolerance,
+            ..record
+        };
+        let report = CompressReport {
+            learned,
+            mean_nonzeros: (self.nonzeros + self.escapes * dim) as f64 / count,
+            nonzero_histogram: self.histogram,
+            escapes: self.escapes,
+            learn_seconds: seconds[0],
+            code_seconds: seconds[1],
+        };
+        (record, report)
+    }
+}
