@@ -46,7 +46,7 @@ impl Indices {
     /// Index at `k`.
     ///
     /// # Panics
-    /// If `k` is not below [`Self::len`].
+    /// If there are not more than `k`.
     #[must_use]
     #[inline]
     pub fn get(&self, k: usize) -> usize {
@@ -104,7 +104,7 @@ impl Values {
     /// Value at `k`.
     ///
     /// # Panics
-    /// If `k` is not below [`Self::len`].
+    /// If there are not more than `k`.
     #[must_use]
     #[inline]
     pub fn get(&self, k: usize) -> f32 {

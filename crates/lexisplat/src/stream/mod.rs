@@ -1,6 +1,6 @@
 //! Scenes larger than memory, converted a part at a time.
 //!
-//! Scenes come from any [`SplatSource`](crate::SplatSource) and results go to any [`Sink`](crate::Sink). The
+//! Scenes come from any [`SplatSource`] and results go to any [`Sink`](crate::Sink). The
 //! bytes are those of the functions that hold the whole scene, except for [`pack`]. Anonymous memory does not
 //! grow with the number of Gaussians. Temporary files are as large as the output, and when packing also as
 //! large as the input. They have no name, and lie in the folder of the output, or in the system's folder for
