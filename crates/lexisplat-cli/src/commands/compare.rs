@@ -43,16 +43,16 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
             write_bytes(path, &png(width, height, &pixels)?, common.overwrite)
         })?;
     let json = json!({
-            "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
-            "b": { "file": b.name, "bytes": b.bytes, "gaussians": scene_b.len() },
-            "ratio": if b.bytes > 0 { Some(a.bytes as f64 / b.bytes as f64) } else { None },
-            "device": renderer.name(),
-            "eight_bit": args.eight_bit,
-            "identical": comparison.identical,
-            "psnr": comparison.psnr,
-            "ssim": comparison.ssim,
-            "views": comparison.views,
-            "saved": saved.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
+        "a": { "file": a.name, "bytes": a.bytes, "gaussians": scene_a.len() },
+        "b": { "file": b.name, "bytes": b.bytes, "gaussians": scene_b.len() },
+        "ratio": if b.bytes > 0 { Some(a.bytes as f64 / b.bytes as f64) } else { None },
+        "device": renderer.name(),
+        "eight_bit": args.eight_bit,
+        "identical": comparison.identical,
+        "psnr": comparison.psnr,
+        "ssim": comparison.ssim,
+        "views": comparison.views,
+        "saved": saved.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
     });
     tell(common, json, || table(&a, &b, &comparison, args, renderer.name()))
 }

@@ -109,12 +109,12 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     exact_file["max_residual"] = json!(exact.record().max_residual);
     exact_file["rms_residual"] = json!(exact.record().rms_residual);
     let json = json!({
-            "folder": folder.display().to_string(),
-            "gaussians": exact.len(),
-            "ply_bytes": ply_bytes,
-            "packed": file(FILES[1], packed_report.file_bytes, &packed_scores),
-            "exact": exact_file,
-            "total_seconds": seconds,
+        "folder": folder.display().to_string(),
+        "gaussians": exact.len(),
+        "ply_bytes": ply_bytes,
+        "packed": file(FILES[1], packed_report.file_bytes, &packed_scores),
+        "exact": exact_file,
+        "total_seconds": seconds,
     });
     let line = |name: &str, bytes: u64, what: &str, scores: &Comparison| {
         format!(
