@@ -41,11 +41,11 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     results.command = command();
     let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
     let json = json!({
-            "output": folder.display().to_string(),
-            "files": files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
-            "parts_reused": progress.reused,
-            "parts_made": progress.made,
-            "results": results,
+        "output": folder.display().to_string(),
+        "files": files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
+        "parts_reused": progress.reused,
+        "parts_made": progress.made,
+        "results": results,
     });
     tell(common, json, || summary(folder, &results, &progress))
 }
