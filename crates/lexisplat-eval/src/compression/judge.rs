@@ -1,6 +1,6 @@
 //! The score of a compressed scene over the judging views.
 
-use lexisplat::{Model, Splats};
+use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 
 use super::views::PackingViews;
@@ -22,15 +22,22 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Draws `splats` from the judging views with `renderer`, which will also draw the models.
+    /// Draws `splats` from the judging views with `renderer`, which will also draw the models. `progress` can cancel.
     ///
     /// # Errors
-    /// None on the processor. On a GPU [`crate::Error::Render`] if the scene or a view does not fit.
-    pub fn new(mut renderer: Renderer, splats: &Splats, views: &PackingViews) -> Result<Self> {
+    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
+    /// or a view does not fit.
+    pub fn new(
+        mut renderer: Renderer,
+        splats: &Splats,
+        views: &PackingViews,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let scene = renderer.prepare(Scene::from(splats))?;
         let most = if views.are_given() { usize::MAX } else { JUDGES };
         let mut drawn: Vec<(f64, Camera, Image)> = Vec::new();
         for camera in views.judging() {
+            progress.check()?;
             let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
             drawn.push((detail(&picture), camera.clone(), picture));
             if drawn.len() > most
@@ -56,14 +63,16 @@ impl Judge {
         self.given
     }
 
-    /// Returns the mean and the least PSNR of `model`, in dB.
+    /// Returns the mean and the least PSNR of `model`, in dB. `progress` can cancel.
     ///
     /// # Errors
-    /// None on the processor. On a GPU [`crate::Error::Render`] if the model or a view does not fit.
-    pub fn score(&mut self, model: &Model) -> Result<[f64; 2]> {
+    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the model
+    /// or a view does not fit.
+    pub fn score(&mut self, model: &Model, progress: &dyn Progress) -> Result<[f64; 2]> {
         let scene = self.renderer.prepare(Scene::from(model))?;
         let (mut sum, mut least) = (0.0, IDENTICAL);
         for (camera, original) in &self.views {
+            progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
             let decibels = psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL);
             sum += decibels;

@@ -139,7 +139,7 @@ impl Packing {
         let (packed, report) = match self.quality {
             Quality::Preset(preset) => packer.pack(packer.step_for(preset.decibels()), progress)?,
             Quality::Target(target) => {
-                let mut judge = Judge::new(renderer, &splats, &views)?;
+                let mut judge = Judge::new(renderer, &splats, &views, progress)?;
                 pack_to_target(&packer, &mut judge, target, source.source_bytes(), progress)?
             }
         };

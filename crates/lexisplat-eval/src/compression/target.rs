@@ -149,7 +149,7 @@ pub fn pack_to_target(
         let (value, reached) = if size {
             (-libm::log2((LexiWriter::packed(&packed).file_bytes() + RECORD_BYTES) as f64), None)
         } else {
-            let [mean, least] = judge.score(&packed.unpack()?)?;
+            let [mean, least] = judge.score(&packed.unpack()?, progress)?;
             (if matches!(target, Target::MinPsnr(_)) { least } else { mean }, Some([mean, least]))
         };
         tries.push(Try { log_step, value });
@@ -172,7 +172,7 @@ pub fn pack_to_target(
     };
     let reached = match reached {
         Some(reached) => reached,
-        None => judge.score(&packed.unpack()?)?,
+        None => judge.score(&packed.unpack()?, progress)?,
     };
     let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
     let given = judge.views_are_given();
