@@ -10,7 +10,7 @@ use lexisplat_eval::{Comparison, DrawOptions, Error, SplitFilter, format};
 use lexisplat_sweep::{
     Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, sweep, write_report,
 };
-use serde_json::json;
+use serde::Serialize;
 
 use super::eval::scorer;
 use crate::args::{Common, Sweep};
@@ -24,6 +24,16 @@ use crate::stop::{self, Work};
 const PARTS: &str = "points";
 /// Columns of the summary with text. The others have numbers.
 const TEXT_COLUMNS: usize = 3;
+
+/// What a sweep made.
+#[derive(Serialize)]
+struct Report<'a> {
+    output: String,
+    files: Vec<String>,
+    parts_reused: u64,
+    parts_made: u64,
+    results: &'a Results,
+}
 
 pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let folder = &args.output;
@@ -40,14 +50,14 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let (mut results, pictures) = outcome?;
     results.command = command();
     let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
-    let json = json!({
-        "output": folder.display().to_string(),
-        "files": files.iter().map(|path| path.display().to_string()).collect::<Vec<_>>(),
-        "parts_reused": progress.reused,
-        "parts_made": progress.made,
-        "results": results,
-    });
-    tell(common, json, || summary(folder, &results, &progress))
+    let report = Report {
+        output: folder.display().to_string(),
+        files: files.iter().map(|path| path.display().to_string()).collect(),
+        parts_reused: progress.reused.load(Ordering::Relaxed),
+        parts_made: progress.made.load(Ordering::Relaxed),
+        results: &results,
+    };
+    tell(common, &report, || summary(folder, &results, &progress))
 }
 
 /// Refuses folders that hold something other than a sweep.

@@ -35,7 +35,14 @@ impl ShPath {
     /// Its name in reports and on the command line.
     #[must_use]
     pub fn name(self) -> &'static str {
-        ["dense-f32", "dense-f16", "sparse", "sparse-ordered", "sparse-shared", "sparse-table"][self as usize]
+        match self {
+            Self::DenseF32 => "dense-f32",
+            Self::DenseF16 => "dense-f16",
+            Self::Sparse => "sparse",
+            Self::SparseOrdered => "sparse-ordered",
+            Self::SparseShared => "sparse-shared",
+            Self::SparseTable => "sparse-table",
+        }
     }
 
     /// Whether it needs a compressed scene.

@@ -41,7 +41,14 @@ impl DrawStage {
     /// Its name in reports.
     #[must_use]
     pub fn name(self) -> &'static str {
-        ["cull", "project", "radiance", "sort", "tiles", "blend"][self as usize]
+        match self {
+            Self::Cull => "cull",
+            Self::Project => "project",
+            Self::Radiance => "radiance",
+            Self::Sort => "sort",
+            Self::Tiles => "tiles",
+            Self::Blend => "blend",
+        }
     }
 }
 
