@@ -7,7 +7,7 @@ use crate::conventions::TILE;
 pub(super) struct Grid {
     pub(super) columns: usize,
     pub(super) rows: usize,
-    height: usize,
+    size: [usize; 2],
 }
 
 /// Tiles from `min` to before `max`, as (column, row).
@@ -52,7 +52,7 @@ const TILE_F64: f64 = TILE as f64;
 impl Grid {
     /// The tiles of a picture whose sides are at most [`crate::MAX_SIDE`].
     pub(super) fn new(width: usize, height: usize) -> Self {
-        Self { columns: width.div_ceil(TILE), rows: height.div_ceil(TILE), height }
+        Self { columns: width.div_ceil(TILE), rows: height.div_ceil(TILE), size: [width, height] }
     }
 
     /// Returns the tiles that the square of `radius` around `centre` overlaps, as INRIA's `getRect` does. `radius`
@@ -78,14 +78,16 @@ impl Grid {
         Rect { min, max }
     }
 
-    /// Pixel rows within `rect` and `extent` of `centre`, or one more on either side.
-    pub(super) fn rows(self, rect: Rect, centre: f32, extent: f64) -> Option<[u16; 2]> {
+    /// Pixel columns and rows within `rect` and `extent` of `centre`, or one more on either side.
+    pub(super) fn pixels(self, rect: Rect, centre: [f32; 2], extent: [f64; 2]) -> Option<[[u16; 2]; 2]> {
         let tile = u16::try_from(TILE).unwrap_or(u16::MAX);
-        let centre = f64::from(centre);
-        let first = truncated((centre - extent).floor(), self.height).max(rect.min[1].saturating_mul(tile));
-        let end =
-            truncated((centre + extent).ceil() + 1.0, self.height).min(rect.max[1].saturating_mul(tile));
-        (first < end).then_some([first, end])
+        let pixels = [0, 1].map(|k| {
+            let centre = f64::from(centre[k]);
+            let first = truncated((centre - extent[k]).floor(), self.size[k]);
+            let end = truncated((centre + extent[k]).ceil() + 1.0, self.size[k]);
+            [first.max(rect.min[k].saturating_mul(tile)), end.min(rect.max[k].saturating_mul(tile))]
+        });
+        pixels.iter().all(|[first, end]| first < end).then_some(pixels)
     }
 }
 

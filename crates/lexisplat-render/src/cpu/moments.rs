@@ -4,7 +4,7 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::{TILE, TRANSMITTANCE_MIN};
 
-use super::blend::{Lanes, TilePixels, alphas};
+use super::blend::{BLOCKS, LANES, Lanes, SIDE, TilePixels, alphas, coordinates, reach};
 use super::project::{Root, Splat, Visible};
 
 /// Number of sums that a splat has.
@@ -54,98 +54,123 @@ pub(super) fn tile(
     )
 }
 
-/// A row of pixels: its coordinates, and its finished colours.
+/// A block as far as it has been drawn.
 #[derive(Clone, Copy)]
-struct Pixels<'a> {
-    x: &'a Lanes,
-    y: f32,
-    picture: &'a [Lanes; 3],
-}
-
-/// A row of pixels as far as it has been drawn.
-#[derive(Clone, Copy)]
-struct Row {
+struct Block {
     colour: [Lanes; 3],
     open: Lanes,
 }
 
+/// The sums of each pixel of a block, and its largest change.
+struct LaneMoments {
+    sums: [Lanes; SUMS],
+    removal: Lanes,
+}
+
 #[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
 fn sum(
     splats: &[Visible],
     roots: &[Root],
     list: impl Iterator<Item = u32>,
-    [column, row]: [usize; 2],
-    [width, height]: [usize; 2],
+    at: [usize; 2],
+    size: [usize; 2],
     picture: &TilePixels,
 ) -> Vec<(u32, Moments)> {
     let mut out = Vec::new();
-    let (left, top) = (column * TILE, row * TILE);
-    let x: Lanes = std::array::from_fn(|lane| (left + lane) as f32);
+    let corner = at.map(|k| k * TILE);
+    let [x, y] = coordinates(corner);
     // Pixels beyond the picture's border are drawn but do not count.
-    let open = std::array::from_fn(|lane| if left + lane < width { 1.0 } else { 0.0 });
-    let mut rows = [Row { colour: [[0.0; TILE]; 3], open }; TILE];
-    let mut row_open: [bool; TILE] = std::array::from_fn(|y| top + y < height);
+    #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
+    let [width, height] = size.map(|side| side as f32);
+    let mut blocks: [[Block; BLOCKS]; BLOCKS] = std::array::from_fn(|column| {
+        std::array::from_fn(|row| Block {
+            colour: [[0.0; LANES]; 3],
+            open: std::array::from_fn(|lane| {
+                let inside = x[column][lane] < width && y[row][lane] < height;
+                if inside { 1.0 } else { 0.0 }
+            }),
+        })
+    });
+    let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
     for index in list {
         let (splat, root) = (&splats[index as usize].splat, &roots[index as usize]);
-        let first = usize::from(splat.rows[0]).saturating_sub(top);
-        let end = usize::from(splat.rows[1]).saturating_sub(top).min(TILE);
-        let mut sums = [[0.0_f32; TILE]; SUMS];
-        let mut removal = [0.0_f32; TILE];
+        let [first, end] = reach(splat, corner);
+        let mut moments = Moments { sums: [0.0; SUMS], removal: 0.0 };
         let mut seen = false;
-        for y in first..end {
-            if row_open[y] {
-                let pixels = Pixels { x: &x, y: (top + y) as f32, picture: &picture.0[y] };
-                let drawn = add(&mut rows[y], splat, root, pixels, &mut sums, &mut removal);
-                seen |= drawn;
-                row_open[y] = !drawn || rows[y].open.iter().any(|&o| o > 0.0);
+        for column in first[0]..end[0] {
+            let mut columns = [[0.0; SIDE]; SUMS];
+            let mut removal = [0.0; SIDE];
+            let mut touched = false;
+            for row in first[1]..end[1] {
+                if !open[column][row] {
+                    continue;
+                }
+                let block = &mut blocks[column][row];
+                let added = add(block, splat, root, &x[column], &y[row], &picture.0[column][row]);
+                let Some(lanes) = added else { continue };
+                touched = true;
+                open[column][row] = block.open != [0.0; LANES];
+                for (sum, lanes) in columns.iter_mut().zip(&lanes.sums) {
+                    for row in lanes.chunks_exact(SIDE) {
+                        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+                    }
+                }
+                for row in lanes.removal.chunks_exact(SIDE) {
+                    removal.iter_mut().zip(row).for_each(|(most, value)| *most = value.max(*most));
+                }
+            }
+            if touched {
+                seen = true;
+                // The sums are independent, so they advance together, pixel column by pixel column.
+                for k in 0..SIDE {
+                    moments.sums.iter_mut().zip(&columns).for_each(|(sum, column)| *sum += column[k]);
+                }
+                moments.removal = removal.into_iter().fold(moments.removal, f32::max);
             }
         }
         if seen {
-            let sums = sums.map(|lanes| lanes.iter().sum());
-            out.push((index, Moments { sums, removal: removal.into_iter().fold(0.0, f32::max) }));
+            out.push((index, moments));
         }
-        if row_open == [false; TILE] {
+        if open == [[false; BLOCKS]; BLOCKS] {
             break;
         }
     }
     out
 }
 
-/// Draws `splat` on a row as `blend` does, and adds to its sums. Returns whether it may show there.
+/// Draws `splat` on a block as `blend` does. Returns its moments; `None` if it shows nowhere.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn add(
-    row: &mut Row,
+    block: &mut Block,
     splat: &Splat,
     root: &Root,
-    Pixels { x, y, picture }: Pixels<'_>,
-    sums: &mut [Lanes; SUMS],
-    removal: &mut Lanes,
-) -> bool {
-    let Some(alphas) = alphas(splat, x, y) else { return false };
-    let dy = splat.centre[1] - y;
-    for lane in 0..TILE {
+    x: &Lanes,
+    y: &Lanes,
+    picture: &[Lanes; 3],
+) -> Option<LaneMoments> {
+    let alphas = alphas(splat, x, y)?;
+    let mut moments = LaneMoments { sums: [[0.0; LANES]; SUMS], removal: [0.0; LANES] };
+    for lane in 0..LANES {
         let alpha = alphas[lane];
-        let left = row.open[lane] * (1.0 - alpha);
+        let left = block.open[lane] * (1.0 - alpha);
         let shows = left >= TRANSMITTANCE_MIN;
-        let weight = if shows { alpha * row.open[lane] } else { 0.0 };
-        row.open[lane] = if shows { left } else { 0.0 };
+        let weight = if shows { alpha * block.open[lane] } else { 0.0 };
+        block.open[lane] = if shows { left } else { 0.0 };
         // alpha / (1 - alpha) is the share of the light behind that one more unit of ln alpha takes away.
         let taken = if weight > 0.0 { alpha / (1.0 - alpha) } else { 0.0 };
         let mut g = 0.0;
-        let mut largest = removal[lane];
+        let mut largest = 0.0;
         for channel in 0..3 {
             let own = weight * splat.colour[channel];
-            row.colour[channel][lane] += own;
-            let behind = picture[channel][lane] - row.colour[channel][lane];
+            block.colour[channel][lane] += own;
+            let behind = picture[channel][lane] - block.colour[channel][lane];
             let change = own - behind * taken;
             g += change * change;
             largest = if change.abs() > largest { change.abs() } else { largest };
         }
-        removal[lane] = largest;
-        let dx = splat.centre[0] - x[lane];
-        let [ux, uy] = root.of([dx, dy]);
+        moments.removal[lane] = largest;
+        let [ux, uy] = root.of([splat.centre[0] - x[lane], splat.centre[1] - y[lane]]);
         let (xx, xy, yy) = (ux * ux, ux * uy, uy * uy);
         let terms = [
             weight * weight,
@@ -159,9 +184,9 @@ fn add(
             g * xy * yy,
             g * yy * yy,
         ];
-        for (sum, term) in sums.iter_mut().zip(terms) {
-            sum[lane] += term;
+        for (sum, term) in moments.sums.iter_mut().zip(terms) {
+            sum[lane] = term;
         }
     }
-    true
+    Some(moments)
 }

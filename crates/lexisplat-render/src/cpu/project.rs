@@ -33,8 +33,8 @@ pub(super) struct Splat {
     pub(super) colour: [f32; 3],
     /// Powers below this give an opacity below [`ALPHA_MIN`] for sure.
     pub(super) cutoff: f32,
-    /// The first pixel row that it may touch, and the first row below all that it may touch.
-    pub(super) rows: [u16; 2],
+    /// The first column of pixels that it may touch, and the first right of all that it may touch; the same of rows.
+    pub(super) pixels: [[u16; 2]; 2],
 }
 
 /// A splat with what sorting and tiling need.
@@ -112,14 +112,14 @@ impl Projection {
             false => (NO_CUTOFF, [f64::INFINITY; 2]),
         };
         let rect = rect.intersect(self.grid.touched(centre, extent))?;
-        let rows = self.grid.rows(rect, centre[1], extent[1])?;
+        let pixels = self.grid.pixels(rect, centre, extent)?;
         let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
         let length = offset.iter().map(|v| v * v).sum::<f32>().sqrt();
         let colour = radiance.colour(i, offset.map(|v| v / length));
         if !colour.iter().all(|v| v.is_finite()) {
             return None;
         }
-        let splat = Splat { centre, conic, opacity, colour, cutoff, rows };
+        let splat = Splat { centre, conic, opacity, colour, cutoff, pixels };
         // Gaussians are counted in u32 since `order`.
         let gaussian = u32::try_from(i).unwrap_or(u32::MAX);
         Some(Visible { splat, depth: z.to_bits(), rect, gaussian })

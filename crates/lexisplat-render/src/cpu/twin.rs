@@ -46,11 +46,11 @@ pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
 
 /// Returns the pixels of the tile at `[column, row]`, row by row, drawn with `splats` from front to back.
 pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec<[f32; 3]> {
-    let rows = [0, u16::MAX];
+    let pixels = [[0, u16::MAX]; 2];
     let visible: Vec<Visible> = splats
         .iter()
         .map(|&Seen { centre, conic, opacity, colour, .. }| Visible {
-            splat: Splat { centre, conic, opacity, colour, cutoff: CUTOFF, rows },
+            splat: Splat { centre, conic, opacity, colour, cutoff: CUTOFF, pixels },
             ..Visible::default()
         })
         .collect();
