@@ -4,18 +4,20 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
+use super::lanes::{LANES, Lanes};
 use super::math::exp_in_range;
-use super::project::{Splat, Visible};
+use super::splat::Splat;
+use super::trace::Trace;
 
 /// Side of a block in pixels. Most splats are small, and touch fewer blocks than rows of a tile.
 pub(super) const SIDE: usize = 4;
 /// Blocks of a row or a column of a tile.
 pub(super) const BLOCKS: usize = TILE / SIDE;
-/// Pixels of a block. Loops over them become vector instructions.
-pub(super) const LANES: usize = SIDE * SIDE;
+/// A block's pixels lie side by side, row by row.
+const _: () = assert!(SIDE * SIDE == LANES);
 
-/// One value for each pixel of a block, row by row.
-pub(super) type Lanes = [f32; LANES];
+/// Splats that are fetched at a time. Each is likely not in the cache, and they are waited for together.
+const FETCHED: usize = 16;
 
 /// A block being drawn.
 #[derive(Debug, Clone, Copy)]
@@ -23,19 +25,12 @@ struct Block {
     red: Lanes,
     green: Lanes,
     blue: Lanes,
-    /// The share of light that splats further back can add; 0 once the pixel is finished.
+    /// The share of light that splats further back can add; 0 once the pixel is finished, and beyond the picture's
+    /// border.
     open: Lanes,
     /// The share of light that the background adds.
     transmittance: Lanes,
 }
-
-const EMPTY: Block = Block {
-    red: [0.0; LANES],
-    green: [0.0; LANES],
-    blue: [0.0; LANES],
-    open: [1.0; LANES],
-    transmittance: [1.0; LANES],
-};
 
 /// A finished tile: its columns of blocks, each block with its three channels.
 #[derive(Debug, Clone)]
@@ -48,62 +43,130 @@ impl TilePixels {
     }
 }
 
-/// The blocks of the tile at `corner`, its first pixel, that a splat may touch: from `first` to before `end`, as
-/// (column, row).
-#[inline(always)]
-pub(super) fn reach(splat: &Splat, corner: [usize; 2]) -> [[usize; 2]; 2] {
-    let within = |pixel: u16, k: usize| usize::from(pixel).saturating_sub(corner[k]).min(TILE);
-    let first = std::array::from_fn(|k| within(splat.pixels[k][0], k) / SIDE);
-    let end = std::array::from_fn(|k| within(splat.pixels[k][1], k).div_ceil(SIDE));
-    [first, end]
+/// A tile of a picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tile {
+    /// Its first pixel, as (column, row).
+    corner: [usize; 2],
+    /// Sides of the whole picture in pixels.
+    size: [usize; 2],
 }
 
-/// The x of the pixels in each column of blocks of the tile at `corner`, and the y of those in each row.
-#[inline(always)]
-#[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
-pub(super) fn coordinates(corner: [usize; 2]) -> [[Lanes; BLOCKS]; 2] {
-    let coordinates = |k: usize, of: fn(usize) -> usize| {
-        std::array::from_fn(|block| {
-            std::array::from_fn(|lane| (corner[k] + block * SIDE + of(lane)) as f32)
+impl Tile {
+    /// The tile at `place`, as (column, row), of a picture of `size` pixels.
+    pub(super) fn new(place: [usize; 2], size: [usize; 2]) -> Self {
+        Self { corner: place.map(|k| k * TILE), size }
+    }
+
+    /// The x of the pixels in each column of blocks, and the y of those in each row.
+    #[inline(always)]
+    #[expect(clippy::cast_precision_loss, reason = "pixel coordinates are far below 2^24")]
+    pub(super) fn coordinates(self) -> [[Lanes; BLOCKS]; 2] {
+        let coordinates = |k: usize, of: fn(usize) -> usize| {
+            std::array::from_fn(|block| {
+                std::array::from_fn(|lane| (self.corner[k] + block * SIDE + of(lane)) as f32)
+            })
+        };
+        [coordinates(0, |lane| lane % SIDE), coordinates(1, |lane| lane / SIDE)]
+    }
+
+    /// For each column of blocks and each of its blocks, 1 at pixels within the picture and 0 elsewhere.
+    #[inline(always)]
+    pub(super) fn inside(self) -> [[Lanes; BLOCKS]; BLOCKS] {
+        let within = |k: usize, block: usize, at: usize| self.corner[k] + block * SIDE + at < self.size[k];
+        std::array::from_fn(|column| {
+            std::array::from_fn(|row| {
+                std::array::from_fn(|lane| {
+                    let inside = within(0, column, lane % SIDE) && within(1, row, lane / SIDE);
+                    if inside { 1.0 } else { 0.0 }
+                })
+            })
         })
-    };
-    [coordinates(0, |lane| lane % SIDE), coordinates(1, |lane| lane / SIDE)]
+    }
+
+    /// The blocks that a splat may touch: from `first` to before `end`, as (column, row).
+    #[inline(always)]
+    fn reach(self, splat: &Splat) -> [[usize; 2]; 2] {
+        let within = |pixel: u16, k: usize| usize::from(pixel).saturating_sub(self.corner[k]).min(TILE);
+        let first = std::array::from_fn(|k| within(splat.pixels.min[k], k) / SIDE);
+        let end = std::array::from_fn(|k| within(splat.pixels.max[k], k).div_ceil(SIDE));
+        [first, end]
+    }
 }
 
-/// Draws the tile at `[column, row]` from the splats in `list`, sorted from front to back.
-pub(super) fn tile(
+/// Draws a tile from the splats in `list`, slots of `splats` from front to back.
+pub(super) fn tile<'a>(
     simd: Simd,
-    splats: &[Visible],
-    list: impl Iterator<Item = u32>,
-    at: [usize; 2],
+    splats: &[Splat],
+    list: impl Iterator<Item = &'a [u32]>,
+    tile: Tile,
     background: [f32; 3],
 ) -> TilePixels {
     simd.dispatch(
         #[inline(always)]
-        || draw(splats, list, at, background),
+        || draw(splats, list, tile, background, &mut ()),
     )
 }
 
+/// What is told of each splat that counts in a block: it shows in a pixel, or finishes one.
+pub(super) trait Watch {
+    /// `splat` has the opacities `alpha` in the block at (column, row) of the tile.
+    fn counts(&mut self, splat: &Splat, block: [usize; 2], alpha: &Lanes);
+}
+
+impl Watch for () {
+    #[inline(always)]
+    fn counts(&mut self, _: &Splat, _: [usize; 2], _: &Lanes) {}
+}
+
+impl Watch for Trace {
+    #[inline(always)]
+    fn counts(&mut self, splat: &Splat, block: [usize; 2], alpha: &Lanes) {
+        self.push(splat, block, alpha);
+    }
+}
+
 #[inline(always)]
-fn draw(
-    splats: &[Visible],
-    list: impl Iterator<Item = u32>,
-    at: [usize; 2],
+pub(super) fn draw<'a>(
+    splats: &[Splat],
+    list: impl Iterator<Item = &'a [u32]>,
+    tile: Tile,
     background: [f32; 3],
+    watch: &mut impl Watch,
 ) -> TilePixels {
-    let corner = at.map(|k| k * TILE);
-    let [x, y] = coordinates(corner);
-    let mut blocks = [[EMPTY; BLOCKS]; BLOCKS];
-    let mut open = [[true; BLOCKS]; BLOCKS];
-    let mut blocks_open = BLOCKS * BLOCKS;
-    for splat in list {
-        let splat = &splats[splat as usize].splat;
-        let [first, end] = reach(splat, corner);
-        for column in first[0]..end[0] {
-            for row in first[1]..end[1] {
-                if open[column][row] && blend(&mut blocks[column][row], splat, &x[column], &y[row]) {
-                    open[column][row] = false;
-                    blocks_open -= 1;
+    let [x, y] = tile.coordinates();
+    let mut blocks = tile.inside().map(|column| {
+        column.map(|inside| Block {
+            red: [0.0; LANES],
+            green: [0.0; LANES],
+            blue: [0.0; LANES],
+            open: inside,
+            transmittance: [1.0; LANES],
+        })
+    });
+    let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
+    let mut blocks_open = open.as_flattened().iter().filter(|open| **open).count();
+    let mut fetched = [Splat::default(); FETCHED];
+    for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
+        for (to, slot) in fetched.iter_mut().zip(slots) {
+            *to = splats[*slot as usize];
+        }
+        for splat in &fetched[..slots.len()] {
+            let [first, end] = tile.reach(splat);
+            for column in first[0]..end[0] {
+                for row in first[1]..end[1] {
+                    if !open[column][row] {
+                        continue;
+                    }
+                    let Some(alpha) = alphas(splat, &x[column], &y[row]) else { continue };
+                    let (counts, finished) = blend(&mut blocks[column][row], splat, &alpha);
+                    if counts {
+                        watch.counts(splat, [column, row], &alpha);
+                    }
+                    if finished {
+                        open[column][row] = false;
+                        blocks_open -= 1;
+                    }
                 }
             }
         }
@@ -122,16 +185,17 @@ fn draw(
     }))
 }
 
-/// Adds `splat` to the pixels of a block. Returns whether all of them are finished then.
+/// Adds `splat` to the pixels of a block. Returns whether it shows in any or finishes any, and whether all are
+/// finished then.
 ///
 /// Loops are short, and their conditions select values instead of branching, so that each loop becomes a few
 /// vector instructions.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
-fn blend(block: &mut Block, splat: &Splat, x: &Lanes, y: &Lanes) -> bool {
+fn blend(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
     let [red, green, blue] = splat.colour;
-    let Some(alpha) = alphas(splat, x, y) else { return false };
     let mut still_open = 0;
+    let mut changed = 0;
     for lane in 0..LANES {
         // Where alpha is 0 an open pixel stays as it is, since it is never below the minimum. A finished one
         // stays 0.
@@ -144,16 +208,17 @@ fn blend(block: &mut Block, splat: &Splat, x: &Lanes, y: &Lanes) -> bool {
         block.green[lane] += green * weight;
         block.blue[lane] += blue * weight;
         block.transmittance[lane] = transmittance;
-        block.open[lane] = open;
         still_open |= open.to_bits();
+        changed |= open.to_bits() ^ block.open[lane].to_bits();
+        block.open[lane] = open;
     }
-    still_open == 0
+    (changed != 0, still_open == 0)
 }
 
 /// Returns the opacities of `splat` at the pixels of a block, 0 where it does not count; `None` if it counts
 /// nowhere.
 #[inline(always)]
-pub(super) fn alphas(splat: &Splat, x: &Lanes, y: &Lanes) -> Option<Lanes> {
+fn alphas(splat: &Splat, x: &Lanes, y: &Lanes) -> Option<Lanes> {
     let Splat { conic: [a, b, c], opacity, cutoff, .. } = *splat;
     let mut power = [0.0; LANES];
     let mut any = false;
@@ -179,6 +244,7 @@ pub(super) fn alphas(splat: &Splat, x: &Lanes, y: &Lanes) -> Option<Lanes> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::splat::PixelRect;
     use super::*;
 
     /// The vector instructions that this machine has round as the plain ones do.
@@ -189,29 +255,26 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             low + (high - low) * f32::from(u16::try_from(state >> 16).unwrap()) / 65_536.0
         };
-        let splats: Vec<Visible> = (0..300)
+        let splats: Vec<Splat> = (0..300)
             .map(|_| Splat {
                 centre: [random(-10.0, 60.0), random(20.0, 90.0)],
                 conic: [random(0.01, 0.5), random(-0.01, 0.01), random(0.01, 0.5)],
                 opacity: random(0.0, 1.0),
                 colour: std::array::from_fn(|_| random(0.0, 2.0)),
                 cutoff: -8.0,
-                pixels: [[0, 100]; 2],
+                pixels: PixelRect { min: [0; 2], max: [100; 2] },
+                ..Splat::default()
             })
-            .map(|splat| Visible { splat, ..Visible::default() })
             .collect();
-        let (at, background) = ([1, 3], [0.1, 0.5, 0.9]);
-        let plain = draw(&splats, 0..300, at, background);
+        let list: Vec<u32> = (0..300).collect();
+        let list = || list.chunks(70);
+        let (at, background) = (Tile::new([1, 3], [100; 2]), [0.1, 0.5, 0.9]);
+        let plain = draw(&splats, list(), at, background, &mut ());
         for simd in Simd::available() {
-            let wide = simd.dispatch(
-                #[inline(always)]
-                || draw(&splats, 0..300, at, background),
-            );
-            let chosen = tile(simd, &splats, 0..300, at, background);
+            let chosen = tile(simd, &splats, list(), at, background);
             for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
                 let bits = plain.pixel(x, y).map(f32::to_bits);
-                assert_eq!(wide.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");
-                assert_eq!(chosen.pixel(x, y).map(f32::to_bits), bits);
+                assert_eq!(chosen.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");
                 assert_ne!(chosen.pixel(x, y), background);
             }
         }

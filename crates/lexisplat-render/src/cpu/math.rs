@@ -16,18 +16,17 @@ const BIAS: u32 = 127;
 const MANTISSA_BITS: u32 = 23;
 
 /// Returns e to the power `x`, with a relative error of at most 2e-7.
-#[inline]
+///
+/// It has no branches and no calls, so that loops over it become vector instructions. This holds for all functions
+/// here.
+#[inline(always)]
 pub(super) fn exp(x: f32) -> f32 {
-    match x {
-        x if x < EXP_MIN => 0.0,
-        x if x > EXP_MAX => f32::INFINITY,
-        x => exp_in_range(x),
-    }
+    let value = exp_in_range(x);
+    let value = if x < EXP_MIN { 0.0 } else { value };
+    if x > EXP_MAX { f32::INFINITY } else { value }
 }
 
 /// [`exp`] for `x` from [`EXP_MIN`] to [`EXP_MAX`]; any number for other `x`.
-///
-/// It has no branches and no calls, so that loops over it become vector instructions.
 #[inline(always)]
 pub(super) fn exp_in_range(x: f32) -> f32 {
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
@@ -47,9 +46,55 @@ pub(super) fn exp_in_range(x: f32) -> f32 {
 }
 
 /// 1 / (1 + e^-x).
-#[inline]
+#[inline(always)]
 pub(super) fn sigmoid(x: f32) -> f32 {
     1.0 / (1.0 + exp(-x))
+}
+
+/// Bits of the square root of one half, where the logarithm's polynomial begins.
+const SQRT_HALF: u32 = 0x3f35_04f3;
+const MANTISSA: u32 = (1 << MANTISSA_BITS) - 1;
+/// ln(1 + f) = f - f^2 / 2 + f^3 P(f) for 1 + f from the square root of one half to that of 2, highest power first
+/// (Cephes `logf`).
+const LOGARITHM: [f32; 9] = [
+    7.037_683_6e-2,
+    -1.151_461e-1,
+    1.167_699_9e-1,
+    -1.242_014_1e-1,
+    1.424_932_3e-1,
+    -1.666_805_8e-1,
+    2.000_071_5e-1,
+    -2.499_999_4e-1,
+    3.333_333e-1,
+];
+
+/// Returns the natural logarithm of a positive normal `x`, with an error of at most 2e-7 times the larger of 1 and the
+/// result; any number for other `x`.
+#[inline(always)]
+#[expect(clippy::cast_possible_wrap, clippy::cast_precision_loss, reason = "an exponent has 8 bits")]
+pub(super) fn ln(x: f32) -> f32 {
+    let bits = x.to_bits().wrapping_sub(SQRT_HALF);
+    let n = ((bits as i32) >> MANTISSA_BITS) as f32;
+    let f = f32::from_bits((bits & MANTISSA).wrapping_add(SQRT_HALF)) - 1.0;
+    let mut p = LOGARITHM[0];
+    p = p * f + LOGARITHM[1];
+    p = p * f + LOGARITHM[2];
+    p = p * f + LOGARITHM[3];
+    p = p * f + LOGARITHM[4];
+    p = p * f + LOGARITHM[5];
+    p = p * f + LOGARITHM[6];
+    p = p * f + LOGARITHM[7];
+    p = p * f + LOGARITHM[8];
+    let z = f * f;
+    let low = f * z * p + n * LN2_LOW - 0.5 * z;
+    f + low + n * LN2_HIGH
+}
+
+/// Returns a whole number from 0 to 65535 as an integer.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range; else it saturates")]
+pub(super) fn whole(x: f32) -> u16 {
+    x as u16
 }
 
 #[cfg(test)]
@@ -68,6 +113,18 @@ mod tests {
         }
         assert!(worst < 2e-7, "{worst}");
         assert_eq!(exp(0.0).to_bits(), 1.0_f32.to_bits());
+    }
+
+    #[test]
+    fn ln_is_accurate() {
+        let mut x = 1e-37_f32;
+        while x < 1e37 {
+            let expected = f64::from(x).ln();
+            let error = (f64::from(ln(x)) - expected).abs();
+            assert!(error < 2e-7 * expected.abs().max(1.0), "{x}: {error}");
+            x *= 1.000_37;
+        }
+        assert_eq!(ln(1.0).to_bits(), 0);
     }
 
     #[test]

@@ -1,18 +1,25 @@
 //! The reference rasteriser: 3DGS's rules on the processor.
 //!
-//! `project` turns Gaussians into ellipses on screen, `order` sorts them by depth, `tiles` lists for
-//! every tile the splats that may touch it, and `blend` draws the tiles. Every step works in parallel on pieces
-//! whose borders and order do not depend on the number of threads. It uses only operations that round the same
-//! everywhere. A picture therefore has the same bits on any machine.
+//! `visible` finds the Gaussians that may be seen, which `project` turns into ellipses on screen. `order` sorts them by
+//! depth, `tiles` lists for every tile the splats that may touch it, and `blend` draws the tiles. `moments` measures how
+//! a tile changes with its splats, and `change` carries that over to the Gaussians' values. Every step works in parallel
+//! on pieces whose borders and order do not depend on the number of threads. It uses only operations that round the
+//! same everywhere. A picture therefore has the same bits on any machine.
 
 mod blend;
+mod change;
 mod grid;
+mod lanes;
 mod math;
 mod moments;
 mod order;
 mod project;
 mod sensitivity;
+mod splat;
 mod tiles;
+mod trace;
+mod visible;
+mod workspace;
 #[cfg(all(test, feature = "gpu"))]
 pub(crate) mod twin;
 
@@ -28,12 +35,14 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
+use blend::Tile;
+#[cfg(feature = "gpu")]
+pub(crate) use change::carry;
 #[cfg(feature = "gpu")]
 pub(crate) use moments::{Moments, SUMS};
 pub(crate) use project::Projection;
-#[cfg(feature = "gpu")]
-pub(crate) use sensitivity::carry;
 pub use sensitivity::sensitivity;
+pub(crate) use workspace::Workspace;
 
 /// How to draw. Whether the anti-aliased rules apply is a mark of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -87,10 +96,20 @@ pub fn render(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Re
 /// # Errors
 /// As [`render`].
 pub fn render_measured(scene: &Scene<'_>, camera: &Camera, options: &RenderOptions) -> Result<Drawn> {
+    render_with(&mut Workspace::default(), scene, camera, options)
+}
+
+/// Draws as [`render_measured`] does, in the memory of `workspace`.
+pub(crate) fn render_with(
+    workspace: &mut Workspace,
+    scene: &Scene<'_>,
+    camera: &Camera,
+    options: &RenderOptions,
+) -> Result<Drawn> {
     scene.validate()?;
     camera.validate()?;
     let projection = Projection::new(camera, scene.meta().antialiased);
-    Ok(draw(scene, &projection, options, tiles::MAX_ENTRIES))
+    Ok(draw(workspace, scene, &projection, options, tiles::MAX_ENTRIES))
 }
 
 /// Times the stages of a picture.
@@ -117,43 +136,43 @@ impl StageTimer {
 }
 
 /// Draws with at most `max_entries` in the tiles' lists at once.
-fn draw(scene: &Scene<'_>, projection: &Projection, options: &RenderOptions, max_entries: u64) -> Drawn {
+fn draw(
+    workspace: &mut Workspace,
+    scene: &Scene<'_>,
+    projection: &Projection,
+    options: &RenderOptions,
+    max_entries: u64,
+) -> Drawn {
     let mut stages = StageTimer::start();
     let simd = Simd::current();
     let (camera, grid) = (&projection.camera, projection.grid);
-    let (width, height) = (camera.width as usize, camera.height as usize);
+    let [width, height] = projection.size();
+    let Workspace { visible, order, lists } = workspace;
     let mut pixels = vec![options.background; width * height];
     let radiance = Radiance::new(scene).up_to(options.max_degree);
-    let projected = project::project(scene.geometry(), &radiance, projection);
+    visible.project(simd, scene.geometry(), &radiance, projection);
     stages.end("project");
-    let splats = order::by_depth(projected);
+    order.sort(visible);
     stages.end("sort");
-    for band in tiles::bands(&splats, grid, max_entries) {
-        let lists = tiles::TileLists::new(&splats, grid, band.clone());
+    for band in tiles::bands(&order.rects, grid, max_entries) {
+        lists.fill(order, grid, &band);
         stages.end("tiles");
-        let count = band.len() * grid.columns;
-        let drawn: Vec<blend::TilePixels> = (0..count)
-            .into_par_iter()
-            .map(|tile| {
-                let (column, row) = (tile % grid.columns, band.start + tile / grid.columns);
-                blend::tile(simd, &splats, lists.of(tile), [column, row], options.background)
-            })
-            .collect();
         let rows = &mut pixels[band.start * TILE * width..(band.end * TILE).min(height) * width];
         rows.par_chunks_mut(width * TILE).enumerate().for_each(|(row, rows)| {
-            for (y, line) in rows.chunks_mut(width).enumerate() {
-                let tiles = &drawn[row * grid.columns..(row + 1) * grid.columns];
-                for (piece, tile) in line.chunks_mut(TILE).zip(tiles) {
-                    for (x, pixel) in piece.iter_mut().enumerate() {
-                        *pixel = tile.pixel(x, y);
-                    }
+            for column in 0..grid.columns {
+                let list = lists.of(row * grid.columns + column);
+                let place = Tile::new([column, band.start + row], [width, height]);
+                let tile = blend::tile(simd, &visible.slots, list, place, options.background);
+                for (y, line) in rows.chunks_mut(width).enumerate() {
+                    let line = line[column * TILE..].iter_mut().take(TILE);
+                    line.enumerate().for_each(|(x, pixel)| *pixel = tile.pixel(x, y));
                 }
             }
         });
         stages.end("blend");
     }
     let image = Image { width: camera.width, height: camera.height, pixels };
-    Drawn { image, gaussians: splats.len(), stage_times: stages.times }
+    Drawn { image, gaussians: visible.len(), stage_times: stages.times }
 }
 
 #[cfg(test)]
@@ -201,8 +220,12 @@ mod tests {
             let splats = Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta };
             let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
             let projection = Projection::new(&straight_ahead(width, height, focal), antialiased);
-            let tight = draw(&Scene::from(&splats), &projection, &options, tiles::MAX_ENTRIES);
-            let plain = draw(&Scene::from(&splats), &projection.untightened(), &options, 1);
+            let mut workspace = Workspace::default();
+            let mut draw = |projection: &Projection, max_entries| {
+                draw(&mut workspace, &Scene::from(&splats), projection, &options, max_entries)
+            };
+            let tight = draw(&projection, tiles::MAX_ENTRIES);
+            let plain = draw(&projection.untightened(), 1);
             prop_assert_eq!(tight.image.pixels, plain.image.pixels);
         }
     }

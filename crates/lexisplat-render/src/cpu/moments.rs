@@ -2,10 +2,12 @@
 
 use lexisplat::simd::Simd;
 
-use crate::conventions::{TILE, TRANSMITTANCE_MIN};
+use crate::conventions::TRANSMITTANCE_MIN;
 
-use super::blend::{BLOCKS, LANES, Lanes, SIDE, TilePixels, alphas, coordinates, reach};
-use super::project::{Root, Splat, Visible};
+use super::blend::{self, BLOCKS, SIDE, Tile, TilePixels};
+use super::lanes::{LANES, Lanes};
+use super::splat::{Root, Splat};
+use super::trace::Trace;
 
 /// Number of sums that a splat has.
 pub(crate) const SUMS: usize = 10;
@@ -37,20 +39,22 @@ impl Moments {
     }
 }
 
-/// Returns the moments of the splats that show in the tile at `[column, row]`. `picture` is the finished tile,
-/// `roots` are the roots of the splats, and `size` is that of the whole picture in pixels.
-pub(super) fn tile(
+/// Returns the moments of the splats that show in a tile, by the Gaussian's index. `list` has slots of `splats` from
+/// front to back. `trace` is overwritten.
+pub(super) fn tile<'a>(
     simd: Simd,
-    splats: &[Visible],
-    roots: &[Root],
-    list: impl Iterator<Item = u32>,
-    at: [usize; 2],
-    size: [usize; 2],
-    picture: &TilePixels,
+    splats: &[Splat],
+    list: impl Iterator<Item = &'a [u32]>,
+    tile: Tile,
+    trace: &mut Trace,
 ) -> Vec<(u32, Moments)> {
+    trace.clear();
     simd.dispatch(
         #[inline(always)]
-        || sum(splats, roots, list, at, size, picture),
+        || {
+            let picture = blend::draw(splats, list, tile, [0.0; 3], trace);
+            sum(trace, tile, &picture)
+        },
     )
 }
 
@@ -61,96 +65,65 @@ struct Block {
     open: Lanes,
 }
 
-/// The sums of each pixel of a block, and its largest change.
-struct LaneMoments {
-    sums: [Lanes; SUMS],
-    removal: Lanes,
+/// The sums of one splat over a column of blocks, pixel column by pixel column.
+struct ColumnSums {
+    sums: [[f32; SIDE]; SUMS],
+    removal: [f32; SIDE],
 }
 
+impl ColumnSums {
+    const ZERO: Self = Self { sums: [[0.0; SIDE]; SUMS], removal: [0.0; SIDE] };
+
+    /// Adds them to `moments`, and begins again.
+    #[inline(always)]
+    fn flush(&mut self, moments: &mut Moments) {
+        // The sums are independent, so they advance together, pixel column by pixel column.
+        for k in 0..SIDE {
+            moments.sums.iter_mut().zip(&self.sums).for_each(|(sum, column)| *sum += column[k]);
+        }
+        moments.removal = self.removal.into_iter().fold(moments.removal, f32::max);
+        *self = Self::ZERO;
+    }
+}
+
+/// Returns the moments of the splats in `trace`. `picture` is the finished tile.
 #[inline(always)]
-fn sum(
-    splats: &[Visible],
-    roots: &[Root],
-    list: impl Iterator<Item = u32>,
-    at: [usize; 2],
-    size: [usize; 2],
-    picture: &TilePixels,
-) -> Vec<(u32, Moments)> {
-    let mut out = Vec::new();
-    let corner = at.map(|k| k * TILE);
-    let [x, y] = coordinates(corner);
-    // Pixels beyond the picture's border are drawn but do not count.
-    #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
-    let [width, height] = size.map(|side| side as f32);
-    let mut blocks: [[Block; BLOCKS]; BLOCKS] = std::array::from_fn(|column| {
-        std::array::from_fn(|row| Block {
-            colour: [[0.0; LANES]; 3],
-            open: std::array::from_fn(|lane| {
-                let inside = x[column][lane] < width && y[row][lane] < height;
-                if inside { 1.0 } else { 0.0 }
-            }),
-        })
-    });
-    let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
-    for index in list {
-        let (splat, root) = (&splats[index as usize].splat, &roots[index as usize]);
-        let [first, end] = reach(splat, corner);
-        let mut moments = Moments { sums: [0.0; SUMS], removal: 0.0 };
-        let mut seen = false;
-        for column in first[0]..end[0] {
-            let mut columns = [[0.0; SIDE]; SUMS];
-            let mut removal = [0.0; SIDE];
-            let mut touched = false;
-            for row in first[1]..end[1] {
-                if !open[column][row] {
-                    continue;
-                }
+fn sum(trace: &Trace, tile: Tile, picture: &TilePixels) -> Vec<(u32, Moments)> {
+    let mut out: Vec<(u32, Moments)> =
+        trace.splats.iter().map(|splat| (splat.gaussian, Moments::default())).collect();
+    let [x, y] = tile.coordinates();
+    let mut blocks = tile.inside().map(|column| column.map(|open| Block { colour: [[0.0; LANES]; 3], open }));
+    let mut columns = ColumnSums::ZERO;
+    for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
+        let k = same[0].splat;
+        let splat = &trace.splats[k];
+        let root = splat.root();
+        for same in same.chunk_by(|a, b| a.block[0] == b.block[0]) {
+            for mark in same {
+                let [column, row] = mark.block.map(|k| k % BLOCKS);
                 let block = &mut blocks[column][row];
-                let added = add(block, splat, root, &x[column], &y[row], &picture.0[column][row]);
-                let Some(lanes) = added else { continue };
-                touched = true;
-                open[column][row] = block.open != [0.0; LANES];
-                for (sum, lanes) in columns.iter_mut().zip(&lanes.sums) {
-                    for row in lanes.chunks_exact(SIDE) {
-                        sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
-                    }
-                }
-                for row in lanes.removal.chunks_exact(SIDE) {
-                    removal.iter_mut().zip(row).for_each(|(most, value)| *most = value.max(*most));
-                }
+                add(&mut columns, block, splat, root, &mark.alpha, [&x[column], &y[row]], &picture.0[column][row]);
             }
-            if touched {
-                seen = true;
-                // The sums are independent, so they advance together, pixel column by pixel column.
-                for k in 0..SIDE {
-                    moments.sums.iter_mut().zip(&columns).for_each(|(sum, column)| *sum += column[k]);
-                }
-                moments.removal = removal.into_iter().fold(moments.removal, f32::max);
-            }
-        }
-        if seen {
-            out.push((index, moments));
-        }
-        if open == [[false; BLOCKS]; BLOCKS] {
-            break;
+            columns.flush(&mut out[k].1);
         }
     }
     out
 }
 
-/// Draws `splat` on a block as `blend` does. Returns its moments; `None` if it shows nowhere.
+/// Draws `splat` on a block as `blend` does, and adds its moments to `columns`.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn add(
+    columns: &mut ColumnSums,
     block: &mut Block,
     splat: &Splat,
-    root: &Root,
-    x: &Lanes,
-    y: &Lanes,
+    root: Root,
+    alphas: &Lanes,
+    [x, y]: [&Lanes; 2],
     picture: &[Lanes; 3],
-) -> Option<LaneMoments> {
-    let alphas = alphas(splat, x, y)?;
-    let mut moments = LaneMoments { sums: [[0.0; LANES]; SUMS], removal: [0.0; LANES] };
+) {
+    let mut sums = [[0.0; LANES]; SUMS];
+    let mut removal = [0.0; LANES];
     for lane in 0..LANES {
         let alpha = alphas[lane];
         let left = block.open[lane] * (1.0 - alpha);
@@ -169,7 +142,7 @@ fn add(
             g += change * change;
             largest = if change.abs() > largest { change.abs() } else { largest };
         }
-        moments.removal[lane] = largest;
+        removal[lane] = largest;
         let [ux, uy] = root.of([splat.centre[0] - x[lane], splat.centre[1] - y[lane]]);
         let (xx, xy, yy) = (ux * ux, ux * uy, uy * uy);
         let terms = [
@@ -184,9 +157,16 @@ fn add(
             g * xy * yy,
             g * yy * yy,
         ];
-        for (sum, term) in moments.sums.iter_mut().zip(terms) {
+        for (sum, term) in sums.iter_mut().zip(terms) {
             sum[lane] = term;
         }
     }
-    Some(moments)
+    for (sum, lanes) in columns.sums.iter_mut().zip(&sums) {
+        for row in lanes.chunks_exact(SIDE) {
+            sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += value);
+        }
+    }
+    for row in removal.chunks_exact(SIDE) {
+        columns.removal.iter_mut().zip(row).for_each(|(most, value)| *most = value.max(*most));
+    }
 }

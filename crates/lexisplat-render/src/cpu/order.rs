@@ -1,53 +1,61 @@
 //! Sorts splats by depth. That happens once for each picture, so that every tile's list comes out sorted.
 
-use super::project::{Projected, Visible};
+use super::splat::PixelRect;
+use super::visible::Visible;
 
 /// Bits of a key sorted in one pass; three passes cover 32.
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
+const PASSES: usize = u32::BITS.div_ceil(DIGIT_BITS) as usize;
 
-/// Returns the splats with the nearest first; those of equal depth are in order of index.
-pub(super) fn by_depth(visible: Projected) -> Vec<Visible> {
-    let mut splats = visible.into_splats();
-    let mut order = sorted(splats.iter().map(|v| v.depth).zip(0..).collect());
-    // The splats are moved in place, cycle by cycle, since a copy of millions of them would take memory. A place
-    // that is done holds its own number.
-    for start in 0..order.len() {
-        let mut place = start;
-        loop {
-            let from = order[place] as usize;
-            order[place] = u32::try_from(place).unwrap_or(u32::MAX);
-            if from == start {
-                break;
-            }
-            splats.swap(place, from);
-            place = from;
-        }
-    }
-    splats
+/// Splats in the order of depth, the nearest first; those of equal depth are in order of index.
+#[derive(Debug, Default)]
+pub(super) struct Order {
+    /// (depth, slot) of each.
+    pub(super) splats: Vec<(u32, u32)>,
+    /// The pixels that each may touch, side by side, since the lists of tiles read nothing else.
+    pub(super) rects: Vec<PixelRect>,
+    spare: Vec<(u32, u32)>,
 }
 
-/// Returns the second of each (key, index) in ascending order of key. A stable radix sort: ties stay in order.
-fn sorted(mut pairs: Vec<(u32, u32)>) -> Vec<u32> {
-    let mut other = vec![(0, 0); pairs.len()];
-    for shift in (0..u32::BITS).step_by(DIGIT_BITS as usize) {
-        let digit = |key: u32| (key >> shift) as usize % DIGITS;
-        let mut starts = vec![0_usize; DIGITS];
-        for &(key, _) in &pairs {
-            starts[digit(key)] += 1;
+impl Order {
+    /// Sorts `visible`, in place of the splats of the picture before.
+    pub(super) fn sort(&mut self, visible: &Visible) {
+        self.splats.clear();
+        // Gaussians are counted in u32.
+        let slot = |slot: usize| u32::try_from(slot).unwrap_or(u32::MAX);
+        self.splats.extend(visible.occupied().map(|k| (visible.slots[k].depth, slot(k))));
+        sort(&mut self.splats, &mut self.spare);
+        self.rects.clear();
+        self.rects.extend(self.splats.iter().map(|&(_, slot)| visible.slots[slot as usize].pixels));
+    }
+}
+
+/// Sorts (key, index) in ascending order of key. A stable radix sort: ties stay in order.
+fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
+    let digit = |pass: usize, key: u32| (key >> (pass as u32 * DIGIT_BITS)) as usize % DIGITS;
+    let mut starts = vec![[0_usize; DIGITS]; PASSES];
+    for &(key, _) in pairs.iter() {
+        for (pass, starts) in starts.iter_mut().enumerate() {
+            starts[digit(pass, key)] += 1;
+        }
+    }
+    spare.resize(pairs.len(), (0, 0));
+    for (pass, starts) in starts.iter_mut().enumerate() {
+        if starts.contains(&pairs.len()) {
+            continue;
         }
         let mut sum = 0;
-        for start in &mut starts {
+        for start in starts.iter_mut() {
             sum += std::mem::replace(start, sum);
         }
-        for &(key, i) in &pairs {
-            let at = &mut starts[digit(key)];
-            other[*at] = (key, i);
+        for &pair in pairs.iter() {
+            let at = &mut starts[digit(pass, pair.0)];
+            spare[*at] = pair;
             *at += 1;
         }
-        std::mem::swap(&mut pairs, &mut other);
+        std::mem::swap(pairs, spare);
     }
-    pairs.into_iter().map(|(_, i)| i).collect()
 }
 
 #[cfg(test)]
@@ -64,9 +72,14 @@ mod tests {
                 if i % 2 == 0 { state } else { state >> 28 }
             })
             .collect();
-        let mut expected: Vec<u32> = (0..5000).collect();
-        expected.sort_by_key(|&i| keys[i as usize]);
-        assert_eq!(sorted(keys.iter().copied().zip(0..).collect()), expected);
-        assert!(sorted(Vec::new()).is_empty());
+        // All digits differ; only the lowest do.
+        for mask in [u32::MAX, 0x7ff] {
+            let mut pairs: Vec<(u32, u32)> = keys.iter().map(|key| key & mask).zip(0..).collect();
+            let mut expected = pairs.clone();
+            expected.sort_by_key(|pair| pair.0);
+            sort(&mut pairs, &mut Vec::new());
+            assert_eq!(pairs, expected);
+        }
+        sort(&mut Vec::new(), &mut Vec::new());
     }
 }

@@ -1,4 +1,7 @@
 //! Projects Gaussians in the world to ellipses on screen.
+//!
+//! The functions on one Gaussian have no branches and are inlined into loops over a group of Gaussians, which become
+//! vector instructions.
 
 use lexisplat::Geometry;
 
@@ -7,47 +10,23 @@ use crate::conventions::{
     ALPHA_MIN, ANTIALIAS_FLOOR, DILATION, EIGEN_FLOOR, NEAR_Z, POWER_SLACK, QUATERNION_FLOOR, RADIUS_SIGMAS,
     TAN_LIMIT, W_EPSILON,
 };
-use crate::parallel::*;
-use crate::radiance::Radiance;
 
-use super::grid::{Grid, Rect};
-use super::math::{exp, sigmoid};
-
-/// Gaussians that one task projects.
-const GAUSSIANS_PER_TASK: usize = 1024;
+use super::grid::{Grid, TILE_F32};
+use super::lanes::{LANES, Lanes, each};
+use super::math::{exp, ln, sigmoid};
+use super::splat::Root;
 
 /// Bound on the relative rounding error of each term of a power, and of the distances in it. It is 16 units in
 /// the last place; at most six roundings happen.
-const TERM_ERROR: f64 = 1e-6;
-
-/// A Gaussian on screen.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Splat {
-    /// Centre in pixels; pixel centres are integers.
-    pub(super) centre: [f32; 2],
-    /// Inverse covariance in 1 / square pixels: xx, xy, yy.
-    pub(super) conic: [f32; 3],
-    /// Opacity at the centre, 0 to 1.
-    pub(super) opacity: f32,
-    /// Colour towards the camera, not below 0.
-    pub(super) colour: [f32; 3],
-    /// Powers below this give an opacity below [`ALPHA_MIN`] for sure.
-    pub(super) cutoff: f32,
-    /// The first column of pixels that it may touch, and the first right of all that it may touch; the same of rows.
-    pub(super) pixels: [[u16; 2]; 2],
-}
-
-/// A splat with what sorting and tiling need.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Visible {
-    pub(super) splat: Splat,
-    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
-    pub(super) depth: u32,
-    /// Tiles that it may touch.
-    pub(super) rect: Rect,
-    /// Its index in the scene.
-    pub(super) gaussian: u32,
-}
+const TERM_ERROR: f32 = 1e-6;
+/// Bound on the relative difference between the determinant of a conic as it is stored and that of the inverse of the
+/// covariance, for each unit of what the determinant loses to cancellation. It is 32 units in the last place; at most
+/// 14 roundings happen.
+const CONIC_ERROR: f32 = 2e-6;
+/// A bound is given up where the determinant may be off by more than this share.
+const MAX_CONIC_ERROR: f32 = 0.5;
+/// Bound on the relative rounding error of the reach itself: 80 units in the last place.
+const REACH_ERROR: f32 = 5e-6;
 
 /// The values that all Gaussians of a picture are projected with.
 #[derive(Debug, Clone)]
@@ -63,8 +42,67 @@ pub(crate) struct Projection {
     tighten: bool,
 }
 
-/// A [`Splat::cutoff`] that leaves nothing out: far below any that could matter, and within the range of `exp`.
+/// A cutoff that leaves nothing out: far below any that could matter, and within the range of `exp`.
 const NO_CUTOFF: f32 = -80.0;
+
+/// Values of a group of Gaussians in the world that say where and how large they are.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Body {
+    pub(super) position: [Lanes; 3],
+    /// Logarithms of the standard deviations.
+    pub(super) scales: [Lanes; 3],
+    /// Quaternion, real part first.
+    pub(super) rotation: [Lanes; 4],
+    /// Logit.
+    pub(super) opacity: Lanes,
+}
+
+/// A group of Gaussians on screen, but for their colours.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Placed {
+    pub(super) centre: [Lanes; 2],
+    pub(super) conic: [Lanes; 3],
+    pub(super) opacity: Lanes,
+    pub(super) cutoff: Lanes,
+    pub(super) variance_y: Lanes,
+    /// View-space z.
+    pub(super) depth: Lanes,
+    /// Unit vectors from the camera to them.
+    pub(super) direction: [Lanes; 3],
+    /// The pixels that they may touch: the first column and row, and the first after the last. There are none where
+    /// nothing may be visible; the other values mean nothing then.
+    pub(super) pixels: [[Lanes; 2]; 2],
+}
+
+impl Body {
+    /// Returns the Gaussians from `first` on; `gaussians` are at most [`LANES`]. The rest of the lanes are zero.
+    #[inline(always)]
+    pub(super) fn load(geometry: &Geometry, gaussians: std::ops::Range<usize>) -> Self {
+        let mut out = Self {
+            position: [[0.0; LANES]; 3],
+            scales: [[0.0; LANES]; 3],
+            rotation: [[0.0; LANES]; 4],
+            opacity: [0.0; LANES],
+        };
+        columns(&mut out.position, &geometry.positions[gaussians.clone()]);
+        columns(&mut out.scales, &geometry.scales[gaussians.clone()]);
+        columns(&mut out.rotation, &geometry.rotations[gaussians.clone()]);
+        for (to, from) in out.opacity.iter_mut().zip(&geometry.opacities[gaussians]) {
+            *to = *from;
+        }
+        out
+    }
+}
+
+/// Transposes rows into columns of lanes.
+#[inline(always)]
+fn columns<const N: usize>(columns: &mut [Lanes; N], rows: &[[f32; N]]) {
+    for (lane, row) in rows.iter().enumerate().take(LANES) {
+        for k in 0..N {
+            columns[k][lane] = row[k];
+        }
+    }
+}
 
 impl Projection {
     pub(crate) fn new(camera: &Camera, antialiased: bool) -> Self {
@@ -77,252 +115,280 @@ impl Projection {
         Self { camera: camera.clone(), tan, focal, size, grid, antialiased, tighten: true }
     }
 
+    /// Width and height of the picture in pixels.
+    pub(super) fn size(&self) -> [usize; 2] {
+        [self.camera.width as usize, self.camera.height as usize]
+    }
+
     /// This projection, without leaving anything out.
     #[cfg(test)]
     pub(super) fn untightened(self) -> Self {
         Self { tighten: false, ..self }
     }
 
-    /// Projects Gaussian `i`; `None` if none of it is visible.
-    fn project(&self, geometry: &Geometry, radiance: &Radiance<'_>, i: usize) -> Option<Visible> {
-        let position = geometry.positions[i];
-        let view = self.camera.to_view(position);
-        let z = view[2];
-        if z.is_nan() || z <= NEAR_Z {
-            return None;
-        }
-        let centre: [f32; 2] = std::array::from_fn(|k| {
-            let ndc = view[k] / self.tan[k] * (1.0 / (z + W_EPSILON));
-            ((ndc + 1.0) * self.size[k] - 1.0) * 0.5
+    /// Projects a group of Gaussians.
+    #[inline(always)]
+    pub(super) fn place(&self, body: &Body) -> Placed {
+        let view = self.view(body);
+        let [x, y, z] = &view;
+        let centre = each([x, y, z], |[x, y, z]| {
+            let near = 1.0 / (z + W_EPSILON);
+            let pixel = |k: usize, v: f32| ((v / self.tan[k] * near + 1.0) * self.size[k] - 1.0) * 0.5;
+            [pixel(0, x), pixel(1, y)]
         });
-        let axes = axes(geometry.scales[i], geometry.rotations[i]);
-        let Ellipse { conic, radius, shrink, .. } = self.ellipse(&self.on_screen(view, &axes))?;
-        let mut opacity = sigmoid(geometry.opacities[i]);
-        if self.antialiased {
-            opacity *= shrink;
+        let ellipse = Ellipse::of(&self.on_screen(&view, &axes(body)));
+        let [opacity, cutoff] = each([&body.opacity, &ellipse.shrink], |[logit, shrink]| {
+            let opacity = sigmoid(logit) * if self.antialiased { shrink } else { 1.0 };
+            [opacity, ln(ALPHA_MIN / opacity) - POWER_SLACK]
+        });
+        let mut pixels = self.pixels(&centre, &ellipse, &cutoff);
+        let [a, b, c] = &ellipse.conic;
+        let [visible] = each([z, &centre[0], &centre[1], a, b, c, &ellipse.det, &opacity], |values| {
+            let [z, x, y, a, b, c, det, opacity] = values;
+            let finite = is_finite(x) & is_finite(y) & is_finite(a) & is_finite(b) & is_finite(c);
+            let drawn = (z > NEAR_Z) & is_ellipse(det) & finite & (opacity >= ALPHA_MIN);
+            [if drawn & is_finite(opacity) { 1.0 } else { 0.0 }]
+        });
+        // Where nothing is drawn, the pixels end where they begin.
+        for k in 0..2 {
+            [pixels[1][k]] = each([&pixels[1][k], &visible], |[end, visible]| {
+                [if visible > 0.0 { end } else { 0.0 }]
+            });
         }
-        let finite = centre.iter().chain(&conic).all(|v| v.is_finite()) && opacity.is_finite();
-        if !finite || opacity < ALPHA_MIN {
-            return None;
-        }
-        let cutoff = libm::logf(ALPHA_MIN / opacity) - POWER_SLACK;
-        let rect = self.grid.rect(centre, radius)?;
-        let (cutoff, extent) = match self.tighten {
-            true => (cutoff, self.extent(centre, conic, cutoff)),
-            false => (NO_CUTOFF, [f64::INFINITY; 2]),
+        let [px, py, pz] = &body.position;
+        let direction = each([px, py, pz], |position| {
+            let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
+            let length = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
+            offset.map(|v| v / length)
+        });
+        let Ellipse { conic, variance: [_, variance_y], .. } = ellipse;
+        let cutoff = if self.tighten { cutoff } else { [NO_CUTOFF; LANES] };
+        Placed { centre, conic, opacity, cutoff, variance_y, depth: *z, direction, pixels }
+    }
+
+    /// Returns the derivatives that carry changes of a group of Gaussians on screen over to the world. They are not
+    /// finite where there is no ellipse on screen.
+    #[inline(always)]
+    pub(super) fn derivatives(&self, body: &Body) -> Derivatives {
+        let view = self.view(body);
+        let on_screen = self.on_screen(&view, &axes(body));
+        let ellipse = Ellipse::of(&on_screen);
+        let root = each([&ellipse.conic[0], &ellipse.conic[1], &ellipse.variance[1], &ellipse.det], |values| {
+            let [xx, xy, variance_y, det] = values;
+            let Root(root) = Root::of_conic([xx, xy, 0.0], variance_y);
+            root.map(|v| if is_ellipse(det) { v } else { f32::NAN })
+        });
+        let rooted = |v: &[Lanes; 2]| {
+            each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| Root([xx, xy, yy]).of([x, y]))
         };
-        let rect = rect.intersect(self.grid.touched(centre, extent))?;
-        let pixels = self.grid.pixels(rect, centre, extent)?;
-        let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
-        let length = offset.iter().map(|v| v * v).sum::<f32>().sqrt();
-        let colour = radiance.colour(i, offset.map(|v| v / length));
-        if !colour.iter().all(|v| v.is_finite()) {
-            return None;
-        }
-        let splat = Splat { centre, conic, opacity, colour, cutoff, pixels };
-        // Gaussians are counted in u32 since `order`.
-        let gaussian = u32::try_from(i).unwrap_or(u32::MAX);
-        Some(Visible { splat, depth: z.to_bits(), rect, gaussian })
-    }
-
-    /// Returns the root of the conic of Gaussian `i` on screen, if it has one.
-    pub(super) fn root(&self, geometry: &Geometry, i: usize) -> Option<Root> {
-        let view = self.camera.to_view(geometry.positions[i]);
-        let on_screen = self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i]));
-        self.ellipse(&on_screen).map(|ellipse| ellipse.root())
-    }
-
-    /// Returns the derivatives that carry changes of Gaussian `i` on screen over to the world; `None` if it has no
-    /// ellipse on screen.
-    pub(super) fn derivatives(&self, geometry: &Geometry, i: usize) -> Option<Derivatives> {
-        let view = self.camera.to_view(geometry.positions[i]);
-        let [x, y, z] = view;
-        let r = &self.camera.rotation;
-        let by_position: [[f32; 2]; 3] = std::array::from_fn(|k| {
-            [
-                self.focal[0] * (r[k][0] * z - r[k][2] * x) / (z * z),
-                self.focal[1] * (r[k][1] * z - r[k][2] * y) / (z * z),
-            ]
+        let [x, y, z] = &view;
+        let by_position: [[Lanes; 2]; 3] = std::array::from_fn(|k| {
+            let [right, down, forward] = self.camera.rotation[k];
+            let moved = each([x, y, z], |[x, y, z]| {
+                [
+                    self.focal[0] * (right * z - forward * x) / (z * z),
+                    self.focal[1] * (down * z - forward * y) / (z * z),
+                ]
+            });
+            rooted(&moved)
         });
-        let on_screen = self.on_screen(view, &axes(geometry.scales[i], geometry.rotations[i]));
-        let root = self.ellipse(&on_screen)?.root();
-        Some(Derivatives {
-            by_position: by_position.map(|v| root.of(v)),
-            axes: on_screen.map(|v| root.of(v)),
-        })
+        Derivatives { by_position, axes: std::array::from_fn(|k| rooted(&on_screen[k])) }
+    }
+
+    /// Returns positions in view space.
+    #[inline(always)]
+    fn view(&self, body: &Body) -> [Lanes; 3] {
+        let [x, y, z] = &body.position;
+        each([x, y, z], |position| self.camera.to_view(position))
     }
 
     /// Returns the axis of each standard deviation on screen, by the linear approximation at `view`.
-    #[inline]
-    fn on_screen(&self, view: [f32; 3], axes: &[[f32; 3]; 3]) -> [[f32; 2]; 3] {
-        let z = view[2];
-        let [tx, ty]: [f32; 2] = std::array::from_fn(|k| {
-            let limit = TAN_LIMIT * self.tan[k];
-            (view[k] / z).clamp(-limit, limit) * z
-        });
-        let jacobian = [
-            [self.focal[0] / z, 0.0, -(self.focal[0] * tx) / (z * z)],
-            [0.0, self.focal[1] / z, -(self.focal[1] * ty) / (z * z)],
-        ];
-        let r = &self.camera.rotation;
-        std::array::from_fn(|a| {
-            let axis = axes[a];
-            let seen: [f32; 3] =
-                std::array::from_fn(|k| r[0][k] * axis[0] + r[1][k] * axis[1] + r[2][k] * axis[2]);
+    #[inline(always)]
+    fn on_screen(&self, view: &[Lanes; 3], axes: &[[Lanes; 3]; 3]) -> [[Lanes; 2]; 3] {
+        let limits = self.tan.map(|tan| TAN_LIMIT * tan);
+        let [x, y, z] = view;
+        // The entries of the Jacobian that are not zero: xx, xz, yy, yz.
+        let jacobian = each([x, y, z], |[x, y, z]| {
+            let t = |k: usize, v: f32| greater(lesser(v / z, limits[k]), -limits[k]) * z;
+            let (tx, ty) = (t(0, x), t(1, y));
             [
-                jacobian[0][0] * seen[0] + jacobian[0][2] * seen[2],
-                jacobian[1][1] * seen[1] + jacobian[1][2] * seen[2],
+                self.focal[0] / z,
+                -(self.focal[0] * tx) / (z * z),
+                self.focal[1] / z,
+                -(self.focal[1] * ty) / (z * z),
             ]
+        });
+        let r = &self.camera.rotation;
+        let [xx, xz, yy, yz] = &jacobian;
+        std::array::from_fn(|a| {
+            let [x, y, z] = &axes[a];
+            each([x, y, z, xx, xz, yy, yz], |[x, y, z, xx, xz, yy, yz]| {
+                let seen: [f32; 3] = std::array::from_fn(|k| r[0][k] * x + r[1][k] * y + r[2][k] * z);
+                [xx * seen[0] + xz * seen[2], yy * seen[1] + yz * seen[2]]
+            })
         })
     }
 
-    /// Returns the dilated ellipse of a Gaussian with these axes on screen.
-    fn ellipse(&self, on_screen: &[[f32; 2]; 3]) -> Option<Ellipse> {
-        // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance of the
-        // world instead. That is the same sum, but loses thin Gaussians to cancellation.
-        let sum = |f: fn([f32; 2]) -> f32| f(on_screen[0]) + f(on_screen[1]) + f(on_screen[2]);
-        let (a, b, c) = (sum(|v| v[0] * v[0]), sum(|v| v[0] * v[1]), sum(|v| v[1] * v[1]));
-        // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
-        let cross = |p: [f32; 2], q: [f32; 2]| {
-            let w = p[0] * q[1] - p[1] * q[0];
-            w * w
+    /// Returns the pixels that may be touched: the first column and row, and the first after the last.
+    #[inline(always)]
+    fn pixels(&self, centre: &[Lanes; 2], ellipse: &Ellipse, cutoff: &Lanes) -> [[Lanes; 2]; 2] {
+        let level = self.level(centre, ellipse, cutoff);
+        let axis = |k: usize| {
+            let variance = &ellipse.variance[k];
+            each([&centre[k], variance, &level, &ellipse.radius], |[centre, variance, level, radius]| {
+                let reach = (level * variance).sqrt();
+                // Sums with the centre are rounded too.
+                let reach = reach + REACH_ERROR * (reach + centre.abs() + 1.0);
+                let reach = if self.tighten { reach } else { f32::INFINITY };
+                // INRIA's tiles (`getRect`): those that the square of `radius` overlaps, truncated as in C.
+                let first = self.grid.tile(k, (centre - radius) / TILE_F32);
+                let end = self.grid.tile(k, (centre + radius + (TILE_F32 - 1.0)) / TILE_F32);
+                let least = (centre - reach).ceil();
+                let most = (centre + reach).floor() + 1.0;
+                [greater(least, first * TILE_F32), lesser(lesser(most, end * TILE_F32), self.size[k])]
+            })
         };
-        let before = cross(on_screen[0], on_screen[1])
-            + cross(on_screen[1], on_screen[2])
-            + cross(on_screen[2], on_screen[0]);
-        let det = before + DILATION * (a + c) + DILATION * DILATION;
-        if det == 0.0 || !det.is_finite() {
-            return None;
-        }
-        let (a, c) = (a + DILATION, c + DILATION);
-        let mid = 0.5 * (a + c);
-        let half = 0.5 * (a - c);
-        let spread = (half * half + b * b).max(EIGEN_FLOOR).sqrt();
-        let radius = (RADIUS_SIGMAS * (mid + spread).sqrt()).ceil();
-        let shrink = (before / det).max(ANTIALIAS_FLOOR).sqrt();
-        Some(Ellipse { conic: [c / det, -b / det, a / det], variance_y: c, radius, shrink })
+        let ([x_first, x_end], [y_first, y_end]) = (axis(0), axis(1));
+        [[x_first, y_first], [x_end, y_end]]
     }
 
-    /// Returns the distances from the centre in x and y, in pixels, beyond which no power, as `blend` computes it,
-    /// reaches `cutoff`. They are infinite where there is no such bound.
-    fn extent(&self, centre: [f32; 2], conic: [f32; 3], cutoff: f32) -> [f64; 2] {
-        let [a, b, c] = conic.map(f64::from);
-        // The largest distance of a pixel, where terms, and with them rounding errors, are largest.
-        let far: [f64; 2] = std::array::from_fn(|k| {
-            let (centre, size) = (f64::from(centre[k]), f64::from(self.size[k]));
-            centre.abs().max((size - 1.0 - centre).abs())
+    /// Returns the level whose product with a variance is the largest squared distance from the centre, in x or y, of
+    /// pixels whose power, as `blend` computes it, reaches `cutoff`. It is infinite where there is no such bound.
+    ///
+    /// Those pixels satisfy `a dx^2 + 2 b dx dy + c dy^2 <= level` over the conic as it is stored, but for rounding.
+    #[inline(always)]
+    fn level(&self, centre: &[Lanes; 2], ellipse: &Ellipse, cutoff: &Lanes) -> Lanes {
+        let [a, b, c] = &ellipse.conic;
+        let [x, y] = centre;
+        let [terms] = each([a, b, c, x, y], |[a, b, c, x, y]| {
+            // The largest distance of a pixel, where terms, and with them rounding errors, are largest.
+            let far = |k: usize, v: f32| greater(v.abs(), (self.size[k] - 1.0 - v).abs());
+            let (x, y) = (far(0, x), far(1, y));
+            [0.5 * (a * x * x + c * y * y) + (b * x * y).abs()]
         });
-        let terms = 0.5 * (a * far[0] * far[0] + c * far[1] * far[1]) + (b * far[0] * far[1]).abs();
-        // Pixels that count satisfy a dx^2 + 2 b dx dy + c dy^2 <= level.
-        let level = 2.0 * (-f64::from(cutoff) + TERM_ERROR * terms).max(0.0);
-        let det = a * c - b * b;
-        // A determinant that is lost to rounding gives no bound.
-        if det.is_nan() || det <= TERM_ERROR * a * c || a <= 0.0 {
-            return [f64::INFINITY; 2];
-        }
-        let reach = |diagonal: f64| (level * diagonal / det).sqrt() * (1.0 + TERM_ERROR) + TERM_ERROR;
-        [reach(c), reach(a)]
+        let [xx, yy] = &ellipse.variance;
+        let [level] = each([&terms, cutoff, xx, yy, &ellipse.det], |[terms, cutoff, xx, yy, det]| {
+            let level = 2.0 * greater(TERM_ERROR * terms - cutoff, 0.0);
+            let error = CONIC_ERROR * (xx * yy / det);
+            let bounded = (error < MAX_CONIC_ERROR) & is_finite(level);
+            [if bounded { level / (1.0 - error) } else { f32::INFINITY }]
+        });
+        level
     }
 }
 
-/// How a Gaussian on screen changes with its values in the world, in the coordinates of its [`Root`].
+/// The larger of two numbers; `b` if `a` is no number.
+#[inline(always)]
+fn greater(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// The smaller of two numbers; `b` if `a` is no number.
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[inline(always)]
+fn is_finite(x: f32) -> bool {
+    x.abs() < f32::INFINITY
+}
+
+/// Whether an ellipse with this determinant can be drawn.
+#[inline(always)]
+fn is_ellipse(det: f32) -> bool {
+    (det != 0.0) & is_finite(det)
+}
+
+/// How a group of Gaussians on screen changes with their values in the world, in the coordinates of their [`Root`]s.
 pub(super) struct Derivatives {
     /// The change of the centre with each world coordinate.
-    pub(super) by_position: [[f32; 2]; 3],
+    pub(super) by_position: [[Lanes; 2]; 3],
     /// The three standard deviations as vectors.
-    pub(super) axes: [[f32; 2]; 3],
+    pub(super) axes: [[Lanes; 2]; 3],
 }
 
-/// The upper triangular root R of a conic, `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in standard
-/// deviations, so that products of it neither grow with a Gaussian's size nor cancel in thin ones.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Root(pub(super) [f32; 3]);
-
-impl Root {
-    /// `R v`.
-    #[inline]
-    pub(super) fn of(&self, v: [f32; 2]) -> [f32; 2] {
-        let [xx, xy, yy] = self.0;
-        [xx * v[0] + xy * v[1], yy * v[1]]
-    }
-}
-
+/// The dilated ellipses of a group of Gaussians on screen.
 struct Ellipse {
-    conic: [f32; 3],
-    /// The yy of the dilated covariance, in square pixels.
-    variance_y: f32,
-    /// In pixels, a whole number.
-    radius: f32,
+    conic: [Lanes; 3],
+    /// The diagonal of the covariance, in square pixels.
+    variance: [Lanes; 2],
+    /// Determinant of the covariance.
+    det: Lanes,
+    /// In pixels, whole numbers.
+    radius: Lanes,
     /// Factor of the opacity in anti-aliased scenes.
-    shrink: f32,
+    shrink: Lanes,
 }
 
 impl Ellipse {
-    fn root(&self) -> Root {
-        let [xx, xy, _] = self.conic;
-        let root = xx.sqrt();
-        // The last element squared is the determinant over xx. The variance gives it without cancellation.
-        Root([root, xy / root, 1.0 / self.variance_y.sqrt()])
+    /// Returns the ellipses of Gaussians with these axes on screen.
+    #[inline(always)]
+    fn of(on_screen: &[[Lanes; 2]; 3]) -> Self {
+        // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance of the
+        // world instead. That is the same sum, but loses thin Gaussians to cancellation.
+        let [p, q, r] = on_screen;
+        let [a, b, c, before] = each([&p[0], &p[1], &q[0], &q[1], &r[0], &r[1]], |[px, py, qx, qy, rx, ry]| {
+            // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
+            let (pq, qr, rp) = (px * qy - py * qx, qx * ry - qy * rx, rx * py - ry * px);
+            [
+                px * px + qx * qx + rx * rx,
+                px * py + qx * qy + rx * ry,
+                py * py + qy * qy + ry * ry,
+                pq * pq + qr * qr + rp * rp,
+            ]
+        });
+        let [conic_a, conic_b, conic_c, det, shrink] = each([&a, &b, &c, &before], |[a, b, c, before]| {
+            let det = before + DILATION * (a + c) + DILATION * DILATION;
+            let shrink = greater(before / det, ANTIALIAS_FLOOR).sqrt();
+            [(c + DILATION) / det, -b / det, (a + DILATION) / det, det, shrink]
+        });
+        let [a, c, radius] = each([&a, &b, &c], |[a, b, c]| {
+            let (a, c) = (a + DILATION, c + DILATION);
+            let (mid, half) = (0.5 * (a + c), 0.5 * (a - c));
+            let spread = greater(half * half + b * b, EIGEN_FLOOR).sqrt();
+            [a, c, (RADIUS_SIGMAS * (mid + spread).sqrt()).ceil()]
+        });
+        Self { conic: [conic_a, conic_b, conic_c], variance: [a, c], det, radius, shrink }
     }
 }
 
 /// Returns the three standard deviations as vectors in the world: the columns of rotation * scale.
-fn axes(scales: [f32; 3], rotation: [f32; 4]) -> [[f32; 3]; 3] {
-    let length = rotation.iter().map(|v| v * v).sum::<f32>().sqrt().max(QUATERNION_FLOOR);
-    let [w, x, y, z] = rotation.map(|v| v / length);
-    let s = scales.map(exp);
+#[inline(always)]
+fn axes(body: &Body) -> [[Lanes; 3]; 3] {
+    let [w, x, y, z] = &body.rotation;
+    let [w, x, y, z] = &each([w, x, y, z], |rotation| {
+        let [w, x, y, z] = rotation;
+        let length = greater((w * w + x * x + y * y + z * z).sqrt(), QUATERNION_FLOOR);
+        rotation.map(|v| v / length)
+    });
+    let scale = |k: usize| {
+        let [scale] = each([&body.scales[k]], |[scale]| [exp(scale)]);
+        scale
+    };
     [
-        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)].map(|v| v * s[0]),
-        [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)].map(|v| v * s[1]),
-        [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)].map(|v| v * s[2]),
+        each([w, x, y, z, &scale(0)], |[w, x, y, z, s]| {
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)].map(|v| v * s)
+        }),
+        each([w, x, y, z, &scale(1)], |[w, x, y, z, s]| {
+            [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)].map(|v| v * s)
+        }),
+        each([w, x, y, z, &scale(2)], |[w, x, y, z, s]| {
+            [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)].map(|v| v * s)
+        }),
     ]
-}
-
-/// The Gaussians that may be visible, in order: the first `counts[k]` of each [`GAUSSIANS_PER_TASK`] slots.
-pub(super) struct Projected {
-    /// One allocation for all. Many small ones from many threads would not be returned to the system.
-    slots: Vec<Visible>,
-    counts: Vec<usize>,
-}
-
-impl Projected {
-    /// Returns the splats alone, in order.
-    pub(super) fn into_splats(self) -> Vec<Visible> {
-        let Self { mut slots, counts } = self;
-        let mut len = 0;
-        for (piece, count) in counts.into_iter().enumerate() {
-            let first = piece * GAUSSIANS_PER_TASK;
-            slots.copy_within(first..first + count, len);
-            len += count;
-        }
-        slots.truncate(len);
-        slots
-    }
-}
-
-/// Projects all Gaussians.
-pub(super) fn project(geometry: &Geometry, radiance: &Radiance<'_>, projection: &Projection) -> Projected {
-    let mut slots = vec![Visible::default(); geometry.len()];
-    let counts = slots
-        .par_chunks_mut(GAUSSIANS_PER_TASK)
-        .enumerate()
-        .map(|(chunk, slots)| {
-            let first = chunk * GAUSSIANS_PER_TASK;
-            let range = first..first + slots.len();
-            let seen = range.filter_map(|i| projection.project(geometry, radiance, i));
-            // There are as many slots as Gaussians, so the slots never run out first.
-            slots.iter_mut().zip(seen).map(|(slot, splat)| *slot = splat).count()
-        })
-        .collect();
-    Projected { slots, counts }
 }
 
 #[cfg(test)]
 mod tests {
+    use lexisplat::simd::Simd;
     use lexisplat::{SceneMeta, ShDegree, Splats};
 
+    use super::super::splat::Splat;
+    use super::super::visible::Visible;
     use super::*;
     use crate::camera::straight_ahead;
+    use crate::radiance::Radiance;
     use crate::scene::Scene;
 
     fn one(position: [f32; 3], scale: f32) -> Splats {
@@ -337,10 +403,13 @@ mod tests {
         Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() }
     }
 
-    fn draw(splats: &Splats, antialiased: bool) -> Option<Visible> {
+    fn draw(splats: &Splats, antialiased: bool) -> Option<Splat> {
         let camera = straight_ahead(100, 80, 100.0);
         let projection = Projection::new(&camera, antialiased);
-        projection.project(&splats.geometry, &Radiance::new(&Scene::from(splats)), 0)
+        let mut visible = Visible::default();
+        let radiance = Radiance::new(&Scene::from(splats));
+        visible.project(Simd::current(), &splats.geometry, &radiance, &projection);
+        visible.occupied().next().map(|slot| visible.slots[slot])
     }
 
     fn near(a: f32, b: f32) -> bool {
@@ -349,20 +418,19 @@ mod tests {
 
     #[test]
     fn a_point_lands_where_ndc2pix_puts_it() {
-        let visible = draw(&one([0.5, -0.25, 2.0], -20.0), false).unwrap();
-        let splat = visible.splat;
+        let splat = draw(&one([0.5, -0.25, 2.0], -20.0), false).unwrap();
         assert!(near(splat.centre[0], 49.5 + 25.0) && near(splat.centre[1], 39.5 - 12.5), "{splat:?}");
         // A point is the dilation alone.
         assert!(splat.conic.iter().zip([1.0 / 0.3, 0.0, 1.0 / 0.3]).all(|(a, b)| near(*a, b)), "{splat:?}");
         assert!(near(splat.opacity, 0.5));
         assert!(near(splat.colour[0], 0.782_094_8) && near(splat.colour[1], 0.5) && splat.colour[2] == 0.0);
-        assert_eq!(visible.depth, 2.0_f32.to_bits());
+        assert_eq!(splat.depth, 2.0_f32.to_bits());
     }
 
     #[test]
     fn a_sphere_on_the_axis_has_the_variance_of_similar_triangles() {
         // Deviation e^-1 at distance 4 with focal length 100.
-        let splat = draw(&one([0.0, 0.0, 4.0], -1.0), false).unwrap().splat;
+        let splat = draw(&one([0.0, 0.0, 4.0], -1.0), false).unwrap();
         let variance = (100.0 * (-1.0_f32).exp() / 4.0).powi(2) + DILATION;
         assert!(near(splat.conic[0] * variance, 1.0) && splat.conic[1] == 0.0, "{splat:?}");
     }
@@ -372,7 +440,7 @@ mod tests {
         let far = draw(&one([0.0, 0.0, 4.0], -20.0), true);
         // The factor's floor is 0.005, and 0.5 * 0.005 is below 1/255.
         assert!(far.is_none());
-        let splat = draw(&one([0.0, 0.0, 4.0], -4.0), true).unwrap().splat;
+        let splat = draw(&one([0.0, 0.0, 4.0], -4.0), true).unwrap();
         let variance = (100.0 * (-4.0_f32).exp() / 4.0).powi(2);
         assert!(near(splat.opacity, 0.5 * variance / (variance + DILATION)), "{splat:?}");
     }
@@ -392,6 +460,15 @@ mod tests {
 
     #[test]
     fn quaternions_are_normalised_and_zero_is_the_identity() {
+        let axes = |scales: [f32; 3], rotation: [f32; 4]| {
+            let body = Body {
+                position: [[0.0; LANES]; 3],
+                scales: scales.map(|v| [v; LANES]),
+                rotation: rotation.map(|v| [v; LANES]),
+                opacity: [0.0; LANES],
+            };
+            axes(&body).map(|axis| axis.map(|v| v[LANES - 1]))
+        };
         let scales = [0.0, -1.0, -2.0];
         let identity = axes(scales, [1.0, 0.0, 0.0, 0.0]);
         assert_eq!(axes(scales, [0.0; 4]), identity);

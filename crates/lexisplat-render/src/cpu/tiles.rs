@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use crate::parallel::*;
 
-use super::grid::{Grid, Rect};
-use super::project::Visible;
+use super::grid::Grid;
+use super::order::Order;
+use super::splat::PixelRect;
 
 /// Pieces that the sorted splats are cut into. One task lists each piece, and a tile's list is those of the pieces
 /// in order.
@@ -15,13 +16,15 @@ pub(super) const MAX_ENTRIES: u64 = 1 << 22;
 
 /// Cuts the rows of tiles into bands. The lists of a band have at most `max_entries` entries, unless it is one
 /// row.
-pub(super) fn bands(splats: &[Visible], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
+pub(super) fn bands(rects: &[PixelRect], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
     // Differences of the number of entries from one row of tiles to the next.
     let mut steps = vec![0_i64; grid.rows + 1];
-    for Visible { rect, .. } in splats {
-        let columns = i64::from(rect.max[0] - rect.min[0]);
-        steps[usize::from(rect.min[1])] += columns;
-        steps[usize::from(rect.max[1])] -= columns;
+    for rect in rects {
+        // At most 1024.
+        let columns = i64::try_from(rect.columns().len()).unwrap_or(i64::MAX);
+        let rows = rect.rows();
+        steps[rows.start] += columns;
+        steps[rows.end] -= columns;
     }
     let mut bands = Vec::new();
     let (mut start, mut in_row, mut in_band) = (0, 0_i64, 0_u64);
@@ -41,94 +44,99 @@ pub(super) fn bands(splats: &[Visible], grid: Grid, max_entries: u64) -> Vec<Ran
 }
 
 /// For each tile of a band, the splats that may touch it, in order.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct TileLists {
     pieces: Vec<Piece>,
 }
 
 /// The lists of one piece of the splats. That of tile `t` is `entries[starts[t]..starts[t + 1]]`.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct Piece {
     starts: Vec<usize>,
     entries: Vec<u32>,
 }
 
 impl TileLists {
-    /// Lists the splats over the rows of tiles in `band`.
-    pub(super) fn new(splats: &[Visible], grid: Grid, band: Range<usize>) -> Self {
-        let size = splats.len().div_ceil(PIECES).max(1);
-        let pieces = splats
-            .par_chunks(size)
-            .enumerate()
-            .map(|(piece, splats)| Piece::new(splats, piece * size, grid, &band))
-            .collect();
-        Self { pieces }
+    /// Lists the splats over the rows of tiles in `band`, in place of the lists before.
+    pub(super) fn fill(&mut self, order: &Order, grid: Grid, band: &Range<usize>) {
+        let size = order.splats.len().div_ceil(PIECES).max(1);
+        self.pieces.resize_with(PIECES, Piece::default);
+        self.pieces.par_chunks_mut(1).enumerate().for_each(|(k, piece)| {
+            let of = |len: usize| (k * size).min(len)..((k + 1) * size).min(len);
+            let rects = &order.rects[of(order.rects.len())];
+            let splats = &order.splats[of(order.splats.len())];
+            piece.iter_mut().for_each(|piece| piece.fill(splats, rects, grid, band));
+        });
     }
 
-    /// Returns the list of tile `tile` of the band. Tiles are counted row by row.
-    pub(super) fn of(&self, tile: usize) -> impl Iterator<Item = u32> {
-        self.pieces.iter().flat_map(move |p| &p.entries[p.starts[tile]..p.starts[tile + 1]]).copied()
+    /// Returns the list of tile `tile` of the band, in pieces: slots of splats. Tiles are counted row by row.
+    pub(super) fn of(&self, tile: usize) -> impl Iterator<Item = &[u32]> {
+        self.pieces.iter().map(move |p| &p.entries[p.starts[tile]..p.starts[tile + 1]])
     }
 }
 
 impl Piece {
-    fn new(splats: &[Visible], first: usize, grid: Grid, band: &Range<usize>) -> Self {
-        let tiles = |rect: &Rect| {
-            let [left, right] = [usize::from(rect.min[0]), usize::from(rect.max[0])];
-            let top = usize::from(rect.min[1]).max(band.start) - band.start;
-            let bottom = usize::from(rect.max[1]).min(band.end).saturating_sub(band.start);
-            let columns = grid.columns;
-            (top..bottom).flat_map(move |row| row * columns + left..row * columns + right)
+    fn fill(&mut self, splats: &[(u32, u32)], rects: &[PixelRect], grid: Grid, band: &Range<usize>) {
+        let tiles = |rect: &PixelRect| {
+            let (columns, rows) = (rect.columns(), rect.rows());
+            let top = rows.start.max(band.start) - band.start;
+            let bottom = rows.end.min(band.end).saturating_sub(band.start);
+            (top..bottom)
+                .flat_map(move |row| row * grid.columns + columns.start..row * grid.columns + columns.end)
         };
+        let Self { starts, entries } = self;
         // Tile t is counted at `t + 2`. After the sums its list begins at `starts[t + 1]`, and filling the list
         // moves that to its end.
-        let mut starts = vec![0_usize; band.len() * grid.columns + 2];
-        for Visible { rect, .. } in splats {
+        starts.clear();
+        starts.resize(band.len() * grid.columns + 2, 0);
+        for rect in rects {
             tiles(rect).for_each(|tile| starts[tile + 2] += 1);
         }
         for tile in 2..starts.len() {
             starts[tile] += starts[tile - 1];
         }
-        let total = starts.last().copied().unwrap_or(0);
-        let mut entries = vec![0; total];
-        for (Visible { rect, .. }, splat) in splats.iter().zip(first..) {
-            // Splats are counted in u32 since `order`.
-            let splat = u32::try_from(splat).unwrap_or(u32::MAX);
+        entries.resize(starts.last().copied().unwrap_or(0), 0);
+        for (rect, &(_, slot)) in rects.iter().zip(splats) {
             for tile in tiles(rect) {
                 let at = &mut starts[tile + 1];
-                entries[*at] = splat;
+                entries[*at] = slot;
                 *at += 1;
             }
         }
-        Self { starts, entries }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::conventions::TILE;
 
     #[test]
     fn lists_hold_every_splat_of_every_tile_in_order() {
         let grid = Grid::new(100, 70);
-        let splats: Vec<Visible> = (0_u8..60)
-            .filter_map(|i| {
-                let i = f32::from(i);
-                let rect = grid.rect([i * 37.0 % 120.0 - 10.0, i * 23.0 % 90.0 - 10.0], 1.0 + i % 30.0)?;
-                Some(Visible { rect, ..Visible::default() })
+        let rects: Vec<PixelRect> = (0_u16..60)
+            .map(|i| {
+                let (x, y, side) = (i * 37 % 90, i * 23 % 60, 1 + i % 30);
+                PixelRect { min: [x, y], max: [(x + side).min(100), (y + side).min(70)] }
             })
             .collect();
+        let splats = (0..60).map(|slot| (0, 100 - slot)).collect();
+        let order = Order { splats, rects: rects.clone(), ..Order::default() };
+        let mut lists = TileLists::default();
         for band in [0..grid.rows, 1..3] {
-            let lists = TileLists::new(&splats, grid, band.clone());
+            lists.fill(&order, grid, &band);
             for row in band.clone() {
                 for column in 0..grid.columns {
-                    let inside = |r: &Rect| {
-                        (usize::from(r.min[0])..usize::from(r.max[0])).contains(&column)
-                            && (usize::from(r.min[1])..usize::from(r.max[1])).contains(&row)
+                    let inside = |r: &PixelRect| {
+                        let overlaps = |k: usize, tile: usize| {
+                            usize::from(r.min[k]) < (tile + 1) * TILE && usize::from(r.max[k]) > tile * TILE
+                        };
+                        overlaps(0, column) && overlaps(1, row)
                     };
                     let expected: Vec<u32> =
-                        (0..).zip(&splats).filter(|(_, v)| inside(&v.rect)).map(|(i, _)| i).collect();
-                    let found: Vec<u32> = lists.of((row - band.start) * grid.columns + column).collect();
+                        (0..).zip(&rects).filter(|(_, r)| inside(r)).map(|(i, _)| 100 - i).collect();
+                    let tile = (row - band.start) * grid.columns + column;
+                    let found: Vec<u32> = lists.of(tile).flatten().copied().collect();
                     assert_eq!(found, expected, "tile {column}, {row}");
                 }
             }
@@ -138,8 +146,8 @@ mod tests {
     #[test]
     fn bands_cover_all_rows_and_stay_small() {
         let grid = Grid::new(16_384, 16_384);
-        let everywhere = Rect { min: [0, 0], max: [1024, 1024] };
-        let bands = bands(&[Visible { rect: everywhere, ..Visible::default() }; 1000], grid, 1 << 26);
+        let everywhere = PixelRect { min: [0, 0], max: [16_384; 2] };
+        let bands = bands(&[everywhere; 1000], grid, 1 << 26);
         assert_eq!(bands.first().map(|b| b.start), Some(0));
         assert_eq!(bands.last().map(|b| b.end), Some(1024));
         assert!(bands.windows(2).all(|w| w[0].end == w[1].start));

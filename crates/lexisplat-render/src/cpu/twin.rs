@@ -1,13 +1,16 @@
 //! The steps of this renderer, one by one, for tests of the GPU to compare with.
 
+use lexisplat::simd::Simd;
+
 use crate::camera::Camera;
 use crate::conventions::TILE;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
-use lexisplat::simd::Simd;
 
-use super::project::{Projection, Splat, Visible};
-use super::{blend, order, project};
+use super::blend::{self, Tile};
+use super::project::Projection;
+use super::splat::{PixelRect, Splat};
+use super::workspace::Workspace;
 
 /// A Gaussian on screen.
 #[derive(Debug, Clone, Copy)]
@@ -29,32 +32,39 @@ const CUTOFF: f32 = -80.0;
 /// Returns what INRIA's rules draw, with the nearest first.
 pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
     let projection = Projection::new(camera, scene.meta().antialiased).untightened();
-    let splats = order::by_depth(project::project(scene.geometry(), &Radiance::new(scene), &projection));
-    splats
-        .into_iter()
-        .map(|Visible { splat, depth, rect, gaussian }| Seen {
-            gaussian,
-            centre: splat.centre,
-            conic: splat.conic,
-            opacity: splat.opacity,
-            colour: splat.colour,
-            depth,
-            tiles: rect.corners(),
+    let Workspace { mut visible, mut order, .. } = Workspace::default();
+    visible.project(Simd::current(), scene.geometry(), &Radiance::new(scene), &projection);
+    order.sort(&visible);
+    order
+        .splats
+        .iter()
+        .map(|&(depth, slot)| {
+            let Splat { gaussian, centre, conic, opacity, colour, pixels, .. } = visible.slots[slot as usize];
+            let (columns, rows) = (pixels.columns(), pixels.rows());
+            let corners = [[columns.start, rows.start], [columns.end, rows.end]];
+            let tiles = corners.map(|corner| corner.map(|k| u16::try_from(k).unwrap()));
+            Seen { gaussian, centre, conic, opacity, colour, depth, tiles }
         })
         .collect()
 }
 
 /// Returns the pixels of the tile at `[column, row]`, row by row, drawn with `splats` from front to back.
 pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec<[f32; 3]> {
-    let pixels = [[0, u16::MAX]; 2];
-    let visible: Vec<Visible> = splats
+    let pixels = PixelRect { min: [0; 2], max: [u16::MAX; 2] };
+    let splats: Vec<Splat> = splats
         .iter()
-        .map(|&Seen { centre, conic, opacity, colour, .. }| Visible {
-            splat: Splat { centre, conic, opacity, colour, cutoff: CUTOFF, pixels },
-            ..Visible::default()
+        .map(|&Seen { centre, conic, opacity, colour, .. }| Splat {
+            centre,
+            conic,
+            opacity,
+            colour,
+            cutoff: CUTOFF,
+            pixels,
+            ..Splat::default()
         })
         .collect();
-    let list = (0..).take(visible.len());
-    let pixels = blend::tile(Simd::current(), &visible, list, at, background);
+    let list: Vec<u32> = (0..).take(splats.len()).collect();
+    let whole = Tile::new(at, [usize::MAX; 2]);
+    let pixels = blend::tile(Simd::current(), &splats, std::iter::once(&*list), whole, background);
     (0..TILE * TILE).map(|k| pixels.pixel(k % TILE, k / TILE)).collect()
 }

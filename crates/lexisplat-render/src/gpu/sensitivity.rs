@@ -54,13 +54,17 @@ impl GpuRenderer {
         }
         let mut measuring = self.measuring().await?;
         let mut total = Sensitivity::zeros(geometry.len());
+        let mut sums = vec![Moments::default(); geometry.len()];
         progress.begin(Stage::Draw, cameras.len() as u64);
         for camera in cameras {
             progress.check()?;
             let frame = measuring.draw_async(scene, camera, &RenderOptions::default()).await?;
             let (gaussians, moments) = measuring.read_moments(frame.stats.visible).await?;
+            for (gaussian, moments) in gaussians.into_iter().zip(moments) {
+                sums[gaussian as usize] = moments;
+            }
             let projection = Projection::new(camera, scene.antialiased);
-            carry(&mut total, &projection, geometry, cameras.len(), &moments, |k| gaussians[k] as usize);
+            carry(&mut total, &projection, geometry, cameras.len(), &mut sums);
             progress.advance(1);
         }
         progress.end();

@@ -1,0 +1,165 @@
+//! Carries changes of splats on screen over to the values of Gaussians in the world.
+
+use lexisplat::simd::Simd;
+use lexisplat::{Geometry, Sensitivity};
+
+use crate::parallel::*;
+
+use super::lanes::{LANES, Lanes, each};
+use super::math::exp;
+use super::moments::{Moments, SUMS};
+use super::project::{Body, Derivatives, Projection};
+
+/// Gaussians that one task carries over.
+const GAUSSIANS_PER_TASK: usize = 1024;
+/// Colour channels of a picture.
+const CHANNELS: f32 = 3.0;
+
+/// Carries one view's moments, one for each Gaussian, over to the world, and adds its share to the `total` over
+/// `views`. Zeroes the moments.
+pub(crate) fn carry(
+    total: &mut Sensitivity,
+    projection: &Projection,
+    geometry: &Geometry,
+    views: usize,
+    moments: &mut [Moments],
+) {
+    let simd = Simd::current();
+    let [width, height] = projection.size();
+    #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
+    let share = 1.0 / (width as f32 * height as f32 * CHANNELS * views as f32);
+    let Sensitivity { position, scale, rotation, opacity, colour, removal, .. } = total;
+    let tasks: Vec<Task<'_>> = moments
+        .chunks_mut(GAUSSIANS_PER_TASK)
+        .zip(position.chunks_mut(GAUSSIANS_PER_TASK))
+        .zip(scale.chunks_mut(GAUSSIANS_PER_TASK))
+        .zip(rotation.chunks_mut(GAUSSIANS_PER_TASK))
+        .zip(opacity.chunks_mut(GAUSSIANS_PER_TASK))
+        .zip(colour.chunks_mut(GAUSSIANS_PER_TASK))
+        .zip(removal.chunks_mut(GAUSSIANS_PER_TASK))
+        .map(|((((((moments, position), scale), rotation), opacity), colour), removal)| Task {
+            moments,
+            position,
+            scale,
+            rotation,
+            opacity,
+            colour,
+            removal,
+        })
+        .collect();
+    tasks.into_par_iter().enumerate().for_each(|(task, mut part)| {
+        simd.dispatch(
+            #[inline(always)]
+            || part.carry(projection, geometry, task * GAUSSIANS_PER_TASK, share),
+        );
+    });
+}
+
+/// The moments and the sensitivities of some Gaussians that follow one another.
+struct Task<'a> {
+    moments: &'a mut [Moments],
+    position: &'a mut [[f32; 6]],
+    scale: &'a mut [[f32; 3]],
+    rotation: &'a mut [[f32; 3]],
+    opacity: &'a mut [f32],
+    colour: &'a mut [f32],
+    removal: &'a mut [f32],
+}
+
+impl Task<'_> {
+    /// Carries the moments of the Gaussians from `first` on.
+    #[inline(always)]
+    fn carry(&mut self, projection: &Projection, geometry: &Geometry, first: usize, share: f32) {
+        let count = self.moments.len();
+        for start in (0..count).step_by(LANES) {
+            let group = start..count.min(start + LANES);
+            let moments = &mut self.moments[group.clone()];
+            if moments.iter().all(|m| m.sums[0] == 0.0 && m.removal == 0.0) {
+                continue;
+            }
+            let mut sums = [[0.0; LANES]; SUMS];
+            for (lane, m) in moments.iter().enumerate() {
+                for k in 0..SUMS {
+                    sums[k][lane] = m.sums[k];
+                }
+            }
+            let bodies = Body::load(geometry, first + group.start..first + group.end);
+            let changes = Change::of(projection, &bodies, &sums);
+            for (lane, i) in group.enumerate() {
+                let m = std::mem::take(&mut moments[lane]);
+                self.removal[i] = self.removal[i].max(m.removal);
+                if m.sums[0] <= 0.0 || !changes.is_finite(lane) {
+                    continue;
+                }
+                self.colour[i] += m.sums[0] * share;
+                self.opacity[i] += m.sums[1] * share;
+                let to = |sums: &mut [f32], values: &[Lanes]| {
+                    for (sum, values) in sums.iter_mut().zip(values) {
+                        *sum += values[lane] * share;
+                    }
+                };
+                to(&mut self.position[i], &changes.position);
+                to(&mut self.scale[i], &changes.scale);
+                to(&mut self.rotation[i], &changes.rotation);
+            }
+        }
+    }
+}
+
+/// Squared derivatives of one picture by the positions and shapes of a group of Gaussians.
+struct Change {
+    position: [Lanes; 6],
+    scale: [Lanes; 3],
+    rotation: [Lanes; 3],
+}
+
+impl Change {
+    /// Carries the moments of a group over to the world.
+    #[inline(always)]
+    fn of(projection: &Projection, body: &Body, m: &[Lanes; SUMS]) -> Self {
+        let Derivatives { by_position, axes } = projection.derivatives(body);
+        let product = |p: usize, q: usize| {
+            let ([ux, uy], [wx, wy]) = (&by_position[p], &by_position[q]);
+            let [product] = each([ux, uy, wx, wy, &m[2], &m[3], &m[4]], |[ux, uy, wx, wy, xx, xy, yy]| {
+                [xx * ux * wx + xy * (ux * wy + uy * wx) + yy * uy * wy]
+            });
+            product
+        };
+        let position =
+            [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)];
+        // With the covariance the sum of a a^T over the axes on screen, d ln alpha / d ln s_k is (u . R a_k)^2
+        // and a rotation in the plane of j and k by one radian makes
+        // (u . R a_j) (u . R a_k) (s_j^2 - s_k^2) / (s_j s_k).
+        let fourth = |p: usize, q: usize| {
+            let ([px, py], [qx, qy]) = (&axes[p], &axes[q]);
+            let inputs = [px, py, qx, qy, &m[5], &m[6], &m[7], &m[8], &m[9]];
+            let [fourth] = each(inputs, |[px, py, qx, qy, m5, m6, m7, m8, m9]| {
+                // This is (u . p)^2 (u . q)^2 as a polynomial in u.
+                let square = |x: f32, y: f32| [x * x, 2.0 * x * y, y * y];
+                let (p, q) = (square(px, py), square(qx, qy));
+                let value = p[0] * q[0] * m5
+                    + (p[0] * q[1] + p[1] * q[0]) * m6
+                    + (p[0] * q[2] + p[1] * q[1] + p[2] * q[0]) * m7
+                    + (p[1] * q[2] + p[2] * q[1]) * m8
+                    + p[2] * q[2] * m9;
+                [if value > 0.0 { value } else { 0.0 }]
+            });
+            fourth
+        };
+        let turned = |j: usize, l: usize| {
+            let [turned] = each([&fourth(j, l), &body.scales[j], &body.scales[l]], |[fourth, j, l]| {
+                let ratio = exp(j - l);
+                let lever = ratio - 1.0 / ratio;
+                [fourth * lever * lever]
+            });
+            turned
+        };
+        let scale = [fourth(0, 0), fourth(1, 1), fourth(2, 2)];
+        Self { position, scale, rotation: [turned(1, 2), turned(2, 0), turned(0, 1)] }
+    }
+
+    /// Whether all values of a lane are finite.
+    fn is_finite(&self, lane: usize) -> bool {
+        self.position.iter().chain(&self.scale).chain(&self.rotation).all(|values| values[lane].is_finite())
+    }
+}

@@ -1,0 +1,64 @@
+//! A Gaussian on screen.
+
+/// A Gaussian on screen. It fills one line of the cache, since tiles read splats in the order of depth, which is none
+/// in memory.
+#[derive(Debug, Clone, Copy, Default)]
+#[repr(align(64))]
+pub(super) struct Splat {
+    /// Centre in pixels; pixel centres are integers.
+    pub(super) centre: [f32; 2],
+    /// Inverse covariance in 1 / square pixels: xx, xy, yy.
+    pub(super) conic: [f32; 3],
+    /// Opacity at the centre, 0 to 1.
+    pub(super) opacity: f32,
+    /// Colour towards the camera, not below 0.
+    pub(super) colour: [f32; 3],
+    /// Powers below this give an opacity below [`ALPHA_MIN`](crate::conventions::ALPHA_MIN) for sure.
+    pub(super) cutoff: f32,
+    /// The pixels that it may touch.
+    pub(super) pixels: PixelRect,
+    /// The yy of the covariance, in square pixels.
+    pub(super) variance_y: f32,
+    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
+    pub(super) depth: u32,
+    /// Its index in the scene.
+    pub(super) gaussian: u32,
+}
+
+impl Splat {
+    /// The root of its conic.
+    #[inline(always)]
+    pub(super) fn root(&self) -> Root {
+        Root::of_conic(self.conic, self.variance_y)
+    }
+}
+
+/// Pixels from `min` to before `max`, as (column, row).
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct PixelRect {
+    pub(super) min: [u16; 2],
+    pub(super) max: [u16; 2],
+}
+
+/// The upper triangular root R of a conic, `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in standard
+/// deviations, so that products of it neither grow with a Gaussian's size nor cancel in thin ones.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Root(pub(super) [f32; 3]);
+
+impl Root {
+    /// The root of a conic whose covariance has `variance_y` as its yy.
+    #[inline(always)]
+    pub(super) fn of_conic(conic: [f32; 3], variance_y: f32) -> Self {
+        let [xx, xy, _] = conic;
+        let root = xx.sqrt();
+        // The last element squared is the determinant over xx. The variance gives it without cancellation.
+        Self([root, xy / root, 1.0 / variance_y.sqrt()])
+    }
+
+    /// `R v`.
+    #[inline(always)]
+    pub(super) fn of(&self, v: [f32; 2]) -> [f32; 2] {
+        let [xx, xy, yy] = self.0;
+        [xx * v[0] + xy * v[1], yy * v[1]]
+    }
+}
