@@ -6,7 +6,7 @@ use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
 use super::lanes::{LANES, Lanes};
 use super::math::exp_in_range;
-use super::splat::Splat;
+use super::splat::{PixelRect, Splat};
 use super::trace::Trace;
 
 /// Side of a block in pixels. Most splats are small, and touch fewer blocks than rows of a tile.
@@ -94,6 +94,80 @@ impl Tile {
     }
 }
 
+/// Splats in blocks, waiting to be blended.
+///
+/// The steps of a batch are loops of their own. Most of their instructions then do not wait for each other: opacities
+/// depend on nothing drawn before.
+struct Queue {
+    splats: [Splat; FETCHED],
+    len: usize,
+    /// The splat's place in the batch, and column and row of the block, of each entry.
+    places: [[u8; 3]; QUEUED],
+    /// The exponent of each pixel's opacity, and then the opacity.
+    lanes: [Lanes; QUEUED],
+}
+
+/// Most entries of a queue: every block for every splat.
+const QUEUED: usize = FETCHED * BLOCKS * BLOCKS;
+/// A queue's entries are counted by their low bits, so that no index can be out of range.
+const _: () = assert!(QUEUED.is_power_of_two() && BLOCKS.is_power_of_two() && FETCHED.is_power_of_two());
+
+impl Queue {
+    const EMPTY: Self = Self {
+        splats: [Splat {
+            centre: [0.0; 2],
+            conic: [0.0; 3],
+            opacity: 0.0,
+            colour: [0.0; 3],
+            cutoff: 0.0,
+            pixels: PixelRect { min: [0; 2], max: [0; 2] },
+            variance_y: 0.0,
+            depth: 0,
+            gaussian: 0,
+        }; FETCHED],
+        len: 0,
+        places: [[0; 3]; QUEUED],
+        lanes: [[0.0; LANES]; QUEUED],
+    };
+
+    /// Replaces the entries by those of the splats in `slots`, in the open blocks of `tile` that they may touch.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "a place in a batch or a tile")]
+    fn fill(
+        &mut self,
+        splats: &[Splat],
+        slots: &[u32],
+        tile: Tile,
+        [x, y]: &[[Lanes; BLOCKS]; 2],
+        open: &[[bool; BLOCKS]; BLOCKS],
+    ) {
+        for (to, slot) in self.splats.iter_mut().zip(slots) {
+            *to = splats[*slot as usize];
+        }
+        self.len = 0;
+        for (k, splat) in self.splats.iter().enumerate().take(slots.len()) {
+            let [first, end] = tile.reach(splat);
+            for column in first[0]..end[0] {
+                for row in first[1]..end[1] {
+                    if open[column][row] {
+                        let at = self.len % QUEUED;
+                        self.places[at] = [k as u8, column as u8, row as u8];
+                        let any = powers(&mut self.lanes[at], splat, &x[column], &y[row]);
+                        self.len += usize::from(any);
+                    }
+                }
+            }
+        }
+    }
+
+    /// The splat and the block's column and row of an entry.
+    #[inline(always)]
+    fn place(&self, at: usize) -> (&Splat, usize, usize) {
+        let [k, column, row] = self.places[at % QUEUED].map(usize::from);
+        (&self.splats[k % FETCHED], column % BLOCKS, row % BLOCKS)
+    }
+}
+
 /// Draws a tile from the splats in `list`, slots of `splats` from front to back.
 pub(super) fn tile<'a>(
     simd: Simd,
@@ -134,7 +208,7 @@ pub(super) fn draw<'a>(
     background: [f32; 3],
     watch: &mut impl Watch,
 ) -> TilePixels {
-    let [x, y] = tile.coordinates();
+    let coordinates = tile.coordinates();
     let mut blocks = tile.inside().map(|column| {
         column.map(|inside| Block {
             red: [0.0; LANES],
@@ -145,32 +219,25 @@ pub(super) fn draw<'a>(
         })
     });
     let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
-    let mut blocks_open = open.as_flattened().iter().filter(|open| **open).count();
-    let mut fetched = [Splat::default(); FETCHED];
+    let mut queue = Queue::EMPTY;
     for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
-        for (to, slot) in fetched.iter_mut().zip(slots) {
-            *to = splats[*slot as usize];
+        queue.fill(splats, slots, tile, &coordinates, &open);
+        for at in 0..queue.len {
+            let (&Splat { opacity, cutoff, .. }, ..) = queue.place(at);
+            alphas(&mut queue.lanes[at % QUEUED], opacity, cutoff);
         }
-        for splat in &fetched[..slots.len()] {
-            let [first, end] = tile.reach(splat);
-            for column in first[0]..end[0] {
-                for row in first[1]..end[1] {
-                    if !open[column][row] {
-                        continue;
-                    }
-                    let Some(alpha) = alphas(splat, &x[column], &y[row]) else { continue };
-                    let (counts, finished) = blend(&mut blocks[column][row], splat, &alpha);
-                    if counts {
-                        watch.counts(splat, [column, row], &alpha);
-                    }
-                    if finished {
-                        open[column][row] = false;
-                        blocks_open -= 1;
-                    }
-                }
+        let mut any_finished = false;
+        for at in 0..queue.len {
+            let (splat, column, row) = queue.place(at);
+            let alpha = &queue.lanes[at % QUEUED];
+            let (counts, finished) = blend(&mut blocks[column][row], splat, alpha);
+            if counts {
+                watch.counts(splat, [column, row], alpha);
             }
+            open[column][row] = !finished;
+            any_finished |= finished;
         }
-        if blocks_open == 0 {
+        if any_finished && open == [[false; BLOCKS]; BLOCKS] {
             break;
         }
     }
@@ -215,36 +282,33 @@ fn blend(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
     (changed != 0, still_open == 0)
 }
 
-/// Returns the opacities of `splat` at the pixels of a block, 0 where it does not count; `None` if it counts
-/// nowhere.
+/// Writes the exponents of the opacities of `splat` at the pixels of a block. Returns whether any may count.
 #[inline(always)]
-fn alphas(splat: &Splat, x: &Lanes, y: &Lanes) -> Option<Lanes> {
-    let Splat { conic: [a, b, c], opacity, cutoff, .. } = *splat;
-    let mut power = [0.0; LANES];
+fn powers(powers: &mut Lanes, splat: &Splat, x: &Lanes, y: &Lanes) -> bool {
+    let Splat { conic: [a, b, c], cutoff, .. } = *splat;
     let mut any = false;
     for lane in 0..LANES {
         let (dx, dy) = (splat.centre[0] - x[lane], splat.centre[1] - y[lane]);
         let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
-        power[lane] = p;
+        powers[lane] = p;
         any |= p >= cutoff;
     }
-    if !any {
-        return None;
-    }
-    let mut alpha = [0.0; LANES];
-    for lane in 0..LANES {
-        let p = power[lane];
-        let value = opacity * exp_in_range(p);
+    any
+}
+
+/// Replaces the exponents of a block's pixels by the opacities there, 0 where the splat does not count.
+#[inline(always)]
+fn alphas(lanes: &mut Lanes, opacity: f32, cutoff: f32) {
+    for p in lanes {
+        let value = opacity * exp_in_range(*p);
         let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
-        let counts = (p >= cutoff) & (p <= 0.0) & (value >= ALPHA_MIN);
-        alpha[lane] = if counts { value } else { 0.0 };
+        let counts = (*p >= cutoff) & (*p <= 0.0) & (value >= ALPHA_MIN);
+        *p = if counts { value } else { 0.0 };
     }
-    Some(alpha)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::splat::PixelRect;
     use super::*;
 
     /// The vector instructions that this machine has round as the plain ones do.
