@@ -59,7 +59,7 @@ impl<'a> Radiance<'a> {
     /// # Panics
     /// If the scene has no Gaussian `i`.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn colour(&self, i: usize, direction: [f32; 3]) -> [f32; 3] {
         let per_channel = self.degree.rest_per_channel();
         let mut rest = [0.0; CHANNELS];
@@ -85,7 +85,7 @@ impl<'a> Radiance<'a> {
 }
 
 /// Returns the dot products of the three channels of a channel-major row with the basis.
-#[inline]
+#[inline(always)]
 fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];
     for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(per_channel)) {
@@ -101,7 +101,7 @@ fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
 }
 
 /// Returns the dot products for a code: `sum_j value_j * (basis . atom_j)`.
-#[inline]
+#[inline(always)]
 fn sparse(
     code: impl Iterator<Item = (usize, f32)>,
     atoms: &[[f32; PADDED]],

@@ -1,11 +1,12 @@
 //! One interface for drawing on the processor and on a GPU.
 
 use std::str::FromStr;
+use std::sync::Mutex;
 
 use lexisplat::{Progress, Sensitivity};
 
 use crate::camera::Camera;
-use crate::cpu::{RenderOptions, render, sensitivity};
+use crate::cpu::{RenderOptions, Workspace, render_with, sensitivity};
 use crate::error::{Error, Result};
 #[cfg(feature = "gpu")]
 use crate::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
@@ -55,6 +56,8 @@ pub struct Renderer {
 #[derive(Debug)]
 pub struct Prepared<'a> {
     scene: Scene<'a>,
+    /// The processor's, from one picture to the next.
+    workspace: Mutex<Workspace>,
     #[cfg(feature = "gpu")]
     gpu: Option<GpuScene>,
 }
@@ -157,6 +160,7 @@ impl Renderer {
                 None => None,
             },
             scene,
+            workspace: Mutex::default(),
         })
     }
 
@@ -175,7 +179,10 @@ impl Renderer {
         if let (Some((_, renderer)), Some(scene)) = (&mut self.gpu, &prepared.gpu) {
             return Ok(renderer.render_async(scene, camera, options).await?.0);
         }
-        render(&prepared.scene, camera, options)
+        // A picture drawn from another thread at the same time, or one that panicked, has memory of its own.
+        let mut own = Workspace::default();
+        let mut shared = prepared.workspace.try_lock().ok();
+        Ok(render_with(shared.as_deref_mut().unwrap_or(&mut own), &prepared.scene, camera, options)?.image)
     }
 
     /// Returns how much the pictures of `scene` from `cameras` change with each value of each Gaussian: see

@@ -6,7 +6,7 @@ use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
 use super::lanes::{LANES, Lanes};
 use super::math::exp_in_range;
-use super::splat::{PixelRect, Splat};
+use super::splat::Splat;
 use super::trace::Trace;
 
 /// Side of a block in pixels. Most splats are small, and touch fewer blocks than rows of a tile.
@@ -98,7 +98,8 @@ impl Tile {
 ///
 /// The steps of a batch are loops of their own. Most of their instructions then do not wait for each other: opacities
 /// depend on nothing drawn before.
-struct Queue {
+#[derive(Debug)]
+pub(super) struct Queue {
     splats: [Splat; FETCHED],
     len: usize,
     /// The splat's place in the batch, and column and row of the block, of each entry.
@@ -112,24 +113,18 @@ const QUEUED: usize = FETCHED * BLOCKS * BLOCKS;
 /// A queue's entries are counted by their low bits, so that no index can be out of range.
 const _: () = assert!(QUEUED.is_power_of_two() && BLOCKS.is_power_of_two() && FETCHED.is_power_of_two());
 
-impl Queue {
-    const EMPTY: Self = Self {
-        splats: [Splat {
-            centre: [0.0; 2],
-            conic: [0.0; 3],
-            opacity: 0.0,
-            colour: [0.0; 3],
-            cutoff: 0.0,
-            pixels: PixelRect { min: [0; 2], max: [0; 2] },
-            variance_y: 0.0,
-            depth: 0,
-            gaussian: 0,
-        }; FETCHED],
-        len: 0,
-        places: [[0; 3]; QUEUED],
-        lanes: [[0.0; LANES]; QUEUED],
-    };
+impl Default for Queue {
+    fn default() -> Self {
+        Self {
+            splats: [Splat::default(); FETCHED],
+            len: 0,
+            places: [[0; 3]; QUEUED],
+            lanes: [[0.0; LANES]; QUEUED],
+        }
+    }
+}
 
+impl Queue {
     /// Replaces the entries by those of the splats in `slots`, in the open blocks of `tile` that they may touch.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "a place in a batch or a tile")]
@@ -168,17 +163,18 @@ impl Queue {
     }
 }
 
-/// Draws a tile from the splats in `list`, slots of `splats` from front to back.
+/// Draws a tile from the splats in `list`, slots of `splats` from front to back. `queue` is overwritten.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
     background: [f32; 3],
+    queue: &mut Queue,
 ) -> TilePixels {
     simd.dispatch(
         #[inline(always)]
-        || draw(splats, list, tile, background, &mut ()),
+        || draw(splats, list, tile, background, queue, &mut ()),
     )
 }
 
@@ -206,6 +202,7 @@ pub(super) fn draw<'a>(
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
     background: [f32; 3],
+    queue: &mut Queue,
     watch: &mut impl Watch,
 ) -> TilePixels {
     let coordinates = tile.coordinates();
@@ -219,7 +216,6 @@ pub(super) fn draw<'a>(
         })
     });
     let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
-    let mut queue = Queue::EMPTY;
     for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
         queue.fill(splats, slots, tile, &coordinates, &open);
         for at in 0..queue.len {
@@ -309,6 +305,7 @@ fn alphas(lanes: &mut Lanes, opacity: f32, cutoff: f32) {
 
 #[cfg(test)]
 mod tests {
+    use super::super::splat::PixelRect;
     use super::*;
 
     /// The vector instructions that this machine has round as the plain ones do.
@@ -333,9 +330,9 @@ mod tests {
         let list: Vec<u32> = (0..300).collect();
         let list = || list.chunks(70);
         let (at, background) = (Tile::new([1, 3], [100; 2]), [0.1, 0.5, 0.9]);
-        let plain = draw(&splats, list(), at, background, &mut ());
+        let plain = draw(&splats, list(), at, background, &mut Queue::default(), &mut ());
         for simd in Simd::available() {
-            let chosen = tile(simd, &splats, list(), at, background);
+            let chosen = tile(simd, &splats, list(), at, background, &mut Queue::default());
             for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
                 let bits = plain.pixel(x, y).map(f32::to_bits);
                 assert_eq!(chosen.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");

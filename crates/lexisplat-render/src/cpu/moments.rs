@@ -4,7 +4,7 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::TRANSMITTANCE_MIN;
 
-use super::blend::{self, BLOCKS, SIDE, Tile, TilePixels};
+use super::blend::{self, BLOCKS, Queue, SIDE, Tile, TilePixels};
 use super::lanes::{LANES, Lanes};
 use super::splat::{Root, Splat};
 use super::trace::Trace;
@@ -39,23 +39,24 @@ impl Moments {
     }
 }
 
-/// Returns the moments of the splats that show in a tile, by the Gaussian's index. `list` has slots of `splats` from
-/// front to back. `trace` is overwritten.
+/// Adds the moments of the splats that show in a tile to `out`, by the Gaussian's index. `list` has slots of `splats`
+/// from front to back. `queue` and `trace` are overwritten.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
-    trace: &mut Trace,
-) -> Vec<(u32, Moments)> {
+    (queue, trace): (&mut Queue, &mut Trace),
+    out: &mut Vec<(u32, Moments)>,
+) {
     trace.clear();
     simd.dispatch(
         #[inline(always)]
         || {
-            let picture = blend::draw(splats, list, tile, [0.0; 3], trace);
-            sum(trace, tile, &picture)
+            let picture = blend::draw(splats, list, tile, [0.0; 3], queue, trace);
+            sum(trace, tile, &picture, out);
         },
-    )
+    );
 }
 
 /// A block as far as it has been drawn.
@@ -86,28 +87,26 @@ impl ColumnSums {
     }
 }
 
-/// Returns the moments of the splats in `trace`. `picture` is the finished tile.
+/// Adds the moments of the splats in `trace` to `out`. `picture` is the finished tile.
 #[inline(always)]
-fn sum(trace: &Trace, tile: Tile, picture: &TilePixels) -> Vec<(u32, Moments)> {
-    let mut out: Vec<(u32, Moments)> =
-        trace.splats.iter().map(|splat| (splat.gaussian, Moments::default())).collect();
+fn sum(trace: &Trace, tile: Tile, picture: &TilePixels, out: &mut Vec<(u32, Moments)>) {
     let [x, y] = tile.coordinates();
     let mut blocks = tile.inside().map(|column| column.map(|open| Block { colour: [[0.0; LANES]; 3], open }));
     let mut columns = ColumnSums::ZERO;
     for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
-        let k = same[0].splat;
-        let splat = &trace.splats[k];
+        let splat = &trace.splats[same[0].splat];
         let root = splat.root();
+        let mut moments = Moments::default();
         for same in same.chunk_by(|a, b| a.block[0] == b.block[0]) {
             for mark in same {
                 let [column, row] = mark.block.map(|k| k % BLOCKS);
                 let block = &mut blocks[column][row];
                 add(&mut columns, block, splat, root, &mark.alpha, [&x[column], &y[row]], &picture.0[column][row]);
             }
-            columns.flush(&mut out[k].1);
+            columns.flush(&mut moments);
         }
+        out.push((splat.gaussian, moments));
     }
-    out
 }
 
 /// Draws `splat` on a block as `blend` does, and adds its moments to `columns`.
@@ -167,6 +166,6 @@ fn add(
         }
     }
     for row in removal.chunks_exact(SIDE) {
-        columns.removal.iter_mut().zip(row).for_each(|(most, value)| *most = value.max(*most));
+        columns.removal.iter_mut().zip(row).for_each(|(most, value)| *most = if value > most { *value } else { *most });
     }
 }

@@ -9,7 +9,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::blend::Tile;
+use super::blend::{Queue, Tile};
 use super::change::carry;
 use super::moments::{self, Moments};
 use super::project::Projection;
@@ -48,6 +48,8 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
 
 /// Tiles measured at a time. Their moments take 48 bytes for each splat of each tile.
 const TILES: usize = 64;
+/// Tiles that one task measures.
+const TILES_PER_TASK: usize = 4;
 
 /// Adds the moments of one view to `sums`, one for each Gaussian.
 fn measure(
@@ -67,12 +69,19 @@ fn measure(
         lists.fill(order, grid, &band);
         // Tiles are summed in order, so that results do not depend on the number of threads.
         let tiles = band.len() * grid.columns;
-        for first in (0..tiles).step_by(TILES) {
-            let parts: Vec<Vec<(u32, Moments)>> = (first..(first + TILES).min(tiles))
-                .into_par_iter()
-                .map(|tile| {
-                    let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
-                    moments::tile(simd, &visible.slots, lists.of(tile), place, &mut Trace::default())
+        let starts: Vec<usize> = (0..tiles).step_by(TILES_PER_TASK).collect();
+        for starts in starts.chunks(TILES / TILES_PER_TASK) {
+            let parts: Vec<Vec<(u32, Moments)>> = starts
+                .par_iter()
+                .map(|&start| {
+                    let (mut queue, mut trace, mut out) = (Queue::default(), Trace::default(), Vec::new());
+                    for tile in start..(start + TILES_PER_TASK).min(tiles) {
+                        let place = [tile % grid.columns, band.start + tile / grid.columns];
+                        let place = Tile::new(place, size);
+                        let list = lists.of(tile);
+                        moments::tile(simd, &visible.slots, list, place, (&mut queue, &mut trace), &mut out);
+                    }
+                    out
                 })
                 .collect();
             for (gaussian, part) in parts.into_iter().flatten() {

@@ -107,7 +107,7 @@ impl std::fmt::Display for ShDegree {
 /// Source: INRIA `diff-gaussian-rasterization` 59f5f77, `forward.cu`, `computeColorFromSH`; degree 4
 /// as in gsplat.
 #[must_use]
-#[inline]
+#[inline(always)]
 pub fn rest_basis(degree: ShDegree, direction: [f32; 3]) -> [f32; MAX_COEFFICIENTS - 1] {
     let [x, y, z] = direction;
     let mut b = [0.0; MAX_COEFFICIENTS - 1];
