@@ -1,5 +1,6 @@
-//! Measures how fast the processor draws: `drawing_speed SCENE CAMERAS [VIEWS] [ROUNDS]`. `RAYON_NUM_THREADS=1`
-//! restricts it to one core, `LEXISPLAT_SIMD` chooses the vector instructions.
+//! Measures how fast the processor draws: `drawing_speed SCENE CAMERAS [VIEWS] [ROUNDS]`. The cameras `around` are
+//! some like those that packing generates. `RAYON_NUM_THREADS=1` restricts it to one core, `LEXISPLAT_SIMD`
+//! chooses the vector instructions.
 //!
 //! Prints the best time of a picture and of its stages, and that of a pass of sensitivity, each as the mean over the
 //! views. The checksums are those of the pictures and of the sensitivities.
@@ -12,7 +13,11 @@ use lexisplat::ply::ReadOptions;
 use lexisplat::simd::Simd;
 use lexisplat::{Sensitivity, Silent};
 use lexisplat_eval::SceneFile;
-use lexisplat_render::{RenderOptions, read_views, render_measured, sensitivity};
+use lexisplat_render::{RenderOptions, read_views, render_measured, sensitivity, surround};
+
+/// Size and distances of the views that packing generates to measure.
+const AROUND_SIZE: [u32; 2] = [384, 256];
+const AROUND_DISTANCES: [f64; 2] = [2.0, 12.0];
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
@@ -26,7 +31,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn measure(file: &str, cameras: &str, views: usize, rounds: usize) -> Result<(), Box<dyn std::error::Error>> {
     let scene_file = SceneFile::read(Path::new(file), &ReadOptions::default())?;
     let scene = scene_file.scene();
-    let all = read_views(Path::new(cameras), &mut |_| None)?.cameras;
+    let all = match cameras {
+        "around" => surround(scene.geometry(), views, AROUND_SIZE, AROUND_DISTANCES),
+        _ => read_views(Path::new(cameras), &mut |_| None)?.cameras,
+    };
     let every = all.len().div_ceil(views).max(1);
     let cameras: Vec<_> = all.into_iter().step_by(every).collect();
     let options = RenderOptions::default();

@@ -87,13 +87,30 @@ impl<'a> Radiance<'a> {
 /// Returns the dot products of the three channels of a channel-major row with the basis.
 #[inline(always)]
 fn dense(row: &[f32], per_channel: usize, basis: &Basis) -> [f32; CHANNELS] {
+    // A number of coefficients that the compiler knows makes the loops a few vector instructions.
+    match per_channel {
+        3 => dense_of::<3>(row, basis),
+        8 => dense_of::<8>(row, basis),
+        15 => dense_of::<15>(row, basis),
+        24 => dense_of::<24>(row, basis),
+        _ => [0.0; CHANNELS],
+    }
+}
+
+/// [`dense`] for `N` coefficients a channel.
+#[inline(always)]
+fn dense_of<const N: usize>(row: &[f32], basis: &Basis) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];
-    for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(per_channel)) {
+    for (sum, channel) in sums.iter_mut().zip(row.as_chunks::<N>().0) {
         let mut lanes = [0.0_f32; LANES];
-        for (channel, basis) in channel.chunks(LANES).zip(basis.chunks(LANES)) {
-            for ((lane, value), b) in lanes.iter_mut().zip(channel).zip(basis) {
-                *lane += value * b;
+        let products: [f32; N] = std::array::from_fn(|k| channel[k] * basis[k]);
+        for k in 0..N / LANES {
+            for lane in 0..LANES {
+                lanes[lane] += products[k * LANES + lane];
             }
+        }
+        for lane in 0..N % LANES {
+            lanes[lane] += products[N / LANES * LANES + lane];
         }
         *sum = (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
     }

@@ -1,12 +1,16 @@
 //! Sorts splats by depth. That happens once for each picture, so that every tile's list comes out sorted.
 
+use crate::parallel::*;
+
 use super::splat::PixelRect;
 use super::visible::Visible;
 
-/// Bits of a key sorted in one pass; three passes cover 32.
-const DIGIT_BITS: u32 = 11;
-const DIGITS: usize = 1 << DIGIT_BITS;
-const PASSES: usize = u32::BITS.div_ceil(DIGIT_BITS) as usize;
+/// Passes of the sort. Each sorts by a digit.
+const PASSES: u32 = 3;
+/// Most values of a digit: three digits cover 32 bits.
+const MAX_DIGITS: usize = 1 << u32::BITS.div_ceil(PASSES);
+/// Splats whose pixels one task collects.
+const RECTS_PER_TASK: usize = 1 << 14;
 
 /// Splats in the order of depth, the nearest first; those of equal depth are in order of index.
 #[derive(Debug, Default)]
@@ -26,32 +30,39 @@ impl Order {
         let slot = |slot: usize| u32::try_from(slot).unwrap_or(u32::MAX);
         self.splats.extend(visible.occupied().map(|k| (visible.slots[k].depth, slot(k))));
         sort(&mut self.splats, &mut self.spare);
-        self.rects.clear();
-        self.rects.extend(self.splats.iter().map(|&(_, slot)| visible.slots[slot as usize].pixels));
+        self.rects.resize(self.splats.len(), PixelRect::default());
+        let tasks = self.rects.par_chunks_mut(RECTS_PER_TASK).zip(self.splats.par_chunks(RECTS_PER_TASK));
+        tasks.for_each(|(rects, splats)| {
+            for (rect, &(_, slot)) in rects.iter_mut().zip(splats) {
+                *rect = visible.slots[slot as usize].pixels;
+            }
+        });
     }
 }
 
 /// Sorts (key, index) in ascending order of key. A stable radix sort: ties stay in order.
 fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
-    let digit = |pass: usize, key: u32| (key >> (pass as u32 * DIGIT_BITS)) as usize % DIGITS;
-    let mut starts = vec![[0_usize; DIGITS]; PASSES];
+    let (least, most) = pairs.iter().fold((u32::MAX, 0), |(a, b), &(key, _)| (a.min(key), b.max(key)));
+    // Depths of one scene differ in few of their high bits. Digits as small as can be keep what is written to in the
+    // cache.
+    let digit_bits = (u32::BITS - most.saturating_sub(least).leading_zeros()).div_ceil(PASSES).max(1);
+    let digits = 1 << digit_bits;
+    let digit = |pass: u32, key: u32| ((key - least) >> (pass * digit_bits)) as usize % digits;
+    let mut starts = vec![[0_u32; MAX_DIGITS]; PASSES as usize];
     for &(key, _) in pairs.iter() {
-        for (pass, starts) in starts.iter_mut().enumerate() {
+        for (pass, starts) in (0..).zip(&mut starts) {
             starts[digit(pass, key)] += 1;
         }
     }
     spare.resize(pairs.len(), (0, 0));
-    for (pass, starts) in starts.iter_mut().enumerate() {
-        if starts.contains(&pairs.len()) {
-            continue;
-        }
+    for (pass, starts) in (0..).zip(&mut starts) {
         let mut sum = 0;
-        for start in starts.iter_mut() {
+        for start in starts.iter_mut().take(digits) {
             sum += std::mem::replace(start, sum);
         }
         for &pair in pairs.iter() {
             let at = &mut starts[digit(pass, pair.0)];
-            spare[*at] = pair;
+            spare[*at as usize] = pair;
             *at += 1;
         }
         std::mem::swap(pairs, spare);
@@ -72,9 +83,9 @@ mod tests {
                 if i % 2 == 0 { state } else { state >> 28 }
             })
             .collect();
-        // All digits differ; only the lowest do.
-        for mask in [u32::MAX, 0x7ff] {
-            let mut pairs: Vec<(u32, u32)> = keys.iter().map(|key| key & mask).zip(0..).collect();
+        // All bits differ; only the lowest; only some in between; none.
+        for mask in [u32::MAX, 0x7f, 0x1_ff00, 0] {
+            let mut pairs: Vec<(u32, u32)> = keys.iter().map(|key| key & mask | !mask).zip(0..).collect();
             let mut expected = pairs.clone();
             expected.sort_by_key(|pair| pair.0);
             sort(&mut pairs, &mut Vec::new());

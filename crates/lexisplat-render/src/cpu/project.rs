@@ -157,9 +157,10 @@ impl Projection {
         }
         let [px, py, pz] = &body.position;
         let direction = each([px, py, pz], |position| {
-            let offset: [f32; 3] = std::array::from_fn(|k| position[k] - self.camera.position[k]);
-            let length = (offset[0] * offset[0] + offset[1] * offset[1] + offset[2] * offset[2]).sqrt();
-            offset.map(|v| v / length)
+            let offset = |k: usize| position[k] - self.camera.position[k];
+            let (x, y, z) = (offset(0), offset(1), offset(2));
+            let length = (x * x + y * y + z * z).sqrt();
+            [x / length, y / length, z / length]
         });
         let Ellipse { conic, variance: [_, variance_y], .. } = ellipse;
         let cutoff = if self.tighten { cutoff } else { [NO_CUTOFF; LANES] };
@@ -182,8 +183,7 @@ impl Projection {
             each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| Root([xx, xy, yy]).of([x, y]))
         };
         let [x, y, z] = &view;
-        let by_position: [[Lanes; 2]; 3] = std::array::from_fn(|k| {
-            let [right, down, forward] = self.camera.rotation[k];
+        let moved = |[right, down, forward]: [f32; 3]| {
             let moved = each([x, y, z], |[x, y, z]| {
                 [
                     self.focal[0] * (right * z - forward * x) / (z * z),
@@ -191,8 +191,10 @@ impl Projection {
                 ]
             });
             rooted(&moved)
-        });
-        Derivatives { by_position, axes: std::array::from_fn(|k| rooted(&on_screen[k])) }
+        };
+        let [a, b, c] = self.camera.rotation;
+        let [p, q, r] = &on_screen;
+        Derivatives { by_position: [moved(a), moved(b), moved(c)], axes: [rooted(p), rooted(q), rooted(r)] }
     }
 
     /// Returns positions in view space.
@@ -220,13 +222,13 @@ impl Projection {
         });
         let r = &self.camera.rotation;
         let [xx, xz, yy, yz] = &jacobian;
-        std::array::from_fn(|a| {
-            let [x, y, z] = &axes[a];
+        let seen = |[x, y, z]: &[Lanes; 3]| {
             each([x, y, z, xx, xz, yy, yz], |[x, y, z, xx, xz, yy, yz]| {
-                let seen: [f32; 3] = std::array::from_fn(|k| r[0][k] * x + r[1][k] * y + r[2][k] * z);
-                [xx * seen[0] + xz * seen[2], yy * seen[1] + yz * seen[2]]
+                let along = |k: usize| r[0][k] * x + r[1][k] * y + r[2][k] * z;
+                [xx * along(0) + xz * along(2), yy * along(1) + yz * along(2)]
             })
-        })
+        };
+        [seen(&axes[0]), seen(&axes[1]), seen(&axes[2])]
     }
 
     /// Returns the pixels that may be touched: the first column and row, and the first after the last.
