@@ -26,15 +26,13 @@ impl Order {
     /// Sorts `visible`, in place of the splats of the picture before.
     pub(super) fn sort(&mut self, visible: &Visible) {
         self.splats.clear();
-        // Gaussians are counted in u32.
-        let slot = |slot: usize| u32::try_from(slot).unwrap_or(u32::MAX);
-        self.splats.extend(visible.occupied().map(|k| (visible.slots[k].depth, slot(k))));
+        self.splats.extend(visible.marked().map(|(slot, mark)| (mark.depth, slot)));
         sort(&mut self.splats, &mut self.spare);
         self.rects.resize(self.splats.len(), PixelRect::default());
         let tasks = self.rects.par_chunks_mut(RECTS_PER_TASK).zip(self.splats.par_chunks(RECTS_PER_TASK));
         tasks.for_each(|(rects, splats)| {
             for (rect, &(_, slot)) in rects.iter_mut().zip(splats) {
-                *rect = visible.slots[slot as usize].pixels;
+                *rect = visible.mark(slot).pixels;
             }
         });
     }

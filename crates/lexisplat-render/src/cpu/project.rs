@@ -405,13 +405,13 @@ mod tests {
         Splats { geometry, degree: ShDegree::ZERO, sh_rest: Vec::new(), meta: SceneMeta::default() }
     }
 
-    fn draw(splats: &Splats, antialiased: bool) -> Option<Splat> {
+    fn draw(splats: &Splats, antialiased: bool) -> Option<(Splat, u32)> {
         let camera = straight_ahead(100, 80, 100.0);
         let projection = Projection::new(&camera, antialiased);
         let mut visible = Visible::default();
         let radiance = Radiance::new(&Scene::from(splats));
         visible.project(Simd::current(), &splats.geometry, &radiance, &projection);
-        visible.occupied().next().map(|slot| visible.slots[slot])
+        visible.marked().next().map(|(slot, mark)| (visible.slots[slot as usize], mark.depth))
     }
 
     fn near(a: f32, b: f32) -> bool {
@@ -420,19 +420,19 @@ mod tests {
 
     #[test]
     fn a_point_lands_where_ndc2pix_puts_it() {
-        let splat = draw(&one([0.5, -0.25, 2.0], -20.0), false).unwrap();
+        let (splat, depth) = draw(&one([0.5, -0.25, 2.0], -20.0), false).unwrap();
         assert!(near(splat.centre[0], 49.5 + 25.0) && near(splat.centre[1], 39.5 - 12.5), "{splat:?}");
         // A point is the dilation alone.
         assert!(splat.conic.iter().zip([1.0 / 0.3, 0.0, 1.0 / 0.3]).all(|(a, b)| near(*a, b)), "{splat:?}");
         assert!(near(splat.opacity, 0.5));
         assert!(near(splat.colour[0], 0.782_094_8) && near(splat.colour[1], 0.5) && splat.colour[2] == 0.0);
-        assert_eq!(splat.depth, 2.0_f32.to_bits());
+        assert_eq!(depth, 2.0_f32.to_bits());
     }
 
     #[test]
     fn a_sphere_on_the_axis_has_the_variance_of_similar_triangles() {
         // Deviation e^-1 at distance 4 with focal length 100.
-        let splat = draw(&one([0.0, 0.0, 4.0], -1.0), false).unwrap();
+        let (splat, _) = draw(&one([0.0, 0.0, 4.0], -1.0), false).unwrap();
         let variance = (100.0 * (-1.0_f32).exp() / 4.0).powi(2) + DILATION;
         assert!(near(splat.conic[0] * variance, 1.0) && splat.conic[1] == 0.0, "{splat:?}");
     }
@@ -442,7 +442,7 @@ mod tests {
         let far = draw(&one([0.0, 0.0, 4.0], -20.0), true);
         // The factor's floor is 0.005, and 0.5 * 0.005 is below 1/255.
         assert!(far.is_none());
-        let splat = draw(&one([0.0, 0.0, 4.0], -4.0), true).unwrap();
+        let (splat, _) = draw(&one([0.0, 0.0, 4.0], -4.0), true).unwrap();
         let variance = (100.0 * (-4.0_f32).exp() / 4.0).powi(2);
         assert!(near(splat.opacity, 0.5 * variance / (variance + DILATION)), "{splat:?}");
     }

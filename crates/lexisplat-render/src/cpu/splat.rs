@@ -19,8 +19,6 @@ pub(super) struct Splat {
     pub(super) pixels: PixelRect,
     /// The yy of the covariance, in square pixels.
     pub(super) variance_y: f32,
-    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
-    pub(super) depth: u32,
     /// Its index in the scene.
     pub(super) gaussian: u32,
 }

@@ -21,7 +21,18 @@ pub(super) const GAUSSIANS_PER_TASK: usize = 1024;
 #[derive(Debug, Default)]
 pub(super) struct Visible {
     pub(super) slots: Vec<Splat>,
+    /// What sorting and listing read of each slot, apart from the slots, which are many times as large.
+    marks: Vec<Mark>,
     counts: Vec<usize>,
+}
+
+/// Where a splat comes in the order of depth, and where it goes.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Mark {
+    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
+    pub(super) depth: u32,
+    /// The pixels that it may touch.
+    pub(super) pixels: PixelRect,
 }
 
 impl Visible {
@@ -34,15 +45,17 @@ impl Visible {
         projection: &Projection,
     ) {
         self.slots.resize(geometry.len(), Splat::default());
+        self.marks.resize(geometry.len(), Mark::default());
         self.counts = self
             .slots
             .par_chunks_mut(GAUSSIANS_PER_TASK)
+            .zip(self.marks.par_chunks_mut(GAUSSIANS_PER_TASK))
             .enumerate()
-            .map(|(task, slots)| {
+            .map(|(task, (slots, marks))| {
                 let first = task * GAUSSIANS_PER_TASK;
                 simd.dispatch(
                     #[inline(always)]
-                    || project(slots, first, geometry, radiance, projection),
+                    || project(slots, marks, first, geometry, radiance, projection),
                 )
             })
             .collect();
@@ -53,10 +66,20 @@ impl Visible {
         self.counts.iter().sum()
     }
 
-    /// The slots that hold a Gaussian.
-    pub(super) fn occupied(&self) -> impl Iterator<Item = usize> {
-        let tasks = self.counts.iter().enumerate();
-        tasks.flat_map(|(task, count)| task * GAUSSIANS_PER_TASK..task * GAUSSIANS_PER_TASK + count)
+    /// The slots that hold a Gaussian, and their marks.
+    pub(super) fn marked(&self) -> impl Iterator<Item = (u32, &Mark)> {
+        // Gaussians are counted in u32.
+        let slot = |slot: usize| u32::try_from(slot).unwrap_or(u32::MAX);
+        let firsts = (0..).step_by(GAUSSIANS_PER_TASK);
+        let tasks = firsts.zip(self.marks.chunks(GAUSSIANS_PER_TASK)).zip(&self.counts);
+        tasks.flat_map(move |((first, marks), count)| {
+            marks.iter().take(*count).enumerate().map(move |(k, mark)| (slot(first + k), mark))
+        })
+    }
+
+    /// The mark of a slot.
+    pub(super) fn mark(&self, slot: u32) -> &Mark {
+        &self.marks[slot as usize]
     }
 }
 
@@ -64,6 +87,7 @@ impl Visible {
 #[inline(always)]
 fn project(
     slots: &mut [Splat],
+    marks: &mut [Mark],
     first: usize,
     geometry: &Geometry,
     radiance: &Radiance<'_>,
@@ -87,16 +111,17 @@ fn project(
             if !colour.iter().all(|v| v.is_finite()) {
                 continue;
             }
+            let pixels = PixelRect { min: min.map(whole), max: max.map(whole) };
+            marks[count] = Mark { depth: placed.depth[lane].to_bits(), pixels };
             slots[count] = Splat {
                 centre: placed.centre.map(|v| v[lane]),
                 conic: placed.conic.map(|v| v[lane]),
                 opacity: placed.opacity[lane],
                 colour,
                 cutoff: placed.cutoff[lane],
-                pixels: PixelRect { min: min.map(whole), max: max.map(whole) },
+                pixels,
                 variance_y: placed.variance_y[lane],
-                depth: placed.depth[lane].to_bits(),
-                // Gaussians are counted in u32 since the order of depth.
+                // Gaussians are counted in u32 since `marked`.
                 gaussian: u32::try_from(i).unwrap_or(u32::MAX),
             };
             count += 1;
