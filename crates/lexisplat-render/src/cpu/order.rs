@@ -19,7 +19,8 @@ pub(super) struct Order {
     pub(super) splats: Vec<(u32, u32)>,
     /// The pixels that each may touch, side by side, since the lists of tiles read nothing else.
     pub(super) rects: Vec<PixelRect>,
-    spare: Vec<(u32, u32)>,
+    /// What sorting writes to in turn with `splats`.
+    pub(super) spare: Vec<(u32, u32)>,
 }
 
 impl Order {
