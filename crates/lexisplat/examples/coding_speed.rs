@@ -1,13 +1,15 @@
 //! Measures the coding step alone: pursuit, rounding of values, and verification of the bound.
 //!
 //! `cargo run --release -p lexisplat --example coding_speed -- SCENE.ply DICTIONARY.lexi TOL PURSUIT THREADS REPEATS`
-//! prints one JSON object. The dictionary may be a dictionary file or a compressed scene.
+//! prints one JSON object. The dictionary may be a dictionary file or a compressed scene. `LEXISPLAT_SIMD` chooses the
+//! vector instructions.
 //! `benches/coding_beside_spams.py` compares this program with SPAMS.
 
 use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
+use lexisplat::simd::Simd;
 use lexisplat::pursuit::{Coder, Encoded, StopRule, ValueType};
 use lexisplat::{Limits, lexi, ply};
 use rayon::prelude::*;
@@ -16,6 +18,11 @@ use rayon::prelude::*;
 const GAUSSIANS_PER_TASK: usize = 2048;
 
 fn main() -> Result<(), Box<dyn Error>> {
+    let simd = std::env::var("LEXISPLAT_SIMD").ok().and_then(|name| Simd::named(&name));
+    simd.unwrap_or_else(Simd::widest).scope(measure)
+}
+
+fn measure() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [scene, dictionary, tolerance, pursuit, threads, repeats] = &arguments[..] else {
         return Err("usage: coding_speed SCENE.ply DICTIONARY.lexi TOL omp|ols THREADS REPEATS".into());
@@ -29,20 +36,22 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let run = || {
         let coder = Coder::new(&dictionary, pursuit.parse()?, stop, ValueType::F32);
+        let simd = Simd::current();
+        let code = |chunk: &[f32]| {
+            let (mut codes, mut escapes, mut worst) = (Vec::new(), 0_usize, 0.0_f64);
+            coder.encode(chunk, |visit| match visit.outcome {
+                Encoded::Code { error } => {
+                    worst = worst.max(error);
+                    codes.extend_from_slice(visit.code);
+                }
+                Encoded::Escape => escapes += 1,
+            });
+            (codes.len(), escapes, worst)
+        };
         let parts = pool.install(|| {
             signals
                 .par_chunks(GAUSSIANS_PER_TASK * dictionary.dim())
-                .map(|chunk| {
-                    let (mut codes, mut escapes, mut worst) = (Vec::new(), 0_usize, 0.0_f64);
-                    coder.encode(chunk, |visit| match visit.outcome {
-                        Encoded::Code { error } => {
-                            worst = worst.max(error);
-                            codes.extend_from_slice(visit.code);
-                        }
-                        Encoded::Escape => escapes += 1,
-                    });
-                    (codes.len(), escapes, worst)
-                })
+                .map(|chunk| simd.scope(|| code(chunk)))
                 .collect::<Vec<_>>()
         });
         Ok::<_, lexisplat::Error>(parts)

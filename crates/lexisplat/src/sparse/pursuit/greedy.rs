@@ -159,21 +159,17 @@ impl Plan {
         let right = &mut s.work[..k];
         right.copy_from_slice(&s.amplitudes[..k]);
         code.clear();
+        code.resize(k, (0, 0.0));
         for l in (0..k).rev() {
             let value = right[l] / s.diagonal[l];
             let column = &s.triangle[l * MAX_REST..l * MAX_REST + l];
             for (r, &c) in right[..l].iter_mut().zip(column) {
                 *r -= c * value;
             }
-            code.push((s.chosen[l], value));
-        }
-        // An insertion sort is faster than the general one for a dozen entries.
-        for i in 1..code.len() {
-            let mut j = i;
-            while j > 0 && code[j - 1].0 > code[j].0 {
-                code.swap(j - 1, j);
-                j -= 1;
-            }
+            // The place of an atom is the number of chosen ones before it. No branch depends on the atoms.
+            let atom = s.chosen[l];
+            let before: u16 = s.chosen[..k].iter().map(|&other| u16::from(other < atom)).sum();
+            code[usize::from(before)] = (atom, value);
         }
     }
 
@@ -236,12 +232,15 @@ fn best_ratio<'a>(correlations: &[Lane], distances: impl Iterator<Item = &'a Lan
     let mut spans = [1.0_f32; LANES];
     let mut blocks = [0_u32; LANES];
     for (number, (r, n)) in (0_u32..).zip(correlations.iter().zip(distances)) {
+        // Masks instead of conditions: the compiler would make writes to memory of those, which the next lane waits
+        // for.
         for i in 0..LANES {
             let gain = r.0[i] * r.0[i];
-            let better = gain * spans[i] > gains[i] * n.0[i];
-            gains[i] = if better { gain } else { gains[i] };
-            spans[i] = if better { n.0[i] } else { spans[i] };
-            blocks[i] = if better { number } else { blocks[i] };
+            let better = if gain * spans[i] > gains[i] * n.0[i] { u32::MAX } else { 0 };
+            let select = |new: u32, old: u32| (new & better) | (old & !better);
+            gains[i] = f32::from_bits(select(gain.to_bits(), gains[i].to_bits()));
+            spans[i] = f32::from_bits(select(n.0[i].to_bits(), spans[i].to_bits()));
+            blocks[i] = select(number, blocks[i]);
         }
     }
     for i in 0..LANES {
