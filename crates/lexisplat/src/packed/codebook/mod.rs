@@ -229,9 +229,10 @@ fn best(correlations: &[Lane], prices: &[Lane]) -> Option<usize> {
     for (number, (c, p)) in (0_u32..).zip(correlations.iter().zip(prices)) {
         for i in 0..LANES {
             let worth = c.0[i] * c.0[i] - p.0[i];
-            let better = worth > most[i];
-            most[i] = if better { worth } else { most[i] };
-            block[i] = if better { number } else { block[i] };
+            // A mask, as in the exact codec's pursuit.
+            let better = if worth > most[i] { u32::MAX } else { 0 };
+            most[i] = f32::from_bits((worth.to_bits() & better) | (most[i].to_bits() & !better));
+            block[i] = (number & better) | (block[i] & !better);
         }
     }
     first_maximum(&most, &block).filter(|(worth, _)| worth.is_finite()).map(|(_, atom)| atom)
