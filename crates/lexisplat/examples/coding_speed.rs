@@ -9,8 +9,8 @@ use std::error::Error;
 use std::path::Path;
 use std::time::Instant;
 
-use lexisplat::simd::Simd;
 use lexisplat::pursuit::{Coder, Encoded, StopRule, ValueType};
+use lexisplat::simd::Simd;
 use lexisplat::{Limits, lexi, ply};
 use rayon::prelude::*;
 

@@ -181,17 +181,17 @@ pub(super) fn tile<'a>(
 /// What is told of each splat that counts in a block: it shows in a pixel, or finishes one.
 pub(super) trait Watch {
     /// `splat` has the opacities `alpha` in the block at (column, row) of the tile.
-    fn counts(&mut self, splat: &Splat, block: [usize; 2], alpha: &Lanes);
+    fn counts(&mut self, splat: &Splat, block: [u8; 2], alpha: &Lanes);
 }
 
 impl Watch for () {
     #[inline(always)]
-    fn counts(&mut self, _: &Splat, _: [usize; 2], _: &Lanes) {}
+    fn counts(&mut self, _: &Splat, _: [u8; 2], _: &Lanes) {}
 }
 
 impl Watch for Trace {
     #[inline(always)]
-    fn counts(&mut self, splat: &Splat, block: [usize; 2], alpha: &Lanes) {
+    fn counts(&mut self, splat: &Splat, block: [u8; 2], alpha: &Lanes) {
         self.push(splat, block, alpha);
     }
 }
@@ -228,6 +228,7 @@ pub(super) fn draw<'a>(
             let alpha = &queue.lanes[at % QUEUED];
             let (counts, finished) = blend(&mut blocks[column][row], splat, alpha);
             if counts {
+                let [_, column, row] = queue.places[at % QUEUED];
                 watch.counts(splat, [column, row], alpha);
             }
             open[column][row] = !finished;

@@ -58,7 +58,8 @@ mod tests {
     fn tiles_are_truncated_and_clamped_as_in_c() {
         let grid = Grid::new(400, 266);
         assert_eq!((grid.columns, grid.rows), (25, 17));
-        let places = [(-1e30, 0.0), (-0.8, 0.0), (0.0, 0.0), (0.99, 0.0), (1.0, 1.0), (16.5, 16.0), (f32::NAN, 0.0)];
+        let places =
+            [(-1e30, 0.0), (-0.8, 0.0), (0.0, 0.0), (0.99, 0.0), (1.0, 1.0), (16.5, 16.0), (f32::NAN, 0.0)];
         for (place, tile) in places {
             assert_eq!([grid.tile(0, place), grid.tile(1, place)], [tile; 2], "{place}");
         }

@@ -18,10 +18,10 @@ mod sensitivity;
 mod splat;
 mod tiles;
 mod trace;
-mod visible;
-mod workspace;
 #[cfg(all(test, feature = "gpu"))]
 pub(crate) mod twin;
+mod visible;
+mod workspace;
 
 use lexisplat::ShDegree;
 use lexisplat::simd::Simd;
@@ -150,11 +150,11 @@ fn draw(
     let Workspace { visible, order, lists } = workspace;
     let mut pixels = vec![options.background; width * height];
     let radiance = Radiance::new(scene).up_to(options.max_degree);
-    visible.project(simd, scene.geometry(), &radiance, projection);
+    visible.project(&mut order.keys, simd, scene.geometry(), &radiance, projection);
     stages.end("project");
     order.sort(visible);
     stages.end("sort");
-    for band in tiles::bands(&order.rects, grid, max_entries) {
+    for band in tiles::bands(order, grid, max_entries) {
         lists.fill(order, grid, &band);
         stages.end("tiles");
         let rows = &mut pixels[band.start * TILE * width..(band.end * TILE).min(height) * width];
@@ -173,7 +173,7 @@ fn draw(
         stages.end("blend");
     }
     let image = Image { width: camera.width, height: camera.height, pixels };
-    Drawn { image, gaussians: visible.len(), stage_times: stages.times }
+    Drawn { image, gaussians: order.keys.len(), stage_times: stages.times }
 }
 
 #[cfg(test)]

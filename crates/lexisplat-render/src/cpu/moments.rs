@@ -39,24 +39,24 @@ impl Moments {
     }
 }
 
-/// Adds the moments of the splats that show in a tile to `out`, by the Gaussian's index. `list` has slots of `splats`
-/// from front to back. `queue` and `trace` are overwritten.
+/// Returns the moments of the splats that show in a tile, by the Gaussian's index. `list` has slots of `splats` from
+/// front to back. `queue` and `trace` are overwritten.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
-    (queue, trace): (&mut Queue, &mut Trace),
-    out: &mut Vec<(u32, Moments)>,
-) {
+    queue: &mut Queue,
+    trace: &mut Trace,
+) -> Vec<(u32, Moments)> {
     trace.clear();
     simd.dispatch(
         #[inline(always)]
         || {
             let picture = blend::draw(splats, list, tile, [0.0; 3], queue, trace);
-            sum(trace, tile, &picture, out);
+            sum(trace, tile, &picture)
         },
-    );
+    )
 }
 
 /// A block as far as it has been drawn.
@@ -87,26 +87,36 @@ impl ColumnSums {
     }
 }
 
-/// Adds the moments of the splats in `trace` to `out`. `picture` is the finished tile.
+/// Returns the moments of the splats in `trace`. `picture` is the finished tile.
 #[inline(always)]
-fn sum(trace: &Trace, tile: Tile, picture: &TilePixels, out: &mut Vec<(u32, Moments)>) {
+fn sum(trace: &Trace, tile: Tile, picture: &TilePixels) -> Vec<(u32, Moments)> {
+    let mut out = Vec::with_capacity(trace.splats.len());
     let [x, y] = tile.coordinates();
     let mut blocks = tile.inside().map(|column| column.map(|open| Block { colour: [[0.0; LANES]; 3], open }));
     let mut columns = ColumnSums::ZERO;
     for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
-        let splat = &trace.splats[same[0].splat];
+        let splat = &trace.splats[same[0].splat as usize];
         let root = splat.root();
         let mut moments = Moments::default();
         for same in same.chunk_by(|a, b| a.block[0] == b.block[0]) {
             for mark in same {
-                let [column, row] = mark.block.map(|k| k % BLOCKS);
+                let [column, row] = mark.block.map(|k| usize::from(k) % BLOCKS);
                 let block = &mut blocks[column][row];
-                add(&mut columns, block, splat, root, &mark.alpha, [&x[column], &y[row]], &picture.0[column][row]);
+                add(
+                    &mut columns,
+                    block,
+                    splat,
+                    root,
+                    &mark.alpha,
+                    [&x[column], &y[row]],
+                    &picture.0[column][row],
+                );
             }
             columns.flush(&mut moments);
         }
         out.push((splat.gaussian, moments));
     }
+    out
 }
 
 /// Draws `splat` on a block as `blend` does, and adds its moments to `columns`.
@@ -166,6 +176,10 @@ fn add(
         }
     }
     for row in removal.chunks_exact(SIDE) {
-        columns.removal.iter_mut().zip(row).for_each(|(most, value)| *most = if value > most { *value } else { *most });
+        columns
+            .removal
+            .iter_mut()
+            .zip(row)
+            .for_each(|(most, value)| *most = if value > most { *value } else { *most });
     }
 }

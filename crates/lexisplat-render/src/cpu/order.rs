@@ -1,5 +1,7 @@
 //! Sorts splats by depth. That happens once for each picture, so that every tile's list comes out sorted.
 
+use std::ops::Range;
+
 use crate::parallel::*;
 
 use super::splat::PixelRect;
@@ -16,26 +18,27 @@ const RECTS_PER_TASK: usize = 1 << 14;
 #[derive(Debug, Default)]
 pub(super) struct Order {
     /// (depth, slot) of each.
-    pub(super) splats: Vec<(u32, u32)>,
-    /// The pixels that each may touch, side by side, since the lists of tiles read nothing else.
-    pub(super) rects: Vec<PixelRect>,
-    /// What sorting writes to in turn with `splats`.
-    pub(super) spare: Vec<(u32, u32)>,
+    pub(super) keys: Vec<(u32, u32)>,
+    /// What sorting writes to in turn with `keys`; then the pixels that each splat may touch.
+    spare: Vec<(u32, u32)>,
 }
 
 impl Order {
-    /// Sorts `visible`, in place of the splats of the picture before.
+    /// Sorts `keys`, the splats of `visible`.
     pub(super) fn sort(&mut self, visible: &Visible) {
-        self.splats.clear();
-        self.splats.extend(visible.marked().map(|(slot, mark)| (mark.depth, slot)));
-        sort(&mut self.splats, &mut self.spare);
-        self.rects.resize(self.splats.len(), PixelRect::default());
-        let tasks = self.rects.par_chunks_mut(RECTS_PER_TASK).zip(self.splats.par_chunks(RECTS_PER_TASK));
-        tasks.for_each(|(rects, splats)| {
-            for (rect, &(_, slot)) in rects.iter_mut().zip(splats) {
-                *rect = visible.mark(slot).pixels;
+        sort(&mut self.keys, &mut self.spare);
+        let tasks = self.spare.par_chunks_mut(RECTS_PER_TASK).zip(self.keys.par_chunks(RECTS_PER_TASK));
+        tasks.for_each(|(rects, keys)| {
+            for (rect, &(_, slot)) in rects.iter_mut().zip(keys) {
+                *rect = visible.rect(slot).to_words();
             }
         });
+    }
+
+    /// The slots of the splats from place `range.start` to before place `range.end`, and the pixels that they may touch.
+    pub(super) fn splats(&self, range: Range<usize>) -> impl Iterator<Item = (u32, PixelRect)> {
+        let slots = self.keys[range.clone()].iter().map(|key| key.1);
+        slots.zip(self.spare[range].iter().map(|words| PixelRect::from_words(*words)))
     }
 }
 
@@ -53,6 +56,7 @@ fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
             starts[digit(pass, key)] += 1;
         }
     }
+    spare.reserve_exact(pairs.capacity().saturating_sub(spare.len()));
     spare.resize(pairs.len(), (0, 0));
     for (pass, starts) in (0..).zip(&mut starts) {
         let mut sum = 0;
@@ -65,6 +69,15 @@ fn sort(pairs: &mut Vec<(u32, u32)>, spare: &mut Vec<(u32, u32)>) {
             *at += 1;
         }
         std::mem::swap(pairs, spare);
+    }
+}
+
+#[cfg(test)]
+impl Order {
+    /// Slots in this order that may touch these pixels.
+    pub(super) fn of(slots: Vec<u32>, rects: &[PixelRect]) -> Self {
+        let keys = slots.into_iter().map(|slot| (0, slot)).collect();
+        Self { keys, spare: rects.iter().map(|rect| rect.to_words()).collect() }
     }
 }
 

@@ -151,9 +151,8 @@ impl Projection {
         });
         // Where nothing is drawn, the pixels end where they begin.
         for k in 0..2 {
-            [pixels[1][k]] = each([&pixels[1][k], &visible], |[end, visible]| {
-                [if visible > 0.0 { end } else { 0.0 }]
-            });
+            [pixels[1][k]] =
+                each([&pixels[1][k], &visible], |[end, visible]| [if visible > 0.0 { end } else { 0.0 }]);
         }
         let [px, py, pz] = &body.position;
         let direction = each([px, py, pz], |position| {
@@ -174,13 +173,16 @@ impl Projection {
         let view = self.view(body);
         let on_screen = self.on_screen(&view, &axes(body));
         let ellipse = Ellipse::of(&on_screen);
-        let root = each([&ellipse.conic[0], &ellipse.conic[1], &ellipse.variance[1], &ellipse.det], |values| {
-            let [xx, xy, variance_y, det] = values;
-            let Root(root) = Root::of_conic([xx, xy, 0.0], variance_y);
-            root.map(|v| if is_ellipse(det) { v } else { f32::NAN })
-        });
+        let root =
+            each([&ellipse.conic[0], &ellipse.conic[1], &ellipse.variance[1], &ellipse.det], |values| {
+                let [xx, xy, variance_y, det] = values;
+                let Root(root) = Root::of_conic([xx, xy, 0.0], variance_y);
+                root.map(|v| if is_ellipse(det) { v } else { f32::NAN })
+            });
         let rooted = |v: &[Lanes; 2]| {
-            each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| Root([xx, xy, yy]).of([x, y]))
+            each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| {
+                Root([xx, xy, yy]).of([x, y])
+            })
         };
         let [x, y, z] = &view;
         let moved = |[right, down, forward]: [f32; 3]| {
@@ -330,16 +332,17 @@ impl Ellipse {
         // The covariance is the sum of the squares of the axes on screen. INRIA projects the covariance of the
         // world instead. That is the same sum, but loses thin Gaussians to cancellation.
         let [p, q, r] = on_screen;
-        let [a, b, c, before] = each([&p[0], &p[1], &q[0], &q[1], &r[0], &r[1]], |[px, py, qx, qy, rx, ry]| {
-            // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
-            let (pq, qr, rp) = (px * qy - py * qx, qx * ry - qy * rx, rx * py - ry * px);
-            [
-                px * px + qx * qx + rx * rx,
-                px * py + qx * qy + rx * ry,
-                py * py + qy * qy + ry * ry,
-                pq * pq + qr * qr + rp * rp,
-            ]
-        });
+        let [a, b, c, before] =
+            each([&p[0], &p[1], &q[0], &q[1], &r[0], &r[1]], |[px, py, qx, qy, rx, ry]| {
+                // The determinant is a sum of squares (Cauchy-Binet), so it is never negative.
+                let (pq, qr, rp) = (px * qy - py * qx, qx * ry - qy * rx, rx * py - ry * px);
+                [
+                    px * px + qx * qx + rx * rx,
+                    px * py + qx * qy + rx * ry,
+                    py * py + qy * qy + ry * ry,
+                    pq * pq + qr * qr + rp * rp,
+                ]
+            });
         let [conic_a, conic_b, conic_c, det, shrink] = each([&a, &b, &c, &before], |[a, b, c, before]| {
             let det = before + DILATION * (a + c) + DILATION * DILATION;
             let shrink = greater(before / det, ANTIALIAS_FLOOR).sqrt();
@@ -408,10 +411,10 @@ mod tests {
     fn draw(splats: &Splats, antialiased: bool) -> Option<(Splat, u32)> {
         let camera = straight_ahead(100, 80, 100.0);
         let projection = Projection::new(&camera, antialiased);
-        let mut visible = Visible::default();
+        let (mut visible, mut keys) = (Visible::default(), Vec::new());
         let radiance = Radiance::new(&Scene::from(splats));
-        visible.project(Simd::current(), &splats.geometry, &radiance, &projection);
-        visible.marked().next().map(|(slot, mark)| (visible.slots[slot as usize], mark.depth))
+        visible.project(&mut keys, Simd::current(), &splats.geometry, &radiance, &projection);
+        keys.first().map(|&(depth, slot)| (visible.slots[slot as usize], depth))
     }
 
     fn near(a: f32, b: f32) -> bool {

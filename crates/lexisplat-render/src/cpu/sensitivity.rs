@@ -1,5 +1,7 @@
 //! Measures how much pictures change with every value of every Gaussian.
 
+use std::sync::{Mutex, PoisonError};
+
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Sensitivity, Stage};
 
@@ -31,14 +33,14 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
     scene.validate()?;
     cameras.iter().try_for_each(Camera::validate)?;
     let mut total = Sensitivity::zeros(scene.len());
-    let mut workspace = Workspace::default();
+    let (mut workspace, pool) = (Workspace::default(), Pool::default());
     let mut sums = vec![Moments::default(); scene.len()];
     let radiance = Radiance::new(scene);
     progress.begin(Stage::Draw, cameras.len() as u64);
     for camera in cameras {
         progress.check()?;
         let projection = Projection::new(camera, scene.meta().antialiased);
-        measure(&mut sums, &mut workspace, scene, &radiance, &projection);
+        measure(&mut sums, &mut workspace, &pool, scene, &radiance, &projection);
         carry(&mut total, &projection, scene.geometry(), cameras.len(), &mut sums);
         progress.advance(1);
     }
@@ -47,14 +49,36 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
 }
 
 /// Tiles measured at a time. Their moments take 48 bytes for each splat of each tile.
-const TILES: usize = 64;
-/// Tiles that one task measures.
-const TILES_PER_TASK: usize = 4;
+const TILES: usize = 32;
+
+/// What measuring a tile overwrites.
+#[derive(Default)]
+struct Scratch {
+    queue: Queue,
+    trace: Trace,
+}
+
+/// Memory that threads take turns with. There is as much of it as threads have used at once, and none of it grows anew
+/// for each tile.
+#[derive(Default)]
+struct Pool(Mutex<Vec<Scratch>>);
+
+impl Pool {
+    fn with<R>(&self, work: impl FnOnce(&mut Scratch) -> R) -> R {
+        // A thread that panicked kept what it had taken, so the rest is whole.
+        let taken = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = taken().pop().unwrap_or_default();
+        let result = work(&mut scratch);
+        taken().push(scratch);
+        result
+    }
+}
 
 /// Adds the moments of one view to `sums`, one for each Gaussian.
 fn measure(
     sums: &mut [Moments],
     workspace: &mut Workspace,
+    pool: &Pool,
     scene: &Scene<'_>,
     radiance: &Radiance<'_>,
     projection: &Projection,
@@ -63,25 +87,21 @@ fn measure(
     let grid = projection.grid;
     let size = projection.size();
     let Workspace { visible, order, lists } = workspace;
-    visible.project(simd, scene.geometry(), radiance, projection);
+    visible.project(&mut order.keys, simd, scene.geometry(), radiance, projection);
     order.sort(visible);
-    for band in tiles::bands(&order.rects, grid, tiles::MAX_ENTRIES) {
+    for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
         lists.fill(order, grid, &band);
         // Tiles are summed in order, so that results do not depend on the number of threads.
         let tiles = band.len() * grid.columns;
-        let starts: Vec<usize> = (0..tiles).step_by(TILES_PER_TASK).collect();
-        for starts in starts.chunks(TILES / TILES_PER_TASK) {
-            let parts: Vec<Vec<(u32, Moments)>> = starts
-                .par_iter()
-                .map(|&start| {
-                    let (mut queue, mut trace, mut out) = (Queue::default(), Trace::default(), Vec::new());
-                    for tile in start..(start + TILES_PER_TASK).min(tiles) {
-                        let place = [tile % grid.columns, band.start + tile / grid.columns];
-                        let place = Tile::new(place, size);
-                        let list = lists.of(tile);
-                        moments::tile(simd, &visible.slots, list, place, (&mut queue, &mut trace), &mut out);
-                    }
-                    out
+        for first in (0..tiles).step_by(TILES) {
+            let parts: Vec<Vec<(u32, Moments)>> = (first..(first + TILES).min(tiles))
+                .into_par_iter()
+                .map(|tile| {
+                    let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
+                    let list = lists.of(tile);
+                    pool.with(|Scratch { queue, trace }| {
+                        moments::tile(simd, &visible.slots, list, place, queue, trace)
+                    })
                 })
                 .collect();
             for (gaussian, part) in parts.into_iter().flatten() {

@@ -38,6 +38,20 @@ pub(super) struct PixelRect {
     pub(super) max: [u16; 2],
 }
 
+impl PixelRect {
+    /// The same as two words.
+    pub(super) fn to_words(self) -> (u32, u32) {
+        let word = |[column, row]: [u16; 2]| u32::from(column) | u32::from(row) << u16::BITS;
+        (word(self.min), word(self.max))
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the halves of a word")]
+    pub(super) fn from_words((min, max): (u32, u32)) -> Self {
+        let place = |word: u32| [word as u16, (word >> u16::BITS) as u16];
+        Self { min: place(min), max: place(max) }
+    }
+}
+
 /// The upper triangular root R of a conic, `R^T R`: xx, xy, yy. `R (centre - pixel)` is the offset in standard
 /// deviations, so that products of it neither grow with a Gaussian's size nor cancel in thin ones.
 #[derive(Debug, Clone, Copy, Default)]

@@ -16,10 +16,10 @@ pub(super) const MAX_ENTRIES: u64 = 1 << 22;
 
 /// Cuts the rows of tiles into bands. The lists of a band have at most `max_entries` entries, unless it is one
 /// row.
-pub(super) fn bands(rects: &[PixelRect], grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
+pub(super) fn bands(order: &Order, grid: Grid, max_entries: u64) -> Vec<Range<usize>> {
     // Differences of the number of entries from one row of tiles to the next.
     let mut steps = vec![0_i64; grid.rows + 1];
-    for rect in rects {
+    for (_, rect) in order.splats(0..order.keys.len()) {
         // At most 1024.
         let columns = i64::try_from(rect.columns().len()).unwrap_or(i64::MAX);
         let rows = rect.rows();
@@ -59,13 +59,12 @@ struct Piece {
 impl TileLists {
     /// Lists the splats over the rows of tiles in `band`, in place of the lists before.
     pub(super) fn fill(&mut self, order: &Order, grid: Grid, band: &Range<usize>) {
-        let size = order.splats.len().div_ceil(PIECES).max(1);
+        let len = order.keys.len();
+        let size = len.div_ceil(PIECES).max(1);
         self.pieces.resize_with(PIECES, Piece::default);
         self.pieces.par_chunks_mut(1).enumerate().for_each(|(k, piece)| {
-            let of = |len: usize| (k * size).min(len)..((k + 1) * size).min(len);
-            let rects = &order.rects[of(order.rects.len())];
-            let splats = &order.splats[of(order.splats.len())];
-            piece.iter_mut().for_each(|piece| piece.fill(splats, rects, grid, band));
+            let range = (k * size).min(len)..((k + 1) * size).min(len);
+            piece.iter_mut().for_each(|piece| piece.fill(order, range.clone(), grid, band));
         });
     }
 
@@ -76,8 +75,8 @@ impl TileLists {
 }
 
 impl Piece {
-    fn fill(&mut self, splats: &[(u32, u32)], rects: &[PixelRect], grid: Grid, band: &Range<usize>) {
-        let tiles = |rect: &PixelRect| {
+    fn fill(&mut self, order: &Order, range: Range<usize>, grid: Grid, band: &Range<usize>) {
+        let tiles = |rect: PixelRect| {
             let (columns, rows) = (rect.columns(), rect.rows());
             let top = rows.start.max(band.start) - band.start;
             let bottom = rows.end.min(band.end).saturating_sub(band.start);
@@ -89,14 +88,17 @@ impl Piece {
         // moves that to its end.
         starts.clear();
         starts.resize(band.len() * grid.columns + 2, 0);
-        for rect in rects {
+        for (_, rect) in order.splats(range.clone()) {
             tiles(rect).for_each(|tile| starts[tile + 2] += 1);
         }
         for tile in 2..starts.len() {
             starts[tile] += starts[tile - 1];
         }
-        entries.resize(starts.last().copied().unwrap_or(0), 0);
-        for (rect, &(_, slot)) in rects.iter().zip(splats) {
+        let len = starts.last().copied().unwrap_or(0);
+        // Views differ in what they need, and doubling would take too much.
+        entries.reserve_exact(len.saturating_sub(entries.len()));
+        entries.resize(len, 0);
+        for (slot, rect) in order.splats(range) {
             for tile in tiles(rect) {
                 let at = &mut starts[tile + 1];
                 entries[*at] = slot;
@@ -120,8 +122,7 @@ mod tests {
                 PixelRect { min: [x, y], max: [(x + side).min(100), (y + side).min(70)] }
             })
             .collect();
-        let splats = (0..60).map(|slot| (0, 100 - slot)).collect();
-        let order = Order { splats, rects: rects.clone(), ..Order::default() };
+        let order = Order::of((0..60).map(|slot| 100 - slot).collect(), &rects);
         let mut lists = TileLists::default();
         for band in [0..grid.rows, 1..3] {
             lists.fill(&order, grid, &band);
@@ -147,7 +148,7 @@ mod tests {
     fn bands_cover_all_rows_and_stay_small() {
         let grid = Grid::new(16_384, 16_384);
         let everywhere = PixelRect { min: [0, 0], max: [16_384; 2] };
-        let bands = bands(&[everywhere; 1000], grid, 1 << 26);
+        let bands = bands(&Order::of(vec![0; 1000], &[everywhere; 1000]), grid, 1 << 26);
         assert_eq!(bands.first().map(|b| b.start), Some(0));
         assert_eq!(bands.last().map(|b| b.end), Some(1024));
         assert!(bands.windows(2).all(|w| w[0].end == w[1].start));

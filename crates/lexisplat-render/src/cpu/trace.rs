@@ -6,7 +6,7 @@ use super::splat::Splat;
 /// The splats that show in a pixel of a tile or finish one, from front to back, and where.
 ///
 /// A pixel is finished after at most 2,350 splats, since each that counts takes at least 1/255 of its light. A tile's
-/// trace therefore has at most 256 times as many marks, about 40 MB; hundreds of kB are common.
+/// trace therefore has at most 256 times as many marks, about 40 MB; less than one MB is common.
 #[derive(Debug, Default)]
 pub(super) struct Trace {
     pub(super) splats: Vec<Splat>,
@@ -18,9 +18,9 @@ pub(super) struct Trace {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mark {
     /// The splat's place in the trace.
-    pub(super) splat: usize,
+    pub(super) splat: u32,
     /// Column and row of the block in the tile.
-    pub(super) block: [usize; 2],
+    pub(super) block: [u8; 2],
     /// Its opacity at each pixel; 0 where it does not count.
     pub(super) alpha: Lanes,
 }
@@ -28,11 +28,13 @@ pub(super) struct Mark {
 impl Trace {
     /// Adds a mark of `splat`, which is that of the last mark or one behind it.
     #[inline(always)]
-    pub(super) fn push(&mut self, splat: &Splat, block: [usize; 2], alpha: &Lanes) {
+    pub(super) fn push(&mut self, splat: &Splat, block: [u8; 2], alpha: &Lanes) {
         if self.splats.last().is_none_or(|last| last.gaussian != splat.gaussian) {
             self.splats.push(*splat);
         }
-        self.marks.push(Mark { splat: self.splats.len() - 1, block, alpha: *alpha });
+        // Splats are counted in u32.
+        let splat = u32::try_from(self.splats.len() - 1).unwrap_or(u32::MAX);
+        self.marks.push(Mark { splat, block, alpha: *alpha });
     }
 
     /// Empties it. Its memory stays for the next tile.

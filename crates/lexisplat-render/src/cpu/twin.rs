@@ -33,10 +33,10 @@ const CUTOFF: f32 = -80.0;
 pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
     let projection = Projection::new(camera, scene.meta().antialiased).untightened();
     let Workspace { mut visible, mut order, .. } = Workspace::default();
-    visible.project(Simd::current(), scene.geometry(), &Radiance::new(scene), &projection);
+    visible.project(&mut order.keys, Simd::current(), scene.geometry(), &Radiance::new(scene), &projection);
     order.sort(&visible);
     order
-        .splats
+        .keys
         .iter()
         .map(|&(depth, slot)| {
             let Splat { gaussian, centre, conic, opacity, colour, pixels, .. } = visible.slots[slot as usize];

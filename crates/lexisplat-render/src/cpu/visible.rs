@@ -21,111 +21,105 @@ pub(super) const GAUSSIANS_PER_TASK: usize = 1024;
 #[derive(Debug, Default)]
 pub(super) struct Visible {
     pub(super) slots: Vec<Splat>,
-    /// What sorting and listing read of each slot, apart from the slots, which are many times as large.
-    marks: Vec<Mark>,
+    /// The pixels that each slot may touch. Listing reads nothing else, and slots are many times as large.
+    rects: Vec<PixelRect>,
     counts: Vec<usize>,
 }
 
-/// Where a splat comes in the order of depth, and where it goes.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Mark {
-    /// Bits of the view-space z. It is positive, so the bits are in the order of the numbers.
-    pub(super) depth: u32,
-    /// The pixels that it may touch.
-    pub(super) pixels: PixelRect,
-}
-
 impl Visible {
-    /// Projects all Gaussians, in place of those of the picture before.
+    /// Projects all Gaussians, in place of those of the picture before. Replaces `keys` by (depth, slot) of those that
+    /// may be visible, in order of index.
     pub(super) fn project(
         &mut self,
+        keys: &mut Vec<(u32, u32)>,
         simd: Simd,
         geometry: &Geometry,
         radiance: &Radiance<'_>,
         projection: &Projection,
     ) {
         self.slots.resize(geometry.len(), Splat::default());
-        self.marks.resize(geometry.len(), Mark::default());
+        self.rects.resize(geometry.len(), PixelRect::default());
+        keys.resize(geometry.len(), (0, 0));
         self.counts = self
             .slots
             .par_chunks_mut(GAUSSIANS_PER_TASK)
-            .zip(self.marks.par_chunks_mut(GAUSSIANS_PER_TASK))
+            .zip(self.rects.par_chunks_mut(GAUSSIANS_PER_TASK))
+            .zip(keys.par_chunks_mut(GAUSSIANS_PER_TASK))
             .enumerate()
-            .map(|(task, (slots, marks))| {
-                let first = task * GAUSSIANS_PER_TASK;
+            .map(|(task, ((slots, rects), keys))| {
+                let mut task = Task { first: task * GAUSSIANS_PER_TASK, slots, rects, keys };
                 simd.dispatch(
                     #[inline(always)]
-                    || project(slots, marks, first, geometry, radiance, projection),
+                    || task.project(geometry, radiance, projection),
                 )
             })
             .collect();
+        let mut len = 0;
+        for (task, count) in self.counts.iter().enumerate() {
+            let first = task * GAUSSIANS_PER_TASK;
+            keys.copy_within(first..first + count, len);
+            len += count;
+        }
+        keys.truncate(len);
     }
 
-    /// Number of Gaussians that may be visible.
-    pub(super) fn len(&self) -> usize {
-        self.counts.iter().sum()
-    }
-
-    /// The slots that hold a Gaussian, and their marks.
-    pub(super) fn marked(&self) -> impl Iterator<Item = (u32, &Mark)> {
-        // Gaussians are counted in u32.
-        let slot = |slot: usize| u32::try_from(slot).unwrap_or(u32::MAX);
-        let firsts = (0..).step_by(GAUSSIANS_PER_TASK);
-        let tasks = firsts.zip(self.marks.chunks(GAUSSIANS_PER_TASK)).zip(&self.counts);
-        tasks.flat_map(move |((first, marks), count)| {
-            marks.iter().take(*count).enumerate().map(move |(k, mark)| (slot(first + k), mark))
-        })
-    }
-
-    /// The mark of a slot.
-    pub(super) fn mark(&self, slot: u32) -> &Mark {
-        &self.marks[slot as usize]
+    /// The pixels that a slot may touch.
+    pub(super) fn rect(&self, slot: u32) -> PixelRect {
+        self.rects[slot as usize]
     }
 }
 
-/// Projects the Gaussians from `first` on, as many as there are slots. Returns how many slots were filled.
-#[inline(always)]
-fn project(
-    slots: &mut [Splat],
-    marks: &mut [Mark],
+/// What Gaussians that follow one another are projected to.
+struct Task<'a> {
+    /// Index of the first Gaussian, and of the first slot.
     first: usize,
-    geometry: &Geometry,
-    radiance: &Radiance<'_>,
-    projection: &Projection,
-) -> usize {
-    let end = first + slots.len();
-    let mut count = 0;
-    for start in (first..end).step_by(LANES) {
-        let group = start..end.min(start + LANES);
-        let in_front = |p: &[f32; 3]| projection.camera.to_view(*p)[2] > NEAR_Z;
-        if !geometry.positions[group.clone()].iter().any(in_front) {
-            continue;
-        }
-        let placed = projection.place(&Body::load(geometry, group.clone()));
-        for (lane, i) in group.enumerate() {
-            let [min, max] = placed.pixels.map(|corner| corner.map(|v| v[lane]));
-            if !(min[0] < max[0] && min[1] < max[1]) {
+    slots: &'a mut [Splat],
+    rects: &'a mut [PixelRect],
+    keys: &'a mut [(u32, u32)],
+}
+
+impl Task<'_> {
+    /// Projects as many Gaussians as there are slots. Returns how many slots were filled.
+    #[inline(always)]
+    fn project(&mut self, geometry: &Geometry, radiance: &Radiance<'_>, projection: &Projection) -> usize {
+        let Self { first, slots, rects, keys } = self;
+        let first = *first;
+        let end = first + slots.len();
+        let mut count = 0;
+        for start in (first..end).step_by(LANES) {
+            let group = start..end.min(start + LANES);
+            let in_front = |p: &[f32; 3]| projection.camera.to_view(*p)[2] > NEAR_Z;
+            if !geometry.positions[group.clone()].iter().any(in_front) {
                 continue;
             }
-            let colour = radiance.colour(i, placed.direction.map(|v| v[lane]));
-            if !colour.iter().all(|v| v.is_finite()) {
-                continue;
+            let placed = projection.place(&Body::load(geometry, group.clone()));
+            for (lane, i) in group.enumerate() {
+                let [min, max] = placed.pixels.map(|corner| corner.map(|v| v[lane]));
+                if !(min[0] < max[0] && min[1] < max[1]) {
+                    continue;
+                }
+                let colour = radiance.colour(i, placed.direction.map(|v| v[lane]));
+                if !colour.iter().all(|v| v.is_finite()) {
+                    continue;
+                }
+                let pixels = PixelRect { min: min.map(whole), max: max.map(whole) };
+                rects[count] = pixels;
+                // Depths are positive, so their bits are in the order of the numbers. Gaussians are counted in u32.
+                let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);
+                keys[count] = (placed.depth[lane].to_bits(), index(first + count));
+                slots[count] = Splat {
+                    centre: placed.centre.map(|v| v[lane]),
+                    conic: placed.conic.map(|v| v[lane]),
+                    opacity: placed.opacity[lane],
+                    colour,
+                    cutoff: placed.cutoff[lane],
+                    pixels,
+                    variance_y: placed.variance_y[lane],
+                    gaussian: index(i),
+                };
+                count += 1;
             }
-            let pixels = PixelRect { min: min.map(whole), max: max.map(whole) };
-            marks[count] = Mark { depth: placed.depth[lane].to_bits(), pixels };
-            slots[count] = Splat {
-                centre: placed.centre.map(|v| v[lane]),
-                conic: placed.conic.map(|v| v[lane]),
-                opacity: placed.opacity[lane],
-                colour,
-                cutoff: placed.cutoff[lane],
-                pixels,
-                variance_y: placed.variance_y[lane],
-                // Gaussians are counted in u32 since `marked`.
-                gaussian: u32::try_from(i).unwrap_or(u32::MAX),
-            };
-            count += 1;
         }
+        count
     }
-    count
 }
