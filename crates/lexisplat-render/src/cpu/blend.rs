@@ -4,8 +4,8 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::{ALPHA_MAX, ALPHA_MIN, TILE, TRANSMITTANCE_MIN};
 
-use super::lanes::{LANES, Lanes};
-use super::math::exp_in_range;
+use super::lanes::{LANES, Lanes, each};
+use super::math::{exp_in_range, mask};
 use super::splat::Splat;
 use super::trace::Trace;
 
@@ -21,26 +21,18 @@ const FETCHED: usize = 16;
 
 /// A block being drawn.
 #[derive(Debug, Clone, Copy)]
-struct Block {
-    red: Lanes,
-    green: Lanes,
-    blue: Lanes,
+pub(super) struct Block {
+    /// Red, green and blue.
+    pub(super) colour: [Lanes; 3],
     /// The share of light that splats further back can add; 0 once the pixel is finished, and beyond the picture's
     /// border.
     open: Lanes,
-    /// The share of light that the background adds.
+    /// The share of light that the background adds. It stays 1 where the background is black.
     transmittance: Lanes,
 }
 
-/// A finished tile: its columns of blocks, each block with its three channels.
-#[derive(Debug, Clone)]
-pub(super) struct TilePixels(pub(super) [[[Lanes; 3]; BLOCKS]; BLOCKS]);
-
-impl TilePixels {
-    pub(super) fn pixel(&self, x: usize, y: usize) -> [f32; 3] {
-        let block = &self.0[x / SIDE][y / SIDE];
-        block.map(|channel| channel[y % SIDE * SIDE + x % SIDE])
-    }
+impl Block {
+    const EMPTY: Self = Self { colour: [[0.0; LANES]; 3], open: [1.0; LANES], transmittance: [1.0; LANES] };
 }
 
 /// A tile of a picture.
@@ -70,17 +62,13 @@ impl Tile {
         [coordinates(0, |lane| lane % SIDE), coordinates(1, |lane| lane / SIDE)]
     }
 
-    /// For each column of blocks and each of its blocks, 1 at pixels within the picture and 0 elsewhere.
+    /// 1 at pixels of a block that lie within the picture and 0 elsewhere.
     #[inline(always)]
-    pub(super) fn inside(self) -> [[Lanes; BLOCKS]; BLOCKS] {
+    pub(super) fn inside(self, column: usize, row: usize) -> Lanes {
         let within = |k: usize, block: usize, at: usize| self.corner[k] + block * SIDE + at < self.size[k];
-        std::array::from_fn(|column| {
-            std::array::from_fn(|row| {
-                std::array::from_fn(|lane| {
-                    let inside = within(0, column, lane % SIDE) && within(1, row, lane / SIDE);
-                    if inside { 1.0 } else { 0.0 }
-                })
-            })
+        std::array::from_fn(|lane| {
+            let inside = within(0, column, lane % SIDE) && within(1, row, lane / SIDE);
+            if inside { 1.0 } else { 0.0 }
         })
     }
 
@@ -94,12 +82,22 @@ impl Tile {
     }
 }
 
+/// A tile being drawn. The next tile overwrites it.
+#[derive(Debug)]
+pub(super) struct Canvas {
+    /// Columns of blocks.
+    pub(super) blocks: [[Block; BLOCKS]; BLOCKS],
+    /// Blocks with a pixel that is not finished.
+    open: [[bool; BLOCKS]; BLOCKS],
+    queue: Queue,
+}
+
 /// Splats in blocks, waiting to be blended.
 ///
 /// The steps of a batch are loops of their own. Most of their instructions then do not wait for each other: opacities
 /// depend on nothing drawn before.
 #[derive(Debug)]
-pub(super) struct Queue {
+struct Queue {
     splats: [Splat; FETCHED],
     len: usize,
     /// The splat's place in the batch, and column and row of the block, of each entry.
@@ -113,14 +111,15 @@ const QUEUED: usize = FETCHED * BLOCKS * BLOCKS;
 /// A queue's entries are counted by their low bits, so that no index can be out of range.
 const _: () = assert!(QUEUED.is_power_of_two() && BLOCKS.is_power_of_two() && FETCHED.is_power_of_two());
 
-impl Default for Queue {
+impl Default for Canvas {
     fn default() -> Self {
-        Self {
+        let queue = Queue {
             splats: [Splat::default(); FETCHED],
             len: 0,
             places: [[0; 3]; QUEUED],
             lanes: [[0.0; LANES]; QUEUED],
-        }
+        };
+        Self { blocks: [[Block::EMPTY; BLOCKS]; BLOCKS], open: [[true; BLOCKS]; BLOCKS], queue }
     }
 }
 
@@ -143,11 +142,12 @@ impl Queue {
         for (k, splat) in self.splats.iter().enumerate().take(slots.len()) {
             let [first, end] = tile.reach(splat);
             for column in first[0]..end[0] {
+                let across = Across::of(splat, &x[column]);
                 for row in first[1]..end[1] {
                     if open[column][row] {
                         let at = self.len % QUEUED;
                         self.places[at] = [k as u8, column as u8, row as u8];
-                        let any = powers(&mut self.lanes[at], splat, &x[column], &y[row]);
+                        let any = across.powers(&mut self.lanes[at], splat, &y[row]);
                         self.len += usize::from(any);
                     }
                 }
@@ -161,21 +161,6 @@ impl Queue {
         let [k, column, row] = self.places[at % QUEUED].map(usize::from);
         (&self.splats[k % FETCHED], column % BLOCKS, row % BLOCKS)
     }
-}
-
-/// Draws a tile from the splats in `list`, slots of `splats` from front to back. `queue` is overwritten.
-pub(super) fn tile<'a>(
-    simd: Simd,
-    splats: &[Splat],
-    list: impl Iterator<Item = &'a [u32]>,
-    tile: Tile,
-    background: [f32; 3],
-    queue: &mut Queue,
-) -> TilePixels {
-    simd.dispatch(
-        #[inline(always)]
-        || draw(splats, list, tile, background, queue, &mut ()),
-    )
 }
 
 /// What is told of each splat that counts in a block: it shows in a pixel, or finishes one.
@@ -196,67 +181,84 @@ impl Watch for Trace {
     }
 }
 
-#[inline(always)]
-pub(super) fn draw<'a>(
-    splats: &[Splat],
-    list: impl Iterator<Item = &'a [u32]>,
-    tile: Tile,
-    background: [f32; 3],
-    queue: &mut Queue,
-    watch: &mut impl Watch,
-) -> TilePixels {
-    let coordinates = tile.coordinates();
-    let mut blocks = tile.inside().map(|column| {
-        column.map(|inside| Block {
-            red: [0.0; LANES],
-            green: [0.0; LANES],
-            blue: [0.0; LANES],
-            open: inside,
-            transmittance: [1.0; LANES],
-        })
-    });
-    let mut open = blocks.map(|column| column.map(|block| block.open != [0.0; LANES]));
-    for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
-        queue.fill(splats, slots, tile, &coordinates, &open);
-        for at in 0..queue.len {
-            let (&Splat { opacity, cutoff, .. }, ..) = queue.place(at);
-            alphas(&mut queue.lanes[at % QUEUED], opacity, cutoff);
-        }
-        let mut any_finished = false;
-        for at in 0..queue.len {
-            let (splat, column, row) = queue.place(at);
-            let alpha = &queue.lanes[at % QUEUED];
-            let (counts, finished) = blend(&mut blocks[column][row], splat, alpha);
-            if counts {
-                let [_, column, row] = queue.places[at % QUEUED];
-                watch.counts(splat, [column, row], alpha);
+impl Canvas {
+    /// Draws a tile over `background` from the splats in `list`, slots of `splats` from front to back.
+    pub(super) fn draw<'a>(
+        &mut self,
+        simd: Simd,
+        splats: &[Splat],
+        list: impl Iterator<Item = &'a [u32]>,
+        tile: Tile,
+        background: [f32; 3],
+    ) {
+        simd.dispatch(
+            #[inline(always)]
+            || match background == [0.0; 3] {
+                true => self.draw_watched::<false>(splats, list, tile, &mut ()),
+                false => self.draw_watched::<true>(splats, list, tile, &mut ()),
+            },
+        );
+    }
+
+    /// The pixel at column `x` and row `y` of the tile, over the background that it was drawn over.
+    #[inline(always)]
+    pub(super) fn pixel(&self, x: usize, y: usize, background: [f32; 3]) -> [f32; 3] {
+        let Block { colour, transmittance, .. } = &self.blocks[x / SIDE][y / SIDE];
+        let lane = y % SIDE * SIDE + x % SIDE;
+        std::array::from_fn(|channel| colour[channel][lane] + transmittance[lane] * background[channel])
+    }
+
+    /// [`Self::draw`], over black unless there is a `BACKGROUND`.
+    #[inline(always)]
+    pub(super) fn draw_watched<'a, const BACKGROUND: bool>(
+        &mut self,
+        splats: &[Splat],
+        list: impl Iterator<Item = &'a [u32]>,
+        tile: Tile,
+        watch: &mut impl Watch,
+    ) {
+        let Self { blocks, open, queue } = self;
+        let coordinates = tile.coordinates();
+        for column in 0..BLOCKS {
+            for row in 0..BLOCKS {
+                let inside = tile.inside(column, row);
+                open[column][row] = inside != [0.0; LANES];
+                blocks[column][row] = Block { open: inside, ..Block::EMPTY };
             }
-            open[column][row] = !finished;
-            any_finished |= finished;
         }
-        if any_finished && open == [[false; BLOCKS]; BLOCKS] {
-            break;
+        for slots in list.flat_map(|piece| piece.chunks(FETCHED)) {
+            queue.fill(splats, slots, tile, &coordinates, open);
+            for at in 0..queue.len {
+                let opacity = queue.place(at).0.opacity;
+                alphas(&mut queue.lanes[at % QUEUED], opacity);
+            }
+            let mut any_finished = false;
+            for at in 0..queue.len {
+                let (splat, column, row) = queue.place(at);
+                let alpha = &queue.lanes[at % QUEUED];
+                let (counts, finished) = blend::<BACKGROUND>(&mut blocks[column][row], splat, alpha);
+                if counts {
+                    let [_, column, row] = queue.places[at % QUEUED];
+                    watch.counts(splat, [column, row], alpha);
+                }
+                open[column][row] = !finished;
+                any_finished |= finished;
+            }
+            if any_finished && *open == [[false; BLOCKS]; BLOCKS] {
+                break;
+            }
         }
     }
-    TilePixels(blocks.map(|column| {
-        column.map(|block| {
-            let over = |colour: &Lanes, background: f32| -> Lanes {
-                std::array::from_fn(|lane| colour[lane] + block.transmittance[lane] * background)
-            };
-            let [red, green, blue] = background;
-            [over(&block.red, red), over(&block.green, green), over(&block.blue, blue)]
-        })
-    }))
 }
 
 /// Adds `splat` to the pixels of a block. Returns whether it shows in any or finishes any, and whether all are
 /// finished then.
 ///
-/// Loops are short, and their conditions select values instead of branching, so that each loop becomes a few
-/// vector instructions.
+/// Loops are short, and conditions are masks, so that each loop becomes a few vector instructions. The compiler would
+/// make branches of other conditions.
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
-fn blend(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
+fn blend<const BACKGROUND: bool>(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
     let [red, green, blue] = splat.colour;
     let mut still_open = 0;
     let mut changed = 0;
@@ -264,42 +266,64 @@ fn blend(block: &mut Block, splat: &Splat, alpha: &Lanes) -> (bool, bool) {
         // Where alpha is 0 an open pixel stays as it is, since it is never below the minimum. A finished one
         // stays 0.
         let left = block.open[lane] * (1.0 - alpha[lane]);
-        let add = left >= TRANSMITTANCE_MIN;
-        let weight = if add { alpha[lane] * block.open[lane] } else { 0.0 };
-        let open = if add { left } else { 0.0 };
-        let transmittance = if add { left } else { block.transmittance[lane] };
-        block.red[lane] += red * weight;
-        block.green[lane] += green * weight;
-        block.blue[lane] += blue * weight;
-        block.transmittance[lane] = transmittance;
-        still_open |= open.to_bits();
-        changed |= open.to_bits() ^ block.open[lane].to_bits();
-        block.open[lane] = open;
+        let add = mask(left >= TRANSMITTANCE_MIN);
+        let weight = f32::from_bits((alpha[lane] * block.open[lane]).to_bits() & add);
+        let open = left.to_bits() & add;
+        block.colour[0][lane] += red * weight;
+        block.colour[1][lane] += green * weight;
+        block.colour[2][lane] += blue * weight;
+        if BACKGROUND {
+            block.transmittance[lane] = f32::from_bits(open | (block.transmittance[lane].to_bits() & !add));
+        }
+        still_open |= open;
+        changed |= open ^ block.open[lane].to_bits();
+        block.open[lane] = f32::from_bits(open);
     }
     (changed != 0, still_open == 0)
 }
 
-/// Writes the exponents of the opacities of `splat` at the pixels of a block. Returns whether any may count.
-#[inline(always)]
-fn powers(powers: &mut Lanes, splat: &Splat, x: &Lanes, y: &Lanes) -> bool {
-    let Splat { conic: [a, b, c], cutoff, .. } = *splat;
-    let mut any = false;
-    for lane in 0..LANES {
-        let (dx, dy) = (splat.centre[0] - x[lane], splat.centre[1] - y[lane]);
-        let p = -0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy;
-        powers[lane] = p;
-        any |= p >= cutoff;
+/// What all blocks of a column have of a splat's exponents.
+struct Across {
+    /// The conic's xx times the squared distance in x.
+    squared: Lanes,
+    /// The conic's xy times the distance in x.
+    product: Lanes,
+}
+
+impl Across {
+    #[inline(always)]
+    fn of(splat: &Splat, x: &Lanes) -> Self {
+        let [a, b, _] = splat.conic;
+        let [squared, product] = each([x], |[x]| {
+            let dx = splat.centre[0] - x;
+            [a * dx * dx, b * dx]
+        });
+        Self { squared, product }
     }
-    any
+
+    /// Writes the exponents of the splat's opacities at the pixels of a block. Returns whether any may count. Those that
+    /// cannot become the cutoff, which cannot count either.
+    #[inline(always)]
+    fn powers(&self, powers: &mut Lanes, splat: &Splat, y: &Lanes) -> bool {
+        let Splat { conic: [_, _, c], cutoff, .. } = *splat;
+        let mut any = 0;
+        for lane in 0..LANES {
+            let dy = splat.centre[1] - y[lane];
+            let p = -0.5 * (self.squared[lane] + c * dy * dy) - self.product[lane] * dy;
+            powers[lane] = if p > cutoff { p } else { cutoff };
+            any |= mask(p > cutoff);
+        }
+        any != 0
+    }
 }
 
 /// Replaces the exponents of a block's pixels by the opacities there, 0 where the splat does not count.
 #[inline(always)]
-fn alphas(lanes: &mut Lanes, opacity: f32, cutoff: f32) {
+fn alphas(lanes: &mut Lanes, opacity: f32) {
     for p in lanes {
         let value = opacity * exp_in_range(*p);
         let value = if value < ALPHA_MAX { value } else { ALPHA_MAX };
-        let counts = (*p >= cutoff) & (*p <= 0.0) & (value >= ALPHA_MIN);
+        let counts = (*p <= 0.0) & (value >= ALPHA_MIN);
         *p = if counts { value } else { 0.0 };
     }
 }
@@ -331,14 +355,22 @@ mod tests {
         let list: Vec<u32> = (0..300).collect();
         let list = || list.chunks(70);
         let (at, background) = (Tile::new([1, 3], [100; 2]), [0.1, 0.5, 0.9]);
-        let plain = draw(&splats, list(), at, background, &mut Queue::default(), &mut ());
+        let draw = |simd: Simd, background| {
+            let mut canvas = Canvas::default();
+            canvas.draw(simd, &splats, list(), at, background);
+            let places = (0..TILE * TILE).map(|k| (k % TILE, k / TILE));
+            places.map(|(x, y)| canvas.pixel(x, y, background)).collect::<Vec<_>>()
+        };
+        let plain = draw(Simd::PLAIN, background);
+        let on_black = draw(Simd::PLAIN, [0.0; 3]);
         for simd in Simd::available() {
-            let chosen = tile(simd, &splats, list(), at, background, &mut Queue::default());
-            for (x, y) in (0..TILE * TILE).map(|k| (k % TILE, k / TILE)) {
-                let bits = plain.pixel(x, y).map(f32::to_bits);
-                assert_eq!(chosen.pixel(x, y).map(f32::to_bits), bits, "{simd:?}");
-                assert_ne!(chosen.pixel(x, y), background);
-            }
+            let bits =
+                |pixels: &[[f32; 3]]| pixels.as_flattened().iter().map(|v| v.to_bits()).collect::<Vec<_>>();
+            assert_eq!(bits(&draw(simd, background)), bits(&plain), "{simd:?}");
+            assert_eq!(bits(&draw(simd, [0.0; 3])), bits(&on_black), "{simd:?}");
         }
+        assert!(
+            plain.iter().zip(&on_black).all(|(a, b)| *a != background && a.iter().zip(b).all(|(a, b)| a > b))
+        );
     }
 }

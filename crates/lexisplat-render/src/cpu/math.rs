@@ -90,6 +90,12 @@ pub(super) fn ln(x: f32) -> f32 {
     f + low + n * LN2_HIGH
 }
 
+/// All bits where `condition` holds, else none.
+#[inline(always)]
+pub(super) fn mask(condition: bool) -> u32 {
+    if condition { u32::MAX } else { 0 }
+}
+
 /// Returns a whole number from 0 to 65535 as an integer.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in range; else it saturates")]

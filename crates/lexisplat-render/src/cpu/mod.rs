@@ -35,7 +35,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use blend::{Queue, Tile};
+use blend::{Canvas, Tile};
 #[cfg(feature = "gpu")]
 pub(crate) use change::carry;
 #[cfg(feature = "gpu")]
@@ -159,14 +159,14 @@ fn draw(
         stages.end("tiles");
         let rows = &mut pixels[band.start * TILE * width..(band.end * TILE).min(height) * width];
         rows.par_chunks_mut(width * TILE).enumerate().for_each(|(row, rows)| {
-            let mut queue = Queue::default();
+            let mut canvas = Canvas::default();
             for column in 0..grid.columns {
                 let list = lists.of(row * grid.columns + column);
                 let place = Tile::new([column, band.start + row], [width, height]);
-                let tile = blend::tile(simd, &visible.slots, list, place, options.background, &mut queue);
+                canvas.draw(simd, &visible.slots, list, place, options.background);
                 for (y, line) in rows.chunks_mut(width).enumerate() {
                     let line = line[column * TILE..].iter_mut().take(TILE);
-                    line.enumerate().for_each(|(x, pixel)| *pixel = tile.pixel(x, y));
+                    line.enumerate().for_each(|(x, pixel)| *pixel = canvas.pixel(x, y, options.background));
                 }
             }
         });

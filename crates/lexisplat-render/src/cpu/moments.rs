@@ -4,7 +4,7 @@ use lexisplat::simd::Simd;
 
 use crate::conventions::TRANSMITTANCE_MIN;
 
-use super::blend::{self, BLOCKS, Queue, SIDE, Tile, TilePixels};
+use super::blend::{BLOCKS, Canvas, SIDE, Tile};
 use super::lanes::{LANES, Lanes};
 use super::splat::{Root, Splat};
 use super::trace::Trace;
@@ -40,21 +40,21 @@ impl Moments {
 }
 
 /// Returns the moments of the splats that show in a tile, by the Gaussian's index. `list` has slots of `splats` from
-/// front to back. `queue` and `trace` are overwritten.
+/// front to back. `canvas` and `trace` are overwritten.
 pub(super) fn tile<'a>(
     simd: Simd,
     splats: &[Splat],
     list: impl Iterator<Item = &'a [u32]>,
     tile: Tile,
-    queue: &mut Queue,
+    canvas: &mut Canvas,
     trace: &mut Trace,
 ) -> Vec<(u32, Moments)> {
     trace.clear();
     simd.dispatch(
         #[inline(always)]
         || {
-            let picture = blend::draw(splats, list, tile, [0.0; 3], queue, trace);
-            sum(trace, tile, &picture)
+            canvas.draw_watched::<false>(splats, list, tile, trace);
+            sum(trace, tile, canvas)
         },
     )
 }
@@ -89,10 +89,15 @@ impl ColumnSums {
 
 /// Returns the moments of the splats in `trace`. `picture` is the finished tile.
 #[inline(always)]
-fn sum(trace: &Trace, tile: Tile, picture: &TilePixels) -> Vec<(u32, Moments)> {
+fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
     let mut out = Vec::with_capacity(trace.splats.len());
     let [x, y] = tile.coordinates();
-    let mut blocks = tile.inside().map(|column| column.map(|open| Block { colour: [[0.0; LANES]; 3], open }));
+    let mut blocks = [[Block { colour: [[0.0; LANES]; 3], open: [0.0; LANES] }; BLOCKS]; BLOCKS];
+    for column in 0..BLOCKS {
+        for row in 0..BLOCKS {
+            blocks[column][row].open = tile.inside(column, row);
+        }
+    }
     let mut columns = ColumnSums::ZERO;
     for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
         let splat = &trace.splats[same[0].splat as usize];
@@ -109,7 +114,7 @@ fn sum(trace: &Trace, tile: Tile, picture: &TilePixels) -> Vec<(u32, Moments)> {
                     root,
                     &mark.alpha,
                     [&x[column], &y[row]],
-                    &picture.0[column][row],
+                    &picture.blocks[column][row].colour,
                 );
             }
             columns.flush(&mut moments);

@@ -11,7 +11,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::blend::{Queue, Tile};
+use super::blend::{Canvas, Tile};
 use super::change::carry;
 use super::moments::{self, Moments};
 use super::project::Projection;
@@ -54,7 +54,7 @@ const TILES: usize = 32;
 /// What measuring a tile overwrites.
 #[derive(Default)]
 struct Scratch {
-    queue: Queue,
+    canvas: Canvas,
     trace: Trace,
 }
 
@@ -99,8 +99,8 @@ fn measure(
                 .map(|tile| {
                     let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
                     let list = lists.of(tile);
-                    pool.with(|Scratch { queue, trace }| {
-                        moments::tile(simd, &visible.slots, list, place, queue, trace)
+                    pool.with(|Scratch { canvas, trace }| {
+                        moments::tile(simd, &visible.slots, list, place, canvas, trace)
                     })
                 })
                 .collect();

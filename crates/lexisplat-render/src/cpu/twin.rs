@@ -7,7 +7,7 @@ use crate::conventions::TILE;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::blend::{self, Queue, Tile};
+use super::blend::{Canvas, Tile};
 use super::project::Projection;
 use super::splat::{PixelRect, Splat};
 use super::workspace::Workspace;
@@ -65,7 +65,7 @@ pub(crate) fn tile(splats: &[Seen], at: [usize; 2], background: [f32; 3]) -> Vec
         .collect();
     let list: Vec<u32> = (0..).take(splats.len()).collect();
     let whole = Tile::new(at, [usize::MAX; 2]);
-    let list = std::iter::once(&*list);
-    let pixels = blend::tile(Simd::current(), &splats, list, whole, background, &mut Queue::default());
-    (0..TILE * TILE).map(|k| pixels.pixel(k % TILE, k / TILE)).collect()
+    let mut canvas = Canvas::default();
+    canvas.draw(Simd::current(), &splats, std::iter::once(&*list), whole, background);
+    (0..TILE * TILE).map(|k| canvas.pixel(k % TILE, k / TILE, background)).collect()
 }
