@@ -117,49 +117,67 @@ impl Change {
     /// Carries the moments of a group over to the world.
     #[inline(always)]
     fn of(projection: &Projection, body: &Body, m: &[Lanes; SUMS]) -> Self {
-        let Derivatives { by_position, axes } = projection.derivatives(body);
-        let product = |p: usize, q: usize| {
-            let ([ux, uy], [wx, wy]) = (&by_position[p], &by_position[q]);
-            let [product] = each([ux, uy, wx, wy, &m[2], &m[3], &m[4]], |[ux, uy, wx, wy, xx, xy, yy]| {
-                [xx * ux * wx + xy * (ux * wy + uy * wx) + yy * uy * wy]
-            });
-            product
-        };
-        let position =
-            [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)];
+        let Derivatives { by_position: [x, y, z], axes: [a, b, c] } = &projection.derivatives(body);
+        let position = [
+            product(x, x, m),
+            product(x, y, m),
+            product(x, z, m),
+            product(y, y, m),
+            product(y, z, m),
+            product(z, z, m),
+        ];
         // With the covariance the sum of a a^T over the axes on screen, d ln alpha / d ln s_k is (u . R a_k)^2
         // and a rotation in the plane of j and k by one radian makes
         // (u . R a_j) (u . R a_k) (s_j^2 - s_k^2) / (s_j s_k).
-        let fourth = |p: usize, q: usize| {
-            let ([px, py], [qx, qy]) = (&axes[p], &axes[q]);
-            let inputs = [px, py, qx, qy, &m[5], &m[6], &m[7], &m[8], &m[9]];
-            let [fourth] = each(inputs, |[px, py, qx, qy, m5, m6, m7, m8, m9]| {
-                // This is (u . p)^2 (u . q)^2 as a polynomial in u.
-                let square = |x: f32, y: f32| [x * x, 2.0 * x * y, y * y];
-                let (p, q) = (square(px, py), square(qx, qy));
-                let value = p[0] * q[0] * m5
-                    + (p[0] * q[1] + p[1] * q[0]) * m6
-                    + (p[0] * q[2] + p[1] * q[1] + p[2] * q[0]) * m7
-                    + (p[1] * q[2] + p[2] * q[1]) * m8
-                    + p[2] * q[2] * m9;
-                [if value > 0.0 { value } else { 0.0 }]
-            });
-            fourth
-        };
-        let turned = |j: usize, l: usize| {
-            let [turned] = each([&fourth(j, l), &body.scales[j], &body.scales[l]], |[fourth, j, l]| {
-                let ratio = exp(j - l);
-                let lever = ratio - 1.0 / ratio;
-                [fourth * lever * lever]
-            });
-            turned
-        };
-        let scale = [fourth(0, 0), fourth(1, 1), fourth(2, 2)];
-        Self { position, scale, rotation: [turned(1, 2), turned(2, 0), turned(0, 1)] }
+        let [sa, sb, sc] = &body.scales;
+        let rotation = [
+            levered(&fourth(b, c, m), sb, sc),
+            levered(&fourth(c, a, m), sc, sa),
+            levered(&fourth(a, b, m), sa, sb),
+        ];
+        Self { position, scale: [fourth(a, a, m), fourth(b, b, m), fourth(c, c, m)], rotation }
     }
 
     /// Whether all values of a lane are finite.
     fn is_finite(&self, lane: usize) -> bool {
         self.position.iter().chain(&self.scale).chain(&self.rotation).all(|values| values[lane].is_finite())
     }
+}
+
+/// The sums of (u . p) (u . q), by the second moments.
+#[inline(always)]
+fn product(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
+    let inputs = [&p[0], &p[1], &q[0], &q[1], &m[2], &m[3], &m[4]];
+    let [product] =
+        each(inputs, |[px, py, qx, qy, xx, xy, yy]| [xx * px * qx + xy * (px * qy + py * qx) + yy * py * qy]);
+    product
+}
+
+/// The sums of (u . p)^2 (u . q)^2, by the fourth moments; not below 0.
+#[inline(always)]
+fn fourth(p: &[Lanes; 2], q: &[Lanes; 2], m: &[Lanes; SUMS]) -> Lanes {
+    let inputs = [&p[0], &p[1], &q[0], &q[1], &m[5], &m[6], &m[7], &m[8], &m[9]];
+    let [fourth] = each(inputs, |[px, py, qx, qy, m5, m6, m7, m8, m9]| {
+        // This is (u . p)^2 (u . q)^2 as a polynomial in u.
+        let square = |x: f32, y: f32| [x * x, 2.0 * x * y, y * y];
+        let (p, q) = (square(px, py), square(qx, qy));
+        let value = p[0] * q[0] * m5
+            + (p[0] * q[1] + p[1] * q[0]) * m6
+            + (p[0] * q[2] + p[1] * q[1] + p[2] * q[0]) * m7
+            + (p[1] * q[2] + p[2] * q[1]) * m8
+            + p[2] * q[2] * m9;
+        [if value > 0.0 { value } else { 0.0 }]
+    });
+    fourth
+}
+
+/// `value` times the squared lever of a turn in the plane of two axes with these logarithms of lengths.
+#[inline(always)]
+fn levered(value: &Lanes, scale: &Lanes, other: &Lanes) -> Lanes {
+    let [levered] = each([value, scale, other], |[value, scale, other]| {
+        let ratio = exp(scale - other);
+        let lever = ratio - 1.0 / ratio;
+        [value * lever * lever]
+    });
+    levered
 }

@@ -179,24 +179,28 @@ impl Projection {
                 let Root(root) = Root::of_conic([xx, xy, 0.0], variance_y);
                 root.map(|v| if is_ellipse(det) { v } else { f32::NAN })
             });
-        let rooted = |v: &[Lanes; 2]| {
-            each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| {
-                Root([xx, xy, yy]).of([x, y])
-            })
-        };
-        let [x, y, z] = &view;
-        let moved = |[right, down, forward]: [f32; 3]| {
-            let moved = each([x, y, z], |[x, y, z]| {
-                [
-                    self.focal[0] * (right * z - forward * x) / (z * z),
-                    self.focal[1] * (down * z - forward * y) / (z * z),
-                ]
-            });
-            rooted(&moved)
-        };
-        let [a, b, c] = self.camera.rotation;
-        let [p, q, r] = &on_screen;
-        Derivatives { by_position: [moved(a), moved(b), moved(c)], axes: [rooted(p), rooted(q), rooted(r)] }
+        let [x, y, z] = &self.camera.rotation;
+        Derivatives {
+            by_position: [
+                rooted(&root, &self.moved(&view, x)),
+                rooted(&root, &self.moved(&view, y)),
+                rooted(&root, &self.moved(&view, z)),
+            ],
+            axes: [rooted(&root, &on_screen[0]), rooted(&root, &on_screen[1]), rooted(&root, &on_screen[2])],
+        }
+    }
+
+    /// Returns by how much Gaussians at `view` move on screen for each unit along a world axis, whose components in view
+    /// space are given.
+    #[inline(always)]
+    fn moved(&self, view: &[Lanes; 3], [right, down, forward]: &[f32; 3]) -> [Lanes; 2] {
+        let [x, y, z] = view;
+        each([x, y, z], |[x, y, z]| {
+            [
+                self.focal[0] * (right * z - forward * x) / (z * z),
+                self.focal[1] * (down * z - forward * y) / (z * z),
+            ]
+        })
     }
 
     /// Returns positions in view space.
@@ -222,38 +226,52 @@ impl Projection {
                 -(self.focal[1] * ty) / (z * z),
             ]
         });
+        [self.seen(&jacobian, &axes[0]), self.seen(&jacobian, &axes[1]), self.seen(&jacobian, &axes[2])]
+    }
+
+    /// Returns vectors in the world as they are on screen, by the entries of the Jacobian.
+    #[inline(always)]
+    fn seen(&self, [xx, xz, yy, yz]: &[Lanes; 4], [x, y, z]: &[Lanes; 3]) -> [Lanes; 2] {
         let r = &self.camera.rotation;
-        let [xx, xz, yy, yz] = &jacobian;
-        let seen = |[x, y, z]: &[Lanes; 3]| {
-            each([x, y, z, xx, xz, yy, yz], |[x, y, z, xx, xz, yy, yz]| {
-                let along = |k: usize| r[0][k] * x + r[1][k] * y + r[2][k] * z;
-                [xx * along(0) + xz * along(2), yy * along(1) + yz * along(2)]
-            })
-        };
-        [seen(&axes[0]), seen(&axes[1]), seen(&axes[2])]
+        each([x, y, z, xx, xz, yy, yz], |[x, y, z, xx, xz, yy, yz]| {
+            let along = |k: usize| r[0][k] * x + r[1][k] * y + r[2][k] * z;
+            [xx * along(0) + xz * along(2), yy * along(1) + yz * along(2)]
+        })
     }
 
     /// Returns the pixels that may be touched: the first column and row, and the first after the last.
     #[inline(always)]
     fn pixels(&self, centre: &[Lanes; 2], ellipse: &Ellipse, cutoff: &Lanes) -> [[Lanes; 2]; 2] {
         let level = self.level(centre, ellipse, cutoff);
-        let axis = |k: usize| {
-            let variance = &ellipse.variance[k];
-            each([&centre[k], variance, &level, &ellipse.radius], |[centre, variance, level, radius]| {
-                let reach = (level * variance).sqrt();
-                // Sums with the centre are rounded too.
-                let reach = reach + REACH_ERROR * (reach + centre.abs() + 1.0);
-                let reach = if self.tighten { reach } else { f32::INFINITY };
-                // INRIA's tiles (`getRect`): those that the square of `radius` overlaps, truncated as in C.
-                let first = self.grid.tile(k, (centre - radius) / TILE_F32);
-                let end = self.grid.tile(k, (centre + radius + (TILE_F32 - 1.0)) / TILE_F32);
-                let least = (centre - reach).ceil();
-                let most = (centre + reach).floor() + 1.0;
-                [greater(least, first * TILE_F32), lesser(lesser(most, end * TILE_F32), self.size[k])]
-            })
-        };
-        let ([x_first, x_end], [y_first, y_end]) = (axis(0), axis(1));
+        let [x_first, x_end] =
+            self.pixels_along(0, &centre[0], &ellipse.variance[0], &level, &ellipse.radius);
+        let [y_first, y_end] =
+            self.pixels_along(1, &centre[1], &ellipse.variance[1], &level, &ellipse.radius);
         [[x_first, y_first], [x_end, y_end]]
+    }
+
+    /// Returns the first column (axis 0) or row (axis 1) that may be touched, and the first after the last.
+    #[inline(always)]
+    fn pixels_along(
+        &self,
+        axis: usize,
+        centre: &Lanes,
+        variance: &Lanes,
+        level: &Lanes,
+        radius: &Lanes,
+    ) -> [Lanes; 2] {
+        each([centre, variance, level, radius], |[centre, variance, level, radius]| {
+            let reach = (level * variance).sqrt();
+            // Sums with the centre are rounded too.
+            let reach = reach + REACH_ERROR * (reach + centre.abs() + 1.0);
+            let reach = if self.tighten { reach } else { f32::INFINITY };
+            // INRIA's tiles (`getRect`): those that the square of `radius` overlaps, truncated as in C.
+            let first = self.grid.tile(axis, (centre - radius) / TILE_F32);
+            let end = self.grid.tile(axis, (centre + radius + (TILE_F32 - 1.0)) / TILE_F32);
+            let least = (centre - reach).ceil();
+            let most = (centre + reach).floor() + 1.0;
+            [greater(least, first * TILE_F32), lesser(lesser(most, end * TILE_F32), self.size[axis])]
+        })
     }
 
     /// Returns the level whose product with a variance is the largest squared distance from the centre, in x or y, of
@@ -312,6 +330,12 @@ pub(super) struct Derivatives {
     pub(super) axes: [[Lanes; 2]; 3],
 }
 
+/// `R v` of each lane, for the entries of the roots.
+#[inline(always)]
+fn rooted(root: &[Lanes; 3], v: &[Lanes; 2]) -> [Lanes; 2] {
+    each([&root[0], &root[1], &root[2], &v[0], &v[1]], |[xx, xy, yy, x, y]| Root([xx, xy, yy]).of([x, y]))
+}
+
 /// The dilated ellipses of a group of Gaussians on screen.
 struct Ellipse {
     conic: [Lanes; 3],
@@ -367,18 +391,18 @@ fn axes(body: &Body) -> [[Lanes; 3]; 3] {
         let length = greater((w * w + x * x + y * y + z * z).sqrt(), QUATERNION_FLOOR);
         rotation.map(|v| v / length)
     });
-    let scale = |k: usize| {
-        let [scale] = each([&body.scales[k]], |[scale]| [exp(scale)]);
-        scale
-    };
+    let [a, b, c] = &body.scales;
     [
-        each([w, x, y, z, &scale(0)], |[w, x, y, z, s]| {
+        each([w, x, y, z, a], |[w, x, y, z, s]| {
+            let s = exp(s);
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)].map(|v| v * s)
         }),
-        each([w, x, y, z, &scale(1)], |[w, x, y, z, s]| {
+        each([w, x, y, z, b], |[w, x, y, z, s]| {
+            let s = exp(s);
             [2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)].map(|v| v * s)
         }),
-        each([w, x, y, z, &scale(2)], |[w, x, y, z, s]| {
+        each([w, x, y, z, c], |[w, x, y, z, s]| {
+            let s = exp(s);
             [2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)].map(|v| v * s)
         }),
     ]

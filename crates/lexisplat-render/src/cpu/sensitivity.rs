@@ -48,8 +48,9 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
     Ok(total)
 }
 
-/// Tiles measured at a time. Their moments take 48 bytes for each splat of each tile.
-const TILES: usize = 32;
+/// Splats in the lists of the tiles that are measured at a time, unless one tile has more. Their moments take 48 bytes
+/// each: 6 MB.
+const ENTRIES: usize = 1 << 17;
 
 /// What measuring a tile overwrites.
 #[derive(Default)]
@@ -93,8 +94,15 @@ fn measure(
         lists.fill(order, grid, &band);
         // Tiles are summed in order, so that results do not depend on the number of threads.
         let tiles = band.len() * grid.columns;
-        for first in (0..tiles).step_by(TILES) {
-            let parts: Vec<Vec<(u32, Moments)>> = (first..(first + TILES).min(tiles))
+        let mut first = 0;
+        while first < tiles {
+            let mut entries = lists.len(first);
+            let mut end = first + 1;
+            while end < tiles && entries + lists.len(end) <= ENTRIES {
+                entries += lists.len(end);
+                end += 1;
+            }
+            let parts: Vec<Vec<(u32, Moments)>> = (first..end)
                 .into_par_iter()
                 .map(|tile| {
                     let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
@@ -107,6 +115,7 @@ fn measure(
             for (gaussian, part) in parts.into_iter().flatten() {
                 sums[gaussian as usize].add(&part);
             }
+            first = end;
         }
     }
 }

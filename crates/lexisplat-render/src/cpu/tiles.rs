@@ -68,6 +68,11 @@ impl TileLists {
         });
     }
 
+    /// Number of splats in the list of tile `tile` of the band.
+    pub(super) fn len(&self, tile: usize) -> usize {
+        self.pieces.iter().map(|p| p.starts[tile + 1] - p.starts[tile]).sum()
+    }
+
     /// Returns the list of tile `tile` of the band, in pieces: slots of splats. Tiles are counted row by row.
     pub(super) fn of(&self, tile: usize) -> impl Iterator<Item = &[u32]> {
         self.pieces.iter().map(move |p| &p.entries[p.starts[tile]..p.starts[tile + 1]])
