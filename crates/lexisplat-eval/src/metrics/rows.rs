@@ -37,18 +37,36 @@ pub(super) fn planes<T: Copy + Default + Send + Sync>(
     [first, second, third]
 }
 
-/// Adds `weight` times `row` to `sums`.
-#[inline]
-pub(super) fn add_scaled(sums: &mut [f64], weight: f64, row: &[f64]) {
-    for (sum, value) in sums.iter_mut().zip(row) {
-        *sum += weight * value;
+/// Sums that are kept in registers while all weights are added to them.
+const BLOCK: usize = 16;
+
+/// Adds the rows that `row` returns, each times the weight of its number, to `sums`. Rows are at least as long as
+/// `sums`.
+#[inline(always)]
+pub(super) fn add_rows<'a>(sums: &mut [f64], weights: &[f64], row: impl Fn(usize) -> &'a [f64]) {
+    let len = sums.len();
+    let (blocks, rest) = sums.as_chunks_mut::<BLOCK>();
+    for (block, start) in blocks.iter_mut().zip((0..).step_by(BLOCK)) {
+        let mut sums = *block;
+        for (k, &weight) in weights.iter().enumerate() {
+            let Some(values) = row(k)[start..].first_chunk::<BLOCK>() else { return };
+            for i in 0..BLOCK {
+                sums[i] += weight * values[i];
+            }
+        }
+        *block = sums;
+    }
+    let start = len - rest.len();
+    for (k, &weight) in weights.iter().enumerate() {
+        for (sum, value) in rest.iter_mut().zip(&row(k)[start..]) {
+            *sum += weight * value;
+        }
     }
 }
 
 /// Adds the correlation of `padded` with `weights` to `sums`. `padded` is longer than `sums` by the number of weights
 /// less one.
+#[inline(always)]
 pub(super) fn add_across(sums: &mut [f64], weights: &[f64], padded: &[f64]) {
-    for (&weight, shifted) in weights.iter().zip(padded.windows(sums.len())) {
-        add_scaled(sums, weight, shifted);
-    }
+    add_rows(sums, weights, |k| &padded[k..]);
 }

@@ -1,5 +1,6 @@
 //! Structural similarity, as the 3DGS papers compute it and as image libraries do.
 
+use lexisplat::simd::Simd;
 use lexisplat_render::Image;
 
 use super::rows::{add_across, planes, sum_rows};
@@ -55,7 +56,7 @@ pub fn ssim_inner(a: &Image, b: &Image) -> Result<f64> {
 fn mean(a: &Image, b: &Image, border: Border) -> f64 {
     let (width, height) = (a.width as usize, a.height as usize);
     let (a, b) = (planes(a, |p| p.map(clip)), planes(b, |p| p.map(clip)));
-    let window = window();
+    let (window, simd) = (window(), Simd::current());
     let cut = if border == Border::Cut { REACH } else { 0 };
     let (rows, columns) = (cut..height - cut, cut..width - cut);
     let pixels = rows.len() * columns.len();
@@ -66,7 +67,10 @@ fn mean(a: &Image, b: &Image, border: Border) -> f64 {
             let channels = a.iter().zip(&b);
             channels
                 .map(|(a, b)| {
-                    scratch.blur([a, b], &window, y);
+                    simd.dispatch(
+                        #[inline(always)]
+                        || scratch.blur([a, b], &window, y),
+                    );
                     columns
                         .clone()
                         .map(|x| similarity(scratch.across.each_ref().map(|row| row[x])))
@@ -93,6 +97,7 @@ impl Scratch {
     }
 
     /// Blurs the quantities of row `y` of two planes.
+    #[inline(always)]
     fn blur(&mut self, [a, b]: [&[f32]; 2], window: &[f64; WINDOW], y: usize) {
         let width = self.across[0].len();
         let inner = REACH..REACH + width;

@@ -79,9 +79,7 @@ impl Task<'_> {
             }
             let mut sums = [[0.0; LANES]; SUMS];
             for (lane, m) in moments.iter().enumerate() {
-                for k in 0..SUMS {
-                    sums[k][lane] = m.sums[k];
-                }
+                sums.iter_mut().zip(m.sums).for_each(|(lanes, sum)| lanes[lane] = sum);
             }
             let bodies = Body::load(geometry, first + group.start..first + group.end);
             let changes = Change::of(projection, &bodies, &sums);

@@ -93,10 +93,8 @@ fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
     let mut out = Vec::with_capacity(trace.splats.len());
     let [x, y] = tile.coordinates();
     let mut blocks = [[Block { colour: [[0.0; LANES]; 3], open: [0.0; LANES] }; BLOCKS]; BLOCKS];
-    for column in 0..BLOCKS {
-        for row in 0..BLOCKS {
-            blocks[column][row].open = tile.inside(column, row);
-        }
+    for (column, blocks) in blocks.iter_mut().enumerate() {
+        blocks.iter_mut().enumerate().for_each(|(row, block)| block.open = tile.inside(column, row));
     }
     let mut columns = ColumnSums::ZERO;
     for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {

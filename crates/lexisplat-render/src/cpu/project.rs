@@ -150,9 +150,9 @@ impl Projection {
             [if drawn & is_finite(opacity) { 1.0 } else { 0.0 }]
         });
         // Where nothing is drawn, the pixels end where they begin.
-        for k in 0..2 {
-            [pixels[1][k]] =
-                each([&pixels[1][k], &visible], |[end, visible]| [if visible > 0.0 { end } else { 0.0 }]);
+        let [_, ends] = &mut pixels;
+        for end in ends {
+            [*end] = each([&*end, &visible], |[end, visible]| [if visible > 0.0 { end } else { 0.0 }]);
         }
         let [px, py, pz] = &body.position;
         let direction = each([px, py, pz], |position| {

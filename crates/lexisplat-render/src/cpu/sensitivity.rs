@@ -62,7 +62,7 @@ struct Scratch {
 /// Memory that threads take turns with. There is as much of it as threads have used at once, and none of it grows anew
 /// for each tile.
 #[derive(Default)]
-struct Pool(Mutex<Vec<Scratch>>);
+struct Pool(Mutex<Vec<Box<Scratch>>>);
 
 impl Pool {
     fn with<R>(&self, work: impl FnOnce(&mut Scratch) -> R) -> R {

@@ -42,7 +42,7 @@ pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
             let Splat { gaussian, centre, conic, opacity, colour, pixels, .. } = visible.slots[slot as usize];
             let (columns, rows) = (pixels.columns(), pixels.rows());
             let corners = [[columns.start, rows.start], [columns.end, rows.end]];
-            let tiles = corners.map(|corner| corner.map(|k| u16::try_from(k).unwrap()));
+            let tiles = corners.map(|corner| corner.map(|k| u16::try_from(k).unwrap_or(u16::MAX)));
             Seen { gaussian, centre, conic, opacity, colour, depth, tiles }
         })
         .collect()

@@ -6,12 +6,13 @@ mod filters;
 
 use std::sync::LazyLock;
 
+use lexisplat::simd::Simd;
 use lexisplat_render::Image;
 
 use self::colour::{LIGHTNESS_SCALE, hyab, rgb_to_hunt_lab, srgb_to_ycxcz, ycxcz_to_rgb};
 use self::filters::{Blur, Features, pixels_per_degree};
-use super::rows::{add_across, add_scaled, planes, sum_rows};
-use super::{clipped, same_size};
+use super::rows::{add_across, add_rows, planes, sum_rows};
+use super::{clip, same_size};
 use crate::error::Result;
 
 /// Exponent that compresses colour differences (`gqc`).
@@ -20,8 +21,6 @@ const COLOUR_EXPONENT: f64 = 0.7;
 const COLOUR_KNEE: f64 = 0.4;
 /// Value that this share maps to (`gpt`).
 const COLOUR_KNEE_TO: f64 = 0.95;
-/// Exponent that raises feature differences (`gqf`).
-const FEATURE_EXPONENT: f64 = 0.5;
 
 /// Returns the mean FLIP over all pixels of `test` and `reference`, both sRGB: 0 for identical pictures, at most 1.
 /// Symmetric. The pictures are seen from 0.7 m on a screen of 0.7 m and 3840 pixels (67 pixels per degree), which is
@@ -32,14 +31,17 @@ const FEATURE_EXPONENT: f64 = 0.5;
 pub fn flip(reference: &Image, test: &Image) -> Result<f64> {
     same_size(reference, test)?;
     let (width, height) = (reference.width as usize, reference.height as usize);
-    let pictures = [reference, test].map(|image| planes(image, |pixel| srgb_to_ycxcz(pixel.map(clipped))));
-    let filters = &*FILTERS;
+    let pictures = [reference, test].map(|image| planes(image, |pixel| srgb_to_ycxcz(pixel.map(clip))));
+    let (filters, simd) = (&*FILTERS, Simd::current());
     let sum = sum_rows(
         0..height,
         || [(); 2].map(|()| Row::new(width, filters)),
         |rows, y| {
             for (row, planes) in rows.iter_mut().zip(&pictures) {
-                row.filter(planes, filters, y, height);
+                simd.dispatch(
+                    #[inline(always)]
+                    || row.filter(planes, filters, y, height),
+                );
             }
             let [a, b] = &*rows;
             (0..width).map(|x| pixel(a.at(x), b.at(x), filters.largest)).sum()
@@ -86,7 +88,8 @@ fn pixel(a: Seen, b: Seen, largest: f64) -> f64 {
         COLOUR_KNEE_TO + (difference - knee) / (largest - knee) * (1.0 - COLOUR_KNEE_TO)
     };
     let feature = (a.edge - b.edge).abs().max((a.point - b.point).abs()) / std::f64::consts::SQRT_2;
-    colour.powf(1.0 - feature.powf(FEATURE_EXPONENT))
+    // The root is the exponent `gqf` of 0.5.
+    colour.powf(1.0 - feature.sqrt())
 }
 
 /// Filtered rows of one picture. Its border is repeated outside of it.
@@ -114,6 +117,7 @@ impl Row {
         }
     }
 
+    #[inline(always)]
     fn filter(&mut self, [luma, cx, cz]: &[Vec<f64>; 3], filters: &Filters, y: usize, height: usize) {
         let Filters { blur, features, .. } = filters;
         let jobs = [(luma, &blur.y), (cx, &blur.cx), (cz, &blur.cz[0]), (cz, &blur.cz[1])];
@@ -154,15 +158,16 @@ impl Row {
 }
 
 /// Filters `plane` down its columns at row `y` into the middle of `out`, and repeats the ends to each side.
+#[inline(always)]
 fn down(out: &mut [f64], weights: &[f64], plane: &[f64], y: usize, height: usize) {
     let width = plane.len() / height;
     let reach = weights.len() / 2;
     let middle = &mut out[reach..reach + width];
     middle.fill(0.0);
-    for (k, &weight) in weights.iter().enumerate() {
+    add_rows(middle, weights, |k| {
         let row = (y + k).saturating_sub(reach).min(height - 1);
-        add_scaled(middle, weight, &plane[row * width..(row + 1) * width]);
-    }
+        &plane[row * width..(row + 1) * width]
+    });
     let (first, last) = (out[reach], out[reach + width - 1]);
     out[..reach].fill(first);
     out[reach + width..].fill(last);

@@ -55,7 +55,7 @@ fn naive(a: &Image, b: &Image) -> f64 {
     let detectors = [edge.clone(), transposed(&edge), point.clone(), transposed(&point)];
     let (width, height) = (i64::from(a.width), i64::from(a.height));
     let opponent = |image: &Image| -> Vec<[f64; 3]> {
-        image.pixels.iter().map(|p| srgb_to_ycxcz(p.map(|v| f64::from(v).clamp(0.0, 1.0)))).collect()
+        image.pixels.iter().map(|p| srgb_to_ycxcz(p.map(|v| v.clamp(0.0, 1.0)))).collect()
     };
     let planes = [opponent(a), opponent(b)];
     let at = |plane: &[[f64; 3]], kernel: &Kernel, x: i64, y: i64, c: usize| -> f64 {
