@@ -186,3 +186,42 @@ fn add(
             .for_each(|(most, value)| *most = if value > most { *value } else { *most });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::splat::PixelRect;
+    use super::*;
+    use crate::conventions::TILE;
+
+    /// A splat whose opacity falls off so slowly that it is the same over the tile, on these columns of pixels.
+    fn flat(gaussian: u32, opacity: f32, columns: std::ops::Range<u16>) -> Splat {
+        Splat {
+            centre: [f32::from(columns.start), 0.0],
+            conic: [1e-9, 0.0, 1e-9],
+            opacity,
+            colour: [1.0; 3],
+            cutoff: -20.0,
+            pixels: PixelRect { min: [columns.start, 0], max: [columns.end, 16] },
+            variance_y: 1e9,
+            gaussian,
+        }
+    }
+
+    /// A splat can finish pixels without showing in any. What lies behind shows in the other pixels alone.
+    #[test]
+    fn what_finishes_a_pixel_without_showing_counts() {
+        // Light left: 0.01, then 0.0005. 0.9 of that would leave less than the least transmittance.
+        let splats = [flat(0, 0.99, 0..16), flat(1, 0.95, 0..16), flat(2, 0.9, 0..8), flat(3, 0.5, 0..16)];
+        let list = [0, 1, 2, 3];
+        for simd in Simd::available() {
+            let (mut canvas, mut trace) = (Canvas::default(), Trace::default());
+            let place = Tile::new([0, 0], [TILE; 2]);
+            let found = tile(simd, &splats, list.chunks(4), place, &mut canvas, &mut trace);
+            let sum = |gaussian| found.iter().find(|(g, _)| *g == gaussian).map_or(0.0, |(_, m)| m.sums[0]);
+            assert_eq!(sum(2), 0.0);
+            // Half of 256 pixels, each with the square of half the light left.
+            let expected = 128.0 * (0.5 * 5e-4_f32).powi(2);
+            assert!((sum(3) / expected - 1.0).abs() < 1e-3, "{simd:?}: {} {expected}", sum(3));
+        }
+    }
+}
