@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Time, memory and bytes of packing, for one binary or several in turn.
 
-    python3 benches/packing_seconds.py [--binary NAME=PATH ...] [--simd avx2 avx512] [--way WAY ...] MODEL.ply ...
+    python3 benches/packing_seconds.py [--binary NAME=PATH ...] [--simd avx2 avx512] [--way WAY ...] -- MODEL.ply ...
 
 Without --binary it builds this tree. Every binary packs every model in every way, one after the other on an
 otherwise idle machine, REPEATS times; the run with the least CPU time counts. A larger model comes from
@@ -11,7 +11,6 @@ benches/tile.py. CPU seconds are user and system time of all threads. Memory is 
 import argparse
 import json
 import os
-import statistics
 import subprocess
 import tempfile
 import time

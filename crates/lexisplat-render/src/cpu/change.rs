@@ -9,9 +9,8 @@ use super::lanes::{LANES, Lanes, each};
 use super::math::exp;
 use super::moments::{Moments, SUMS};
 use super::project::{Body, Derivatives, Projection};
+use super::visible::GAUSSIANS_PER_TASK;
 
-/// Gaussians that one task carries over.
-const GAUSSIANS_PER_TASK: usize = 1024;
 /// Colour channels of a picture.
 const CHANNELS: f32 = 3.0;
 

@@ -1,7 +1,6 @@
 //! Projects Gaussians in the world to ellipses on screen.
 //!
-//! The functions on one Gaussian have no branches and are inlined into loops over a group of Gaussians, which become
-//! vector instructions.
+//! All steps work on a group of Gaussians, in short loops without branches that become vector instructions.
 
 use lexisplat::Geometry;
 
@@ -75,7 +74,7 @@ pub(super) struct Placed {
 }
 
 impl Body {
-    /// Returns the Gaussians from `first` on; `gaussians` are at most [`LANES`]. The rest of the lanes are zero.
+    /// Returns these Gaussians, at most [`LANES`]. The rest of the lanes are zero.
     #[inline(always)]
     pub(super) fn load(geometry: &Geometry, gaussians: std::ops::Range<usize>) -> Self {
         let mut out = Self {

@@ -12,10 +12,10 @@ use super::math::whole;
 use super::project::{Body, Projection};
 use super::splat::{PixelRect, Splat};
 
-/// Gaussians that one task projects.
+/// Gaussians that one task projects, or carries changes over to.
 pub(super) const GAUSSIANS_PER_TASK: usize = 1024;
 
-/// The Gaussians that may be visible, in order of index: the first `counts[k]` of each [`GAUSSIANS_PER_TASK`] slots.
+/// The Gaussians that may be visible, in order of index: the first few of each [`GAUSSIANS_PER_TASK`] slots.
 ///
 /// One allocation holds all of them. Many small ones from many threads would not be returned to the system.
 #[derive(Debug, Default)]
@@ -23,7 +23,6 @@ pub(super) struct Visible {
     pub(super) slots: Vec<Splat>,
     /// The pixels that each slot may touch. Listing reads nothing else, and slots are many times as large.
     rects: Vec<PixelRect>,
-    counts: Vec<usize>,
 }
 
 impl Visible {
@@ -40,7 +39,7 @@ impl Visible {
         self.slots.resize(geometry.len(), Splat::default());
         self.rects.resize(geometry.len(), PixelRect::default());
         keys.resize(geometry.len(), (0, 0));
-        self.counts = self
+        let counts: Vec<usize> = self
             .slots
             .par_chunks_mut(GAUSSIANS_PER_TASK)
             .zip(self.rects.par_chunks_mut(GAUSSIANS_PER_TASK))
@@ -55,7 +54,7 @@ impl Visible {
             })
             .collect();
         let mut len = 0;
-        for (task, count) in self.counts.iter().enumerate() {
+        for (task, count) in counts.into_iter().enumerate() {
             let first = task * GAUSSIANS_PER_TASK;
             keys.copy_within(first..first + count, len);
             len += count;
