@@ -91,7 +91,7 @@ impl Codebook {
         let transposed = transposed(dim, &rows);
         let mut gram = vec![ZERO; atoms * blocks];
         for (atom, products) in rows.chunks_exact(dim.max(1)).zip(gram.chunks_exact_mut(blocks.max(1))) {
-            accumulate(products, atom, &transposed, blocks, |sum, x, t| sum + x * t);
+            accumulate(products, |_| ZERO, atom, &transposed, |sum, x, t| sum + x * t);
         }
         Self { dim, blocks, rows, transposed, gram, costs }
     }
@@ -143,8 +143,7 @@ impl Codebook {
         if energy <= goal || (stop == StopRule::Balanced && energy <= cheapest) || !energy.is_finite() {
             return;
         }
-        s.correlations.fill(ZERO);
-        accumulate(&mut s.correlations, row, &self.transposed, self.blocks, |sum, x, t| sum + x * t);
+        accumulate(&mut s.correlations, |_| ZERO, row, &self.transposed, |sum, x, t| sum + x * t);
         for _ in 0..TAKES_PER_VALUE * self.dim {
             if s.code.len() >= self.dim || energy <= goal {
                 break;
@@ -181,7 +180,9 @@ impl Codebook {
     #[inline(always)]
     fn take(&self, s: &mut Scratch, j: usize, value: f32) {
         let gram = &self.gram[j * self.blocks..(j + 1) * self.blocks];
-        accumulate(&mut s.correlations, &[value], gram, self.blocks, |sum, x, g| sum - x * g);
+        for (correlations, products) in s.correlations.iter_mut().zip(gram) {
+            *correlations = correlations.zip(*products, |r, g| r - value * g);
+        }
     }
 
     /// Rounds every value anew, since later atoms changed the residual. Returns by how much the squared error fell.

@@ -2,7 +2,8 @@
 
 use half::f16;
 
-use super::greedy::{Plan, Scratch};
+use super::greedy::{ANY, Plan, Scratch};
+use super::lanes::blocks_of;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 use crate::support::error::{Error, Result};
@@ -14,6 +15,9 @@ const PROMISE_MARGIN: f64 = 1e-12;
 const MAX_ENERGY: f64 = 1e30;
 /// Below this share of the signal's energy the f32 residual is rounding noise, and more atoms would not help.
 const NOISE_FLOOR: f64 = 1e-12;
+
+/// Lanes of a per-atom array of the paper's dictionary, 90 atoms. Loops of a length known to the compiler are faster.
+const DEFAULT_BLOCKS: usize = blocks_of(90);
 
 /// Precision of the stored values. The error is verified after the values are rounded to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,7 +99,7 @@ impl Visit<'_> {
 
 /// The loop of [`Coder::encode`]. A closure would not be inlined into the dispatch, and would then be compiled without
 /// the chosen instructions.
-struct Job<'a, F> {
+struct Job<'a, F, const BLOCKS: usize> {
     coder: &'a Coder,
     signals: &'a [f32],
     scratch: &'a mut Scratch,
@@ -103,14 +107,14 @@ struct Job<'a, F> {
     sink: &'a mut F,
 }
 
-impl<F: FnMut(Visit<'_>)> pulp::NullaryFnOnce for Job<'_, F> {
+impl<F: FnMut(Visit<'_>), const BLOCKS: usize> pulp::NullaryFnOnce for Job<'_, F, BLOCKS> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         let Self { coder, signals, scratch, code, sink } = self;
         for signal in signals.chunks_exact(coder.plan.dim) {
-            let outcome = coder.encode_one(scratch, signal, code);
+            let outcome = coder.encode_one::<BLOCKS>(scratch, signal, code);
             sink(Visit { signal, code, outcome, reconstruction: &scratch.reconstruction });
         }
     }
@@ -138,20 +142,27 @@ impl Coder {
     /// # Panics
     /// If the dictionary is empty (degree 0).
     pub fn encode(&self, signals: &[f32], mut sink: impl FnMut(Visit<'_>)) {
+        match self.plan.has_blocks(DEFAULT_BLOCKS) {
+            true => self.encode_blocks::<DEFAULT_BLOCKS>(signals, &mut sink),
+            false => self.encode_blocks::<ANY>(signals, &mut sink),
+        }
+    }
+
+    fn encode_blocks<const BLOCKS: usize>(&self, signals: &[f32], sink: &mut impl FnMut(Visit<'_>)) {
         let mut scratch = self.plan.scratch();
         let mut code = Vec::with_capacity(self.plan.dim);
         // The loop is compiled once for each vector width; the arithmetic is the same in each.
-        Simd::current().run(Job {
-            coder: self,
-            signals,
-            scratch: &mut scratch,
-            code: &mut code,
-            sink: &mut sink,
-        });
+        let job = Job::<_, BLOCKS> { coder: self, signals, scratch: &mut scratch, code: &mut code, sink };
+        Simd::current().run(job);
     }
 
     #[inline(always)]
-    fn encode_one(&self, s: &mut Scratch, signal: &[f32], code: &mut Vec<(u16, f32)>) -> Encoded {
+    fn encode_one<const BLOCKS: usize>(
+        &self,
+        s: &mut Scratch,
+        signal: &[f32],
+        code: &mut Vec<(u16, f32)>,
+    ) -> Encoded {
         code.clear();
         let error = self.plan.error(s, signal, code);
         let promise = self.stop.tolerance.map_or(0.0, |t| t * (1.0 - PROMISE_MARGIN));
@@ -164,13 +175,13 @@ impl Coder {
         }
         let cap = self.stop.max_nonzeros.map_or(self.plan.dim, usize::from);
         let target = (promise * promise).max(energy * NOISE_FLOOR);
-        self.plan.start(s, signal, energy);
+        self.plan.start::<BLOCKS>(s, signal, energy);
         loop {
             // Each time round takes at least one more atom. The recurrence was too optimistic, or rounding to the value
             // type raised the error above the tolerance.
             let mut exhausted = false;
             loop {
-                exhausted |= s.len >= cap || !self.plan.step(s, self.pursuit);
+                exhausted |= s.len >= cap || !self.plan.step::<BLOCKS>(s, self.pursuit);
                 if exhausted || s.energy <= target {
                     break;
                 }

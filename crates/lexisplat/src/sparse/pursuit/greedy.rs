@@ -8,6 +8,8 @@ use crate::sparse::model::Pursuit;
 /// An atom whose squared distance to the chosen span is below this counts as part of the span, because the f32
 /// recurrences hold only noise about its direction.
 const MIN_SPAN_DISTANCE: f32 = 1e-5;
+/// Stands for any number of lanes, where a constant number makes loops faster.
+pub(super) const ANY: usize = 0;
 /// A lane of ones.
 const ONES: Lane = Lane([1.0; LANES]);
 
@@ -76,6 +78,17 @@ impl Plan {
         Self { blocks, atom_blocks, dim, transposed: transposed(dim, dictionary.as_slice()), gram, padded }
     }
 
+    /// Lanes of one per-atom array, `BLOCKS` unless that is [`ANY`].
+    #[inline(always)]
+    fn blocks<const BLOCKS: usize>(&self) -> usize {
+        if BLOCKS == ANY { self.blocks } else { BLOCKS }
+    }
+
+    /// Whether every per-atom array has `blocks` lanes.
+    pub(super) fn has_blocks(&self, blocks: usize) -> bool {
+        self.blocks == blocks
+    }
+
     pub(super) fn scratch(&self) -> Scratch {
         Scratch {
             correlations: vec![ZERO; self.blocks],
@@ -94,9 +107,10 @@ impl Plan {
 
     /// Starts on `signal`, whose squared norm is `energy`.
     #[inline(always)]
-    pub(super) fn start(&self, s: &mut Scratch, signal: &[f32], energy: f64) {
-        s.correlations.fill(ZERO);
-        accumulate(&mut s.correlations, signal, &self.transposed, self.blocks, |sum, x, t| sum + x * t);
+    pub(super) fn start<const BLOCKS: usize>(&self, s: &mut Scratch, signal: &[f32], energy: f64) {
+        let blocks = self.blocks::<BLOCKS>();
+        let correlations = &mut s.correlations[..blocks];
+        accumulate(correlations, |_| ZERO, signal, &self.transposed, |sum, x, t| sum + x * t);
         s.distances.fill(ONES);
         s.len = 0;
         s.energy = energy;
@@ -104,8 +118,8 @@ impl Plan {
 
     /// Chooses one more atom. Returns `false` if no atom helps, or if `dim` atoms are chosen already.
     #[inline(always)]
-    pub(super) fn step(&self, s: &mut Scratch, pursuit: Pursuit) -> bool {
-        let k = s.len;
+    pub(super) fn step<const BLOCKS: usize>(&self, s: &mut Scratch, pursuit: Pursuit) -> bool {
+        let (k, blocks) = (s.len, self.blocks::<BLOCKS>());
         if k >= self.dim {
             return false;
         }
@@ -116,31 +130,30 @@ impl Plan {
         }) else {
             return false;
         };
-        let (block, lane, blocks) = (best / LANES, best % LANES, self.blocks);
-        let length = s.distances[block].0[lane].sqrt();
-        let amplitude = s.correlations[block].0[lane] / length;
+        let (correlations, distances) = (&mut s.correlations[..blocks], &mut s.distances[..blocks]);
+        let (block, lane) = (best / LANES, best % LANES);
+        let length = distances[block].0[lane].sqrt();
+        let amplitude = correlations[block].0[lane] / length;
         let column = &mut s.triangle[k * MAX_REST..k * MAX_REST + k];
-        for (coordinate, direction) in column.iter_mut().zip(s.directions.chunks_exact(blocks)) {
-            *coordinate = direction[block].0[lane];
-        }
         let (previous, new) = s.directions.split_at_mut(k * blocks);
-        let gram = &self.gram[best * blocks..(best + 1) * blocks];
-        let new = &mut new[..blocks];
-        for (u, g) in new.iter_mut().zip(gram) {
-            *u = *g;
+        for (coordinate, direction) in column.iter_mut().zip(previous.iter().skip(block).step_by(blocks)) {
+            *coordinate = direction.0[lane];
         }
-        accumulate(new, column, previous, blocks, |sum, c, u| sum - c * u);
+        let new = &mut new[..blocks];
+        let gram = &self.gram[best * blocks..(best + 1) * blocks];
+        accumulate(new, |block| gram[block], column, previous, |sum, c, u| sum - c * u);
+        // The chosen atom is in the span now. Because of rounding, the recurrence alone might not tell. The whole lane is
+        // written, since a processor waits long to read a lane of which it has just written a part.
+        let chosen = Lane(std::array::from_fn(|i| if i == lane { f32::INFINITY } else { 0.0 }));
+        distances[block] = distances[block].zip(chosen, |n, chosen| n - chosen);
         let inverse = 1.0 / length;
-        for ((u, r), n) in new.iter_mut().zip(&mut s.correlations).zip(&mut s.distances) {
+        for ((u, r), n) in new.iter_mut().zip(correlations).zip(distances) {
             *u = u.map(|x| x * inverse);
             let distance = n.zip(*u, |n, x| n - x * x);
             let correlation = r.zip(*u, |r, x| r - amplitude * x);
             *n = distance.map(|n| if n > MIN_SPAN_DISTANCE { n } else { f32::INFINITY });
             *r = correlation.zip(distance, |r, n| if n > MIN_SPAN_DISTANCE { r } else { 0.0 });
         }
-        // Because of rounding, the recurrence alone may not exclude the chosen atom.
-        s.distances[block].0[lane] = f32::INFINITY;
-        s.correlations[block].0[lane] = 0.0;
         s.diagonal[k] = length;
         s.amplitudes[k] = amplitude;
         #[expect(clippy::cast_possible_truncation, reason = "a dictionary has at most 1024 atoms")]

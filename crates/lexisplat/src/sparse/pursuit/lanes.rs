@@ -38,7 +38,7 @@ impl Lane {
 }
 
 /// Number of lanes of an array with an entry for each of `atoms`.
-pub(crate) fn blocks_of(atoms: usize) -> usize {
+pub(crate) const fn blocks_of(atoms: usize) -> usize {
     atoms.div_ceil(LANES)
 }
 
@@ -54,52 +54,56 @@ pub(crate) fn transposed(dim: usize, atoms: &[f32]) -> Vec<Lane> {
     out
 }
 
-/// Folds `factors[l]` and row l of `rows`, each `blocks` lanes long, into `sums`, in order of l.
+/// Writes to `sums` what becomes of the lanes that `from` returns when `factors[l]` and row l of `rows` are folded into
+/// them, in order of l. Each row is as long as `sums`.
 ///
-/// Each group of lanes stays in registers for all of `factors`, so that `sums` is read and written once.
+/// Each group of lanes stays in registers for all of `factors`.
 #[inline(always)]
 pub(crate) fn accumulate(
     sums: &mut [Lane],
+    from: impl Fn(usize) -> Lane + Copy,
     factors: &[f32],
     rows: &[Lane],
-    blocks: usize,
     f: impl Fn(f32, f32, f32) -> f32 + Copy,
 ) {
-    let mut done = 0;
-    while done + LARGE <= sums.len() {
-        accumulate_group::<LARGE>(&mut sums[done..], factors, rows, blocks, done, f);
-        done += LARGE;
+    let blocks = sums.len();
+    let mut first = 0;
+    while first + LARGE <= blocks {
+        accumulate_group::<LARGE>(sums, from, factors, rows, first, f);
+        first += LARGE;
     }
-    while done + SMALL <= sums.len() {
-        accumulate_group::<SMALL>(&mut sums[done..], factors, rows, blocks, done, f);
-        done += SMALL;
+    while first + SMALL <= blocks {
+        accumulate_group::<SMALL>(sums, from, factors, rows, first, f);
+        first += SMALL;
     }
-    if done < sums.len() {
-        accumulate_group::<1>(&mut sums[done..], factors, rows, blocks, done, f);
+    if first < blocks {
+        accumulate_group::<1>(sums, from, factors, rows, first, f);
     }
 }
 
 #[inline(always)]
 fn accumulate_group<const GROUP: usize>(
     sums: &mut [Lane],
+    from: impl Fn(usize) -> Lane,
     factors: &[f32],
     rows: &[Lane],
-    blocks: usize,
-    offset: usize,
+    first: usize,
     f: impl Fn(f32, f32, f32) -> f32 + Copy,
 ) {
+    let blocks = sums.len();
     // Arrays of constant length stay in registers, and the loop over them needs no bounds checks.
-    let Some(sums) = sums.first_chunk_mut::<GROUP>() else { return };
-    let mut group = *sums;
-    for (l, &factor) in factors.iter().enumerate() {
-        let Some(row) = rows.get(l * blocks + offset..).and_then(<[Lane]>::first_chunk::<GROUP>) else {
-            return;
-        };
+    let Some(sums) = sums[first..].first_chunk_mut::<GROUP>() else { return };
+    let mut group: [Lane; GROUP] = std::array::from_fn(|g| from(first + g));
+    let mut rows = &rows[first.min(rows.len())..];
+    for &factor in factors {
+        let Some(row) = rows.first_chunk::<GROUP>() else { break };
         for g in 0..GROUP {
             for i in 0..LANES {
                 group[g].0[i] = f(group[g].0[i], factor, row[g].0[i]);
             }
         }
+        // Nothing follows the last row but, perhaps, the end of that row.
+        rows = rows.get(blocks..).unwrap_or_default();
     }
     *sums = group;
 }

@@ -4,7 +4,7 @@ use crate::scene::sh::ShDegree;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
-use crate::sparse::pursuit::greedy::Plan;
+use crate::sparse::pursuit::greedy::{ANY, Plan};
 use crate::sparse::pursuit::{Coder, Encoded, StopRule, ValueType};
 use crate::support::rng::SplitMix64;
 use crate::support::simd::Simd;
@@ -116,11 +116,11 @@ proptest! {
             for pursuit in [Pursuit::Omp, Pursuit::Ols] {
                 let mut basis = Vec::new();
                 let mut residual = exact.clone();
-                plan.start(&mut scratch, signal, dot(&exact, &exact));
+                plan.start::<ANY>(&mut scratch, signal, dot(&exact, &exact));
                 while dot(&residual, &residual).sqrt() > tol {
                     let scores = scores(pursuit, &all, &basis, &residual);
                     let best = scores.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
-                    prop_assert!(plan.step(&mut scratch, pursuit) || best == 0.0);
+                    prop_assert!(plan.step::<ANY>(&mut scratch, pursuit) || best == 0.0);
                     let taken = scratch.chosen[..scratch.len].last().copied().map(usize::from).unwrap();
                     if let Some(score) = scores[taken] {
                         let slack = CLOSE * best + NOISE * dot(&exact, &exact);
