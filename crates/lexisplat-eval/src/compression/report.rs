@@ -1,6 +1,6 @@
 //! What a compression did: the facts that programs print as text and as JSON.
 
-use lexisplat::packed::{PackedHead, StreamBits, TargetRecord};
+use lexisplat::packed::{PackedHead, TargetRecord};
 use lexisplat::stream::Compressed;
 use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
@@ -106,9 +106,8 @@ impl CompressionReport {
         record: &Record,
         report: &CompressReport,
         tensors: &[(String, u64)],
-        streams: &[StreamBits],
     ) -> Self {
-        let parts = part_bytes(tensors, streams);
+        let parts = part_bytes(tensors, &report.stream_bits);
         Self {
             gaussians,
             sh_degree: degree.get(),
@@ -135,18 +134,15 @@ impl CompressionReport {
     /// Returns the report of a file with exact geometry.
     pub(super) fn exact(done: Compressed, layout: Layout) -> Self {
         let Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds, .. } = done;
-        let shared =
-            Self::new(layout, gaussians, dictionary.degree(), &record, &report, &attribute_bytes, &[]);
+        let shared = Self::new(layout, gaussians, dictionary.degree(), &record, &report, &attribute_bytes);
         Self { atoms: dictionary.len(), write_seconds, dictionary: Some(dictionary), ..shared }
     }
 
-    /// Returns the report of a packed file, whose tensors take the bytes in `tensors` and whose streams the
-    /// bits in `streams`.
+    /// Returns the report of a packed file, whose tensors take the bytes in `tensors`.
     pub(super) fn packed(
         head: &PackedHead,
         report: &CompressReport,
         tensors: &[(String, u64)],
-        streams: &[StreamBits],
         importance: SensitivitySource,
     ) -> Self {
         let (gaussians, degree, record) = (head.gaussians, head.degree, &head.record);
@@ -155,7 +151,7 @@ impl CompressionReport {
             target: head.target.clone(),
             importance: Some(importance),
             device: Some(head.device.as_deref().unwrap_or("cpu").to_owned()),
-            ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors, streams)
+            ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors)
         }
     }
 }

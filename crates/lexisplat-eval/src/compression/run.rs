@@ -84,8 +84,7 @@ fn in_parts(
         }
     };
     let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;
-    let report =
-        CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, &done.stream_bits, origin);
+    let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
     let pack_seconds = clock.seconds() - look_seconds;
     Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
 }
@@ -152,9 +151,7 @@ impl Packing {
         let tensors = writer.attribute_bytes().to_vec();
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
-        let streams = packed.stream_bits()?;
-        let report =
-            CompressionReport::packed(packed.head(), &report, &tensors, &streams, SensitivitySource::Views);
+        let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
         Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
     }
 }

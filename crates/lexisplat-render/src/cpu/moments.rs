@@ -66,24 +66,25 @@ struct Block {
     open: Lanes,
 }
 
-/// The sums of one splat over a column of blocks, pixel column by pixel column.
-struct ColumnSums {
+/// What is known of one splat, pixel column by pixel column.
+struct Columns {
+    /// Sums over a column of blocks.
     sums: [[f32; SIDE]; SUMS],
+    /// The largest changes so far, over all columns of blocks.
     removal: [f32; SIDE],
 }
 
-impl ColumnSums {
+impl Columns {
     const ZERO: Self = Self { sums: [[0.0; SIDE]; SUMS], removal: [0.0; SIDE] };
 
-    /// Adds them to `moments`, and begins again.
+    /// Adds the sums to `moments`, and begins with the next column of blocks.
     #[inline(always)]
     fn flush(&mut self, moments: &mut Moments) {
         // The sums are independent, so they advance together, pixel column by pixel column.
         for k in 0..SIDE {
             moments.sums.iter_mut().zip(&self.sums).for_each(|(sum, column)| *sum += column[k]);
         }
-        moments.removal = self.removal.into_iter().fold(moments.removal, f32::max);
-        *self = Self::ZERO;
+        self.sums = Self::ZERO.sums;
     }
 }
 
@@ -96,11 +97,11 @@ fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
     for (column, blocks) in blocks.iter_mut().enumerate() {
         blocks.iter_mut().enumerate().for_each(|(row, block)| block.open = tile.inside(column, row));
     }
-    let mut columns = ColumnSums::ZERO;
     for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
         let splat = &trace.splats[same[0].splat as usize];
         let root = splat.root();
         let mut moments = Moments::default();
+        let mut columns = Columns::ZERO;
         for same in same.chunk_by(|a, b| a.block[0] == b.block[0]) {
             for mark in same {
                 let [column, row] = mark.block.map(|k| usize::from(k) % BLOCKS);
@@ -117,6 +118,7 @@ fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
             }
             columns.flush(&mut moments);
         }
+        moments.removal = columns.removal.into_iter().fold(0.0, f32::max);
         out.push((splat.gaussian, moments));
     }
     out
@@ -126,7 +128,7 @@ fn sum(trace: &Trace, tile: Tile, picture: &Canvas) -> Vec<(u32, Moments)> {
 #[inline(always)]
 #[expect(clippy::needless_range_loop, reason = "lanes of several arrays side by side")]
 fn add(
-    columns: &mut ColumnSums,
+    columns: &mut Columns,
     block: &mut Block,
     splat: &Splat,
     root: Root,

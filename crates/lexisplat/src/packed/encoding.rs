@@ -4,7 +4,7 @@ use super::coder::ChunkCoder;
 use super::entropy::{CONTEXTS, Histogram, Tables};
 use super::pack::PackOptions;
 use super::scene::{PackedHead, UNNAMED};
-use super::stream::{BitCounts, Stream, StreamBits, SymbolEncoder};
+use super::stream::{BitCounts, Stream, SymbolEncoder};
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
 use crate::sparse::tally::{CompressReport, Tally};
@@ -74,7 +74,6 @@ pub(super) struct Finished {
     pub(super) head: PackedHead,
     pub(super) data: Spilled,
     pub(super) report: CompressReport,
-    pub(super) stream_bits: Vec<StreamBits>,
 }
 
 impl Encoding {
@@ -117,7 +116,8 @@ impl Encoding {
         code_chunks(&coder, &tables, &mut write)?;
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
         let seconds = [learn_seconds, clock.seconds() - learn_seconds];
-        let (record, report) = counts.tally.into_report(record, gaussians, None, seconds);
+        let (record, mut report) = counts.tally.into_report(record, gaussians, None, seconds);
+        report.stream_bits = stream_bits;
         let head = PackedHead {
             file: UNNAMED.to_owned(),
             degree: coder.dictionary.degree(),
@@ -133,6 +133,6 @@ impl Encoding {
             lengths,
             limits: Limits::default(),
         };
-        Ok(Finished { head, data: data.finish()?, report, stream_bits })
+        Ok(Finished { head, data: data.finish()?, report })
     }
 }

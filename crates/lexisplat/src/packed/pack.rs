@@ -161,7 +161,7 @@ impl<S: Borrow<Splats>> Packer<S> {
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = splats.meta.clone();
-        let Finished { head, data, report, .. } =
+        let Finished { head, data, report } =
             encoding.finish(n, &self.options, meta, SpillTo::Memory, &mut code_chunks)?;
         let order = self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect());
         Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))

@@ -8,7 +8,7 @@ use super::entropy::Tables;
 use super::fit::Fit;
 use super::pack::{PackOptions, expected_step};
 use super::scene::{PackedHead, SpilledPacked};
-use super::stream::{StreamBits, code_symbols};
+use super::stream::code_symbols;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::scene::spilled::SpilledExtras;
@@ -106,14 +106,14 @@ impl PartPacker {
         self.extras.push(&splats.geometry)
     }
 
-    /// The packed scene, the report, and the sizes of the streams. `device` is the GPU that measured the
+    /// The packed scene and the report. `device` is the GPU that measured the
     /// sensitivity, if one did.
     pub(crate) fn finish(
         self,
         to: SpillTo<'_>,
         device: Option<&str>,
         progress: &dyn Progress,
-    ) -> Result<(PackedHead, SpilledPacked, CompressReport, Vec<StreamBits>)> {
+    ) -> Result<(PackedHead, SpilledPacked, CompressReport)> {
         let mut spilled = self.chunks.finish()?;
         let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
             for batch in self.lengths.chunks(CHUNKS_AT_ONCE) {
@@ -127,10 +127,10 @@ impl PartPacker {
             }
             Ok(())
         };
-        let Finished { mut head, data, report, stream_bits } =
+        let Finished { mut head, data, report } =
             self.encoding.finish(self.gaussians, &self.options, self.meta, to, &mut code_chunks)?;
         head.device = device.map(str::to_owned);
         let order = self.order.map(Spill::finish).transpose()?;
-        Ok((head, SpilledPacked { data, order, extras: self.extras.finish()? }, report, stream_bits))
+        Ok((head, SpilledPacked { data, order, extras: self.extras.finish()? }, report))
     }
 }

@@ -3,7 +3,7 @@
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::{CHUNK, PackOptions, PackedHead, PartPacker, StreamBits, Whole};
+use crate::packed::{CHUNK, PackOptions, PackedHead, PartPacker, Whole};
 use crate::scene::source::SplatSource;
 use crate::sparse::compress::AT_ONCE;
 use crate::sparse::tally::CompressReport;
@@ -25,8 +25,6 @@ pub struct PackedFile {
     pub head: PackedHead,
     /// How packing went.
     pub report: CompressReport,
-    /// Sizes of the streams.
-    pub stream_bits: Vec<StreamBits>,
     /// Bytes of each tensor and of the header, as [`LexiWriter::attribute_bytes`].
     pub tensor_bytes: Vec<(String, u64)>,
 }
@@ -87,11 +85,11 @@ fn run<E: From<Error>>(
         Ok(())
     })?;
     progress.end();
-    let (head, spilled, report, stream_bits) = packer.finish(to, importance.device(), progress)?;
+    let (head, spilled, report) = packer.finish(to, importance.device(), progress)?;
     let writer = LexiWriter::spilled_packed(&head, spilled);
     let tensor_bytes = writer.attribute_bytes().to_vec();
     writer.write(sink, progress)?;
-    Ok(PackedFile { head, report, stream_bits, tensor_bytes })
+    Ok(PackedFile { head, report, tensor_bytes })
 }
 
 #[cfg(test)]
@@ -151,7 +149,7 @@ mod tests {
             assert!(found == expected, "{count}");
             assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
             let bits = packed.stream_bits().unwrap();
-            for (a, b) in done.stream_bits.iter().zip(&bits) {
+            for (a, b) in done.report.stream_bits.iter().zip(&bits) {
                 assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
             }
         }
