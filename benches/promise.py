@@ -1,0 +1,135 @@
+#!/usr/bin/env python3
+"""The quality asked for beside the quality reached over views that were not there when a file was made.
+
+    python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets] [--jobs 1]
+        [--binary LEXISPLAT] [--json FILE]
+
+Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
+every PLY below 8000 Gaussians over an orbit, is compressed with `--psnr` to each asked quality: without cameras, and
+with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB.
+
+The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
+and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, by the
+straight line between the logarithms of the bytes of neighbouring files.
+"""
+
+import argparse
+import json
+import math
+import subprocess
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+SMALL = 8000  # Gaussians; below that an orbit judges where there are no cameras
+PRESETS = {"small": 35, "balanced": 40, "high": 45, "archive": 54}
+KINDS = ("half", "quarter", "far", "above", "back")
+
+
+def gaussians(path):
+    """Number of Gaussians of a binary PLY of 3DGS, else None."""
+    with open(path, "rb") as file:
+        head = file.read(65536).split(b"end_header\n")[0].decode("ascii", "replace").splitlines()
+    counts = [int(l.split()[2]) for l in head if l.startswith("element vertex")]
+    ours = any(l.endswith(" f_dc_0") for l in head) and "format binary_little_endian 1.0" in head
+    return counts[0] if counts and ours else None
+
+
+def cameras_of(path):
+    found = [c for c in path.parent.glob("*.cameras.json") if path.stem.startswith(c.name.removesuffix(".cameras.json"))]
+    return max(found, key=lambda c: len(c.name), default=None)
+
+
+def training(cameras, folder):
+    """The cameras without the test views, which the split marks or which are every 8th by name."""
+    views = sorted(json.loads(cameras.read_text()), key=lambda v: v["img_name"])
+    if any(v.get("split") for v in views):
+        kept = [v for v in views if v.get("split") != "test"]
+    else:
+        kept = [v for k, v in enumerate(views) if k % 8]
+    file = Path(folder) / "training.cameras.json"
+    file.write_text(json.dumps([{k: v for k, v in view.items() if k != "split"} for view in kept]))
+    return file
+
+
+def bytes_at(points, decibels):
+    """Bytes at a reached quality, between the two neighbouring (dB, bytes) points or beyond the last two."""
+    points = sorted(points)
+    if len(points) < 2:
+        return None
+    k = next((k for k in range(1, len(points) - 1) if points[k][0] >= decibels), len(points) - 1)
+    (x0, y0), (x1, y1) = points[k - 1], points[k]
+    if x1 - x0 < 1e-6:
+        return None
+    return math.exp(math.log(y0) + (decibels - x0) / (x1 - x0) * (math.log(y1) - math.log(y0)))
+
+
+def measure(binary, scorer, model, count, args):
+    cameras = cameras_of(model)
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        ways = [("none", [])] + ([("given", ["--cameras", training(cameras, folder)])] if cameras else [])
+        jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways for a in args.asked]
+        if args.presets:
+            jobs += [(way, name, aim, [*extra, "--preset", name]) for way, extra in ways for name, aim in PRESETS.items()]
+        files = []
+        for number, (_, _, _, options) in enumerate(jobs):
+            file = Path(folder) / f"{number}.lexi"
+            done = subprocess.run([binary, "compress", "--quiet", model, "-o", file, *options], capture_output=True, text=True)
+            if done.returncode:
+                raise SystemExit(f"{model.name} {options}: {done.stderr}")
+            files.append(file)
+        scored = subprocess.check_output([scorer, model, cameras or "orbit", *files], text=True).splitlines()
+        for (way, name, aim, _), line in zip(jobs, scored):
+            rows.append({"scene": model.stem, "gaussians": count, "cameras": way, "asked": name, "aim": aim, **json.loads(line)})
+    return rows
+
+
+def table(rows, asked):
+    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | with / without |")
+    print("|" + "---|" * (9 + len(KINDS)))
+    points = {}
+    for r in rows:
+        if r["asked"].startswith("psnr"):
+            points.setdefault((r["scene"], r["cameras"]), []).append((r["path"]["mean"], r["bytes"]))
+    for r in rows:
+        path = r["path"]
+        off = [f"{r[k]['mean']:.1f}" if r[k] else "-" for k in KINDS]
+        ratio = ""
+        if r["cameras"] == "none" and (r["scene"], "given") in points:
+            other = bytes_at(points[r["scene"], "given"], path["mean"])
+            ratio = f"{r['bytes'] / other:.2f}" if other else ""
+        print(f"| {r['scene']} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
+              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} |", flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="+", type=Path)
+    parser.add_argument("--only", nargs="+")
+    parser.add_argument("--asked", nargs="+", type=float, default=[36, 40, 44])
+    parser.add_argument("--presets", action="store_true")
+    parser.add_argument("--binary", type=Path)
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    build = ["cargo", "build", "--release", "-q", "-p", "lexisplat-eval", "--example", "promise"]
+    subprocess.run(build, cwd=ROOT, check=True)
+    if args.binary is None:
+        subprocess.run(["cargo", "build", "--release", "-q", "-p", "lexisplat-cli"], cwd=ROOT, check=True)
+    metadata = subprocess.check_output(["cargo", "metadata", "--format-version=1", "--no-deps"], cwd=ROOT)
+    target = Path(json.loads(metadata)["target_directory"]) / "release"
+    rows = []
+    for model in sorted(m for folder in args.folders for m in folder.glob("*.ply")):
+        count = gaussians(model)
+        if count is None or (args.only and model.stem not in args.only):
+            continue
+        if cameras_of(model) is None and count >= SMALL:
+            continue
+        rows += measure(args.binary or target / "lexisplat", target / "examples" / "promise", model, count, args)
+    if args.json:
+        args.json.write_text(json.dumps(rows, indent=1))
+    table(rows, args.asked)
+
+
+if __name__ == "__main__":
+    main()
