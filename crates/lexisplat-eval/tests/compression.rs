@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
-use lexisplat_eval::compression::{PackingViews, SensitivitySource};
+use lexisplat_eval::compression::{Looked, PackingViews, SensitivitySource};
 use lexisplat_eval::{Compression, CompressionReport, Error, Packing, Quality, Target};
 use lexisplat_render::Renderer;
 use lexisplat_sample::{SampleOptions, scene};
@@ -131,12 +131,11 @@ fn targets_out_of_reach_are_told_in_their_own_unit() {
 }
 
 #[test]
-fn a_sensitivity_serves_several_files() {
+fn one_look_serves_several_files() {
     let splats = sample();
-    let views = PackingViews::generated(&splats);
-    let sensitivity = Arc::new(views.sensitivity(&mut Renderer::cpu(), &splats, &Silent).unwrap());
+    let looked = Arc::new(Looked::at(&mut Renderer::cpu(), &splats, None, &Silent).unwrap());
     for preset in [Preset::Small, Preset::High] {
-        let known = Packing::new(preset).with_sensitivity(Arc::clone(&sensitivity));
+        let known = Packing::new(preset).with_looked(Arc::clone(&looked));
         assert!(run(known, &splats).0 == run(Packing::new(Quality::Preset(preset)), &splats).0);
     }
 }

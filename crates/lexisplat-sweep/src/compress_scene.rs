@@ -3,21 +3,21 @@
 use std::sync::Arc;
 
 use lexisplat::packed::PackOptions;
-use lexisplat::{CompressOptions, Limits, Model, Progress, Sensitivity, Splats, Stopwatch, lexi};
-use lexisplat_eval::compression::PackingViews;
+use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, Stopwatch, lexi};
+use lexisplat_eval::compression::Looked;
 use lexisplat_eval::{Compression, CompressionReport, Packing, Result};
 use lexisplat_render::Renderer;
 
 use super::options::SweepOptions;
 use super::results::Setting;
 
-/// Compresses `splats`. `sensitivity` is measured for the first packed file of a model and reused for the others.
+/// Compresses `splats`. The model is looked at for its first packed file, and `looked` is reused for the others.
 pub(super) fn compress_scene(
     splats: &Splats,
     setting: Setting,
     options: &SweepOptions,
     renderer: &mut Renderer,
-    sensitivity: &mut Option<Arc<Sensitivity>>,
+    looked: &mut Option<Arc<Looked>>,
     progress: &dyn Progress,
 ) -> Result<(Model, CompressionReport)> {
     let clock = Stopwatch::start();
@@ -33,15 +33,12 @@ pub(super) fn compress_scene(
         }
         // As `lexisplat compress --preset` does without cameras.
         Setting::Preset(preset) => {
-            let measured = match sensitivity {
-                Some(measured) => measured,
-                None => {
-                    let views = PackingViews::generated(splats);
-                    sensitivity.insert(Arc::new(views.sensitivity(renderer, splats, progress)?))
-                }
+            let looked = match looked {
+                Some(looked) => looked,
+                None => looked.insert(Arc::new(Looked::at(renderer, splats, None, progress)?)),
             };
             let packing = PackOptions::default().with_seed(options.seed);
-            Packing::new(preset).with_options(packing).with_sensitivity(Arc::clone(measured)).into()
+            Packing::new(preset).with_options(packing).with_looked(Arc::clone(looked)).into()
         }
     };
     let look_seconds = clock.seconds();

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lexisplat::ply::{self, ReadOptions};
-use lexisplat::{Input, Layout, Sensitivity, Splats};
+use lexisplat::{Input, Layout, Splats};
+use lexisplat_eval::compression::Looked;
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
@@ -87,7 +88,7 @@ struct Subject {
     shown: Vec<usize>,
     /// Pictures of the original and photos, made when the first part needs them.
     references: Option<References>,
-    sensitivity: Option<Arc<Sensitivity>>,
+    looked: Option<Arc<Looked>>,
 }
 
 /// Pictures that others are compared with, one for each view.
@@ -136,7 +137,7 @@ impl Evaluator<'_> {
             cameras,
             photos,
             references: None,
-            sensitivity: None,
+            looked: None,
         };
         self.progress.part(&format!("{} {}", entry.name, entry.method));
         let original = self.original(&mut subject)?;
@@ -250,10 +251,9 @@ impl Evaluator<'_> {
     fn point(&mut self, subject: &mut Subject, setting: Setting) -> Part<Point> {
         let label = setting.label();
         self.part(subject, Some(&label), |this, subject, References { originals, photos }| {
-            let Subject { splats, sensitivity, .. } = subject;
+            let Subject { splats, looked, .. } = subject;
             let (renderer, progress) = (&mut this.renderer, this.progress);
-            let (model, report) =
-                compress_scene(splats, setting, this.options, renderer, sensitivity, progress)?;
+            let (model, report) = compress_scene(splats, setting, this.options, renderer, looked, progress)?;
             let scene = Scene::from(&model);
             let drawn = this.draw(&scene, &subject.cameras)?;
             for &view in &subject.shown {

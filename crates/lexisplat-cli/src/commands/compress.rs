@@ -8,7 +8,7 @@ use anyhow::Result;
 use lexisplat::packed::{PackOptions, TargetRecord};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Layout, Limits, Record, lexi};
-use lexisplat_eval::compression::SensitivitySource;
+use lexisplat_eval::compression::{Reached, SensitivitySource};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_render::read_views;
 
@@ -169,6 +169,8 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     }
     if let Some(target) = &report.target {
         line("pictures", target_line(target))?;
+    } else if let Some(reached) = &report.reached {
+        line("pictures", reached_line(reached))?;
     }
     let dictionary = match (report.learn_sample, report.learn_rounds) {
         _ if dim == 0 => "none: the scene has no view-dependent colour".to_owned(),
@@ -226,6 +228,13 @@ pub(crate) fn error_line(record: &Record) -> String {
         ),
         (None, _) => format!("{found}; nothing was promised"),
     }
+}
+
+/// What a file shows of its scene.
+fn reached_line(reached: &Reached) -> String {
+    let Reached { judged_psnr, min_psnr, views, cameras, .. } = reached;
+    let kind = if *cameras { "given cameras" } else { "generated views" };
+    format!("about {judged_psnr:.1} dB in photographs; {min_psnr:.1} dB at worst over {views} {kind}")
 }
 
 /// What a file of a given quality or size reached.

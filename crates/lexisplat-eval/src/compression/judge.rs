@@ -3,13 +3,9 @@
 use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 
-use super::views::PackingViews;
 use crate::error::Result;
 use crate::metrics::psnr;
 
-/// Number of generated views that judge. Photographs are taken of what has detail and are more demanding than
-/// most generated views, so those with the most detail judge (docs/METHOD.md has the measurements).
-const JUDGES: usize = 18;
 /// PSNR that identical pictures count as, in dB, so that means are finite.
 const IDENTICAL: f64 = 100.0;
 
@@ -22,7 +18,8 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// Draws `splats` from the judging views with `renderer`, which will also draw the models. `progress` can cancel.
+    /// Draws `splats` from the cameras `judging` with `renderer`, which will also draw the models. The cameras were
+    /// `given`, or else generated. `progress` can cancel.
     ///
     /// # Errors
     /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
@@ -30,25 +27,19 @@ impl Judge {
     pub fn new(
         mut renderer: Renderer,
         splats: &Splats,
-        views: &PackingViews,
+        judging: &[&Camera],
+        given: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let scene = renderer.prepare(Scene::from(splats))?;
-        let most = if views.are_given() { usize::MAX } else { JUDGES };
-        let mut drawn: Vec<(f64, Camera, Image)> = Vec::new();
-        for camera in views.judging() {
+        let mut drawn = Vec::with_capacity(judging.len());
+        for &camera in judging {
             progress.check()?;
             let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
-            drawn.push((detail(&picture), camera.clone(), picture));
-            if drawn.len() > most
-                && let Some(least) = (0..drawn.len()).min_by(|&a, &b| drawn[a].0.total_cmp(&drawn[b].0))
-            {
-                drawn.remove(least);
-            }
+            drawn.push((camera.clone(), picture));
         }
         drop(scene);
-        let drawn = drawn.into_iter().map(|(_, camera, picture)| (camera, picture)).collect();
-        Ok(Self { renderer, views: drawn, given: views.are_given() })
+        Ok(Self { renderer, views: drawn, given })
     }
 
     /// Number of views that judge.
@@ -63,41 +54,36 @@ impl Judge {
         self.given
     }
 
-    /// Returns the mean and the least PSNR of `model`, in dB. `progress` can cancel.
+    /// Scores `model`. `progress` can cancel.
     ///
     /// # Errors
     /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the model
     /// or a view does not fit.
-    pub fn score(&mut self, model: &Model, progress: &dyn Progress) -> Result<[f64; 2]> {
+    pub fn score(&mut self, model: &Model, progress: &dyn Progress) -> Result<Score> {
         let scene = self.renderer.prepare(Scene::from(model))?;
-        let (mut sum, mut least) = (0.0, IDENTICAL);
+        let mut all = Vec::with_capacity(self.views.len());
         for (camera, original) in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
-            let decibels = psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL);
-            sum += decibels;
-            least = f64::min(least, decibels);
+            all.push(psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL));
         }
-        Ok([sum / self.views.len().max(1) as f64, least])
+        all.sort_by(f64::total_cmp);
+        let mean = |views: &[f64]| views.iter().sum::<f64>() / views.len().max(1) as f64;
+        // Photographs are as hard as the harder half of the generated views (docs/METHOD.md).
+        let hard = if self.given { all.len() } else { all.len().div_ceil(2) };
+        let least = all.first().copied().unwrap_or(IDENTICAL);
+        Ok(Score { judged: mean(&all[..hard]), mean: mean(&all), least })
     }
 }
 
-/// Mean squared difference of neighbouring pixels, never negative.
-fn detail(picture: &Image) -> f64 {
-    let width = picture.width as usize;
-    let mut sum = 0.0;
-    let mut add = |a: &[f32; 3], b: &[f32; 3]| {
-        for (a, b) in a.iter().zip(b) {
-            sum += f64::from(a - b).powi(2);
-        }
-    };
-    for row in picture.pixels.chunks_exact(width.max(1)) {
-        for pair in row.windows(2) {
-            add(&pair[0], &pair[1]);
-        }
-    }
-    for (above, below) in picture.pixels.iter().zip(picture.pixels.iter().skip(width)) {
-        add(above, below);
-    }
-    sum / picture.pixels.len().max(1) as f64
+/// PSNR over the judging views, in dB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Score {
+    /// What photographs are expected to show on average: the mean of given views, or that of the worse half of
+    /// generated ones.
+    pub judged: f64,
+    /// The mean of all views.
+    pub mean: f64,
+    /// The least of a view.
+    pub least: f64,
 }

@@ -19,6 +19,7 @@
 //! ```
 
 mod facts;
+mod found;
 mod judge;
 mod packing;
 mod prune;
@@ -28,9 +29,9 @@ mod target;
 mod views;
 
 pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
-pub use judge::Judge;
+pub use judge::{Judge, Score};
 pub use packing::{Compression, Packing, Quality};
 pub use prune::{Pruned, prune};
-pub use report::{CompressionReport, SensitivitySource};
-pub use target::{Target, pack_to_target};
-pub use views::PackingViews;
+pub use report::{CompressionReport, Reached, SensitivitySource};
+pub use target::{Target, pack_to_preset, pack_to_target};
+pub use views::{Looked, PackingViews};

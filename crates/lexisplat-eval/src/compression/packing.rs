@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use lexisplat::packed::{PackOptions, Preset};
-use lexisplat::{CodeLayout, CompressOptions, Sensitivity};
+use lexisplat::{CodeLayout, CompressOptions};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Renderer};
 
 use super::target::Target;
+use super::views::Looked;
 use crate::error::{Error, Result};
 
 /// Bytes of memory that packing a whole scene takes for each byte of its source. 1.85 was measured.
@@ -71,7 +72,7 @@ pub struct Packing {
     pub(super) cameras: Option<Vec<Camera>>,
     pub(super) prune: Option<f32>,
     pub(super) gpu: Option<Gpu>,
-    pub(super) sensitivity: Option<Arc<Sensitivity>>,
+    pub(super) looked: Option<Arc<Looked>>,
     memory: u64,
 }
 
@@ -91,7 +92,7 @@ impl Packing {
             cameras: None,
             prune: None,
             gpu: None,
-            sensitivity: None,
+            looked: None,
             memory: u64::MAX,
         }
     }
@@ -130,10 +131,10 @@ impl Packing {
         Self { memory: bytes, ..self }
     }
 
-    /// Packs by a sensitivity that was measured before, for several files of one scene.
+    /// Packs by what looking at the scene gave before, for several files of one scene.
     #[must_use]
-    pub fn with_sensitivity(self, sensitivity: Arc<Sensitivity>) -> Self {
-        Self { sensitivity: Some(sensitivity), ..self }
+    pub fn with_looked(self, looked: Arc<Looked>) -> Self {
+        Self { looked: Some(looked), ..self }
     }
 
     /// The renderer that the choices mean.
@@ -181,7 +182,7 @@ impl Packing {
             Quality::Target(target) => Some(target.name()),
             Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
             Quality::Preset(_) if self.prune.is_some() => Some("prune"),
-            Quality::Preset(_) => self.sensitivity.as_ref().map(|_| "sensitivity"),
+            Quality::Preset(_) => self.looked.as_ref().map(|_| "looked"),
         }
     }
 }

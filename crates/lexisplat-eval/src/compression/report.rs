@@ -6,6 +6,7 @@ use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
 use serde::{Serialize, Serializer};
 
 use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use super::judge::{Judge, Score};
 use super::prune::Pruned;
 
 /// What a compression did.
@@ -51,6 +52,8 @@ pub struct CompressionReport {
     /// What was asked and reached, if the quality was a target.
     #[serde(rename = "promise")]
     pub target: Option<TargetRecord>,
+    /// What the file shows of the scene, if views judged it.
+    pub reached: Option<Reached>,
     /// What the sensitivity comes from. `None` if the geometry is exact, which needs none.
     pub importance: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
@@ -84,6 +87,35 @@ pub struct CompressionReport {
     /// The dictionary of a file with exact geometry.
     #[serde(skip)]
     pub dictionary: Option<Dictionary>,
+}
+
+/// What a file shows of its scene over the judging views.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Reached {
+    /// PSNR that photographs are expected to show on average, in dB; see [`Score::judged`].
+    pub judged_psnr: f64,
+    /// Mean PSNR of all views, in dB.
+    pub mean_psnr: f64,
+    /// Least PSNR of a view, in dB.
+    pub min_psnr: f64,
+    /// Number of views.
+    pub views: usize,
+    /// Whether the views were given. Otherwise they were found.
+    pub cameras: bool,
+}
+
+impl Reached {
+    pub(super) fn new(score: Score, judge: &Judge) -> Self {
+        let [judged_psnr, mean_psnr, min_psnr] =
+            [score.judged, score.mean, score.least].map(rounded_decibels);
+        Self { judged_psnr, mean_psnr, min_psnr, views: judge.views(), cameras: judge.views_are_given() }
+    }
+}
+
+/// Rounds decibels to the thousandths that are reported.
+pub(super) fn rounded_decibels(decibels: f64) -> f64 {
+    (decibels * 1000.0).round() / 1000.0
 }
 
 /// What the sensitivity of a scene comes from.

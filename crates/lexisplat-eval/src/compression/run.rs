@@ -9,10 +9,13 @@ use lexisplat_render::Renderer;
 use super::judge::Judge;
 use super::packing::{Compression, Packing, Quality};
 use super::prune::prune;
-use super::report::{CompressionReport, SensitivitySource};
-use super::target::pack_to_target;
-use super::views::PackingViews;
+use super::report::{CompressionReport, Reached, SensitivitySource};
+use super::target::{pack_to_preset, pack_to_target};
+use super::views::{Looked, PackingViews};
 use crate::error::Result;
+
+/// Views that judge a preset, at most.
+const PRESET_JUDGES: usize = 12;
 
 impl Compression {
     /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once. Such a source is best
@@ -117,15 +120,11 @@ impl Packing {
         let read_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
-        let views = match &self.cameras {
-            Some(cameras) => PackingViews::given(cameras)?,
-            None => PackingViews::generated(&splats),
-        };
         let mut renderer = self.renderer()?;
         let device = gpu(&renderer);
-        let mut sensitivity = match &self.sensitivity {
-            Some(measured) => Sensitivity::clone(measured),
-            None => views.sensitivity(&mut renderer, &splats, progress)?,
+        let Looked { views, mut sensitivity } = match &self.looked {
+            Some(looked) => Looked::clone(looked),
+            None => Looked::at(&mut renderer, &splats, self.cameras.as_deref(), progress)?,
         };
         let mut prune =
             |levels| prune(&mut renderer, splats.to_mut(), &mut sensitivity, &views, levels, progress);
@@ -135,13 +134,16 @@ impl Packing {
         let clock = Stopwatch::start();
         let packer = Packer::new(&*splats, &sensitivity, &self.options)?;
         drop(sensitivity);
-        let (packed, report) = match self.quality {
-            Quality::Preset(preset) => packer.pack(packer.step_for(preset.decibels()), progress)?,
+        let most = if let Quality::Preset(_) = self.quality { PRESET_JUDGES } else { usize::MAX };
+        let mut judge =
+            Judge::new(renderer, &splats, &views.some_judging(most), views.are_given(), progress)?;
+        let (packed, report, score) = match self.quality {
+            Quality::Preset(preset) => pack_to_preset(&packer, &mut judge, preset, progress)?,
             Quality::Target(target) => {
-                let mut judge = Judge::new(renderer, &splats, &views, progress)?;
                 pack_to_target(&packer, &mut judge, target, source.source_bytes(), progress)?
             }
         };
+        let reached = Some(Reached::new(score, &judge));
         drop(packer);
         let packed = packed.with_device(device);
         let pack_seconds = clock.seconds();
@@ -152,7 +154,15 @@ impl Packing {
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
-        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
+        Ok(CompressionReport {
+            read_seconds,
+            look_seconds,
+            pack_seconds,
+            write_seconds,
+            pruned,
+            reached,
+            ..report
+        })
     }
 }
 

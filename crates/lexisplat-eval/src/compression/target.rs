@@ -3,16 +3,19 @@
 use std::borrow::Borrow;
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{Packed, Packer, TargetRecord};
+use lexisplat::packed::{Packed, Packer, Preset, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
-use super::judge::Judge;
+use super::judge::{Judge, Score};
+use super::report::rounded_decibels;
 use crate::error::{Error, Result};
 
 /// A quality may exceed the target by this much, in dB.
 const CLOSE_DB: f64 = 0.06;
 /// A size may fall short of the target by this share.
 const CLOSE_SIZE: f64 = 0.01;
+/// A preset may miss its aim by this much, in dB.
+const CLOSE_PRESET: f64 = 0.75;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -129,6 +132,30 @@ struct Try {
     value: f64,
 }
 
+/// Packs to the aim of `preset`. If the file misses that by more than [`CLOSE_PRESET`], it is packed once more.
+///
+/// # Errors
+/// Errors of packing and drawing.
+pub fn pack_to_preset(
+    packer: &Packer<impl Borrow<Splats>>,
+    judge: &mut Judge,
+    preset: Preset,
+    progress: &dyn Progress,
+) -> Result<(Packed, CompressReport, Score)> {
+    let step = packer.step_for(preset.decibels());
+    let (packed, report) = packer.pack(step, progress)?;
+    let score = judge.score(&packed.unpack()?, progress)?;
+    let over = score.judged - preset.decibels();
+    if over.abs() <= CLOSE_PRESET {
+        return Ok((packed, report, score));
+    }
+    drop(packed);
+    let step = step * libm::exp2(over / DB_PER_HALVING);
+    let (packed, report) = packer.pack(step.clamp(STEPS[0], STEPS[1]), progress)?;
+    let score = judge.score(&packed.unpack()?, progress)?;
+    Ok((packed, report, score))
+}
+
 /// Packs until `target` is met as closely as possible. The file records what was asked and reached. A ratio
 /// is one of `source_bytes`.
 ///
@@ -140,7 +167,7 @@ pub fn pack_to_target(
     target: Target,
     source_bytes: u64,
     progress: &dyn Progress,
-) -> Result<(Packed, CompressReport)> {
+) -> Result<(Packed, CompressReport, Score)> {
     target.check()?;
     let recorded = target.recorded(source_bytes);
     let asked = recorded.asked();
@@ -166,15 +193,15 @@ pub fn pack_to_target(
     };
     log_step = log_step.clamp(limits[0], limits[1]);
     let mut tries: Vec<Try> = Vec::new();
-    let mut best: Option<(f64, Packed, CompressReport, Option<[f64; 2]>)> = None;
+    let mut best: Option<(f64, Packed, CompressReport, Option<Score>)> = None;
     for _ in 0..MAX_TRIES {
         progress.check()?;
         let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
         let (value, reached) = if size {
             (-libm::log2((LexiWriter::packed(&packed).file_bytes() + RECORD_BYTES) as f64), None)
         } else {
-            let [mean, least] = judge.score(&packed.unpack()?, progress)?;
-            (if matches!(target, Target::MinPsnr(_)) { least } else { mean }, Some([mean, least]))
+            let score = judge.score(&packed.unpack()?, progress)?;
+            (if matches!(target, Target::MinPsnr(_)) { score.least } else { score.judged }, Some(score))
         };
         tries.push(Try { log_step, value });
         let met = value >= wanted;
@@ -200,13 +227,14 @@ pub fn pack_to_target(
     };
     let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
     let given = judge.views_are_given();
-    let record = TargetRecord::new(recorded.name(), asked, reached.map(rounded), views, given);
-    Ok((packed.with_target(record), report))
-}
-
-/// Rounds decibels to the thousandths that a file records.
-fn rounded(decibels: f64) -> f64 {
-    (decibels * 1000.0).round() / 1000.0
+    let record = TargetRecord::new(
+        recorded.name(),
+        asked,
+        [rounded_decibels(reached.mean), rounded_decibels(reached.least)],
+        views,
+        given,
+    );
+    Ok((packed.with_target(record), report, reached))
 }
 
 /// Returns the binary logarithm of the next step to try: on the line through the two tries around the wanted

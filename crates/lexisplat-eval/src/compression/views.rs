@@ -3,6 +3,7 @@
 use lexisplat::{Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, surround};
 
+use super::found::{Found, find};
 use crate::error::{Error, Result};
 
 /// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
@@ -14,10 +15,8 @@ const GAUSSIANS_DRAWN: usize = 48_000_000;
 const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Distances of generated views that measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
-/// Number of generated views that may judge. [`Judge`](super::Judge) takes those with the most detail.
-const CANDIDATES: usize = 72;
-/// Distances of generated views that may judge, in radii of the scene's detail.
-const JUDGE_DISTANCES: [f64; 2] = [2.0, 10.0];
+/// Number of generated views that judge.
+const JUDGES: usize = 24;
 /// Largest width of a given camera's picture, in pixels. Sharper pictures give the same sensitivity.
 const MAX_WIDTH: u32 = 480;
 /// Number of given cameras that are used at most, evenly spread.
@@ -28,6 +27,42 @@ const JUDGE_SHARE: usize = 2;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
+/// What looking at a scene gave, for several files of it.
+#[derive(Debug, Clone)]
+pub struct Looked {
+    /// The views.
+    pub views: PackingViews,
+    /// What they measured.
+    pub sensitivity: Sensitivity,
+}
+
+impl Looked {
+    /// Looks at `splats` from `cameras`, or from views that are found. `progress` can cancel.
+    ///
+    /// # Errors
+    /// As [`PackingViews::given`], [`PackingViews::found`] and [`PackingViews::sensitivity`].
+    pub fn at(
+        renderer: &mut Renderer,
+        splats: &Splats,
+        cameras: Option<&[Camera]>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let views = match cameras {
+            Some(cameras) => PackingViews::given(cameras)?,
+            None => PackingViews::found(renderer, splats, progress)?,
+        };
+        let sensitivity = views.sensitivity(renderer, splats, progress)?;
+        Ok(Self { views, sensitivity })
+    }
+}
+
+/// Views from all around `splats`.
+fn around(splats: &Splats) -> Vec<Camera> {
+    let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
+    let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
+    surround(&splats.geometry, views, GENERATED_SIZE, GENERATED_DISTANCES)
+}
+
 /// The views that packing draws.
 #[derive(Debug, Clone)]
 pub struct PackingViews {
@@ -37,17 +72,30 @@ pub struct PackingViews {
 }
 
 impl PackingViews {
-    /// Generates views from all around `splats`.
+    /// Finds views of `splats` that are like photographs, with `renderer`. Half of those that measure are views from
+    /// all around, so that nothing is left out.
+    ///
+    /// # Errors
+    /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn found(renderer: &mut Renderer, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
+        let around = around(splats);
+        let count = around.len() / 2;
+        let mut sides = [Vec::with_capacity(count), Vec::with_capacity(count)];
+        for (i, camera) in around.into_iter().enumerate() {
+            sides[i % 2].push(camera);
+        }
+        let [mut measuring, more] = sides;
+        let Found { best, judges } = find(renderer, splats, more, [count, JUDGES], progress)?;
+        measuring.extend(best);
+        Ok(Self { measuring, judging: judges, given: false })
+    }
+
+    /// Generates views from all around `splats`, without drawing any. A quarter of them judges too.
     #[must_use]
     pub fn generated(splats: &Splats) -> Self {
-        let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
-        let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
-        let around = |count, distances| surround(&splats.geometry, count, GENERATED_SIZE, distances);
-        Self {
-            measuring: around(views, GENERATED_DISTANCES),
-            judging: around(CANDIDATES, JUDGE_DISTANCES),
-            given: false,
-        }
+        let measuring = around(splats);
+        let judging = measuring.iter().step_by(measuring.len().div_ceil(JUDGES)).cloned().collect();
+        Self { measuring, judging, given: false }
     }
 
     /// Generates views from all around `part` of a scene. None of them judges. Their number is that of a large
@@ -89,17 +137,22 @@ impl PackingViews {
         &self.measuring
     }
 
-    /// The views that judge, or of which the judging ones are chosen if they were generated.
+    /// The views that judge.
     #[must_use]
     pub fn judging(&self) -> &[Camera] {
         &self.judging
     }
 
+    /// At most `most` of the views that judge, evenly spread.
+    #[must_use]
+    pub fn some_judging(&self, most: usize) -> Vec<&Camera> {
+        self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1)).collect()
+    }
+
     /// Returns every view once.
     pub fn all(&self) -> impl Iterator<Item = &Camera> {
-        // Given cameras that judge also measure.
-        let judging = if self.given { &[] } else { self.judging.as_slice() };
-        self.measuring.iter().chain(judging)
+        let judges_alone = |camera: &&Camera| !self.measuring.contains(camera);
+        self.measuring.iter().chain(self.judging.iter().filter(judges_alone))
     }
 
     /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result

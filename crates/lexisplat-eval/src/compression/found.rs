@@ -1,0 +1,100 @@
+//! Finds views of a scene that are like photographs of it.
+//!
+//! Photographs show more detail than nearly all views from random places: they are taken of what has detail, through
+//! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
+//! detail win.
+
+use lexisplat::{Progress, Splats};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
+
+use crate::error::Result;
+
+/// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
+const TRIED: std::ops::RangeInclusive<usize> = 96..=320;
+/// Gaussians drawn in all tried views together, about.
+const GAUSSIANS_DRAWN: usize = 20_000_000;
+/// Width and height of the small pictures, in pixels.
+const SMALL: [u32; 2] = [96, 64];
+/// Width and height of the views, in pixels.
+const SIZE: [u32; 2] = [384, 256];
+/// A pixel shows something if a channel is above this.
+const LIT: f32 = 0.02;
+/// A view with less than this share of the median of lit pixels looks past the scene.
+const LEAST_LIT: f64 = 0.9;
+/// If the median of lit pixels is below this share, the scene is an object before nothing. Pictures of such an object
+/// show all of it. The median is 0.9 to 1 for six captures with a background, and 0.45 for lego.
+const BARE: f64 = 0.7;
+
+/// Views that are like photographs, those with most detail first.
+#[derive(Debug)]
+pub(super) struct Found {
+    /// Views to measure by.
+    pub(super) best: Vec<Camera>,
+    /// Views to judge by. None of them measures.
+    pub(super) judges: Vec<Camera>,
+}
+
+/// Finds as many views to measure and to judge by as `counts` says, or fewer in a scene of few Gaussians, among `more`
+/// and natural ones. `progress` can cancel.
+///
+/// # Errors
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
+/// view does not fit.
+pub(super) fn find(
+    renderer: &mut Renderer,
+    splats: &Splats,
+    more: Vec<Camera>,
+    [measuring, judging]: [usize; 2],
+    progress: &dyn Progress,
+) -> Result<Found> {
+    let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
+    let mut views = natural_views(&splats.geometry, tried, SIZE);
+    views.extend(more);
+    let scene = renderer.prepare(Scene::from(splats))?;
+    let mut seen = Vec::with_capacity(views.len());
+    for camera in views {
+        progress.check()?;
+        let small = camera.resized(SMALL[0], SMALL[1]);
+        let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
+        seen.push((detail(&picture), lit(&picture), camera));
+    }
+    let mut shares: Vec<f64> = seen.iter().map(|view| view.1).collect();
+    shares.sort_by(f64::total_cmp);
+    let median = shares.get(shares.len() / 2).copied().unwrap_or(0.0);
+    let clear = |view: &(f64, f64, Camera)| view.1 >= LEAST_LIT * median;
+    // The sort is stable, so that equal views stay in their order. Views past the scene come last.
+    seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(b.0.total_cmp(&a.0)));
+    // The best take turns to judge and to measure, as long as judges are needed.
+    let (mut best, mut judges) = (Vec::new(), Vec::new());
+    for (rank, (_, _, camera)) in seen.into_iter().enumerate() {
+        if rank.is_multiple_of(2) && judges.len() < judging {
+            judges.push(camera);
+        } else if best.len() < measuring {
+            best.push(camera);
+        }
+    }
+    if median < BARE {
+        judges = object(&splats.geometry, judging, SIZE[0], SIZE[1]);
+    }
+    Ok(Found { best, judges })
+}
+
+/// The share of pixels that show something.
+fn lit(picture: &Image) -> f64 {
+    let lit = picture.pixels.iter().filter(|pixel| pixel.iter().any(|value| *value > LIT)).count();
+    lit as f64 / picture.pixels.len().max(1) as f64
+}
+
+/// Mean difference of neighbouring pixels.
+fn detail(picture: &Image) -> f64 {
+    let width = picture.width as usize;
+    let difference = |a: &[f32; 3], b: &[f32; 3]| -> f64 {
+        let channel = |k: usize| f64::from((a[k].clamp(0.0, 1.0) - b[k].clamp(0.0, 1.0)).abs());
+        channel(0) + channel(1) + channel(2)
+    };
+    let rows = picture.pixels.chunks_exact(width.max(1));
+    let across: f64 = rows.flat_map(|row| row.windows(2)).map(|pair| difference(&pair[0], &pair[1])).sum();
+    let below = picture.pixels.iter().skip(width);
+    let down: f64 = picture.pixels.iter().zip(below).map(|(a, b)| difference(a, b)).sum();
+    (across + down) / picture.pixels.len().max(1) as f64
+}
