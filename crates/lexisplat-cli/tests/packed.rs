@@ -43,12 +43,17 @@ fn presets_are_ordered_and_the_default_is_balanced() {
 #[test]
 fn a_quality_is_reached_and_recorded() {
     let folder = Folder::new();
-    for (option, key) in [("--psnr", "mean_psnr"), ("--min-psnr", "min_psnr")] {
+    for (option, key) in [("--psnr", "judged_psnr"), ("--min-psnr", "min_psnr")] {
         let report = folder.json(&["compress", "scene.ply", option, "38", "--overwrite"]);
         let promise = &report["promise"];
         assert_eq!((&promise["target"], &promise["asked"]), (&option[2..].into(), &38.0.into()));
-        let reached = number(&promise[key]);
-        assert!((38.0..38.6).contains(&reached), "{report}");
+        let reached = &report["reached"];
+        assert!((38.0..38.6).contains(&number(&reached[key])), "{report}");
+        // Generated views are judged by the worse half of them.
+        assert!(number(&reached["judged_psnr"]) < number(&reached["mean_psnr"]), "{report}");
+        for key in ["mean_psnr", "min_psnr", "views", "cameras"] {
+            assert_eq!(promise[key], reached[key], "{key}");
+        }
         assert_eq!(promise["cameras"], false);
         let info = folder.json(&["info", "scene.lexi"]);
         assert_eq!(&info["lexi"]["promise"], promise);

@@ -68,7 +68,8 @@ fn natural_view(geometry: &Geometry, i: usize, number: usize, size: [u32; 2]) ->
     let position = DVec3::from_array(geometry.positions[i].map(f64::from)) + out * distance;
     let up = if out.y.abs() > STEEP { DVec3::X } else { DVec3::NEG_Y };
     let focal = f64::from(size[0]) * FOCALS[number % FOCALS.len()];
-    Some(pinhole(format!("natural_{number:03}"), size, focal, position, axes(-out, up)))
+    let camera = pinhole(format!("natural_{number:03}"), size, focal, position, axes(-out, up));
+    camera.validate().is_ok().then_some(camera)
 }
 
 #[cfg(test)]

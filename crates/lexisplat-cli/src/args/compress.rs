@@ -39,7 +39,7 @@ pub(crate) struct Compress {
     #[arg(long, group = "goal", value_name = "R", help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
     /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default:
-    /// views generated around the scene].
+    /// views like photographs, which are looked for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
     /// Store the index that each Gaussian has in the source, 4 bytes each. Without it packed files lose the order

@@ -167,9 +167,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
             ),
         )?;
     }
-    if let Some(target) = &report.target {
-        line("pictures", target_line(target))?;
-    } else if let Some(reached) = &report.reached {
+    if let Some(reached) = &report.reached {
         line("pictures", reached_line(reached))?;
     }
     let dictionary = match (report.learn_sample, report.learn_rounds) {
@@ -233,8 +231,14 @@ pub(crate) fn error_line(record: &Record) -> String {
 /// What a file shows of its scene.
 fn reached_line(reached: &Reached) -> String {
     let Reached { judged_psnr, min_psnr, views, cameras, .. } = reached;
-    let kind = if *cameras { "given cameras" } else { "generated views" };
-    format!("about {judged_psnr:.1} dB in photographs; {min_psnr:.1} dB at worst over {views} {kind}")
+    match cameras {
+        true => {
+            format!("{judged_psnr:.2} dB on average, {min_psnr:.2} dB at worst, over {views} given cameras")
+        }
+        false => format!(
+            "about {judged_psnr:.1} dB in photographs; {min_psnr:.1} dB at worst over {views} generated views"
+        ),
+    }
 }
 
 /// What a file of a given quality or size reached.
