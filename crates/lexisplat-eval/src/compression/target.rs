@@ -132,7 +132,7 @@ struct Try {
     value: f64,
 }
 
-/// Packs to the aim of `preset`. If the file misses that by more than [`CLOSE_PRESET`], it is packed once more.
+/// Packs to the aim of `preset`. If the file misses that by more than 0.75 dB, it is packed once more.
 ///
 /// # Errors
 /// Errors of packing and drawing.
