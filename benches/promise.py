@@ -86,7 +86,7 @@ def measure(binary, scorer, model, count, args):
 
 
 def table(rows, asked):
-    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | with / without |")
+    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | without / with |")
     print("|" + "---|" * (9 + len(KINDS)))
     points = {}
     for r in rows:
