@@ -114,3 +114,56 @@ fn detail(picture: &Image) -> f64 {
     let down: f64 = picture.pixels.iter().zip(below).map(|(a, b)| difference(a, b)).sum();
     (across + down) / picture.pixels.len().max(1) as f64
 }
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat_render::{render, surround};
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+
+    fn found(splats: &Splats, counts: [usize; 2]) -> Found {
+        let more = surround(&splats.geometry, 8, SIZE, [2.0, 12.0]);
+        find(&mut Renderer::cpu(), splats, more, counts, &Silent).unwrap()
+    }
+
+    #[test]
+    fn views_of_detail_measure_and_others_of_it_judge() {
+        let splats = scene(&SampleOptions::new(1500, 3));
+        let Found { best, judges } = found(&splats, [10, 6]);
+        assert_eq!((best.len(), judges.len()), (10, 6));
+        assert!(judges.iter().all(|judge| !best.contains(judge)));
+        let again = found(&splats, [10, 6]);
+        assert!(again.best == best && again.judges == judges);
+        let mean_detail = |views: &[Camera]| {
+            let draw = |view: &Camera| {
+                let small = view.resized(SMALL[0], SMALL[1]);
+                render(&Scene::from(&splats), &small, &RenderOptions::default()).unwrap()
+            };
+            views.iter().map(|view| detail(&draw(view))).sum::<f64>() / views.len() as f64
+        };
+        let others = natural_views(&splats.geometry, 60, SIZE);
+        assert!(mean_detail(&best) > 1.2 * mean_detail(&others));
+        assert!(mean_detail(&judges) > 1.2 * mean_detail(&others));
+    }
+
+    #[test]
+    fn an_object_before_nothing_is_judged_from_a_ring() {
+        let mut splats = scene(&SampleOptions::new(1500, 3));
+        // A flat piece of the scene, of which most natural views show little.
+        let near: Vec<bool> = splats.geometry.positions.iter().map(|p| p[1].abs() < 0.02).collect();
+        splats.retain(&near);
+        splats.geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s.min(-4.5)));
+        let Found { judges, .. } = found(&splats, [10, 6]);
+        assert_eq!(judges, object(&splats.geometry, 6, SIZE[0], SIZE[1]));
+    }
+
+    #[test]
+    fn scenes_without_anything_have_views() {
+        let mut splats = scene(&SampleOptions::new(10, 3));
+        splats.retain(&[false; 10]);
+        let Found { best, judges } = found(&splats, [10, 6]);
+        assert!(best.len() + judges.len() > 0);
+    }
+}
