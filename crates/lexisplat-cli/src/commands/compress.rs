@@ -58,6 +58,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
     report.read_seconds += opened;
     report.total_seconds = start.elapsed().as_secs_f64();
+    warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
     if is_pipe(&output) {
         // Standard output carries the file.
         if !common.quiet {
@@ -226,6 +227,16 @@ pub(crate) fn error_line(record: &Record) -> String {
         ),
         (None, _) => format!("{found}; nothing was promised"),
     }
+}
+
+/// A warning if what photographs show is not certain.
+fn uncertain(reached: &Reached) -> Option<String> {
+    reached.uncertain_by().map(|below| {
+        format!(
+            "one of the views that judged is {below:.0} dB worse than the harder half of them: what photographs show is \
+             not certain. Give --cameras if you have them"
+        )
+    })
 }
 
 /// What a file shows of its scene.
