@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """The quality asked for beside the quality reached over views that were not there when a file was made.
 
-    python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets] [--jobs 1]
+    python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets]
         [--binary LEXISPLAT] [--json FILE]
 
 Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
@@ -17,22 +17,17 @@ import argparse
 import json
 import math
 import subprocess
+import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+sys.dont_write_bytecode = True  # no __pycache__ in the working tree
+from rate_distortion import header  # noqa: E402
+from real_models import ROOT  # noqa: E402
+
 SMALL = 8000  # Gaussians; below that an orbit judges where there are no cameras
 PRESETS = {"small": 35, "balanced": 40, "high": 45, "archive": 54}
 KINDS = ("half", "quarter", "far", "above", "back")
-
-
-def gaussians(path):
-    """Number of Gaussians of a binary PLY of 3DGS, else None."""
-    with open(path, "rb") as file:
-        head = file.read(65536).split(b"end_header\n")[0].decode("ascii", "replace").splitlines()
-    counts = [int(l.split()[2]) for l in head if l.startswith("element vertex")]
-    ours = any(l.endswith(" f_dc_0") for l in head) and "format binary_little_endian 1.0" in head
-    return counts[0] if counts and ours else None
 
 
 def cameras_of(path):
@@ -85,7 +80,7 @@ def measure(binary, scorer, model, count, args):
     return rows
 
 
-def table(rows, asked):
+def table(rows):
     print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | without / with |")
     print("|" + "---|" * (9 + len(KINDS)))
     points = {}
@@ -120,15 +115,16 @@ def main():
     target = Path(json.loads(metadata)["target_directory"]) / "release"
     rows = []
     for model in sorted(m for folder in args.folders for m in folder.glob("*.ply")):
-        count = gaussians(model)
-        if count is None or (args.only and model.stem not in args.only):
+        found = header(model)
+        if found is None or (args.only and model.stem not in args.only):
             continue
+        count = found[1]
         if cameras_of(model) is None and count >= SMALL:
             continue
         rows += measure(args.binary or target / "lexisplat", target / "examples" / "promise", model, count, args)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1))
-    table(rows, args.asked)
+    table(rows)
 
 
 if __name__ == "__main__":

@@ -11,15 +11,13 @@ use std::path::Path;
 
 use lexisplat::Geometry;
 use lexisplat::ply::ReadOptions;
-use lexisplat_eval::SceneFile;
-use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Split, orbit, read_cameras};
+use lexisplat_eval::{SceneFile, SplitFilter, choose_views};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, orbit};
 use serde_json::{Map, Value, json};
 
 const WIDTH: u32 = 400;
 const ORBIT_VIEWS: usize = 12;
 const ORBIT_HEIGHT: u32 = 300;
-/// Every so many views, by name, are test views if none is marked.
-const HOLD: usize = 8;
 const TILE: usize = 32;
 /// Largest PSNR of a view, in dB.
 const MOST: f64 = 60.0;
@@ -135,11 +133,7 @@ fn test_views(file: &str, geometry: &Geometry) -> Result<Vec<Camera>, Box<dyn Er
     if file == "orbit" {
         return Ok(orbit(geometry, ORBIT_VIEWS, WIDTH, ORBIT_HEIGHT));
     }
-    let mut all = read_cameras(file)?;
-    all.sort_by(|a, b| a.name.cmp(&b.name));
-    let marked: Vec<Camera> = all.iter().filter(|c| c.split == Some(Split::Test)).cloned().collect();
-    let chosen = if marked.is_empty() { all.into_iter().step_by(HOLD).collect() } else { marked };
-    Ok(chosen.into_iter().map(|c| c.with_max_width(WIDTH)).collect())
+    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, WIDTH, geometry)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -3,15 +3,16 @@
 //! Training makes Gaussians as small as the photographs need: in a photograph a Gaussian's size is a certain share of
 //! its distance. So its size says how far away the camera may have been.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
 use crate::orbit::{axes, opacity_weights, pinhole};
 use crate::surround::PLASTIC;
+use crate::transmittance::unit_rotation;
 
 /// Logarithm of a Gaussian's distance from the nearest and the farthest camera in its largest standard deviations. The
-/// mean of the Gaussians in a photograph is 2.6 to 5.1 (33 views each of six real scenes; docs/METHOD.md).
+/// mean of the Gaussians in a photograph is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md).
 const DISTANCES: [f64; 2] = [3.0, 5.5];
 /// Focal lengths in picture widths, in turn: fields of view of 84, 67, 56 and 42 degrees.
 const FOCALS: [f64; 4] = [0.55, 0.75, 0.95, 1.3];
@@ -61,10 +62,7 @@ fn natural_view(geometry: &Geometry, i: usize, number: usize, size: [u32; 2]) ->
     direction[shortest] = side;
     direction[(shortest + 1) % 3] = sine * turn_cosine;
     direction[(shortest + 2) % 3] = sine * turn_sine;
-    let [w, x, y, z] = geometry.rotations[i].map(f64::from);
-    let rotation = DQuat::from_xyzw(x, y, z, w);
-    let rotation = if rotation.length_squared().is_normal() { rotation.normalize() } else { DQuat::IDENTITY };
-    let out = (rotation * DVec3::from_array(direction)).normalize_or(DVec3::Z);
+    let out = (unit_rotation(geometry.rotations[i]) * DVec3::from_array(direction)).normalize_or(DVec3::Z);
     let position = DVec3::from_array(geometry.positions[i].map(f64::from)) + out * distance;
     let up = if out.y.abs() > STEEP { DVec3::X } else { DVec3::NEG_Y };
     let focal = f64::from(size[0]) * FOCALS[number % FOCALS.len()];

@@ -66,6 +66,14 @@ fn logs(geometry: &Geometry, some: impl Iterator<Item = usize>, rays: &[Ray]) ->
     logs
 }
 
+/// The rotation that a Gaussian's quaternion (w, x, y, z) of any length means; none if it has no length.
+pub(crate) fn unit_rotation(quaternion: [f32; 4]) -> DQuat {
+    let [w, x, y, z] = quaternion.map(f64::from);
+    let rotation = DQuat::from_xyzw(x, y, z, w);
+    let squares = rotation.length_squared();
+    if squares.is_normal() { rotation / squares.sqrt() } else { DQuat::IDENTITY }
+}
+
 struct Gaussian {
     centre: DVec3,
     alpha: f64,
@@ -81,16 +89,16 @@ impl Gaussian {
         let alpha = 1.0 / (1.0 + libm::exp(-f64::from(*geometry.opacities.get(i)?)));
         let centre = DVec3::from_array(geometry.positions.get(i)?.map(f64::from));
         let logs = geometry.scales.get(i)?.map(|s| f64::from(s).clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE));
-        let [w, x, y, z] = geometry.rotations.get(i)?.map(f64::from);
-        let rotation = DQuat::from_xyzw(x, y, z, w);
-        let finite = centre.is_finite() && logs.iter().all(|s| s.is_finite()) && rotation.is_finite();
+        let rotation = *geometry.rotations.get(i)?;
+        let finite = centre.is_finite()
+            && logs.iter().all(|s| s.is_finite())
+            && rotation.iter().all(|r| r.is_finite());
         if !(finite && alpha >= f64::from(ALPHA_MIN)) {
             return None;
         }
         let scales = DVec3::from_array(logs.map(libm::exp));
-        let squares = rotation.length_squared();
-        let rotation = if squares.is_normal() { rotation / squares.sqrt() } else { DQuat::IDENTITY };
-        Some(Self { centre, alpha, reach: REACH_SIGMAS * scales.max_element(), rotation, scales })
+        let (reach, rotation) = (REACH_SIGMAS * scales.max_element(), unit_rotation(rotation));
+        Some(Self { centre, alpha, reach, rotation, scales })
     }
 
     /// Returns its alpha where it is densest on the ray; `None` if that is not on the ray's piece or does not show.

@@ -1,6 +1,6 @@
 //! `lexisplat compress`.
 
-use std::fmt::Write as _;
+use std::fmt::{Display, Write as _};
 use std::path::Path;
 use std::time::Instant;
 
@@ -241,11 +241,9 @@ fn uncertain(reached: &Reached) -> Option<String> {
 
 /// What a file shows of its scene.
 fn reached_line(reached: &Reached) -> String {
-    let Reached { judged_psnr, min_psnr, views, cameras, .. } = reached;
+    let Reached { judged_psnr, mean_psnr, min_psnr, views, cameras, .. } = reached;
     match cameras {
-        true => {
-            format!("{judged_psnr:.2} dB on average, {min_psnr:.2} dB at worst, over {views} given cameras")
-        }
+        true => psnr_line(*mean_psnr, *min_psnr, views, *cameras),
         false => format!(
             "about {judged_psnr:.1} dB in photographs; {min_psnr:.1} dB at worst over {views} generated views"
         ),
@@ -255,6 +253,11 @@ fn reached_line(reached: &Reached) -> String {
 /// What a file of a given quality or size reached.
 pub(crate) fn target_line(target: &TargetRecord) -> String {
     let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
-    let kind = if *cameras { "given cameras" } else { "generated views" };
-    format!("{mean_psnr:.2} dB on average, {min_psnr:.2} dB at worst, over {views} {kind}")
+    psnr_line(*mean_psnr, *min_psnr, views, *cameras)
+}
+
+/// The mean and the least PSNR over `views` views, which were `given` or else generated.
+fn psnr_line(mean: f64, least: f64, views: impl Display, given: bool) -> String {
+    let kind = if given { "given cameras" } else { "generated views" };
+    format!("{mean:.2} dB on average, {least:.2} dB at worst, over {views} {kind}")
 }

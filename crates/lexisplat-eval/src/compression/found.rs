@@ -7,6 +7,7 @@
 use lexisplat::{Progress, ShDegree, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
 
+use super::views::GENERATED_SIZE as SIZE;
 use crate::error::Result;
 
 /// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
@@ -15,8 +16,6 @@ const TRIED: std::ops::RangeInclusive<usize> = 96..=640;
 const GAUSSIANS_DRAWN: usize = 22_000_000;
 /// Width and height of the small pictures, in pixels.
 const SMALL: [u32; 2] = [96, 64];
-/// Width and height of the views, in pixels.
-const SIZE: [u32; 2] = [384, 256];
 /// Gaussians of less opacity than this, 5 %, before the sigmoid, are not in the small pictures.
 const FAINT: f32 = -3.0;
 /// A pixel shows something if a channel is above this.
@@ -84,12 +83,7 @@ pub(super) fn find(
 
 /// A copy of `splats` that is faster to draw: without view-dependent colour, and without what is hardly visible.
 fn sketch(splats: &Splats) -> Splats {
-    let mut sketch = Splats {
-        geometry: splats.geometry.clone(),
-        degree: ShDegree::ZERO,
-        sh_rest: Vec::new(),
-        meta: splats.meta.clone(),
-    };
+    let mut sketch = splats.with_degree_cut(ShDegree::ZERO);
     let keep: Vec<bool> = splats.geometry.opacities.iter().map(|&opacity| opacity > FAINT).collect();
     sketch.retain(&keep);
     sketch

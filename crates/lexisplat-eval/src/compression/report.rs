@@ -9,6 +9,10 @@ use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use super::judge::{Judge, Score};
 use super::prune::Pruned;
 
+/// A view worse than the judged quality by more than this, in dB, is a sign of views unlike photographs. Ten models had
+/// at most 4.2 at the default preset (docs/results/promise.md), and a courtyard whose views stood outside its walls 11.
+const WIDE_SPREAD: f64 = 8.0;
+
 /// What a compression did.
 ///
 /// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
@@ -111,13 +115,7 @@ impl Reached {
             [score.judged, score.mean, score.least].map(rounded_decibels);
         Self { judged_psnr, mean_psnr, min_psnr, views: judge.views(), cameras: judge.views_are_given() }
     }
-}
 
-/// A view worse than the judged quality by more than this, in dB, is a sign of views unlike photographs. Ten models had
-/// at most 4.2 at the default preset (docs/results/promise.md), and a courtyard whose views stood outside its walls 11.
-const WIDE_SPREAD: f64 = 8.0;
-
-impl Reached {
     /// By how much the worst view falls short of the judged quality, in dB, if that is so much that photographs may
     /// be as hard as that view. `None` if the views were given, for then they are what counts.
     #[must_use]

@@ -142,18 +142,19 @@ pub fn pack_to_preset(
     preset: Preset,
     progress: &dyn Progress,
 ) -> Result<(Packed, CompressReport, Score)> {
+    let mut pack = |step| {
+        let (packed, report) = packer.pack(step, progress)?;
+        let score = judge.score(&packed.unpack()?, progress)?;
+        Ok((packed, report, score))
+    };
     let step = packer.step_for(preset.decibels());
-    let (packed, report) = packer.pack(step, progress)?;
-    let score = judge.score(&packed.unpack()?, progress)?;
-    let over = score.judged - preset.decibels();
+    let first = pack(step)?;
+    let over = first.2.judged - preset.decibels();
     if over.abs() <= CLOSE_PRESET {
-        return Ok((packed, report, score));
+        return Ok(first);
     }
-    drop(packed);
-    let step = step * libm::exp2(over / DB_PER_HALVING);
-    let (packed, report) = packer.pack(step.clamp(STEPS[0], STEPS[1]), progress)?;
-    let score = judge.score(&packed.unpack()?, progress)?;
-    Ok((packed, report, score))
+    drop(first);
+    pack((step * libm::exp2(over / DB_PER_HALVING)).clamp(STEPS[0], STEPS[1]))
 }
 
 /// Packs until `target` is met as closely as possible. The file records what was asked and reached. A ratio

@@ -12,7 +12,7 @@ const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
 /// Gaussians drawn in all generated views together, about.
 const GAUSSIANS_DRAWN: usize = 48_000_000;
 /// Width and height of generated views, in pixels.
-const GENERATED_SIZE: [u32; 2] = [384, 256];
+pub(super) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Distances of generated views that measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
 /// Number of generated views that judge.
@@ -79,14 +79,10 @@ impl PackingViews {
     /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
     pub fn found(renderer: &mut Renderer, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
         let around = around(splats);
-        let count = around.len() / 2;
-        let mut sides = [Vec::with_capacity(count), Vec::with_capacity(count)];
-        for (i, camera) in around.into_iter().enumerate() {
-            sides[i % 2].push(camera);
-        }
-        let [mut measuring, more] = sides;
-        let Found { best, judges } = find(renderer, splats, more, [count, JUDGES], progress)?;
-        measuring.extend(best);
+        let every_second = |first| around.iter().skip(first).step_by(2).cloned();
+        let counts = [around.len() / 2, JUDGES];
+        let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
+        let measuring = every_second(0).chain(best).collect();
         Ok(Self { measuring, judging: judges, given: false })
     }
 
