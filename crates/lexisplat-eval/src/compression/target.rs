@@ -157,6 +157,98 @@ pub fn pack_to_preset(
     pack((step * libm::exp2(over / DB_PER_HALVING)).clamp(STEPS[0], STEPS[1]))
 }
 
+/// A file that meets a target.
+struct Found {
+    log_step: f64,
+    file_bytes: u64,
+    packed: Packed,
+    report: CompressReport,
+    /// `None` if the target is a size.
+    reached: Option<Score>,
+}
+
+/// What is searched for, and where the search begins.
+struct Search {
+    target: Target,
+    is_size: bool,
+    /// In the units of [`Try::value`].
+    wanted: f64,
+    /// By how much `wanted` may be exceeded.
+    close: f64,
+    log_step: f64,
+    slope: f64,
+}
+
+impl Search {
+    fn new(packer: &Packer<impl Borrow<Splats>>, target: Target) -> Self {
+        let asked = target.asked();
+        let is_size = matches!(target, Target::Size(_));
+        let wanted = if is_size { -libm::log2(asked) } else { asked };
+        let gaussians = packer.len().max(1) as f64;
+        let close = match is_size {
+            true if asked > FINE_BYTES * gaussians => -libm::log2(1.0 - CLOSE_FINE_SIZE),
+            true => -libm::log2(1.0 - CLOSE_SIZE),
+            false if asked > FINE_DB => CLOSE_FINE_DB,
+            false => CLOSE_DB,
+        };
+        let slope = if is_size { libm::log2(BYTES_PER_HALVING) } else { -DB_PER_HALVING };
+        let limits = STEPS.map(libm::log2);
+        let log_step = match is_size {
+            true if asked > MOST_BYTES * gaussians => limits[0],
+            true => {
+                let first = -libm::log2(FIRST_BYTES * gaussians);
+                libm::log2(packer.step_for(FIRST_DB)) + (wanted - first) / slope
+            }
+            false if asked > MOST_DB => limits[0],
+            false => libm::log2(packer.step_for(wanted)),
+        };
+        Self { target, is_size, wanted, close, log_step: log_step.clamp(limits[0], limits[1]), slope }
+    }
+
+    /// Packs until the target is met closely, with or without a `floor` under what is visible. Returns the value
+    /// nearest to the target if none meets it.
+    fn run(
+        &self,
+        packer: &Packer<impl Borrow<Splats>>,
+        judge: &mut Judge,
+        floor: bool,
+        progress: &dyn Progress,
+    ) -> Result<std::result::Result<Found, f64>> {
+        let (mut log_step, mut slope) = (self.log_step, self.slope);
+        let mut tries: Vec<Try> = Vec::new();
+        let mut best: Option<Found> = None;
+        for _ in 0..MAX_TRIES {
+            progress.check()?;
+            let step = libm::exp2(log_step);
+            let (packed, report) =
+                if floor { packer.pack(step, progress)? } else { packer.pack_coarsely(step, progress)? };
+            let file_bytes = LexiWriter::packed(&packed).file_bytes();
+            let reached = if self.is_size { None } else { Some(judge.score(&packed.unpack()?, progress)?) };
+            let value = match (reached, self.target) {
+                (None, _) => -libm::log2((file_bytes + RECORD_BYTES) as f64),
+                (Some(score), Target::MinPsnr(_)) => score.least,
+                (Some(score), _) => score.judged,
+            };
+            tries.push(Try { log_step, value });
+            let met = value >= self.wanted;
+            // Of those that reach a quality the smallest file is the best, and of those that reach a size the one of
+            // the smallest step.
+            let is_better = |best: &Found| {
+                if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
+            };
+            if met && best.as_ref().is_none_or(is_better) {
+                best = Some(Found { log_step, file_bytes, packed, report, reached });
+            }
+            if met && value - self.wanted <= self.close {
+                break;
+            }
+            let Some(next) = next_step(&tries, self.wanted + 0.5 * self.close, &mut slope) else { break };
+            log_step = next;
+        }
+        Ok(best.ok_or_else(|| tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max)))
+    }
+}
+
 /// Packs until `target` is met as closely as possible. The file records what was asked and reached. A ratio
 /// is one of `source_bytes`.
 ///
@@ -171,57 +263,13 @@ pub fn pack_to_target(
 ) -> Result<(Packed, CompressReport, Score)> {
     target.check()?;
     let recorded = target.recorded(source_bytes);
-    let asked = recorded.asked();
-    let size = matches!(recorded, Target::Size(_));
-    let wanted = if size { -libm::log2(asked) } else { asked };
-    let gaussians = packer.len().max(1) as f64;
-    let close = match size {
-        true if asked > FINE_BYTES * gaussians => -libm::log2(1.0 - CLOSE_FINE_SIZE),
-        true => -libm::log2(1.0 - CLOSE_SIZE),
-        false if asked > FINE_DB => CLOSE_FINE_DB,
-        false => CLOSE_DB,
+    let search = Search::new(packer, recorded);
+    let found = match search.run(packer, judge, true, progress)? {
+        // A size is asked for however bad the file is.
+        Err(_) if search.is_size => search.run(packer, judge, false, progress)?,
+        found => found,
     };
-    let mut slope = if size { libm::log2(BYTES_PER_HALVING) } else { -DB_PER_HALVING };
-    let limits = STEPS.map(libm::log2);
-    let mut log_step = match size {
-        true if asked > MOST_BYTES * gaussians => limits[0],
-        true => {
-            let first = -libm::log2(FIRST_BYTES * gaussians);
-            libm::log2(packer.step_for(FIRST_DB)) + (wanted - first) / slope
-        }
-        false if asked > MOST_DB => limits[0],
-        false => libm::log2(packer.step_for(wanted)),
-    };
-    log_step = log_step.clamp(limits[0], limits[1]);
-    let mut tries: Vec<Try> = Vec::new();
-    let mut best: Option<(f64, Packed, CompressReport, Option<Score>)> = None;
-    for _ in 0..MAX_TRIES {
-        progress.check()?;
-        let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
-        let (value, reached) = if size {
-            (-libm::log2((LexiWriter::packed(&packed).file_bytes() + RECORD_BYTES) as f64), None)
-        } else {
-            let score = judge.score(&packed.unpack()?, progress)?;
-            (if matches!(target, Target::MinPsnr(_)) { score.least } else { score.judged }, Some(score))
-        };
-        tries.push(Try { log_step, value });
-        let met = value >= wanted;
-        // The smallest file of those that reach a quality has the largest step. The best file of those that
-        // reach a size has the smallest step.
-        let better = |other: f64| if size { log_step < other } else { log_step > other };
-        if met && best.as_ref().is_none_or(|b| better(b.0)) {
-            best = Some((log_step, packed, report, reached));
-        }
-        if met && value - wanted <= close {
-            break;
-        }
-        let Some(next) = next_step(&tries, wanted + 0.5 * close, &mut slope) else { break };
-        log_step = next;
-    }
-    let Some((_, packed, report, reached)) = best else {
-        let found = tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max);
-        return Err(target.unreachable(found, source_bytes));
-    };
+    let Found { packed, report, reached, .. } = found.map_err(|best| target.unreachable(best, source_bytes))?;
     let reached = match reached {
         Some(reached) => reached,
         None => judge.score(&packed.unpack()?, progress)?,
@@ -230,7 +278,7 @@ pub fn pack_to_target(
     let given = judge.views_are_given();
     let record = TargetRecord::new(
         recorded.name(),
-        asked,
+        recorded.asked(),
         [rounded_decibels(reached.mean), rounded_decibels(reached.least)],
         views,
         given,
@@ -242,7 +290,10 @@ pub fn pack_to_target(
 /// value, or beyond the last try, within [`STEPS`]. `None` if that step was tried.
 fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
     let above = tries.iter().filter(|t| t.value >= wanted).min_by(|a, b| a.value.total_cmp(&b.value));
-    let below = tries.iter().filter(|t| t.value < wanted).max_by(|a, b| a.value.total_cmp(&b.value));
+    // Values need not change evenly with the step: small scenes have few of them. So the nearest step counts.
+    let distance = |t: &Try| above.map_or(-t.value, |a| (a.log_step - t.log_step).abs());
+    let below =
+        tries.iter().filter(|t| t.value < wanted).min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let next = match (above, below) {
         (Some(a), Some(b)) => {
             let t = (wanted - b.value) / (a.value - b.value);

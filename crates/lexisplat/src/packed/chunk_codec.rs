@@ -280,20 +280,33 @@ fn difference<S: Symbols>(
     prediction + steps * step
 }
 
+/// The axis that a turn about matters least: a needle's longest, and a disc's shortest.
+pub(super) fn least_axis(scales: Vec3) -> usize {
+    if scales[0] - scales[1] >= scales[1] - scales[2] { 0 } else { 2 }
+}
+
+/// The steps of an orientation as it is coded, in radians, for `steps` of turns about each axis: those of
+/// [`least_axis`]'s direction, and of the turn about it.
+pub(super) fn rotation_steps(steps: Vec3, scales: Vec3) -> [f32; 2] {
+    match least_axis(scales) {
+        0 => [(steps[1] * steps[2]).sqrt(), steps[0]],
+        _ => [(steps[0] * steps[1]).sqrt(), steps[2]],
+    }
+}
+
 /// Codes the axes: the one that matters least as a point on a sphere, and the others as a turn about it.
 fn rotation<S: Symbols>(s: &mut S, steps: Vec3, scales: Vec3, target: &[Vec3; 3]) -> [Vec3; 3] {
-    // A needle hardly changes when turned about its longest axis, and a disc about its shortest.
-    let needle = scales[0] - scales[1] >= scales[1] - scales[2];
-    let (main, other) = if needle { (0, 1) } else { (2, 0) };
-    let across: Vec<f32> = (0..3).filter(|&k| k != main).map(|k| steps[k]).collect();
-    let step = (across[0] * across[1]).sqrt();
+    let main = least_axis(scales);
+    let needle = main == 0;
+    let other = if needle { 1 } else { 0 };
+    let [step, turn_step] = rotation_steps(steps, scales);
     let count = bits_for(2.0 * SQUARE_ANGLE / step);
     let coordinates: [f32; 2] = std::array::from_fn(|k| {
         share(s, count, || (square_of_axis(target[main])[k] + 1.0) * 0.5) * 2.0 - 1.0
     });
     let u = axis_of_square(coordinates);
     let [first, second] = frame(u);
-    let turn = share(s, bits_for(HALF_TURN / steps[main]), || {
+    let turn = share(s, bits_for(HALF_TURN / turn_step), || {
         let angle = atan2(dot(target[other], second), dot(target[other], first));
         angle.rem_euclid(HALF_TURN) / HALF_TURN
     });

@@ -6,7 +6,6 @@ use super::canonical::{MortonKey, canonical};
 use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
-use super::fit::Fit;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
 use super::stream::SymbolEncoder;
@@ -93,7 +92,7 @@ impl ChunkCoder {
     pub(super) fn new(
         view: View<'_>,
         total: usize,
-        fit: &Fit,
+        mut parameters: Parameters,
         step: f64,
         options: &PackOptions,
         progress: &dyn Progress,
@@ -101,7 +100,6 @@ impl ChunkCoder {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
-        let mut parameters = fit.with_step(step);
         let mut stop = StopRule::Balanced;
         #[expect(
             clippy::cast_possible_truncation,

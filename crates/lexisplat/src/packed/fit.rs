@@ -36,8 +36,8 @@ const RIDGE: f64 = 1e-6;
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
     pub(super) parameters: Parameters,
-    /// Colour and shape class of each Gaussian.
-    pub(super) classes: Vec<[u8; 2]>,
+    /// Colour and shape class of each Gaussian before they are rounded.
+    pub(super) classes: Vec<[f32; 2]>,
     /// How weights become classes of colour and of shape.
     kinds: [Classes; 2],
 }
@@ -78,9 +78,9 @@ impl Fit {
         Self { parameters, classes, kinds }
     }
 
-    /// Colour and shape class of each Gaussian of another part of the scene. `weights` are its sensitivities to
-    /// colour and opacity.
-    pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
+    /// Colour and shape class, before they are rounded, of each Gaussian of another part of the scene. `weights` are its
+    /// sensitivities to colour and opacity.
+    pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
         classes_of(self.kinds, weights)
     }
 
@@ -93,7 +93,7 @@ impl Fit {
 }
 
 /// Colour and shape class of Gaussians of these sensitivities to colour and opacity.
-fn classes_of(kinds: [Classes; 2], weights: &[[f32; 2]]) -> Vec<[u8; 2]> {
+fn classes_of(kinds: [Classes; 2], weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
     weights.iter().map(|w| [kinds[0].of(w[0]), kinds[1].of(w[1])]).collect()
 }
 
@@ -126,18 +126,22 @@ impl Classes {
         Self { floor, top: quantile(&logs, TOP_QUANTILE).round() }
     }
 
-    /// The class of a weight.
-    fn of(self, weight: f32) -> u8 {
-        let log = 0.5 * libm::log2(f64::from(weight) + self.floor);
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let class = (self.top - log).round().clamp(0.0, f64::from(LAST_CLASS)) as u8;
-        class
+    /// The class of a weight, before it is rounded.
+    fn of(self, weight: f32) -> f32 {
+        single(self.top - 0.5 * libm::log2(f64::from(weight) + self.floor))
     }
 
     /// The step of class 0 for an overall step of 1.
     fn unit(self) -> f64 {
         libm::exp2(-self.top)
     }
+}
+
+/// The nearest class.
+pub(super) fn rounded(class: f32) -> u8 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let class = class.round().clamp(0.0, f32::from(LAST_CLASS)) as u8;
+    class
 }
 
 /// Mean base colour and its principal axes, strongest first.
@@ -207,7 +211,7 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
 }
 
 /// Fits the predictions to the values of the scene before they are rounded.
-fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], parameters: &mut Parameters) {
+fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[f32; 2]], parameters: &mut Parameters) {
     let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
         let dc = parameters.dc_coordinates(g.dc);
         [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
@@ -223,7 +227,7 @@ fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[u8; 2]], par
         }
         if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
             for (t, equations) in equations.iter_mut().enumerate() {
-                let [colour, shape] = class.map(f32::from);
+                let [colour, shape] = class.map(|class| f32::from(rounded(class)));
                 let known = |k: usize| if t > k { values[k] } else { 0.0 };
                 let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
                 equations.add(features.map(f64::from), f64::from(values[t]));

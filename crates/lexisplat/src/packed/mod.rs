@@ -16,6 +16,7 @@ mod coder;
 mod encoding;
 mod entropy;
 mod fit;
+mod floor;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;

@@ -10,6 +10,7 @@ use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
 use super::entropy::Tables;
 use super::fit::Fit;
+use super::floor::Floor;
 use super::reorder::gather;
 use super::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
@@ -120,16 +121,37 @@ impl<S: Borrow<Splats>> Packer<S> {
     }
 
     /// Packs with an overall step: about the root of the mean squared error of pictures that each value of
-    /// each Gaussian may make on its own. Half the step gives about 5 dB more.
+    /// each Gaussian may make on its own. Half the step gives about 5 dB more. However large the step is, visible
+    /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
     ///
     /// # Errors
     /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
     /// leave f32; [`Error::Cancelled`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
+        let geometry = &self.splats.borrow().geometry;
+        self.pack_above(Floor::new(self.fit.with_step(step), geometry, &self.scene), step, progress)
+    }
+
+    /// [`Self::pack`] without a floor, for files smaller than the floor allows.
+    ///
+    /// # Errors
+    /// As [`Self::pack`].
+    pub fn pack_coarsely(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
+        self.pack_above(Floor::none(self.fit.with_step(step)), step, progress)
+    }
+
+    fn pack_above(
+        &self,
+        floor: Floor,
+        step: f64,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
         let (splats, n) = (self.splats.borrow(), self.len());
-        let view = View { splats, scene: &self.scene, classes: &self.fit.classes };
+        let geometry = &splats.geometry;
+        let classes = floor.classes(&self.fit.classes, geometry, &self.scene);
+        let view = View { splats, scene: &self.scene, classes: &classes };
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, n, &self.fit, step, &self.options, progress)?;
+        let coder = ChunkCoder::new(view, n, floor.parameters, step, &self.options, progress)?;
         let mut encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);

@@ -115,15 +115,25 @@ impl Parameters {
 
     /// Steps of turns about each of the Gaussian's axes, in radians.
     pub(super) fn rotation_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        let step = self.step(1, shape);
-        self.rotation.map(|row| (step * exp2(linear(row, scales))).min(MAX_ANGLE_STEP))
+        self.free_rotation_steps(shape, scales).map(|step| step.min(MAX_ANGLE_STEP))
     }
 
     /// Steps of the position along each of the Gaussian's axes, in world units.
     pub(super) fn position_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        let step = self.step(1, shape);
         let most = MAX_POSITION_STEP * exp(scales[0].clamp(-60.0, 60.0));
-        self.position.map(|row| (step * exp2(linear(row, scales))).min(most).max(f32::MIN_POSITIVE))
+        self.free_position_steps(shape, scales).map(|step| step.min(most).max(f32::MIN_POSITIVE))
+    }
+
+    /// [`Self::rotation_steps`] before they are limited.
+    pub(super) fn free_rotation_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
+        let step = self.step(1, shape);
+        self.rotation.map(|row| step * exp2(linear(row, scales)))
+    }
+
+    /// [`Self::position_steps`] before they are limited.
+    pub(super) fn free_position_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
+        let step = self.step(1, shape);
+        self.position.map(|row| step * exp2(linear(row, scales)))
     }
 
     /// Predicts `target`.

@@ -6,6 +6,7 @@ use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
 use super::entropy::Tables;
 use super::fit::Fit;
+use super::floor::Floor;
 use super::pack::{PackOptions, expected_step};
 use super::scene::{PackedHead, SpilledPacked};
 use super::stream::code_symbols;
@@ -39,6 +40,7 @@ pub(crate) struct Whole {
 pub(crate) struct PartPacker {
     options: PackOptions,
     fit: Fit,
+    floor: Floor,
     encoding: Encoding,
     gaussians: usize,
     /// Of each chunk its symbols, and then its raw bits.
@@ -64,9 +66,12 @@ impl PartPacker {
         let Whole { gaussians: total, grid, decibels } = scene;
         let scene = grid.keys(&sample.geometry);
         let fit = Fit::new(&sample.geometry, sensitivity, &scene, &grid);
-        let view = View { splats: sample, scene: &scene, classes: &fit.classes };
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, total, &fit, expected_step(total, decibels), options, progress)?;
+        let step = expected_step(total, decibels);
+        let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
+        let classes = floor.classes(&fit.classes, &sample.geometry, &scene);
+        let view = View { splats: sample, scene: &scene, classes: &classes };
+        let coder = ChunkCoder::new(view, total, floor.parameters.clone(), step, options, progress)?;
         progress.check()?;
         Ok(Self {
             options: options.clone(),
@@ -77,6 +82,7 @@ impl PartPacker {
             extras: SpilledExtras::new(to, sample.empty().geometry)?,
             meta: sample.meta.clone(),
             fit,
+            floor,
             encoding: Encoding::new(coder, clock),
         })
     }
@@ -84,8 +90,8 @@ impl PartPacker {
     /// Codes the next Gaussians: whole chunks, unless they are the last ones. `weights` are the sensitivities of
     /// each to colour and opacity, and `places` its cell and its place in the source. The caller has checked all.
     pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[MortonKey]) -> Result<()> {
-        let classes = self.fit.classes_of(weights);
         let scene: Vec<MortonKey> = (0..).zip(places).map(|(source, p)| MortonKey { source, ..*p }).collect();
+        let classes = self.floor.classes(&self.fit.classes_of(weights), &splats.geometry, &scene);
         let view = View { splats, scene: &scene, classes: &classes };
         let coder = &self.encoding.coder;
         let chunks = map_chunks(splats.len(), CHUNK, |range| {
