@@ -51,7 +51,7 @@ fn codes_draw_as_the_decompressed_scene_does() {
     let folder = Folder::new();
     folder.run(&["compress", "scene.ply", "--quiet"]);
     folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
-    let small = ["--orbit", "3", "--width", "120"];
+    let small = ["--orbit", "3", "--width", "120", "--scene", "object"];
     let score = folder.json(&[&["compare", "back.ply", "scene.lexi"], &small[..]].concat());
     if score["identical"] != Value::Bool(true) {
         assert!(score["psnr"]["min"].as_f64().unwrap() >= 70.0, "{score}");

@@ -5,7 +5,7 @@ use crate::folder::{Folder, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
-const SMALL: [&str; 4] = ["--orbit", "4", "--width", "160"];
+const SMALL: [&str; 6] = ["--scene", "object", "--orbit", "4", "--width", "160"];
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
@@ -57,12 +57,42 @@ fn a_quality_is_reached_and_recorded() {
         assert_eq!(promise["cameras"], false);
         let info = folder.json(&["info", "scene.lexi"]);
         assert_eq!(&info["lexi"]["promise"], promise);
+        assert_eq!(&info["lexi"]["reached"], reached);
         assert!(folder.run(&["info", "scene.lexi"]).contains("dB at worst"));
     }
     let error = folder.fail(&["compress", "scene.ply", "--psnr=-3", "--overwrite"], 5);
     assert!(error.contains("psnr"), "{error}");
     let error = folder.fail(&["compress", "scene.ply", "--psnr", "400", "--overwrite"], 5);
     assert!(error.contains("at most") && error.contains("dB"), "{error}");
+}
+
+#[test]
+fn comparing_without_cameras_looks_from_where_compress_judged() {
+    let folder = Folder::new();
+    let report = folder.json(&["compress", "scene.ply"]);
+    let views = report["reached"]["views"].to_string();
+    let score = folder.json(&["compare", "scene.ply", "scene.lexi", "--orbit", &views, "--device", "cpu"]);
+    assert_eq!(score["recorded"], report["reached"]);
+    assert_eq!(score["found_views"], true);
+    let text = folder.run(&["compare", "scene.ply", "scene.lexi", "--orbit", "3", "--device", "cpu"]);
+    assert!(text.contains("about ") && text.contains("says the second file"), "{text}");
+    let around = folder.json(&[&["compare", "scene.ply", "scene.lexi"], &SMALL[..]].concat());
+    assert!(around["views"].as_array().unwrap().iter().all(|view| view["name"] != score["views"][0]["name"]));
+    assert_eq!(around["found_views"], false);
+}
+
+#[test]
+fn the_kind_of_scene_can_be_given() {
+    let folder = Folder::new();
+    let file = |kind: &[&str]| {
+        folder.json(&[&["compress", "scene.ply", "--overwrite", "--psnr", "38"], kind].concat());
+        std::fs::read(folder.path("scene.lexi")).unwrap()
+    };
+    let auto = file(&[]);
+    assert!(auto == file(&["--scene", "auto"]));
+    assert!(auto != file(&["--scene", "room"]));
+    folder.fail(&["compress", "scene.ply", "--scene", "room", "--cameras", "cameras.json"], 2);
+    folder.fail(&["compress", "scene.ply", "--scene", "room", "--guess"], 2);
 }
 
 #[test]

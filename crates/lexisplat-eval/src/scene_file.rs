@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lexisplat::lexi::LexiReader;
-use lexisplat::packed::Packed;
+use lexisplat::packed::{Packed, PackedHead};
 use lexisplat::ply::{self, PlyRead, ReadOptions};
 use lexisplat::{FileKind, Input, Model, Result};
 use lexisplat_render::Scene;
@@ -67,6 +67,15 @@ impl SceneFile {
         match &self.loaded {
             Loaded::Ply(read) => Scene::from(&read.splats),
             Loaded::Lexi(model, _) => Scene::from(&**model),
+        }
+    }
+
+    /// What a packed file says of itself.
+    #[must_use]
+    pub fn packed_head(&self) -> Option<&PackedHead> {
+        match &self.loaded {
+            Loaded::Lexi(_, Some(packed)) => Some(packed.head()),
+            _ => None,
         }
     }
 

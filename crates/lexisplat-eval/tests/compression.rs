@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
 use lexisplat_eval::compression::{Looked, PackingViews, SensitivitySource};
-use lexisplat_eval::{Compression, CompressionReport, Error, Packing, Quality, Target};
+use lexisplat_eval::{Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target};
 use lexisplat_render::Renderer;
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -95,6 +95,7 @@ fn memory_decides_between_whole_and_part_by_part() {
         (Packing::new(Target::MeanPsnr(40.0)), "psnr"),
         (Packing::new(Target::Ratio(9.0)), "ratio"),
         (Packing::default().with_cameras(cameras), "cameras"),
+        (Packing::default().with_scene_kind(SceneKind::Room), "scene"),
         (Packing::default().with_prune(1.0), "prune"),
     ] {
         match refused(packing.with_memory(1000)) {

@@ -210,6 +210,7 @@ fn any_other_unknown_tensor_is_refused_by_name() {
         // Those of other layouts are not known in this one.
         let mut unknown = vec!["X-thumbnail", "thumbnail", "codes.more", "sh.order", "packed.more", ""];
         if name.starts_with("packed") {
+            assert_refused(&parts.with("reached", r#"{"judged_psnr":38.5}"#), &["reached"]);
             unknown.extend(["position", "dictionary", "codes.counts", "escapes.rows"]);
         } else {
             let pointers = if name == "paper" { "codes.counts" } else { "codes.pointers" };
@@ -239,8 +240,11 @@ fn unknown_metadata_is_ignored() {
         let more = parts.with("licence", "none").with("x", "").with("generator", "another program 7");
         assert_same(name, &more, &parts);
     }
-    // Of a promise too.
+    // Of a promise too, and of what was reached.
     let parts = Parts::of(&golden("packed"));
+    let reached =
+        r#"{"judged_psnr":38.5,"mean_psnr":40,"min_psnr":31,"views":12,"cameras":false,"judge":"someone"}"#;
+    assert_same("packed", &parts.with("reached", reached), &parts);
     let mut promise: Value = serde_json::from_str(parts.metadata["promise"].as_str().unwrap()).unwrap();
     promise["judge"] = Value::from("someone");
     assert_same("packed", &parts.with("promise", &promise.to_string()), &parts);

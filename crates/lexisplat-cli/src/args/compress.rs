@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
+use lexisplat_eval::SceneKind;
 use lexisplat_render::Device;
 
-use super::values::{preset, size, whole};
+use super::values::{preset, scene_kind, size, whole};
 
 /// Heading of the options that say how good or how small the file shall be.
 const TARGET: &str = "Target, at most one of";
@@ -42,6 +43,10 @@ pub(crate) struct Compress {
     /// views like photographs, which are looked for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
+    /// Draw and judge the scene from around an `object` or from inside a `room`. `auto` looks for views like
+    /// photographs [default: auto].
+    #[arg(long, value_parser = scene_kind(), conflicts_with = "cameras")]
+    pub(crate) scene: Option<SceneKind>,
     /// Store the index that each Gaussian has in the source, 4 bytes each. Without it packed files lose the order
     /// of the source.
     #[arg(long)]
@@ -88,7 +93,7 @@ pub(crate) struct Compress {
     pub(crate) drop_invalid: bool,
     /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
     /// faster and makes larger files of the same quality. The only target is then --preset.
-    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "prune"])]
+    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene", "prune"])]
     pub(crate) guess: bool,
     /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
     /// parts, each drawn on its own, and the only target is then --preset. Packing in parts takes up to 1.5 GiB,
@@ -115,7 +120,7 @@ impl Compress {
     }
 
     /// The options that only packed files have, and whether they are given.
-    fn packed_only(&self) -> [(&'static str, bool); 9] {
+    fn packed_only(&self) -> [(&'static str, bool); 10] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -124,6 +129,7 @@ impl Compress {
             ("--size", self.size.is_some()),
             ("--ratio", self.ratio.is_some()),
             ("--cameras", self.cameras.is_some()),
+            ("--scene", self.scene.is_some()),
             ("--keep-order", self.keep_order),
             ("--prune", self.prune.is_some()),
         ]

@@ -20,7 +20,8 @@ pub(crate) struct Render {
     pub(crate) views: Views,
 }
 
-/// Draw two scenes from the same cameras and score the second against the first.
+/// Draw two scenes from the same cameras and score the second against the first. Without --cameras and --scene views
+/// like photographs are looked for, of 384 x 256 pixels, as `compress` does.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// The original, a PLY or .lexi file.

@@ -3,12 +3,16 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use lexisplat::{Model, Progress};
+use lexisplat_eval::compression::judging_views;
 use lexisplat_eval::metrics::Metric;
-use lexisplat_eval::{Comparison, DrawOptions, SceneFile, compare, format, montage, png};
+use lexisplat_eval::{Comparison, DrawOptions, Loaded, SceneFile, SceneKind, compare, format, montage, png};
+use lexisplat_render::{Camera, Renderer};
 use serde_json::json;
 
+use super::compress::record_line;
 use super::scores::ScoreTable;
-use crate::args::{Common, Compare};
+use crate::args::{Common, Compare, Views};
 use crate::device::open_renderer;
 use crate::files::{check_free, load, make_folder, tell, view_name, warn_of, write_bytes};
 use crate::progress::Bars;
@@ -20,8 +24,13 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
     let views = &args.views;
-    let cameras = super::cameras(views, scene_a.geometry())?;
     let mut renderer = open_renderer(views.device)?;
+    let bars = Bars::new(common.quiet);
+    let found = views.cameras.is_none() && views.scene == SceneKind::Auto;
+    let cameras = match found {
+        true => photographs(&a, views, &mut renderer, &bars)?,
+        false => super::cameras(views, scene_a.geometry())?,
+    };
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {
         for (i, camera) in cameras.iter().enumerate() {
@@ -33,7 +42,6 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
         stop::while_writing(Work::Files(usize::MAX));
         make_folder(folder)?;
     }
-    let bars = Bars::new(common.quiet);
     let mut paths = saved.iter();
     let options = DrawOptions::new(views.background, args.eight_bit);
     let comparison =
@@ -52,9 +60,28 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
         "psnr": comparison.psnr,
         "ssim": comparison.ssim,
         "views": comparison.views,
+        "found_views": found,
+        "recorded": b.packed_head().and_then(|head| head.reached),
         "saved": saved.iter().map(|p| p.display().to_string()).collect::<Vec<_>>(),
     });
     tell(common, json, || table(&a, &b, &comparison, args, renderer.name()))
+}
+
+/// Views of `a` that are like photographs, of the kind that judges what `compress` makes.
+fn photographs(
+    a: &SceneFile,
+    views: &Views,
+    renderer: &mut Renderer,
+    progress: &dyn Progress,
+) -> Result<Vec<Camera>> {
+    let count = usize::from(views.orbit);
+    let found = match &a.loaded {
+        Loaded::Ply(read) => judging_views(renderer, &read.splats, count, progress)?,
+        Loaded::Lexi(model, _) => {
+            judging_views(renderer, &Model::clone(model).into_splats(), count, progress)?
+        }
+    };
+    Ok(found.iter().map(|camera| camera.with_max_width(views.width)).collect())
 }
 
 fn table(
@@ -84,6 +111,11 @@ fn table(
     }
     writeln!(out, "{:>10}  first file over second, whole files", format::ratio(a.bytes, b.bytes))?;
     writeln!(out, "{:>10}  {device}", "drawn on")?;
+    if let Some(line) =
+        b.packed_head().and_then(|head| record_line(head.reached.as_ref(), head.target.as_ref()))
+    {
+        writeln!(out, "{:>10}  {line}, says the second file", "recorded")?;
+    }
     if let Some(folder) = &args.save_views {
         let times = montage::AMPLIFICATION;
         writeln!(out, "saved to {}: first, second, difference times {times}", folder.display())?;

@@ -5,10 +5,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::packed::{PackOptions, TargetRecord};
+use lexisplat::packed::{PackOptions, ReachedRecord, TargetRecord};
 use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Layout, Limits, Record, lexi};
-use lexisplat_eval::compression::{Reached, SensitivitySource};
+use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_render::read_views;
 
@@ -59,6 +59,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     report.read_seconds += opened;
     report.total_seconds = start.elapsed().as_secs_f64();
     warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
+    warn(&name, report.target.as_ref().and_then(costly).as_slice());
     if is_pipe(&output) {
         // Standard output carries the file.
         if !common.quiet {
@@ -96,6 +97,7 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     let mut packing = Packing::new(target.map_or(Quality::Preset(preset), Quality::Target))
         .with_options(options)
         .with_gpu(open_gpu(args.device)?)
+        .with_scene_kind(args.scene.unwrap_or_default())
         .with_memory(args.memory);
     if let Some(path) = &args.cameras {
         let set = read_views(path, &mut |_| None)?;
@@ -230,8 +232,8 @@ pub(crate) fn error_line(record: &Record) -> String {
 }
 
 /// A warning if what photographs show is not certain.
-fn uncertain(reached: &Reached) -> Option<String> {
-    reached.uncertain_by().map(|below| {
+fn uncertain(reached: &ReachedRecord) -> Option<String> {
+    uncertain_by(reached).map(|below| {
         format!(
             "one of the views that judged is {below:.0} dB worse than the harder half of them: what photographs show is \
              not certain. Give --cameras if you have them"
@@ -239,9 +241,19 @@ fn uncertain(reached: &Reached) -> Option<String> {
     })
 }
 
+/// A warning if one hard view made a file large.
+fn costly(target: &TargetRecord) -> Option<String> {
+    overshoot(target).map(|above| {
+        format!(
+            "the views have {above:.0} dB more on average than the worst one, which alone decides --min-psnr. --psnr makes a \
+             smaller file if the others matter more"
+        )
+    })
+}
+
 /// What a file shows of its scene.
-fn reached_line(reached: &Reached) -> String {
-    let Reached { judged_psnr, mean_psnr, min_psnr, views, cameras, .. } = reached;
+fn reached_line(reached: &ReachedRecord) -> String {
+    let ReachedRecord { judged_psnr, mean_psnr, min_psnr, views, cameras, .. } = reached;
     match cameras {
         true => psnr_line(*mean_psnr, *min_psnr, views, *cameras),
         false => format!(
@@ -250,10 +262,13 @@ fn reached_line(reached: &Reached) -> String {
     }
 }
 
-/// What a file of a given quality or size reached.
-pub(crate) fn target_line(target: &TargetRecord) -> String {
-    let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
-    psnr_line(*mean_psnr, *min_psnr, views, *cameras)
+/// What a file records of its pictures. Files made before `reached` was recorded have a `promise` at most.
+pub(crate) fn record_line(reached: Option<&ReachedRecord>, promise: Option<&TargetRecord>) -> Option<String> {
+    let of_promise = |target: &TargetRecord| {
+        let TargetRecord { mean_psnr, min_psnr, views, cameras, .. } = target;
+        psnr_line(*mean_psnr, *min_psnr, views, *cameras)
+    };
+    reached.map(reached_line).or_else(|| promise.map(of_promise))
 }
 
 /// The mean and the least PSNR over `views` views, which were `given` or else generated.

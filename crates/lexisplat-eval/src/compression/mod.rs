@@ -32,6 +32,6 @@ pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 pub use judge::{Judge, Score};
 pub use packing::{Compression, Packing, Quality};
 pub use prune::{Pruned, prune};
-pub use report::{CompressionReport, Reached, SensitivitySource};
+pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
 pub use target::{Target, pack_to_preset, pack_to_target};
-pub use views::{Looked, PackingViews};
+pub use views::{Looked, PackingViews, judging_views};

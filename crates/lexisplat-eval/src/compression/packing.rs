@@ -10,6 +10,7 @@ use lexisplat_render::{Camera, Renderer};
 use super::target::Target;
 use super::views::Looked;
 use crate::error::{Error, Result};
+use crate::views::SceneKind;
 
 /// Bytes of memory that packing a whole scene takes for each byte of its source. 1.85 was measured.
 const MEMORY_PER_BYTE: u64 = 2;
@@ -64,12 +65,13 @@ impl From<Target> for Quality {
 /// How to pack a scene by what shows in views of it.
 ///
 /// A scene that needs more than the memory allowed is packed part by part, each part by its own views. Only
-/// presets without cameras and pruning can be had so.
+/// presets without cameras, kind of scene and pruning can be had so.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(super) quality: Quality,
     pub(super) options: PackOptions,
     pub(super) cameras: Option<Vec<Camera>>,
+    pub(super) kind: SceneKind,
     pub(super) prune: Option<f32>,
     pub(super) gpu: Option<Gpu>,
     pub(super) looked: Option<Arc<Looked>>,
@@ -90,6 +92,7 @@ impl Packing {
             quality: quality.into(),
             options: PackOptions::default(),
             cameras: None,
+            kind: SceneKind::Auto,
             prune: None,
             gpu: None,
             looked: None,
@@ -108,6 +111,13 @@ impl Packing {
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
         Self { cameras: Some(cameras), ..self }
+    }
+
+    /// Measures and judges by views around an object or inside a room. By default views like photographs are looked
+    /// for. Cameras that are given count more.
+    #[must_use]
+    pub fn with_scene_kind(self, kind: SceneKind) -> Self {
+        Self { kind, ..self }
     }
 
     /// Leaves Gaussians out as long as no pixel of any view changes by more than `levels` of 255, a finite
@@ -181,6 +191,7 @@ impl Packing {
         match self.quality {
             Quality::Target(target) => Some(target.name()),
             Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
+            Quality::Preset(_) if self.kind != SceneKind::Auto => Some("scene"),
             Quality::Preset(_) if self.prune.is_some() => Some("prune"),
             Quality::Preset(_) => self.looked.as_ref().map(|_| "looked"),
         }

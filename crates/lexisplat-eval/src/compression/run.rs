@@ -9,7 +9,7 @@ use lexisplat_render::Renderer;
 use super::judge::Judge;
 use super::packing::{Compression, Packing, Quality};
 use super::prune::prune;
-use super::report::{CompressionReport, Reached, SensitivitySource};
+use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
 use super::views::{Looked, PackingViews};
 use crate::error::Result;
@@ -124,7 +124,13 @@ impl Packing {
         let device = gpu(&renderer);
         let Looked { views, mut sensitivity } = match &self.looked {
             Some(looked) => Looked::clone(looked),
-            None => Looked::at(&mut renderer, &splats, self.cameras.as_deref(), progress)?,
+            None => {
+                let views = match &self.cameras {
+                    Some(cameras) => PackingViews::given(cameras)?,
+                    None => PackingViews::of_kind(self.kind, &mut renderer, &splats, progress)?,
+                };
+                Looked::from_views(views, &mut renderer, &splats, progress)?
+            }
         };
         let mut prune =
             |levels| prune(&mut renderer, splats.to_mut(), &mut sensitivity, &views, levels, progress);
@@ -143,9 +149,8 @@ impl Packing {
                 pack_to_target(&packer, &mut judge, target, source.source_bytes(), progress)?
             }
         };
-        let reached = Some(Reached::new(score, &judge));
+        let packed = packed.with_device(device).with_reached(reached(score, &judge));
         drop(packer);
-        let packed = packed.with_device(device);
         let pack_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
@@ -154,15 +159,7 @@ impl Packing {
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
-        Ok(CompressionReport {
-            read_seconds,
-            look_seconds,
-            pack_seconds,
-            write_seconds,
-            pruned,
-            reached,
-            ..report
-        })
+        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
     }
 }
 

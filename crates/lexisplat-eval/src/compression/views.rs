@@ -1,10 +1,11 @@
 //! The views that packing draws: some measure the sensitivity, some judge the result.
 
-use lexisplat::{Progress, Sensitivity, Splats};
-use lexisplat_render::{Camera, Renderer, Scene, Split, surround};
+use lexisplat::{Geometry, Progress, Sensitivity, Splats};
+use lexisplat_render::{Camera, Renderer, Scene, Split, interior_views, object, surround};
 
 use super::found::{Found, find};
 use crate::error::{Error, Result};
+use crate::views::SceneKind;
 
 /// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
 /// fewer, for a view of so many Gaussians takes long.
@@ -51,9 +52,36 @@ impl Looked {
             Some(cameras) => PackingViews::given(cameras)?,
             None => PackingViews::found(renderer, splats, progress)?,
         };
+        Self::from_views(views, renderer, splats, progress)
+    }
+
+    /// Looks at `splats` from `views`. `progress` can cancel.
+    ///
+    /// # Errors
+    /// As [`PackingViews::sensitivity`].
+    pub fn from_views(
+        views: PackingViews,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let sensitivity = views.sensitivity(renderer, splats, progress)?;
         Ok(Self { views, sensitivity })
     }
+}
+
+/// Finds at most `count` views of `splats` that are like photographs, as those that judge a packed file without cameras.
+///
+/// # Errors
+/// As [`PackingViews::found`].
+pub fn judging_views(
+    renderer: &mut Renderer,
+    splats: &Splats,
+    count: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Camera>> {
+    let more = around(splats).into_iter().skip(1).step_by(2).collect();
+    Ok(find(renderer, splats, more, [count, count], progress)?.judges)
 }
 
 /// Views from all around `splats`.
@@ -84,6 +112,30 @@ impl PackingViews {
         let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
         let measuring = every_second(0).chain(best).collect();
         Ok(Self { measuring, judging: judges, given: false })
+    }
+
+    /// Views of `splats` where its `kind` says that photographs were taken: half of those that measure and all that
+    /// judge are around an object, or inside a room. The other half is from all around.
+    ///
+    /// # Errors
+    /// As [`Self::found`], which finds the views if the kind is [`SceneKind::Auto`].
+    pub fn of_kind(
+        kind: SceneKind,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let [width, height] = GENERATED_SIZE;
+        let views: fn(&Geometry, usize, u32, u32) -> Vec<Camera> = match kind {
+            SceneKind::Auto => return Self::found(renderer, splats, progress),
+            SceneKind::Object => object,
+            SceneKind::Room => interior_views,
+        };
+        let mut measuring: Vec<Camera> = around(splats).into_iter().step_by(2).collect();
+        measuring.extend(views(&splats.geometry, measuring.len(), width, height));
+        // A number of its own, so that most of these are not among those that measure.
+        let judging = views(&splats.geometry, JUDGES - 1, width, height);
+        Ok(Self { measuring, judging, given: false })
     }
 
     /// Generates views from all around `splats`, without drawing any. A quarter of them judges too.

@@ -127,6 +127,7 @@ impl Encoding {
             record,
             meta,
             target: None,
+            reached: None,
             device: None,
             parameters: coder.parameters.to_list(),
             tables: tables.write(),

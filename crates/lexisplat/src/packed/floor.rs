@@ -125,11 +125,8 @@ mod tests {
     use super::*;
     use crate::packed::{PackOptions, Packer};
     use crate::scene::sensitivity::Sensitivity;
-    use crate::support::maths::{columns, dot, log_sigmoid};
+    use crate::support::maths::{dot, log_sigmoid};
     use crate::{Silent, Splats};
-
-    /// Share of a step by which a value may be off: half of it, and the dead zone of 0.08.
-    const OFF: f32 = 0.58;
 
     /// `splats` as a file of this overall step has them.
     fn packed(splats: &Splats, sensitivity: &Sensitivity, step: f64, limited: bool) -> Splats {
@@ -184,7 +181,7 @@ mod tests {
         let misleading = misleading(&splats);
         for step in [1e-4, 1e-3, 1e-2] {
             let most = most_off(&splats, &packed(&splats, &misleading, step, true));
-// docs/METHOD.md states these.
+            // docs/METHOD.md states these.
             let limits = [0.47, 0.29, 1.0, 0.7];
             assert!(std::iter::zip(most, limits).all(|(most, limit)| most <= limit), "{step}: {most:?}");
             // With them the file is not much finer than they ask.

@@ -40,7 +40,7 @@ pub(crate) use stream::BitCounts;
 
 pub use pack::{PackOptions, Packer};
 pub use preset::Preset;
-pub use scene::{Packed, PackedHead, TargetRecord};
+pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};
 pub use stream::StreamBits;
 
 /// Gaussians of a chunk. Chunks are decoded independently of each other, so that decoding is parallel and a

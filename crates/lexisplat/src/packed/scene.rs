@@ -31,6 +31,8 @@ pub struct PackedHead {
     pub meta: SceneMeta,
     /// What a search for a quality or a size asked for and reached, if there was one.
     pub target: Option<TargetRecord>,
+    /// What views showed of the file, if views judged it.
+    pub reached: Option<ReachedRecord>,
     /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
     /// everywhere.
     pub device: Option<String>,
@@ -50,8 +52,8 @@ impl PartialEq for PackedHead {
     fn eq(&self, other: &Self) -> bool {
         (self.degree, self.gaussians, self.atoms, self.atom_bits)
             == (other.degree, other.gaussians, other.atoms, other.atom_bits)
-            && (&self.record, &self.meta, &self.target, &self.device)
-                == (&other.record, &other.meta, &other.target, &other.device)
+            && (&self.record, &self.meta, &self.target, &self.reached, &self.device)
+                == (&other.record, &other.meta, &other.target, &other.reached, &other.device)
             && (&self.parameters, &self.tables, &self.lengths)
                 == (&other.parameters, &other.tables, &other.lengths)
     }
@@ -115,6 +117,13 @@ impl Packed {
         self
     }
 
+    /// The same with what views showed of it.
+    #[must_use]
+    pub fn with_reached(mut self, reached: impl Into<Option<ReachedRecord>>) -> Self {
+        self.head.reached = reached.into();
+        self
+    }
+
     /// The same with the GPU that measured the sensitivity; see [`PackedHead::device`].
     #[must_use]
     pub fn with_device(mut self, device: Option<String>) -> Self {
@@ -163,5 +172,32 @@ impl TargetRecord {
     pub fn new(target: &str, asked: f64, reached: [f64; 2], views: u32, cameras: bool) -> Self {
         let [mean_psnr, min_psnr] = reached;
         Self { target: target.to_owned(), asked, mean_psnr, min_psnr, views, cameras }
+    }
+}
+
+/// What a packed file shows of its scene over the views that judged it.
+///
+/// Serialized, it is the member `reached` of reports.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ReachedRecord {
+    /// PSNR that photographs are expected to show on average, in decibels.
+    pub judged_psnr: f64,
+    /// Mean PSNR of all views, in decibels.
+    pub mean_psnr: f64,
+    /// Least PSNR of a view, in decibels.
+    pub min_psnr: f64,
+    /// Number of views.
+    pub views: u32,
+    /// Whether the views were given. Otherwise they were found.
+    pub cameras: bool,
+}
+
+impl ReachedRecord {
+    /// Puts a record together. `psnr` is the judged, the mean and the least one.
+    #[must_use]
+    pub fn new(psnr: [f64; 3], views: u32, cameras: bool) -> Self {
+        let [judged_psnr, mean_psnr, min_psnr] = psnr;
+        Self { judged_psnr, mean_psnr, min_psnr, views, cameras }
     }
 }

@@ -204,3 +204,28 @@ fn heuristic_weight(geometry: &Geometry, i: usize) -> f32 {
     let weight = maths::exp(ALPHA_POWER * alpha + AREA_POWER * (longest + middle));
     if weight.is_finite() { weight } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_weight_is_far_below_the_guess() {
+        let geometry = crate::support::testing::scene(400, 5).geometry;
+        let guessed = Sensitivity::heuristic(&geometry);
+        let mut measured = guessed.clone();
+        // Views that saw the first half of the scene only, and some of it hardly.
+        for (i, weight) in measured.colour.iter_mut().enumerate() {
+            *weight *= if i < 200 { 1.0 } else { 1e-9 };
+        }
+        measured.colour[7] *= 1e-3;
+        measured.blend_with_prior(&geometry, 0.3);
+        let total = |s: &Sensitivity| s.colour.iter().map(|&w| f64::from(w)).sum::<f64>();
+        let unit = total(&measured) / total(&guessed);
+        let shares = (0..400).map(|i| f64::from(measured.colour[i]) / (f64::from(guessed.colour[i]) * unit));
+        let least = shares.fold(f64::INFINITY, f64::min);
+        // The sum of all weights is kept, which changes each of them a little.
+        let expected = f64::from(LEAST_OF_GUESS);
+        assert!((0.8 * expected..1.25 * expected).contains(&least), "{least}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Scenes no trainer makes: they pack, and what comes back is finite and said here.
 
-use lexisplat::packed::PackOptions;
-use lexisplat::{Limits, Sensitivity, Splats, lexi};
+use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::{Limits, Sensitivity, Silent, Splats, lexi};
 
 use super::support::{STEP, bytes, copies, distance, options, pack, returned, row_errors, sample, size};
 
@@ -31,7 +31,9 @@ fn copies_of_one_gaussian_come_back_alike() {
 #[test]
 fn the_cheapest_gaussians_there_are_can_be_read() {
     let splats = copies(&sample(1, 43, 0), 100_000);
-    let (packed, _) = pack(&splats, 1e300, &PackOptions::default());
+    let sensitivity = Sensitivity::heuristic(&splats.geometry);
+    let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
+    let (packed, _) = packer.pack_coarsely(1e300, &Silent).unwrap();
     let bytes = bytes(&packed);
     assert!(bytes.len() < 50_000, "{}", bytes.len());
     let model = lexi::read_bytes("copies.lexi", &bytes, &Limits::default()).unwrap();
@@ -158,8 +160,8 @@ fn what_is_too_large_to_be_drawn_stays_unseen() {
 fn a_scene_nothing_depends_on_packs() {
     let splats = sample(300, 44, 1);
     let zeros = Sensitivity::zeros(300);
-    let packer = lexisplat::packed::Packer::new(&splats, &zeros, &options(|_| ())).unwrap();
-    let (packed, _) = packer.pack(STEP, &lexisplat::Silent).unwrap();
+    let packer = Packer::new(&splats, &zeros, &options(|_| ())).unwrap();
+    let (packed, _) = packer.pack(STEP, &Silent).unwrap();
     super::support::assert_finite(&packed.unpack().unwrap().into_splats());
 }
 

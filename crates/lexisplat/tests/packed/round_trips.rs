@@ -1,7 +1,7 @@
 //! Pack, write, read, unpack: the same every way, whatever the degree and the number of Gaussians.
 
 use lexisplat::lexi::{LexiReader, LexiWriter};
-use lexisplat::packed::{CHUNK, PackOptions, Packed, TargetRecord};
+use lexisplat::packed::{CHUNK, PackOptions, Packed, ReachedRecord, TargetRecord};
 use lexisplat::{Input, Layout, Limits, Silent, Splats, lexi};
 
 use super::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
@@ -44,6 +44,7 @@ fn a_file_holds_comments_marks_and_promise() {
     splats.meta.antialiased = true;
     let (packed, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
     let packed = packed.with_target(TargetRecord::new("min-psnr", 38.5, [41.127, 38.507], 18, true));
+    let packed = packed.with_reached(ReachedRecord::new([39.25, 41.127, 38.507], 18, true));
     assert_travels(&packed, "everything");
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.lexi");
@@ -54,6 +55,7 @@ fn a_file_holds_comments_marks_and_promise() {
     let reader: LexiReader<'static> = LexiReader::open("p.lexi", owned, &Limits::default()).unwrap();
     let head = reader.packed_head().unwrap();
     assert_eq!((&head.meta, head.target.as_ref()), (&splats.meta, packed.head().target.as_ref()));
+    assert_eq!(head.reached, packed.head().reached);
     assert_eq!(lexi::read(&path, &Limits::default()).unwrap().meta(), &splats.meta);
 }
 

@@ -1,7 +1,7 @@
 //! Small packed files of every kind.
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{PackOptions, Packer, TargetRecord};
+use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
 use lexisplat::{Extra, ExtraValues, Sensitivity, ShDegree, Silent, Splats};
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -19,7 +19,9 @@ fn packed(
     let packer = Packer::new(splats, &sensitivity, &options).unwrap();
     let (packed, _) = packer.pack(step, &Silent).unwrap();
     let mut bytes = Vec::new();
-    LexiWriter::packed(&packed.with_target(promise)).write(&mut bytes, &Silent).unwrap();
+    let reached = promise.is_some().then(|| ReachedRecord::new([28.5, 31.5, 25.0], 18, false));
+    let packed = packed.with_target(promise).with_reached(reached);
+    LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
     bytes
 }
 

@@ -6,14 +6,14 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use lexisplat::Record;
 use lexisplat::lexi::{self, LexiReader};
-use lexisplat::packed::{StreamBits, TargetRecord};
+use lexisplat::packed::{ReachedRecord, StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
 use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use lexisplat_eval::format;
 use serde::Serialize;
 
 use super::bars;
-use crate::commands::compress::{error_line, target_line};
+use crate::commands::compress::{error_line, record_line};
 
 /// Bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
 const DENSE_SH_BYTES: usize = 192;
@@ -54,6 +54,7 @@ pub(super) struct LexiFacts<'a> {
 #[derive(Serialize)]
 struct PackedFacts<'a> {
     promise: Option<&'a TargetRecord>,
+    reached: Option<&'a ReachedRecord>,
     device: &'a str,
     order_kept: bool,
     stream_bits_per_gaussian: BTreeMap<&'a str, f64>,
@@ -73,6 +74,7 @@ impl<'a> LexiFacts<'a> {
         let streams = &survey.stream_bits;
         let packed = lexi.packed_head().map(|head| PackedFacts {
             promise: head.target.as_ref(),
+            reached: head.reached.as_ref(),
             device: head.device.as_deref().unwrap_or(CPU),
             order_kept: lexi.order_kept(),
             stream_bits_per_gaussian: streams.iter().map(|s| (s.name.as_str(), each(s.bits))).collect(),
@@ -111,8 +113,8 @@ impl<'a> LexiFacts<'a> {
             (None, pursuit) => pursuit.map(|name| format!(", pursuit {name}")).unwrap_or_default(),
         };
         writeln!(out, ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match")?;
-        if let Some(target) = packed.as_ref().and_then(|packed| packed.promise) {
-            writeln!(out, "pictures: {}", target_line(target))?;
+        if let Some(line) = packed.as_ref().and_then(|packed| record_line(packed.reached, packed.promise)) {
+            writeln!(out, "pictures: {line}")?;
         }
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
             writeln!(out, "measured on: {}", format::escape(packed.device))?;

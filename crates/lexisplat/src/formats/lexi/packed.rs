@@ -65,6 +65,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     checked.refuse_unknown(known, "for layout 'packed'")?;
     let chunks = gaussians.div_ceil(CHUNK);
     let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE)).transpose()?;
+    let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED)).transpose()?;
     extras(checked, gaussians, &(0..0))?;
     data(checked)?;
     Ok(PackedHead {
@@ -76,6 +77,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         record: record(checked)?,
         meta: meta(checked)?,
         target,
+        reached,
         device: checked.optional(key::DRAWN_ON)?,
         parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,

@@ -85,6 +85,7 @@ pub(super) mod key {
     pub(crate) const ATOMS: &str = "atoms";
     pub(crate) const ATOM_BITS: &str = "atom_bits";
     pub(crate) const PROMISE: &str = "promise";
+    pub(crate) const REACHED: &str = "reached";
     pub(crate) const DRAWN_ON: &str = "drawn_on";
     pub(crate) const CHECKSUMS: &str = "checksums";
 }

@@ -92,6 +92,7 @@ impl<'a> LexiWriter<'a> {
             (key::ATOM_BITS, head.atom_bits.to_string()),
         ]);
         metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
+        metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
         metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
         let bytes = head.lengths.iter().map(|&l| l as usize).sum();
         let list = |name, dtype, len, source| Tensor::new(name, dtype, &[len], source);
