@@ -1,20 +1,20 @@
 #!/usr/bin/env python3
 """The quality asked for beside the quality reached over views that were not there when a file was made.
 
-    python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets]
+    python3 benches/promise.py FOLDER [FOLDER ...] [--only NAME ...] [--asked 36 40 44] [--presets] [--guess]
         [--binary LEXISPLAT] [--json FILE] [--peer "NAME=COMMAND {model} {encoded} {decoded}" ...]
 
 Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
 every PLY below 8000 Gaussians over an orbit, is compressed with `--psnr` to each asked quality: without cameras, and
-with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB.
+with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB, and `--guess` the presets of `--guess`.
 
 Each `--peer` encodes and decodes every model with cameras: the command writes a file whose size counts and a PLY. Its
 quality is measured in the same way, and a last table has our bytes over those of the best peer at equal reached quality,
 by the same lines. Where a peer's curve begins above a quality, its smallest file counts.
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
-and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, by the
-straight line between the logarithms of the bytes of neighbouring files.
+and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or of a guess over bytes without cameras, by the straight line between
+the logarithms of the bytes of neighbouring files.
 """
 
 import argparse
@@ -72,6 +72,8 @@ def measure(binary, scorer, model, count, args):
         jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways for a in args.asked]
         if args.presets:
             jobs += [(way, name, aim, [*extra, "--preset", name]) for way, extra in ways for name, aim in PRESETS.items()]
+        if args.guess:
+            jobs += [("guess", name, aim, ["--guess", "--preset", name]) for name, aim in PRESETS.items()]
         files = []
         for number, (_, _, _, options) in enumerate(jobs):
             file = Path(folder) / f"{number}.lexi"
@@ -99,7 +101,7 @@ def measure(binary, scorer, model, count, args):
 
 
 def table(rows):
-    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | without / with |")
+    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | ratio |")
     print("|" + "---|" * (9 + len(KINDS)))
     points = {}
     for r in rows:
@@ -109,8 +111,9 @@ def table(rows):
         path = r["path"]
         off = [f"{r[k]['mean']:.1f}" if r[k] else "-" for k in KINDS]
         ratio = ""
-        if r["cameras"] == "none" and (r["scene"], "given") in points:
-            other = bytes_at(points[r["scene"], "given"], path["mean"])
+        beside = (r["scene"], {"none": "given", "guess": "none"}.get(r["cameras"]))
+        if beside in points:
+            other = bytes_at(points[beside], path["mean"])
             ratio = f"{r['bytes'] / other:.2f}" if other else ""
         print(f"| {r['scene']} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
               f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} |", flush=True)
@@ -146,6 +149,7 @@ def main():
     parser.add_argument("--only", nargs="+")
     parser.add_argument("--asked", nargs="+", type=float, default=[36, 40, 44])
     parser.add_argument("--presets", action="store_true")
+    parser.add_argument("--guess", action="store_true")
     parser.add_argument("--binary", type=Path)
     parser.add_argument("--peer", action="append", default=[])
     parser.add_argument("--json", type=Path)
