@@ -48,6 +48,7 @@ fn a_scene_that_is_turned_scaled_and_moved_keeps_its_quality() {
     let turn = DQuat::from_axis_angle(DVec3::new(1.0, 2.0, -0.5).normalize(), 0.9);
     let (scale, shift) = (3.0, DVec3::new(7.0, -20.0, 4.0));
     let place = |p: DVec3| turn * p * scale + shift;
+    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
     let single = |v: f64| v as f32;
     let mut turned = splats.clone();
     for position in &mut turned.geometry.positions {

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::fuzzing::parts;
-use lexisplat::packed::{PackOptions, Packer, TargetRecord};
+use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
@@ -182,7 +182,8 @@ fn packed(root: &Path) -> Done {
             let packer = Packer::new(&splats, &sensitivity, &options)?;
             let (packed, _) = packer.pack(1e-3, &Silent)?;
             let target = rich.then(|| TargetRecord::new("size", 3000.0, [31.5, 25.0], 18, false));
-            let packed = packed.with_target(target);
+            let reached = rich.then(|| ReachedRecord::new([28.5, 31.5, 25.0], 18, false));
+            let packed = packed.with_target(target).with_reached(reached);
             let mut bytes = Vec::new();
             LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;
             let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });
