@@ -6,15 +6,16 @@
 
 Every binary float PLY of the folders that has a `NAME.cameras.json` (NAME may be a prefix of the PLY's name), and
 every PLY below 8000 Gaussians over an orbit, is compressed with `--psnr` to each asked quality: without cameras, and
-with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB, and `--guess` the presets of `--guess`.
+with its training cameras where it has cameras. `--presets` adds the presets, whose aims are 35, 40, 45 and 54 dB, and
+`--guess` the presets of `--guess`.
 
 Each `--peer` encodes and decodes every model with cameras: the command writes a file whose size counts and a PLY. Its
 quality is measured in the same way, and a last table has our bytes over those of the best peer at equal reached quality,
 by the same lines. Where a peer's curve begins above a quality, its smallest file counts.
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
-and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or of a guess over bytes without cameras, by the straight line between
-the logarithms of the bytes of neighbouring files.
+and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or
+of a guess over bytes without cameras, by the straight line between the logarithms of the bytes of neighbouring files.
 """
 
 import argparse

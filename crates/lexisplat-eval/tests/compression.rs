@@ -134,7 +134,7 @@ fn targets_out_of_reach_are_told_in_their_own_unit() {
 #[test]
 fn one_look_serves_several_files() {
     let splats = sample();
-    let looked = Arc::new(Looked::at(&mut Renderer::cpu(), &splats, None, &Silent).unwrap());
+    let looked = Arc::new(Looked::at(&mut Renderer::cpu(), &splats, None, SceneKind::Auto, &Silent).unwrap());
     for preset in [Preset::Small, Preset::High] {
         let known = Packing::new(preset).with_looked(Arc::clone(&looked));
         assert!(run(known, &splats).0 == run(Packing::new(Quality::Preset(preset)), &splats).0);

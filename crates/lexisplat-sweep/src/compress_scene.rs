@@ -5,7 +5,7 @@ use std::sync::Arc;
 use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, Stopwatch, lexi};
 use lexisplat_eval::compression::Looked;
-use lexisplat_eval::{Compression, CompressionReport, Packing, Result};
+use lexisplat_eval::{Compression, CompressionReport, Packing, Result, SceneKind};
 use lexisplat_render::Renderer;
 
 use super::options::SweepOptions;
@@ -35,7 +35,9 @@ pub(super) fn compress_scene(
         Setting::Preset(preset) => {
             let looked = match looked {
                 Some(looked) => looked,
-                None => looked.insert(Arc::new(Looked::at(renderer, splats, None, progress)?)),
+                None => {
+                    looked.insert(Arc::new(Looked::at(renderer, splats, None, SceneKind::Auto, progress)?))
+                }
             };
             let packing = PackOptions::default().with_seed(options.seed);
             Packing::new(preset).with_options(packing).with_looked(Arc::clone(looked)).into()

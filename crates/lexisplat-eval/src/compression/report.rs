@@ -122,7 +122,7 @@ pub(super) fn reached(score: Score, judge: &Judge) -> ReachedRecord {
 }
 
 /// Rounds decibels to the thousandths that are reported.
-pub(super) fn rounded_decibels(decibels: f64) -> f64 {
+fn rounded_decibels(decibels: f64) -> f64 {
     (decibels * 1000.0).round() / 1000.0
 }
 

@@ -124,13 +124,7 @@ impl Packing {
         let device = gpu(&renderer);
         let Looked { views, mut sensitivity } = match &self.looked {
             Some(looked) => Looked::clone(looked),
-            None => {
-                let views = match &self.cameras {
-                    Some(cameras) => PackingViews::given(cameras)?,
-                    None => PackingViews::of_kind(self.kind, &mut renderer, &splats, progress)?,
-                };
-                Looked::from_views(views, &mut renderer, &splats, progress)?
-            }
+            None => Looked::at(&mut renderer, &splats, self.cameras.as_deref(), self.kind, progress)?,
         };
         let mut prune =
             |levels| prune(&mut renderer, splats.to_mut(), &mut sensitivity, &views, levels, progress);

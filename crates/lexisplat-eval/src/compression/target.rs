@@ -3,19 +3,19 @@
 use std::borrow::Borrow;
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{Packed, Packer, Preset, TargetRecord};
+use lexisplat::packed::{Packed, Packer, Preset, ReachedRecord, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
 use super::judge::{Judge, Score};
-use super::report::rounded_decibels;
+use super::report::reached;
 use crate::error::{Error, Result};
 
 /// A quality may exceed the target by this much, in dB.
 const CLOSE_DB: f64 = 0.06;
 /// A size may fall short of the target by this share.
 const CLOSE_SIZE: f64 = 0.01;
-/// A preset may miss its aim by this much, in dB, at each try.
-const CLOSE_PRESET: [f64; 3] = [0.75, 1.5, f64::INFINITY];
+/// A preset may miss its aim by this much, in dB, at the first and at the second try.
+const CLOSE_PRESET: [f64; 2] = [0.75, 1.5];
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -146,26 +146,27 @@ pub fn pack_to_preset(
     preset: Preset,
     progress: &dyn Progress,
 ) -> Result<(Packed, CompressReport, Score)> {
-    let mut log_step = libm::log2(packer.step_for(preset.decibels()));
-    let mut slope = -DB_PER_HALVING;
-    let mut tries: Vec<Try> = Vec::new();
-    let mut best: Option<(f64, (Packed, CompressReport, Score))> = None;
-    for close in CLOSE_PRESET {
+    let mut pack = |log_step: f64| {
         let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
         let score = judge.score(&packed.unpack()?, progress)?;
-        tries.push(Try { log_step, value: score.judged });
         let off = (score.judged - preset.decibels()).abs();
-        if best.as_ref().is_none_or(|best| off < best.0) {
-            best = Some((off, (packed, report, score)));
-        }
+        Ok::<_, Error>((Try { log_step, value: score.judged }, off, (packed, report, score)))
+    };
+    let (first, mut off, mut best) = pack(libm::log2(packer.step_for(preset.decibels())))?;
+    let (mut tries, mut slope, mut least) = (vec![first], -DB_PER_HALVING, off);
+    for close in CLOSE_PRESET {
         if off <= close {
             break;
         }
         let Some(next) = next_step(&tries, preset.decibels(), &mut slope) else { break };
-        log_step = next;
+        let (again, other);
+        (again, off, other) = pack(next)?;
+        tries.push(again);
+        if off < least {
+            (least, best) = (off, other);
+        }
     }
-    // The list of tolerances is not empty.
-    best.map(|best| best.1).ok_or_else(|| Error::parameter("preset", preset, "a quality"))
+    Ok(best)
 }
 
 /// A file that meets a target.
@@ -280,22 +281,15 @@ pub fn pack_to_target(
         Err(_) if search.is_size => search.run(packer, judge, false, progress)?,
         found => found,
     };
-    let Found { packed, report, reached, .. } =
+    let Found { packed, report, reached: score, .. } =
         found.map_err(|best| target.unreachable(best, source_bytes))?;
-    let reached = match reached {
-        Some(reached) => reached,
+    let score = match score {
+        Some(score) => score,
         None => judge.score(&packed.unpack()?, progress)?,
     };
-    let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
-    let given = judge.views_are_given();
-    let record = TargetRecord::new(
-        recorded.name(),
-        recorded.asked(),
-        [rounded_decibels(reached.mean), rounded_decibels(reached.least)],
-        views,
-        given,
-    );
-    Ok((packed.with_target(record), report, reached))
+    let ReachedRecord { mean_psnr, min_psnr, views, cameras, .. } = reached(score, judge);
+    let record = TargetRecord::new(recorded.name(), recorded.asked(), [mean_psnr, min_psnr], views, cameras);
+    Ok((packed.with_target(record), report, score))
 }
 
 /// Returns the binary logarithm of the next step to try: on the line through the two tries around the wanted
@@ -308,16 +302,14 @@ fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
         .iter()
         .filter(|t| t.value >= wanted)
         .max_by(|a, b| (towards_below * a.log_step).total_cmp(&(towards_below * b.log_step)));
-    let distance = |t: &Try| match above {
-        None => -t.value,
-        Some(a) => {
-            let beyond = towards_below * (t.log_step - a.log_step);
-            if beyond > 0.0 { beyond } else { f64::MAX }
-        }
-    };
-    let below = tries.iter().filter(|t| t.value < wanted).min_by(|a, b| distance(a).total_cmp(&distance(b)));
+    let is_beyond = |t: &&Try| above.is_none_or(|a| towards_below * (t.log_step - a.log_step) > 0.0);
+    let distance = |t: &Try| above.map_or(-t.value, |a| (t.log_step - a.log_step).abs());
     // If all that miss are on the wrong side, the search goes on beyond the one that meets.
-    let below = below.filter(|t| above.is_none() || distance(t) < f64::MAX);
+    let below = tries
+        .iter()
+        .filter(|t| t.value < wanted)
+        .filter(is_beyond)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)));
     let next = match (above, below) {
         (Some(a), Some(b)) => {
             let t = (wanted - b.value) / (a.value - b.value);

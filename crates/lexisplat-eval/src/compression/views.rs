@@ -38,33 +38,21 @@ pub struct Looked {
 }
 
 impl Looked {
-    /// Looks at `splats` from `cameras`, or from views that are found. `progress` can cancel.
+    /// Looks at `splats` from `cameras`, or from where its `kind` says. `progress` can cancel.
     ///
     /// # Errors
-    /// As [`PackingViews::given`], [`PackingViews::found`] and [`PackingViews::sensitivity`].
+    /// As [`PackingViews::given`], [`PackingViews::of_kind`] and [`PackingViews::sensitivity`].
     pub fn at(
         renderer: &mut Renderer,
         splats: &Splats,
         cameras: Option<&[Camera]>,
+        kind: SceneKind,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let views = match cameras {
             Some(cameras) => PackingViews::given(cameras)?,
-            None => PackingViews::found(renderer, splats, progress)?,
+            None => PackingViews::of_kind(kind, renderer, splats, progress)?,
         };
-        Self::from_views(views, renderer, splats, progress)
-    }
-
-    /// Looks at `splats` from `views`. `progress` can cancel.
-    ///
-    /// # Errors
-    /// As [`PackingViews::sensitivity`].
-    pub fn from_views(
-        views: PackingViews,
-        renderer: &mut Renderer,
-        splats: &Splats,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
         let sensitivity = views.sensitivity(renderer, splats, progress)?;
         Ok(Self { views, sensitivity })
     }

@@ -93,13 +93,9 @@ impl ChunkCoder {
         view: View<'_>,
         total: usize,
         mut parameters: Parameters,
-        step: f64,
         options: &PackOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, SymbolEncoder)> {
-        if !step.is_finite() || step <= 0.0 {
-            return Err(Error::parameter("step", step, "a finite number above 0"));
-        }
         let mut stop = StopRule::Balanced;
         #[expect(
             clippy::cast_possible_truncation,

@@ -10,7 +10,7 @@ use super::parameters::{LAST_CLASS, Parameters};
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{exp, exp2, log2};
-use crate::support::parallel::map_chunks;
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Smallest natural logarithm of the opacity, 0.2, of Gaussians that count as visible here.
 const VISIBLE: f32 = -1.609_438;
@@ -29,8 +29,6 @@ const COLOUR_STEP: f32 = 0.28;
 const MOST_OCTAVES: f32 = 4.0;
 /// Added to the number of octaves below a limit, so that a step that is the limit but for rounding is within it.
 const EXACT: f32 = 1e-3;
-/// Gaussians that one task looks at.
-const GAUSSIANS_PER_TASK: usize = 8192;
 
 /// Parameters under which the classes of Gaussians can keep the limits.
 #[derive(Debug, Clone)]

@@ -11,6 +11,7 @@ use super::encoding::{Counts, Encoding, Finished, WriteChunk};
 use super::entropy::Tables;
 use super::fit::Fit;
 use super::floor::Floor;
+use super::parameters::Parameters;
 use super::reorder::gather;
 use super::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
@@ -129,7 +130,7 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// leave f32; [`Error::Cancelled`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         let geometry = &self.splats.borrow().geometry;
-        self.pack_above(Floor::new(self.fit.with_step(step), geometry, &self.scene), step, progress)
+        self.pack_above(Floor::new(self.parameters(step)?, geometry, &self.scene), progress)
     }
 
     /// [`Self::pack`] without a floor, for files smaller than the floor allows.
@@ -137,21 +138,23 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// # Errors
     /// As [`Self::pack`].
     pub fn pack_coarsely(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
-        self.pack_above(Floor::none(self.fit.with_step(step)), step, progress)
+        self.pack_above(Floor::none(self.parameters(step)?), progress)
     }
 
-    fn pack_above(
-        &self,
-        floor: Floor,
-        step: f64,
-        progress: &dyn Progress,
-    ) -> Result<(Packed, CompressReport)> {
+    fn parameters(&self, step: f64) -> Result<Parameters> {
+        if !step.is_finite() || step <= 0.0 {
+            return Err(Error::parameter("step", step, "a finite number above 0"));
+        }
+        Ok(self.fit.with_step(step))
+    }
+
+    fn pack_above(&self, floor: Floor, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
         let (splats, n) = (self.splats.borrow(), self.len());
         let geometry = &splats.geometry;
         let classes = floor.classes(&self.fit.classes, geometry, &self.scene);
         let view = View { splats, scene: &self.scene, classes: &classes };
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, n, floor.parameters, step, &self.options, progress)?;
+        let coder = ChunkCoder::new(view, n, floor.parameters, &self.options, progress)?;
         let mut encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);

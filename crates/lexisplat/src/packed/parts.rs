@@ -71,7 +71,7 @@ impl PartPacker {
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&fit.classes, &sample.geometry, &scene);
         let view = View { splats: sample, scene: &scene, classes: &classes };
-        let coder = ChunkCoder::new(view, total, floor.parameters.clone(), step, options, progress)?;
+        let coder = ChunkCoder::new(view, total, floor.parameters.clone(), options, progress)?;
         progress.check()?;
         Ok(Self {
             options: options.clone(),
