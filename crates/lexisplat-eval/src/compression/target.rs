@@ -303,7 +303,8 @@ fn next_step(tries: &[Try], wanted: f64, slope: &mut f64) -> Option<f64> {
         .filter(|t| t.value >= wanted)
         .max_by(|a, b| (towards_below * a.log_step).total_cmp(&(towards_below * b.log_step)));
     let is_beyond = |t: &&Try| above.is_none_or(|a| towards_below * (t.log_step - a.log_step) > 0.0);
-    let distance = |t: &Try| above.map_or(-t.value, |a| (t.log_step - a.log_step).abs());
+    // If none meets it, the search goes on beyond the last step, though one before it may have come nearer.
+    let distance = |t: &Try| above.map_or(towards_below * t.log_step, |a| (t.log_step - a.log_step).abs());
     // If all that miss are on the wrong side, the search goes on beyond the one that meets.
     let below = tries
         .iter()
@@ -359,6 +360,18 @@ mod tests {
         for wanted in [25.0, 40.0, 47.3, 60.0] {
             assert!(nearest(curve, wanted, -DB_PER_HALVING) < 0.02, "{wanted}");
         }
+    }
+
+    #[test]
+    fn the_search_goes_on_beyond_a_fall() {
+        // Where a Gaussian crosses the near plane of a view, a smaller step can show less.
+        let curve = |x: f64| 39.985 - 4.0 * (x + 16.571) - if (-16.7..-16.575).contains(&x) { 0.3 } else { 0.0 };
+        let (mut tries, mut slope) = (vec![Try { log_step: -16.378, value: 39.16 }], -DB_PER_HALVING);
+        while tries.len() < MAX_TRIES && tries.iter().all(|t| t.value < 40.0) {
+            let next = next_step(&tries, 40.02, &mut slope).unwrap();
+            tries.push(Try { log_step: next, value: curve(next) });
+        }
+        assert!(tries.last().unwrap().value >= 40.0, "{tries:?}");
     }
 
     #[test]
