@@ -26,7 +26,7 @@ pub(super) struct Block {
     pub(super) colour: [Lanes; 3],
     /// The share of light that splats further back can add; 0 once the pixel is finished, and beyond the picture's
     /// border.
-    open: Lanes,
+    pub(super) open: Lanes,
     /// The share of light that the background adds. It stays 1 where the background is black.
     transmittance: Lanes,
 }
@@ -48,6 +48,11 @@ impl Tile {
     /// The tile at `place`, as (column, row), of a picture of `size` pixels.
     pub(super) fn new(place: [usize; 2], size: [usize; 2]) -> Self {
         Self { corner: place.map(|k| k * TILE), size }
+    }
+
+    /// Its first pixel, as (column, row).
+    pub(super) fn corner(self) -> [usize; 2] {
+        self.corner
     }
 
     /// The x of the pixels in each column of blocks, and the y of those in each row.

@@ -2,15 +2,18 @@
 //!
 //! `visible` finds the Gaussians that may be seen, which `project` turns into ellipses on screen. `order` sorts them by
 //! depth, `tiles` lists for every tile the splats that may touch it, and `blend` draws the tiles. `moments` measures how
-//! a tile changes with its splats, and `change` carries that over to the Gaussians' values. Every step works in parallel
+//! a tile changes with its splats, and `change` carries that over to the Gaussians' values. `adjoint` is for fitting
+//! colours to pictures. Every step works in parallel
 //! on pieces whose borders and order do not depend on the number of threads. It uses only operations that round the
 //! same everywhere. A picture therefore has the same bits on any machine.
 
+mod adjoint;
 mod blend;
 mod change;
 mod grid;
 mod lanes;
 mod math;
+mod measured_tiles;
 mod moments;
 mod order;
 mod project;
@@ -35,6 +38,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
+pub use adjoint::{ColourAdjoint, ColourErrors};
 use blend::{Canvas, Tile};
 #[cfg(feature = "gpu")]
 pub(crate) use change::carry;

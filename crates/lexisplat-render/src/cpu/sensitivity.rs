@@ -1,22 +1,17 @@
 //! Measures how much pictures change with every value of every Gaussian.
 
-use std::sync::{Mutex, PoisonError};
-
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Sensitivity, Stage};
 
 use crate::camera::Camera;
 use crate::error::Result;
-use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-use super::blend::{Canvas, Tile};
 use super::change::carry;
+use super::measured_tiles::{Pool, Scratch, measure_tiles};
 use super::moments::{self, Moments};
 use super::project::Projection;
-use super::tiles;
-use super::trace::Trace;
 use super::workspace::Workspace;
 
 /// Returns how much the pictures of `scene` from `cameras`, over black, change with each value of each
@@ -48,33 +43,6 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
     Ok(total)
 }
 
-/// Splats in the lists of the tiles that are measured at a time, unless one tile has more. Their moments take 48 bytes
-/// each: 6 MB.
-const ENTRIES: usize = 1 << 17;
-
-/// What measuring a tile overwrites.
-#[derive(Default)]
-struct Scratch {
-    canvas: Canvas,
-    trace: Trace,
-}
-
-/// Memory that threads take turns with. There is as much of it as threads have used at once, and none of it grows anew
-/// for each tile.
-#[derive(Default)]
-struct Pool(Mutex<Vec<Box<Scratch>>>);
-
-impl Pool {
-    fn with<R>(&self, work: impl FnOnce(&mut Scratch) -> R) -> R {
-        // A thread that panicked kept what it had taken, so the rest is whole.
-        let taken = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut scratch = taken().pop().unwrap_or_default();
-        let result = work(&mut scratch);
-        taken().push(scratch);
-        result
-    }
-}
-
 /// Adds the moments of one view to `sums`, one for each Gaussian.
 fn measure(
     sums: &mut [Moments],
@@ -85,37 +53,14 @@ fn measure(
     projection: &Projection,
 ) {
     let simd = Simd::current();
-    let grid = projection.grid;
-    let size = projection.size();
-    let Workspace { visible, order, lists } = workspace;
-    visible.project(&mut order.keys, simd, scene.geometry(), radiance, projection);
-    order.sort(visible);
-    for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
-        lists.fill(order, grid, &band);
-        // Tiles are summed in order, so that results do not depend on the number of threads.
-        let tiles = band.len() * grid.columns;
-        let mut first = 0;
-        while first < tiles {
-            let mut entries = lists.len(first);
-            let mut end = first + 1;
-            while end < tiles && entries + lists.len(end) <= ENTRIES {
-                entries += lists.len(end);
-                end += 1;
-            }
-            let parts: Vec<Vec<(u32, Moments)>> = (first..end)
-                .into_par_iter()
-                .map(|tile| {
-                    let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
-                    let list = lists.of(tile);
-                    pool.with(|Scratch { canvas, trace }| {
-                        moments::tile(simd, &visible.slots, list, place, canvas, trace)
-                    })
-                })
-                .collect();
-            for (gaussian, part) in parts.into_iter().flatten() {
-                sums[gaussian as usize].add(&part);
-            }
-            first = end;
-        }
-    }
+    workspace.visible.project(&mut workspace.order.keys, simd, scene.geometry(), radiance, projection);
+    measure_tiles(
+        workspace,
+        pool,
+        projection,
+        |splats, list, tile, Scratch { canvas, trace }| {
+            moments::tile(simd, splats, list, tile, canvas, trace)
+        },
+        |gaussian, part| sums[gaussian].add(&part),
+    );
 }

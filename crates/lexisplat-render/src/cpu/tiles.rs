@@ -73,9 +73,24 @@ impl TileLists {
         self.pieces.iter().map(|p| p.starts[tile + 1] - p.starts[tile]).sum()
     }
 
-    /// Returns the list of tile `tile` of the band, in pieces: slots of splats. Tiles are counted row by row.
-    pub(super) fn of(&self, tile: usize) -> impl Iterator<Item = &[u32]> {
-        self.pieces.iter().map(move |p| &p.entries[p.starts[tile]..p.starts[tile + 1]])
+    /// Returns the list of tile `tile` of the band. Tiles are counted row by row.
+    pub(super) fn of(&self, tile: usize) -> List<'_> {
+        List { pieces: self.pieces.iter(), tile }
+    }
+}
+
+/// The list of one tile, in pieces: slots of splats.
+pub(super) struct List<'a> {
+    pieces: std::slice::Iter<'a, Piece>,
+    tile: usize,
+}
+
+impl<'a> Iterator for List<'a> {
+    type Item = &'a [u32];
+
+    fn next(&mut self) -> Option<&'a [u32]> {
+        let piece = self.pieces.next()?;
+        Some(&piece.entries[piece.starts[self.tile]..piece.starts[self.tile + 1]])
     }
 }
 

@@ -1,0 +1,78 @@
+//! Measures a view tile by tile, and hands on what each splat got in the order of the tiles.
+
+use std::sync::{Mutex, PoisonError};
+
+use crate::parallel::*;
+
+use super::blend::{Canvas, Tile};
+use super::project::Projection;
+use super::splat::Splat;
+use super::tiles::{self, List};
+use super::trace::Trace;
+use super::workspace::Workspace;
+
+/// Splats in the lists of the tiles that are measured at a time, unless one tile has more. What is measured of them
+/// takes up to 48 bytes each: 6 MB.
+const ENTRIES: usize = 1 << 17;
+
+/// What measuring a tile overwrites.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    pub(super) canvas: Canvas,
+    pub(super) trace: Trace,
+}
+
+/// Memory that threads take turns with. There is as much of it as threads have used at once, and none of it grows anew
+/// for each tile.
+#[derive(Debug, Default)]
+pub(super) struct Pool(Mutex<Vec<Box<Scratch>>>);
+
+impl Pool {
+    fn with<R>(&self, work: impl FnOnce(&mut Scratch) -> R) -> R {
+        // A thread that panicked kept what it had taken, so the rest is whole.
+        let taken = || self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut scratch = taken().pop().unwrap_or_default();
+        let result = work(&mut scratch);
+        taken().push(scratch);
+        result
+    }
+}
+
+/// Measures every tile of a view, of which `workspace` has the projected Gaussians, with `measure`. It returns values by
+/// the Gaussian's index. `add` gets them in the order of the tiles, so that sums do not depend on the number of threads.
+pub(super) fn measure_tiles<T: Send>(
+    workspace: &mut Workspace,
+    pool: &Pool,
+    projection: &Projection,
+    measure: impl Fn(&[Splat], List<'_>, Tile, &mut Scratch) -> Vec<(u32, T)> + Sync,
+    mut add: impl FnMut(usize, T),
+) {
+    let grid = projection.grid;
+    let size = projection.size();
+    let Workspace { visible, order, lists } = workspace;
+    order.sort(visible);
+    for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
+        lists.fill(order, grid, &band);
+        let tiles = band.len() * grid.columns;
+        let mut first = 0;
+        while first < tiles {
+            let mut entries = lists.len(first);
+            let mut end = first + 1;
+            while end < tiles && entries + lists.len(end) <= ENTRIES {
+                entries += lists.len(end);
+                end += 1;
+            }
+            let parts: Vec<Vec<(u32, T)>> = (first..end)
+                .into_par_iter()
+                .map(|tile| {
+                    let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
+                    pool.with(|scratch| measure(&visible.slots, lists.of(tile), place, scratch))
+                })
+                .collect();
+            for (gaussian, part) in parts.into_iter().flatten() {
+                add(gaussian as usize, part);
+            }
+            first = end;
+        }
+    }
+}
