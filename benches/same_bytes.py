@@ -29,7 +29,7 @@ WAYS = {
     "packed-tol": ["--layout", "packed", "--tol", "0.1"],
     "psnr": ["--psnr", "40"],
     "size": ["--ratio", "20"],
-    "prune": ["--prune"],
+    "keep-all": ["--keep-all"],
     "cameras": ["--psnr", "38", "--cameras", "{cameras}"],
     "parts": ["--memory", "1MB"],
     "f16": ["--tol", "0.1"],

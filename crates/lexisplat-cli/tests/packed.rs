@@ -191,14 +191,27 @@ fn info_says_what_a_packed_file_is_made_of() {
 }
 
 #[test]
-fn pruning_is_reported() {
+fn what_is_left_out_is_reported() {
     let folder = Folder::new();
-    let report = folder.json(&["compress", "scene.ply", "--prune=2"]);
-    let removed = number(&report["pruned"]["gaussians"]);
+    let report = folder.json(&["compress", "scene.ply", "--preset", "small"]);
+    let removed = number(&report["removed"]);
+    assert!(removed > 0.0);
     assert_eq!(number(&report["gaussians"]) + removed, folder::GAUSSIANS as f64);
-    assert!(number(&report["pruned"]["largest_change"]) <= 2.0 / 255.0);
-    folder.fail(&["compress", "scene.ply", "--prune=0", "--overwrite"], 5);
-    folder.fail(&["compress", "scene.ply", "--prune", "--keep-order", "--overwrite"], 2);
+    assert_eq!(folder.json(&["info", "scene.lexi"])["lexi"]["removed"], report["removed"]);
+    assert!(folder.run(&["info", "scene.lexi"]).contains("left out"));
+    for keep in ["--keep-all", "--keep-order"] {
+        let report = folder.json(&["compress", "scene.ply", "--preset", "small", keep, "--overwrite"]);
+        assert_eq!(
+            (number(&report["removed"]), number(&report["gaussians"])),
+            (0.0, folder::GAUSSIANS as f64)
+        );
+        assert!(!folder.run(&["info", "scene.lexi"]).contains("left out"));
+    }
+    // An option of before is accepted, and told about.
+    let arguments = ["compress", "scene.ply", "--prune", "--overwrite"];
+    let told = folder::lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
+    assert!(told.status.success());
+    assert!(String::from_utf8_lossy(&told.stderr).contains("--keep-all"));
 }
 
 #[test]

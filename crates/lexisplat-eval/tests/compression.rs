@@ -17,12 +17,6 @@ fn sample() -> Splats {
     scene(&SampleOptions::new(GAUSSIANS, 0))
 }
 
-fn keeping_order() -> PackOptions {
-    let mut options = PackOptions::default();
-    options.keep_order = true;
-    options
-}
-
 fn run(compression: impl Into<Compression>, splats: &Splats) -> (Vec<u8>, CompressionReport) {
     let mut file = Vec::new();
     let report = compression.into().run(splats, &mut file, &Silent).unwrap();
@@ -57,9 +51,26 @@ fn files_and_memory_are_the_same_as_source_and_sink() {
         assert_eq!(of_file.source_bytes, bytes.len() as u64);
         let parts: f64 = of_file.attribute_bytes.iter().map(|part| part.1).sum();
         assert!((parts - file.len() as f64).abs() < 1e-6, "{parts}");
-        assert_eq!(lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap().len(), GAUSSIANS);
+        let read = lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap();
+        assert_eq!(read.len() as u64 + of_file.removed, GAUSSIANS as u64);
         assert!(of_file.sh_bytes > 0.0 && of_file.sh_bytes < of_file.dense_sh_bytes as f64);
     }
+}
+
+#[test]
+fn gaussians_go_unless_they_are_to_stay() {
+    let splats = sample();
+    let removed = |options: PackOptions| {
+        let (file, report) = run(Packing::new(Preset::Small).with_options(options), &splats);
+        let read = lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap();
+        assert_eq!(read.len(), report.gaussians);
+        assert_eq!(read.len() as u64 + report.removed, GAUSSIANS as u64);
+        report.removed
+    };
+    assert!(removed(PackOptions::default()) > 0);
+    assert_eq!(removed(PackOptions::default().with_keep_all(true)), 0);
+    assert_eq!(removed(PackOptions::default().with_keep_order(true)), 0);
+    assert_eq!(removed(PackOptions::default().with_tolerance(0.1)), 0);
 }
 
 #[test]
@@ -96,7 +107,6 @@ fn memory_decides_between_whole_and_part_by_part() {
         (Packing::new(Target::Ratio(9.0)), "ratio"),
         (Packing::default().with_cameras(cameras), "cameras"),
         (Packing::default().with_scene_kind(SceneKind::Room), "scene"),
-        (Packing::default().with_prune(1.0), "prune"),
     ] {
         match refused(packing.with_memory(1000)) {
             Error::Memory { choice, needed, allowed } => {
@@ -110,13 +120,9 @@ fn memory_decides_between_whole_and_part_by_part() {
 
 #[test]
 fn choices_out_of_range_are_refused_before_any_work() {
-    for (packing, text) in [
-        (Packing::default().with_prune(0.0), "prune = 0"),
-        (Packing::default().with_prune(f32::NAN), "prune = NaN"),
-        (Packing::default().with_prune(1.0).with_options(keeping_order()), "order of the source"),
-        (Packing::new(Target::MeanPsnr(-3.0)), "psnr = -3"),
-        (Packing::new(Target::Ratio(1.0)), "ratio = 1"),
-    ] {
+    for (packing, text) in
+        [(Packing::new(Target::MeanPsnr(-3.0)), "psnr = -3"), (Packing::new(Target::Ratio(1.0)), "ratio = 1")]
+    {
         let error = refused(packing).to_string();
         assert!(error.contains(text) && !error.contains("--"), "{error}");
     }
@@ -167,7 +173,7 @@ fn work_that_is_cancelled_leaves_no_file() {
     let ways: [Compression; 3] = [
         CompressOptions::default().into(),
         Packing::new(Target::MeanPsnr(40.0)).into(),
-        Packing::default().with_prune(1.0).into(),
+        Packing::default().into(),
     ];
     for (compression, stage) in ways.iter().zip([Stage::Learn, Stage::Code, Stage::Draw]) {
         let error = compression.run(&sample(), &output, &Until(stage, AtomicU64::new(0))).unwrap_err();

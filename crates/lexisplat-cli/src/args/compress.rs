@@ -51,9 +51,12 @@ pub(crate) struct Compress {
     /// of the source.
     #[arg(long)]
     pub(crate) keep_order: bool,
-    /// Remove Gaussians that hardly show. Without all of them together, no pixel of any view changes by more than
-    /// LEVELS of 255 levels; LEVELS is above 0, and 1 if it is not given. The report says how many were removed.
-    #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, conflicts_with = "keep_order")]
+    /// Leave no Gaussian out. Otherwise those that show less than their bits are worth are left out, and base colours
+    /// make up for them and for errors. --keep-order and --tol leave none out either.
+    #[arg(long)]
+    pub(crate) keep_all: bool,
+    /// Does nothing of its own: every packed file leaves out what hardly shows.
+    #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
     pub(crate) prune: Option<f32>,
     /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
     /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
@@ -93,7 +96,7 @@ pub(crate) struct Compress {
     pub(crate) drop_invalid: bool,
     /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
     /// faster and makes larger files of the same quality. The only target is then --preset.
-    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene", "prune"])]
+    #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene"])]
     pub(crate) guess: bool,
     /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
     /// parts, each drawn on its own, and the only target is then --preset. Packing in parts takes up to 1.5 GiB,
@@ -120,7 +123,7 @@ impl Compress {
     }
 
     /// The options that only packed files have, and whether they are given.
-    fn packed_only(&self) -> [(&'static str, bool); 10] {
+    fn packed_only(&self) -> [(&'static str, bool); 11] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -131,6 +134,7 @@ impl Compress {
             ("--cameras", self.cameras.is_some()),
             ("--scene", self.scene.is_some()),
             ("--keep-order", self.keep_order),
+            ("--keep-all", self.keep_all),
             ("--prune", self.prune.is_some()),
         ]
     }

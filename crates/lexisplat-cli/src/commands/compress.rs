@@ -21,8 +21,6 @@ use crate::stop::{self, Work};
 /// A preset that falls short of its aim by more than this, in dB, is warned of. Of the files in docs/results/promise.md
 /// only the `archive` of flowers does, by 4.3.
 const FAR_BELOW: f64 = 3.0;
-/// Largest value of an 8-bit channel.
-const LEVELS: f32 = 255.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let start = Instant::now();
@@ -41,6 +39,11 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     });
     let limits = common.limits()?;
     let compression = compression(args, &limits)?;
+    if args.prune.is_some() && !common.quiet {
+        note(
+            "note: --prune does nothing of its own: packed files leave out what hardly shows (--keep-all keeps it)",
+        );
+    }
 
     let (name, bytes) = input(&args.input, common)?;
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
@@ -89,6 +92,7 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
         .with_tolerance(args.tol)
         .with_atoms(args.atoms)
         .with_keep_order(args.keep_order)
+        .with_keep_all(args.keep_all)
         .with_seed(args.seed);
     let preset = args.preset.unwrap_or_default();
     if args.guess {
@@ -110,9 +114,6 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
         let set = read_views(path, &mut |_| None)?;
         warn("cameras", &set.warnings);
         packing = packing.with_cameras(set.cameras);
-    }
-    if let Some(levels) = args.prune {
-        packing = packing.with_prune(levels);
     }
     Ok(packing.into())
 }
@@ -166,16 +167,8 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
         .map(|(name, bytes)| format!("{name} {:.1}", each(8.0 * bytes)))
         .collect();
     line("bits each", bits.join(", "))?;
-    if let Some(pruned) = report.pruned {
-        line(
-            "pruned",
-            format!(
-                "{} Gaussians; no pixel of {} views changes by more than {:.2} of 255 levels without them",
-                format::count(pruned.removed as u64),
-                pruned.views,
-                pruned.largest_change * LEVELS
-            ),
-        )?;
+    if report.removed > 0 {
+        line("left out", removed_line(report.removed))?;
     }
     if let Some(reached) = &report.reached {
         line("pictures", reached_line(reached))?;
@@ -278,6 +271,11 @@ fn reached_line(reached: &ReachedRecord) -> String {
             "about {judged_psnr:.1} dB in photographs; {min_psnr:.1} dB at worst over {views} generated views"
         ),
     }
+}
+
+/// How many Gaussians of the source a file lacks.
+pub(crate) fn removed_line(removed: u64) -> String {
+    format!("{} Gaussians, which show less than their bits are worth", format::count(removed))
 }
 
 /// What a file records of its pictures. Files made before `reached` was recorded have a `promise` at most.

@@ -1,7 +1,7 @@
 //! Compression as one call: a source of splats in, a .lexi file and a report out.
 //!
-//! A [`Compression`] says how. [`Compression::run`] measures what shows in pictures, prunes, packs to a quality
-//! or a size, writes, and reports. Programs, windows and bindings need no more than this:
+//! A [`Compression`] says how. [`Compression::run`] measures what shows in pictures, packs to a quality or a size
+//! without what does not show, writes, and reports. Programs, windows and bindings need no more than this:
 //!
 //! ```
 //! use lexisplat::packed::Preset;
@@ -14,15 +14,17 @@
 //! let mut file = Vec::new();
 //! let report = compression.run(&splats, &mut file, &Silent)?;
 //! assert_eq!(report.file_bytes, file.len() as u64);
-//! assert_eq!(lexi::read_bytes("scene.lexi", &file, &Limits::default())?.len(), splats.len());
+//! let read = lexi::read_bytes("scene.lexi", &file, &Limits::default())?;
+//! assert_eq!(read.len() as u64 + report.removed, splats.len() as u64);
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod facts;
 mod found;
 mod judge;
+mod only_cancels;
 mod packing;
-mod prune;
+mod refit;
 mod report;
 mod run;
 mod target;
@@ -31,7 +33,6 @@ mod views;
 pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 pub use judge::{Judge, Score};
 pub use packing::{Compression, Packing, Quality};
-pub use prune::{Pruned, prune};
 pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
-pub use target::{Target, pack_to_preset, pack_to_target};
+pub use target::Target;
 pub use views::{Looked, PackingViews, judging_views};

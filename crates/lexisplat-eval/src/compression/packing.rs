@@ -65,14 +65,13 @@ impl From<Target> for Quality {
 /// How to pack a scene by what shows in views of it.
 ///
 /// A scene that needs more than the memory allowed is packed part by part, each part by its own views. Only
-/// presets without cameras, kind of scene and pruning can be had so.
+/// presets without cameras and kind of scene can be had so.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(super) quality: Quality,
     pub(super) options: PackOptions,
     pub(super) cameras: Option<Vec<Camera>>,
     pub(super) kind: SceneKind,
-    pub(super) prune: Option<f32>,
     pub(super) gpu: Option<Gpu>,
     pub(super) looked: Option<Arc<Looked>>,
     memory: u64,
@@ -93,7 +92,6 @@ impl Packing {
             options: PackOptions::default(),
             cameras: None,
             kind: SceneKind::Auto,
-            prune: None,
             gpu: None,
             looked: None,
             memory: u64::MAX,
@@ -118,13 +116,6 @@ impl Packing {
     #[must_use]
     pub fn with_scene_kind(self, kind: SceneKind) -> Self {
         Self { kind, ..self }
-    }
-
-    /// Leaves Gaussians out as long as no pixel of any view changes by more than `levels` of 255, a finite
-    /// number above 0. The source's order cannot be kept then.
-    #[must_use]
-    pub fn with_prune(self, levels: f32) -> Self {
-        Self { prune: Some(levels), ..self }
     }
 
     /// Draws on `gpu`, or on the processor if there is none. The file records a GPU, because its results are not
@@ -160,17 +151,7 @@ impl Packing {
         if let Quality::Target(target) = self.quality {
             target.check()?;
         }
-        match self.prune {
-            Some(levels) if !levels.is_finite() || levels <= 0.0 => {
-                Err(Error::parameter("prune", levels, "a finite number above 0"))
-            }
-            Some(levels) if self.options.keep_order => {
-                let expected =
-                    "nothing if the order of the source is kept: it has no place for what is left out";
-                Err(Error::parameter("prune", levels, expected))
-            }
-            _ => Ok(()),
-        }
+        Ok(())
     }
 
     /// Whether a scene of `source_bytes` bytes is packed whole. Otherwise it is packed part by part.
@@ -192,7 +173,6 @@ impl Packing {
             Quality::Target(target) => Some(target.name()),
             Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
             Quality::Preset(_) if self.kind != SceneKind::Auto => Some("scene"),
-            Quality::Preset(_) if self.prune.is_some() => Some("prune"),
             Quality::Preset(_) => self.looked.as_ref().map(|_| "looked"),
         }
     }

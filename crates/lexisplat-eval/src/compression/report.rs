@@ -7,7 +7,6 @@ use serde::{Serialize, Serializer};
 
 use super::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use super::judge::{Judge, Score};
-use super::prune::Pruned;
 use super::target::MIN_PSNR;
 
 /// A view worse than the judged quality by more than this, in dB, is a sign of views unlike photographs. Ten models had
@@ -67,8 +66,8 @@ pub struct CompressionReport {
     pub importance: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
     pub device: Option<String>,
-    /// What pruning did, if it was asked for.
-    pub pruned: Option<Pruned>,
+    /// Number of Gaussians of the source that were left out, because they show less than their bits are worth.
+    pub removed: u64,
     /// Whether a packed scene was measured and packed part by part.
     pub in_parts: bool,
     /// Rounds of learning. `None` if the dictionary was given or the file is packed, as the next two.
@@ -79,7 +78,7 @@ pub struct CompressionReport {
     pub held_out_nonzeros: Option<f64>,
     /// Seconds spent reading the source.
     pub read_seconds: f64,
-    /// Seconds spent measuring the sensitivity and pruning.
+    /// Seconds spent measuring the sensitivity.
     pub look_seconds: f64,
     /// Seconds spent learning the dictionary.
     pub learn_seconds: f64,
@@ -188,6 +187,7 @@ impl CompressionReport {
         let (gaussians, degree, record) = (head.gaussians, head.degree, &head.record);
         Self {
             atoms: head.atoms,
+            removed: head.removed,
             target: head.target.clone(),
             reached: head.reached,
             importance: Some(importance),

@@ -7,8 +7,9 @@ use lexisplat::{Layout, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwa
 use lexisplat_render::Renderer;
 
 use super::judge::Judge;
+use super::only_cancels::OnlyCancels;
 use super::packing::{Compression, Packing, Quality};
-use super::prune::prune;
+use super::refit::Refitting;
 use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
 use super::views::{Looked, PackingViews};
@@ -116,35 +117,33 @@ impl Packing {
         progress: &dyn Progress,
     ) -> Result<CompressionReport> {
         let clock = Stopwatch::start();
-        let mut splats = source.whole()?;
+        let splats = source.whole()?;
         let read_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
         let mut renderer = self.renderer()?;
         let device = gpu(&renderer);
-        let Looked { views, mut sensitivity } = match &self.looked {
+        let Looked { views, sensitivity } = match &self.looked {
             Some(looked) => Looked::clone(looked),
             None => Looked::at(&mut renderer, &splats, self.cameras.as_deref(), self.kind, progress)?,
         };
-        let mut prune =
-            |levels| prune(&mut renderer, splats.to_mut(), &mut sensitivity, &views, levels, progress);
-        let pruned = self.prune.map(&mut prune).transpose()?;
         let look_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
         let packer = Packer::new(&*splats, &sensitivity, &self.options)?;
         drop(sensitivity);
+        let refitting = Refitting::new(packer, &splats, &views, self.options.may_change(), progress)?;
         let most = if let Quality::Preset(_) = self.quality { PRESET_JUDGES } else { usize::MAX };
         let mut judge =
             Judge::new(renderer, &splats, &views.some_judging(most), views.are_given(), progress)?;
         let (packed, report, score) = match self.quality {
-            Quality::Preset(preset) => pack_to_preset(&packer, &mut judge, preset, progress)?,
+            Quality::Preset(preset) => pack_to_preset(&refitting, &mut judge, preset, progress)?,
             Quality::Target(target) => {
-                pack_to_target(&packer, &mut judge, target, source.source_bytes(), progress)?
+                pack_to_target(&refitting, &mut judge, target, source.source_bytes(), progress)?
             }
         };
         let packed = packed.with_device(device).with_reached(reached(score, &judge));
-        drop(packer);
+        drop(refitting);
         let pack_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
@@ -153,20 +152,11 @@ impl Packing {
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
-        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, pruned, ..report })
+        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, ..report })
     }
 }
 
 /// Name of the GPU that `renderer` draws on, if it does. The results of a GPU are its own, so files name it.
 fn gpu(renderer: &Renderer) -> Option<String> {
     renderer.is_gpu().then(|| renderer.name().to_owned())
-}
-
-/// Passes cancellation on, but no reports: those of the work around it go on.
-struct OnlyCancels<'a>(&'a dyn Progress);
-
-impl Progress for OnlyCancels<'_> {
-    fn is_cancelled(&self) -> bool {
-        self.0.is_cancelled()
-    }
 }

@@ -3,10 +3,11 @@
 use std::borrow::Borrow;
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{Packed, Packer, Preset, ReachedRecord, TargetRecord};
+use lexisplat::packed::{Packed, Preset, ReachedRecord, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
 use super::judge::{Judge, Score};
+use super::refit::Refitting;
 use super::report::reached;
 use crate::error::{Error, Result};
 
@@ -14,8 +15,10 @@ use crate::error::{Error, Result};
 const CLOSE_DB: f64 = 0.06;
 /// A size may fall short of the target by this share.
 const CLOSE_SIZE: f64 = 0.01;
-/// A preset may miss its aim by this much, in dB, at the first and at the second try.
-const CLOSE_PRESET: [f64; 2] = [0.75, 1.5];
+/// The file that says what step a preset takes may miss its aim by this much, in dB.
+const CLOSE_FIRST: f64 = 0.5;
+/// A preset may miss its aim by this much, in dB.
+const CLOSE_PRESET: f64 = 1.0;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -135,38 +138,42 @@ struct Try {
     value: f64,
 }
 
-/// Packs to the aim of `preset`. If the file misses that by more than 0.75 dB, it is packed once more, and again if that
-/// one still misses it by more than 1.5 dB. Returns the closest.
+/// Packs to the aim of `preset`. A first file, not refitted, says what step that takes. If the next misses the aim by more
+/// than 1 dB, it is packed once more. Returns the closest.
 ///
 /// # Errors
 /// Errors of packing and drawing.
-pub fn pack_to_preset(
-    packer: &Packer<impl Borrow<Splats>>,
+pub(super) fn pack_to_preset(
+    packer: &Refitting<impl Borrow<Splats>>,
     judge: &mut Judge,
     preset: Preset,
     progress: &dyn Progress,
 ) -> Result<(Packed, CompressReport, Score)> {
-    let mut pack = |log_step: f64| {
-        let (packed, report) = packer.pack(libm::exp2(log_step), progress)?;
-        let score = judge.score(&packed.unpack()?, progress)?;
-        let off = (score.judged - preset.decibels()).abs();
-        Ok::<_, Error>((Try { log_step, value: score.judged }, off, (packed, report, score)))
-    };
-    let (first, mut off, mut best) = pack(libm::log2(packer.step_for(preset.decibels())))?;
-    let (mut tries, mut slope, mut least) = (vec![first], -DB_PER_HALVING, off);
-    for close in CLOSE_PRESET {
-        if off <= close {
-            break;
-        }
-        let Some(next) = next_step(&tries, preset.decibels(), &mut slope) else { break };
-        let (again, other);
-        (again, off, other) = pack(next)?;
-        tries.push(again);
-        if off < least {
-            (least, best) = (off, other);
-        }
+    let aim = preset.decibels();
+    let mut log_step = libm::log2(packer.step_for(aim));
+    let (mut tries, mut slope) = (Vec::new(), -DB_PER_HALVING);
+    let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), progress)?;
+    let expected = judge.score(&file.0.unpack()?, progress)?.judged + packer.gain();
+    if (expected - aim).abs() > CLOSE_FIRST
+        && let Some(next) = next_step(&[Try { log_step, value: expected }], aim, &mut slope)
+    {
+        tries.push(Try { log_step, value: expected });
+        log_step = next;
+        (quantised, file) = packer.quantise(libm::exp2(log_step), progress)?;
     }
-    Ok(best)
+    let (packed, report) = packer.refit(&quantised, file, progress)?;
+    drop(quantised);
+    let score = judge.score(&packed.unpack()?, progress)?;
+    let off = (score.judged - aim).abs();
+    tries.push(Try { log_step, value: score.judged });
+    let best = (packed, report, score);
+    if off <= CLOSE_PRESET {
+        return Ok(best);
+    }
+    let Some(next) = next_step(&tries, aim, &mut slope) else { return Ok(best) };
+    let (packed, report) = packer.pack(libm::exp2(next), true, progress)?;
+    let score = judge.score(&packed.unpack()?, progress)?;
+    Ok(if (score.judged - aim).abs() < off { (packed, report, score) } else { best })
 }
 
 /// A file that meets a target.
@@ -192,7 +199,7 @@ struct Search {
 }
 
 impl Search {
-    fn new(packer: &Packer<impl Borrow<Splats>>, target: Target) -> Self {
+    fn new(packer: &Refitting<impl Borrow<Splats>>, target: Target) -> Self {
         let asked = target.asked();
         let is_size = matches!(target, Target::Size(_));
         let wanted = if is_size { -libm::log2(asked) } else { asked };
@@ -221,7 +228,7 @@ impl Search {
     /// nearest to the target if none meets it.
     fn run(
         &self,
-        packer: &Packer<impl Borrow<Splats>>,
+        packer: &Refitting<impl Borrow<Splats>>,
         judge: &mut Judge,
         floor: bool,
         progress: &dyn Progress,
@@ -232,8 +239,7 @@ impl Search {
         for _ in 0..MAX_TRIES {
             progress.check()?;
             let step = libm::exp2(log_step);
-            let (packed, report) =
-                if floor { packer.pack(step, progress)? } else { packer.pack_coarsely(step, progress)? };
+            let (packed, report) = packer.pack(step, floor, progress)?;
             let file_bytes = LexiWriter::packed(&packed).file_bytes();
             let reached = if self.is_size { None } else { Some(judge.score(&packed.unpack()?, progress)?) };
             let value = match (reached, self.target) {
@@ -266,8 +272,8 @@ impl Search {
 ///
 /// # Errors
 /// [`Error::Parameter`] if the target is out of range or cannot be met. Errors of packing and drawing.
-pub fn pack_to_target(
-    packer: &Packer<impl Borrow<Splats>>,
+pub(super) fn pack_to_target(
+    packer: &Refitting<impl Borrow<Splats>>,
     judge: &mut Judge,
     target: Target,
     source_bytes: u64,
@@ -365,7 +371,8 @@ mod tests {
     #[test]
     fn the_search_goes_on_beyond_a_fall() {
         // Where a Gaussian crosses the near plane of a view, a smaller step can show less.
-        let curve = |x: f64| 39.985 - 4.0 * (x + 16.571) - if (-16.7..-16.575).contains(&x) { 0.3 } else { 0.0 };
+        let curve =
+            |x: f64| 39.985 - 4.0 * (x + 16.571) - if (-16.7..-16.575).contains(&x) { 0.3 } else { 0.0 };
         let (mut tries, mut slope) = (vec![Try { log_step: -16.378, value: 39.16 }], -DB_PER_HALVING);
         while tries.len() < MAX_TRIES && tries.iter().all(|t| t.value < 40.0) {
             let next = next_step(&tries, 40.02, &mut slope).unwrap();

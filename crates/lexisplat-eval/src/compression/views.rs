@@ -25,6 +25,10 @@ const MAX_VIEWS: usize = 150;
 /// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
 /// than views that did not measure (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
+/// Most views that base colours are fitted to.
+const FITTED_VIEWS: usize = 32;
+/// Those of them that are from all around, if cameras are given.
+const FITTED_AROUND: usize = 12;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
@@ -185,10 +189,17 @@ impl PackingViews {
         self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1)).collect()
     }
 
-    /// Returns every view once.
-    pub fn all(&self) -> impl Iterator<Item = &Camera> {
-        let judges_alone = |camera: &&Camera| !self.measuring.contains(camera);
-        self.measuring.iter().chain(self.judging.iter().filter(judges_alone))
+    /// The views of `splats` that base colours are fitted to: some of those that measure and do not judge, evenly
+    /// spread. Beside given cameras there are some from all around, so that colours do not suit those alone.
+    #[must_use]
+    pub fn fitting(&self, splats: &Splats) -> Vec<Camera> {
+        let free: Vec<&Camera> =
+            self.measuring.iter().filter(|camera| !self.judging.contains(camera)).collect();
+        let around = if self.given { FITTED_AROUND } else { 0 };
+        let stride = free.len().div_ceil(FITTED_VIEWS - around).max(1);
+        let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
+        views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
+        views
     }
 
     /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result

@@ -46,12 +46,19 @@ pub(super) struct View<'a> {
     pub(super) scene: &'a [MortonKey],
     /// Colour and shape class of each, in this order.
     pub(super) classes: &'a [[u8; 2]],
+    /// SH coefficients of degree 0 of each, in this order, instead of those of `splats`.
+    pub(super) base_colours: Option<&'a [[f32; 3]]>,
 }
 
 impl<'a> View<'a> {
     /// Gaussians `range`.
     pub(super) fn part(self, range: std::ops::Range<usize>) -> Self {
-        Self { splats: self.splats, scene: &self.scene[range.clone()], classes: &self.classes[range] }
+        Self {
+            splats: self.splats,
+            scene: &self.scene[range.clone()],
+            classes: &self.classes[range.clone()],
+            base_colours: self.base_colours.map(|colours| &colours[range]),
+        }
     }
 
     fn len(self) -> usize {
@@ -77,7 +84,7 @@ impl<'a> View<'a> {
 }
 
 /// Everything that all chunks are coded with.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct ChunkCoder {
     pub(super) parameters: Parameters,
     pub(super) dictionary: Dictionary,
@@ -192,7 +199,10 @@ impl ChunkCoder {
         let mut rebuilt = vec![0.0_f32; dim];
         for i in 0..view.len() {
             let placed = view.scene[i];
-            let form = canonical(&view.splats.geometry, placed.index());
+            let mut form = canonical(&view.splats.geometry, placed.index());
+            if let Some(colours) = view.base_colours {
+                form.dc = colours[i];
+            }
             let classes = view.classes[i];
             let mut target = GaussianValues { cell: placed.cell, classes, form, code: &[], exact: &[] };
             if dim > 0 {

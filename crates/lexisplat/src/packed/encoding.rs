@@ -14,7 +14,7 @@ use crate::support::spill::{Spill, SpillTo, Spilled};
 use crate::support::stopwatch::Stopwatch;
 
 /// What is counted over chunks before any is coded.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Counts {
     tally: Tally,
     histograms: Vec<Histogram>,
@@ -58,7 +58,7 @@ pub(super) type WriteChunk<'a> = dyn FnMut([Vec<u8>; 2]) -> Result<()> + 'a;
 type CodeChunks<'a> = dyn FnMut(&ChunkCoder, &Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
 
 /// A scene that is being packed.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Encoding {
     pub(super) coder: ChunkCoder,
     /// The symbols of the dictionary.
@@ -122,6 +122,7 @@ impl Encoding {
             file: UNNAMED.to_owned(),
             degree: coder.dictionary.degree(),
             gaussians,
+            removed: 0,
             atoms: coder.dictionary.len(),
             atom_bits: coder.atom_bits,
             record,

@@ -130,8 +130,8 @@ mod tests {
     fn packed(splats: &Splats, sensitivity: &Sensitivity, step: f64, limited: bool) -> Splats {
         let options = PackOptions::default().with_keep_order(true);
         let packer = Packer::new(splats, sensitivity, &options).unwrap();
-        let packed = if limited { packer.pack(step, &Silent) } else { packer.pack_coarsely(step, &Silent) };
-        packed.unwrap().0.unpack().unwrap().into_splats()
+        let (packed, _) = packer.quantise(step, limited, &Silent).unwrap().finish(None, &Silent).unwrap();
+        packed.unpack().unwrap().into_splats()
     }
 
     /// Weights of views that saw every fifth Gaussian, and by which moving and turning hardly shows.

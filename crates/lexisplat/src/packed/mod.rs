@@ -26,6 +26,8 @@ mod pack;
 mod parameters;
 mod parts;
 mod preset;
+mod quantised;
+mod removal;
 mod reorder;
 mod scene;
 mod stream;
@@ -40,6 +42,7 @@ pub(crate) use stream::BitCounts;
 
 pub use pack::{PackOptions, Packer};
 pub use preset::Preset;
+pub use quantised::Quantised;
 pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};
 pub use stream::StreamBits;
 

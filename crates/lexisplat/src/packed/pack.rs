@@ -1,30 +1,20 @@
 //! From a scene to a packed file.
 
 use std::borrow::Borrow;
-use std::ops::Range;
 
-use super::CHUNK;
 use super::canonical::{Grid, MortonKey};
-use super::codebook::Codes;
-use super::coder::{ChunkCoder, View};
-use super::encoding::{Counts, Encoding, Finished, WriteChunk};
-use super::entropy::Tables;
 use super::fit::Fit;
 use super::floor::Floor;
-use super::parameters::Parameters;
-use super::reorder::gather;
+use super::quantised::Quantised;
+use super::removal::Weights;
 use super::scene::Packed;
-use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::{Splats, all_finite};
 use crate::sparse::tally::CompressReport;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
-use crate::support::parallel::map_chunks;
-use crate::support::progress::{Progress, Stage};
-use crate::support::spill::SpillTo;
-use crate::support::stopwatch::Stopwatch;
+use crate::support::progress::Progress;
 
 /// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
 /// next three constants are fitted to held-out views of the models in docs/METHOD.md, which they miss by up to
@@ -46,8 +36,10 @@ pub struct PackOptions {
     pub tolerance: Option<f64>,
     /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
     pub atoms: Option<usize>,
-    /// Store each Gaussian's place in the source.
+    /// Store each Gaussian's place in the source. Then none is left out.
     pub keep_order: bool,
+    /// Leave no Gaussian out and keep base colours. A tolerance does so too.
+    pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
 }
@@ -57,8 +49,15 @@ impl PackOptions {
         with_tolerance(tolerance: impl Into<Option<f64>>),
         with_atoms(atoms: impl Into<Option<usize>>),
         with_keep_order(keep_order: bool),
+        with_keep_all(keep_all: bool),
         with_seed(seed: u64),
     );
+
+    /// Whether Gaussians may be left out, and base colours changed to make up for errors.
+    #[must_use]
+    pub fn may_change(&self) -> bool {
+        !self.keep_all && !self.keep_order && self.tolerance.is_none()
+    }
 
     /// Refuses options out of range.
     pub(crate) fn check(&self) -> Result<()> {
@@ -83,6 +82,7 @@ pub struct Packer<S> {
     options: PackOptions,
     scene: Vec<MortonKey>,
     fit: Fit,
+    weights: Weights,
 }
 
 impl<S: Borrow<Splats>> Packer<S> {
@@ -99,7 +99,8 @@ impl<S: Borrow<Splats>> Packer<S> {
         let mut scene = grid.keys(g);
         scene.sort_unstable();
         let fit = Fit::new(g, sensitivity, &scene, &grid);
-        Ok(Self { splats, options: options.clone(), scene, fit })
+        let weights = Weights::new(g, sensitivity, &scene, options.may_change());
+        Ok(Self { splats, options: options.clone(), scene, fit, weights })
     }
 
     /// Number of Gaussians.
@@ -126,78 +127,44 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
     ///
     /// # Errors
-    /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
-    /// leave f32; [`Error::Cancelled`].
+    /// As [`Self::quantise`] and [`Quantised::finish`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
-        let geometry = &self.splats.borrow().geometry;
-        self.pack_above(Floor::new(self.parameters(step)?, geometry, &self.scene), progress)
+        self.quantise(step, true, progress)?.finish(None, progress)
     }
 
-    /// [`Self::pack`] without a floor, for files smaller than the floor allows.
+    /// Settles everything that does not depend on base colours, with an overall step as in [`Self::pack`]. Without a
+    /// `floor` under what is visible the file can be smaller than the floor allows.
+    ///
+    /// Gaussians that show less than their bits are worth are left out, unless the options or the sensitivity keep
+    /// them: those whose largest change of a picture is not known, or that no picture showed.
     ///
     /// # Errors
-    /// As [`Self::pack`].
-    pub fn pack_coarsely(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
-        self.pack_above(Floor::none(self.parameters(step)?), progress)
-    }
-
-    fn parameters(&self, step: f64) -> Result<Parameters> {
+    /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
+    /// leave f32; [`Error::Cancelled`].
+    pub fn quantise(&self, step: f64, floor: bool, progress: &dyn Progress) -> Result<Quantised<'_>> {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
-        Ok(self.fit.with_step(step))
-    }
-
-    fn pack_above(&self, floor: Floor, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
-        let (splats, n) = (self.splats.borrow(), self.len());
-        let geometry = &splats.geometry;
-        let classes = floor.classes(&self.fit.classes, geometry, &self.scene);
-        let view = View { splats, scene: &self.scene, classes: &classes };
-        let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, n, floor.parameters, &self.options, progress)?;
-        let mut encoding = Encoding::new(coder, clock);
-        progress.check()?;
-        progress.begin(Stage::Code, n as u64);
-        let codes = (0..n.div_ceil(CHUNK)).map(|c| {
-            progress.check()?;
-            let part = view.part(c * CHUNK..n.min((c + 1) * CHUNK));
-            let codes = encoding.coder.codes(part);
-            progress.advance(part.scene.len() as u64);
-            Ok(codes)
-        });
-        let codes = codes.collect::<Result<Vec<Codes>>>()?;
-        progress.end();
-        encoding.end_learning();
-        // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
-        // symbols in memory would take more than the scene's geometry.
-        let record = |coder: &ChunkCoder, range: Range<usize>| {
-            progress.check()?;
-            coder.record(view.part(range.clone()), &codes[range.start / CHUNK])
+        let parameters = self.fit.with_step(step);
+        let kept = self.weights.kept(step);
+        let scene: Vec<MortonKey> = kept.iter().map(|&i| self.scene[i]).collect();
+        let classes: Vec<[f32; 2]> = kept.iter().map(|&i| self.fit.classes[i]).collect();
+        let colour = kept.iter().map(|&i| self.weights.colour[i]).collect();
+        let geometry = &self.splats.borrow().geometry;
+        let floor = match floor {
+            true => Floor::new(parameters, geometry, &scene),
+            false => Floor::none(parameters),
         };
-        let chunks = map_chunks(n, CHUNK, |range| {
-            let (tally, symbols) = record(&encoding.coder, range)?;
-            Ok(Counts::of(tally, &symbols))
-        });
-        for chunk in chunks {
-            encoding.counts.add(&chunk?);
-        }
-        let mut code_chunks = |coder: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts = map_chunks(n, CHUNK, |range| Ok(record(coder, range)?.1.finish(tables)));
-            parts.into_iter().try_for_each(|part| write(part?))
-        };
-        let meta = splats.meta.clone();
-        let Finished { head, data, report } =
-            encoding.finish(n, &self.options, meta, SpillTo::Memory, &mut code_chunks)?;
-        let order = self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect());
-        Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
-    }
-
-    fn extras(&self) -> Vec<Extra> {
-        let mut extras = self.splats.borrow().geometry.extras.clone();
-        for extra in &mut extras {
-            for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));
-        }
-        extras
+        let classes = floor.classes(&classes, geometry, &scene);
+        Quantised::new(
+            self.splats.borrow(),
+            &self.options,
+            scene,
+            classes,
+            colour,
+            floor.parameters,
+            progress,
+        )
     }
 }
 

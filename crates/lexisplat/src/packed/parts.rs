@@ -70,7 +70,7 @@ impl PartPacker {
         let step = expected_step(total, decibels);
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&fit.classes, &sample.geometry, &scene);
-        let view = View { splats: sample, scene: &scene, classes: &classes };
+        let view = View { splats: sample, scene: &scene, classes: &classes, base_colours: None };
         let coder = ChunkCoder::new(view, total, floor.parameters.clone(), options, progress)?;
         progress.check()?;
         Ok(Self {
@@ -92,7 +92,7 @@ impl PartPacker {
     pub(crate) fn push(&mut self, splats: &Splats, weights: &[[f32; 2]], places: &[MortonKey]) -> Result<()> {
         let scene: Vec<MortonKey> = (0..).zip(places).map(|(source, p)| MortonKey { source, ..*p }).collect();
         let classes = self.floor.classes(&self.fit.classes_of(weights), &splats.geometry, &scene);
-        let view = View { splats, scene: &scene, classes: &classes };
+        let view = View { splats, scene: &scene, classes: &classes, base_colours: None };
         let coder = &self.encoding.coder;
         let chunks = map_chunks(splats.len(), CHUNK, |range| {
             let part = view.part(range);

@@ -21,6 +21,8 @@ pub struct PackedHead {
     pub degree: ShDegree,
     /// Number of Gaussians.
     pub gaussians: usize,
+    /// Number of Gaussians of the source that were left out.
+    pub removed: u64,
     /// Number of atoms; 0 for degree 0.
     pub atoms: usize,
     /// Coefficients of atoms are multiples of 2 to the power of minus this.
@@ -50,8 +52,8 @@ pub struct PackedHead {
 impl PartialEq for PackedHead {
     /// Compares what is written to a file, and neither the name of the file nor the limits of its reader.
     fn eq(&self, other: &Self) -> bool {
-        (self.degree, self.gaussians, self.atoms, self.atom_bits)
-            == (other.degree, other.gaussians, other.atoms, other.atom_bits)
+        (self.degree, self.gaussians, self.removed, self.atoms, self.atom_bits)
+            == (other.degree, other.gaussians, other.removed, other.atoms, other.atom_bits)
             && (&self.record, &self.meta, &self.target, &self.reached, &self.device)
                 == (&other.record, &other.meta, &other.target, &other.reached, &other.device)
             && (&self.parameters, &self.tables, &self.lengths)

@@ -105,7 +105,7 @@ pub(super) trait Symbols {
 }
 
 /// The encoder of a chunk. It keeps all symbols until the tables are known.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct SymbolEncoder {
     /// Contexts of all streams, and symbols.
     symbols: Vec<[u16; 2]>,

@@ -34,7 +34,7 @@ impl CompressReport {
 }
 
 /// What is counted while coding.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Tally {
     /// Gaussians by number of nonzeros; escapes not among them.
     pub(crate) histogram: Vec<u64>,

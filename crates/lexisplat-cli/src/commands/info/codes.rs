@@ -13,7 +13,7 @@ use lexisplat_eval::format;
 use serde::Serialize;
 
 use super::bars;
-use crate::commands::compress::{error_line, record_line};
+use crate::commands::compress::{error_line, record_line, removed_line};
 
 /// Bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
 const DENSE_SH_BYTES: usize = 192;
@@ -53,6 +53,7 @@ pub(super) struct LexiFacts<'a> {
 /// The facts about a packed file.
 #[derive(Serialize)]
 struct PackedFacts<'a> {
+    removed: u64,
     promise: Option<&'a TargetRecord>,
     reached: Option<&'a ReachedRecord>,
     device: &'a str,
@@ -73,6 +74,7 @@ impl<'a> LexiFacts<'a> {
         let each = |value: f64| value / gaussians.max(1) as f64;
         let streams = &survey.stream_bits;
         let packed = lexi.packed_head().map(|head| PackedFacts {
+            removed: head.removed,
             promise: head.target.as_ref(),
             reached: head.reached.as_ref(),
             device: head.device.as_deref().unwrap_or(CPU),
@@ -115,6 +117,9 @@ impl<'a> LexiFacts<'a> {
         writeln!(out, ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match")?;
         if let Some(line) = packed.as_ref().and_then(|packed| record_line(packed.reached, packed.promise)) {
             writeln!(out, "pictures: {line}")?;
+        }
+        if let Some(packed) = packed.as_ref().filter(|packed| packed.removed > 0) {
+            writeln!(out, "left out: {}", removed_line(packed.removed))?;
         }
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
             writeln!(out, "measured on: {}", format::escape(packed.device))?;

@@ -72,6 +72,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         file: checked.file.clone(),
         degree: degree(checked)?,
         gaussians,
+        removed: checked.optional(key::REMOVED)?.unwrap_or(0),
         atoms: usize::try_from(atoms).map_err(|_| checked.malformed("too many atoms"))?,
         atom_bits: checked.number(key::ATOM_BITS)?,
         record: record(checked)?,

@@ -82,6 +82,7 @@ pub(super) mod key {
     pub(crate) const ANTIALIASED: &str = "antialiased";
     pub(crate) const COMMENTS: &str = "comments";
     pub(crate) const GAUSSIANS: &str = "gaussians";
+    pub(crate) const REMOVED: &str = "removed";
     pub(crate) const ATOMS: &str = "atoms";
     pub(crate) const ATOM_BITS: &str = "atom_bits";
     pub(crate) const PROMISE: &str = "promise";

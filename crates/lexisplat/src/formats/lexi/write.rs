@@ -91,6 +91,7 @@ impl<'a> LexiWriter<'a> {
             (key::ATOMS, head.atoms.to_string()),
             (key::ATOM_BITS, head.atom_bits.to_string()),
         ]);
+        metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
         metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
         metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
         metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));

@@ -55,7 +55,7 @@ impl Codes {
 }
 
 /// A dictionary prepared for coding.
-#[derive(Debug)]
+#[derive(Debug, Clone)]
 pub(super) struct Codebook {
     dim: usize,
     blocks: usize,

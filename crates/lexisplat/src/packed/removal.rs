@@ -1,0 +1,131 @@
+//! Which Gaussians a packed file leaves out.
+
+use super::canonical::MortonKey;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::Geometry;
+use crate::support::maths::log_sigmoid;
+
+/// A Gaussian is left out if the mean squared error of the pictures grows by less than this many squares of the
+/// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
+/// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
+const REMOVAL: f64 = 8.0;
+/// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
+const NEVER_DRAWN: f32 = -5.541_264;
+
+/// How much pictures depend on each Gaussian as a whole.
+#[derive(Debug)]
+pub(super) struct Weights {
+    /// Sensitivity to the colour.
+    pub(super) colour: Vec<f32>,
+    /// Squared change of the pictures if the Gaussian is left out; infinite if it must stay. That change is the
+    /// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian.
+    left_out: Vec<f32>,
+}
+
+impl Weights {
+    /// The weights of the Gaussians of `geometry` in the order of `scene`, of which some may be left out if they
+    /// `may_change`.
+    pub(super) fn new(
+        geometry: &Geometry,
+        sensitivity: &Sensitivity,
+        scene: &[MortonKey],
+        may_change: bool,
+    ) -> Self {
+        let left_out = |i: usize| {
+            // What no view showed may show in others. Where nothing was measured it is infinite.
+            let largest = sensitivity.removal[i];
+            match may_change && largest.is_finite() {
+                true if largest > 0.0 => sensitivity.opacity[i],
+                true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
+                _ => f32::INFINITY,
+            }
+        };
+        Self {
+            colour: scene.iter().map(|g| sensitivity.colour[g.index()]).collect(),
+            left_out: scene.iter().map(|g| left_out(g.index())).collect(),
+        }
+    }
+
+    /// The places of the Gaussians that stay at an overall step. At least one stays, if there are any.
+    pub(super) fn kept(&self, step: f64) -> Vec<usize> {
+        let limit = REMOVAL * step * step;
+        let kept: Vec<usize> =
+            (0..self.left_out.len()).filter(|&i| f64::from(self.left_out[i]) >= limit).collect();
+        match kept.is_empty() {
+            true => (0..self.left_out.len().min(1)).collect(),
+            false => kept,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::{PackOptions, Packer};
+    use crate::scene::extra::{Extra, ExtraValues};
+    use crate::support::testing::scene;
+    use crate::{Silent, Splats};
+
+    /// A scene whose Gaussians have their number, and measured weights: every fifth shows in nothing.
+    fn measured() -> (Splats, Sensitivity) {
+        let mut splats = scene(600, 2);
+        let numbers = ExtraValues::U32((0..600).collect());
+        splats.geometry.extras = vec![Extra { name: "number".into(), values: numbers }];
+        let mut sensitivity = Sensitivity::heuristic(&splats.geometry);
+        sensitivity.removal.fill(0.01);
+        for i in (0..600).step_by(5) {
+            sensitivity.opacity[i] = 1e-20;
+        }
+        (splats, sensitivity)
+    }
+
+    /// The numbers of the Gaussians of a file.
+    fn numbers(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> Vec<u32> {
+        let packer = Packer::new(splats, sensitivity, options).unwrap();
+        let (packed, _) = packer.pack(1e-7, &Silent).unwrap();
+        let geometry = packed.unpack().unwrap().into_splats().geometry;
+        let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
+        assert_eq!((packed.len(), packed.head().removed), (numbers.len(), 600 - numbers.len() as u64));
+        let mut numbers = numbers.clone();
+        numbers.sort_unstable();
+        numbers
+    }
+
+    #[test]
+    fn what_shows_less_than_its_bits_are_worth_goes() {
+        let (mut splats, mut sensitivity) = measured();
+        let options = PackOptions::default();
+        let rest = |step: u32| (0..600).filter(|k| k % step != 0).collect::<Vec<u32>>();
+        assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
+        // What no view showed stays, unless no view can show it.
+        for i in (0..600).step_by(10) {
+            sensitivity.removal[i] = 0.0;
+        }
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+        splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.6);
+        assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
+        splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.5);
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+    }
+
+    #[test]
+    fn options_and_guesses_keep_all() {
+        let (splats, mut sensitivity) = measured();
+        for options in [
+            PackOptions::default().with_keep_all(true),
+            PackOptions::default().with_keep_order(true),
+            PackOptions::default().with_tolerance(0.1),
+        ] {
+            assert_eq!(numbers(&splats, &sensitivity, &options).len(), 600, "{options:?}");
+        }
+        sensitivity.removal.fill(f32::INFINITY);
+        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), 600);
+    }
+
+    #[test]
+    fn one_gaussian_stays() {
+        let (splats, mut sensitivity) = measured();
+        sensitivity.opacity.fill(0.0);
+        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), 1);
+    }
+}
