@@ -44,7 +44,7 @@ impl From<Packing> for Compression {
 /// The quality of a packed file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Quality {
-    /// A quality by name. One packing gives it, without a search.
+    /// A quality by name, which at most three packings give.
     Preset(Preset),
     /// A quality or a size that a search reaches.
     Target(Target),

@@ -9,10 +9,11 @@ use std::borrow::Borrow;
 use lexisplat::packed::{Packed, Packer, Quantised};
 use lexisplat::sh::C0;
 use lexisplat::{CompressReport, Model, Progress, Splats};
-use lexisplat_render::{Camera, ColourAdjoint, ColourErrors, Image, RenderOptions, Renderer, Scene};
+use lexisplat_render::{Camera, ColourAdjoint, ColourErrors, Image, Renderer, Scene};
 
 use super::only_cancels::OnlyCancels;
 use super::views::PackingViews;
+use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
 
 /// Steps of the method of conjugate gradients. Each takes about as long as drawing all views.
@@ -63,6 +64,11 @@ impl<S: Borrow<Splats>> Refitting<S> {
         self.packer.len()
     }
 
+    /// Whether files are refitted.
+    pub(super) fn refits(&self) -> bool {
+        self.fit.is_some()
+    }
+
     /// By how much files are expected to be better than they are before they are refitted, in dB.
     pub(super) fn gain(&self) -> f64 {
         self.fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND })
@@ -83,21 +89,21 @@ impl<S: Borrow<Splats>> Refitting<S> {
         floor: bool,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
-        let quantised = self.packer.quantise(step, floor, progress)?;
-        let first = quantised.finish(None, progress)?;
+        let (quantised, first) = self.quantise(step, floor, progress)?;
         self.refit(&quantised, first, progress)
     }
 
-    /// Packs with an overall step, and does not refit.
+    /// Packs as [`Self::pack`] does, and does not refit.
     ///
     /// # Errors
     /// Errors of packing.
     pub(super) fn quantise(
         &self,
         step: f64,
+        floor: bool,
         progress: &dyn Progress,
     ) -> Result<(Quantised<'_>, (Packed, CompressReport))> {
-        let quantised = self.packer.quantise(step, true, progress)?;
+        let quantised = self.packer.quantise(step, floor, progress)?;
         let first = quantised.finish(None, progress)?;
         Ok((quantised, first))
     }
@@ -123,13 +129,8 @@ impl Fit {
     /// Pictures of `splats` to fit to. The processor draws them, for it fits too.
     fn to(splats: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Self> {
         let cameras = views.fitting(splats);
-        let mut renderer = Renderer::cpu();
-        let scene = renderer.prepare(Scene::from(splats))?;
-        let draw = |camera| {
-            progress.check()?;
-            Ok(renderer.render(&scene, camera, &RenderOptions::default())?)
-        };
-        let targets = cameras.iter().map(draw).collect::<Result<Vec<Image>>>()?;
+        let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
+        let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, &OnlyCancels(progress))?;
         Ok(Self { cameras, targets, given: views.are_given() })
     }
 

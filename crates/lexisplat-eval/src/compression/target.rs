@@ -152,18 +152,20 @@ pub(super) fn pack_to_preset(
     let aim = preset.decibels();
     let mut log_step = libm::log2(packer.step_for(aim));
     let (mut tries, mut slope) = (Vec::new(), -DB_PER_HALVING);
-    let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), progress)?;
-    let expected = judge.score(&file.0.unpack()?, progress)?.judged + packer.gain();
+    let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
+    let first = judge.score(&file.0.unpack()?, progress)?;
+    let expected = first.judged + packer.gain();
     if (expected - aim).abs() > CLOSE_FIRST
         && let Some(next) = next_step(&[Try { log_step, value: expected }], aim, &mut slope)
     {
         tries.push(Try { log_step, value: expected });
         log_step = next;
-        (quantised, file) = packer.quantise(libm::exp2(log_step), progress)?;
+        (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
     let (packed, report) = packer.refit(&quantised, file, progress)?;
     drop(quantised);
-    let score = judge.score(&packed.unpack()?, progress)?;
+    let is_first = tries.is_empty() && !packer.refits();
+    let score = if is_first { first } else { judge.score(&packed.unpack()?, progress)? };
     let off = (score.judged - aim).abs();
     tries.push(Try { log_step, value: score.judged });
     let best = (packed, report, score);
