@@ -28,7 +28,12 @@ fn a_scene_larger_than_memory_is_packed_in_parts() {
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     assert!(!before.geometry.positions.iter().zip(&after.geometry.positions).any(far), "out of order");
     let text = folder.run(&[&["compress", "scene.ply", "--overwrite"], &LITTLE[..]].concat());
-    assert!(text.contains("part by part"), "{text}");
+    assert!(text.contains("part by part") && text.contains("left out"), "{text}");
+    let info = folder.json(&["info", "scene.lexi"]);
+    assert_eq!(
+        info["gaussians"].as_u64().unwrap() + info["lexi"]["removed"].as_u64().unwrap(),
+        GAUSSIANS as u64
+    );
     assert_eq!(folder.names(), ["back.ply", "scene.lexi", "scene.ply"]);
 }
 
@@ -51,7 +56,8 @@ fn what_shows_can_be_guessed_whatever_the_memory() {
 #[test]
 fn what_needs_the_whole_scene_is_refused_before_any_work() {
     let folder = Folder::new();
-    for option in [&["--psnr", "40"][..], &["--size", "10kB"], &["--ratio", "12"]] {
+    for option in [&["--psnr", "40"][..], &["--size", "10kB"], &["--ratio", "12"], &["--max-gaussians", "9"]]
+    {
         let error = folder.fail(&[&["compress", "scene.ply"], option, &LITTLE[..]].concat(), 5);
         assert!(error.contains(&option[0][2..]) && error.contains("memory = 100000"), "{error}");
     }

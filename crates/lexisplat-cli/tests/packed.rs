@@ -215,6 +215,36 @@ fn what_is_left_out_is_reported() {
 }
 
 #[test]
+fn a_limit_on_gaussians_is_kept() {
+    let folder = Folder::new();
+    let most = folder::GAUSSIANS / 4;
+    let limit = most.to_string();
+    let limited = ["compress", "scene.ply", "--preset", "small", "--max-gaussians", &limit];
+    let report = folder.json(&limited);
+    let gaussians = number(&report["gaussians"]);
+    assert!(gaussians <= most as f64 && gaussians > 0.0, "{gaussians}");
+    assert_eq!(gaussians + number(&report["removed"]), folder::GAUSSIANS as f64);
+    let first = std::fs::read(folder.path("scene.lexi")).unwrap();
+    folder.run(&[&limited[..], &["--overwrite"]].concat());
+    assert!(std::fs::read(folder.path("scene.lexi")).unwrap() == first);
+    // What is reached is told beside the original, and no preset promises more than the limit lets it.
+    assert!(number(&report["reached"]["mean_psnr"]) < 35.0);
+    // A limit that is kept anyway changes nothing.
+    let plain = ["compress", "scene.ply", "--preset", "small", "-o", "plain.lexi"];
+    folder.run(&plain);
+    folder.run(&[&plain[..4], &["-o", "wide.lexi", "--max-gaussians", "1000000"]].concat());
+    let [plain, wide] = ["plain.lexi", "wide.lexi"].map(|name| std::fs::read(folder.path(name)).unwrap());
+    assert!(plain == wide);
+    for (option, code) in [("--keep-all", 2), ("--keep-order", 2), ("--guess", 2), ("--layout=f16", 5)] {
+        folder.fail(&["compress", "scene.ply", "--max-gaussians", "5", option, "-o", "x.lexi"], code);
+    }
+    folder.fail(&["compress", "scene.ply", "--max-gaussians", "0", "-o", "x.lexi"], 2);
+    let error =
+        folder.fail(&["compress", "scene.ply", "--max-gaussians", "5", "--psnr", "40", "-o", "x.lexi"], 5);
+    assert!(error.contains("nothing better"), "{error}");
+}
+
+#[test]
 fn options_that_do_not_go_together_are_refused() {
     let folder = Folder::new();
     folder.fail(&["compress", "scene.ply", "--psnr", "40", "--size", "10kB"], 2);

@@ -55,6 +55,11 @@ pub(crate) struct Compress {
     /// make up for them and for errors. --keep-order and --tol leave none out either.
     #[arg(long)]
     pub(crate) keep_all: bool,
+    /// Make the best scene of at most this many Gaussians, 1 or more, for viewers with a limit. --preset is then the
+    /// quality of the file beside that scene, while --psnr and --min-psnr compare it with the original [default: no
+    /// limit].
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
+    pub(crate) max_gaussians: Option<usize>,
     /// Does nothing of its own: every packed file leaves out what hardly shows.
     #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
     pub(crate) prune: Option<f32>,
@@ -123,7 +128,7 @@ impl Compress {
     }
 
     /// The options that only packed files have, and whether they are given.
-    fn packed_only(&self) -> [(&'static str, bool); 11] {
+    fn packed_only(&self) -> [(&'static str, bool); 12] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -135,6 +140,7 @@ impl Compress {
             ("--scene", self.scene.is_some()),
             ("--keep-order", self.keep_order),
             ("--keep-all", self.keep_all),
+            ("--max-gaussians", self.max_gaussians.is_some()),
             ("--prune", self.prune.is_some()),
         ]
     }

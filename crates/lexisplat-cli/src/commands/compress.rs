@@ -66,7 +66,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     report.total_seconds = start.elapsed().as_secs_f64();
     warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
     warn(&name, report.target.as_ref().and_then(costly).as_slice());
-    if report.target.is_none() {
+    if report.target.is_none() && args.max_gaussians.is_none() {
         let preset = args.preset.unwrap_or_default();
         warn(&name, report.reached.as_ref().and_then(|reached| short(reached, preset)).as_slice());
     }
@@ -109,6 +109,7 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
         .with_options(options)
         .with_gpu(open_gpu(args.device)?)
         .with_scene_kind(args.scene.unwrap_or_default())
+        .with_max_gaussians(args.max_gaussians)
         .with_memory(args.memory);
     if let Some(path) = &args.cameras {
         let set = read_views(path, &mut |_| None)?;
@@ -275,7 +276,7 @@ fn reached_line(reached: &ReachedRecord) -> String {
 
 /// How many Gaussians of the source a file lacks.
 pub(crate) fn removed_line(removed: u64) -> String {
-    format!("{} Gaussians, which show less than their bits are worth", format::count(removed))
+    format!("{} Gaussians, which show least", format::count(removed))
 }
 
 /// What a file records of its pictures. Files made before `reached` was recorded have a `promise` at most.

@@ -1,6 +1,6 @@
 //! The score of a compressed scene over the judging views.
 
-use lexisplat::{Model, Progress, Splats};
+use lexisplat::{Progress, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
@@ -54,13 +54,22 @@ impl Judge {
         self.given
     }
 
-    /// Scores `model`. `progress` can cancel.
+    /// The same views of `splats`, against which models are scored instead.
     ///
     /// # Errors
-    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the model
+    /// As [`Self::new`].
+    pub(super) fn against(self, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
+        let cameras: Vec<&Camera> = self.views.iter().map(|view| &view.0).collect();
+        Self::new(self.renderer, splats, &cameras, self.given, progress)
+    }
+
+    /// Scores a model or another scene. `progress` can cancel.
+    ///
+    /// # Errors
+    /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
     /// or a view does not fit.
-    pub fn score(&mut self, model: &Model, progress: &dyn Progress) -> Result<Score> {
-        let scene = self.renderer.prepare(Scene::from(model))?;
+    pub fn score<'a>(&mut self, scene: impl Into<Scene<'a>>, progress: &dyn Progress) -> Result<Score> {
+        let scene = self.renderer.prepare(scene.into())?;
         let mut all = Vec::with_capacity(self.views.len());
         for (camera, original) in &self.views {
             progress.check()?;

@@ -20,6 +20,7 @@
 //! ```
 
 mod facts;
+mod fewer;
 mod found;
 mod judge;
 mod only_cancels;

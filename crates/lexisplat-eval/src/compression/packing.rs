@@ -15,6 +15,9 @@ use crate::views::SceneKind;
 /// Bytes of memory that packing a whole scene takes for each byte of its source. 1.85 was measured.
 const MEMORY_PER_BYTE: u64 = 2;
 
+/// Name of [`Packing::with_max_gaussians`] in errors.
+const MAX_GAUSSIANS: &str = "max-gaussians";
+
 /// How to compress a scene.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
@@ -74,6 +77,7 @@ pub struct Packing {
     pub(super) kind: SceneKind,
     pub(super) gpu: Option<Gpu>,
     pub(super) looked: Option<Arc<Looked>>,
+    pub(super) max_gaussians: Option<usize>,
     memory: u64,
 }
 
@@ -94,6 +98,7 @@ impl Packing {
             kind: SceneKind::Auto,
             gpu: None,
             looked: None,
+            max_gaussians: None,
             memory: u64::MAX,
         }
     }
@@ -138,6 +143,13 @@ impl Packing {
         Self { looked: Some(looked), ..self }
     }
 
+    /// Leaves out the Gaussians that show least until there are at most this many, 1 or more. A preset is then the quality
+    /// of the file beside that scene; a target in decibels is beside the scene that was given.
+    #[must_use]
+    pub fn with_max_gaussians(self, most: impl Into<Option<usize>>) -> Self {
+        Self { max_gaussians: most.into(), ..self }
+    }
+
     /// The renderer that the choices mean.
     pub(super) fn renderer(&self) -> Result<Renderer> {
         match &self.gpu {
@@ -151,7 +163,14 @@ impl Packing {
         if let Quality::Target(target) = self.quality {
             target.check()?;
         }
-        Ok(())
+        match self.max_gaussians {
+            Some(0) => Err(Error::parameter(MAX_GAUSSIANS, 0, "at least 1")),
+            Some(most) if !self.options.may_change() => {
+                let expected = "no limit with keep_all, keep_order or a tolerance";
+                Err(Error::parameter(MAX_GAUSSIANS, most, expected))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Whether a scene of `source_bytes` bytes is packed whole. Otherwise it is packed part by part.
@@ -173,6 +192,7 @@ impl Packing {
             Quality::Target(target) => Some(target.name()),
             Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
             Quality::Preset(_) if self.kind != SceneKind::Auto => Some("scene"),
+            Quality::Preset(_) if self.max_gaussians.is_some() => Some(MAX_GAUSSIANS),
             Quality::Preset(_) => self.looked.as_ref().map(|_| "looked"),
         }
     }

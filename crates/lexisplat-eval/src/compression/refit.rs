@@ -34,7 +34,7 @@ pub(super) struct Refitting<S> {
 }
 
 /// What base colours are fitted to.
-struct Fit {
+pub(super) struct Fit {
     cameras: Vec<Camera>,
     /// The original's pictures.
     targets: Vec<Image>,
@@ -43,20 +43,9 @@ struct Fit {
 }
 
 impl<S: Borrow<Splats>> Refitting<S> {
-    /// Files of `packer`, whose scene is `splats`, fitted to some of `views`. They are as `packer` makes them unless base
-    /// colours `may_change`.
-    ///
-    /// # Errors
-    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(super) fn new(
-        packer: Packer<S>,
-        splats: &Splats,
-        views: &PackingViews,
-        may_change: bool,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
-        let fit = if may_change { Some(Fit::to(splats, views, progress)?) } else { None };
-        Ok(Self { packer, fit })
+    /// Files of `packer`, with base colours as `fit` says or as `packer` makes them.
+    pub(super) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
+        Self { packer, fit }
     }
 
     /// Number of Gaussians of the scene.
@@ -119,33 +108,58 @@ impl<S: Borrow<Splats>> Refitting<S> {
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let Some(fit) = &self.fit else { return Ok(file) };
-        let colours = fit.base_colours(&file.0.unpack()?, quantised, progress)?;
+        let model = file.0.unpack()?;
+        let dc = &model.geometry().dc;
+        let colours = fit.base_colours(Scene::from(&model), dc, quantised.colour_weights(), progress)?;
+        drop(model);
         drop(file);
         Ok(quantised.finish(Some(&colours), progress)?)
     }
 }
 
+/// Base colours of `model`, which is what a file has of `part`, fitted to pictures of the part alone.
+///
+/// # Errors
+/// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+pub(super) fn base_colours_of_part(
+    part: &Splats,
+    model: &Model,
+    colour_weights: &[f32],
+    progress: &dyn Progress,
+) -> Result<Vec<[f32; 3]>> {
+    let fit = Fit::to(part, &PackingViews::of_part(part), progress)?;
+    fit.base_colours(Scene::from(model), &model.geometry().dc, colour_weights, progress)
+}
+
 impl Fit {
     /// Pictures of `splats` to fit to. The processor draws them, for it fits too.
-    fn to(splats: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Self> {
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(super) fn to(splats: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Self> {
         let cameras = views.fitting(splats);
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
         let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, &OnlyCancels(progress))?;
         Ok(Self { cameras, targets, given: views.are_given() })
     }
 
-    /// Base colours of `model`, which is the scene as `quantised`, with which its pictures are nearest to the targets.
-    fn base_colours(
+    /// Base colours of `scene` with which its pictures are nearest to the targets. `dc` are those it has, and
+    /// `colour_weights` the sensitivities of its Gaussians to colour.
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(super) fn base_colours(
         &self,
-        model: &Model,
-        quantised: &Quantised<'_>,
+        scene: Scene<'_>,
+        dc: &[[f32; 3]],
+        colour_weights: &[f32],
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; 3]>> {
-        let mut adjoint = ColourAdjoint::new(Scene::from(model), &self.cameras)?;
+        let mut adjoint = ColourAdjoint::new(scene, &self.cameras)?;
         let progress = &OnlyCancels(progress);
         let ColourErrors { mut errors, row_sums, .. } = adjoint.of_errors(&self.targets, progress)?;
         // Sensitivities are averaged over three channels, and products with the adjoint are not.
-        let ridge: Vec<f32> = quantised.colour_weights().iter().map(|w| RIDGE * 3.0 * w).collect();
+        let ridge: Vec<f32> = colour_weights.iter().map(|w| RIDGE * 3.0 * w).collect();
         let diagonal: Vec<f32> = row_sums
             .iter()
             .zip(&ridge)
@@ -180,7 +194,7 @@ impl Fit {
             }
         }
         let fitted = |(dc, found): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| dc[c] + found[c] / C0);
-        Ok(model.geometry().dc.iter().zip(&found).map(fitted).collect())
+        Ok(dc.iter().zip(&found).map(fitted).collect())
     }
 }
 
@@ -214,7 +228,8 @@ mod tests {
         let Looked { views, sensitivity } =
             Looked::at(&mut cpu, splats, None, SceneKind::Auto, &Silent).unwrap();
         let packer = Packer::new(splats.clone(), &sensitivity, options).unwrap();
-        let refitting = Refitting::new(packer, splats, &views, options.may_change(), &Silent).unwrap();
+        let fit = options.may_change().then(|| Fit::to(splats, &views, &Silent).unwrap());
+        let refitting = Refitting::new(packer, fit);
         let step = refitting.packer.step_for(34.0);
         let (packed, _) = refitting.pack(step, true, &Silent).unwrap();
         let model = packed.unpack().unwrap();

@@ -66,7 +66,7 @@ pub struct CompressionReport {
     pub importance: Option<SensitivitySource>,
     /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
     pub device: Option<String>,
-    /// Number of Gaussians of the source that were left out, because they show less than their bits are worth.
+    /// Number of Gaussians of the source that were left out.
     pub removed: u64,
     /// Whether a packed scene was measured and packed part by part.
     pub in_parts: bool,

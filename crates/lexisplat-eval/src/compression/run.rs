@@ -3,13 +3,14 @@
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, Preset};
 use lexisplat::stream::{self, Importance};
-use lexisplat::{Layout, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
+use lexisplat::{Layout, Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
 use lexisplat_render::Renderer;
 
+use super::fewer::at_most;
 use super::judge::Judge;
 use super::only_cancels::OnlyCancels;
 use super::packing::{Compression, Packing, Quality};
-use super::refit::Refitting;
+use super::refit::{Fit, Refitting, base_colours_of_part};
 use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
 use super::views::{Looked, PackingViews};
@@ -73,6 +74,9 @@ fn in_parts(
     let device = renderer.as_ref().and_then(gpu);
     let origin = if renderer.is_some() { SensitivitySource::Views } else { SensitivitySource::Heuristic };
     let mut look_seconds = 0.0;
+    let mut refit = |part: &Splats, model: &Model, colour_weights: &[f32]| {
+        base_colours_of_part(part, model, colour_weights, progress)
+    };
     let mut measure;
     let importance = match &mut renderer {
         None => Importance::Heuristic,
@@ -84,7 +88,7 @@ fn in_parts(
                 look_seconds += clock.seconds();
                 sensitivity
             };
-            Importance::Judge { judge: &mut measure, device }
+            Importance::Judge { judge: &mut measure, refit: Some(&mut refit), device }
         }
     };
     let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;
@@ -130,19 +134,43 @@ impl Packing {
         let look_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
-        let packer = Packer::new(&*splats, &sensitivity, &self.options)?;
+        let fit = if self.options.may_change() { Some(Fit::to(&splats, &views, progress)?) } else { None };
+        let given = views.are_given();
+        let most = self.max_gaussians.filter(|&most| most < splats.len());
+        let (fewer, sensitivity) = match (most, &fit) {
+            (Some(most), Some(fit)) => {
+                let made = at_most(most, &splats, sensitivity, &views, &mut renderer, fit, progress)?;
+                (Some(made.0), made.1)
+            }
+            _ => (None, sensitivity),
+        };
+        let packed_scene = fewer.as_ref().unwrap_or(&splats);
+        let packer = Packer::new(packed_scene, &sensitivity, &self.options)?;
         drop(sensitivity);
-        let refitting = Refitting::new(packer, &splats, &views, self.options.may_change(), progress)?;
-        let most = if let Quality::Preset(_) = self.quality { PRESET_JUDGES } else { usize::MAX };
-        let mut judge =
-            Judge::new(renderer, &splats, &views.some_judging(most), views.are_given(), progress)?;
-        let (packed, report, score) = match self.quality {
-            Quality::Preset(preset) => pack_to_preset(&refitting, &mut judge, preset, progress)?,
+        let refitting = Refitting::new(packer, fit);
+        let (packed, report, judge, score) = match self.quality {
+            Quality::Preset(preset) => {
+                // What is left out to keep a limit is not what a preset can make up for.
+                let judges = views.some_judging(PRESET_JUDGES);
+                let mut judge = Judge::new(renderer, packed_scene, &judges, given, progress)?;
+                let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
+                if fewer.is_some() {
+                    judge = judge.against(&splats, progress)?;
+                    score = judge.score(&packed.unpack()?, progress)?;
+                }
+                (packed, report, judge, score)
+            }
             Quality::Target(target) => {
-                pack_to_target(&refitting, &mut judge, target, source.source_bytes(), progress)?
+                let judges = views.some_judging(usize::MAX);
+                let mut judge = Judge::new(renderer, &splats, &judges, given, progress)?;
+                let bytes = source.source_bytes();
+                let (packed, report, score) =
+                    pack_to_target(&refitting, &mut judge, target, bytes, progress)?;
+                (packed, report, judge, score)
             }
         };
-        let packed = packed.with_device(device).with_reached(reached(score, &judge));
+        let removed = (splats.len() - packed.len()) as u64;
+        let packed = packed.with_device(device).with_reached(reached(score, &judge)).with_removed(removed);
         drop(refitting);
         let pack_seconds = clock.seconds();
 

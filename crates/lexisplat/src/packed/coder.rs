@@ -61,7 +61,7 @@ impl<'a> View<'a> {
         }
     }
 
-    fn len(self) -> usize {
+    pub(super) fn len(self) -> usize {
         self.scene.len()
     }
 

@@ -35,12 +35,14 @@ mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
 pub(crate) use chunks::Decoder;
-pub(crate) use pack::check;
-pub(crate) use parts::{PartPacker, Whole};
+pub(crate) use pack::{check, expected_step};
+pub(crate) use parts::{Part, PartPacker, Whole};
+pub(crate) use removal::{change_without, is_worth_its_bits};
 pub(crate) use scene::SpilledPacked;
 pub(crate) use stream::BitCounts;
 
 pub use pack::{PackOptions, Packer};
+pub use parts::Refit;
 pub use preset::Preset;
 pub use quantised::Quantised;
 pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};

@@ -169,7 +169,7 @@ impl<S: Borrow<Splats>> Packer<S> {
 }
 
 /// [`Packer::step_for`] of a scene of `gaussians` Gaussians.
-pub(super) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
+pub(crate) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
     // decibels = EXPECTED_DB + DB_PER_OCTAVE x + DB_PER_OCTAVE_2 x^2, with x the octaves below.
     let over = decibels.clamp(0.0, MOST_DB) - EXPECTED_DB;
     let root = (DB_PER_OCTAVE * DB_PER_OCTAVE + 4.0 * DB_PER_OCTAVE_2 * over).max(0.0).sqrt();

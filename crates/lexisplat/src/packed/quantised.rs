@@ -1,7 +1,5 @@
 //! A scene at one overall step, ready to be written with any base colours.
 
-use std::ops::Range;
-
 use super::CHUNK;
 use super::canonical::MortonKey;
 use super::codebook::Codes;
@@ -12,9 +10,10 @@ use super::pack::PackOptions;
 use super::parameters::Parameters;
 use super::reorder::gather;
 use super::scene::Packed;
+use super::stream::SymbolEncoder;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::splats::{Splats, all_finite};
-use crate::sparse::tally::CompressReport;
+use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_chunks;
 use crate::support::progress::{Progress, Stage};
@@ -53,16 +52,24 @@ impl<'a> Quantised<'a> {
         let mut encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
-        let codes = (0..n.div_ceil(CHUNK)).map(|c| {
-            progress.check()?;
-            let part = view.part(c * CHUNK..n.min((c + 1) * CHUNK));
-            let codes = encoding.coder.codes(part);
-            progress.advance(part.scene.len() as u64);
-            Ok(codes)
-        });
-        let codes = codes.collect::<Result<Vec<Codes>>>()?;
+        let codes = codes_of(&encoding.coder, view, progress)?;
         progress.end();
         encoding.end_learning();
+        Ok(Self { splats, options, scene, classes, colour_weights, codes, encoding })
+    }
+
+    /// A part of a scene, with what all parts are coded with.
+    pub(super) fn of_part(
+        splats: &'a Splats,
+        options: &'a PackOptions,
+        scene: Vec<MortonKey>,
+        classes: Vec<[u8; 2]>,
+        colour_weights: Vec<f32>,
+        encoding: Encoding,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let view = View { splats, scene: &scene, classes: &classes, base_colours: None };
+        let codes = codes_of(&encoding.coder, view, progress)?;
         Ok(Self { splats, options, scene, classes, colour_weights, codes, encoding })
     }
 
@@ -96,29 +103,15 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
-        if let Some(colours) = base_colours {
-            if colours.len() != n {
-                return Err(Error::parameter("base colours", colours.len(), format!("{n} rows")));
-            }
-            all_finite([("base colours", colours.as_flattened())])?;
-        }
-        let view = View { splats: self.splats, scene: &self.scene, classes: &self.classes, base_colours };
+        let view = self.view(base_colours)?;
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.
-        let record = |coder: &ChunkCoder, range: Range<usize>| {
-            progress.check()?;
-            coder.record(view.part(range.clone()), &self.codes[range.start / CHUNK])
-        };
-        let chunks = map_chunks(n, CHUNK, |range| {
-            let (tally, symbols) = record(&encoding.coder, range)?;
-            Ok(Counts::of(tally, &symbols))
-        });
-        for chunk in chunks {
+        for chunk in self.each_chunk(view, progress, |tally, symbols| Counts::of(tally, &symbols)) {
             encoding.counts.add(&chunk?);
         }
-        let mut code_chunks = |coder: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts = map_chunks(n, CHUNK, |range| Ok(record(coder, range)?.1.finish(tables)));
+        let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
+            let parts = self.each_chunk(view, progress, |_, symbols| symbols.finish(tables));
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = self.splats.meta.clone();
@@ -129,13 +122,54 @@ impl<'a> Quantised<'a> {
         Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
     }
 
-    fn extras(&self) -> Vec<Extra> {
+    /// The Gaussians with the scene's own base colours or with these, which are refused as [`Self::finish`] says.
+    pub(super) fn view<'v>(&'v self, base_colours: Option<&'v [[f32; 3]]>) -> Result<View<'v>> {
+        let n = self.len();
+        if let Some(colours) = base_colours {
+            if colours.len() != n {
+                return Err(Error::parameter("base colours", colours.len(), format!("{n} rows")));
+            }
+            all_finite([("base colours", colours.as_flattened())])?;
+        }
+        Ok(View { splats: self.splats, scene: &self.scene, classes: &self.classes, base_colours })
+    }
+
+    /// What `with` makes of the counts and the symbols of each chunk of `view`.
+    pub(super) fn each_chunk<T: Send>(
+        &self,
+        view: View<'_>,
+        progress: &dyn Progress,
+        with: impl Fn(Tally, SymbolEncoder) -> T + Sync,
+    ) -> Vec<Result<T>> {
+        map_chunks(self.len(), CHUNK, |range| {
+            progress.check()?;
+            let codes = &self.codes[range.start / CHUNK];
+            let (tally, symbols) = self.encoding.coder.record(view.part(range), codes)?;
+            Ok(with(tally, symbols))
+        })
+    }
+
+    /// The columns that are not drawn, with the rows of the file.
+    pub(super) fn extras(&self) -> Vec<Extra> {
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
             for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));
         }
         extras
     }
+}
+
+/// The codes of all of `view`, chunk by chunk.
+fn codes_of(coder: &ChunkCoder, view: View<'_>, progress: &dyn Progress) -> Result<Vec<Codes>> {
+    let n = view.len();
+    let codes = (0..n.div_ceil(CHUNK)).map(|c| {
+        progress.check()?;
+        let part = view.part(c * CHUNK..n.min((c + 1) * CHUNK));
+        let codes = coder.codes(part);
+        progress.advance(part.len() as u64);
+        Ok(codes)
+    });
+    codes.collect()
 }
 
 #[cfg(test)]

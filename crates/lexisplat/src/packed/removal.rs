@@ -12,13 +12,34 @@ const REMOVAL: f64 = 8.0;
 /// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
 const NEVER_DRAWN: f32 = -5.541_264;
 
+/// Squared change of the pictures if Gaussian `i` is left out; infinite if it must stay. That change is the sensitivity to
+/// the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian.
+pub(crate) fn change_without(
+    geometry: &Geometry,
+    sensitivity: &Sensitivity,
+    i: usize,
+    may_change: bool,
+) -> f32 {
+    // What no view showed may show in others. Where nothing was measured it is infinite.
+    let largest = sensitivity.removal[i];
+    match may_change && largest.is_finite() {
+        true if largest > 0.0 => sensitivity.opacity[i],
+        true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
+        _ => f32::INFINITY,
+    }
+}
+
+/// Whether a Gaussian without which pictures change by `change` stays at an overall step.
+pub(crate) fn is_worth_its_bits(change: f32, step: f64) -> bool {
+    f64::from(change) >= REMOVAL * step * step
+}
+
 /// How much pictures depend on each Gaussian as a whole.
 #[derive(Debug)]
 pub(super) struct Weights {
     /// Sensitivity to the colour.
     pub(super) colour: Vec<f32>,
-    /// Squared change of the pictures if the Gaussian is left out; infinite if it must stay. That change is the
-    /// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian.
+    /// As [`change_without`].
     left_out: Vec<f32>,
 }
 
@@ -31,26 +52,17 @@ impl Weights {
         scene: &[MortonKey],
         may_change: bool,
     ) -> Self {
-        let left_out = |i: usize| {
-            // What no view showed may show in others. Where nothing was measured it is infinite.
-            let largest = sensitivity.removal[i];
-            match may_change && largest.is_finite() {
-                true if largest > 0.0 => sensitivity.opacity[i],
-                true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
-                _ => f32::INFINITY,
-            }
-        };
+        let left_out = |g: &MortonKey| change_without(geometry, sensitivity, g.index(), may_change);
         Self {
             colour: scene.iter().map(|g| sensitivity.colour[g.index()]).collect(),
-            left_out: scene.iter().map(|g| left_out(g.index())).collect(),
+            left_out: scene.iter().map(left_out).collect(),
         }
     }
 
     /// The places of the Gaussians that stay at an overall step. At least one stays, if there are any.
     pub(super) fn kept(&self, step: f64) -> Vec<usize> {
-        let limit = REMOVAL * step * step;
         let kept: Vec<usize> =
-            (0..self.left_out.len()).filter(|&i| f64::from(self.left_out[i]) >= limit).collect();
+            (0..self.left_out.len()).filter(|&i| is_worth_its_bits(self.left_out[i], step)).collect();
         match kept.is_empty() {
             true => (0..self.left_out.len().min(1)).collect(),
             false => kept,

@@ -126,6 +126,13 @@ impl Packed {
         self
     }
 
+    /// The same with the number of Gaussians that were left out in all; see [`PackedHead::removed`].
+    #[must_use]
+    pub fn with_removed(mut self, removed: u64) -> Self {
+        self.head.removed = removed;
+        self
+    }
+
     /// The same with the GPU that measured the sensitivity; see [`PackedHead::device`].
     #[must_use]
     pub fn with_device(mut self, device: Option<String>) -> Self {

@@ -16,8 +16,8 @@ impl SpilledExtras {
     }
 
     /// Appends the values of the next Gaussians.
-    pub(crate) fn push(&mut self, geometry: &Geometry) -> Result<()> {
-        for (extra, (_, spill)) in geometry.extras.iter().zip(&mut self.0) {
+    pub(crate) fn push(&mut self, extras: &[Extra]) -> Result<()> {
+        for (extra, (_, spill)) in extras.iter().zip(&mut self.0) {
             for_extra!(&extra.values, v => spill.push(v)?);
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! The sensitivity of pictures to a scene that is too large to be drawn as a whole.
 
+use crate::packed::Refit;
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
@@ -17,6 +18,9 @@ pub enum Importance<'a, E = Error> {
     Judge {
         /// Measures how pictures of a part depend on its values. It is called once for each part, in order.
         judge: &'a mut dyn FnMut(&Splats) -> Result<Sensitivity, E>,
+        /// Fits base colours to pictures of a part, if the options let them change. The parts are not those that
+        /// `judge` takes.
+        refit: Option<&'a mut Refit<'a, E>>,
         /// Name of the GPU that draws, which the file records; `None` for the CPU renderer.
         device: Option<String>,
     },
@@ -31,12 +35,20 @@ impl<E> std::fmt::Debug for Importance<'_, E> {
     }
 }
 
-impl<E> Importance<'_, E> {
+impl<'a, E> Importance<'a, E> {
     /// Name of the GPU that drew, if one did.
     pub(super) fn device(&self) -> Option<&str> {
         match self {
             Self::Heuristic => None,
             Self::Judge { device, .. } => device.as_deref(),
+        }
+    }
+
+    /// What fits base colours, if anything does.
+    pub(super) fn refit(&mut self) -> Option<&mut Refit<'a, E>> {
+        match self {
+            Self::Heuristic => None,
+            Self::Judge { refit, .. } => refit.as_deref_mut(),
         }
     }
 

@@ -6,10 +6,10 @@ use super::buckets::Buckets;
 use super::each_part;
 use super::importance::Importance;
 use super::rows::RowLayout;
-use crate::packed::{Bounds, Grid, MortonKey, check};
+use crate::packed::{Bounds, Grid, MortonKey, Part, check};
 use crate::scene::sensitivity::{Sensitivity, heuristic_total};
 use crate::scene::source::SplatSource;
-use crate::scene::splats::Splats;
+use crate::scene::splats::{Geometry, Splats};
 use crate::support::error::{Error, Result};
 use crate::support::progress::{Progress, Stage};
 use crate::support::rng::SplitMix64;
@@ -36,8 +36,10 @@ const KEY_BYTES: usize = 12;
 /// Mixed into the seed of the Gaussians whose cells are looked at.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
-/// Takes Gaussians, their sensitivities to colour and opacity, and their places.
-type Take<'a> = dyn FnMut(&Splats, &[[f32; 2]], &[MortonKey]) -> Result<()> + 'a;
+/// Takes a part of the scene.
+type Take<'a, E> = dyn FnMut(Part<'_>) -> Result<(), E> + 'a;
+/// Says whether a Gaussian of a part of the scene stays.
+type Stays<'a> = dyn Fn(&Geometry, &Sensitivity, usize) -> bool + 'a;
 
 /// A scene distributed over buckets in the order of a packed file.
 pub(super) struct Ordered {
@@ -57,8 +59,20 @@ pub(super) struct Judged {
     pub(super) sample: Splats,
     /// The sensitivity of the sample.
     pub(super) sensitivity: Sensitivity,
-    /// Sensitivities to colour and opacity of all Gaussians, in order, as pairs of f32.
-    pub(super) weights: Spilled,
+    /// What is known of all of them.
+    pub(super) rows: Rows,
+}
+
+/// What is known of all Gaussians, in order.
+pub(super) struct Rows {
+    /// Number of Gaussians that stay.
+    pub(super) kept: usize,
+    /// Whether no Gaussian is worth its bits. Then the first stays.
+    none_stays: bool,
+    /// Sensitivities to colour and opacity, as pairs of f32.
+    weights: Spilled,
+    /// One byte for each: 1 if it stays.
+    stays: Spilled,
 }
 
 impl Ordered {
@@ -116,15 +130,18 @@ impl Ordered {
         Ok(Self { grid, heuristic_total: total, rows, buckets, gaussians: n, runs: (run_ends, every) })
     }
 
-    /// Finds the sensitivity to all Gaussians, bucket by bucket.
+    /// Finds the sensitivity to all Gaussians, bucket by bucket, and which of them stay.
     pub(super) fn judge<E: From<Error>>(
         &mut self,
         importance: &mut Importance<'_, E>,
+        stays: &Stays<'_>,
         folder: &Path,
         progress: &dyn Progress,
     ) -> Result<Judged, E> {
         let (mut sample, mut sensitivity) = (Vec::new(), Sensitivity::default());
         let mut weights = Spill::new(SpillTo::Folder(folder))?;
+        let mut stay = Spill::new(SpillTo::Folder(folder))?;
+        let mut kept = 0;
         progress.begin(Stage::Look, self.gaussians as u64);
         for bucket in 0..self.buckets.len() {
             progress.check()?;
@@ -136,6 +153,10 @@ impl Ordered {
             let pairs: Vec<[f32; 2]> =
                 found.colour.iter().zip(&found.opacity).map(|(&c, &o)| [c, o]).collect();
             weights.push(&pairs)?;
+            let marks: Vec<u8> =
+                (0..splats.len()).map(|i| u8::from(stays(&splats.geometry, &found, i))).collect();
+            kept += marks.iter().filter(|&&mark| mark == 1).count();
+            stay.push(&marks)?;
             let (ends, every) = &self.runs;
             let sampled = |key: &MortonKey| ends.partition_point(|end| end <= key).is_multiple_of(*every);
             let keep: Vec<bool> = places.iter().map(sampled).collect();
@@ -148,24 +169,48 @@ impl Ordered {
         }
         progress.end();
         let sample = self.rows.unpack(&sample);
-        Ok(Judged { sample, sensitivity, weights: weights.finish()? })
+        let none_stays = kept == 0 && self.gaussians > 0;
+        let kept = kept + usize::from(none_stays);
+        let rows = Rows { kept, none_stays, weights: weights.finish()?, stays: stay.finish()? };
+        Ok(Judged { sample, sensitivity, rows })
     }
 
-    /// Hands all Gaussians to `take` in order, with their `weights` and their places. Each time but the last their
-    /// number is a multiple of `chunk`.
-    pub(super) fn each(mut self, mut weights: Spilled, chunk: usize, take: &mut Take<'_>) -> Result<()> {
+    /// Hands all Gaussians to `take` in order. Each time but the last the number of those that stay is a multiple of
+    /// `chunk`.
+    pub(super) fn each<E: From<Error>>(
+        mut self,
+        mut rows: Rows,
+        chunk: usize,
+        take: &mut Take<'_, E>,
+    ) -> Result<(), E> {
+        let width = self.rows.bytes();
         let (mut bytes, mut places) = (Vec::new(), Vec::new());
+        let (mut weights, mut stays) = (Vec::new(), Vec::new());
+        let mut none_stays = rows.none_stays;
         let count = self.buckets.len();
         for bucket in 0..count {
+            let before = places.len();
             in_order(&self.buckets.take(bucket)?, &self.rows, &mut bytes, &mut places);
-            let last = bucket + 1 == count;
-            let whole = if last { places.len() } else { places.len() / chunk * chunk };
-            if whole > 0 {
-                let splats = self.rows.unpack(&bytes[..whole * self.rows.bytes()]);
-                take(&splats, &weights.take(whole)?, &places[..whole])?;
-                bytes.drain(..whole * self.rows.bytes());
-                places.drain(..whole);
+            weights.append(&mut rows.weights.take::<[f32; 2]>(places.len() - before)?);
+            stays.extend(rows.stays.take::<u8>(places.len() - before)?.into_iter().map(|mark| mark == 1));
+            if let Some(first) = stays.first_mut().filter(|_| std::mem::take(&mut none_stays)) {
+                *first = true;
             }
+            let kept: Vec<usize> = (0..stays.len()).filter(|&i| stays[i]).collect();
+            let whole = match kept.len() / chunk * chunk {
+                _ if bucket + 1 == count => places.len(),
+                0 => 0,
+                whole => kept[whole - 1] + 1,
+            };
+            if whole > 0 {
+                let splats = self.rows.unpack(&bytes[..whole * width]);
+                let (weights, places, stays) = (&weights[..whole], &places[..whole], &stays[..whole]);
+                take(Part { splats: &splats, weights, places, stays })?;
+            }
+            bytes.drain(..whole * width);
+            weights.drain(..whole);
+            places.drain(..whole);
+            stays.drain(..whole);
         }
         Ok(())
     }

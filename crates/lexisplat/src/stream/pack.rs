@@ -3,8 +3,12 @@
 use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::{CHUNK, PackOptions, PackedHead, PartPacker, Whole};
+use crate::packed::{
+    CHUNK, PackOptions, PackedHead, PartPacker, Whole, change_without, expected_step, is_worth_its_bits,
+};
+use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
+use crate::scene::splats::Geometry;
 use crate::sparse::compress::AT_ONCE;
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
@@ -73,17 +77,16 @@ fn run<E: From<Error>>(
     let folder = sink.spill_folder()?;
     let to = SpillTo::Folder(&folder);
     let mut ordered = Ordered::new(source, sizes, options.seed, &folder, progress)?;
-    let Judged { sample, sensitivity, weights } = ordered.judge(&mut importance, &folder, progress)?;
-    let whole = Whole { gaussians: n, grid: ordered.grid, decibels };
+    let step = expected_step(n, decibels);
+    let stays = |geometry: &Geometry, found: &Sensitivity, i: usize| {
+        is_worth_its_bits(change_without(geometry, found, i, options.may_change()), step)
+    };
+    let Judged { sample, sensitivity, rows } = ordered.judge(&mut importance, &stays, &folder, progress)?;
+    let whole = Whole { gaussians: n, kept: rows.kept, grid: ordered.grid, step };
     let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, to, progress)?;
     drop((sample, sensitivity));
-    progress.begin(Stage::Code, n as u64);
-    ordered.each(weights, CHUNK, &mut |splats, weights, places| {
-        progress.check()?;
-        packer.push(splats, weights, places)?;
-        progress.advance(splats.len() as u64);
-        Ok(())
-    })?;
+    progress.begin(Stage::Code, rows.kept as u64);
+    ordered.each(rows, CHUNK, &mut |part| packer.push(part, importance.refit(), progress))?;
     progress.end();
     let (head, spilled, report) = packer.finish(to, importance.device(), progress)?;
     let writer = LexiWriter::spilled_packed(&head, spilled);
@@ -96,9 +99,9 @@ fn run<E: From<Error>>(
 mod tests {
     use super::*;
     use crate::packed::Packer;
-    use crate::scene::sensitivity::{Sensitivity, heuristic_total};
+    use crate::scene::sensitivity::heuristic_total;
     use crate::stream::importance::SHOWN;
-    use crate::{Extra, ExtraValues, Silent, Splats, lexi, ply};
+    use crate::{Extra, ExtraValues, Model, Silent, Splats, lexi, ply};
 
     fn scene(count: usize) -> Splats {
         let mut splats = crate::support::testing::scene(count, 4);
@@ -113,12 +116,21 @@ mod tests {
     }
 
     fn streamed(splats: &Splats, importance: Importance<'_>, sizes: Sizes) -> Result<(Vec<u8>, PackedFile)> {
+        streamed_with(splats, importance, &options(), sizes)
+    }
+
+    fn streamed_with(
+        splats: &Splats,
+        importance: Importance<'_>,
+        options: &PackOptions,
+        sizes: Sizes,
+    ) -> Result<(Vec<u8>, PackedFile)> {
         let mut bytes = Vec::new();
         ply::write(&mut bytes, splats).unwrap();
         let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let output = folder.path().join("out.lexi");
-        let done = run(&chunks, importance, &options(), 38.0, Sink::from(&output), sizes, &Silent);
+        let done = run(&chunks, importance, options, 38.0, Sink::from(&output), sizes, &Silent);
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), usize::from(done.is_ok()));
         done.map(|done| (std::fs::read(output).unwrap(), done))
     }
@@ -138,7 +150,9 @@ mod tests {
                 Ok(Sensitivity::heuristic_part(&part.geometry, total))
             };
             assert!(
-                streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, all).unwrap().0
+                streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, all)
+                    .unwrap()
+                    .0
                     == found,
                 "{count}"
             );
@@ -153,6 +167,108 @@ mod tests {
                 assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
             }
         }
+    }
+
+    /// Without every fifth Gaussian pictures stay as they are.
+    fn shown(part: &Splats, total: f64) -> Sensitivity {
+        let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
+        let mut sensitivity = Sensitivity::heuristic_part(&part.geometry, total);
+        sensitivity.removal.fill(0.5);
+        for (opacity, _) in sensitivity.opacity.iter_mut().zip(numbers).filter(|(_, n)| n.is_multiple_of(5)) {
+            *opacity = 1e-25;
+        }
+        sensitivity
+    }
+
+    #[test]
+    fn what_is_not_worth_its_bits_is_left_out() {
+        let options = PackOptions { keep_order: false, ..options() };
+        let splats = scene(CHUNK + 9000);
+        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+        let packer = Packer::new(&splats, &shown(&splats, total), &options).unwrap();
+        let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
+        let mut expected = Vec::new();
+        LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
+        let sizes = Sizes { sample: splats.len(), looked_at: splats.len(), ..SIZES };
+        let mut judge = |part: &Splats| Ok(shown(part, total));
+        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+        let (found, done) = streamed_with(&splats, importance, &options, sizes).unwrap();
+        assert!(found == expected);
+        assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
+        // Chunks are filled from several buckets, and rows stay together.
+        let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
+        let mut judge = |part: &Splats| Ok(shown(part, total));
+        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+        let (found, done) = streamed_with(&splats, importance, &options, small).unwrap();
+        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+        let geometry = model.geometry();
+        assert_eq!((geometry.len(), done.head.gaussians), (model.len(), model.len()));
+        assert_eq!(done.head.removed, (splats.len() - model.len()) as u64);
+        let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
+        assert!(numbers.iter().all(|n| !n.is_multiple_of(5)));
+        for (position, &number) in geometry.positions.iter().zip(numbers) {
+            let original = splats.geometry.positions[number as usize];
+            assert!((0..3).all(|k| (position[k] - original[k]).abs() < 0.1), "{number}");
+        }
+    }
+
+    #[test]
+    fn base_colours_are_fitted_part_by_part() {
+        let options = PackOptions { keep_order: false, ..options() };
+        let splats = scene(CHUNK + 9000);
+        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+        let others =
+            |model: &Model| model.geometry().dc.iter().map(|dc| dc.map(|v| v + 0.5)).collect::<Vec<_>>();
+        let sizes = Sizes { sample: splats.len(), looked_at: splats.len(), ..SIZES };
+        let fitted = |options: &PackOptions, sizes: Sizes| {
+            let mut judge = |part: &Splats| Ok(shown(part, total));
+            let mut refit = |part: &Splats, model: &Model, weights: &[f32]| {
+                // The part has what the file leaves out, and the rest is in order.
+                assert!(part.len() > model.len() || options.keep_order);
+                assert_eq!(model.len(), weights.len());
+                Ok(others(model))
+            };
+            let importance = Importance::Judge { judge: &mut judge, refit: Some(&mut refit), device: None };
+            streamed_with(&splats, importance, options, sizes).unwrap().0
+        };
+        let sensitivity = shown(&splats, total);
+        let file = |options: &PackOptions, fitted: bool| {
+            let packer = Packer::new(&splats, &sensitivity, options).unwrap();
+            let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
+            let model = quantised.finish(None, &Silent).unwrap().0.unpack().unwrap();
+            let colours = fitted.then(|| others(&model));
+            let (packed, _) = quantised.finish(colours.as_deref(), &Silent).unwrap();
+            let mut bytes = Vec::new();
+            LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
+            bytes
+        };
+        assert!(fitted(&options, sizes) == file(&options, true));
+        let keeps = PackOptions { keep_order: true, ..options.clone() };
+        assert!(fitted(&keeps, sizes) == file(&keeps, false));
+        let model =
+            lexi::read_bytes("t", &fitted(&options, Sizes { bucket: 9000, ..sizes }), &Limits::default());
+        let model = model.unwrap();
+        let ExtraValues::U32(numbers) = &model.geometry().extras[0].values else { panic!("not u32") };
+        let moved = model.geometry().dc.iter().zip(numbers);
+        let moved = moved.map(|(dc, &number)| f64::from(dc[0] - splats.geometry.dc[number as usize][0]));
+        let mean = moved.sum::<f64>() / model.len() as f64;
+        assert!((0.45..0.55).contains(&mean), "{mean}");
+    }
+
+    #[test]
+    fn one_gaussian_stays() {
+        let options = PackOptions { keep_order: false, ..options() };
+        let splats = scene(9000);
+        let small = Sizes { at_once: 4096, bucket: 3000, looked_at: 3000, sample: 6000, run: 500 };
+        let mut judge = |part: &Splats| {
+            let mut none = Sensitivity::heuristic(&part.geometry);
+            none.removal.fill(0.5);
+            none.opacity.fill(0.0);
+            Ok(none)
+        };
+        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+        let (found, _) = streamed_with(&splats, importance, &options, small).unwrap();
+        assert_eq!(lexi::read_bytes("t", &found, &Limits::default()).unwrap().len(), 1);
     }
 
     #[test]
@@ -194,7 +310,8 @@ mod tests {
             Ok(Sensitivity::heuristic(&part.geometry))
         };
         let (found, _) =
-            streamed(&splats, Importance::Judge { judge: &mut judge, device: None }, small).unwrap();
+            streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, small)
+                .unwrap();
         assert_eq!(parts, 4);
         let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
         assert_eq!(model.geometry().extras, splats.geometry.extras);
@@ -206,7 +323,9 @@ mod tests {
     fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
         let splats = scene(700);
         let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
-            streamed(&splats, Importance::Judge { judge, device: None }, SIZES).unwrap_err().to_string()
+            streamed(&splats, Importance::Judge { judge, refit: None, device: None }, SIZES)
+                .unwrap_err()
+                .to_string()
         };
         let error = refused(&mut |part| Ok(Sensitivity::zeros(part.len() - 1)));
         assert!(error.contains("699") && error.contains("700"), "{error}");

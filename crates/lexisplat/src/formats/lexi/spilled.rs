@@ -67,7 +67,7 @@ impl SpilledModel {
         for (spill, values) in self.geometry.iter_mut().zip(geometry.floats()) {
             spill.push(values)?;
         }
-        self.extras.push(geometry)?;
+        self.extras.push(&geometry.extras)?;
         self.push_codes(coded)
     }
 
