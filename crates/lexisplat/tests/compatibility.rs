@@ -265,6 +265,108 @@ fn values_beyond_those_of_this_version_are_refused_by_name() {
     }
 }
 
+/// The file with another text of its header, sealed again.
+fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
+    let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk().unwrap())).unwrap();
+    let text = std::str::from_utf8(&bytes[8..8 + length]).unwrap();
+    let entries: Value = serde_json::from_str(text).unwrap();
+    let at = entries["checksum.header"]["data_offsets"][0].as_u64().unwrap();
+    let changed = change(text);
+    assert_ne!(changed, text);
+    let mut header = (changed.len() as u64).to_le_bytes().to_vec();
+    header.extend_from_slice(changed.as_bytes());
+    let sum = crc32fast::hash(&header).to_le_bytes();
+    let at = usize::try_from(at).unwrap() + header.len();
+    let mut new = [&header, &bytes[8 + length..]].concat();
+    new[at..at + 4].copy_from_slice(&sum);
+    new
+}
+
+/// Parsers differ in which of two members of one name they take.
+#[test]
+fn members_that_are_there_twice_are_refused() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        let degree = parts.metadata["degree"].as_str().unwrap();
+        let bytes = parts.sealed();
+        assert_eq!(read(&with_header(&bytes, |text| format!("{text} "))).map(|r| r.is_ok()), [true; 2]);
+        let twice = [
+            (r#""__metadata__":{"#, r#""__metadata__":{"degree":"0","#, "degree"),
+            (
+                "{",
+                r#"{"checksum.header":{"dtype":"U32","shape":[1],"data_offsets":[0,4]},"#,
+                "checksum.header",
+            ),
+            (r#"{"data_offsets":"#, r#"{"dtype":"F32","data_offsets":"#, "dtype"),
+        ];
+        for (before, after, member) in twice {
+            let bytes = with_header(&bytes, |text| text.replacen(before, after, 1));
+            for error in refusals(&bytes, degree) {
+                let said = error.to_string();
+                assert!(said.contains(&format!("member '{member}' is there twice")), "{said}");
+            }
+        }
+        let sums = parts.metadata["checksums"].as_str().unwrap();
+        assert!(sums.starts_with('{'));
+        let bytes = with_header(&bytes, |text| {
+            text.replacen(r#""checksums":"{"#, r#""checksums":"{\"a\":\"00000000\",\"a\":\"00000000\","#, 1)
+        });
+        for error in refusals(&bytes, degree) {
+            assert!(error.to_string().contains("metadata 'checksums': member 'a' is there twice"), "{error}");
+        }
+    }
+    let parts = Parts::of(&golden("packed"));
+    for key in ["promise", "reached"] {
+        for said in scene_refusals(&parts.with(key, r#"{"views":1,"views":2}"#).sealed()) {
+            assert!(said.contains(&format!("metadata '{key}': member 'views' is there twice")), "{said}");
+        }
+    }
+}
+
+#[test]
+fn numbers_of_the_metadata_are_those_of_json() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        for (key, wrong) in [
+            ("seed", "+7"),
+            ("seed", "017"),
+            ("seed", " 7"),
+            ("max_residual", ".5"),
+            ("max_residual", "5."),
+            ("max_residual", "NaN"),
+            ("tolerance", "inf"),
+            ("over_tolerance", "-0x1"),
+            ("antialiased", "True"),
+            ("antialiased", "1"),
+        ] {
+            for said in scene_refusals(&parts.with(key, wrong).sealed()) {
+                assert!(said.contains(key), "{said}");
+            }
+        }
+        assert_same(name, &parts.with("max_residual", "1e-3"), &parts.with("max_residual", "0.001"));
+    }
+}
+
+#[test]
+fn properties_that_no_ply_could_hold_are_damage() {
+    for name in SCENES {
+        let parts = Parts::of(&golden(name));
+        let gaussians = read(&parts.sealed())[0].as_ref().unwrap().len();
+        let with = |tensor: &str| parts.and(tensor, "U8", &[gaussians], &vec![0; gaussians]).sealed();
+        for tensor in
+            ["extra.", "extra.a b", "extra.a\nb", "extra.\u{a0}", "extra.x", "extra.f_rest_7", "extra.rot_3"]
+        {
+            for said in scene_refusals(&with(tensor)) {
+                assert!(said.contains("is not named as a property can be"), "{said}");
+                assert!(!said.contains('\n'), "{said}");
+            }
+        }
+        for tensor in ["extra.mine", "extra.f_rest_07", "extra.nx", "extra.größe"] {
+            assert!(read(&with(tensor)).iter().all(Result::is_ok), "{tensor}");
+        }
+    }
+}
+
 #[test]
 fn a_dictionary_alone_keeps_the_same_rules() {
     let parts = Parts::of(&dictionary_alone());

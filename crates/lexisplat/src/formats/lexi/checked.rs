@@ -6,6 +6,7 @@ use std::ops::Range;
 use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
 use safetensors::{Dtype, SafeTensors};
 
+use super::json;
 use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
@@ -60,6 +61,8 @@ impl<'a> Checked<'a> {
         let end = length + LENGTH_BYTES as u64;
         let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
         let header = header.ok_or_else(|| truncated("the header", end))?;
+        json::check(&header[LENGTH_BYTES..])
+            .map_err(|e| Error::malformed(file.as_str(), format!("the header: {e}")))?;
         let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(|error| {
             let text = match error {
                 SafeTensorError::MetadataIncompleteBuffer => {
@@ -137,10 +140,11 @@ impl<'a> Checked<'a> {
             .ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
     }
 
-    /// The metadata entry `key` as a number or a name.
+    /// The metadata entry `key` as a number, or as `true` or `false`.
     pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T> {
         let text = self.text(key)?;
-        text.parse().map_err(|_| self.malformed(format!("metadata '{key}' is '{text}'")))
+        let parsed = text.parse().ok().filter(|_| json::is_number(text) || matches!(text, "true" | "false"));
+        parsed.ok_or_else(|| self.malformed(format!("metadata '{key}' is '{text}'")))
     }
 
     /// The metadata entry `key`, if it is there.
@@ -155,7 +159,10 @@ impl<'a> Checked<'a> {
 
     /// The JSON in the metadata entry `key`.
     pub(super) fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<T> {
-        serde_json::from_str(self.text(key)?).map_err(|e| self.malformed(format!("metadata '{key}': {e}")))
+        let text = self.text(key)?;
+        let parsed = json::check(text.as_bytes())
+            .and_then(|()| serde_json::from_str(text).map_err(|error| error.to_string()));
+        parsed.map_err(|error| self.malformed(format!("metadata '{key}': {error}")))
     }
 
     /// All bytes of the file.

@@ -7,6 +7,7 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, PACKED_VERSION, key, tensor};
+use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, ScalarType, with_scalar};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
@@ -86,6 +87,10 @@ pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> R
     let mut out = Vec::new();
     for full in &checked.names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
+        if !is_extra_name(name) {
+            let text = format!("tensor '{}' is not named as a property can be", full.escape_debug());
+            return Err(checked.malformed(text));
+        }
         let dtype = checked.view(full)?.dtype;
         let ty = ScalarType::of_dtype(dtype)
             .ok_or_else(|| checked.malformed(format!("tensor '{full}' has type {dtype:?}")))?;

@@ -8,6 +8,7 @@ mod checked;
 mod dictionary_file;
 mod exact;
 mod fields;
+mod json;
 mod layout;
 mod packed;
 mod reader;

@@ -54,6 +54,7 @@ mod write;
 pub use crate::scene::extra::ScalarType;
 pub use chunks::PlySource;
 pub use header::Format;
+pub(crate) use names::is_extra_name;
 pub use read::{PlyRead, ReadOptions, read, read_bytes};
 pub use summary::{Dialect, PlySummary};
 pub use write::write;

@@ -2,7 +2,7 @@
 
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
-use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
+use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, is_token, shown};
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::for_extra;
 use crate::scene::splats::{SceneMeta, Splats};
@@ -71,8 +71,7 @@ fn check(splats: &Splats) -> Result<()> {
     let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
     for extra in &splats.geometry.extras {
         let name = &extra.name;
-        // A name with a line break could add lines to the header.
-        if name.is_empty() || name.chars().any(|c| c.is_whitespace() || c.is_control()) {
+        if !is_token(name) {
             return Err(Error::parameter(
                 "extra",
                 shown(name),
