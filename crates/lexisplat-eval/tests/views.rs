@@ -4,11 +4,11 @@
 use glam::{DQuat, DVec3};
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::Preset;
-use lexisplat::{Limits, ShDegree, Silent, Splats, lexi};
+use lexisplat::{Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
 use lexisplat_eval::Compression;
 use lexisplat_eval::compression::{Judge, PackingViews};
 use lexisplat_eval::{CompressionReport, Packing, SceneKind, Target};
-use lexisplat_render::{Camera, Renderer, orbit};
+use lexisplat_render::{Camera, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 
 fn sample() -> Splats {
@@ -39,6 +39,30 @@ fn the_kind_of_scene_says_where_views_are() {
     assert!(!reached.cameras && reached.judged_psnr > 30.0, "{reached:?}");
     let reader = LexiReader::open("scene.lexi", &file, &Limits::default()).unwrap();
     assert_eq!(reader.packed_head().unwrap().reached, Some(reached));
+}
+
+#[test]
+fn views_from_beside_given_cameras_measure_and_do_not_judge() {
+    let splats = sample();
+    let cameras = orbit(&splats.geometry, 60, 96, 64);
+    // Cameras on one side.
+    let views = PackingViews::given(&cameras[..12]).unwrap();
+    let seen = |s: &Sensitivity| s.removal.iter().filter(|change| **change > 0.0).count();
+    let alone = Renderer::cpu().sensitivity(&Scene::from(&splats), views.measuring(), &Silent).unwrap();
+    let measured = views.sensitivity(&mut Renderer::cpu(), &splats, &Silent).unwrap();
+    assert!(seen(&measured) > seen(&alone), "{} {}", seen(&measured), seen(&alone));
+    assert!(views.judging().iter().all(|judge| cameras.contains(judge)));
+    // What is fitted to is given or from all around.
+    let fitted = views.fitting(&splats);
+    let around = fitted.iter().filter(|camera| camera.name.starts_with("surround")).count();
+    assert_eq!((fitted.len(), around), (6 + 8, 8));
+    assert!(fitted.iter().all(|camera| !views.judging().contains(camera)));
+    // Of many cameras more are fitted to, in smaller pictures.
+    let cameras = orbit(&splats.geometry, 90, 480, 320);
+    let fitted = PackingViews::given(&cameras).unwrap().fitting(&splats);
+    let given: Vec<&Camera> = fitted.iter().filter(|camera| camera.name.starts_with("orbit")).collect();
+    assert!((25..=40).contains(&given.len()), "{}", given.len());
+    assert!(given.iter().all(|camera| camera.width == 340));
 }
 
 /// A turn of 0.9 radians about an axis that is none of the world's, and a scale and a shift.

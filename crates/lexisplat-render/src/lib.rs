@@ -39,6 +39,7 @@
 #[cfg(all(test, feature = "gpu"))]
 extern crate self as lexisplat_render;
 
+mod aside;
 mod camera;
 mod cameras_json;
 mod colmap;
@@ -66,6 +67,7 @@ mod view_set;
 #[cfg(any(feature = "gpu", not(target_family = "wasm")))]
 mod wait;
 
+pub use aside::aside;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
 pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};

@@ -49,6 +49,7 @@ fn compare(gpu: &Gpu, splats: &Splats, cameras: &[Camera]) {
     let expected = sensitivity(&Scene::from(splats), cameras, &Silent).unwrap();
     near("colour", &found.colour, &expected.colour, SUM_TOLERANCE);
     near("opacity", &found.opacity, &expected.opacity, SUM_TOLERANCE);
+    near("removal from a view", &found.removal_view, &expected.removal_view, SUM_TOLERANCE);
     let [a, b] = [&found, &expected].map(|s| s.position.as_flattened());
     near("position", a, b, SUM_TOLERANCE);
     let [a, b] = [&found, &expected].map(|s| s.scale.as_flattened());

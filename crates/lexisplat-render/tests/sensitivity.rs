@@ -155,13 +155,17 @@ fn removal_is_what_the_pictures_lose() {
         keep[i] = false;
         let mut without = splats.clone();
         without.retain(&keep);
-        let mut largest = 0.0_f32;
+        let (mut largest, mut squares) = (0.0_f32, 0.0_f32);
         for camera in &cameras {
             let (a, b) = (draw(&splats, camera), draw(&without, camera));
+            let mut sum = 0.0;
             for (a, b) in a.pixels.as_flattened().iter().zip(b.pixels.as_flattened()) {
                 largest = largest.max((a - b).abs());
+                sum += (a - b).powi(2);
             }
+            squares = squares.max(sum / a.pixels.as_flattened().len() as f32);
         }
+        assert!((s.removal_view[i] - squares).abs() < 1e-6 + 0.02 * squares, "Gaussian {i}: {squares}");
         // What lies behind a finished pixel is not drawn, so it is not known to come back: at most the
         // light a finished pixel has left, 1e-4 over 1 - 0.99.
         assert!((s.removal[i] - largest).abs() < 2e-2, "Gaussian {i}: {} {largest}", s.removal[i]);

@@ -1,7 +1,7 @@
 //! The views that packing draws: some measure the sensitivity, some judge the result.
 
 use lexisplat::{Geometry, Progress, Sensitivity, Splats};
-use lexisplat_render::{Camera, Renderer, Scene, Split, interior_views, object, surround};
+use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use super::found::{Found, find};
 use crate::error::{Error, Result};
@@ -25,10 +25,19 @@ const MAX_VIEWS: usize = 150;
 /// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
 /// than views that did not measure (docs/METHOD.md).
 const JUDGE_SHARE: usize = 2;
-/// Most views that base colours are fitted to.
-const FITTED_VIEWS: usize = 32;
-/// Those of them that are from all around, if cameras are given.
-const FITTED_AROUND: usize = 12;
+/// Views from beside given cameras that measure too. Without them Gaussians that only such views show have coarse steps
+/// (docs/METHOD.md).
+const ASIDE: usize = 20;
+/// Most views that base colours are fitted to, of views that were found.
+const FITTED_FOUND: usize = 32;
+/// Most given cameras that base colours are fitted to.
+const FITTED_GIVEN: usize = 40;
+/// Views from all around that they are fitted to beside given cameras.
+const FITTED_AROUND: usize = 8;
+/// If there are more given cameras to fit to than this, their pictures are narrower, so that more of them take as long.
+const FITTED_WHOLE: usize = 24;
+/// Largest width of those pictures, in pixels.
+const FITTED_WIDTH: u32 = 340;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
@@ -171,7 +180,7 @@ impl PackingViews {
         self.given
     }
 
-    /// The views that measure the sensitivity.
+    /// The views that measure the sensitivity. If they were given, [`Self::sensitivity`] adds some from beside them.
     #[must_use]
     pub fn measuring(&self) -> &[Camera] {
         &self.measuring
@@ -195,9 +204,11 @@ impl PackingViews {
     pub fn fitting(&self, splats: &Splats) -> Vec<Camera> {
         let free: Vec<&Camera> =
             self.measuring.iter().filter(|camera| !self.judging.contains(camera)).collect();
-        let around = if self.given { FITTED_AROUND } else { 0 };
-        let stride = free.len().div_ceil(FITTED_VIEWS - around).max(1);
-        let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
+        let [most, around] = if self.given { [FITTED_GIVEN, FITTED_AROUND] } else { [FITTED_FOUND, 0] };
+        let width = if self.given && free.len() > FITTED_WHOLE { FITTED_WIDTH } else { u32::MAX };
+        let stride = free.len().div_ceil(most).max(1);
+        let some = free.into_iter().step_by(stride);
+        let mut views: Vec<Camera> = some.map(|camera| camera.with_max_width(width)).collect();
         views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
         views
     }
@@ -214,7 +225,11 @@ impl PackingViews {
         splats: &Splats,
         progress: &dyn Progress,
     ) -> Result<Sensitivity> {
-        let mut measured = renderer.sensitivity(&Scene::from(splats), &self.measuring, progress)?;
+        let mut cameras = self.measuring.clone();
+        if self.given {
+            cameras.extend(aside(&splats.geometry, &self.measuring, ASIDE));
+        }
+        let mut measured = renderer.sensitivity(&Scene::from(splats), &cameras, progress)?;
         measured.blend_with_prior(&splats.geometry, PRIOR_SHARE);
         Ok(measured)
     }

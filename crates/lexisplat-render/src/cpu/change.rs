@@ -26,8 +26,9 @@ pub(crate) fn carry(
     let simd = Simd::current();
     let [width, height] = projection.size();
     #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
-    let share = 1.0 / (width as f32 * height as f32 * CHANNELS * views as f32);
-    let Sensitivity { position, scale, rotation, opacity, colour, removal, .. } = total;
+    let [alone, share] =
+        [1, views].map(|views| 1.0 / (width as f32 * height as f32 * CHANNELS * views as f32));
+    let Sensitivity { position, scale, rotation, opacity, colour, removal, removal_view, .. } = total;
     let tasks: Vec<Task<'_>> = moments
         .chunks_mut(GAUSSIANS_PER_TASK)
         .zip(position.chunks_mut(GAUSSIANS_PER_TASK))
@@ -36,20 +37,15 @@ pub(crate) fn carry(
         .zip(opacity.chunks_mut(GAUSSIANS_PER_TASK))
         .zip(colour.chunks_mut(GAUSSIANS_PER_TASK))
         .zip(removal.chunks_mut(GAUSSIANS_PER_TASK))
-        .map(|((((((moments, position), scale), rotation), opacity), colour), removal)| Task {
-            moments,
-            position,
-            scale,
-            rotation,
-            opacity,
-            colour,
-            removal,
+        .zip(removal_view.chunks_mut(GAUSSIANS_PER_TASK))
+        .map(|(((((((moments, position), scale), rotation), opacity), colour), removal), removal_view)| {
+            Task { moments, position, scale, rotation, opacity, colour, removal, removal_view }
         })
         .collect();
     tasks.into_par_iter().enumerate().for_each(|(task, mut part)| {
         simd.dispatch(
             #[inline(always)]
-            || part.carry(projection, geometry, task * GAUSSIANS_PER_TASK, share),
+            || part.carry(projection, geometry, task * GAUSSIANS_PER_TASK, [alone, share]),
         );
     });
 }
@@ -63,12 +59,20 @@ struct Task<'a> {
     opacity: &'a mut [f32],
     colour: &'a mut [f32],
     removal: &'a mut [f32],
+    removal_view: &'a mut [f32],
 }
 
 impl Task<'_> {
-    /// Carries the moments of the Gaussians from `first` on.
+    /// Carries the moments of the Gaussians from `first` on. A sum over pixels counts by its share of one picture alone and
+    /// of all.
     #[inline(always)]
-    fn carry(&mut self, projection: &Projection, geometry: &Geometry, first: usize, share: f32) {
+    fn carry(
+        &mut self,
+        projection: &Projection,
+        geometry: &Geometry,
+        first: usize,
+        [alone, share]: [f32; 2],
+    ) {
         let count = self.moments.len();
         for start in (0..count).step_by(LANES) {
             let group = start..count.min(start + LANES);
@@ -90,6 +94,7 @@ impl Task<'_> {
                 }
                 self.colour[i] += m.sums[0] * share;
                 self.opacity[i] += m.sums[1] * share;
+                self.removal_view[i] = self.removal_view[i].max(m.sums[1] * alone);
                 let to = |sums: &mut [f32], values: &[Lanes]| {
                     for (sum, values) in sums.iter_mut().zip(values) {
                         *sum += values[lane] * share;

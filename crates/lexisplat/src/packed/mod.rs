@@ -37,7 +37,7 @@ pub(crate) use canonical::{Bounds, Grid, MortonKey};
 pub(crate) use chunks::Decoder;
 pub(crate) use pack::{check, expected_step};
 pub(crate) use parts::{Part, PartPacker, Whole};
-pub(crate) use removal::{change_without, is_worth_its_bits};
+pub(crate) use removal::{changes_without, is_worth_its_bits};
 pub(crate) use scene::SpilledPacked;
 pub(crate) use stream::BitCounts;
 

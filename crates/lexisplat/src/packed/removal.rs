@@ -9,24 +9,40 @@ use crate::support::maths::log_sigmoid;
 /// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
 /// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
 const REMOVAL: f64 = 8.0;
+/// Share of the mean squared change of the picture that changes most, which counts if it is larger than the mean over
+/// all pictures. Found by trial (docs/METHOD.md).
+const WORST_SHARE: f32 = 0.1;
 /// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
 const NEVER_DRAWN: f32 = -5.541_264;
 
-/// Squared change of the pictures if Gaussian `i` is left out; infinite if it must stay. That change is the sensitivity to
-/// the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian.
-pub(crate) fn change_without(
-    geometry: &Geometry,
-    sensitivity: &Sensitivity,
-    i: usize,
-    may_change: bool,
-) -> f32 {
-    // What no view showed may show in others. Where nothing was measured it is infinite.
-    let largest = sensitivity.removal[i];
-    match may_change && largest.is_finite() {
-        true if largest > 0.0 => sensitivity.opacity[i],
-        true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
-        _ => f32::INFINITY,
+/// Squared change of the pictures if each Gaussian is left out; infinite if it must stay. On average that change is the
+/// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian. No single picture
+/// may change much more.
+pub(crate) fn changes_without(geometry: &Geometry, sensitivity: &Sensitivity, may_change: bool) -> Vec<f32> {
+    let share = WORST_SHARE / usual_excess(sensitivity);
+    let change = |i: usize| {
+        // What no view showed may show in others. Where nothing was measured it is infinite.
+        let largest = sensitivity.removal[i];
+        match may_change && largest.is_finite() {
+            true if largest > 0.0 => sensitivity.opacity[i].max(share * sensitivity.removal_view[i]),
+            true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
+            _ => f32::INFINITY,
+        }
+    };
+    (0..sensitivity.len()).map(change).collect()
+}
+
+/// How much more the most changed picture changes than pictures do on average, for the median Gaussian of those that
+/// pictures showed; infinite if there are none. The larger a scene, the fewer pictures show a Gaussian.
+fn usual_excess(sensitivity: &Sensitivity) -> f32 {
+    let pairs = sensitivity.opacity.iter().zip(&sensitivity.removal_view);
+    let mut excess: Vec<f32> =
+        pairs.filter(|p| *p.0 > 0.0 && *p.1 > 0.0).map(|(mean, most)| most / mean).collect();
+    if excess.is_empty() {
+        return f32::INFINITY;
     }
+    let middle = excess.len() / 2;
+    *excess.select_nth_unstable_by(middle, f32::total_cmp).1
 }
 
 /// Whether a Gaussian without which pictures change by `change` stays at an overall step.
@@ -39,7 +55,7 @@ pub(crate) fn is_worth_its_bits(change: f32, step: f64) -> bool {
 pub(super) struct Weights {
     /// Sensitivity to the colour.
     pub(super) colour: Vec<f32>,
-    /// As [`change_without`].
+    /// As [`changes_without`].
     left_out: Vec<f32>,
 }
 
@@ -52,10 +68,10 @@ impl Weights {
         scene: &[MortonKey],
         may_change: bool,
     ) -> Self {
-        let left_out = |g: &MortonKey| change_without(geometry, sensitivity, g.index(), may_change);
+        let left_out = changes_without(geometry, sensitivity, may_change);
         Self {
             colour: scene.iter().map(|g| sensitivity.colour[g.index()]).collect(),
-            left_out: scene.iter().map(left_out).collect(),
+            left_out: scene.iter().map(|g| left_out[g.index()]).collect(),
         }
     }
 
@@ -109,6 +125,14 @@ mod tests {
         let options = PackOptions::default();
         let rest = |step: u32| (0..600).filter(|k| k % step != 0).collect::<Vec<u32>>();
         assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
+        // What a single picture shows stays.
+        sensitivity.removal_view[5] = 1e-3;
+        assert!(
+            numbers(&splats, &sensitivity, &options)
+                .into_iter()
+                .eq((0..600).filter(|k| k % 5 != 0 || *k == 5))
+        );
+        sensitivity.removal_view[5] = 0.0;
         // What no view showed stays, unless no view can show it.
         for i in (0..600).step_by(10) {
             sensitivity.removal[i] = 0.0;

@@ -22,6 +22,9 @@ pub struct Sensitivity {
     /// Largest change of any colour value of any picture when the Gaussian is left out; infinite where
     /// that is not known.
     pub removal: Vec<f32>,
+    /// Mean squared change of the one picture that changes most when the Gaussian is left out; 0 where that is not
+    /// known.
+    pub removal_view: Vec<f32>,
 }
 
 /// Squared change of a picture by the opacity, as a share of that by the colour. This and the shares below are
@@ -56,6 +59,7 @@ impl Sensitivity {
             scale: vec![[0.0; 3]; count],
             rotation: vec![[0.0; 3]; count],
             removal: vec![0.0; count],
+            removal_view: vec![0.0; count],
         }
     }
 
@@ -83,6 +87,7 @@ impl Sensitivity {
         filter(&mut self.scale, keep);
         filter(&mut self.rotation, keep);
         filter(&mut self.removal, keep);
+        filter(&mut self.removal_view, keep);
     }
 
     /// Appends the sensitivity of further Gaussians.
@@ -93,13 +98,15 @@ impl Sensitivity {
         self.scale.append(&mut other.scale);
         self.rotation.append(&mut other.rotation);
         self.removal.append(&mut other.removal);
+        self.removal_view.append(&mut other.removal_view);
     }
 
     /// Scales the sensitivity to pictures of which only `share` show these Gaussians.
     pub(crate) fn share(&mut self, share: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();
         let shapes = shapes.chain(self.scale.as_flattened_mut()).chain(self.rotation.as_flattened_mut());
-        self.colour.iter_mut().chain(&mut self.opacity).chain(shapes).for_each(|v| *v *= share);
+        let whole = self.colour.iter_mut().chain(&mut self.opacity).chain(&mut self.removal_view);
+        whole.chain(shapes).for_each(|v| *v *= share);
     }
 
     /// An estimate from the Gaussians alone: opaque and large ones weigh most. It does not know which
@@ -154,8 +161,8 @@ impl Sensitivity {
         let n = self.len();
         let total: f64 = self.colour.iter().map(|&v| f64::from(v)).sum();
         if total <= 0.0 {
-            let removal = std::mem::take(&mut self.removal);
-            *self = Self { removal, ..Self::heuristic(geometry) };
+            let [removal, removal_view] = [&mut self.removal, &mut self.removal_view].map(std::mem::take);
+            *self = Self { removal, removal_view, ..Self::heuristic(geometry) };
             return;
         }
         let mut sorted = self.colour.clone();

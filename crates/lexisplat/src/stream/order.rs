@@ -9,7 +9,7 @@ use super::rows::RowLayout;
 use crate::packed::{Bounds, Grid, MortonKey, Part, check};
 use crate::scene::sensitivity::{Sensitivity, heuristic_total};
 use crate::scene::source::SplatSource;
-use crate::scene::splats::{Geometry, Splats};
+use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::progress::{Progress, Stage};
 use crate::support::rng::SplitMix64;
@@ -38,8 +38,8 @@ const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
 /// Takes a part of the scene.
 type Take<'a, E> = dyn FnMut(Part<'_>) -> Result<(), E> + 'a;
-/// Says whether a Gaussian of a part of the scene stays.
-type Stays<'a> = dyn Fn(&Geometry, &Sensitivity, usize) -> bool + 'a;
+/// Says which Gaussians of a part of the scene stay.
+type Stays<'a> = dyn Fn(&Splats, &Sensitivity) -> Vec<bool> + 'a;
 
 /// A scene distributed over buckets in the order of a packed file.
 pub(super) struct Ordered {
@@ -153,8 +153,7 @@ impl Ordered {
             let pairs: Vec<[f32; 2]> =
                 found.colour.iter().zip(&found.opacity).map(|(&c, &o)| [c, o]).collect();
             weights.push(&pairs)?;
-            let marks: Vec<u8> =
-                (0..splats.len()).map(|i| u8::from(stays(&splats.geometry, &found, i))).collect();
+            let marks: Vec<u8> = stays(&splats, &found).into_iter().map(u8::from).collect();
             kept += marks.iter().filter(|&&mark| mark == 1).count();
             stay.push(&marks)?;
             let (ends, every) = &self.runs;

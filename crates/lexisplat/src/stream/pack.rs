@@ -4,11 +4,11 @@ use super::importance::Importance;
 use super::order::{Judged, Ordered, Sizes};
 use crate::formats::lexi::LexiWriter;
 use crate::packed::{
-    CHUNK, PackOptions, PackedHead, PartPacker, Whole, change_without, expected_step, is_worth_its_bits,
+    CHUNK, PackOptions, PackedHead, PartPacker, Whole, changes_without, expected_step, is_worth_its_bits,
 };
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
-use crate::scene::splats::Geometry;
+use crate::scene::splats::Splats;
 use crate::sparse::compress::AT_ONCE;
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
@@ -78,8 +78,9 @@ fn run<E: From<Error>>(
     let to = SpillTo::Folder(&folder);
     let mut ordered = Ordered::new(source, sizes, options.seed, &folder, progress)?;
     let step = expected_step(n, decibels);
-    let stays = |geometry: &Geometry, found: &Sensitivity, i: usize| {
-        is_worth_its_bits(change_without(geometry, found, i, options.may_change()), step)
+    let stays = |part: &Splats, found: &Sensitivity| -> Vec<bool> {
+        let changes = changes_without(&part.geometry, found, options.may_change());
+        changes.into_iter().map(|change| is_worth_its_bits(change, step)).collect()
     };
     let Judged { sample, sensitivity, rows } = ordered.judge(&mut importance, &stays, &folder, progress)?;
     let whole = Whole { gaussians: n, kept: rows.kept, grid: ordered.grid, step };
@@ -101,7 +102,7 @@ mod tests {
     use crate::packed::Packer;
     use crate::scene::sensitivity::heuristic_total;
     use crate::stream::importance::SHOWN;
-    use crate::{Extra, ExtraValues, Model, Silent, Splats, lexi, ply};
+    use crate::{Extra, ExtraValues, Model, Silent, lexi, ply};
 
     fn scene(count: usize) -> Splats {
         let mut splats = crate::support::testing::scene(count, 4);

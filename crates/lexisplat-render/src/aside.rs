@@ -1,0 +1,145 @@
+//! Views from beside given cameras, to learn what shows there.
+//!
+//! Who has a scene's cameras also looks from elsewhere: from nearer, from further away, from the side.
+
+use glam::DVec3;
+use lexisplat::Geometry;
+
+use crate::camera::Camera;
+use crate::conventions::NEAR_Z;
+use crate::surround::PLASTIC;
+
+/// Half the width of the middle of a picture, as a tangent, in which a camera's subject is looked for.
+const MIDDLE: f32 = 0.15;
+/// Largest weight of one Gaussian in the middle, as a share of the squared distance. A nearer one would cover it all.
+const LARGEST: f64 = 0.1;
+/// Largest turn around the subject, in radians: 60 degrees.
+const TURN: f64 = std::f64::consts::FRAC_PI_3;
+/// Least and largest distance of the subject, in distances of the given camera.
+const DISTANCES: [f64; 2] = [0.3, 2.0];
+
+/// Returns at most `count` cameras, each made of one of `cameras`, evenly spread: moved around what that one looks at,
+/// and towards it or away from it, but with its pictures' size and its name. Cameras that look at nothing have none. The
+/// same input gives the same cameras.
+#[must_use]
+pub fn aside(geometry: &Geometry, cameras: &[Camera], count: usize) -> Vec<Camera> {
+    let stride = cameras.len().div_ceil(count.max(1)).max(1);
+    let some = cameras.iter().skip(stride / 2).step_by(stride).take(count).enumerate();
+    some.filter_map(|(number, camera)| {
+        let moved = moved(camera, subject_distance(camera, geometry)?, number);
+        // A camera far out may be moved beyond what numbers hold.
+        moved.validate().is_ok().then_some(moved)
+    })
+    .collect()
+}
+
+/// The `number`-th camera that is moved, of one whose subject is at `distance`.
+fn moved(camera: &Camera, distance: f64, number: usize) -> Camera {
+    let spread = |k: usize| ((number as f64 + 0.5) * PLASTIC[k]).fract();
+    let [right, down, forward] =
+        [0, 1, 2].map(|k| DVec3::from_array(camera.rotation.map(|row| f64::from(row[k]))));
+    // The camera turns towards a direction across the line of sight. What is perpendicular to both stays.
+    let (sine, cosine) = libm::sincos(std::f64::consts::TAU * spread(0));
+    let [towards, level] = [cosine * right + sine * down, cosine * down - sine * right];
+    let (turn_sine, turn_cosine) = libm::sincos(TURN * libm::sqrt(spread(1)));
+    let new_forward = turn_cosine * forward + turn_sine * towards;
+    let new_towards = turn_cosine * towards - turn_sine * forward;
+    let axes = [cosine * new_towards - sine * level, sine * new_towards + cosine * level, new_forward];
+    let [near, far] = DISTANCES.map(libm::log);
+    let subject = DVec3::from_array(camera.position.map(f64::from)) + distance * forward;
+    let position = subject - distance * libm::exp(near + spread(2) * (far - near)) * new_forward;
+    let rotation = std::array::from_fn(|row| axes.map(|axis| axis[row]));
+    let rounded = Camera::rounded(String::new(), [1; 2], [1.0; 2], position.to_array(), rotation);
+    Camera { position: rounded.position, rotation: rounded.rotation, ..camera.clone() }
+}
+
+/// The distance of what `camera` looks at: half of what covers the middle of its picture is nearer. `None` if nothing is
+/// there.
+fn subject_distance(camera: &Camera, geometry: &Geometry) -> Option<f64> {
+    let mut found: Vec<(f32, f64)> = Vec::new();
+    for (position, (scales, &opacity)) in
+        geometry.positions.iter().zip(geometry.scales.iter().zip(&geometry.opacities))
+    {
+        let [x, y, z] = camera.to_view(*position);
+        if z.is_finite() && z > NEAR_Z && x.abs() < MIDDLE * z && y.abs() < MIDDLE * z {
+            let mut sorted = scales.map(f64::from);
+            sorted.sort_by(f64::total_cmp);
+            let size = libm::exp(sorted[1] + sorted[2]) / (f64::from(z) * f64::from(z));
+            let weight = size.min(LARGEST) / (1.0 + libm::exp(-f64::from(opacity)));
+            if weight.is_finite() {
+                found.push((z, weight));
+            }
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * found.iter().map(|f| f.1).sum::<f64>();
+    let mut sum = 0.0;
+    let middle = found.iter().find(|(_, weight)| {
+        sum += weight;
+        sum >= half
+    });
+    middle.map(|(z, _)| f64::from(*z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::single;
+    use crate::orbit::orbit;
+
+    /// A ball of radius 1 around (5, -2, 7).
+    fn ball() -> Geometry {
+        let mut g = Geometry::default();
+        for i in 0..1000_u16 {
+            let t = f64::from(i);
+            let y = 1.0 - (2.0 * t + 1.0) / 1000.0;
+            let around = (1.0 - y * y).sqrt();
+            let p = DVec3::new(around * (t * 2.4).cos(), y, around * (t * 2.4).sin());
+            g.positions.push((p + DVec3::new(5.0, -2.0, 7.0)).to_array().map(single));
+            g.scales.push([-3.0; 3]);
+            g.opacities.push(2.0);
+        }
+        g
+    }
+
+    #[test]
+    fn views_turn_around_what_cameras_look_at() {
+        let geometry = ball();
+        let cameras = orbit(&geometry, 30, 90, 60);
+        let views = aside(&geometry, &cameras, 10);
+        assert_eq!(views.len(), 10);
+        let (mut nearest, mut farthest) = (f64::INFINITY, 0.0_f64);
+        for (k, view) in views.iter().enumerate() {
+            view.validate().unwrap();
+            let of = &cameras[1 + 3 * k];
+            assert_eq!((&view.name, view.width, view.fx), (&of.name, of.width, of.fx));
+            // What is in the middle of the one picture is in the middle of the other.
+            let distance = subject_distance(of, &geometry).unwrap();
+            let forward = |camera: &Camera| DVec3::from_array(camera.rotation.map(|row| f64::from(row[2])));
+            let subject = DVec3::from_array(of.position.map(f64::from)) + distance * forward(of);
+            let [x, y, z] = view.to_view(subject.to_array().map(single)).map(f64::from);
+            assert!(x.abs() < 1e-3 * z && y.abs() < 1e-3 * z, "{x} {y} {z}");
+            assert!(forward(of).dot(forward(view)) > 0.499);
+            (nearest, farthest) = (nearest.min(z / distance), farthest.max(z / distance));
+            let r = &view.rotation;
+            let cross = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1])
+                - r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0])
+                + r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);
+            assert!((cross - 1.0).abs() < 1e-4, "a rotation, not a mirror");
+        }
+        assert!(nearest < 0.5 && farthest > 1.3, "{nearest} {farthest}");
+        assert_eq!(views, aside(&geometry, &cameras, 10));
+        assert_eq!(aside(&geometry, &cameras[..2], 10).len(), 2);
+    }
+
+    #[test]
+    fn cameras_that_look_at_nothing_have_none() {
+        let geometry = ball();
+        let mut camera = orbit(&geometry, 1, 90, 60).remove(0);
+        assert!(aside(&geometry, std::slice::from_ref(&camera), 0).is_empty());
+        assert!(aside(&geometry, &[], 3).is_empty());
+        assert!(aside(&Geometry::default(), std::slice::from_ref(&camera), 3).is_empty());
+        camera.rotation.iter_mut().for_each(|row| *row = [-row[0], row[1], -row[2]]);
+        assert!(aside(&geometry, std::slice::from_ref(&camera), 3).is_empty());
+    }
+}
