@@ -4,7 +4,7 @@
 use glam::{DQuat, DVec3};
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::Preset;
-use lexisplat::{Limits, Sensitivity, ShDegree, Silent, Splats, lexi};
+use lexisplat::{Limits, ShDegree, Silent, Splats, lexi};
 use lexisplat_eval::Compression;
 use lexisplat_eval::compression::{Judge, PackingViews};
 use lexisplat_eval::{CompressionReport, Packing, SceneKind, Target};
@@ -47,10 +47,11 @@ fn views_from_beside_given_cameras_measure_and_do_not_judge() {
     let cameras = orbit(&splats.geometry, 60, 96, 64);
     // Cameras on one side.
     let views = PackingViews::given(&cameras[..12]).unwrap();
-    let seen = |s: &Sensitivity| s.removal.iter().filter(|change| **change > 0.0).count();
     let alone = Renderer::cpu().sensitivity(&Scene::from(&splats), views.measuring(), &Silent).unwrap();
     let measured = views.sensitivity(&mut Renderer::cpu(), &splats, &Silent).unwrap();
-    assert!(seen(&measured) > seen(&alone), "{} {}", seen(&measured), seen(&alone));
+    // Some Gaussians show more in others.
+    let pairs: Vec<(f32, f32)> = measured.removal.into_iter().zip(alone.removal).collect();
+    assert!(pairs.iter().all(|(all, given)| all >= given) && pairs.iter().any(|(all, given)| all > given));
     assert!(views.judging().iter().all(|judge| cameras.contains(judge)));
     // What is fitted to is given or from all around.
     let fitted = views.fitting(&splats);
@@ -58,7 +59,7 @@ fn views_from_beside_given_cameras_measure_and_do_not_judge() {
     assert_eq!((fitted.len(), around), (6 + 8, 8));
     assert!(fitted.iter().all(|camera| !views.judging().contains(camera)));
     // Of many cameras more are fitted to, in smaller pictures.
-    let cameras = orbit(&splats.geometry, 90, 480, 320);
+    let cameras = orbit(&splats.geometry, 70, 480, 320);
     let fitted = PackingViews::given(&cameras).unwrap().fitting(&splats);
     let given: Vec<&Camera> = fitted.iter().filter(|camera| camera.name.starts_with("orbit")).collect();
     assert!((25..=40).contains(&given.len()), "{}", given.len());

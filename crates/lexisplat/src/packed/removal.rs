@@ -8,10 +8,10 @@ use crate::support::maths::log_sigmoid;
 /// A Gaussian is left out if the mean squared error of the pictures grows by less than this many squares of the
 /// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
 /// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
-const REMOVAL: f64 = 8.0;
-/// Share of the mean squared change of the picture that changes most, which counts if it is larger than the mean over
-/// all pictures. Found by trial (docs/METHOD.md).
-const WORST_SHARE: f32 = 0.1;
+const REMOVAL: f64 = 10.0;
+/// Share of the mean squared change of the picture that changes most, over the usual excess of that over the mean of all
+/// pictures. It counts where it is larger than that mean. Found by trial (docs/METHOD.md).
+const WORST_SHARE: f32 = 0.8;
 /// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
 const NEVER_DRAWN: f32 = -5.541_264;
 
