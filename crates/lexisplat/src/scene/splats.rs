@@ -1,5 +1,6 @@
 //! A trained scene as arrays, in the units of its PLY.
 
+use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
@@ -106,6 +107,11 @@ impl Geometry {
         for extra in &self.extras {
             if extra.values.len() != n {
                 return Err(Error::parameter("extra", &extra.name, format!("{n} entries, one a position")));
+            }
+            if !is_extra_name(&extra.name) {
+                let expected =
+                    "a name without white space and control characters that no property of 3DGS has";
+                return Err(Error::parameter("extra", extra.name.escape_debug(), expected));
             }
         }
         Ok(())

@@ -100,7 +100,7 @@ mod tests {
             splats = splats.with_degree_cut(ShDegree::new(degree).unwrap());
             let numbers = || (0..count).map(|i| i as f64);
             splats.geometry.extras = vec![
-                Extra { name: "a name".into(), values: vec![7_u8; count].into() },
+                Extra { name: "a_name".into(), values: vec![7_u8; count].into() },
                 Extra { name: String::new(), values: numbers().collect::<Vec<f64>>().into() },
             ];
             splats.meta.comments = vec!["a".into()];

@@ -17,18 +17,14 @@ pub(super) const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
 /// The element that holds Gaussians.
 pub(super) const VERTEX: &str = "vertex";
 
-/// Whether a PLY can name a property so. A name with a line break could add lines to the header.
-pub(super) fn is_token(name: &str) -> bool {
-    !name.is_empty() && !name.chars().any(|c| c.is_whitespace() || c.is_control())
-}
-
-/// Whether a property that 3DGS does not define can have this name. A file with one or two of the normals has them as
-/// such properties.
+/// Whether a property that 3DGS does not define can have this name. A name with a line break could add lines to a header.
+/// A file with one or two of the normals has them as such properties.
 pub(crate) fn is_extra_name(name: &str) -> bool {
     let fixed = [&POSITION[..], &DC, &OPACITY, &SCALE, &ROTATION].concat();
     let rest = name.strip_prefix(REST_PREFIX).and_then(|digits| digits.parse::<u64>().ok());
     let is_rest = rest.is_some_and(|number| format!("{REST_PREFIX}{number}") == name);
-    is_token(name) && !fixed.contains(&name) && !is_rest
+    let is_token = !name.is_empty() && !name.chars().any(|c| c.is_whitespace() || c.is_control());
+    is_token && !fixed.contains(&name) && !is_rest
 }
 
 /// Most characters of a name or token from a file that a message repeats.

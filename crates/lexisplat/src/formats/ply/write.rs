@@ -2,7 +2,7 @@
 
 use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
-use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, is_token, shown};
+use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::for_extra;
 use crate::scene::splats::{SceneMeta, Splats};
@@ -71,13 +71,6 @@ fn check(splats: &Splats) -> Result<()> {
     let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
     for extra in &splats.geometry.extras {
         let name = &extra.name;
-        if !is_token(name) {
-            return Err(Error::parameter(
-                "extra",
-                shown(name),
-                "a name without spaces or control characters",
-            ));
-        }
         if !taken.insert(name.clone()) {
             return Err(Error::parameter("extra", shown(name), "a name no other property has"));
         }
