@@ -35,8 +35,8 @@ const MAX_FINENESS: f32 = MIN_FINENESS * 4000.0;
 /// Gaps with at least this many bits share a context.
 const GAP_CONTEXTS: u32 = 23;
 /// Averages that are not predicted: the classes and the number of nonzeros.
-pub(super) const COLOUR: usize = TARGETS;
-pub(super) const SHAPE: usize = TARGETS + 1;
+const COLOUR: usize = TARGETS;
+const SHAPE: usize = TARGETS + 1;
 const NONZEROS: usize = TARGETS + 2;
 
 /// A Gaussian to be coded. Decoders have none and look at no value of it: they pass the default.
@@ -228,29 +228,19 @@ fn classes<S: Symbols>(
     around: &[f32; AVERAGES],
     known: bool,
 ) -> Option<[u8; 2]> {
-    let context = colour_context(around, known);
+    let context = if known { 1 + level(around[COLOUR]) } else { 0 };
     let colour = s.symbol(Stream::ColourClass, context, || u16::from(target.classes[0]));
     let colour = u8::try_from(colour).ok()?;
-    let (context, nearest) = shape_context(colour, around, known);
+    let expected = (f32::from(colour) + around[SHAPE]).clamp(0.0, f32::from(LAST_CLASS));
+    // In halves, so that the context also says on which side of the rounded value the class may lie.
+    let context = if known { level(2.0 * (expected - (expected - 0.25).floor())) + 1 } else { 0 };
+    let nearest = level(expected);
     let shape = s.integer(Stream::ShapeClass, context, || {
         zigzag(i64::from(target.classes[1]) - i64::try_from(nearest).unwrap_or(0))
     });
     let shape = i64::try_from(nearest).ok()?.checked_add(unzigzag(shape))?;
     let shape = u8::try_from(shape).ok()?;
     (colour <= LAST_CLASS && shape <= LAST_CLASS).then_some([colour, shape])
-}
-
-/// Context of the colour class, by the averages of the neighbours if there are any.
-pub(super) fn colour_context(around: &[f32; AVERAGES], known: bool) -> usize {
-    if known { 1 + level(around[COLOUR]) } else { 0 }
-}
-
-/// Context of the shape class, and the class that it is coded as the difference from.
-pub(super) fn shape_context(colour: u8, around: &[f32; AVERAGES], known: bool) -> (usize, usize) {
-    let expected = (f32::from(colour) + around[SHAPE]).clamp(0.0, f32::from(LAST_CLASS));
-    // In halves, so that the context also says on which side of the rounded value the class may lie.
-    let context = if known { level(2.0 * (expected - (expected - 0.25).floor())) + 1 } else { 0 };
-    (context, level(expected))
 }
 
 /// The nearest whole number from 0 to the last class.

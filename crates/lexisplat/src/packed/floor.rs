@@ -63,44 +63,24 @@ impl Floor {
         Self { parameters, added, limited: true }
     }
 
-    /// What classes Gaussians need for the same steps as `classes`, within the limits.
-    pub(super) fn wanted(
+    /// The classes of Gaussians of the same steps as `classes`, or of smaller ones where the limits ask for it.
+    pub(super) fn classes(
         &self,
         classes: &[[f32; 2]],
         geometry: &Geometry,
         scene: &[MortonKey],
-    ) -> Vec<[Wanted; 2]> {
+    ) -> Vec<[u8; 2]> {
         if !self.limited {
-            let free = |class| Wanted { class, most: LAST_CLASS };
-            return classes.iter().map(|class| class.map(free)).collect();
+            return classes.iter().map(|class| class.map(rounded)).collect();
         }
         let parts = map_chunks(scene.len(), GAUSSIANS_PER_TASK, |range| {
             let within = |(class, &placed): (&[f32; 2], &MortonKey)| {
                 let coarsest = coarsest(&self.parameters, geometry, placed);
-                std::array::from_fn(|kind| Wanted {
-                    class: class[kind] + self.added[kind],
-                    most: rounded(coarsest[kind]),
-                })
+                std::array::from_fn(|kind| rounded((class[kind] + self.added[kind]).min(coarsest[kind])))
             };
-            classes[range.clone()].iter().zip(&scene[range]).map(within).collect::<Vec<[Wanted; 2]>>()
+            classes[range.clone()].iter().zip(&scene[range]).map(within).collect::<Vec<[u8; 2]>>()
         });
         parts.concat()
-    }
-}
-
-/// What a Gaussian needs of a class.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
-    /// The class that its weight asks for, before it is rounded.
-    pub(super) class: f32,
-    /// The coarsest class within the limits.
-    pub(super) most: u8,
-}
-
-impl Wanted {
-    /// The nearest class within the limits.
-    pub(super) fn nearest(self) -> u8 {
-        rounded(self.class).min(self.most)
     }
 }
 

@@ -11,7 +11,6 @@ mod bits;
 mod canonical;
 mod chunk_codec;
 mod chunks;
-mod class_choice;
 mod codebook;
 mod coder;
 mod encoding;

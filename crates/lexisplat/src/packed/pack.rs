@@ -3,7 +3,6 @@
 use std::borrow::Borrow;
 
 use super::canonical::{Grid, MortonKey};
-use super::class_choice::ClassChoice;
 use super::fit::Fit;
 use super::floor::Floor;
 use super::quantised::Quantised;
@@ -156,15 +155,14 @@ impl<S: Borrow<Splats>> Packer<S> {
             true => Floor::new(parameters, geometry, &scene),
             false => Floor::none(parameters),
         };
-        let choice = ClassChoice::new(floor, &classes, geometry, &scene);
-        let classes = choice.classes(&classes, geometry, &scene);
+        let classes = floor.classes(&classes, geometry, &scene);
         Quantised::new(
             self.splats.borrow(),
             &self.options,
             scene,
             classes,
             colour,
-            choice.floor.parameters,
+            floor.parameters,
             progress,
         )
     }

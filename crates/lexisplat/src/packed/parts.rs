@@ -1,7 +1,6 @@
 //! Packing a scene that comes part after part, in the order of the file.
 
 use super::canonical::{Grid, MortonKey};
-use super::class_choice::ClassChoice;
 use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
 use super::entropy::Tables;
@@ -61,7 +60,7 @@ pub(crate) struct Part<'a> {
 pub(crate) struct PartPacker {
     options: PackOptions,
     fit: Fit,
-    choice: ClassChoice,
+    floor: Floor,
     encoding: Encoding,
     /// As `encoding` was before the first part.
     blank: Encoding,
@@ -96,10 +95,9 @@ impl PartPacker {
         let classes: Vec<[f32; 2]> = kept.iter().map(|&i| fit.classes[i]).collect();
         let clock = Stopwatch::start();
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
-        let choice = ClassChoice::new(floor, &classes, &sample.geometry, &scene);
-        let classes = choice.classes(&classes, &sample.geometry, &scene);
+        let classes = floor.classes(&classes, &sample.geometry, &scene);
         let view = View { splats: sample, scene: &scene, classes: &classes, base_colours: None };
-        let coder = ChunkCoder::new(view, total, choice.floor.parameters.clone(), options, progress)?;
+        let coder = ChunkCoder::new(view, total, floor.parameters.clone(), options, progress)?;
         progress.check()?;
         let encoding = Encoding::new(coder, clock);
         Ok(Self {
@@ -114,7 +112,7 @@ impl PartPacker {
             extras: SpilledExtras::new(to, sample.empty().geometry)?,
             meta: sample.meta.clone(),
             fit,
-            choice,
+            floor,
         })
     }
 
@@ -135,7 +133,7 @@ impl PartPacker {
             .map(|((source, place), _)| MortonKey { source, ..*place })
             .collect();
         let weights: Vec<[f32; 2]> = kept().map(|i| part.weights[i]).collect();
-        let classes = self.choice.classes(&self.fit.classes_of(&weights), &splats.geometry, &scene);
+        let classes = self.floor.classes(&self.fit.classes_of(&weights), &splats.geometry, &scene);
         let colour_weights = weights.iter().map(|w| w[0]).collect();
         let (options, blank) = (&self.options, self.blank.clone());
         let quantised = Quantised::of_part(splats, options, scene, classes, colour_weights, blank, progress)?;

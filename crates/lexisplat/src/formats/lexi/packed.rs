@@ -79,7 +79,11 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         meta: meta(checked)?,
         target,
         reached,
-        device: checked.optional(key::DRAWN_ON)?,
+        device: checked
+            .has_text(key::DRAWN_ON)
+            .then(|| checked.text(key::DRAWN_ON))
+            .transpose()?
+            .map(str::to_owned),
         parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
         lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
         tables: list(checked, tensor::TABLES, Dtype::U8)?,
