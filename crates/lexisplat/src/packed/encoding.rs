@@ -55,7 +55,7 @@ impl Counts {
 /// Takes the symbols and the raw bits of the next chunk.
 pub(super) type WriteChunk<'a> = dyn FnMut([Vec<u8>; 2]) -> Result<()> + 'a;
 /// Codes all chunks with the tables.
-type CodeChunks<'a> = dyn FnMut(&ChunkCoder, &Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
+type CodeChunks<'a> = dyn FnMut(&Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
 
 /// A scene that is being packed.
 #[derive(Debug, Clone)]
@@ -113,7 +113,7 @@ impl Encoding {
             Ok(())
         };
         write(dictionary.finish(&tables))?;
-        code_chunks(&coder, &tables, &mut write)?;
+        code_chunks(&tables, &mut write)?;
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
         let seconds = [learn_seconds, clock.seconds() - learn_seconds];
         let (record, mut report) = counts.tally.into_report(record, gaussians, None, seconds);

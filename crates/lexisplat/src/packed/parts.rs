@@ -166,7 +166,7 @@ impl PartPacker {
         progress: &dyn Progress,
     ) -> Result<(PackedHead, SpilledPacked, CompressReport)> {
         let mut spilled = self.chunks.finish()?;
-        let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
+        let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
             for batch in self.lengths.chunks(CHUNKS_AT_ONCE) {
                 progress.check()?;
                 let mut chunks = Vec::with_capacity(batch.len());

@@ -49,13 +49,13 @@ impl<'a> Quantised<'a> {
         let view = View { splats, scene: &scene, classes: &classes, base_colours: None };
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, parameters, options, progress)?;
-        let mut encoding = Encoding::new(coder, clock);
+        let encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
-        let codes = codes_of(&encoding.coder, view, progress)?;
+        let mut whole = Self::of_part(splats, options, scene, classes, colour_weights, encoding, progress)?;
         progress.end();
-        encoding.end_learning();
-        Ok(Self { splats, options, scene, classes, colour_weights, codes, encoding })
+        whole.encoding.end_learning();
+        Ok(whole)
     }
 
     /// A part of a scene, with what all parts are coded with.
@@ -110,7 +110,7 @@ impl<'a> Quantised<'a> {
         for chunk in self.each_chunk(view, progress, |tally, symbols| Counts::of(tally, &symbols)) {
             encoding.counts.add(&chunk?);
         }
-        let mut code_chunks = |_: &ChunkCoder, tables: &Tables, write: &mut WriteChunk<'_>| {
+        let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
             let parts = self.each_chunk(view, progress, |_, symbols| symbols.finish(tables));
             parts.into_iter().try_for_each(|part| write(part?))
         };
