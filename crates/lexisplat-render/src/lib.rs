@@ -71,7 +71,9 @@ pub use aside::aside;
 pub use camera::{Camera, MAX_SIDE, Split};
 pub use cameras_json::{MAX_CAMERAS, read_cameras_bytes};
 pub use colmap::{MAX_COLMAP_BYTES, read_colmap_binary, read_colmap_text};
-pub use cpu::{ColourAdjoint, ColourErrors, Drawn, RenderOptions, render, render_measured, sensitivity};
+pub use cpu::{
+    Drawn, GaussianChange, PictureAdjoint, PictureErrors, RenderOptions, render, render_measured, sensitivity,
+};
 pub use error::{Error, Result};
 pub use image::Image;
 pub use interior_views::{interior_views, is_interior};

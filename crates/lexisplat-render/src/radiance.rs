@@ -26,13 +26,8 @@ pub struct Radiance<'a> {
 
 #[derive(Debug)]
 enum Rest<'a> {
-    /// The DC rows are colours, the same from everywhere.
-    None,
     Dense(&'a [f32]),
-    Sparse {
-        codes: &'a SparseCodes,
-        atoms: Vec<[f32; PADDED]>,
-    },
+    Sparse { codes: &'a SparseCodes, atoms: Vec<[f32; PADDED]> },
 }
 
 type Basis = [f32; MAX_COEFFICIENTS - 1];
@@ -51,11 +46,6 @@ impl<'a> Radiance<'a> {
         Self { degree, shown: degree, dc: &scene.geometry().dc, rest }
     }
 
-    /// Gaussians with these colours, the same from everywhere. They may be below 0.
-    pub(crate) fn of_colours(colours: &'a [[f32; 3]]) -> Self {
-        Self { degree: ShDegree::ZERO, shown: ShDegree::ZERO, dc: colours, rest: Rest::None }
-    }
-
     /// Leaves out the bands above `degree`, if that is given and below the scene's own.
     #[must_use]
     pub fn up_to(self, degree: Option<ShDegree>) -> Self {
@@ -71,16 +61,12 @@ impl<'a> Radiance<'a> {
     #[must_use]
     #[inline(always)]
     pub fn colour(&self, i: usize, direction: [f32; 3]) -> [f32; 3] {
-        if let Rest::None = self.rest {
-            return self.dc[i];
-        }
         let per_channel = self.degree.rest_per_channel();
         let mut rest = [0.0; CHANNELS];
         if self.shown.rest_per_channel() > 0 {
             // The basis is zero above the degree shown, which leaves those bands out.
             let basis = rest_basis(self.shown, direction);
             rest = match &self.rest {
-                Rest::None => rest,
                 Rest::Dense(all) => {
                     let dim = self.degree.rest();
                     dense(&all[i * dim..(i + 1) * dim], per_channel, &basis)

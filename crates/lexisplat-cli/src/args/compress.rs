@@ -52,7 +52,7 @@ pub(crate) struct Compress {
     #[arg(long)]
     pub(crate) keep_order: bool,
     /// Leave no Gaussian out. Otherwise those that show less than their bits are worth are left out, and base colours
-    /// make up for them and for errors. --keep-order and --tol leave none out either.
+    /// and opacities make up for them and for errors. --keep-order and --tol leave none out either.
     #[arg(long)]
     pub(crate) keep_all: bool,
     /// Make the best scene of at most this many Gaussians, 1 or more, for viewers with a limit. --preset is then the

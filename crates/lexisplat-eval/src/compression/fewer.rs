@@ -12,8 +12,8 @@ use crate::error::Result;
 /// its neighbours are gone (docs/METHOD.md, "At most so many").
 const SHARE: f64 = 0.25;
 
-/// The Gaussians of `splats` that show most, at most `most`, and what they show in `views`. Their base colours are fitted to
-/// what `fit` holds of all. `sensitivity` is that of `splats`.
+/// The Gaussians of `splats` that show most, at most `most`, and what they show in `views`. Their base colours and
+/// opacities are fitted to what `fit` holds of all. `sensitivity` is that of `splats`.
 ///
 /// # Errors
 /// As [`PackingViews::sensitivity`].
@@ -34,9 +34,9 @@ pub(super) fn at_most(
         let keep = all_but(share.min(splats.len() - most), &sensitivity.opacity);
         splats.retain(&keep);
         sensitivity.retain(&keep);
-        let colours =
-            fit.base_colours(Scene::from(&splats), &splats.geometry.dc, &sensitivity.colour, progress)?;
-        splats.geometry.dc = colours;
+        let weights: Vec<[f32; 2]> = (0..splats.len()).map(|i| sensitivity.appearance(i)).collect();
+        let fitted = fit.appearances(Scene::from(&splats), &weights, progress)?;
+        fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
         sensitivity = views.sensitivity(renderer, &splats, progress)?;
     }
     Ok((splats, sensitivity))

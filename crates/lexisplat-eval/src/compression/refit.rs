@@ -1,30 +1,36 @@
-//! Fits the base colours of a packed scene to the pictures of the original.
+//! Fits the base colours and opacities of a packed scene to the pictures of the original.
 //!
-//! Pictures are linear in base colours. So what removal and quantisation do to pictures is made up for by a linear
-//! least-squares problem, which the method of conjugate gradients solves through the renderer and its adjoint
-//! (docs/METHOD.md, "Refitting").
+//! Pictures are linear in base colours, and nearly so in small changes of opacities. So what removal and quantisation do
+//! to pictures is made up for by a linear least-squares problem, which the method of conjugate gradients solves through
+//! the renderer and its adjoint (docs/METHOD.md, "Refitting").
 
 use std::borrow::Borrow;
 
-use lexisplat::packed::{Packed, Packer, Quantised};
+use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
-use lexisplat::{CompressReport, Model, Progress, Splats};
-use lexisplat_render::{Camera, ColourAdjoint, ColourErrors, Image, Renderer, Scene};
+use lexisplat::{CompressReport, Geometry, Model, Progress, Splats};
+use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
 use super::only_cancels::OnlyCancels;
 use super::views::PackingViews;
 use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
 
-/// Steps of the method of conjugate gradients. Each takes about as long as drawing all views.
-const STEPS: usize = 3;
-/// Weight of the distance to the colours before, as a share of a Gaussian's weight in pictures. Other views than those
-/// that are fitted to depend on them too.
+/// Steps of the method of conjugate gradients, with given cameras and with views that were found. Each takes about as
+/// long as drawing all views. More steps gain less where other views than the fitted ones count (docs/METHOD.md).
+const STEPS_GIVEN: usize = 5;
+const STEPS_FOUND: usize = 3;
+/// Weight of the distance to the colours and opacities before, as a share of a Gaussian's weight in pictures. Other views
+/// than those that are fitted to depend on them too.
 const RIDGE: f32 = 0.5;
-/// Share of the sums of rows in the preconditioner. The diagonal of the matrix is smaller than those.
-const ROW: f32 = 0.3;
+/// Share of the sums of rows in the preconditioner of colours. The diagonal of the matrix is smaller than those.
+const ROW: f32 = 0.2;
+/// Multiple of the diagonal of the matrix in the preconditioner of opacities.
+const OPACITY_DIAGONAL: f32 = 4.0;
+/// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small ones.
+const MOST_LOG_OPACITY: f32 = 0.5;
 /// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
-const GAIN_GIVEN: f64 = 1.8;
+const GAIN_GIVEN: f64 = 2.4;
 const GAIN_FOUND: f64 = 0.5;
 
 /// A packer whose files are refitted, if that is allowed.
@@ -33,7 +39,7 @@ pub(super) struct Refitting<S> {
     fit: Option<Fit>,
 }
 
-/// What base colours are fitted to.
+/// What base colours and opacities are fitted to.
 pub(super) struct Fit {
     cameras: Vec<Camera>,
     /// The original's pictures.
@@ -43,7 +49,7 @@ pub(super) struct Fit {
 }
 
 impl<S: Borrow<Splats>> Refitting<S> {
-    /// Files of `packer`, with base colours as `fit` says or as `packer` makes them.
+    /// Files of `packer`, with base colours and opacities as `fit` says or as `packer` makes them.
     pub(super) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
         Self { packer, fit }
     }
@@ -109,26 +115,25 @@ impl<S: Borrow<Splats>> Refitting<S> {
     ) -> Result<(Packed, CompressReport)> {
         let Some(fit) = &self.fit else { return Ok(file) };
         let model = file.0.unpack()?;
-        let dc = &model.geometry().dc;
-        let colours = fit.base_colours(Scene::from(&model), dc, quantised.colour_weights(), progress)?;
-        drop(model);
         drop(file);
-        Ok(quantised.finish(Some(&colours), progress)?)
+        let fitted = fit.appearances(Scene::from(&model), quantised.weights(), progress)?;
+        drop(model);
+        Ok(quantised.finish(Some(&fitted), progress)?)
     }
 }
 
-/// Base colours of `model`, which is what a file has of `part`, fitted to pictures of the part alone.
+/// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone.
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(super) fn base_colours_of_part(
+pub(super) fn appearances_of_part(
     part: &Splats,
     model: &Model,
-    colour_weights: &[f32],
+    weights: &[[f32; 2]],
     progress: &dyn Progress,
-) -> Result<Vec<[f32; 3]>> {
+) -> Result<Vec<Appearance>> {
     let fit = Fit::to(part, &PackingViews::of_part(part), progress)?;
-    fit.base_colours(Scene::from(model), &model.geometry().dc, colour_weights, progress)
+    fit.appearances(Scene::from(model), weights, progress)
 }
 
 impl Fit {
@@ -143,38 +148,41 @@ impl Fit {
         Ok(Self { cameras, targets, given: views.are_given() })
     }
 
-    /// Base colours of `scene` with which its pictures are nearest to the targets. `dc` are those it has, and
-    /// `colour_weights` the sensitivities of its Gaussians to colour.
+    /// Base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` are the
+    /// sensitivities of its Gaussians to the colour and to the logarithm of the opacity.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(super) fn base_colours(
+    pub(super) fn appearances(
         &self,
         scene: Scene<'_>,
-        dc: &[[f32; 3]],
-        colour_weights: &[f32],
+        weights: &[[f32; 2]],
         progress: &dyn Progress,
-    ) -> Result<Vec<[f32; 3]>> {
-        let mut adjoint = ColourAdjoint::new(scene, &self.cameras)?;
+    ) -> Result<Vec<Appearance>> {
+        let mut adjoint = PictureAdjoint::new(scene, &self.cameras)?;
         let progress = &OnlyCancels(progress);
-        let ColourErrors { mut errors, row_sums, .. } = adjoint.of_errors(&self.targets, progress)?;
+        let PictureErrors { mut errors, row_sums, opacity_squares, .. } =
+            adjoint.of_errors(&self.targets, progress)?;
         // Sensitivities are averaged over three channels, and products with the adjoint are not.
-        let ridge: Vec<f32> = colour_weights.iter().map(|w| RIDGE * 3.0 * w).collect();
-        let diagonal: Vec<f32> = row_sums
-            .iter()
-            .zip(&ridge)
-            .map(|(row, ridge)| (ROW * row + ridge).max(f32::MIN_POSITIVE))
-            .collect();
-        let scaled = |rows: &[[f32; 3]]| -> Vec<[f32; 3]> {
-            rows.iter().zip(&diagonal).map(|(row, d)| row.map(|v| v / d)).collect()
+        let ridge: Vec<[f32; 2]> = weights.iter().map(|w| w.map(|w| RIDGE * 3.0 * w)).collect();
+        let mut diagonal = Vec::with_capacity(ridge.len());
+        for (i, [colour, opacity]) in ridge.iter().enumerate() {
+            let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
+            diagonal.push(own.map(|v| v.max(f32::MIN_POSITIVE)));
+        }
+        let scaled = |rows: &[GaussianChange]| -> Vec<GaussianChange> {
+            let divided = |([r, g, b, a], [c, o]): (&GaussianChange, &[f32; 2])| [r / c, g / c, b / c, a / o];
+            rows.iter().zip(&diagonal).map(divided).collect()
         };
-        let mut found = vec![[0.0_f32; 3]; ridge.len()];
+        let mut found = vec![[0.0_f32; 4]; ridge.len()];
         let mut direction = scaled(&errors);
         let mut norm = dot(&errors, &direction);
-        for _ in 0..STEPS {
-            let mut product = adjoint.of_pictures(&direction, progress)?;
-            for ((product, direction), ridge) in product.iter_mut().zip(&direction).zip(&ridge) {
-                add(product, *ridge, direction);
+        let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
+        for _ in 0..steps {
+            let mut product = adjoint.of_changes(&direction, progress)?;
+            for ((product, direction), [colour, opacity]) in product.iter_mut().zip(&direction).zip(&ridge) {
+                let ridge = [*colour, *colour, *colour, *opacity];
+                (0..4).for_each(|k| product[k] += ridge[k] * direction[k]);
             }
             let along = dot(&direction, &product);
             if along <= 0.0 {
@@ -193,17 +201,27 @@ impl Fit {
                 add(direction, share, &old);
             }
         }
-        let fitted = |(dc, found): (&[f32; 3], &[f32; 3])| std::array::from_fn(|c| dc[c] + found[c] / C0);
-        Ok(dc.iter().zip(&found).map(fitted).collect())
+        let geometry = scene.geometry();
+        Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())
+    }
+}
+
+/// What Gaussian `i` shows after a change.
+fn changed(geometry: &Geometry, i: usize, change: &GaussianChange) -> Appearance {
+    let Appearance { dc, log_opacity } = Appearance::of(geometry, i);
+    let more = change[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
+    Appearance {
+        dc: std::array::from_fn(|c| dc[c] + change[c] / C0),
+        log_opacity: (log_opacity + more).min(0.0),
     }
 }
 
 /// Adds `factor` times `row` to `sum`.
-fn add(sum: &mut [f32; 3], factor: f32, row: &[f32; 3]) {
+fn add(sum: &mut GaussianChange, factor: f32, row: &GaussianChange) {
     sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += factor * value);
 }
 
-fn dot(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+fn dot(a: &[GaussianChange], b: &[GaussianChange]) -> f64 {
     a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
 }
 
@@ -222,8 +240,8 @@ mod tests {
     use crate::compression::{Judge, Looked};
     use crate::views::SceneKind;
 
-    /// The judged quality and the base colours of a file of `splats` at one step.
-    fn made(splats: &Splats, options: &PackOptions) -> (f64, Vec<[f32; 3]>, usize) {
+    /// The judged quality of a file of `splats` at one step, and its scene.
+    fn made(splats: &Splats, options: &PackOptions) -> (f64, Splats) {
         let mut cpu = Renderer::cpu();
         let Looked { views, sensitivity } =
             Looked::at(&mut cpu, splats, None, SceneKind::Auto, &Silent).unwrap();
@@ -236,17 +254,31 @@ mod tests {
         // None of the views that judge is fitted to.
         assert!(views.fitting(splats).iter().all(|camera| !views.judging().contains(camera)));
         let mut judge = Judge::new(cpu, splats, &views.some_judging(12), false, &Silent).unwrap();
-        (judge.score(&model, &Silent).unwrap().mean, model.geometry().dc.clone(), model.len())
+        (judge.score(&model, &Silent).unwrap().mean, model.into_splats())
     }
 
     #[test]
-    fn base_colours_make_up_for_errors() {
+    fn base_colours_and_opacities_make_up_for_errors() {
         let splats = scene(&SampleOptions::new(800, 1));
-        let (kept, _, all) = made(&splats, &PackOptions::default().with_keep_all(true));
-        let (refitted, colours, some) = made(&splats, &PackOptions::default());
-        assert_eq!(all, 800);
-        assert!(some < all && some > all / 4, "{some}");
+        let (kept, all) = made(&splats, &PackOptions::default().with_keep_all(true));
+        let (refitted, some) = made(&splats, &PackOptions::default());
+        assert_eq!(all.len(), 800);
+        assert!(some.len() < all.len() && some.len() > all.len() / 4, "{}", some.len());
         assert!(refitted > kept + 0.5, "{refitted} {kept}");
-        assert!(colours.as_flattened().iter().all(|v| v.is_finite() && v.abs() < 20.0));
+        let Geometry { dc, opacities, .. } = &some.geometry;
+        assert!(dc.as_flattened().iter().chain(opacities).all(|v| v.is_finite() && v.abs() < 20.0));
+    }
+
+    #[test]
+    fn opacities_move_little() {
+        let mut geometry = scene(&SampleOptions::new(3, 1)).geometry;
+        for (opacity, change) in [(-1.0, 9.0), (-1.0, -9.0), (9.0, 0.4), (-200.0, 0.1)] {
+            geometry.opacities[1] = opacity;
+            let before = Appearance::of(&geometry, 1);
+            let after = changed(&geometry, 1, &[C0, 0.0, -C0, change]);
+            assert!((after.dc[0] - before.dc[0] - 1.0).abs() < 1e-5, "{after:?} {before:?}");
+            let moved = after.log_opacity - before.log_opacity;
+            assert!(moved.abs() <= MOST_LOG_OPACITY && after.log_opacity <= 0.0, "{after:?} {before:?}");
+        }
     }
 }

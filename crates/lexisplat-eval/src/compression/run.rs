@@ -10,7 +10,7 @@ use super::fewer::at_most;
 use super::judge::Judge;
 use super::only_cancels::OnlyCancels;
 use super::packing::{Compression, Packing, Quality};
-use super::refit::{Fit, Refitting, base_colours_of_part};
+use super::refit::{Fit, Refitting, appearances_of_part};
 use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
 use super::views::{Looked, PackingViews};
@@ -74,8 +74,8 @@ fn in_parts(
     let device = renderer.as_ref().and_then(gpu);
     let origin = if renderer.is_some() { SensitivitySource::Views } else { SensitivitySource::Heuristic };
     let mut look_seconds = 0.0;
-    let mut refit = |part: &Splats, model: &Model, colour_weights: &[f32]| {
-        base_colours_of_part(part, model, colour_weights, progress)
+    let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+        appearances_of_part(part, model, weights, progress)
     };
     let mut measure;
     let importance = match &mut renderer {

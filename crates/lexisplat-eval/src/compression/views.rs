@@ -28,9 +28,9 @@ const JUDGE_SHARE: usize = 2;
 /// Views from beside given cameras that measure too. Without them Gaussians that only such views show have coarse steps
 /// (docs/METHOD.md).
 const ASIDE: usize = 20;
-/// Most views that base colours are fitted to, of views that were found.
+/// Most views that base colours and opacities are fitted to, of views that were found.
 const FITTED_FOUND: usize = 32;
-/// Most given cameras that base colours are fitted to.
+/// Most given cameras that base colours and opacities are fitted to.
 const FITTED_GIVEN: usize = 40;
 /// Views from all around that they are fitted to beside given cameras.
 const FITTED_AROUND: usize = 8;
@@ -198,7 +198,7 @@ impl PackingViews {
         self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1)).collect()
     }
 
-    /// The views of `splats` that base colours are fitted to: some of those that measure and do not judge, evenly
+    /// The views of `splats` that base colours and opacities are fitted to: some of those that measure and do not judge, evenly
     /// spread. Beside given cameras there are some from all around, so that colours do not suit those alone.
     #[must_use]
     pub fn fitting(&self, splats: &Splats) -> Vec<Camera> {

@@ -1,45 +1,53 @@
-//! Pictures as linear functions of the Gaussians' colours.
+//! How pictures change with the colours and opacities of Gaussians.
 //!
-//! A pixel is the sum over Gaussians of weight times colour. The weights, A, depend on geometry and opacity alone. Fitting
-//! colours to pictures takes products with A and with its adjoint, and both take about as long as drawing.
+//! A pixel is the sum over Gaussians of weight times colour. It is linear in all colours, and in each single opacity.
+//! Fitting colours and opacities to pictures takes products with the matrix J of derivatives and with its adjoint.
 
 use lexisplat::simd::Simd;
 use lexisplat::{Progress, Stage};
 
 use crate::camera::Camera;
-use crate::conventions::{TILE, TRANSMITTANCE_MIN};
+use crate::conventions::{ALPHA_MAX, TILE, TRANSMITTANCE_MIN};
 use crate::error::{Error, Result};
 use crate::image::Image;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
 use super::blend::{BLOCKS, Canvas, SIDE, Tile};
-use super::lanes::{LANES, Lanes};
+use super::lanes::{LANES, Lanes, each};
+use super::math::mask;
 use super::measured_tiles::{Pool, Scratch, measure_tiles};
 use super::project::Projection;
+use super::splat::Splat;
 use super::trace::Trace;
 use super::workspace::Workspace;
+
+/// Changes of a Gaussian: of its red, green and blue, and of the natural logarithm of its opacity.
+pub type GaussianChange = [f32; 4];
 
 /// What the pictures of a scene lack, carried back to its Gaussians.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct ColourErrors {
-    /// For each Gaussian the sum over pixels of its weight times what the target has more than the picture.
-    pub errors: Vec<[f32; 3]>,
-    /// For each Gaussian the sum of its row of the matrix A* A: its weights times those of all Gaussians.
+pub struct PictureErrors {
+    /// For each Gaussian the adjoint of J times what the targets have more than the pictures.
+    pub errors: Vec<GaussianChange>,
+    /// For each Gaussian the sum of its weights times those of all Gaussians: the sum of its row of J* J for one channel
+    /// of colour.
     pub row_sums: Vec<f32>,
+    /// For each Gaussian the sum of the squared derivatives by the logarithm of its opacity: the diagonal of J* J.
+    pub opacity_squares: Vec<f32>,
 }
 
-/// The pictures of a scene over black as linear functions A of its Gaussians' colours.
+/// The pictures of a scene over black, and their derivatives J by its Gaussians' colours and opacities.
 #[derive(Debug)]
-pub struct ColourAdjoint<'a> {
+pub struct PictureAdjoint<'a> {
     scene: Scene<'a>,
     cameras: &'a [Camera],
     workspace: Workspace,
     pool: Pool,
 }
 
-impl<'a> ColourAdjoint<'a> {
+impl<'a> PictureAdjoint<'a> {
     /// The pictures of `scene` from `cameras`.
     ///
     /// # Errors
@@ -50,7 +58,7 @@ impl<'a> ColourAdjoint<'a> {
         Ok(Self { scene, cameras, workspace: Workspace::default(), pool: Pool::default() })
     }
 
-    /// Returns the adjoint of A times the errors of the pictures: what `targets`, one for each camera, have more than
+    /// Returns the adjoint of J times the errors of the pictures: what `targets`, one for each camera, have more than
     /// them. Both are clamped to 0 to 1. Sums are averaged over the pixels of a view, and over the views.
     ///
     /// Reports [`Stage::Draw`], in views, to `progress`, and asks it before each view whether to stop.
@@ -58,7 +66,7 @@ impl<'a> ColourAdjoint<'a> {
     /// # Errors
     /// [`Error::Parameter`] if a target is missing or has another size than its camera;
     /// [`Error::Codec`](crate::Error::Codec) if `progress` cancelled the work.
-    pub fn of_errors(&mut self, targets: &[Image], progress: &dyn Progress) -> Result<ColourErrors> {
+    pub fn of_errors(&mut self, targets: &[Image], progress: &dyn Progress) -> Result<PictureErrors> {
         if targets.len() != self.cameras.len() {
             return Err(Error::parameter("targets", targets.len(), "one for each camera"));
         }
@@ -68,38 +76,50 @@ impl<'a> ColourAdjoint<'a> {
                 return Err(Error::parameter("target", size, "the size of its camera's pictures"));
             }
         }
-        let radiance = Radiance::new(&self.scene);
-        let light = |canvas: &Canvas, view: usize, tile: Tile| errors(canvas, &targets[view], tile);
-        let sums = self.apply(&radiance, light, progress)?;
-        Ok(ColourErrors {
-            errors: sums.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
-            row_sums: sums.iter().map(|&[.., row]| row).collect(),
+        let sums = self.apply(
+            #[inline(always)]
+            |canvas, _, view, tile| errors(canvas, &targets[view], tile),
+            carried_with_squares,
+            progress,
+        )?;
+        Ok(PictureErrors {
+            errors: sums.iter().map(|&[r, g, b, opacity, ..]| [r, g, b, opacity]).collect(),
+            row_sums: sums.iter().map(|sums| sums[4]).collect(),
+            opacity_squares: sums.iter().map(|sums| sums[5]).collect(),
         })
     }
 
-    /// Returns the adjoint of A times A times `colours`, one row for each Gaussian, averaged as in [`Self::of_errors`].
+    /// Returns the adjoint of J times J times `changes`, one for each Gaussian, averaged as in [`Self::of_errors`].
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are more or fewer rows than Gaussians; [`Error::Codec`](crate::Error::Codec) if
+    /// [`Error::Parameter`] if there are more or fewer changes than Gaussians; [`Error::Codec`](crate::Error::Codec) if
     /// `progress` cancelled the work.
-    pub fn of_pictures(&mut self, colours: &[[f32; 3]], progress: &dyn Progress) -> Result<Vec<[f32; 3]>> {
-        if colours.len() != self.scene.len() {
-            return Err(Error::parameter("colours", colours.len(), "one row for each Gaussian"));
+    pub fn of_changes(
+        &mut self,
+        changes: &[GaussianChange],
+        progress: &dyn Progress,
+    ) -> Result<Vec<GaussianChange>> {
+        if changes.len() != self.scene.len() {
+            return Err(Error::parameter("changes", changes.len(), "one for each Gaussian"));
         }
-        let light =
-            |canvas: &Canvas, _: usize, _: Tile| canvas.blocks.map(|column| column.map(|block| block.colour));
-        self.apply(&Radiance::of_colours(colours), light, progress)
+        self.apply(
+            #[inline(always)]
+            |canvas, trace, _, tile| changed(canvas, trace, tile, changes),
+            carried,
+            progress,
+        )
     }
 
-    /// The adjoint of A times `light`, which is worked out for each tile of each view after it was drawn.
-    fn apply<const N: usize>(
+    /// What `carry` makes of `light`, which is worked out for each tile of each view after it was drawn.
+    fn apply<const N: usize, const M: usize>(
         &mut self,
-        radiance: &Radiance<'_>,
-        light: impl Fn(&Canvas, usize, Tile) -> Light<N> + Sync,
+        light: impl Fn(&Canvas, &Trace, usize, Tile) -> Light<M> + Sync,
+        carry: impl Fn(&Canvas, &Trace, Tile, &Light<M>) -> Vec<(u32, [f32; N])> + Sync,
         progress: &dyn Progress,
     ) -> Result<Vec<[f32; N]>> {
         let simd = Simd::current();
         let mut sums = vec![[0.0_f32; N]; self.scene.len()];
+        let radiance = Radiance::new(&self.scene);
         progress.begin(Stage::Draw, self.cameras.len() as u64);
         for (view, camera) in self.cameras.iter().enumerate() {
             progress.check()?;
@@ -108,7 +128,7 @@ impl<'a> ColourAdjoint<'a> {
             #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
             let share = 1.0 / (width as f32 * height as f32 * self.cameras.len() as f32);
             let Workspace { visible, order, .. } = &mut self.workspace;
-            visible.project(&mut order.keys, simd, self.scene.geometry(), radiance, &projection);
+            visible.project(&mut order.keys, simd, self.scene.geometry(), &radiance, &projection);
             measure_tiles(
                 &mut self.workspace,
                 &self.pool,
@@ -119,7 +139,7 @@ impl<'a> ColourAdjoint<'a> {
                         #[inline(always)]
                         || {
                             canvas.draw_watched::<false>(splats, list, tile, trace);
-                            weighted(trace, tile, &light(canvas, view, tile))
+                            carry(canvas, trace, tile, &light(canvas, trace, view, tile))
                         },
                     )
                 },
@@ -159,32 +179,154 @@ fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     light
 }
 
-/// Returns for each splat in `trace` the sum over pixels of its weight times the `light` there, by the Gaussian's index.
+/// J times `changes` at each pixel of a finished tile.
 #[inline(always)]
-fn weighted<const N: usize>(trace: &Trace, tile: Tile, light: &Light<N>) -> Vec<(u32, [f32; N])> {
-    let mut out = Vec::with_capacity(trace.splats.len());
+fn changed(picture: &Canvas, trace: &Trace, tile: Tile, changes: &[GaussianChange]) -> Light<3> {
+    let mut light = [[[[0.0; LANES]; 3]; BLOCKS]; BLOCKS];
+    each_mark(
+        picture,
+        trace,
+        tile,
+        #[inline(always)]
+        |splat, [column, row], weights, derivatives| {
+            let [red, green, blue, opacity] = changes[splat.gaussian as usize];
+            let light = &mut light[column][row];
+            for (channel, colour) in [red, green, blue].into_iter().enumerate() {
+                [light[channel]] =
+                    each([&light[channel], weights, &derivatives[channel]], |[sum, weight, derivative]| {
+                        [sum + weight * colour + derivative * opacity]
+                    });
+            }
+        },
+    );
+    light
+}
+
+/// The adjoint of J times `light`, of each splat in `trace`, by the Gaussian's index.
+#[inline(always)]
+fn carried(picture: &Canvas, trace: &Trace, tile: Tile, light: &Light<3>) -> Vec<(u32, GaussianChange)> {
+    summed(
+        picture,
+        trace,
+        tile,
+        #[inline(always)]
+        |sums, [column, row], weights, derivatives| {
+            let light = &light[column][row];
+            for channel in 0..3 {
+                sums[channel] = products_added(&sums[channel], weights, &light[channel]);
+                sums[3] = products_added(&sums[3], &derivatives[channel], &light[channel]);
+            }
+        },
+    )
+}
+
+/// [`carried`] for the first three values of `light`; then the sum of weights times the fourth, and that of the squared
+/// derivatives by the opacity.
+#[inline(always)]
+fn carried_with_squares(
+    picture: &Canvas,
+    trace: &Trace,
+    tile: Tile,
+    light: &Light<4>,
+) -> Vec<(u32, [f32; 6])> {
+    summed(
+        picture,
+        trace,
+        tile,
+        #[inline(always)]
+        |sums, [column, row], weights, derivatives| {
+            let light = &light[column][row];
+            for channel in 0..3 {
+                sums[channel] = products_added(&sums[channel], weights, &light[channel]);
+                sums[3] = products_added(&sums[3], &derivatives[channel], &light[channel]);
+                sums[5] = products_added(&sums[5], &derivatives[channel], &derivatives[channel]);
+            }
+            sums[4] = products_added(&sums[4], weights, &light[3]);
+        },
+    )
+}
+
+#[inline(always)]
+fn products_added(sums: &Lanes, a: &Lanes, b: &Lanes) -> Lanes {
+    let [sums] = each([sums, a, b], |[sum, a, b]| [sum + a * b]);
+    sums
+}
+
+/// Sums over the pixels of each splat in `trace`, by the Gaussian's index. `add` adds those of one block.
+#[inline(always)]
+fn summed<const N: usize>(
+    picture: &Canvas,
+    trace: &Trace,
+    tile: Tile,
+    mut add: impl FnMut(&mut [Lanes; N], [usize; 2], &Lanes, &[Lanes; 3]),
+) -> Vec<(u32, [f32; N])> {
+    let mut out: Vec<(u32, [f32; N])> = Vec::with_capacity(trace.splats.len());
+    let mut sums = [[0.0_f32; LANES]; N];
+    let mut last = None;
+    each_mark(
+        picture,
+        trace,
+        tile,
+        #[inline(always)]
+        |splat, block, weights, derivatives| {
+            if last != Some(splat.gaussian) {
+                out.extend(last.replace(splat.gaussian).map(|gaussian| (gaussian, take(&mut sums))));
+            }
+            add(&mut sums, block, weights, derivatives);
+        },
+    );
+    out.extend(last.map(|gaussian| (gaussian, take(&mut sums))));
+    out
+}
+
+/// The sums over lanes, which become 0.
+#[inline(always)]
+fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
+    std::mem::replace(sums, [[0.0; LANES]; N]).map(|lanes| lanes.iter().sum())
+}
+
+/// Calls `with` for each mark of `trace`, from front to back: with the splat, the column and row of the block, the splat's
+/// weights there, and the derivatives of the three channels by the logarithm of its opacity.
+///
+/// Without opacity `a` a splat would let through what lies behind it. So the derivative is the weight times the colour,
+/// less `a / (1 - a)` times all that is added behind it. It is 0 where the opacity is cut off at its largest value.
+#[inline(always)]
+fn each_mark(
+    picture: &Canvas,
+    trace: &Trace,
+    tile: Tile,
+    mut with: impl FnMut(&Splat, [usize; 2], &Lanes, &[Lanes; 3]),
+) {
     let mut open: [[Lanes; BLOCKS]; BLOCKS] =
         std::array::from_fn(|column| std::array::from_fn(|row| tile.inside(column, row)));
-    for same in trace.marks.chunk_by(|a, b| a.splat == b.splat) {
-        let mut sums = [[0.0_f32; LANES]; N];
-        for mark in same {
-            let [column, row] = mark.block.map(|k| usize::from(k) % BLOCKS);
-            let (open, light) = (&mut open[column][row], &light[column][row]);
-            for lane in 0..LANES {
-                let alpha = mark.alpha[lane];
-                let left = open[lane] * (1.0 - alpha);
-                let shows = left >= TRANSMITTANCE_MIN;
-                let weight = if shows { alpha * open[lane] } else { 0.0 };
-                open[lane] = if shows { left } else { 0.0 };
-                for channel in 0..N {
-                    sums[channel][lane] += weight * light[channel][lane];
-                }
-            }
+    // What is added from a splat on, and behind it.
+    let mut behind: Light<3> = picture.blocks.map(|column| column.map(|block| block.colour));
+    for mark in &trace.marks {
+        let splat = &trace.splats[mark.splat as usize];
+        let block = mark.block.map(|k| usize::from(k) % BLOCKS);
+        let (open, behind) = (&mut open[block[0]][block[1]], &mut behind[block[0]][block[1]]);
+        let [weights, odds, left] = each([&mark.alpha, open], |[alpha, open]| {
+            let left = open * (1.0 - alpha);
+            let shows = mask(left >= TRANSMITTANCE_MIN);
+            let moves = shows & mask(alpha < ALPHA_MAX);
+            let [weight, odds] = [alpha * open, alpha / (1.0 - alpha)];
+            [(weight, shows), (odds, moves), (left, shows)]
+                .map(|(v, mask)| f32::from_bits(v.to_bits() & mask))
+        });
+        *open = left;
+        let mut derivatives = [[0.0_f32; LANES]; 3];
+        for (channel, colour) in splat.colour.into_iter().enumerate() {
+            [behind[channel], derivatives[channel]] =
+                each([&behind[channel], &weights, &odds], |[behind, weight, odds]| {
+                    let own = weight * colour;
+                    let behind = behind - own;
+                    // Without odds the opacity is cut off, or there is no weight.
+                    let moved = f32::from_bits(own.to_bits() & mask(odds > 0.0));
+                    [behind, moved - odds * behind]
+                });
         }
-        let splat = &trace.splats[same[0].splat as usize];
-        out.push((splat.gaussian, sums.map(|lanes| lanes.iter().sum())));
+        with(splat, block, &weights, &derivatives);
     }
-    out
 }
 
 #[cfg(test)]
@@ -196,50 +338,123 @@ mod tests {
     use crate::cpu::{RenderOptions, render};
     use crate::orbit::orbit;
 
-    fn dot(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
+    /// The opacity of every Gaussian of the test's scenes is moved to below this, so that none is cut off.
+    const MOST_OPAQUE: f32 = 0.9;
+
+    fn drawn(splats: &Splats, cameras: &[Camera]) -> Vec<Image> {
+        let picture = |camera| render(&Scene::from(splats), camera, &RenderOptions::default()).unwrap();
+        cameras.iter().map(picture).collect()
+    }
+
+    fn logit(x: f32) -> f32 {
+        (x / (1.0 - x)).ln()
+    }
+
+    fn opacity(logit: f32) -> f32 {
+        1.0 / (1.0 + (-logit).exp())
+    }
+
+    /// `splats` with `share` of `changes` made to colours and opacities.
+    fn with(splats: &Splats, changes: &[GaussianChange], share: f32) -> Splats {
+        let mut moved = splats.clone();
+        let g = &mut moved.geometry;
+        for (i, change) in changes.iter().enumerate() {
+            g.dc[i].iter_mut().zip(change).for_each(|(dc, v)| *dc += share * v / lexisplat::sh::C0);
+            g.opacities[i] = logit(opacity(g.opacities[i]) * (share * change[3]).exp());
+        }
+        moved
+    }
+
+    fn dot<const N: usize>(a: &[[f32; N]], b: &[[f32; N]]) -> f64 {
         a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
     }
 
-    /// A scene of one colour from everywhere, and the pictures of it.
-    fn flat(splats: &Splats, colours: &[[f32; 3]]) -> Splats {
-        let mut flat = splats.with_degree_cut(lexisplat::ShDegree::ZERO);
-        let dc = |c: &[f32; 3]| c.map(|v| (v - lexisplat::sh::COLOUR_OFFSET) / lexisplat::sh::C0);
-        flat.geometry.dc = colours.iter().map(dc).collect();
-        flat
+    fn sample() -> (Splats, Vec<Camera>) {
+        let mut splats = scene(&SampleOptions::new(400, 3));
+        for i in 0..splats.len() {
+            let g = &mut splats.geometry;
+            g.opacities[i] = g.opacities[i].min(logit(MOST_OPAQUE));
+            // Nothing is cut off at 0, and little of the pictures at 1.
+            splats.geometry.dc[i] = splats.geometry.dc[i].map(|v| 0.4 * v);
+        }
+        let splats = splats.with_degree_cut(lexisplat::ShDegree::ZERO);
+        let cameras = orbit(&splats.geometry, 3, 70, 50);
+        (splats, cameras)
     }
 
-    /// `<x, A* A x>` is the sum of squares of the pictures of x, which the renderer draws too.
+    /// `<x, J* J y>` is the product of the changes of the pictures that x and y make, for changes of colours, of
+    /// opacities, and of both.
     #[test]
     fn products_agree_with_pictures() {
-        let splats = scene(&SampleOptions::new(400, 3));
-        let colours: Vec<[f32; 3]> =
-            splats.geometry.positions.iter().map(|p| p.map(|v| (v * 3.0).sin().abs() * 0.3)).collect();
-        let cameras = orbit(&splats.geometry, 3, 70, 50);
-        let drawn = flat(&splats, &colours);
-        let picture =
-            |camera: &Camera| render(&Scene::from(&drawn), camera, &RenderOptions::default()).unwrap();
-        let pictures: Vec<Image> = cameras.iter().map(picture).collect();
-        let squares: f64 = pictures.iter().map(|image| dot(&image.pixels, &image.pixels)).sum();
-        let pixels = (3 * 70 * 50) as f64;
-        let mut adjoint = ColourAdjoint::new(Scene::from(&drawn), &cameras).unwrap();
-        let product = dot(&adjoint.of_pictures(&colours, &Silent).unwrap(), &colours);
-        assert!((product * pixels / squares - 1.0).abs() < 1e-4, "{product} {squares}");
-        // The errors of a picture against twice itself are that picture, as long as nothing is clamped.
-        let twice = |mut image: Image| {
-            assert!(image.pixels.as_flattened().iter().all(|v| *v < 0.5));
-            image.pixels.as_flattened_mut().iter_mut().for_each(|v| *v *= 2.0);
-            image
+        let (splats, cameras) = sample();
+        let wave = |i: usize, k: f32| ((i as f32) * k).sin() * 0.3;
+        let changes = |colour: f32, opacity: f32| -> Vec<GaussianChange> {
+            (0..splats.len())
+                .map(|i| {
+                    [
+                        wave(i, 1.1) * colour,
+                        wave(i, 2.3) * colour,
+                        wave(i, 0.7) * colour,
+                        wave(i, 1.7) * opacity,
+                    ]
+                })
+                .collect()
         };
-        let targets: Vec<Image> = pictures.into_iter().map(twice).collect();
-        let ColourErrors { errors, row_sums } = adjoint.of_errors(&targets, &Silent).unwrap();
-        let errors = dot(&errors, &colours);
-        assert!((errors / product - 1.0).abs() < 1e-4, "{errors} {product}");
-        let rows = adjoint.of_pictures(&vec![[1.0; 3]; splats.len()], &Silent).unwrap();
-        for (found, row) in row_sums.iter().zip(rows) {
+        let kinds = [changes(1.0, 0.0), changes(0.0, 1.0), changes(0.6, -1.0)];
+        let moved = |changes: &[GaussianChange]| -> Vec<[f32; 3]> {
+            const STEP: f32 = 1.0 / 64.0;
+            let [more, less] = [STEP, -STEP].map(|step| drawn(&with(&splats, changes, step), &cameras));
+            let pixels = more.iter().zip(&less).flat_map(|(a, b)| a.pixels.iter().zip(&b.pixels));
+            pixels.map(|(a, b)| std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * STEP))).collect()
+        };
+        let pictures = kinds.each_ref().map(|changes| moved(changes));
+        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+        let pixels = f64::from(3 * 70 * 50);
+        for (changes, picture) in kinds.iter().zip(&pictures) {
+            let product = adjoint.of_changes(changes, &Silent).unwrap();
+            for (other, other_picture) in kinds.iter().zip(&pictures) {
+                let (found, expected) = (dot(other, &product) * pixels, dot(other_picture, picture));
+                let size = (dot(picture, picture) * dot(other_picture, other_picture)).sqrt();
+                // Splats begin to show where their opacity rises above 1/255, which J does not know.
+                assert!((found - expected).abs() < 0.02 * size, "{found} {expected} {size}");
+            }
+        }
+        assert!(adjoint.of_changes(&kinds[0][1..], &Silent).is_err());
+    }
+
+    /// The adjoint of the errors of pictures is half the negative gradient of their squares.
+    #[test]
+    fn errors_are_carried_back() {
+        let (splats, cameras) = sample();
+        let changes: Vec<GaussianChange> =
+            (0..splats.len()).map(|i| [0.1, 0.05, -0.05, 0.1 * (i % 3) as f32]).collect();
+        let targets = drawn(&with(&splats, &changes, 0.5), &cameras);
+        let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+        let PictureErrors { errors, row_sums, opacity_squares } =
+            adjoint.of_errors(&targets, &Silent).unwrap();
+        let squares = |share: f32| -> f64 {
+            let pictures = drawn(&with(&splats, &changes, share), &cameras);
+            let pairs = pictures.iter().zip(&targets).flat_map(|(a, b)| a.pixels.iter().zip(&b.pixels));
+            let off = |(a, b): (&[f32; 3], &[f32; 3])| -> f64 {
+                (0..3).map(|c| f64::from(a[c].clamp(0.0, 1.0) - b[c].clamp(0.0, 1.0)).powi(2)).sum()
+            };
+            pairs.map(off).sum()
+        };
+        let slope = (squares(-1.0 / 64.0) - squares(1.0 / 64.0)) * 32.0 / 2.0 / f64::from(3 * 70 * 50);
+        let found = dot(&errors, &changes);
+        assert!((found / slope - 1.0).abs() < 0.02, "{found} {slope}");
+        let colours = vec![[1.0, 1.0, 1.0, 0.0]; splats.len()];
+        for (found, row) in row_sums.iter().zip(adjoint.of_changes(&colours, &Silent).unwrap()) {
             // The last light of a finished pixel, 1e-4 at most, counts as a weight.
             assert!((found - row[0]).abs() <= 1e-3 * row[0], "{found} {row:?}");
         }
+        // One Gaussian at a time finds the diagonal.
+        for gaussian in (0..splats.len()).step_by(37) {
+            let mut one = vec![[0.0; 4]; splats.len()];
+            one[gaussian][3] = 1.0;
+            let diagonal = adjoint.of_changes(&one, &Silent).unwrap()[gaussian][3];
+            assert!((opacity_squares[gaussian] - diagonal).abs() <= 1e-4 * diagonal, "{gaussian}");
+        }
         assert!(adjoint.of_errors(&targets[1..], &Silent).is_err());
-        assert!(adjoint.of_pictures(&colours[1..], &Silent).is_err());
     }
 }

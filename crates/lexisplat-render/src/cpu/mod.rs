@@ -38,7 +38,7 @@ use crate::parallel::*;
 use crate::radiance::Radiance;
 use crate::scene::Scene;
 
-pub use adjoint::{ColourAdjoint, ColourErrors};
+pub use adjoint::{GaussianChange, PictureAdjoint, PictureErrors};
 use blend::{Canvas, Tile};
 #[cfg(feature = "gpu")]
 pub(crate) use change::carry;

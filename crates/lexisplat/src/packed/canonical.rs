@@ -13,7 +13,7 @@ const MAX_LOG_SCALE: f32 = 40.0;
 /// Gaussian. With its scale limited to [`MAX_LOG_SCALE`] it might be drawn, so it is made invisible.
 const MAX_DRAWN_LOG_SCALE: f32 = 44.361_42;
 /// Smallest logarithm of an opacity. The exponential of a smaller one is about 0 in f32.
-const MIN_LOG_OPACITY: f32 = -100.0;
+pub(super) const MIN_LOG_OPACITY: f32 = -100.0;
 /// Cells along the longest side of the bulk, for each Gaussian in it.
 const CELLS_PER_GAUSSIAN: f64 = 3000.0;
 /// Share of the Gaussians at either end of each axis that are not part of the bulk.

@@ -19,7 +19,7 @@ use crate::support::maths::{
 /// zero. The value nearer to zero takes fewer bits.
 const DEAD_ZONE: f32 = 0.08;
 /// Largest logarithm of an opacity. Its exponential, 0.9999, counts as opaque.
-const MAX_LOG_OPACITY: f32 = -1e-4;
+pub(super) const MAX_LOG_OPACITY: f32 = -1e-4;
 /// Largest difference, in steps.
 const MAX_STEPS: f32 = 1e9;
 /// Largest number of bits of each coordinate of an axis, and of a turn.

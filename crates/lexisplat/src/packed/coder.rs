@@ -2,6 +2,7 @@
 
 use half::f16;
 
+use super::appearance::Appearance;
 use super::canonical::{MortonKey, canonical};
 use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
@@ -46,8 +47,8 @@ pub(super) struct View<'a> {
     pub(super) scene: &'a [MortonKey],
     /// Colour and shape class of each, in this order.
     pub(super) classes: &'a [[u8; 2]],
-    /// SH coefficients of degree 0 of each, in this order, instead of those of `splats`.
-    pub(super) base_colours: Option<&'a [[f32; 3]]>,
+    /// What each shows, in this order, instead of the base colours and opacities of `splats`.
+    pub(super) appearances: Option<&'a [Appearance]>,
 }
 
 impl<'a> View<'a> {
@@ -57,7 +58,7 @@ impl<'a> View<'a> {
             splats: self.splats,
             scene: &self.scene[range.clone()],
             classes: &self.classes[range.clone()],
-            base_colours: self.base_colours.map(|colours| &colours[range]),
+            appearances: self.appearances.map(|all| &all[range]),
         }
     }
 
@@ -200,8 +201,9 @@ impl ChunkCoder {
         for i in 0..view.len() {
             let placed = view.scene[i];
             let mut form = canonical(&view.splats.geometry, placed.index());
-            if let Some(colours) = view.base_colours {
-                form.dc = colours[i];
+            if let Some(appearances) = view.appearances {
+                let Appearance { dc, log_opacity } = appearances[i];
+                (form.dc, form.log_opacity) = (dc, log_opacity);
             }
             let classes = view.classes[i];
             let mut target = GaussianValues { cell: placed.cell, classes, form, code: &[], exact: &[] };

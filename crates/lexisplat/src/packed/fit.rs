@@ -50,8 +50,7 @@ impl Fit {
         scene: &[MortonKey],
         grid: &Grid,
     ) -> Self {
-        let weights = |g: &MortonKey| [sensitivity.colour[g.index()], sensitivity.opacity[g.index()]];
-        let weights: Vec<[f32; 2]> = scene.iter().map(weights).collect();
+        let weights: Vec<[f32; 2]> = scene.iter().map(|g| sensitivity.appearance(g.index())).collect();
         let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
         let classes = classes_of(kinds, &weights);
         let (dc_mean, dc_axes) = colour_axes(geometry, scene);

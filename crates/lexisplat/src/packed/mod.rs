@@ -7,6 +7,7 @@
 //! `encoding.rs` packs a scene whole or in parts. `chunk_codec.rs` goes over the Gaussians of a chunk; encoder and
 //! decoder share it.
 
+mod appearance;
 mod bits;
 mod canonical;
 mod chunk_codec;
@@ -41,6 +42,7 @@ pub(crate) use removal::{changes_without, is_worth_its_bits};
 pub(crate) use scene::SpilledPacked;
 pub(crate) use stream::BitCounts;
 
+pub use appearance::Appearance;
 pub use pack::{PackOptions, Packer};
 pub use parts::Refit;
 pub use preset::Preset;

@@ -38,7 +38,7 @@ pub struct PackOptions {
     pub atoms: Option<usize>,
     /// Store each Gaussian's place in the source. Then none is left out.
     pub keep_order: bool,
-    /// Leave no Gaussian out and keep base colours. A tolerance does so too.
+    /// Leave no Gaussian out, and keep base colours and opacities. A tolerance does so too.
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
@@ -53,7 +53,7 @@ impl PackOptions {
         with_seed(seed: u64),
     );
 
-    /// Whether Gaussians may be left out, and base colours changed to make up for errors.
+    /// Whether Gaussians may be left out, and base colours and opacities changed to make up for errors.
     #[must_use]
     pub fn may_change(&self) -> bool {
         !self.keep_all && !self.keep_order && self.tolerance.is_none()
@@ -132,7 +132,7 @@ impl<S: Borrow<Splats>> Packer<S> {
         self.quantise(step, true, progress)?.finish(None, progress)
     }
 
-    /// Settles everything that does not depend on base colours, with an overall step as in [`Self::pack`]. Without a
+    /// Settles everything that does not depend on base colours and opacities, with an overall step as in [`Self::pack`]. Without a
     /// `floor` under what is visible the file can be smaller than the floor allows.
     ///
     /// Gaussians that show less than their bits are worth are left out, unless the options or the sensitivity keep
@@ -149,7 +149,7 @@ impl<S: Borrow<Splats>> Packer<S> {
         let kept = self.weights.kept(step);
         let scene: Vec<MortonKey> = kept.iter().map(|&i| self.scene[i]).collect();
         let classes: Vec<[f32; 2]> = kept.iter().map(|&i| self.fit.classes[i]).collect();
-        let colour = kept.iter().map(|&i| self.weights.colour[i]).collect();
+        let weights = kept.iter().map(|&i| self.weights.shown[i]).collect();
         let geometry = &self.splats.borrow().geometry;
         let floor = match floor {
             true => Floor::new(parameters, geometry, &scene),
@@ -161,7 +161,7 @@ impl<S: Borrow<Splats>> Packer<S> {
             &self.options,
             scene,
             classes,
-            colour,
+            weights,
             floor.parameters,
             progress,
         )

@@ -1,5 +1,6 @@
 //! Packing a scene that comes part after part, in the order of the file.
 
+use super::appearance::Appearance;
 use super::canonical::{Grid, MortonKey};
 use super::coder::{ChunkCoder, View};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk};
@@ -38,9 +39,10 @@ pub(crate) struct Whole {
     pub(crate) step: f64,
 }
 
-/// Fits the base colours of a part of a scene. Takes all Gaussians of the part, what a file has of them, and for each
-/// that the file has its sensitivity to colour. Returns the SH coefficients of degree 0 of those.
-pub type Refit<'a, E = Error> = dyn FnMut(&Splats, &Model, &[f32]) -> Result<Vec<[f32; 3]>, E> + 'a;
+/// Fits base colours and opacities of a part of a scene. Takes all Gaussians of the part, what a file has of them, and for
+/// each that the file has its sensitivities to the colour and to the logarithm of the opacity. Returns what fits, for each
+/// that the file has.
+pub type Refit<'a, E = Error> = dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Vec<Appearance>, E> + 'a;
 
 /// Gaussians that are neighbours in the file. All slices have one entry for each.
 #[derive(Debug, Clone, Copy)]
@@ -96,7 +98,7 @@ impl PartPacker {
         let clock = Stopwatch::start();
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&classes, &sample.geometry, &scene);
-        let view = View { splats: sample, scene: &scene, classes: &classes, base_colours: None };
+        let view = View { splats: sample, scene: &scene, classes: &classes, appearances: None };
         let coder = ChunkCoder::new(view, total, floor.parameters.clone(), options, progress)?;
         progress.check()?;
         let encoding = Encoding::new(coder, clock);
@@ -116,8 +118,8 @@ impl PartPacker {
         })
     }
 
-    /// Codes the Gaussians of `part` that stay: whole chunks, unless they are the last ones. `refit` fits their base colours
-    /// if those may change. Advances `progress` by their number. The caller has checked the part.
+    /// Codes the Gaussians of `part` that stay: whole chunks, unless they are the last ones. `refit` fits what they
+    /// show if that may change. Advances `progress` by their number. The caller has checked the part.
     pub(crate) fn push<E: From<Error>>(
         &mut self,
         part: Part<'_>,
@@ -134,15 +136,14 @@ impl PartPacker {
             .collect();
         let weights: Vec<[f32; 2]> = kept().map(|i| part.weights[i]).collect();
         let classes = self.floor.classes(&self.fit.classes_of(&weights), &splats.geometry, &scene);
-        let colour_weights = weights.iter().map(|w| w[0]).collect();
         let (options, blank) = (&self.options, self.blank.clone());
-        let quantised = Quantised::of_part(splats, options, scene, classes, colour_weights, blank, progress)?;
-        let mut colours = None;
+        let quantised = Quantised::of_part(splats, options, scene, classes, weights, blank, progress)?;
+        let mut appearances = None;
         if let Some(refit) = refit.filter(|_| options.may_change()) {
             let model = quantised.finish(None, progress)?.0.unpack()?;
-            colours = Some(refit(splats, &model, quantised.colour_weights())?);
+            appearances = Some(refit(splats, &model, quantised.weights())?);
         }
-        let view = quantised.view(colours.as_deref())?;
+        let view = quantised.view(appearances.as_deref())?;
         for chunk in quantised.each_chunk(view, progress, |tally, symbols| (tally, symbols)) {
             let (tally, symbols) = chunk?;
             self.encoding.counts.add(&Counts::of(tally, &symbols));

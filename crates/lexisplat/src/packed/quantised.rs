@@ -1,6 +1,7 @@
-//! A scene at one overall step, ready to be written with any base colours.
+//! A scene at one overall step, ready to be written with any base colours and opacities.
 
 use super::CHUNK;
+use super::appearance::Appearance;
 use super::canonical::MortonKey;
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, View};
@@ -12,7 +13,7 @@ use super::reorder::gather;
 use super::scene::Packed;
 use super::stream::SymbolEncoder;
 use crate::scene::extra::{Extra, for_extra};
-use crate::scene::splats::{Splats, all_finite};
+use crate::scene::splats::Splats;
 use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_chunks;
@@ -21,7 +22,7 @@ use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
 /// A scene at one overall step: which Gaussians stay, steps, dictionary and codes are settled. [`Self::finish`] makes the
-/// file with the scene's own base colours or with others, which change nothing else.
+/// file with the scene's own base colours and opacities or with others, which change nothing else.
 #[derive(Debug)]
 pub struct Quantised<'a> {
     splats: &'a Splats,
@@ -29,8 +30,8 @@ pub struct Quantised<'a> {
     scene: Vec<MortonKey>,
     /// Colour and shape class of each Gaussian.
     classes: Vec<[u8; 2]>,
-    /// Sensitivity to the colour of each.
-    colour_weights: Vec<f32>,
+    /// Sensitivities of each to its colour and to the logarithm of its opacity.
+    weights: Vec<[f32; 2]>,
     codes: Vec<Codes>,
     encoding: Encoding,
 }
@@ -41,18 +42,18 @@ impl<'a> Quantised<'a> {
         options: &'a PackOptions,
         scene: Vec<MortonKey>,
         classes: Vec<[u8; 2]>,
-        colour_weights: Vec<f32>,
+        weights: Vec<[f32; 2]>,
         parameters: Parameters,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = scene.len();
-        let view = View { splats, scene: &scene, classes: &classes, base_colours: None };
+        let view = View { splats, scene: &scene, classes: &classes, appearances: None };
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, parameters, options, progress)?;
         let encoding = Encoding::new(coder, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
-        let mut whole = Self::of_part(splats, options, scene, classes, colour_weights, encoding, progress)?;
+        let mut whole = Self::of_part(splats, options, scene, classes, weights, encoding, progress)?;
         progress.end();
         whole.encoding.end_learning();
         Ok(whole)
@@ -64,13 +65,13 @@ impl<'a> Quantised<'a> {
         options: &'a PackOptions,
         scene: Vec<MortonKey>,
         classes: Vec<[u8; 2]>,
-        colour_weights: Vec<f32>,
+        weights: Vec<[f32; 2]>,
         encoding: Encoding,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let view = View { splats, scene: &scene, classes: &classes, base_colours: None };
+        let view = View { splats, scene: &scene, classes: &classes, appearances: None };
         let codes = codes_of(&encoding.coder, view, progress)?;
-        Ok(Self { splats, options, scene, classes, colour_weights, codes, encoding })
+        Ok(Self { splats, options, scene, classes, weights, codes, encoding })
     }
 
     /// Number of Gaussians of the file.
@@ -85,25 +86,25 @@ impl<'a> Quantised<'a> {
         self.scene.is_empty()
     }
 
-    /// Sensitivity to the colour of each Gaussian, in the order of the file.
+    /// Sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the file.
     #[must_use]
-    pub fn colour_weights(&self) -> &[f32] {
-        &self.colour_weights
+    pub fn weights(&self) -> &[[f32; 2]] {
+        &self.weights
     }
 
-    /// Makes the file, with the scene's own base colours or with these: SH coefficients of degree 0, one row for each
-    /// Gaussian in the order of the file.
+    /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
+    /// order of the file.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if there are more or fewer rows than Gaussians, if values are not finite, or if sums of
-    /// them leave f32; [`Error::Cancelled`].
+    /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
+    /// above 1, or if sums of values leave f32; [`Error::Cancelled`].
     pub fn finish(
         &self,
-        base_colours: Option<&[[f32; 3]]>,
+        appearances: Option<&[Appearance]>,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
-        let view = self.view(base_colours)?;
+        let view = self.view(appearances)?;
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.
@@ -122,16 +123,16 @@ impl<'a> Quantised<'a> {
         Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
     }
 
-    /// The Gaussians with the scene's own base colours or with these, which are refused as [`Self::finish`] says.
-    pub(super) fn view<'v>(&'v self, base_colours: Option<&'v [[f32; 3]]>) -> Result<View<'v>> {
+    /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
+    pub(super) fn view<'v>(&'v self, appearances: Option<&'v [Appearance]>) -> Result<View<'v>> {
         let n = self.len();
-        if let Some(colours) = base_colours {
-            if colours.len() != n {
-                return Err(Error::parameter("base colours", colours.len(), format!("{n} rows")));
+        if let Some(all) = appearances {
+            if all.len() != n {
+                return Err(Error::parameter("appearances", all.len(), format!("{n} entries")));
             }
-            all_finite([("base colours", colours.as_flattened())])?;
+            all.iter().try_for_each(Appearance::check)?;
         }
-        Ok(View { splats: self.splats, scene: &self.scene, classes: &self.classes, base_colours })
+        Ok(View { splats: self.splats, scene: &self.scene, classes: &self.classes, appearances })
     }
 
     /// What `with` makes of the counts and the symbols of each chunk of `view`.
@@ -179,39 +180,44 @@ mod tests {
     use crate::{Sensitivity, Silent};
 
     #[test]
-    fn other_base_colours_change_nothing_else() {
+    fn other_appearances_change_nothing_else() {
         let splats = crate::support::testing::scene(700, 5);
         let sensitivity = Sensitivity::heuristic(&splats.geometry);
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
-        let file = |colours| quantised.finish(colours, &Silent).unwrap().0.unpack().unwrap();
+        let file = |shown| quantised.finish(shown, &Silent).unwrap().0.unpack().unwrap();
         let own = file(None);
         assert!(own == packer.pack(1e-5, &Silent).unwrap().0.unpack().unwrap());
-        let colours: Vec<[f32; 3]> = own.geometry().dc.iter().map(|dc| dc.map(|v| v + 0.5)).collect();
-        let other = file(Some(&colours));
-        let off = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f32::max);
-        let farthest = other.geometry().dc.iter().zip(&colours).map(off).fold(0.0, f32::max);
-        assert!(farthest < 0.1, "{farthest}");
-        let mut mixed = other.into_splats();
-        mixed.geometry.dc.clone_from(&own.geometry().dc);
-        assert_eq!(mixed, own.into_splats());
+        let mut expected = own.clone().into_splats();
+        for i in 0..own.len() {
+            let Appearance { dc, log_opacity } = Appearance::of(own.geometry(), i);
+            Appearance { dc: dc.map(|v| v + 0.5), log_opacity: log_opacity - 0.4 }
+                .give(&mut expected.geometry, i);
+        }
+        let shown: Vec<Appearance> = (0..own.len()).map(|i| Appearance::of(&expected.geometry, i)).collect();
+        let mut other = file(Some(&shown)).into_splats();
+        for (i, wanted) in shown.iter().enumerate() {
+            let found = Appearance::of(&other.geometry, i);
+            assert!((0..3).all(|k| (found.dc[k] - wanted.dc[k]).abs() < 0.1), "{found:?} {wanted:?}");
+            assert!((found.log_opacity - wanted.log_opacity).abs() < 0.2, "{found:?} {wanted:?}");
+        }
+        other.geometry.dc.clone_from(&expected.geometry.dc);
+        other.geometry.opacities.clone_from(&expected.geometry.opacities);
+        assert_eq!(other, expected);
     }
 
     #[test]
-    fn base_colours_that_do_not_fit_are_refused() {
+    fn appearances_that_do_not_fit_are_refused() {
         let splats = crate::support::testing::scene(50, 5);
         let sensitivity = Sensitivity::heuristic(&splats.geometry);
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
-        assert_eq!(
-            (quantised.len(), quantised.colour_weights().len(), quantised.is_empty()),
-            (50, 50, false)
-        );
-        let refused =
-            |colours: &[[f32; 3]]| quantised.finish(Some(colours), &Silent).unwrap_err().to_string();
-        assert!(refused(&[[0.0; 3]; 49]).contains("50 rows"));
-        assert!(refused(&[[f32::NAN; 3]; 50]).contains("NaN"));
+        assert_eq!((quantised.len(), quantised.weights().len(), quantised.is_empty()), (50, 50, false));
+        let refused = |shown: &[Appearance]| quantised.finish(Some(shown), &Silent).unwrap_err().to_string();
+        let good = Appearance { dc: [0.0; 3], log_opacity: -1.0 };
+        assert!(refused(&[good; 49]).contains("50 entries"));
+        assert!(refused(&[Appearance { dc: [f32::NAN; 3], ..good }; 50]).contains("NaN"));
     }
 }

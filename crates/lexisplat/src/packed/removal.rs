@@ -53,8 +53,8 @@ pub(crate) fn is_worth_its_bits(change: f32, step: f64) -> bool {
 /// How much pictures depend on each Gaussian as a whole.
 #[derive(Debug)]
 pub(super) struct Weights {
-    /// Sensitivity to the colour.
-    pub(super) colour: Vec<f32>,
+    /// Sensitivities to the colour and to the logarithm of the opacity.
+    pub(super) shown: Vec<[f32; 2]>,
     /// As [`changes_without`].
     left_out: Vec<f32>,
 }
@@ -70,7 +70,7 @@ impl Weights {
     ) -> Self {
         let left_out = changes_without(geometry, sensitivity, may_change);
         Self {
-            colour: scene.iter().map(|g| sensitivity.colour[g.index()]).collect(),
+            shown: scene.iter().map(|g| sensitivity.appearance(g.index())).collect(),
             left_out: scene.iter().map(|g| left_out[g.index()]).collect(),
         }
     }

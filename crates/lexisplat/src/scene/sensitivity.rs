@@ -75,6 +75,15 @@ impl Sensitivity {
         self.colour.is_empty()
     }
 
+    /// Sensitivities of Gaussian `i` to its colour and to the logarithm of its opacity.
+    ///
+    /// # Panics
+    /// If there is no Gaussian `i`.
+    #[must_use]
+    pub fn appearance(&self, i: usize) -> [f32; 2] {
+        [self.colour[i], self.opacity[i]]
+    }
+
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     ///
     /// # Panics

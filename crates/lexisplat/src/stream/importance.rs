@@ -18,7 +18,7 @@ pub enum Importance<'a, E = Error> {
     Judge {
         /// Measures how pictures of a part depend on its values. It is called once for each part, in order.
         judge: &'a mut dyn FnMut(&Splats) -> Result<Sensitivity, E>,
-        /// Fits base colours to pictures of a part, if the options let them change. The parts are not those that
+        /// Fits base colours and opacities to pictures of a part, if the options let them change. The parts are not those that
         /// `judge` takes.
         refit: Option<&'a mut Refit<'a, E>>,
         /// Name of the GPU that draws, which the file records; `None` for the CPU renderer.
@@ -44,7 +44,7 @@ impl<'a, E> Importance<'a, E> {
         }
     }
 
-    /// What fits base colours, if anything does.
+    /// What fits base colours and opacities, if anything does.
     pub(super) fn refit(&mut self) -> Option<&mut Refit<'a, E>> {
         match self {
             Self::Heuristic => None,

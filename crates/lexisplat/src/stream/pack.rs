@@ -99,7 +99,7 @@ fn run<E: From<Error>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::Packer;
+    use crate::packed::{Appearance, Packer};
     use crate::scene::sensitivity::heuristic_total;
     use crate::stream::importance::SHOWN;
     use crate::{Extra, ExtraValues, Model, Silent, lexi, ply};
@@ -214,16 +214,21 @@ mod tests {
     }
 
     #[test]
-    fn base_colours_are_fitted_part_by_part() {
+    fn appearances_are_fitted_part_by_part() {
         let options = PackOptions { keep_order: false, ..options() };
         let splats = scene(CHUNK + 9000);
         let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-        let others =
-            |model: &Model| model.geometry().dc.iter().map(|dc| dc.map(|v| v + 0.5)).collect::<Vec<_>>();
+        let others = |model: &Model| -> Vec<Appearance> {
+            let moved = |i| {
+                let Appearance { dc, log_opacity } = Appearance::of(model.geometry(), i);
+                Appearance { dc: dc.map(|v| v + 0.5), log_opacity: log_opacity - 0.3 }
+            };
+            (0..model.len()).map(moved).collect()
+        };
         let sizes = Sizes { sample: splats.len(), looked_at: splats.len(), ..SIZES };
         let fitted = |options: &PackOptions, sizes: Sizes| {
             let mut judge = |part: &Splats| Ok(shown(part, total));
-            let mut refit = |part: &Splats, model: &Model, weights: &[f32]| {
+            let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
                 // The part has what the file leaves out, and the rest is in order.
                 assert!(part.len() > model.len() || options.keep_order);
                 assert_eq!(model.len(), weights.len());
@@ -237,8 +242,8 @@ mod tests {
             let packer = Packer::new(&splats, &sensitivity, options).unwrap();
             let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
             let model = quantised.finish(None, &Silent).unwrap().0.unpack().unwrap();
-            let colours = fitted.then(|| others(&model));
-            let (packed, _) = quantised.finish(colours.as_deref(), &Silent).unwrap();
+            let shown = fitted.then(|| others(&model));
+            let (packed, _) = quantised.finish(shown.as_deref(), &Silent).unwrap();
             let mut bytes = Vec::new();
             LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
             bytes
