@@ -1,7 +1,7 @@
 //! The program as a user runs it.
 
 use crate::folder::{Folder, GAUSSIANS, lexisplat, read};
-use lexisplat::ply;
+use lexisplat::{Extra, ExtraValues, ply};
 use lexisplat_sample::{SampleOptions, scene};
 use serde_json::Value;
 
@@ -230,6 +230,29 @@ fn invalid_gaussians_are_refused_or_dropped() {
     let report = folder.json(&["compress", "nan.ply", "--drop-invalid"]);
     assert_eq!(report["gaussians"], 58);
     assert!(report["warnings"].to_string().contains('2'), "{report}");
+}
+
+#[test]
+fn extra_properties_are_kept_or_dropped() {
+    let folder = Folder::new();
+    let mut splats = scene(&SampleOptions::new(60, 0));
+    let values = ExtraValues::U32((0..60).collect());
+    splats.geometry.extras = vec![Extra { name: "label".into(), values }];
+    ply::write(&folder.path("labelled.ply"), &splats).unwrap();
+    let properties = |options: &[&str]| {
+        let report =
+            folder.json(&[&["compress", "labelled.ply", "-o", "l.lexi", "--overwrite"], options].concat());
+        folder.run(&["decompress", "l.lexi", "-o", "l.ply", "--overwrite"]);
+        let header = std::fs::read(folder.path("l.ply")).unwrap();
+        let kept = String::from_utf8_lossy(&header).contains("property uint label");
+        (kept, report["warnings"].to_string())
+    };
+    for layout in ["packed", "f16"] {
+        let (kept, said) = properties(&["--layout", layout]);
+        assert!(kept && said.contains("extra properties kept: label"), "{said}");
+        let (kept, said) = properties(&["--layout", layout, "--drop-extras"]);
+        assert!(!kept && said.contains("extra properties dropped: label"), "{said}");
+    }
 }
 
 #[test]

@@ -99,6 +99,10 @@ pub(crate) struct Compress {
     /// Remove Gaussians with NaN or infinite values. Without this option such a file is refused.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
+    /// Leave out properties that 3DGS does not define. Otherwise they are kept as they are, and a column of floats can
+    /// take half of a packed file.
+    #[arg(long)]
+    pub(crate) drop_extras: bool,
     /// Estimate how much each Gaussian shows from its own values instead of drawing the scene. This is several times
     /// faster and makes larger files of the same quality. The only target is then --preset.
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene"])]

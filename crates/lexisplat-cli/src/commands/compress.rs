@@ -46,7 +46,10 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
 
     let (name, bytes) = input(&args.input, common)?;
-    let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
+    let read = ReadOptions::default()
+        .with_drop_invalid(args.drop_invalid)
+        .with_drop_extras(args.drop_extras)
+        .with_limits(limits);
     let bars = Bars::new(common.quiet);
     let whole = compression.holds_whole(bytes.len() as u64);
     let open = if whole { PlySource::open_whole } else { PlySource::open };

@@ -90,6 +90,12 @@ fn every_dialect_is_the_same_scene() {
                         .map(|n| Extra { name: n.to_owned(), values: bytes_of(&mut file, n) })
                         .collect();
                     assert_eq!(found.warnings, ["extra properties kept: red, green, blue"], "{what}");
+                    let without = ReadOptions::default().with_drop_extras(true);
+                    let without = ply::read_bytes(name, &file.bytes(), &without).unwrap();
+                    assert_eq!(without.warnings, ["extra properties dropped: red, green, blue"], "{what}");
+                    let mut plain = expected.clone();
+                    plain.geometry.extras.clear();
+                    assert_same(&without.splats, &plain, &what);
                 } else if name == "doubles" {
                     assert_eq!(found.warnings.len(), 1, "{what}");
                     assert!(found.warnings[0].starts_with("converted to 32-bit float: x (double)"), "{what}");

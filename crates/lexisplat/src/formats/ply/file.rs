@@ -32,7 +32,8 @@ impl<'a> PlyFile<'a> {
     /// Reads the header of `bytes`, which messages call `name`.
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
         let header = Header::parse(name, bytes, &options.limits)?;
-        let layout = Layout::new(&header).map_err(|problem| Error::format(name, problem))?;
+        let layout =
+            Layout::new(&header, options.drop_extras).map_err(|problem| Error::format(name, problem))?;
         let summary = PlySummary::new(&header, &layout, bytes.len() as u64);
         options.limits.check_gaussians(name, summary.vertices)?;
         let marks = marks(&header.comments);

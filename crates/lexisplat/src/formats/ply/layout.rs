@@ -36,8 +36,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Finds the layout of the vertices of `header`.
-    pub(super) fn new(header: &Header) -> Accepted<Self> {
+    /// Finds the layout of the vertices of `header`, with extras or without.
+    pub(super) fn new(header: &Header, drop_extras: bool) -> Accepted<Self> {
         let vertex = vertex_index(header)?;
         let mut columns = Columns::new(&header.elements[vertex])?;
         refuse_other_kinds(&columns)?;
@@ -67,7 +67,11 @@ impl Layout {
         extras.sort_by_key(|(_, field)| field.offset);
         if !extras.is_empty() {
             let names: Vec<&str> = extras.iter().map(|(name, _)| name.as_str()).collect();
-            warnings.push(format!("extra properties kept: {}", listed(&names)));
+            let what = if drop_extras { "dropped" } else { "kept" };
+            warnings.push(format!("extra properties {what}: {}", listed(&names)));
+        }
+        if drop_extras {
+            extras.clear();
         }
         let groups = [position, normal, dc, rest, opacity, scale, rotation];
         Ok(Self { vertex, row_bytes, degree, groups, extras, warnings })

@@ -19,12 +19,18 @@ use crate::support::progress::Silent;
 pub struct ReadOptions {
     /// Whether to leave out Gaussians with NaN or infinite values instead of refusing the file. Default `false`.
     pub drop_invalid: bool,
+    /// Whether to leave out the properties that 3DGS does not define. Default `false`.
+    pub drop_extras: bool,
     /// How much a file may ask for.
     pub limits: Limits,
 }
 
 impl ReadOptions {
-    builder_methods!(with_drop_invalid(drop_invalid: bool), with_limits(limits: Limits));
+    builder_methods!(
+        with_drop_invalid(drop_invalid: bool),
+        with_drop_extras(drop_extras: bool),
+        with_limits(limits: Limits),
+    );
 }
 
 /// A scene and a description of its file.

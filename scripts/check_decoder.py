@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Decodes .lexi files twice, by decode_lexi.py and by the program, and compares every bit.
+
+    python3 scripts/check_decoder.py LEXISPLAT FILE.lexi ...
+
+LEXISPLAT is the program. Needs NumPy.
+"""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+sys.dont_write_bytecode = True  # no __pycache__ in the working tree
+from decode_lexi import decode, in_source_order  # noqa: E402
+
+TYPES = {"char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4",
+         "double": "<f8"}
+COLUMNS = {
+    "position": ("x", "y", "z"),
+    "dc": ("f_dc_0", "f_dc_1", "f_dc_2"),
+    "opacity": ("opacity",),
+    "scale": ("scale_0", "scale_1", "scale_2"),
+    "rotation": ("rot_0", "rot_1", "rot_2", "rot_3"),
+}
+
+
+def read_ply(path):
+    """Return the columns of a little-endian PLY of one element by name."""
+    data = path.read_bytes()
+    end = data.index(b"end_header\n") + len(b"end_header\n")
+    words = [line.split() for line in data[:end].decode().splitlines()]
+    count = next(int(w[2]) for w in words if w[:2] == ["element", "vertex"])
+    fields = [(w[2], TYPES[w[1]]) for w in words if w[0] == "property"]
+    return np.frombuffer(data[end:], np.dtype(fields), count)
+
+
+def differences(file, program, folder):
+    """Return the names of the columns that differ."""
+    ply = Path(folder) / "decoded.ply"
+    subprocess.run([program, "decompress", "--quiet", "--overwrite", file, "-o", ply], check=True, stderr=subprocess.DEVNULL)
+    theirs = read_ply(ply)
+    _, ours = decode(Path(file).read_bytes())
+    ours = in_source_order(ours)
+    columns = dict(ours["extras"])
+    for name, parts in COLUMNS.items():
+        values = ours[name].reshape(len(ours["position"]), -1)
+        columns.update({part: values[:, k] for k, part in enumerate(parts)})
+    columns.update({f"f_rest_{k}": ours["sh_rest"][:, k] for k in range(ours["sh_rest"].shape[1])})
+    if len(theirs) != len(ours["position"]):
+        return ["number of Gaussians"]
+    missing = set(theirs.dtype.names) - set(columns) - {"nx", "ny", "nz"}
+    return sorted(missing) + [name for name, values in columns.items()
+                              if name not in theirs.dtype.names or values.tobytes() != theirs[name].tobytes()]
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit("usage: check_decoder.py LEXISPLAT FILE.lexi ...")
+    bad = False
+    with tempfile.TemporaryDirectory() as folder:
+        for file in sys.argv[2:]:
+            found = differences(file, sys.argv[1], folder)
+            bad |= bool(found)
+            print(f"{file}: {'differs in ' + ', '.join(found) if found else 'the same'}")
+    sys.exit(bad)
+
+
+if __name__ == "__main__":
+    main()
