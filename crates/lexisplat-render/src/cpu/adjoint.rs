@@ -288,8 +288,9 @@ fn take<const N: usize>(sums: &mut [Lanes; N]) -> [f32; N] {
 /// Calls `with` for each mark of `trace`, from front to back: with the splat, the column and row of the block, the splat's
 /// weights there, and the derivatives of the three channels by the logarithm of its opacity.
 ///
-/// Without opacity `a` a splat would let through what lies behind it. So the derivative is the weight times the colour,
-/// less `a / (1 - a)` times all that is added behind it. It is 0 where the opacity is cut off at its largest value.
+/// A splat of opacity `a` adds its weight times its colour, and leaves `1 - a` of the light to what lies behind it. So the
+/// derivative is the weight times the colour, less `a / (1 - a)` times all that is added behind it. It is 0 where the
+/// opacity is cut off at its largest value.
 #[inline(always)]
 fn each_mark(
     picture: &Canvas,
