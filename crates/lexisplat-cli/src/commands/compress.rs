@@ -19,7 +19,7 @@ use crate::progress::Bars;
 use crate::stop::{self, Work};
 
 /// A preset that falls short of its aim by more than this, in dB, is warned of. The `archive` of flowers, which stays
-/// below its aim by most in docs/results/promise.md, falls short by 2.1.
+/// below its aim by most in docs/results/promise.md, falls short by 2.2.
 const FAR_BELOW: f64 = 3.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {

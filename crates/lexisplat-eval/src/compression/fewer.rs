@@ -34,8 +34,7 @@ pub(super) fn at_most(
         let keep = all_but(share.min(splats.len() - most), &sensitivity.opacity);
         splats.retain(&keep);
         sensitivity.retain(&keep);
-        let weights: Vec<[f32; 2]> = (0..splats.len()).map(|i| sensitivity.appearance(i)).collect();
-        let fitted = fit.appearances(Scene::from(&splats), &weights, progress)?;
+        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), progress)?;
         fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
         sensitivity = views.sensitivity(renderer, &splats, progress)?;
     }

@@ -211,11 +211,7 @@ fn carried(picture: &Canvas, trace: &Trace, tile: Tile, light: &Light<3>) -> Vec
         tile,
         #[inline(always)]
         |sums, [column, row], weights, derivatives| {
-            let light = &light[column][row];
-            for channel in 0..3 {
-                sums[channel] = products_added(&sums[channel], weights, &light[channel]);
-                sums[3] = products_added(&sums[3], &derivatives[channel], &light[channel]);
-            }
+            add_carried(sums, weights, derivatives, &light[column][row]);
         },
     )
 }
@@ -236,14 +232,27 @@ fn carried_with_squares(
         #[inline(always)]
         |sums, [column, row], weights, derivatives| {
             let light = &light[column][row];
-            for channel in 0..3 {
-                sums[channel] = products_added(&sums[channel], weights, &light[channel]);
-                sums[3] = products_added(&sums[3], &derivatives[channel], &light[channel]);
-                sums[5] = products_added(&sums[5], &derivatives[channel], &derivatives[channel]);
-            }
+            add_carried(sums, weights, derivatives, light);
             sums[4] = products_added(&sums[4], weights, &light[3]);
+            for derivatives in derivatives {
+                sums[5] = products_added(&sums[5], derivatives, derivatives);
+            }
         },
     )
+}
+
+/// Adds to the first four of `sums` what one block carries back of the first three values of `light`.
+#[inline(always)]
+fn add_carried<const N: usize, const M: usize>(
+    sums: &mut [Lanes; N],
+    weights: &Lanes,
+    derivatives: &[Lanes; 3],
+    light: &[Lanes; M],
+) {
+    for channel in 0..3 {
+        sums[channel] = products_added(&sums[channel], weights, &light[channel]);
+        sums[3] = products_added(&sums[3], &derivatives[channel], &light[channel]);
+    }
 }
 
 #[inline(always)]

@@ -84,6 +84,12 @@ impl Sensitivity {
         [self.colour[i], self.opacity[i]]
     }
 
+    /// [`Self::appearance`] of all Gaussians.
+    #[must_use]
+    pub fn appearances(&self) -> Vec<[f32; 2]> {
+        (0..self.len()).map(|i| self.appearance(i)).collect()
+    }
+
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     ///
     /// # Panics

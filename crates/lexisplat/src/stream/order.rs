@@ -150,9 +150,7 @@ impl Ordered {
             let splats = self.rows.unpack(&bytes);
             let mut found = importance.of(&splats, self.gaussians, self.heuristic_total)?;
             check(&splats, &found)?;
-            let pairs: Vec<[f32; 2]> =
-                found.colour.iter().zip(&found.opacity).map(|(&c, &o)| [c, o]).collect();
-            weights.push(&pairs)?;
+            weights.push(&found.appearances())?;
             let marks: Vec<u8> = stays(&splats, &found).into_iter().map(u8::from).collect();
             kept += marks.iter().filter(|&&mark| mark == 1).count();
             stay.push(&marks)?;
