@@ -6,6 +6,8 @@ use super::appearance::Appearance;
 use super::canonical::{MortonKey, canonical};
 use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
+use super::layered::Target;
+use super::morton;
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::pack::PackOptions;
 use super::parameters::Parameters;
@@ -188,6 +190,45 @@ impl ChunkCoder {
         let Some(book) = &self.book else { return Codes::default() };
         let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
         book.encode(&rows, &classes, self.stop)
+    }
+
+    /// What is to be coded of all of `view`, and its counts. Base colours are in units of `dc_unit`.
+    pub(super) fn targets(&self, view: View<'_>, codes: &Codes, dc_unit: f64) -> Result<(Tally, Vec<Target>)> {
+        let (parameters, dictionary) = (&self.parameters, &self.dictionary);
+        let dim = dictionary.dim();
+        let mut tally = Tally::new(dim);
+        let mut values: Vec<(u16, f16)> = Vec::new();
+        let mut rebuilt = vec![0.0_f32; dim];
+        let mut targets = Vec::with_capacity(view.len());
+        for i in 0..view.len() {
+            let placed = view.scene[i];
+            let mut form = canonical(&view.splats.geometry, placed.index());
+            if let Some(appearances) = view.appearances {
+                let Appearance { dc, log_opacity } = appearances[i];
+                (form.dc, form.log_opacity) = (dc, log_opacity);
+            }
+            let classes = view.classes[i];
+            let centre = parameters.centre(morton::decode(placed.cell).unwrap_or_default());
+            let mut target = Target::new(&form, placed.cell, centre, classes, parameters, dc_unit);
+            if dim > 0 {
+                resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
+                let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
+                reconstruct(dictionary, pairs, &mut rebuilt);
+                let row = view.row(i);
+                let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+                let error = squares.sum::<f64>().sqrt();
+                let storable = values.iter().all(|v| v.1.is_finite());
+                if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
+                    target.code = codes.row(i).to_vec();
+                    tally.code(values.len(), error, None);
+                } else {
+                    target.exact = row.to_vec();
+                    tally.escapes += 1;
+                }
+            }
+            targets.push(target);
+        }
+        Ok((tally, targets))
     }
 
     /// Codes a chunk, all of `view`. Returns its counts and its symbols; an error if a decoder would refuse them.

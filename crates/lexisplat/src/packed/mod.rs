@@ -18,6 +18,7 @@ mod encoding;
 mod entropy;
 mod fit;
 mod floor;
+pub(crate) mod layered;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;

@@ -10,7 +10,13 @@ pub(super) fn encode(cell: [u32; 3]) -> u64 {
 
 /// Inverse of [`encode`]; `None` for numbers that are not of a cell.
 pub(super) fn decode(code: u64) -> Option<[u32; 3]> {
-    (code >> (3 * BITS) == 0).then(|| [gather(code), gather(code >> 1), gather(code >> 2)])
+    (code >> (3 * BITS) == 0).then(|| gathered(code))
+}
+
+/// The coordinates that the bits of any number make.
+#[inline(always)]
+pub(super) fn gathered(code: u64) -> [u32; 3] {
+    [gather(code), gather(code >> 1), gather(code >> 2)]
 }
 
 const MASKS: [(u32, u64); 5] = [
@@ -25,13 +31,14 @@ fn spread(x: u32) -> u64 {
     MASKS.iter().fold(u64::from(x), |x, &(shift, mask)| (x | (x << shift)) & mask)
 }
 
+#[inline(always)]
 fn gather(code: u64) -> u32 {
     let mut x = code & MASKS[4].1;
     for k in (0..5).rev() {
         let mask = if k == 0 { (1 << BITS) - 1 } else { MASKS[k - 1].1 };
         x = (x | (x >> MASKS[k].0)) & mask;
     }
-    u32::try_from(x).unwrap_or(u32::MAX)
+    (x & u64::from(u32::MAX)) as u32
 }
 
 #[cfg(test)]

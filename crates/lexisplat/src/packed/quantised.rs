@@ -105,6 +105,9 @@ impl<'a> Quantised<'a> {
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
         let view = self.view(appearances)?;
+        if std::env::var_os("LAYERS").is_some() {
+            self.layers(view);
+        }
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.
@@ -121,6 +124,62 @@ impl<'a> Quantised<'a> {
         head.removed = (self.splats.len() - n) as u64;
         let order = self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect());
         Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
+    }
+
+    fn layers(&self, view: View<'_>) {
+        use super::layered::*;
+        let coder = &self.encoding.coder;
+        let parameters = &coder.parameters;
+        let n = view.len();
+        for (levels, least) in [(0, vec![1]), (1, vec![4, 1]), (1, vec![2, 1]), (2, vec![6, 2, 1])] {
+            let steering = Steering::new(&Integers::of(parameters, 1.0));
+            let dim = coder.dictionary.dim();
+            let least = if dim == 0 { vec![] } else { least };
+            let form = Form { steering, levels, rest: RestForm { dim, atoms: coder.dictionary.len(), least: least.clone() } };
+            let mut all = Vec::new();
+            let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
+            let mut raw = vec![0.0; 29];
+            for c in 0..n.div_ceil(CHUNK) {
+                let range = c * CHUNK..n.min((c + 1) * CHUNK);
+                let (_, targets) = coder.targets(view.part(range), &self.codes[c], 1.0).unwrap();
+                let recorded = form.record(&targets).unwrap();
+                for (r, _) in &recorded {
+                    r.each(|context, symbol| histograms[context].add(symbol), |stream, bits| raw[stream] += f64::from(bits));
+                }
+                all.push((targets.len(), recorded));
+            }
+            let tables = Tables::new(&histograms).unwrap();
+            let written = tables.write();
+            let lookup = Lookup::new(&Tables::read(&written).unwrap());
+            let mut sizes = vec![0; form.ranges()];
+            let frame = Frame {
+                origin: parameters.origin, cell: parameters.cell, dc_mean: parameters.dc_mean, dc_axes: parameters.dc_axes, dc_unit: 1.0,
+                value_steps: std::array::from_fn(|c| parameters.value_step(c as u8)),
+            };
+            let mut seconds = 0.0;
+            for (n, recorded) in &all {
+                let lanes = if *n < 4096 { 1 } else { 8 };
+                let bytes: Vec<Vec<u8>> = recorded.iter().map(|r| r.0.finish(&tables, lanes)).collect();
+                for (size, bytes) in sizes.iter_mut().zip(&bytes) { *size += bytes.len(); }
+                let ranges: Vec<Option<&[u8]>> = bytes.iter().map(|b| Some(b.as_slice())).collect();
+                let mut g = crate::scene::splats::Geometry::zeros(*n);
+                let mut counts = vec![0; *n];
+                let mut place = Place { positions: &mut g.positions, dc: &mut g.dc, opacities: &mut g.opacities, scales: &mut g.scales, rotations: &mut g.rotations, counts: &mut counts };
+                let piece = unpack(&form, &frame, &lookup, &ranges, true, &mut place).unwrap();
+                assert_eq!(piece.sums, recorded.iter().map(|r| r.1).collect::<Vec<_>>());
+                for _ in 0..3 {
+                    let clock = std::time::Instant::now();
+                    unpack(&form, &frame, &lookup, &ranges, false, &mut place).unwrap();
+                    seconds += clock.elapsed().as_secs_f64() / 3.0;
+                }
+            }
+            let mut text = String::new();
+            for (k, raw) in raw.iter().enumerate() {
+                let bits: f64 = (0..24).map(|c| tables.bits(k * 24 + c, &histograms[k * 24 + c])).sum::<f64>() + raw;
+                text += &format!(" {k}:{:.2}", bits / n as f64);
+            }
+            println!("levels {levels} {least:?}: ranges {sizes:?} = {} + tables {}; {:.0} ns a Gaussian = {:.2} M/s; {:.3} bits\n  {text}", sizes.iter().sum::<usize>(), written.len(), seconds * 1e9 / n as f64, n as f64 / seconds / 1e6, 8.0 * sizes.iter().sum::<usize>() as f64 / n as f64);
+        }
     }
 
     /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.

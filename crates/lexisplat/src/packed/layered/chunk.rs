@@ -1,0 +1,183 @@
+//! Coding of a chunk: ranges of a base, refinements and nonzeros, eight lanes each.
+
+use super::fine::refine;
+use super::range::{Player, Recorder};
+use super::rest::{Rest, RestForm};
+use super::steering::Steering;
+use super::symbols::{LANES, Lanes, has};
+use super::tables::Lookup;
+use super::target::Target;
+use super::walk::{Group, Walk};
+
+/// Chunks of fewer Gaussians have one lane. Each lane takes about 8 bytes of every range.
+const LEAST_LANED: usize = 4096;
+
+/// Number of lanes of a chunk.
+pub(in crate::packed) fn lanes(gaussians: usize) -> usize {
+    if gaussians < LEAST_LANED { 1 } else { LANES }
+}
+
+/// First Gaussian of each lane of a chunk, and the number of Gaussians. The first lanes have one more than the others
+/// where the number does not divide.
+pub(super) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
+    std::array::from_fn(|l| {
+        let l = l.min(lanes);
+        gaussians / lanes * l + (gaussians % lanes).min(l)
+    })
+}
+
+/// The sets of lanes that have a first, second, ... Gaussian.
+fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
+    let whole = (1 << lanes) - 1;
+    let last = (1 << (gaussians % lanes)) - 1;
+    std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
+}
+
+/// How the chunks of a file are coded.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Form {
+    pub(in crate::packed) steering: Steering,
+    /// Levels of refinement.
+    pub(in crate::packed) levels: usize,
+    pub(in crate::packed) rest: RestForm,
+}
+
+impl Form {
+    /// Number of ranges of a chunk: a base, levels of refinement, and parts of nonzeros.
+    pub(in crate::packed) fn ranges(&self) -> usize {
+        1 + self.levels + self.rest.least.len()
+    }
+
+    /// Codes the Gaussians of a chunk, and returns what its ranges hold. `None` if there is something no decoder takes.
+    pub(in crate::packed) fn record(&self, targets: &[Target]) -> Option<Vec<(Recorder, u32)>> {
+        let lanes = lanes(targets.len());
+        let starts = starts(targets.len(), lanes);
+        let mut ranges = vec![Recorder::default(); self.ranges()];
+        let mut sums = vec![Sums::default(); self.ranges()];
+        let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
+        let none = Target::default();
+        for (step, set) in sets(targets.len(), lanes).enumerate() {
+            let group: [&Target; LANES] =
+                std::array::from_fn(|l| targets.get(starts[l] + step).filter(|_| has(set, l)).unwrap_or(&none));
+            let targets = Some(&group);
+            rest.clear();
+            let (base, finer) = ranges.split_first_mut()?;
+            let mut group = walk.base(base, set, targets)?;
+            sums[0].base(set, &group);
+            let (levels, parts) = finer.split_at_mut_checked(self.levels)?;
+            for (k, range) in levels.iter_mut().enumerate() {
+                refine(range, set, &mut group, self.levels - k);
+                sums[1 + k].refined(set, &group);
+            }
+            for (part, range) in parts.iter_mut().enumerate() {
+                rest.part(range, set, targets, &group.colour, &self.rest, part)?;
+                sums[1 + self.levels + part].rest(set, &rest, part);
+            }
+        }
+        Some(ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect())
+    }
+
+    /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: those that follow one that is missing
+    /// are not looked at. Hands each group of up to eight Gaussians, one of each lane in the set, to `take`, with the
+    /// number of levels that are missing. Returns the checksums of the integers of the ranges if they are wanted; `None`
+    /// if no encoder writes this.
+    #[inline(always)]
+    pub(super) fn play(
+        &self,
+        lookup: &Lookup,
+        ranges: &[Option<&[u8]>],
+        gaussians: usize,
+        want_sums: bool,
+        mut take: impl FnMut(usize, u32, &Group, &Rest, usize) -> Option<()>,
+    ) -> Option<Vec<u32>> {
+        let lanes = lanes(gaussians);
+        let of = |k: usize| ranges.get(k).copied().flatten();
+        let mut base = Player::new(lookup, of(0)?, lanes)?;
+        let mut levels = Vec::new();
+        for bytes in (0..self.levels).map_while(|k| of(1 + k)) {
+            levels.push(Player::new(lookup, bytes, lanes)?);
+        }
+        let mut parts = Vec::new();
+        for bytes in (0..self.rest.least.len()).map_while(|k| of(1 + self.levels + k)) {
+            parts.push(Player::new(lookup, bytes, lanes)?);
+        }
+        let missing = self.levels - levels.len();
+        let mut sums = vec![Sums::default(); if want_sums { self.ranges() } else { 0 }];
+        let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
+        for (step, set) in sets(gaussians, lanes).enumerate() {
+            rest.clear();
+            let mut group = walk.base(&mut base, set, None)?;
+            if want_sums {
+                sums[0].base(set, &group);
+            }
+            for (k, range) in levels.iter_mut().enumerate() {
+                refine(range, set, &mut group, self.levels - k);
+                if want_sums {
+                    sums[1 + k].refined(set, &group);
+                }
+            }
+            for (part, range) in parts.iter_mut().enumerate() {
+                rest.part(range, set, None, &group.colour, &self.rest, part)?;
+                if want_sums {
+                    sums[1 + self.levels + part].rest(set, &rest, part);
+                }
+            }
+            take(step, set, &group, &rest, missing)?;
+        }
+        let whole = base.exhausted() && levels.iter().chain(&parts).all(Player::exhausted);
+        whole.then(|| sums.into_iter().map(Sums::finish).collect())
+    }
+}
+
+/// CRC-32 of the integers of a range, as i32, Gaussian by Gaussian.
+#[derive(Debug, Clone, Default)]
+struct Sums(Lanes<crc32fast::Hasher>);
+
+impl Sums {
+    fn add(&mut self, l: usize, numbers: &[i32]) {
+        for number in numbers {
+            self.0[l].update(&number.to_le_bytes());
+        }
+    }
+
+    /// Cell, classes, coarse steps, codes of the rotation.
+    fn base(&mut self, set: u32, group: &Group) {
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            self.add(l, &group.cell.map(|x| x[l]));
+            self.add(l, &[group.colour[l].cast_signed(), group.shape[l].cast_signed()]);
+            self.refined_of(l, group);
+        }
+    }
+
+    fn refined(&mut self, set: u32, group: &Group) {
+        (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.refined_of(l, group));
+    }
+
+    /// Steps so far, codes of the rotation so far.
+    fn refined_of(&mut self, l: usize, group: &Group) {
+        self.add(l, &group.counts.map(|x| x[l]));
+        self.add(l, &group.rotation.map(|x| x[l].cast_signed()));
+    }
+
+    /// Number of nonzeros, atoms with values; -1 and the bits of an exact row.
+    fn rest(&mut self, set: u32, rest: &Rest, part: usize) {
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            if !rest.exact[l].is_empty() {
+                if part == 0 {
+                    self.add(l, &[-1]);
+                    rest.exact[l].iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
+                }
+                continue;
+            }
+            let new = rest.codes[l].get(rest.earlier(l)..).unwrap_or_default();
+            self.add(l, &[new.len() as i32]);
+            new.iter().for_each(|&(atom, value)| self.add(l, &[i32::from(atom), value]));
+        }
+    }
+
+    fn finish(self) -> u32 {
+        let [mut all, rest @ ..] = self.0;
+        rest.iter().for_each(|lane| all.combine(lane));
+        all.finalize()
+    }
+}

@@ -1,0 +1,54 @@
+//! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
+
+use super::streams::Stream;
+use super::symbols::{LANES, Lanes, Symbols};
+use super::walk::{DC, FACTOR, Group, OPACITY, REFINED, coarsened, dropped, factor};
+use crate::packed::parameters::TARGETS;
+
+/// Contexts by the number of coarse steps: none, one, more.
+const BY_COUNT: u32 = 3;
+/// Classes, or finenesses, that contexts are told apart by.
+const CLASSES: u32 = 8;
+/// Classes, and finenesses, of a context.
+const CLASS_WIDTH: u32 = 2;
+const FINENESS_WIDTH: u32 = 3;
+
+/// Codes the refinement of a group from `level` missing levels to one less.
+#[inline(always)]
+pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) {
+    let finer = factor(level - 1);
+    for k in 0..REFINED {
+        let (stream, class, width) = match k {
+            0..OPACITY => (Stream::FineScale, &group.shape, CLASS_WIDTH),
+            OPACITY => (Stream::FineOpacity, &group.shape, CLASS_WIDTH),
+            DC..TARGETS => (Stream::FineDc, &group.colour, CLASS_WIDTH),
+            _ => (Stream::FinePosition, &group.fineness[k - TARGETS], FINENESS_WIDTH),
+        };
+        let counts = group.counts[k];
+        let wanted = &group.wanted[k];
+        let context: Lanes<u32> = std::array::from_fn(|l| {
+            BY_COUNT * (class[l] / width).min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1)
+        });
+        // Zero is the step towards zero, which is the one that occurs most.
+        let symbols = s.symbols(stream, context, set, |l| {
+            let rest = coarsened(wanted[l], finer) - FACTOR * counts[l];
+            (if counts[l] < 0 { 1 - rest } else { 1 + rest }).cast_unsigned()
+        });
+        for l in 0..LANES {
+            let rest = symbols[l].cast_signed().wrapping_sub(1);
+            let rest = if counts[l] < 0 { rest.wrapping_neg() } else { rest };
+            group.counts[k][l] = counts[l].wrapping_mul(FACTOR).wrapping_add(rest);
+        }
+    }
+    for k in 0..3 {
+        let full = &group.axis_bits[usize::from(k == 2)];
+        let count = full.map(|bits| dropped(bits, level) - dropped(bits, level - 1));
+        let wanted = &group.wanted_rotation[k];
+        let low = s.bits(Stream::Rotation, count, set, |l| {
+            wanted[l] >> dropped(full[l], level - 1) & ((1 << count[l]) - 1)
+        });
+        for l in 0..LANES {
+            group.rotation[k][l] = group.rotation[k][l] << count[l] | low[l];
+        }
+    }
+}

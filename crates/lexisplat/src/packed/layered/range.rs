@@ -1,0 +1,228 @@
+//! The entropy coder of a range: eight lanes of rANS, each with a state of 32 bits and words of 16 bits.
+//!
+//! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
+
+use super::streams::{Stream, place};
+use super::symbols::{ALL, LANES, Lanes, Symbols, has};
+use super::tables::{Lookup, Model, PRECISION, TOTAL, Tables};
+
+/// Least state between symbols. A lane begins and, decoded, ends with it.
+const LEAST: u32 = 1 << 16;
+/// Most raw bits that a state gives at once.
+const MOST_BITS: u32 = 16;
+/// Marks a recorded entry as raw bits.
+const RAW: u32 = 1 << 31;
+
+/// The encoder of a range. It keeps everything until the tables are known.
+#[derive(Debug, Clone, Default)]
+pub(in crate::packed) struct Recorder {
+    /// Of each lane: symbols with their contexts, or up to 16 raw bits with their number and stream.
+    lanes: [Vec<u32>; LANES],
+}
+
+/// A recorded symbol.
+fn symbol_entry(context: usize, symbol: u32) -> u32 {
+    (context as u32) << 8 | symbol
+}
+
+impl Symbols for Recorder {
+    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            out[l] = value(l);
+            self.lanes[l].push(symbol_entry(place(stream, context[l]), out[l]));
+        }
+        out
+    }
+
+    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l) && count[l] > 0) {
+            out[l] = value(l);
+            let mut rest = out[l];
+            for piece in pieces(count[l]) {
+                let bits = rest & ((1 << piece) - 1);
+                self.lanes[l].push(RAW | (stream as u32) << 24 | piece << 16 | bits);
+                rest = rest.checked_shr(piece).unwrap_or(0);
+            }
+        }
+        out
+    }
+}
+
+/// Raw bits are taken in pieces of at most [`MOST_BITS`], low ones first.
+fn pieces(count: u32) -> impl Iterator<Item = u32> {
+    [count.min(MOST_BITS), count.saturating_sub(MOST_BITS)].into_iter().filter(|&piece| piece > 0)
+}
+
+impl Recorder {
+    /// Hands every symbol and its context to `count`, and every piece of raw bits, its stream and its length to `raw`.
+    pub(in crate::packed) fn each(&self, mut count: impl FnMut(usize, u8), mut raw: impl FnMut(usize, u32)) {
+        for &entry in self.lanes.iter().flatten() {
+            if entry & RAW == 0 {
+                count((entry >> 8) as usize, entry.to_le_bytes()[0]);
+            } else {
+                raw((entry >> 24 & 0x7f) as usize, entry >> 16 & 0xff);
+            }
+        }
+    }
+
+    /// All entries, lane by lane, to be [put back](Self::restore) later.
+    pub(in crate::packed) fn entries(&self) -> &[Vec<u32>; LANES] {
+        &self.lanes
+    }
+
+    /// A recorder with the entries of another.
+    pub(in crate::packed) fn restore(lanes: [Vec<u32>; LANES]) -> Self {
+        Self { lanes }
+    }
+
+    /// The bytes of the range: the numbers of words of all lanes in use but the last, as u32, and the words.
+    pub(in crate::packed) fn finish(&self, tables: &Tables, lanes: usize) -> Vec<u8> {
+        let words: Vec<Vec<u16>> = self.lanes.iter().take(lanes).map(|lane| encode(lane, tables)).collect();
+        let mut out = Vec::new();
+        for lane in words.iter().take(lanes.saturating_sub(1)) {
+            out.extend((lane.len() as u32).to_le_bytes());
+        }
+        out.extend(words.iter().flatten().flat_map(|word| word.to_le_bytes()));
+        out
+    }
+}
+
+/// The words of a lane, in the order in which they are read.
+fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
+    let mut words = Vec::new();
+    let mut state = LEAST;
+    let mut make_room = |state: &mut u32, limit: u64| {
+        if u64::from(*state) >= limit {
+            words.push((*state & 0xffff) as u16);
+            *state >>= 16;
+        }
+    };
+    // The coder is a stack: what is coded last is decoded first.
+    for &entry in lane.iter().rev() {
+        if entry & RAW == 0 {
+            let Model { start, share } = tables.model((entry >> 8) as usize, entry.to_le_bytes()[0]);
+            make_room(&mut state, u64::from(share) << (32 - PRECISION));
+            state = (state / share) * TOTAL + start + state % share;
+        } else {
+            let count = entry >> 16 & 0xff;
+            make_room(&mut state, 1 << (32 - count));
+            state = state << count | entry & 0xffff;
+        }
+    }
+    words.push((state & 0xffff) as u16);
+    words.push((state >> 16) as u16);
+    words.reverse();
+    words
+}
+
+/// The decoder of a range.
+#[derive(Debug)]
+pub(in crate::packed) struct Player<'a> {
+    lookup: &'a Lookup,
+    words: &'a [[u8; 2]],
+    states: Lanes<u32>,
+    /// Next word of each lane, and the end of its words.
+    next: Lanes<u32>,
+    ends: Lanes<u32>,
+    /// Whether something was asked for that no encoder writes.
+    damaged: bool,
+}
+
+impl<'a> Player<'a> {
+    /// `None` if `bytes` cannot be a range of this many lanes.
+    pub(in crate::packed) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize) -> Option<Self> {
+        let (lengths, words) = bytes.split_at_checked(size_of::<u32>() * lanes.checked_sub(1)?)?;
+        let (words, []) = words.as_chunks::<2>() else { return None };
+        let total = u32::try_from(words.len()).ok()?;
+        let mut player =
+            Self { lookup, words, states: [LEAST; LANES], next: [0; LANES], ends: [0; LANES], damaged: false };
+        let mut end = 0_u32;
+        for l in 0..lanes {
+            player.next[l] = end;
+            end = match lengths.as_chunks::<4>().0.get(l) {
+                Some(length) => end.checked_add(u32::from_le_bytes(*length)).filter(|&end| end <= total)?,
+                None => total,
+            };
+            player.ends[l] = end;
+            player.states[l] = u32::from(player.word(l)) << 16;
+            player.states[l] |= u32::from(player.word(l));
+        }
+        Some(player)
+    }
+
+    /// The next word of a lane; 0 beyond the end.
+    #[inline(always)]
+    fn word(&mut self, l: usize) -> u16 {
+        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
+        self.next[l] += 1;
+        u16::from_le_bytes(word)
+    }
+
+    /// Takes a word into the state of a lane if it has room for one.
+    #[inline(always)]
+    fn refill(&mut self, l: usize, state: u32) {
+        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
+        let low = state < LEAST;
+        let filled = state << 16 | u32::from(u16::from_le_bytes(word));
+        self.states[l] = if low { filled } else { state };
+        self.next[l] += u32::from(low);
+    }
+
+    #[inline(always)]
+    fn symbol(&mut self, l: usize, at: u32) -> u32 {
+        let state = self.states[l];
+        let (symbol, share, over) = self.lookup.entry(at, state & (TOTAL - 1));
+        self.refill(l, (state >> PRECISION).wrapping_mul(share).wrapping_add(over));
+        symbol
+    }
+
+    #[inline(always)]
+    fn raw(&mut self, l: usize, count: u32) -> u32 {
+        let state = self.states[l];
+        self.refill(l, state >> count);
+        state & ((1 << count) - 1)
+    }
+
+    /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.
+    pub(in crate::packed) fn exhausted(&self) -> bool {
+        !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
+    }
+}
+
+impl Symbols for Player<'_> {
+    #[inline(always)]
+    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        let at: Lanes<u32> = std::array::from_fn(|l| self.lookup.start(place(stream, context[l])));
+        if set == ALL {
+            for l in 0..LANES {
+                self.damaged |= self.lookup.is_missing(at[l]);
+                out[l] = self.symbol(l, at[l]);
+            }
+        } else {
+            for l in 0..LANES {
+                if has(set, l) {
+                    self.damaged |= self.lookup.is_missing(at[l]);
+                    out[l] = self.symbol(l, at[l]);
+                }
+            }
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn bits(&mut self, _: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in 0..LANES {
+            if has(set, l) {
+                out[l] = self.raw(l, count[l].min(MOST_BITS));
+                if count[l] > MOST_BITS {
+                    out[l] |= self.raw(l, (count[l] - MOST_BITS).min(MOST_BITS)) << MOST_BITS;
+                }
+            }
+        }
+        out
+    }
+}

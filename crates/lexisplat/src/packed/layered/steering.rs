@@ -1,0 +1,238 @@
+//! What steers the decoder: steps, predictions and contexts, in integers that 32 bits hold.
+//!
+//! In files that an encoder wrote no product and no sum leaves the range of an `i32`, so every language computes the
+//! same ones. In damaged files sums wrap around. Floating point only makes values of decoded integers.
+
+use super::symbols::{LANES, Lanes};
+use crate::packed::parameters::{LAST_CLASS, Parameters, TARGETS};
+
+/// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
+pub(super) const VALUE_BITS: u32 = 20;
+/// Features of predictions are multiples of 2^-9, and so are logarithms of steps, in octaves.
+pub(super) const FEATURE_BITS: u32 = 9;
+/// Coefficients are multiples of 2^-12.
+pub(super) const COEFFICIENT_BITS: u32 = 12;
+/// Bits by which products of coefficients and features are shifted before they are summed.
+const PRODUCT_SHIFT: u32 = 4;
+/// Largest absolute value of a feature.
+const MOST_FEATURE: i32 = (1 << 14) - 1;
+/// Largest step: 1.5. With larger ones a value is as good as unknown.
+const MOST_STEP: u32 = 3 << (VALUE_BITS - 1);
+/// Bits of the mantissa of a step.
+const MANTISSA_BITS: u32 = 16;
+/// Largest logarithm of a step of a turn: that of 1.2 radians.
+const MOST_TURN: i32 = 135;
+/// Largest absolute value of the sum of a prediction before it is made a value.
+const MOST_SUM: i32 = 1 << 25;
+/// 512 times the binary logarithms of 2.5, the number of coordinates an axis has at a step of one radian, and of pi.
+const DIRECTIONS: i32 = 677;
+const HALF_TURN: i32 = 846;
+/// 512 / ln 2, and 512 times the binary logarithm of 2, the largest step of a position in standard deviations along the
+/// longest axis.
+const OCTAVES_PER_E: i32 = 739;
+const MOST_MOVE: i32 = 512;
+/// Rounds a logarithm of a number of values to bits: 2^n stands for up to 2^n times the root of 2.
+const HALF_BIT: i32 = 255;
+/// Largest number of bits of a coordinate of an axis and of a turn.
+const MOST_AXIS_BITS: i32 = 15;
+/// 2.25 octaves. Cells narrower than 2^-2.25 steps have the first context.
+const FINENESS: i32 = 1152;
+/// The context of the widest cells.
+const LAST_FINENESS: i32 = 23;
+/// A value of 1 as a feature.
+pub(super) const ONE: i32 = 1 << FEATURE_BITS;
+
+/// Coefficients of a prediction: a constant, and those of the average, the two classes and the scales.
+pub(super) const COEFFICIENTS: usize = 7;
+/// Coefficients of the logarithm of a step: a constant and those of the scales.
+pub(super) const SLOPES: usize = 4;
+
+/// A step of class 0: a mantissa below 2^16, shifted down.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Step {
+    pub(super) mantissa: u16,
+    pub(super) shift: u8,
+}
+
+impl Step {
+    /// The step nearest to `x`, as a multiple of 2^-20.
+    fn of(x: f64) -> Self {
+        let mut scaled = x * f64::from(1_u32 << VALUE_BITS);
+        let mut shift = 0;
+        while shift < 31 && scaled < f64::from(1_u32 << (MANTISSA_BITS - 1)) {
+            scaled *= 2.0;
+            shift += 1;
+        }
+        Self { mantissa: rounded(scaled, 1.0, f64::from(u16::MAX)) as u16, shift }
+    }
+
+    /// The step of a class.
+    fn at(self, class: u32) -> u32 {
+        ((u32::from(self.mantissa) << class) >> self.shift).clamp(1, MOST_STEP)
+    }
+}
+
+/// The nearest whole number within limits.
+#[expect(clippy::cast_possible_truncation, reason = "clamped")]
+fn rounded(x: f64, least: f64, most: f64) -> i64 {
+    libm::rint(x).clamp(least, most) as i64
+}
+
+/// `x` as a multiple of 2^-`bits`.
+fn fixed(x: f64, bits: u32) -> i16 {
+    rounded(x * f64::from(1_u32 << bits), f64::from(i16::MIN + 1), f64::from(i16::MAX)) as i16
+}
+
+/// The integers of a file's parameters.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct Integers {
+    /// Logarithm of the side of a cell.
+    pub(super) cell: i16,
+    /// Logarithm of the step of shape class 0.
+    pub(super) shape: i16,
+    /// Steps of class 0 of the three scales, the opacity and the base colour.
+    pub(super) steps: [Step; 5],
+    /// Logarithms of the steps of turns and moves.
+    pub(super) turns: [[i16; SLOPES]; 3],
+    pub(super) moves: [[i16; SLOPES]; 3],
+    /// Averages where there are no neighbours, as features.
+    pub(super) means: [i16; TARGETS],
+    pub(super) predictors: [[i16; COEFFICIENTS]; TARGETS],
+}
+
+impl Integers {
+    /// The integers nearest to `p`. Base colours are in units of `dc_unit`.
+    pub(in crate::packed) fn of(p: &Parameters, dc_unit: f64) -> Self {
+        let octaves = |x: f32| fixed(libm::log2(f64::from(x)), FEATURE_BITS);
+        let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
+            std::array::from_fn(|k| fixed(f64::from(row[k]), if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS }))
+        };
+        let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
+        let [colour, shape] = p.base.map(f64::from);
+        let steps = [shape * s0, shape * s1, shape * s2, shape * opacity, colour * dc / dc_unit];
+        // A coefficient of features of another unit is divided by it.
+        let unit = |t: usize| if t < 4 { 1.0 } else { dc_unit };
+        let predictors = std::array::from_fn(|t| {
+            std::array::from_fn(|k| {
+                let own = if k == 1 { 1.0 } else { unit(t) };
+                fixed(f64::from(p.predictors[t][k]) / own, if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS })
+            })
+        });
+        Self {
+            cell: octaves(p.cell),
+            shape: octaves(p.base[1]),
+            steps: steps.map(Step::of),
+            turns: p.rotation.map(slopes),
+            moves: p.position.map(slopes),
+            means: std::array::from_fn(|t| fixed(f64::from(p.means[t]) / unit(t), FEATURE_BITS)),
+            predictors,
+        }
+    }
+}
+
+/// The integers of a file's parameters, prepared for the walk.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Steering {
+    cell: i32,
+    /// Steps of the scales, the opacity and the base colour at each class.
+    steps: [[u32; LAST_CLASS as usize + 1]; 5],
+    /// Constants include the logarithm of the step of shape class 0.
+    turns: [[i32; SLOPES]; 3],
+    moves: [[i32; SLOPES]; 3],
+    pub(super) means: [i32; TARGETS],
+    predictors: [[i32; COEFFICIENTS]; TARGETS],
+}
+
+impl Steering {
+    pub(in crate::packed) fn new(p: &Integers) -> Self {
+        let slopes = |row: [i16; SLOPES]| {
+            let mut row = row.map(i32::from);
+            row[0] += i32::from(p.shape);
+            row
+        };
+        Self {
+            cell: p.cell.into(),
+            steps: p.steps.map(|step| std::array::from_fn(|class| step.at(class as u32))),
+            turns: p.turns.map(slopes),
+            moves: p.moves.map(slopes),
+            means: p.means.map(i32::from),
+            predictors: p.predictors.map(|row| row.map(i32::from)),
+        }
+    }
+
+    /// The steps of target `t` at classes from 0 to 15.
+    #[inline(always)]
+    pub(super) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
+        let steps = &self.steps[t.min(4)];
+        class.map(|class| steps[(class & u32::from(LAST_CLASS)) as usize].cast_signed())
+    }
+
+    /// Predictions of target `t`, as values. The features are the average, the two classes and the scales.
+    #[inline(always)]
+    pub(super) fn predict(&self, t: usize, features: &[Lanes; COEFFICIENTS - 1]) -> Lanes {
+        let row = &self.predictors[t];
+        let mut sums = [row[0] << (COEFFICIENT_BITS - PRODUCT_SHIFT); LANES];
+        for (p, feature) in row[1..].iter().zip(features) {
+            for l in 0..LANES {
+                sums[l] = sums[l].wrapping_add(p.wrapping_mul(feature[l]) >> PRODUCT_SHIFT);
+            }
+        }
+        sums.map(|s| s.clamp(-MOST_SUM, MOST_SUM) << (VALUE_BITS + PRODUCT_SHIFT - FEATURE_BITS - COEFFICIENT_BITS))
+    }
+
+    /// Logarithms of steps.
+    #[inline(always)]
+    fn logarithms(row: &[i32; SLOPES], class: &Lanes<u32>, scales: &[Lanes; 3]) -> Lanes {
+        let mut logs = [0; LANES];
+        for l in 0..LANES {
+            let slopes = (row[1] * scales[0][l] >> COEFFICIENT_BITS)
+                + (row[2] * scales[1][l] >> COEFFICIENT_BITS)
+                + (row[3] * scales[2][l] >> COEFFICIENT_BITS);
+            logs[l] = row[0] + (class[l].cast_signed() << FEATURE_BITS) + slopes;
+        }
+        logs
+    }
+
+    /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
+    #[inline(always)]
+    pub(super) fn axis_bits(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> ([Lanes<u32>; 2], Lanes<bool>) {
+        let logs = self.turns.map(|row| Self::logarithms(&row, class, scales).map(|log| log.min(MOST_TURN)));
+        let (mut bits, mut needle) = ([[0; LANES]; 2], [false; LANES]);
+        for l in 0..LANES {
+            needle[l] = scales[0][l] - scales[1][l] >= scales[1][l] - scales[2][l];
+            let (turn, other) = if needle[l] { (logs[0][l], logs[2][l]) } else { (logs[2][l], logs[0][l]) };
+            let pair = (logs[1][l] + other) >> 1;
+            bits[0][l] = bits_for(DIRECTIONS - pair);
+            bits[1][l] = bits_for(HALF_TURN - turn);
+        }
+        (bits, needle)
+    }
+
+    /// Logarithms of the steps of the position along each axis.
+    #[inline(always)]
+    pub(super) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
+        let most = scales[0].map(|s| MOST_MOVE + (s * OCTAVES_PER_E >> FEATURE_BITS));
+        self.moves.map(|row| {
+            let logs = Self::logarithms(&row, class, scales);
+            std::array::from_fn(|l| logs[l].min(most[l]))
+        })
+    }
+
+    /// The context of a step of the position.
+    #[inline(always)]
+    pub(super) fn fineness(&self, log: i32) -> u32 {
+        ((self.cell - log + FINENESS) >> (FEATURE_BITS - 1)).clamp(0, LAST_FINENESS).cast_unsigned()
+    }
+}
+
+/// Bits for a number of values whose logarithm this is.
+#[inline(always)]
+fn bits_for(log: i32) -> u32 {
+    ((log + HALF_BIT) >> FEATURE_BITS).clamp(0, MOST_AXIS_BITS).cast_unsigned()
+}
+
+/// A value as a feature.
+#[inline(always)]
+pub(super) fn feature(value: i32) -> i32 {
+    (value >> (VALUE_BITS - FEATURE_BITS)).clamp(-MOST_FEATURE, MOST_FEATURE)
+}

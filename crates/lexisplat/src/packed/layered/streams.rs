@@ -1,0 +1,80 @@
+//! The streams of symbols. Each has contexts, and each context a table of probabilities.
+
+/// Contexts of a stream.
+pub(in crate::packed) const CONTEXTS: usize = 24;
+/// Parts into which nonzeros are split by their size, largest first.
+pub(in crate::packed) const REST_PARTS: usize = 3;
+
+/// Defines [`Stream`] from the names of the streams and of the attributes that they belong to.
+macro_rules! streams {
+    ($count:literal: $($(#[$doc:meta])* $stream:ident => $attribute:literal,)+) => {
+        /// The streams, in the order of their tables.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        #[repr(u8)]
+        pub(in crate::packed) enum Stream {
+            $($(#[$doc])* $stream),+
+        }
+
+        impl Stream {
+            pub(in crate::packed) const ALL: [Self; $count] = [$(Self::$stream),+];
+
+            /// The attribute that it belongs to, by the name in reports.
+            pub(in crate::packed) fn attribute(self) -> &'static str {
+                match self { $(Self::$stream => $attribute),+ }
+            }
+        }
+    };
+}
+streams! { 29:
+    /// Gaps between cells along the Morton curve.
+    Cell => "position",
+    /// Step class of the colour.
+    ColourClass => "classes",
+    /// Step class of the shape.
+    ShapeClass => "classes",
+    /// Logarithms of the standard deviations, longest axis first.
+    Scale0 => "scale",
+    Scale1 => "scale",
+    Scale2 => "scale",
+    Opacity => "opacity",
+    /// Direction of the axis about which turning matters least, and the turn about it. It has raw bits alone.
+    Rotation => "rotation",
+    /// Position within the cell along the Gaussian's own axes.
+    Position0 => "position",
+    Position1 => "position",
+    Position2 => "position",
+    Dc0 => "dc",
+    Dc1 => "dc",
+    Dc2 => "dc",
+    /// What coarse steps leave.
+    FineScale => "scale",
+    FineOpacity => "opacity",
+    FinePosition => "position",
+    FineDc => "dc",
+    /// Numbers, atoms and sizes of the nonzeros of each part.
+    Count0 => "codes.counts",
+    Count1 => "codes.counts",
+    Count2 => "codes.counts",
+    Atom0 => "codes.indices",
+    Atom1 => "codes.indices",
+    Atom2 => "codes.indices",
+    Value0 => "codes.values",
+    Value1 => "codes.values",
+    Value2 => "codes.values",
+    /// Which 256 atoms an atom is of, if there are more.
+    AtomPage => "codes.indices",
+    /// Coefficients of the atoms.
+    Dictionary => "dictionary",
+}
+
+impl Stream {
+    pub(super) const COUNTS: [Self; REST_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
+    pub(super) const ATOMS: [Self; REST_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
+    pub(super) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
+}
+
+/// Number of the context `context` of `stream` among all contexts.
+#[inline(always)]
+pub(super) fn place(stream: Stream, context: u32) -> usize {
+    stream as usize * CONTEXTS + (context as usize).min(CONTEXTS - 1)
+}

@@ -1,0 +1,107 @@
+//! Eight runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
+
+use super::streams::Stream;
+
+/// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. Vector registers of 256 bits
+/// hold one number of each.
+pub(in crate::packed) const LANES: usize = 8;
+
+/// One number of each lane. Numbers of lanes that are not in use mean nothing.
+pub(in crate::packed) type Lanes<T = i32> = [T; LANES];
+
+/// The set of all lanes.
+pub(in crate::packed) const ALL: u32 = (1 << LANES) - 1;
+
+/// Whether `lane` is in `set`.
+#[inline(always)]
+pub(super) fn has(set: u32, lane: usize) -> bool {
+    (set >> lane) & 1 == 1
+}
+
+/// The encoder or the decoder of a range. The encoder records what the closures say of each lane, and returns it. The
+/// decoder returns what the range holds and never calls the closures. So one walk serves both.
+///
+/// Only lanes in `set` are coded. The others get 0.
+pub(super) trait Symbols {
+    /// Bytes that are modelled in `context`, one for each lane.
+    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
+
+    /// Numbers of `count` bits each, at most 32, that are not modelled.
+    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
+
+    /// Whole numbers: a token that is modelled, and for large ones bits that are not.
+    #[inline(always)]
+    fn integers(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let tokens = self.symbols(stream, context, set, |l| token(u64::from(value(l))));
+        if tokens.iter().all(|&t| t < DIRECT) {
+            return tokens;
+        }
+        let count = tokens.map(|t| low_bits(t).min(30));
+        let low = self.bits(stream, count, set, |l| value(l) & ((1 << low_bits(token(u64::from(value(l))))) - 1));
+        std::array::from_fn(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
+    }
+
+    /// Whole numbers with a sign.
+    #[inline(always)]
+    fn signed(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
+        let coded = self.integers(stream, context, set, |l| zigzag(value(l)));
+        coded.map(unzigzag)
+    }
+
+    /// Whole numbers below 2^63.
+    #[inline(always)]
+    fn wide(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u64) -> Lanes<u64> {
+        let tokens = self.symbols(stream, context, set, |l| token(value(l)));
+        let mut out = tokens.map(u64::from);
+        if tokens.iter().all(|&t| t < DIRECT) {
+            return out;
+        }
+        let count = tokens.map(|t| low_bits(t).min(61));
+        let rest = |l: usize| value(l) & ((1 << low_bits(token(value(l)))) - 1);
+        let low = self.bits(stream, count.map(|c| c.min(32)), set, |l| low_half(rest(l)));
+        let high = self.bits(stream, count.map(|c| c.saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
+        for l in 0..LANES {
+            if tokens[l] >= DIRECT {
+                out[l] = u64::from(2 + (tokens[l] & 1)) << count[l] | u64::from(high[l]) << 32 | u64::from(low[l]);
+            }
+        }
+        out
+    }
+}
+
+/// The low 32 bits.
+fn low_half(x: u64) -> u32 {
+    (x & u64::from(u32::MAX)) as u32
+}
+
+/// Whole numbers below this are their own token.
+const DIRECT: u32 = 16;
+/// Bits of the last number that is its own token.
+const DIRECT_BITS: u32 = 4;
+
+/// The token of a whole number: itself, or its bit length and the bit after the leading one.
+pub(super) fn token(value: u64) -> u32 {
+    if value < u64::from(DIRECT) {
+        return low_half(value);
+    }
+    let length = u64::BITS - value.leading_zeros();
+    DIRECT + 2 * (length - DIRECT_BITS - 1) + low_half((value >> (length - 2)) & 1)
+}
+
+/// Number of bits that follow `token`.
+#[inline(always)]
+pub(super) fn low_bits(token: u32) -> u32 {
+    if token < DIRECT { 0 } else { (token - DIRECT) / 2 + DIRECT_BITS - 1 }
+}
+
+/// Maps signed numbers to unsigned ones by magnitude: 0, -1, 1, -2, ...
+#[inline(always)]
+pub(super) fn zigzag(value: i32) -> u32 {
+    ((value << 1) ^ (value >> 31)).cast_unsigned()
+}
+
+/// Inverse of [`zigzag`].
+#[inline(always)]
+pub(super) fn unzigzag(value: u32) -> i32 {
+    (value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg()
+}
