@@ -103,6 +103,11 @@ impl Parameters {
         if self.promised > 0.0 { self.promised } else { self.step(0, colour) * self.factors[1] }
     }
 
+    /// Step of the values of SH codes of colour class 0 where no error is promised.
+    pub(super) fn free_value_step(&self) -> f32 {
+        self.step(0, 0) * self.factors[1]
+    }
+
     /// Step of the logarithm of the opacity.
     pub(super) fn opacity_step(&self, shape: u8) -> f32 {
         (self.step(1, shape) * self.factors[2]).min(MAX_LOG_STEP)

@@ -150,29 +150,32 @@ impl<'a> Quantised<'a> {
             }
             let tables = Tables::new(&histograms).unwrap();
             let written = tables.write();
-            let lookup = Lookup::new(&Tables::read(&written).unwrap());
+            let mut head = Head::new(parameters, 0.0, levels, form.rest.clone(), coder.atom_bits as u8);
+            head.tables = written.clone();
             let mut sizes = vec![0; form.ranges()];
-            let frame = Frame {
-                origin: parameters.origin, cell: parameters.cell, dc_mean: parameters.dc_mean, dc_axes: parameters.dc_axes, dc_unit: 1.0,
-                value_steps: std::array::from_fn(|c| parameters.value_step(c as u8)),
-            };
-            let mut seconds = 0.0;
+            let mut passes = vec![Vec::new(); form.ranges()];
             for (n, recorded) in &all {
                 let lanes = if *n < 4096 { 1 } else { 8 };
                 let bytes: Vec<Vec<u8>> = recorded.iter().map(|r| r.0.finish(&tables, lanes)).collect();
-                for (size, bytes) in sizes.iter_mut().zip(&bytes) { *size += bytes.len(); }
-                let ranges: Vec<Option<&[u8]>> = bytes.iter().map(|b| Some(b.as_slice())).collect();
-                let mut g = crate::scene::splats::Geometry::zeros(*n);
-                let mut counts = vec![0; *n];
-                let mut place = Place { positions: &mut g.positions, dc: &mut g.dc, opacities: &mut g.opacities, scales: &mut g.scales, rotations: &mut g.rotations, counts: &mut counts };
-                let piece = unpack(&form, &frame, &lookup, &ranges, true, &mut place).unwrap();
-                assert_eq!(piece.sums, recorded.iter().map(|r| r.1).collect::<Vec<_>>());
-                for _ in 0..3 {
-                    let clock = std::time::Instant::now();
-                    unpack(&form, &frame, &lookup, &ranges, false, &mut place).unwrap();
-                    seconds += clock.elapsed().as_secs_f64() / 3.0;
+                let mut chunk = Chunk { gaussians: *n, ..Chunk::default() };
+                for k in 0..bytes.len() {
+                    sizes[k] += bytes[k].len();
+                    passes[k].extend_from_slice(&bytes[k]);
+                    chunk.ranges.push(Range { start: 0, length: bytes[k].len() as u32, checksum: 0, integers: recorded[k].1 });
                 }
+                head.index.chunks.push(chunk);
             }
+            head.index.layers = 1;
+            head.index.passes = (0..form.ranges()).map(|k| Pass { layer: 0, range: k as u8 }).collect();
+            head.index.place().unwrap();
+            let mut dump = Vec::new();
+            let bytes = head.write();
+            dump.extend((dim as u64).to_le_bytes());
+            dump.extend((bytes.len() as u64).to_le_bytes());
+            dump.extend(bytes);
+            for pass in passes { dump.extend(pass); }
+            std::fs::write(format!("/tmp/w/dump{levels}{}.bin", least.len()), dump).unwrap();
+            let seconds = 1.0;
             let mut text = String::new();
             for (k, raw) in raw.iter().enumerate() {
                 let bits: f64 = (0..24).map(|c| tables.bits(k * 24 + c, &histograms[k * 24 + c])).sum::<f64>() + raw;

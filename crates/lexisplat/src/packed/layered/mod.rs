@@ -1,8 +1,11 @@
 //! Version 3 of packed files: layers of chunks that are decoded coarse to fine.
 
 mod around;
+mod bytes;
 mod chunk;
 mod fine;
+mod head;
+mod index;
 mod range;
 mod rest;
 mod steering;
@@ -15,6 +18,8 @@ mod values;
 mod walk;
 
 pub(super) use chunk::Form;
+pub(super) use head::Head;
+pub(super) use index::{Chunk, Index, Pass, Range};
 pub(super) use rest::RestForm;
 pub(super) use steering::{Integers, Steering};
 pub(super) use tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};

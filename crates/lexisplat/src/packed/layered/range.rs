@@ -195,16 +195,16 @@ impl Symbols for Player<'_> {
     #[inline(always)]
     fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
         let mut out = [0; LANES];
-        let at: Lanes<u32> = std::array::from_fn(|l| self.lookup.start(place(stream, context[l])));
+        let at: Lanes<u32> = std::array::from_fn(|l| self.lookup.table(place(stream, context[l])));
         if set == ALL {
             for l in 0..LANES {
-                self.damaged |= self.lookup.is_missing(at[l]);
+                self.damaged |= at[l] == 0;
                 out[l] = self.symbol(l, at[l]);
             }
         } else {
             for l in 0..LANES {
                 if has(set, l) {
-                    self.damaged |= self.lookup.is_missing(at[l]);
+                    self.damaged |= at[l] == 0;
                     out[l] = self.symbol(l, at[l]);
                 }
             }

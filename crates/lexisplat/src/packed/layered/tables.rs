@@ -272,54 +272,60 @@ fn join(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
     (groups.into_iter().map(|g| g.0).collect(), map)
 }
 
-/// The tables as a decoder looks symbols up: for each of the 4096 values of a state's low bits the symbol, its share
-/// less 1, and by how much the value lies above the symbol's start.
+/// The tables as a decoder looks symbols up.
+///
+/// A symbol is found by the low bits of a state, and its share by the symbol. One list that held both would be four times
+/// as long, and would not stay in cache.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
-    /// Where the table of each context starts in `entries`.
-    starts: Vec<u32>,
-    entries: Vec<u32>,
+    /// The table of each context.
+    tables: Vec<u32>,
+    /// Of each table, for each of the 4096 values of a state's low bits, the symbol.
+    symbols: Vec<u8>,
+    /// Of each table and symbol the share, shifted by 16 bits, and the start.
+    models: Vec<u32>,
 }
+
+/// Symbols of a table in [`Lookup`].
+const SYMBOLS: usize = 256;
 
 impl Lookup {
     pub(in crate::packed) fn new(tables: &Tables) -> Self {
         // The first table stands for those that are missing: one symbol that takes no bits.
-        let only = |over: u32| (TOTAL - 1) << 8 | over << 20;
-        let mut entries: Vec<u32> = (0..TOTAL).map(only).collect();
-        let mut starts_of = Vec::with_capacity(tables.tables.len());
+        let mut symbols = vec![0; TOTAL as usize];
+        let mut models = vec![TOTAL << 16; SYMBOLS];
+        let mut numbers = Vec::with_capacity(tables.tables.len());
+        let mut number = 0_u32;
         for stream in &tables.tables {
-            let mut starts = Vec::with_capacity(stream.len());
+            numbers.push(number);
             for table in stream {
-                starts.push(entries.len() as u32);
-                for (symbol, model) in (0_u32..).zip(&table.models) {
-                    entries.extend((0..model.share).map(|over| symbol | (model.share - 1) << 8 | over << 20));
+                number += 1;
+                for (symbol, model) in (0_u8..=u8::MAX).zip(&table.models) {
+                    symbols.extend(std::iter::repeat_n(symbol, model.share as usize));
                 }
+                let packed = table.models.iter().map(|model| model.share << 16 | model.start);
+                models.extend(packed.chain(std::iter::repeat(0)).take(SYMBOLS));
             }
-            starts_of.push(starts);
         }
-        let start = |(context, &table): (usize, &u8)| {
-            let starts = starts_of.get(context / CONTEXTS).and_then(|starts| starts.get(usize::from(table)));
-            starts.copied().unwrap_or(0)
+        let table = |(context, &table): (usize, &u8)| {
+            let stream = context / CONTEXTS;
+            let there = tables.tables.get(stream).is_some_and(|stream| stream.len() > usize::from(table));
+            if there { numbers[stream] + u32::from(table) + 1 } else { 0 }
         };
-        Self { starts: tables.map.iter().enumerate().map(start).collect(), entries }
+        Self { tables: tables.map.iter().enumerate().map(table).collect(), symbols, models }
     }
 
-    /// Where the table of a context starts.
+    /// The table of a context; 0 if it is missing.
     #[inline(always)]
-    pub(super) fn start(&self, context: usize) -> u32 {
-        self.starts.get(context).copied().unwrap_or(0)
-    }
-
-    /// Whether the table that starts at `at` stands for one that is missing.
-    #[inline(always)]
-    pub(super) fn is_missing(&self, at: u32) -> bool {
-        at == 0
+    pub(super) fn table(&self, context: usize) -> u32 {
+        self.tables.get(context).copied().unwrap_or(0)
     }
 
     /// The symbol, its share, and how far `low` lies above its start.
     #[inline(always)]
-    pub(super) fn entry(&self, at: u32, low: u32) -> (u32, u32, u32) {
-        let entry = self.entries.get((at + low) as usize).copied().unwrap_or(0);
-        (entry & 0xff, (entry >> 8 & (TOTAL - 1)) + 1, entry >> 20)
+    pub(super) fn entry(&self, table: u32, low: u32) -> (u32, u32, u32) {
+        let symbol = self.symbols.get((table << PRECISION | low) as usize).copied().unwrap_or(0);
+        let model = self.models.get(table as usize * SYMBOLS + usize::from(symbol)).copied().unwrap_or(0);
+        (symbol.into(), model >> 16, low.wrapping_sub(model & 0xffff))
     }
 }
