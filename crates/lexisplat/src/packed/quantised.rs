@@ -155,7 +155,7 @@ impl<'a> Quantised<'a> {
             let mut sizes = vec![0; form.ranges()];
             let mut passes = vec![Vec::new(); form.ranges()];
             for (n, recorded) in &all {
-                let lanes = if *n < 4096 { 1 } else { 8 };
+                let lanes = lanes(*n);
                 let bytes: Vec<Vec<u8>> = recorded.iter().map(|r| r.0.finish(&tables, lanes)).collect();
                 let mut chunk = Chunk { gaussians: *n, ..Chunk::default() };
                 for k in 0..bytes.len() {

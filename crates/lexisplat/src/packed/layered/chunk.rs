@@ -1,7 +1,8 @@
 //! Coding of a chunk: ranges of a base, refinements and nonzeros, eight lanes each.
 
 use super::fine::refine;
-use super::range::{Player, Recorder};
+use super::player::Player;
+use super::range::Recorder;
 use super::rest::{Rest, RestForm};
 use super::steering::Steering;
 use super::symbols::{LANES, Lanes, has};
@@ -9,12 +10,12 @@ use super::tables::Lookup;
 use super::target::Target;
 use super::walk::{Group, Walk};
 
-/// Chunks of fewer Gaussians have one lane. Each lane takes about 8 bytes of every range.
-const LEAST_LANED: usize = 4096;
+/// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
+const LEAST_OF_LANE: usize = 1024;
 
 /// Number of lanes of a chunk.
 pub(in crate::packed) fn lanes(gaussians: usize) -> usize {
-    if gaussians < LEAST_LANED { 1 } else { LANES }
+    (gaussians / LEAST_OF_LANE).clamp(1, LANES)
 }
 
 /// First Gaussian of each lane of a chunk, and the number of Gaussians. The first lanes have one more than the others
@@ -31,6 +32,13 @@ fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
     let whole = (1 << lanes) - 1;
     let last = (1 << (gaussians % lanes)) - 1;
     std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
+}
+
+/// Takes what a chunk decodes to. A trait and not a closure, since closures are not inlined into vector code.
+pub(super) trait Sink {
+    /// Takes one Gaussian of each lane in `set`: of each lane the one with this number. `missing` is the number of levels
+    /// that are missing. Returns `None` for what no encoder writes.
+    fn take(&mut self, number: usize, set: u32, group: &Group, rest: &Rest, missing: usize) -> Option<()>;
 }
 
 /// How the chunks of a file are coded.
@@ -78,8 +86,7 @@ impl Form {
     }
 
     /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: those that follow one that is missing
-    /// are not looked at. Hands each group of up to eight Gaussians, one of each lane in the set, to `take`, with the
-    /// number of levels that are missing. Returns the checksums of the integers of the ranges if they are wanted; `None`
+    /// are not looked at. Hands each group of up to eight Gaussians, one of each lane in the set, to `sink`. Returns the checksums of the integers of the ranges if they are wanted; `None`
     /// if no encoder writes this.
     #[inline(always)]
     pub(super) fn play(
@@ -88,7 +95,7 @@ impl Form {
         ranges: &[Option<&[u8]>],
         gaussians: usize,
         want_sums: bool,
-        mut take: impl FnMut(usize, u32, &Group, &Rest, usize) -> Option<()>,
+        sink: &mut impl Sink,
     ) -> Option<Vec<u32>> {
         let lanes = lanes(gaussians);
         let of = |k: usize| ranges.get(k).copied().flatten();
@@ -122,7 +129,7 @@ impl Form {
                     sums[1 + self.levels + part].rest(set, &rest, part);
                 }
             }
-            take(step, set, &group, &rest, missing)?;
+            sink.take(step, set, &group, &rest, missing)?;
         }
         let whole = base.exhausted() && levels.iter().chain(&parts).all(Player::exhausted);
         whole.then(|| sums.into_iter().map(Sums::finish).collect())

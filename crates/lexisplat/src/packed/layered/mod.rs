@@ -6,6 +6,9 @@ mod chunk;
 mod fine;
 mod head;
 mod index;
+mod player;
+#[cfg(target_arch = "x86_64")]
+mod player_avx2;
 mod range;
 mod rest;
 mod steering;
@@ -17,7 +20,7 @@ mod unpack;
 mod values;
 mod walk;
 
-pub(super) use chunk::Form;
+pub(super) use chunk::{Form, lanes};
 pub(super) use head::Head;
 pub(super) use index::{Chunk, Index, Pass, Range};
 pub(super) use rest::RestForm;

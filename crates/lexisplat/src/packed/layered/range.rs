@@ -1,15 +1,15 @@
-//! The entropy coder of a range: eight lanes of rANS, each with a state of 32 bits and words of 16 bits.
+//! The entropy encoder of a range: eight lanes of rANS, each with a state of 32 bits and words of 16 bits.
 //!
 //! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
 
-use super::streams::{Stream, place};
-use super::symbols::{ALL, LANES, Lanes, Symbols, has};
-use super::tables::{Lookup, Model, PRECISION, TOTAL, Tables};
+use super::streams::{CONTEXTS, Stream, place};
+use super::symbols::{LANES, Lanes, Symbols, has};
+use super::tables::{Model, Tables};
 
 /// Least state between symbols. A lane begins and, decoded, ends with it.
-const LEAST: u32 = 1 << 16;
+pub(super) const LEAST: u32 = 1 << 16;
 /// Most raw bits that a state gives at once.
-const MOST_BITS: u32 = 16;
+pub(super) const MOST_BITS: u32 = 16;
 /// Marks a recorded entry as raw bits.
 const RAW: u32 = 1 << 31;
 
@@ -102,9 +102,11 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     // The coder is a stack: what is coded last is decoded first.
     for &entry in lane.iter().rev() {
         if entry & RAW == 0 {
-            let Model { start, share } = tables.model((entry >> 8) as usize, entry.to_le_bytes()[0]);
-            make_room(&mut state, u64::from(share) << (32 - PRECISION));
-            state = (state / share) * TOTAL + start + state % share;
+            let context = (entry >> 8) as usize;
+            let precision = Stream::ALL.get(context / CONTEXTS).map_or(0, |stream| stream.precision());
+            let Model { start, share } = tables.model(context, entry.to_le_bytes()[0]);
+            make_room(&mut state, u64::from(share) << (32 - precision));
+            state = (state / share << precision) + start + state % share;
         } else {
             let count = entry >> 16 & 0xff;
             make_room(&mut state, 1 << (32 - count));
@@ -117,112 +119,3 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     words
 }
 
-/// The decoder of a range.
-#[derive(Debug)]
-pub(in crate::packed) struct Player<'a> {
-    lookup: &'a Lookup,
-    words: &'a [[u8; 2]],
-    states: Lanes<u32>,
-    /// Next word of each lane, and the end of its words.
-    next: Lanes<u32>,
-    ends: Lanes<u32>,
-    /// Whether something was asked for that no encoder writes.
-    damaged: bool,
-}
-
-impl<'a> Player<'a> {
-    /// `None` if `bytes` cannot be a range of this many lanes.
-    pub(in crate::packed) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize) -> Option<Self> {
-        let (lengths, words) = bytes.split_at_checked(size_of::<u32>() * lanes.checked_sub(1)?)?;
-        let (words, []) = words.as_chunks::<2>() else { return None };
-        let total = u32::try_from(words.len()).ok()?;
-        let mut player =
-            Self { lookup, words, states: [LEAST; LANES], next: [0; LANES], ends: [0; LANES], damaged: false };
-        let mut end = 0_u32;
-        for l in 0..lanes {
-            player.next[l] = end;
-            end = match lengths.as_chunks::<4>().0.get(l) {
-                Some(length) => end.checked_add(u32::from_le_bytes(*length)).filter(|&end| end <= total)?,
-                None => total,
-            };
-            player.ends[l] = end;
-            player.states[l] = u32::from(player.word(l)) << 16;
-            player.states[l] |= u32::from(player.word(l));
-        }
-        Some(player)
-    }
-
-    /// The next word of a lane; 0 beyond the end.
-    #[inline(always)]
-    fn word(&mut self, l: usize) -> u16 {
-        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
-        self.next[l] += 1;
-        u16::from_le_bytes(word)
-    }
-
-    /// Takes a word into the state of a lane if it has room for one.
-    #[inline(always)]
-    fn refill(&mut self, l: usize, state: u32) {
-        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
-        let low = state < LEAST;
-        let filled = state << 16 | u32::from(u16::from_le_bytes(word));
-        self.states[l] = if low { filled } else { state };
-        self.next[l] += u32::from(low);
-    }
-
-    #[inline(always)]
-    fn symbol(&mut self, l: usize, at: u32) -> u32 {
-        let state = self.states[l];
-        let (symbol, share, over) = self.lookup.entry(at, state & (TOTAL - 1));
-        self.refill(l, (state >> PRECISION).wrapping_mul(share).wrapping_add(over));
-        symbol
-    }
-
-    #[inline(always)]
-    fn raw(&mut self, l: usize, count: u32) -> u32 {
-        let state = self.states[l];
-        self.refill(l, state >> count);
-        state & ((1 << count) - 1)
-    }
-
-    /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.
-    pub(in crate::packed) fn exhausted(&self) -> bool {
-        !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
-    }
-}
-
-impl Symbols for Player<'_> {
-    #[inline(always)]
-    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
-        let mut out = [0; LANES];
-        let at: Lanes<u32> = std::array::from_fn(|l| self.lookup.table(place(stream, context[l])));
-        if set == ALL {
-            for l in 0..LANES {
-                self.damaged |= at[l] == 0;
-                out[l] = self.symbol(l, at[l]);
-            }
-        } else {
-            for l in 0..LANES {
-                if has(set, l) {
-                    self.damaged |= at[l] == 0;
-                    out[l] = self.symbol(l, at[l]);
-                }
-            }
-        }
-        out
-    }
-
-    #[inline(always)]
-    fn bits(&mut self, _: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
-        let mut out = [0; LANES];
-        for l in 0..LANES {
-            if has(set, l) {
-                out[l] = self.raw(l, count[l].min(MOST_BITS));
-                if count[l] > MOST_BITS {
-                    out[l] |= self.raw(l, (count[l] - MOST_BITS).min(MOST_BITS)) << MOST_BITS;
-                }
-            }
-        }
-        out
-    }
-}

@@ -73,6 +73,17 @@ impl Stream {
     pub(super) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
 }
 
+impl Stream {
+    /// Bits of its probabilities. There are hundreds of atoms, and a probability is at least one unit.
+    #[inline(always)]
+    pub(super) const fn precision(self) -> u32 {
+        match self {
+            Self::Atom0 | Self::Atom1 | Self::Atom2 => 12,
+            _ => 10,
+        }
+    }
+}
+
 /// Number of the context `context` of `stream` among all contexts.
 #[inline(always)]
 pub(super) fn place(stream: Stream, context: u32) -> usize {

@@ -1,10 +1,10 @@
-//! Eight runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
+//! Runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
 
 use super::streams::Stream;
 
-/// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. Vector registers of 256 bits
-/// hold one number of each.
-pub(in crate::packed) const LANES: usize = 8;
+/// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A symbol of a lane depends on
+/// the one before it, so a CPU is busy only with many lanes. Two vector registers of 256 bits hold one number of each.
+pub(in crate::packed) const LANES: usize = 16;
 
 /// One number of each lane. Numbers of lanes that are not in use mean nothing.
 pub(in crate::packed) type Lanes<T = i32> = [T; LANES];

@@ -3,10 +3,6 @@
 use super::streams::{CONTEXTS, Stream};
 use crate::packed::bits::{BitReader, BitWriter};
 
-/// Bits of a probability. Finer probabilities cost more in tables than they save.
-pub(super) const PRECISION: u32 = 12;
-/// All probabilities of a table.
-pub(super) const TOTAL: u32 = 1 << PRECISION;
 /// Bits of a symbol count and of a bit length in a written table.
 const SYMBOLS_BITS: u32 = 9;
 const LENGTH_BITS: u32 = 4;
@@ -47,15 +43,15 @@ impl Histogram {
         }
     }
 
-    /// Bits of all its symbols when coded with its own probabilities, and of its table.
-    fn cost(&self) -> f64 {
+    /// Bits of all its symbols when coded with its own probabilities of `precision` bits, and of its table.
+    fn cost(&self, precision: u32) -> f64 {
         let total: u64 = self.counts.iter().map(|&c| u64::from(c)).sum();
         let total = total as f64;
         let mut bits = 0.0;
         let mut used = 0;
         for &count in self.counts.iter().filter(|&&c| c > 0) {
             // A probability is at least one unit of precision.
-            let share = (f64::from(count) / total).max(1.0 / f64::from(TOTAL));
+            let share = (f64::from(count) / total).max(1.0 / f64::from(1_u32 << precision));
             bits -= f64::from(count) * libm::log2(share);
             used += 1;
         }
@@ -80,7 +76,7 @@ impl Histogram {
     }
 }
 
-/// Where a symbol's share of the states lies, in units of 2^-12.
+/// Where a symbol's share of the states lies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Model {
     pub(super) start: u32,
@@ -97,16 +93,17 @@ struct Table {
 }
 
 impl Table {
-    /// A table from counts; `None` if they are all zero or too many.
-    fn new(counts: &[u32]) -> Option<Self> {
+    /// A table of probabilities of `precision` bits from counts; `None` if they are all zero or too many.
+    fn new(counts: &[u32], precision: u32) -> Option<Self> {
+        let whole = 1_u32 << precision;
         let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
         if total == 0 || counts.len() > MAX_SYMBOLS {
             return None;
         }
-        let share = |&c: &u32| if c == 0 { 0 } else { (u64::from(c) * u64::from(TOTAL) / total).max(1).cast_signed() };
+        let share = |&c: &u32| if c == 0 { 0 } else { (u64::from(c) * u64::from(whole) / total).max(1).cast_signed() };
         let mut shares: Vec<i64> = counts.iter().map(share).collect();
         // The difference that rounding leaves goes to the most frequent symbols, where it costs least.
-        let mut left = i64::from(TOTAL) - shares.iter().sum::<i64>();
+        let mut left = i64::from(whole) - shares.iter().sum::<i64>();
         while left != 0 {
             let most = (0..shares.len()).max_by_key(|&k| (shares[k], std::cmp::Reverse(k)))?;
             let change = if left > 0 { left } else { left.max(-(shares[most] / 2)) };
@@ -138,10 +135,11 @@ impl Tables {
     pub(in crate::packed) fn new(histograms: &[Histogram]) -> Option<Self> {
         let mut map = Vec::with_capacity(histograms.len());
         let mut tables = Vec::new();
-        for stream in histograms.chunks(CONTEXTS) {
-            let (joined, of) = join(stream);
+        for (stream, contexts) in Stream::ALL.into_iter().zip(histograms.chunks(CONTEXTS)) {
+            let (joined, of) = join(contexts, stream.precision());
             map.extend(of);
-            let made: Option<Vec<Table>> = joined.iter().map(|h| Table::new(&h.rounded())).collect();
+            let table = |h: &Histogram| Table::new(&h.rounded(), stream.precision());
+            let made: Option<Vec<Table>> = joined.iter().map(table).collect();
             tables.push(made?);
         }
         Some(Self { map, tables })
@@ -156,13 +154,14 @@ impl Tables {
     /// The model of a symbol, which was counted when the tables were made.
     pub(super) fn model(&self, context: usize, symbol: u8) -> Model {
         let model = self.table(context).and_then(|table| table.models.get(usize::from(symbol)));
-        model.copied().filter(|m| m.share > 0).unwrap_or(Model { start: 0, share: TOTAL })
+        model.copied().filter(|m| m.share > 0).unwrap_or(Model { start: 0, share: 1 })
     }
 
     /// Bits of all symbols counted in `histogram` of a context.
     pub(in crate::packed) fn bits(&self, context: usize, histogram: &Histogram) -> f64 {
         let used = (0_u8..=u8::MAX).zip(&histogram.counts).filter(|(_, count)| **count > 0);
-        let cost = |symbol| f64::from(PRECISION) - libm::log2(f64::from(self.model(context, symbol).share));
+        let precision = Stream::ALL.get(context / CONTEXTS).map_or(0, |stream| stream.precision());
+        let cost = |symbol| f64::from(precision) - libm::log2(f64::from(self.model(context, symbol).share));
         used.map(|(symbol, &count)| f64::from(count) * cost(symbol)).sum()
     }
 
@@ -202,7 +201,7 @@ impl Tables {
         let mut bits = BitReader::new(bytes);
         let mut map = Vec::with_capacity(ALL_CONTEXTS);
         let mut tables = Vec::with_capacity(Stream::ALL.len());
-        for _ in Stream::ALL {
+        for stream in Stream::ALL {
             let count = bits.take(TABLE_BITS);
             let mut last = 0_u8;
             for _ in 0..CONTEXTS {
@@ -225,7 +224,7 @@ impl Tables {
                     let drop = length.saturating_sub(1) - kept;
                     counts.push(if length == 0 { 0 } else { ((1 << kept) | mantissa) << drop });
                 }
-                made.push(Table::new(&counts)?);
+                made.push(Table::new(&counts, stream.precision())?);
             }
             tables.push(made);
         }
@@ -234,11 +233,11 @@ impl Tables {
 }
 
 /// Joins the two histograms that gain most by sharing a table until none gains. Returns the joined histograms, and for
-/// each context the number of its histogram among them.
-fn join(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
+/// each context the number of its histogram among them. Probabilities have `precision` bits.
+fn join(contexts: &[Histogram], precision: u32) -> (Vec<Histogram>, Vec<u8>) {
     let mut groups: Vec<(Histogram, Vec<usize>, f64)> = (0..contexts.len())
         .filter(|&c| !contexts[c].counts.is_empty())
-        .map(|c| (contexts[c].clone(), vec![c], contexts[c].cost()))
+        .map(|c| (contexts[c].clone(), vec![c], contexts[c].cost(precision)))
         .collect();
     let joined = |a: &Histogram, b: &Histogram| {
         let mut sum = a.clone();
@@ -250,7 +249,7 @@ fn join(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
         let mut gain = 0.0;
         for i in 0..groups.len() {
             for j in i + 1..groups.len() {
-                let cost = joined(&groups[i].0, &groups[j].0).cost();
+                let cost = joined(&groups[i].0, &groups[j].0).cost(precision);
                 let saved = groups[i].2 + groups[j].2 - cost;
                 if saved > gain {
                     (best, gain) = (Some((i, j, cost)), saved);
@@ -272,60 +271,57 @@ fn join(contexts: &[Histogram]) -> (Vec<Histogram>, Vec<u8>) {
     (groups.into_iter().map(|g| g.0).collect(), map)
 }
 
-/// The tables as a decoder looks symbols up.
-///
-/// A symbol is found by the low bits of a state, and its share by the symbol. One list that held both would be four times
-/// as long, and would not stay in cache.
+/// Most bits of a probability.
+const MOST_PRECISION: u32 = 12;
+
+/// The tables as a decoder looks symbols up: for each value of a state's low bits the symbol, its share less 1, and how
+/// far the value lies above the symbol's start.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
-    /// The table of each context.
-    tables: Vec<u32>,
-    /// Of each table, for each of the 4096 values of a state's low bits, the symbol.
-    symbols: Vec<u8>,
-    /// Of each table and symbol the share, shifted by 16 bits, and the start.
-    models: Vec<u32>,
+    /// Where the table of each context starts in `entries`.
+    starts: Vec<u32>,
+    entries: Vec<u32>,
 }
-
-/// Symbols of a table in [`Lookup`].
-const SYMBOLS: usize = 256;
 
 impl Lookup {
     pub(in crate::packed) fn new(tables: &Tables) -> Self {
-        // The first table stands for those that are missing: one symbol that takes no bits.
-        let mut symbols = vec![0; TOTAL as usize];
-        let mut models = vec![TOTAL << 16; SYMBOLS];
-        let mut numbers = Vec::with_capacity(tables.tables.len());
-        let mut number = 0_u32;
+        let entry = |symbol: u32, share: u32, over: u32| symbol | (share - 1) << 8 | over << (8 + MOST_PRECISION);
+        // The first table stands for those that are missing. Its symbols take bits, so that states stay within limits.
+        let mut entries: Vec<u32> = (0..1 << MOST_PRECISION).map(|_| entry(0, 1, 0)).collect();
+        let mut starts_of = Vec::with_capacity(tables.tables.len());
         for stream in &tables.tables {
-            numbers.push(number);
+            let mut starts = Vec::with_capacity(stream.len());
             for table in stream {
-                number += 1;
-                for (symbol, model) in (0_u8..=u8::MAX).zip(&table.models) {
-                    symbols.extend(std::iter::repeat_n(symbol, model.share as usize));
+                starts.push(entries.len() as u32);
+                for (symbol, model) in (0_u32..).zip(&table.models) {
+                    entries.extend((0..model.share).map(|over| entry(symbol, model.share, over)));
                 }
-                let packed = table.models.iter().map(|model| model.share << 16 | model.start);
-                models.extend(packed.chain(std::iter::repeat(0)).take(SYMBOLS));
             }
+            starts_of.push(starts);
         }
-        let table = |(context, &table): (usize, &u8)| {
-            let stream = context / CONTEXTS;
-            let there = tables.tables.get(stream).is_some_and(|stream| stream.len() > usize::from(table));
-            if there { numbers[stream] + u32::from(table) + 1 } else { 0 }
+        let start = |(context, &table): (usize, &u8)| {
+            let starts = starts_of.get(context / CONTEXTS).and_then(|starts| starts.get(usize::from(table)));
+            starts.copied().unwrap_or(0)
         };
-        Self { tables: tables.map.iter().enumerate().map(table).collect(), symbols, models }
+        Self { starts: tables.map.iter().enumerate().map(start).collect(), entries }
     }
 
-    /// The table of a context; 0 if it is missing.
+    /// Where the table of a context starts; 0 if it is missing.
     #[inline(always)]
-    pub(super) fn table(&self, context: usize) -> u32 {
-        self.tables.get(context).copied().unwrap_or(0)
+    pub(super) fn start(&self, context: usize) -> u32 {
+        self.starts.get(context).copied().unwrap_or(0)
     }
 
-    /// The symbol, its share, and how far `low` lies above its start.
+    /// The symbol, its share, and how far `low` lies above its start, by the table that starts at `start`.
     #[inline(always)]
-    pub(super) fn entry(&self, table: u32, low: u32) -> (u32, u32, u32) {
-        let symbol = self.symbols.get((table << PRECISION | low) as usize).copied().unwrap_or(0);
-        let model = self.models.get(table as usize * SYMBOLS + usize::from(symbol)).copied().unwrap_or(0);
-        (symbol.into(), model >> 16, low.wrapping_sub(model & 0xffff))
+    pub(super) fn entry(&self, start: u32, low: u32) -> (u32, u32, u32) {
+        let entry = self.entries.get((start + low) as usize).copied().unwrap_or(0);
+        (entry & 0xff, (entry >> 8 & ((1 << MOST_PRECISION) - 1)) + 1, entry >> (8 + MOST_PRECISION))
+    }
+
+    /// Where the table of each context starts, and all entries: as many for each table as its stream's precision says.
+    #[cfg(target_arch = "x86_64")]
+    pub(super) fn lists(&self) -> (&[u32], &[u32]) {
+        (&self.starts, &self.entries)
     }
 }

@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::chunk::{Form, starts};
+use super::chunk::{Form, Sink, starts};
 use super::rest::Rest;
 use super::steering::VALUE_BITS;
 use super::symbols::{LANES, Lanes, has};
@@ -72,32 +72,9 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         let Self { form, frame, lookup, ranges, want_sums, place } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
-        let mut lanes: Lanes<Piece> = Lanes::default();
-        let mut sorted: Vec<(u16, f16)> = Vec::new();
-        let sums = form.play(lookup, ranges, n, want_sums, |step, set, group, rest, missing| {
-            let drawn = Drawn::new(form, frame, group, missing);
-            for l in (0..LANES).filter(|&l| has(set, l)) {
-                let i = starts[l] + step;
-                *place.positions.get_mut(i)? = drawn.position.map(|x| x[l]);
-                *place.scales.get_mut(i)? = drawn.scales.map(|x| x[l]);
-                *place.opacities.get_mut(i)? = drawn.opacity[l];
-                *place.rotations.get_mut(i)? = drawn.rotation.map(|x| x[l]);
-                *place.dc.get_mut(i)? = drawn.dc.map(|x| x[l]);
-                code(frame, rest, group, l, &mut sorted);
-                *place.counts.get_mut(i)? = u8::try_from(sorted.len()).ok()?;
-                let out = &mut lanes[l];
-                for &(atom, value) in &sorted {
-                    out.atoms.push(atom);
-                    out.values.push(value);
-                }
-                if !rest.exact[l].is_empty() {
-                    out.escapes.gaussians.push(u32::try_from(i).ok()?);
-                    out.escapes.rows.extend_from_slice(&rest.exact[l]);
-                }
-            }
-            drawn.can_be(set).then_some(())
-        })?;
-        let [mut all, rest @ ..] = lanes;
+        let mut out = Out { form, frame, place, starts, lanes: Lanes::default(), sorted: Vec::new() };
+        let sums = form.play(lookup, ranges, n, want_sums, &mut out)?;
+        let [mut all, rest @ ..] = out.lanes;
         for lane in rest {
             all.atoms.extend(lane.atoms);
             all.values.extend(lane.values);
@@ -107,6 +84,44 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         // Large values of f16 are infinite, and no atom occurs twice in a Gaussian.
         let good = all.values.iter().all(|v| v.is_finite());
         good.then_some(Piece { sums, ..all })
+    }
+}
+
+/// Where a decoded chunk goes.
+struct Out<'j, 'p> {
+    form: &'j Form,
+    frame: &'j Frame,
+    place: &'j mut Place<'p>,
+    /// First Gaussian of each lane.
+    starts: [usize; LANES + 1],
+    lanes: Lanes<Piece>,
+    sorted: Vec<(u16, f16)>,
+}
+
+impl Sink for Out<'_, '_> {
+    #[inline(always)]
+    fn take(&mut self, number: usize, set: u32, group: &Group, rest: &Rest, missing: usize) -> Option<()> {
+        let drawn = Drawn::new(self.form, self.frame, group, missing);
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            let i = self.starts[l] + number;
+            *self.place.positions.get_mut(i)? = drawn.position.map(|x| x[l]);
+            *self.place.scales.get_mut(i)? = drawn.scales.map(|x| x[l]);
+            *self.place.opacities.get_mut(i)? = drawn.opacity[l];
+            *self.place.rotations.get_mut(i)? = drawn.rotation.map(|x| x[l]);
+            *self.place.dc.get_mut(i)? = drawn.dc.map(|x| x[l]);
+            code(self.frame, rest, group, l, &mut self.sorted);
+            *self.place.counts.get_mut(i)? = u8::try_from(self.sorted.len()).ok()?;
+            let out = &mut self.lanes[l];
+            for &(atom, value) in &self.sorted {
+                out.atoms.push(atom);
+                out.values.push(value);
+            }
+            if !rest.exact[l].is_empty() {
+                out.escapes.gaussians.push(u32::try_from(i).ok()?);
+                out.escapes.rows.extend_from_slice(&rest.exact[l]);
+            }
+        }
+        drawn.can_be(set).then_some(())
     }
 }
 

@@ -1,0 +1,145 @@
+//! The entropy decoder of a range.
+
+use super::range::{LEAST, MOST_BITS};
+use super::streams::{Stream, place};
+use super::symbols::{LANES, Lanes, Symbols, has};
+use super::tables::Lookup;
+
+/// The decoder of a range.
+#[derive(Debug)]
+pub(in crate::packed) struct Player<'a> {
+    pub(super) lookup: &'a Lookup,
+    /// Words of 16 bits, at least two.
+    pub(super) words: &'a [[u8; 2]],
+    pub(super) states: Lanes<u32>,
+    /// Next word of each lane, and the end of its words.
+    pub(super) next: Lanes<u32>,
+    ends: Lanes<u32>,
+    /// Whether something was asked for that no encoder writes.
+    pub(super) damaged: bool,
+    #[cfg(target_arch = "x86_64")]
+    avx2: Option<pulp::x86::V3>,
+}
+
+impl<'a> Player<'a> {
+    /// `None` if `bytes` cannot be a range of this many lanes.
+    pub(in crate::packed) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize) -> Option<Self> {
+        let (lengths, words) = bytes.split_at_checked(size_of::<u32>() * lanes.checked_sub(1)?)?;
+        let (words, []) = words.as_chunks::<2>() else { return None };
+        let total = u32::try_from(words.len()).ok().filter(|&total| (2..=MAX_WORDS).contains(&total))?;
+        let mut player = Self {
+            lookup,
+            words,
+            states: [LEAST; LANES],
+            next: [2; LANES],
+            ends: [2; LANES],
+            damaged: false,
+            #[cfg(target_arch = "x86_64")]
+            avx2: crate::support::simd::Simd::current().avx2(),
+        };
+        let mut end = 0_u32;
+        for l in 0..lanes {
+            let start = end;
+            end = match lengths.as_chunks::<4>().0.get(l) {
+                Some(length) => end.checked_add(u32::from_le_bytes(*length)).filter(|&end| end <= total)?,
+                None => total,
+            };
+            let [high, low] = *words.get(start as usize..end as usize)?.first_chunk()?;
+            player.states[l] = u32::from(u16::from_le_bytes(high)) << 16 | u32::from(u16::from_le_bytes(low));
+            player.next[l] = start + 2;
+            player.ends[l] = end;
+        }
+        Some(player)
+    }
+
+    /// Takes a word into the state of a lane if it has room for one. Beyond the end there are zeros.
+    #[inline(always)]
+    fn refill(&mut self, l: usize, state: u32) {
+        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
+        let low = state < LEAST;
+        let filled = state << 16 | u32::from(u16::from_le_bytes(word));
+        self.states[l] = if low { filled } else { state };
+        self.next[l] += u32::from(low);
+    }
+
+    /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.
+    pub(in crate::packed) fn exhausted(&self) -> bool {
+        !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
+    }
+
+    /// The next symbol of each lane in `set`, by the table of its context.
+    ///
+    /// It is called and not inlined: the walk has dozens of places that take symbols, and with this in each of them it
+    /// would not fit into the cache of instructions.
+    #[inline(never)]
+    fn take(&mut self, stream: Stream, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        let precision = stream.precision();
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            let start = self.lookup.start(place(stream, context[l]));
+            self.damaged |= start == 0;
+            let state = self.states[l];
+            let (symbol, share, over) = self.lookup.entry(start, state & ((1 << precision) - 1));
+            self.refill(l, (state >> precision).wrapping_mul(share).wrapping_add(over));
+            out[l] = symbol;
+        }
+        out
+    }
+
+    /// The next `count` raw bits of each lane in `set`, at most 16.
+    #[inline(never)]
+    fn take_bits(&mut self, count: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            let state = self.states[l];
+            self.refill(l, state >> count[l]);
+            out[l] = state & ((1 << count[l]) - 1);
+        }
+        out
+    }
+
+    #[inline(always)]
+    fn pieces(&mut self, count: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = self.avx2 {
+            return super::player_avx2::take_bits(avx2, self, count, set);
+        }
+        self.take_bits(count, set)
+    }
+}
+
+/// Most words of a range, which gathers of 4 bytes can reach with signed offsets.
+const MAX_WORDS: u32 = 1 << 30;
+
+impl Symbols for Player<'_> {
+    #[inline(always)]
+    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        #[cfg(target_arch = "x86_64")]
+        if let Some(avx2) = self.avx2 {
+            return super::player_avx2::take(avx2, self, stream, &context, set);
+        }
+        self.take(stream, &context, set)
+    }
+
+    #[inline(always)]
+    fn bits(&mut self, _: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut first = [0; LANES];
+        let mut more = 0;
+        for l in 0..LANES {
+            first[l] = count[l].min(MOST_BITS);
+            more |= count[l];
+        }
+        let mut out = self.pieces(&first, set);
+        if more > MOST_BITS {
+            let mut rest = [0; LANES];
+            for l in 0..LANES {
+                rest[l] = (count[l] - first[l]).min(MOST_BITS);
+            }
+            let high = self.pieces(&rest, set);
+            for l in 0..LANES {
+                out[l] |= high[l] << MOST_BITS;
+            }
+        }
+        out
+    }
+}
