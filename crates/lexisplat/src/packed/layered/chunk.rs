@@ -3,7 +3,7 @@
 use super::fine::refine;
 use super::player::Player;
 use super::range::Recorder;
-use super::rest::{Rest, RestForm};
+use super::rest::{BLOCK, Coded, Cursor, Rest, RestForm};
 use super::steering::Steering;
 use super::symbols::{LANES, Lanes, has};
 use super::tables::Lookup;
@@ -34,11 +34,14 @@ fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
     std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
 }
 
-/// Takes what a chunk decodes to. A trait and not a closure, since closures are not inlined into vector code.
+/// Takes what a chunk decodes to. A trait and not closures, since closures are not inlined into vector code.
 pub(super) trait Sink {
     /// Takes one Gaussian of each lane in `set`: of each lane the one with this number. `missing` is the number of levels
     /// that are missing. Returns `None` for what no encoder writes.
-    fn take(&mut self, number: usize, set: u32, group: &Group, rest: &Rest, missing: usize) -> Option<()>;
+    fn group(&mut self, number: usize, set: u32, group: &Group, missing: usize) -> Option<()>;
+
+    /// Takes the SH-rest of a block of Gaussians, of each lane those from this number on.
+    fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
 }
 
 /// How the chunks of a file are coded.
@@ -56,7 +59,8 @@ impl Form {
         1 + self.levels + self.rest.least.len()
     }
 
-    /// Codes the Gaussians of a chunk, and returns what its ranges hold. `None` if there is something no decoder takes.
+    /// Codes the Gaussians of a chunk, and returns what its ranges hold and the checksums of their integers. `None` if
+    /// there is something no decoder takes.
     pub(in crate::packed) fn record(&self, targets: &[Target]) -> Option<Vec<(Recorder, u32)>> {
         let lanes = lanes(targets.len());
         let starts = starts(targets.len(), lanes);
@@ -64,22 +68,30 @@ impl Form {
         let mut sums = vec![Sums::default(); self.ranges()];
         let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
         let none = Target::default();
-        for (step, set) in sets(targets.len(), lanes).enumerate() {
-            let group: [&Target; LANES] =
-                std::array::from_fn(|l| targets.get(starts[l] + step).filter(|_| has(set, l)).unwrap_or(&none));
-            let targets = Some(&group);
+        let sets: Vec<u32> = sets(targets.len(), lanes).collect();
+        for (block, sets) in sets.chunks(BLOCK).enumerate() {
+            let first = block * BLOCK;
             rest.clear();
             let (base, finer) = ranges.split_first_mut()?;
-            let mut group = walk.base(base, set, targets)?;
-            sums[0].base(set, &group);
             let (levels, parts) = finer.split_at_mut_checked(self.levels)?;
-            for (k, range) in levels.iter_mut().enumerate() {
-                refine(range, set, &mut group, self.levels - k);
-                sums[1 + k].refined(set, &group);
+            for (i, &set) in sets.iter().enumerate() {
+                let of = |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
+                let group: [&Target; LANES] = std::array::from_fn(of);
+                let mut group = walk.base(base, set, Some(&group))?;
+                sums[0].base(set, &group);
+                for (k, range) in levels.iter_mut().enumerate() {
+                    refine(range, set, &mut group, self.levels - k);
+                    sums[1 + k].refined(set, &group);
+                }
+                rest.push(set, group.colour);
             }
+            let wanted: Lanes<Vec<&Target>> = std::array::from_fn(|l| {
+                let there = sets.iter().enumerate().filter(|(_, set)| has(**set, l));
+                there.filter_map(|(i, _)| targets.get(starts[l] + first + i)).collect()
+            });
             for (part, range) in parts.iter_mut().enumerate() {
-                rest.part(range, set, targets, &group.colour, &self.rest, part)?;
-                sums[1 + self.levels + part].rest(set, &rest, part);
+                rest.part(range, Some(&wanted), &self.rest, part)?;
+                sums[1 + self.levels + part].rest(&rest, &self.rest, part);
             }
         }
         Some(ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect())
@@ -109,10 +121,10 @@ impl Form {
             parts.push(Player::new(lookup, bytes, lanes)?);
         }
         let missing = self.levels - levels.len();
+        let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want_sums { self.ranges() } else { 0 }];
         let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
         for (step, set) in sets(gaussians, lanes).enumerate() {
-            rest.clear();
             let mut group = walk.base(&mut base, set, None)?;
             if want_sums {
                 sums[0].base(set, &group);
@@ -123,13 +135,18 @@ impl Form {
                     sums[1 + k].refined(set, &group);
                 }
             }
-            for (part, range) in parts.iter_mut().enumerate() {
-                rest.part(range, set, None, &group.colour, &self.rest, part)?;
-                if want_sums {
-                    sums[1 + self.levels + part].rest(set, &rest, part);
+            sink.group(step, set, &group, missing)?;
+            rest.push(set, group.colour);
+            if rest.len() == BLOCK || step + 1 == steps {
+                for (part, range) in parts.iter_mut().enumerate() {
+                    rest.part(range, None, &self.rest, part)?;
+                    if want_sums {
+                        sums[1 + self.levels + part].rest(&rest, &self.rest, part);
+                    }
                 }
+                sink.rest(step + 1 - rest.len(), &rest)?;
+                rest.clear();
             }
-            sink.take(step, set, &group, &rest, missing)?;
         }
         let whole = base.exhausted() && levels.iter().chain(&parts).all(Player::exhausted);
         whole.then(|| sums.into_iter().map(Sums::finish).collect())
@@ -167,18 +184,23 @@ impl Sums {
     }
 
     /// Number of nonzeros, atoms with values; -1 and the bits of an exact row.
-    fn rest(&mut self, set: u32, rest: &Rest, part: usize) {
-        for l in (0..LANES).filter(|&l| has(set, l)) {
-            if !rest.exact[l].is_empty() {
-                if part == 0 {
-                    self.add(l, &[-1]);
-                    rest.exact[l].iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
+    fn rest(&mut self, rest: &Rest, form: &RestForm, part: usize) {
+        for l in 0..LANES {
+            let mut cursor = Cursor::default();
+            for i in (0..rest.len()).filter(|&i| has(rest.of(i).0, l)) {
+                match rest.coded(form, part, i, l, &mut cursor) {
+                    Coded::Exact(row) => {
+                        self.add(l, &[-1]);
+                        row.iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
+                    }
+                    Coded::Code(from, count) => {
+                        self.add(l, &[count as i32]);
+                        for (atom, value) in (from..from + count).map(|j| rest.nonzero(part, j, l)) {
+                            self.add(l, &[atom.into(), value]);
+                        }
+                    }
                 }
-                continue;
             }
-            let new = rest.codes[l].get(rest.earlier(l)..).unwrap_or_default();
-            self.add(l, &[new.len() as i32]);
-            new.iter().for_each(|&(atom, value)| self.add(l, &[i32::from(atom), value]));
         }
     }
 

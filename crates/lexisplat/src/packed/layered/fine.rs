@@ -1,7 +1,7 @@
 //! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
 
 use super::streams::Stream;
-use super::symbols::{LANES, Lanes, Symbols};
+use super::symbols::{LANES, Lanes, Symbols, each};
 use super::walk::{DC, FACTOR, Group, OPACITY, REFINED, coarsened, dropped, factor};
 use crate::packed::parameters::TARGETS;
 
@@ -26,7 +26,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
         };
         let counts = group.counts[k];
         let wanted = &group.wanted[k];
-        let context: Lanes<u32> = std::array::from_fn(|l| {
+        let context: Lanes<u32> = each(|l| {
             BY_COUNT * (class[l] / width).min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1)
         });
         // Zero is the step towards zero, which is the one that occurs most.
@@ -42,7 +42,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
     }
     for k in 0..3 {
         let full = &group.axis_bits[usize::from(k == 2)];
-        let count = full.map(|bits| dropped(bits, level) - dropped(bits, level - 1));
+        let count = each(|l| dropped(full[l], level) - dropped(full[l], level - 1));
         let wanted = &group.wanted_rotation[k];
         let low = s.bits(Stream::Rotation, count, set, |l| {
             wanted[l] >> dropped(full[l], level - 1) & ((1 << count[l]) - 1)

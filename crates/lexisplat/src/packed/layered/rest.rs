@@ -1,7 +1,7 @@
 //! SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
 
 use super::streams::{REST_PARTS, Stream};
-use super::symbols::{LANES, Lanes, Symbols, has};
+use super::symbols::{LANES, Lanes, Symbols, each};
 use super::target::Target;
 
 /// Colour classes that numbers of nonzeros are told apart by.
@@ -16,6 +16,13 @@ const FIRST_CONTEXTS: u32 = 8;
 const LATER_CONTEXTS: u32 = 16;
 /// Atoms that a symbol tells apart.
 pub(in crate::packed) const PAGE: u32 = 256;
+/// Gaussians of each lane of which the numbers of nonzeros come first, and then the nonzeros. Lanes have numbers of their
+/// own, which differ less over many Gaussians, so that nearly all lanes are busy.
+pub(super) const BLOCK: usize = 64;
+/// Signs that are coded at once.
+const SIGNS: usize = 16;
+/// Marks a nonzero that is not the first one of its Gaussian and part.
+const LATER: u8 = u8::MAX;
 /// Largest size of a nonzero.
 const MAX_SIZE: u32 = 1 << 30;
 
@@ -29,125 +36,267 @@ pub(in crate::packed) struct RestForm {
     pub(in crate::packed) least: Vec<u32>,
 }
 
-/// What is known of the SH-rest of eight Gaussians.
+/// The SH-rest of up to [`BLOCK`] Gaussians of each lane.
 #[derive(Debug, Default)]
 pub(super) struct Rest {
-    /// Pairs (atom, value in steps) of each lane.
-    pub(super) codes: Lanes<Vec<(u16, i32)>>,
-    /// Exact rows, empty for Gaussians that have codes.
-    pub(super) exact: Lanes<Vec<f32>>,
-    /// Nonzeros of the part before.
-    before: Lanes<u32>,
-    /// Nonzeros of the first part of the group before.
+    /// Of each Gaussian: the lanes that have one, and their colour classes.
+    sets: Vec<u32>,
+    colours: Vec<Lanes<u32>>,
+    parts: [Part; REST_PARTS],
+    /// Exact rows of each lane, one after the other.
+    rows: Lanes<Vec<f32>>,
+    /// Nonzeros of the first part of the Gaussian before.
     last: Lanes<u32>,
+    /// Of each nonzero of each lane the context of its size, or [`LATER`].
+    plan: Vec<[u8; LANES]>,
+}
+
+/// One part of the nonzeros of a block.
+#[derive(Debug, Default)]
+struct Part {
+    /// Of each Gaussian the number of nonzeros of each lane.
+    counts: Vec<Lanes<u32>>,
+    /// Of each nonzero of each lane the atom, and the value in steps.
+    atoms: Vec<Lanes<u32>>,
+    values: Vec<Lanes>,
+}
+
+/// Places in the nonzeros of a lane.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Cursor {
+    next: [usize; REST_PARTS],
+    row: usize,
+}
+
+/// The SH-rest of one Gaussian of a part of a block.
+#[derive(Debug)]
+pub(super) enum Coded<'r> {
+    Exact(&'r [f32]),
+    /// First nonzero and number of nonzeros.
+    Code(usize, usize),
 }
 
 impl Rest {
-    /// Nonzeros of a lane before the last part.
-    pub(super) fn earlier(&self, l: usize) -> usize {
-        self.codes[l].len() - self.before[l] as usize
+    /// Number of Gaussians of each lane so far.
+    pub(super) fn len(&self) -> usize {
+        self.sets.len()
     }
 
-    /// Forgets the codes of the last group.
+    /// The lanes that have Gaussian `i` of the block, and their colour classes.
     #[inline(always)]
-    pub(super) fn clear(&mut self) {
-        self.codes.iter_mut().for_each(Vec::clear);
-        self.exact.iter_mut().for_each(Vec::clear);
+    pub(super) fn of(&self, i: usize) -> (u32, &Lanes<u32>) {
+        (self.sets[i], &self.colours[i])
     }
 
-    /// Codes one part of the nonzeros of the next Gaussian of each lane in `set`. Returns `None` for impossible values.
+    /// Adds a Gaussian of each lane in `set`, of these colour classes.
+    #[inline(always)]
+    pub(super) fn push(&mut self, set: u32, colours: Lanes<u32>) {
+        self.sets.push(set);
+        self.colours.push(colours);
+    }
+
+    /// Begins the next block.
+    pub(super) fn clear(&mut self) {
+        self.sets.clear();
+        self.colours.clear();
+        for part in &mut self.parts {
+            part.counts.clear();
+            part.atoms.clear();
+            part.values.clear();
+        }
+        self.rows.iter_mut().for_each(Vec::clear);
+    }
+
+    /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
+    #[inline(always)]
+    pub(super) fn coded(&self, form: &RestForm, part: usize, i: usize, l: usize, cursor: &mut Cursor) -> Coded<'_> {
+        let count = self.parts[part].counts.get(i).map_or(0, |counts| counts[l] as usize);
+        if count == form.dim + 1 {
+            let from = cursor.row;
+            cursor.row += form.dim;
+            return Coded::Exact(self.rows[l].get(from..cursor.row).unwrap_or_default());
+        }
+        let from = cursor.next[part];
+        cursor.next[part] += count;
+        Coded::Code(from, count)
+    }
+
+    /// Nonzero `j` of lane `l` of a part: atom and value in steps.
+    #[inline(always)]
+    pub(super) fn nonzero(&self, part: usize, j: usize, l: usize) -> (u16, i32) {
+        let part = &self.parts[part];
+        (part.atoms[j][l] as u16, part.values[j][l])
+    }
+
+    /// Codes one part of the nonzeros of the block. `targets` holds the Gaussians of each lane. Returns `None` for
+    /// impossible values.
     #[inline(always)]
     pub(super) fn part<S: Symbols>(
         &mut self,
         s: &mut S,
-        set: u32,
-        targets: Option<&[&Target; LANES]>,
-        colour: &Lanes<u32>,
+        targets: Option<&Lanes<Vec<&Target>>>,
         form: &RestForm,
         part: usize,
     ) -> Option<()> {
-        let escape = form.dim as u32 + 1;
         let least = *form.least.get(part)?;
         let most = part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
-        let of = |l: usize| {
-            let code = targets.map_or(&[][..], |targets| &targets[l].code);
-            let size = |&&(_, value): &&(u16, i32)| (least..most).contains(&value.unsigned_abs());
-            code.iter().filter(size)
-        };
-        // Rows that are stored exactly have no later parts.
-        let mut coded = 0;
-        for l in (0..LANES).filter(|&l| has(set, l) && (part == 0 || self.exact[l].is_empty())) {
-            coded |= 1 << l;
-        }
-        let context: Lanes<u32> = std::array::from_fn(|l| match part {
-            0 => 2 * colour[l].min(COUNT_CLASSES - 1) + u32::from(self.last[l] > 1),
-            _ => {
-                BY_BEFORE * (colour[l] / CLASS_WIDTH).min(LATER_CLASSES - 1) + self.before[l].min(BY_BEFORE - 1)
-            }
-        });
-        let counts = s.integers(Stream::COUNTS[part], context, coded, |l| {
-            let exact = part == 0 && targets.is_some_and(|targets| !targets[l].exact.is_empty());
-            if exact { escape } else { of(l).count() as u32 }
-        });
-        let mut most_count = 0;
-        for l in 0..LANES {
-            if counts[l] > escape || (counts[l] == escape && part > 0) {
-                return None;
-            }
-            if counts[l] == escape {
-                self.row(s, l, targets, form.dim)?;
-            } else {
-                most_count = most_count.max(counts[l]);
+        // Of each lane the nonzeros that belong to this part.
+        let mut wanted: Lanes<Vec<(u16, i32)>> = Lanes::default();
+        if let Some(targets) = targets {
+            for (wanted, lane) in wanted.iter_mut().zip(targets) {
+                let all = lane.iter().flat_map(|target| &target.code);
+                wanted.extend(all.filter(|(_, value)| (least..most).contains(&value.unsigned_abs())));
             }
         }
-        let counts = counts.map(|count| if count == escape { 0 } else { count });
-        self.before = counts;
-        if part == 0 {
-            self.last = counts;
-        }
-        let (mut last, pages) = ([0; LANES], form.atoms as u32 > PAGE);
-        for k in 0..most_count {
-            let mut set = 0;
-            for l in 0..LANES {
-                set |= u32::from(counts[l] > k) << l;
-            }
-            let nth = |l: usize| of(l).nth(k as usize).copied().unwrap_or_default();
+        self.counts(s, targets, form, part, least..most)?;
+        let totals = self.totals(form, part);
+        let count = totals.iter().copied().max().unwrap_or(0) as usize;
+        let pages = form.atoms as u32 > PAGE;
+        let of = |l: usize, j: usize| wanted[l].get(j).copied().unwrap_or_default();
+        let mut last = [0; LANES];
+        let mut beyond = false;
+        for j in 0..count {
+            let set = longer(&totals, j);
+            let plan = self.plan[j];
+            let later: Lanes<u32> = each(|l| u32::from(plan[l] == LATER));
             let page = match pages {
-                true => s.symbols(Stream::AtomPage, [part as u32; LANES], set, |l| u32::from(nth(l).0) / PAGE),
+                true => s.symbols(Stream::AtomPage, [part as u32; LANES], set, |l| u32::from(of(l, j).0) / PAGE),
                 false => [0; LANES],
             };
-            let context = page.map(|page| 2 * page.min(3) + u32::from(k > 0));
-            let atom = s.symbols(Stream::ATOMS[part], context, set, |l| u32::from(nth(l).0) % PAGE);
-            let context: Lanes<u32> = std::array::from_fn(|l| match k {
-                0 => counts[l].wrapping_sub(1).min(FIRST_CONTEXTS - 1),
+            let context = each(|l| 2 * page[l].min(3) + later[l]);
+            let atom = s.symbols(Stream::ATOMS[part], context, set, |l| u32::from(of(l, j).0) % PAGE);
+            let context = each(|l| match later[l] {
+                0 => u32::from(plan[l]),
                 _ => FIRST_CONTEXTS + last[l].min(LATER_CONTEXTS - 1),
             });
-            let size = s.integers(Stream::VALUES[part], context, set, |l| nth(l).1.unsigned_abs().wrapping_sub(least));
+            let size =
+                s.integers(Stream::VALUES[part], context, set, |l| of(l, j).1.unsigned_abs().wrapping_sub(least));
             last = size;
-            let negative = s.bits(Stream::VALUES[part], [1; LANES], set, |l| u32::from(nth(l).1 < 0));
+            let atom = each(|l| PAGE * page[l] + atom[l]);
             for l in 0..LANES {
-                if has(set, l) {
-                    let atom = PAGE * page[l] + atom[l];
-                    let value = size[l].checked_add(least).filter(|&value| value < most)?.cast_signed();
-                    if atom >= form.atoms as u32 {
-                        return None;
-                    }
-                    self.codes[l].push((atom as u16, if negative[l] == 1 { -value } else { value }));
+                beyond |= atom[l] >= form.atoms as u32 || size[l] >= most - least;
+            }
+            self.parts[part].atoms.push(atom);
+            self.parts[part].values.push(each(|l| size[l].wrapping_add(least).cast_signed()));
+        }
+        if beyond {
+            return None;
+        }
+        for from in (0..count).step_by(SIGNS) {
+            let taken = each(|l| (totals[l]).saturating_sub(from as u32).min(SIGNS as u32));
+            let signs = s.bits(Stream::VALUES[part], taken, longer(&totals, from), |l| {
+                (0..taken[l]).fold(0, |bits, k| bits | u32::from(of(l, from + k as usize).1 < 0) << k)
+            });
+            for (k, values) in self.parts[part].values[from..].iter_mut().take(SIGNS).enumerate() {
+                for l in 0..LANES {
+                    let negative = (signs[l] >> k & 1).cast_signed().wrapping_neg();
+                    values[l] = (values[l] ^ negative).wrapping_sub(negative);
                 }
             }
         }
-        Some(())
+        if part == 0 { self.exact(s, targets, form) } else { Some(()) }
     }
 
-    /// Codes an exact row.
-    fn row<S: Symbols>(&mut self, s: &mut S, l: usize, targets: Option<&[&Target; LANES]>, dim: usize) -> Option<()> {
-        for k in 0..dim {
-            let own = |_: usize| targets.map_or(0, |targets| targets[l].exact[k].to_bits());
-            let bits = s.bits(Stream::Value0, [32; LANES], 1 << l, own);
-            self.exact[l].push(f32::from_bits(bits[l]));
+    /// Codes the numbers of nonzeros.
+    #[inline(always)]
+    fn counts<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        targets: Option<&Lanes<Vec<&Target>>>,
+        form: &RestForm,
+        part: usize,
+        sizes: std::ops::Range<u32>,
+    ) -> Option<()> {
+        let escape = form.dim as u32 + 1;
+        let mut beyond = false;
+        for i in 0..self.len() {
+            let (mut set, colour) = (self.sets[i], &self.colours[i]);
+            let context = if part == 0 {
+                each(|l| 2 * colour[l].min(COUNT_CLASSES - 1) + u32::from(self.last[l] > 1))
+            } else {
+                let before = &self.parts[part - 1].counts[i];
+                // Rows that are stored exactly have no later parts.
+                let exact = &self.parts[0].counts[i];
+                for l in 0..LANES {
+                    set &= !(u32::from(exact[l] == escape) << l);
+                }
+                each(|l| BY_BEFORE * (colour[l] / CLASS_WIDTH).min(LATER_CLASSES - 1) + before[l].min(BY_BEFORE - 1))
+            };
+            let counts = s.integers(Stream::COUNTS[part], context, set, |l| {
+                let Some(target) = targets.and_then(|targets| targets[l].get(i)) else { return 0 };
+                if part == 0 && !target.exact.is_empty() {
+                    return escape;
+                }
+                target.code.iter().filter(|(_, value)| sizes.contains(&value.unsigned_abs())).count() as u32
+            });
+            for l in 0..LANES {
+                beyond |= counts[l] > escape || (counts[l] == escape && part > 0);
+            }
+            if part == 0 {
+                self.last = each(|l| if counts[l] == escape { 0 } else { counts[l] });
+            }
+            self.parts[part].counts.push(counts);
         }
-        self.exact[l].iter().all(|v| v.is_finite()).then_some(())
+        (!beyond).then_some(())
     }
+
+    /// Plans the nonzeros of a part, and returns their number in each lane.
+    #[inline(always)]
+    fn totals(&mut self, form: &RestForm, part: usize) -> Lanes<u32> {
+        let escape = form.dim as u32 + 1;
+        let mut totals = [0; LANES];
+        self.plan.clear();
+        self.plan.resize(self.len() * form.dim, [0; LANES]);
+        for counts in &self.parts[part].counts {
+            for l in 0..LANES {
+                if counts[l] == 0 || counts[l] == escape {
+                    continue;
+                }
+                let from = totals[l] as usize;
+                totals[l] += counts[l];
+                for plan in &mut self.plan[from..totals[l] as usize] {
+                    plan[l] = LATER;
+                }
+                self.plan[from][l] = (counts[l] - 1).min(FIRST_CONTEXTS - 1) as u8;
+            }
+        }
+        totals
+    }
+
+    /// Codes the exact rows of the block.
+    fn exact<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        targets: Option<&Lanes<Vec<&Target>>>,
+        form: &RestForm,
+    ) -> Option<()> {
+        let escape = form.dim as u32 + 1;
+        let mut finite = true;
+        for i in 0..self.len() {
+            for l in (0..LANES).filter(|&l| self.parts[0].counts[i][l] == escape) {
+                for k in 0..form.dim {
+                    let own = |_: usize| {
+                        let target = targets.and_then(|targets| targets[l].get(i));
+                        target.and_then(|target| target.exact.get(k)).map_or(0, |v| v.to_bits())
+                    };
+                    let value = f32::from_bits(s.bits(Stream::Value0, [32; LANES], 1 << l, own)[l]);
+                    finite &= value.is_finite();
+                    self.rows[l].push(value);
+                }
+            }
+        }
+        finite.then_some(())
+    }
+}
+
+/// The lanes whose total is above `j`.
+#[inline(always)]
+fn longer(totals: &Lanes<u32>, j: usize) -> u32 {
+    let mut set = 0;
+    for l in 0..LANES {
+        set |= u32::from(totals[l] as usize > j) << l;
+    }
+    set
 }
 
 const _: () = assert!(COUNT_CLASSES as usize * 2 <= super::streams::CONTEXTS);

@@ -3,7 +3,7 @@
 //! In files that an encoder wrote no product and no sum leaves the range of an `i32`, so every language computes the
 //! same ones. In damaged files sums wrap around. Floating point only makes values of decoded integers.
 
-use super::symbols::{LANES, Lanes};
+use super::symbols::{LANES, Lanes, each};
 use crate::packed::parameters::{LAST_CLASS, Parameters, TARGETS};
 
 /// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
@@ -164,7 +164,7 @@ impl Steering {
     #[inline(always)]
     pub(super) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
         let steps = &self.steps[t.min(4)];
-        class.map(|class| steps[(class & u32::from(LAST_CLASS)) as usize].cast_signed())
+        each(|l| steps[(class[l] & u32::from(LAST_CLASS)) as usize].cast_signed())
     }
 
     /// Predictions of target `t`, as values. The features are the average, the two classes and the scales.
@@ -177,7 +177,8 @@ impl Steering {
                 sums[l] = sums[l].wrapping_add(p.wrapping_mul(feature[l]) >> PRODUCT_SHIFT);
             }
         }
-        sums.map(|s| s.clamp(-MOST_SUM, MOST_SUM) << (VALUE_BITS + PRODUCT_SHIFT - FEATURE_BITS - COEFFICIENT_BITS))
+        const SHIFT: u32 = VALUE_BITS + PRODUCT_SHIFT - FEATURE_BITS - COEFFICIENT_BITS;
+        each(|l| sums[l].clamp(-MOST_SUM, MOST_SUM) << SHIFT)
     }
 
     /// Logarithms of steps.
@@ -196,7 +197,12 @@ impl Steering {
     /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
     #[inline(always)]
     pub(super) fn axis_bits(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> ([Lanes<u32>; 2], Lanes<bool>) {
-        let logs = self.turns.map(|row| Self::logarithms(&row, class, scales).map(|log| log.min(MOST_TURN)));
+        let [a, b, c] = &self.turns;
+        let log = |row: &[i32; SLOPES]| {
+            let logs = Self::logarithms(row, class, scales);
+            each(|l| logs[l].min(MOST_TURN))
+        };
+        let logs = [log(a), log(b), log(c)];
         let (mut bits, mut needle) = ([[0; LANES]; 2], [false; LANES]);
         for l in 0..LANES {
             needle[l] = scales[0][l] - scales[1][l] >= scales[1][l] - scales[2][l];
@@ -211,11 +217,13 @@ impl Steering {
     /// Logarithms of the steps of the position along each axis.
     #[inline(always)]
     pub(super) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
-        let most = scales[0].map(|s| MOST_MOVE + (s * OCTAVES_PER_E >> FEATURE_BITS));
-        self.moves.map(|row| {
-            let logs = Self::logarithms(&row, class, scales);
-            std::array::from_fn(|l| logs[l].min(most[l]))
-        })
+        let most = each(|l| MOST_MOVE + (scales[0][l] * OCTAVES_PER_E >> FEATURE_BITS));
+        let log = |row: &[i32; SLOPES]| {
+            let logs = Self::logarithms(row, class, scales);
+            each(|l| logs[l].min(most[l]))
+        };
+        let [a, b, c] = &self.moves;
+        [log(a), log(b), log(c)]
     }
 
     /// The context of a step of the position.

@@ -9,8 +9,15 @@ pub(in crate::packed) const LANES: usize = 16;
 /// One number of each lane. Numbers of lanes that are not in use mean nothing.
 pub(in crate::packed) type Lanes<T = i32> = [T; LANES];
 
-/// The set of all lanes.
-pub(in crate::packed) const ALL: u32 = (1 << LANES) - 1;
+/// What `of` says of each lane. It is always inlined into vector code, which the methods of arrays are not.
+#[inline(always)]
+pub(super) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
+    let mut out = [T::default(); LANES];
+    for (l, out) in out.iter_mut().enumerate() {
+        *out = of(l);
+    }
+    out
+}
 
 /// Whether `lane` is in `set`.
 #[inline(always)]
@@ -33,33 +40,33 @@ pub(super) trait Symbols {
     #[inline(always)]
     fn integers(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
         let tokens = self.symbols(stream, context, set, |l| token(u64::from(value(l))));
-        if tokens.iter().all(|&t| t < DIRECT) {
+        if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
             return tokens;
         }
-        let count = tokens.map(|t| low_bits(t).min(30));
+        let count = each(|l| low_bits(tokens[l]).min(30));
         let low = self.bits(stream, count, set, |l| value(l) & ((1 << low_bits(token(u64::from(value(l))))) - 1));
-        std::array::from_fn(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
+        each(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
     }
 
     /// Whole numbers with a sign.
     #[inline(always)]
     fn signed(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
         let coded = self.integers(stream, context, set, |l| zigzag(value(l)));
-        coded.map(unzigzag)
+        each(|l| unzigzag(coded[l]))
     }
 
     /// Whole numbers below 2^63.
     #[inline(always)]
     fn wide(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u64) -> Lanes<u64> {
         let tokens = self.symbols(stream, context, set, |l| token(value(l)));
-        let mut out = tokens.map(u64::from);
-        if tokens.iter().all(|&t| t < DIRECT) {
+        let mut out = each(|l| u64::from(tokens[l]));
+        if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
             return out;
         }
-        let count = tokens.map(|t| low_bits(t).min(61));
+        let count = each(|l| low_bits(tokens[l]).min(61));
         let rest = |l: usize| value(l) & ((1 << low_bits(token(value(l)))) - 1);
-        let low = self.bits(stream, count.map(|c| c.min(32)), set, |l| low_half(rest(l)));
-        let high = self.bits(stream, count.map(|c| c.saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
+        let low = self.bits(stream, each(|l| count[l].min(32)), set, |l| low_half(rest(l)));
+        let high = self.bits(stream, each(|l| count[l].saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
         for l in 0..LANES {
             if tokens[l] >= DIRECT {
                 out[l] = u64::from(2 + (tokens[l] & 1)) << count[l] | u64::from(high[l]) << 32 | u64::from(low[l]);

@@ -3,9 +3,9 @@
 use half::f16;
 
 use super::chunk::{Form, Sink, starts};
-use super::rest::Rest;
+use super::rest::{Coded, Cursor, Rest};
 use super::steering::VALUE_BITS;
-use super::symbols::{LANES, Lanes, has};
+use super::symbols::{LANES, Lanes, each, has};
 use super::tables::Lookup;
 use super::values::{logits, numbers, powers, rotations};
 use super::walk::{DC, Group, OPACITY, dropped, factor};
@@ -100,7 +100,7 @@ struct Out<'j, 'p> {
 
 impl Sink for Out<'_, '_> {
     #[inline(always)]
-    fn take(&mut self, number: usize, set: u32, group: &Group, rest: &Rest, missing: usize) -> Option<()> {
+    fn group(&mut self, number: usize, set: u32, group: &Group, missing: usize) -> Option<()> {
         let drawn = Drawn::new(self.form, self.frame, group, missing);
         for l in (0..LANES).filter(|&l| has(set, l)) {
             let i = self.starts[l] + number;
@@ -109,19 +109,42 @@ impl Sink for Out<'_, '_> {
             *self.place.opacities.get_mut(i)? = drawn.opacity[l];
             *self.place.rotations.get_mut(i)? = drawn.rotation.map(|x| x[l]);
             *self.place.dc.get_mut(i)? = drawn.dc.map(|x| x[l]);
-            code(self.frame, rest, group, l, &mut self.sorted);
-            *self.place.counts.get_mut(i)? = u8::try_from(self.sorted.len()).ok()?;
-            let out = &mut self.lanes[l];
-            for &(atom, value) in &self.sorted {
-                out.atoms.push(atom);
-                out.values.push(value);
-            }
-            if !rest.exact[l].is_empty() {
-                out.escapes.gaussians.push(u32::try_from(i).ok()?);
-                out.escapes.rows.extend_from_slice(&rest.exact[l]);
-            }
         }
         drawn.can_be(set).then_some(())
+    }
+
+    #[inline(always)]
+    fn rest(&mut self, number: usize, rest: &Rest) -> Option<()> {
+        let form = &self.form.rest;
+        for l in 0..LANES {
+            let out = &mut self.lanes[l];
+            let mut cursor = Cursor::default();
+            for k in (0..rest.len()).filter(|&k| has(rest.of(k).0, l)) {
+                let i = self.starts[l] + number + k;
+                let step = self.frame.value_steps[(rest.of(k).1[l] & u32::from(LAST_CLASS)) as usize];
+                self.sorted.clear();
+                for part in 0..form.least.len() {
+                    match rest.coded(form, part, k, l, &mut cursor) {
+                        Coded::Exact(row) => {
+                            out.escapes.gaussians.push(u32::try_from(i).ok()?);
+                            out.escapes.rows.extend_from_slice(row);
+                        }
+                        Coded::Code(from, count) => {
+                            for (atom, value) in (from..from + count).map(|j| rest.nonzero(part, j, l)) {
+                                // Codes are short, so that moving what follows is cheaper than sorting.
+                                let at = self.sorted.iter().rposition(|&(other, _)| other <= atom);
+                                let at = at.map_or(0, |before| before + 1);
+                                self.sorted.insert(at, (atom, f16::from_f32(value as f32 * step)));
+                            }
+                        }
+                    }
+                }
+                *self.place.counts.get_mut(i)? = u8::try_from(self.sorted.len()).ok()?;
+                out.atoms.extend(self.sorted.iter().map(|p| p.0));
+                out.values.extend(self.sorted.iter().map(|p| p.1));
+            }
+        }
+        Some(())
     }
 }
 
@@ -135,15 +158,6 @@ pub(in crate::packed) fn unpack(
     place: &mut Place<'_>,
 ) -> Option<Piece> {
     Simd::current().run(Job { form, frame, lookup, ranges, want_sums, place })
-}
-
-/// The code of a lane as it is kept in memory: by ascending atom, values in f16.
-#[inline(always)]
-fn code(frame: &Frame, rest: &Rest, group: &Group, l: usize, out: &mut Vec<(u16, f16)>) {
-    out.clear();
-    let step = frame.value_steps[(group.colour[l] & u32::from(LAST_CLASS)) as usize];
-    out.extend(rest.codes[l].iter().map(|&(atom, value)| (atom, f16::from_f32(value as f32 * step))));
-    out.sort_by_key(|p| p.0);
 }
 
 /// Eight Gaussians as numbers.
@@ -170,12 +184,15 @@ impl Drawn {
                 within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
             }
         }
-        let bits = group.axis_bits.map(|bits| bits.map(|bits| bits - dropped(bits, missing)));
+        let [directions, turns] = &group.axis_bits;
+        let left = |bits: &Lanes<u32>| each(|l| bits[l] - dropped(bits[l], missing));
+        let bits = [left(directions), left(turns)];
         let turned = rotations(&group.rotation, &bits, &group.needle);
-        let mut position: [Lanes<f64>; 3] = std::array::from_fn(|k| {
+        let centre = |k: usize| {
             let origin = f64::from(frame.origin[k]);
-            group.cell[k].map(|x| origin + (f64::from(x) + 0.5) * f64::from(frame.cell))
-        });
+            each(|l| origin + (f64::from(group.cell[k][l]) + 0.5) * f64::from(frame.cell))
+        };
+        let mut position: [Lanes<f64>; 3] = [centre(0), centre(1), centre(2)];
         for k in 0..3 {
             let step = powers(&group.moves[k]);
             for j in 0..3 {
@@ -185,19 +202,17 @@ impl Drawn {
                 }
             }
         }
-        let coordinates: [Lanes<f32>; 3] = std::array::from_fn(|k| numbers(&values[DC + k]));
-        let dc = std::array::from_fn(|c| {
-            let axis = frame.dc_axes.map(|axis| axis[c] * frame.dc_unit);
-            std::array::from_fn(|l| {
-                frame.dc_mean[c] + coordinates[0][l] * axis[0] + coordinates[1][l] * axis[1] + coordinates[2][l] * axis[2]
-            })
-        });
+        let coordinates = [numbers(&values[DC]), numbers(&values[DC + 1]), numbers(&values[DC + 2])];
+        let channel = |c: usize| {
+            let [a, b, d] = frame.dc_axes.map(|axis| axis[c] * frame.dc_unit);
+            each(|l| frame.dc_mean[c] + coordinates[0][l] * a + coordinates[1][l] * b + coordinates[2][l] * d)
+        };
         Self {
-            position: position.map(|x| x.map(|x| x as f32)),
-            scales: std::array::from_fn(|k| numbers(&values[k])),
+            position: [each(|l| position[0][l] as f32), each(|l| position[1][l] as f32), each(|l| position[2][l] as f32)],
+            scales: [numbers(&values[0]), numbers(&values[1]), numbers(&values[2])],
             opacity: logits(&values[OPACITY]),
             rotation: turned.quaternions,
-            dc,
+            dc: [channel(0), channel(1), channel(2)],
             within,
         }
     }

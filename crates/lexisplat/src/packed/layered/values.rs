@@ -5,7 +5,7 @@
 //! how far values may differ.
 
 use super::steering::VALUE_BITS;
-use super::symbols::{LANES, Lanes};
+use super::symbols::{LANES, Lanes, each};
 
 /// A unit of integer values.
 const UNIT: f32 = 1.0 / (1_u32 << VALUE_BITS) as f32;
@@ -18,7 +18,7 @@ pub(super) type Lanes3 = [Lanes<f32>; 3];
 /// Integer values as numbers.
 #[inline(always)]
 pub(super) fn numbers(values: &Lanes) -> Lanes<f32> {
-    values.map(|v| v as f32 * UNIT)
+    each(|l| values[l] as f32 * UNIT)
 }
 
 /// 2 to the power `x`.
@@ -68,8 +68,8 @@ fn ln(x: f64) -> f64 {
 /// What trainers store of opacities: their logits, from logarithms as integer values.
 #[inline(always)]
 pub(super) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
-    log_opacity.map(|log| {
-        let log = f64::from(log.min(MAX_LOG_OPACITY)) / f64::from(1_u32 << VALUE_BITS);
+    each(|l| {
+        let log = f64::from(log_opacity[l].min(MAX_LOG_OPACITY)) / f64::from(1_u32 << VALUE_BITS);
         let opacity = exp2(log * std::f64::consts::LOG2_E);
         (log - ln(1.0 - opacity)) as f32
     })
@@ -160,5 +160,5 @@ pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle:
 /// Powers of two of logarithms in 512ths of an octave.
 #[inline(always)]
 pub(super) fn powers(logs: &Lanes) -> Lanes<f64> {
-    logs.map(|log| exp2(f64::from(log) / 512.0))
+    each(|l| exp2(f64::from(logs[l]) / 512.0))
 }

@@ -6,7 +6,7 @@
 use super::around::{AVERAGED, Around};
 use super::steering::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
 use super::streams::Stream;
-use super::symbols::{LANES, Lanes, Symbols, has};
+use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::target::Target;
 use super::values::rotations;
 use crate::packed::morton;
@@ -95,7 +95,7 @@ impl<'a> Walk<'a> {
     pub(super) fn base<S: Symbols>(&mut self, s: &mut S, set: u32, targets: Option<&[&Target; LANES]>) -> Option<Group> {
         let p = self.steering;
         let target = |l: usize| targets.map(|targets| targets[l]);
-        let context = self.gap_bits.map(|bits| bits.min(GAP_CONTEXTS));
+        let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
         let before = self.cell;
         let gap = s.wide(Stream::Cell, context, set, |l| target(l).map_or(0, |t| t.cell.wrapping_sub(before[l])));
         let mut cell = [[0; LANES]; 3];
@@ -120,7 +120,7 @@ impl<'a> Walk<'a> {
         };
         let [colour, shape] = classes(s, set, targets, known, &around)?;
 
-        let features_of = |class: &Lanes<u32>| class.map(|class| (class << FEATURE_BITS).cast_signed());
+        let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
         let zeros = [0; LANES];
         let mut features: [Lanes; COEFFICIENTS - 1] =
             [zeros, features_of(&colour), features_of(&shape), zeros, zeros, zeros];
@@ -190,7 +190,8 @@ impl<'a> Walk<'a> {
         let p = self.steering;
         let coarse = factor(self.levels);
         (group.axis_bits, group.needle) = p.axis_bits(&group.shape, &scales);
-        let left = group.axis_bits.map(|bits| bits.map(|bits| dropped(bits, self.levels)));
+        let [directions, turns] = &group.axis_bits;
+        let left = [each(|l| dropped(directions[l], self.levels)), each(|l| dropped(turns[l], self.levels))];
         group.moves = p.move_logs(&group.shape, &scales);
         if let Some(targets) = targets {
             for l in (0..LANES).filter(|&l| has(set, l)) {
@@ -211,12 +212,12 @@ impl<'a> Walk<'a> {
         }
         for k in 0..3 {
             let (full, left) = if k < 2 { (&group.axis_bits[0], &left[0]) } else { (&group.axis_bits[1], &left[1]) };
-            let count = std::array::from_fn(|l| full[l] - left[l]);
+            let count = each(|l| full[l] - left[l]);
             let wanted = &group.wanted_rotation[k];
             group.rotation[k] = s.bits(Stream::Rotation, count, set, |l| wanted[l] >> left[l]);
         }
         for (k, stream) in POSITION_STREAMS.into_iter().enumerate() {
-            group.fineness[k] = group.moves[k].map(|log| p.fineness(log));
+            group.fineness[k] = each(|l| p.fineness(group.moves[k][l]));
             let wanted = &group.wanted[TARGETS + k];
             group.base[TARGETS + k] = s.signed(stream, group.fineness[k], set, |l| coarsened(wanted[l], coarse));
         }
@@ -243,7 +244,7 @@ fn classes<S: Symbols>(
     let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
     let class = |k: usize, l: usize| targets.map_or(0, |targets| u32::from(targets[l].classes[k]));
     let none = [0; LANES];
-    let context = if known { around[COLOUR].map(|x| 1 + level(x)) } else { none };
+    let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
     let colour = s.symbols(Stream::ColourClass, context, set, |l| class(0, l));
     let (mut context, mut nearest) = (none, none);
     for l in 0..LANES {
