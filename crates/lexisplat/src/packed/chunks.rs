@@ -5,19 +5,17 @@ use std::ops::Range;
 use half::f16;
 
 use super::CHUNK;
-use super::bits::{unzigzag, zigzag};
+use super::bits::unzigzag;
 use super::chunk_codec::{ChunkCodec, GaussianValues};
 use super::entropy::Tables;
 use super::parameters::Parameters;
-use super::scene::PackedHead;
+use super::place::{Piece, Place, indices};
+use super::scene::{Flat, PackedHead};
 use super::stream::{BitCounts, Stream, SymbolDecoder, Symbols};
 use crate::scene::sh::ShDegree;
-use crate::scene::splats::Geometry;
-use crate::sparse::codes::{Escapes, Indices, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS};
-use crate::support::maths::Vec3;
 use crate::support::memory_budget::MemoryBudget;
 
 /// Steps of atoms' coefficients are 2^-k for k up to this.
@@ -30,61 +28,14 @@ fn bad(file: &str, what: &str) -> Error {
     Error::malformed(file, format!("packed {what} is damaged: no encoder writes it"))
 }
 
-/// Where a chunk's geometry goes.
-pub(super) struct Place<'a> {
-    positions: &'a mut [Vec3],
-    dc: &'a mut [Vec3],
-    opacities: &'a mut [f32],
-    scales: &'a mut [Vec3],
-    rotations: &'a mut [[f32; 4]],
-    /// Nonzeros of each Gaussian.
-    counts: &'a mut [u8],
-}
-
-/// What a chunk holds beside geometry and counts.
-#[derive(Default)]
-pub(super) struct Piece {
-    pub(super) atoms: Vec<u16>,
-    pub(super) values: Vec<f16>,
-    pub(super) escapes: Escapes,
-    pub(super) bit_counts: BitCounts,
-}
-
-/// The places of all chunks.
-pub(super) fn places<'a>(g: &'a mut Geometry, counts: &'a mut [u8]) -> impl Iterator<Item = Place<'a>> {
-    g.positions
-        .chunks_mut(CHUNK)
-        .zip(g.dc.chunks_mut(CHUNK))
-        .zip(g.opacities.chunks_mut(CHUNK))
-        .zip(g.scales.chunks_mut(CHUNK))
-        .zip(g.rotations.chunks_mut(CHUNK))
-        .zip(counts.chunks_mut(CHUNK))
-        .map(|(((((positions, dc), opacities), scales), rotations), counts)| Place {
-            positions,
-            dc,
-            opacities,
-            scales,
-            rotations,
-            counts,
-        })
-}
-
-pub(super) fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {
-    if dictionary.len() <= 256 {
-        Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
-    } else {
-        Indices::U16(atoms)
-    }
-}
-
-/// What all chunks of a packed scene are decoded with, and where they are.
+/// What all chunks of a file of version 2 are decoded with, and where they are.
 #[derive(Debug)]
-pub(crate) struct Decoder {
+pub(super) struct FlatDecoder {
     /// The file, as the caller named it.
     file: String,
     limits: Limits,
-    pub(crate) dictionary: Dictionary,
-    pub(crate) dictionary_bits: BitCounts,
+    pub(super) dictionary: Dictionary,
+    pub(super) dictionary_bits: BitCounts,
     parameters: Parameters,
     tables: Tables,
     /// The parts of the data: two for the dictionary and two for each chunk.
@@ -92,18 +43,18 @@ pub(crate) struct Decoder {
     gaussians: usize,
 }
 
-impl Decoder {
+impl FlatDecoder {
     /// Reads what all chunks need from `head` and from the start of `data`.
-    pub(crate) fn new(head: &PackedHead, data: &[u8]) -> Result<Self> {
+    pub(super) fn new(head: &PackedHead, flat: &Flat, data: &[u8]) -> Result<Self> {
         let (file, limits, gaussians) = (head.file.clone(), head.limits, head.gaussians);
         let bad = |what| bad(&file, what);
         limits.check_gaussians(&file, gaussians as u64)?;
         limits.check_atoms(&file, head.atoms as u64)?;
-        let parameters = Parameters::from_list(&head.parameters).ok_or_else(|| bad("parameters"))?;
-        let tables = Tables::read(&head.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
-        let parts = parts(gaussians, &head.lengths, data.len()).ok_or_else(|| bad("lengths"))?;
+        let parameters = Parameters::from_list(&flat.parameters).ok_or_else(|| bad("parameters"))?;
+        let tables = Tables::read(&flat.tables, Stream::ALL.len()).ok_or_else(|| bad("tables"))?;
+        let parts = parts(gaussians, &flat.lengths, data.len()).ok_or_else(|| bad("lengths"))?;
         let part = |k: usize| parts.get(k).and_then(|range| data.get(range.clone()));
-        let dictionary = part(0).zip(part(1)).and_then(|parts| dictionary(head, &tables, parts));
+        let dictionary = part(0).zip(part(1)).and_then(|parts| dictionary(head, flat, &tables, parts));
         let (dictionary, dictionary_bits) = dictionary.ok_or_else(|| bad("dictionary"))?;
         Ok(Self { file, limits, dictionary, dictionary_bits, parameters, tables, parts, gaussians })
     }
@@ -112,24 +63,10 @@ impl Decoder {
         bad(&self.file, &format!("chunk {c}"))
     }
 
-    /// Decodes chunk `c` of `data` without extras. Escapes are numbered from its start. `budget` already holds
-    /// everything except its codes. Its bits are counted if `count_bits`.
-    pub(crate) fn chunk(
-        &self,
-        data: &[u8],
-        c: usize,
-        budget: &MemoryBudget<'_>,
-        count_bits: bool,
-    ) -> Result<(Geometry, SparseCodes, BitCounts)> {
-        let first = c * CHUNK;
-        let n = self.gaussians.saturating_sub(first).min(CHUNK);
-        let (mut g, mut counts) = (Geometry::zeros(n), vec![0; n]);
-        let place = places(&mut g, &mut counts).next().ok_or_else(|| self.bad_chunk(c))?;
-        let piece = self.piece(data, c, 0, place, budget, count_bits)?;
-        let (indices, values) = (indices(&self.dictionary, piece.atoms), Values::F16(piece.values));
-        let codes = SparseCodes::part(&self.dictionary, first, counts, indices, values, piece.escapes)
-            .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
-        Ok((g, codes, piece.bit_counts))
+    /// The Gaussians of each chunk.
+    pub(super) fn spans(&self) -> Vec<Range<usize>> {
+        let n = self.gaussians;
+        (0..n).step_by(CHUNK).map(|first| first..n.min(first + CHUNK)).collect()
     }
 
     /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
@@ -138,7 +75,7 @@ impl Decoder {
         data: &[u8],
         c: usize,
         first: usize,
-        place: Place<'_>,
+        place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
@@ -147,7 +84,7 @@ impl Decoder {
         let parts = part(2 * c + 2).zip(part(2 * c + 3));
         let player = parts.and_then(|(symbols, raw)| SymbolDecoder::new(&self.tables, symbols, raw));
         let mut player = player.ok_or_else(damaged)?;
-        player.bit_counts = count_bits.then(BitCounts::default);
+        player.bit_counts = count_bits.then(|| BitCounts::zeros(Stream::ALL.len()));
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let mut piece = Piece::default();
         let mut walk = ChunkCodec::new(parameters, dictionary.dim());
@@ -214,6 +151,7 @@ fn parts(gaussians: usize, lengths: &[u32], len: usize) -> Option<Vec<Range<usiz
 
 fn dictionary(
     head: &PackedHead,
+    flat: &Flat,
     tables: &Tables,
     (symbols, raw): (&[u8], &[u8]),
 ) -> Option<(Dictionary, BitCounts)> {
@@ -221,12 +159,12 @@ fn dictionary(
         return (head.atoms == 0 && symbols.is_empty() && raw.is_empty())
             .then(|| (Dictionary::empty(), BitCounts::default()));
     }
-    if !(1..=MAX_ATOMS).contains(&head.atoms) || head.atom_bits > MAX_ATOM_BITS {
+    if !(1..=MAX_ATOMS).contains(&head.atoms) || flat.atom_bits > MAX_ATOM_BITS {
         return None;
     }
     let mut player = SymbolDecoder::new(tables, symbols, raw)?;
-    player.bit_counts = Some(BitCounts::default());
-    let rows = code_dictionary(&mut player, head.degree, head.atoms, head.atom_bits, &[]);
+    player.bit_counts = Some(BitCounts::zeros(Stream::ALL.len()));
+    let rows = code_dictionary(&mut player, head.degree, head.atoms, flat.atom_bits);
     if !player.exhausted() {
         return None;
     }
@@ -235,12 +173,22 @@ fn dictionary(
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
 /// the encoder's; decoders have none.
-pub(super) fn code_dictionary<S: Symbols>(
+fn code_dictionary<S: Symbols>(
     s: &mut S,
     degree: ShDegree,
     atoms: usize,
     bits: u32,
-    target: &[f32],
+) -> Vec<f32> {
+    rounded_atoms(degree, atoms, bits, |context, _| unzigzag(s.integer(Stream::Dictionary, context, || 0)))
+}
+
+/// Unit-norm atoms of whole numbers. `coded` gives the number of each coefficient, from its context and the number of
+/// the coefficient among all.
+pub(super) fn rounded_atoms(
+    degree: ShDegree,
+    atoms: usize,
+    bits: u32,
+    mut coded: impl FnMut(usize, usize) -> i64,
 ) -> Vec<f32> {
     let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
     let steps = f64::from(1_u32 << bits);
@@ -250,13 +198,8 @@ pub(super) fn code_dictionary<S: Symbols>(
         for d in 0..dim {
             // Coefficients of one degree are alike, whatever the channel.
             let context = (d % per_channel + 1).isqrt() - 1;
-            let coded = s.integer(Stream::Dictionary, context, || {
-                #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
-                let whole = (f64::from(target[j * dim + d]) * steps).round() as i64;
-                zigzag(whole)
-            });
             #[expect(clippy::cast_precision_loss, reason = "small, or the norm check refuses it")]
-            row.push(unzigzag(coded) as f64 / steps);
+            row.push(coded(context, j * dim + d) as f64 / steps);
         }
         let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
         // An atom of zeros cannot be used; the first axis stands in so that the rest can be read.

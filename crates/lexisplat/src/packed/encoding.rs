@@ -26,7 +26,7 @@ impl Counts {
     pub(super) fn of(tally: Tally, symbols: &SymbolEncoder) -> Self {
         let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
         symbols.count(&mut histograms);
-        Self { tally, histograms, raw_bits: symbols.raw_bits }
+        Self { tally, histograms, raw_bits: symbols.raw_bits.clone() }
     }
 
     /// Adds the counts of other chunks.
@@ -38,7 +38,7 @@ impl Counts {
 
     /// Bits of all streams.
     fn bits(&self, tables: &Tables) -> BitCounts {
-        let mut bit_counts = self.raw_bits;
+        let mut bit_counts = self.raw_bits.clone();
         for (stream, (sum, contexts)) in
             bit_counts.0.iter_mut().zip(self.histograms.chunks(CONTEXTS)).enumerate()
         {
@@ -100,7 +100,7 @@ impl Encoding {
         let Self { coder, dictionary, counts, learn_seconds, clock } = self;
         let tables = Tables::new(&counts.histograms)
             .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
-        let stream_bits = counts.bits(&tables).named();
+        let stream_bits = counts.bits(&tables).named(Stream::names());
         let mut data = Spill::new(to)?;
         let mut lengths = Vec::new();
         let mut write = |parts: [Vec<u8>; 2]| -> Result<()> {

@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::chunks::indices;
+use super::place::indices;
 use crate::scene::extra::for_extra;
 use crate::sparse::codes::{CodedRest, Escapes, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;

@@ -25,8 +25,6 @@ pub struct PackedHead {
     pub removed: u64,
     /// Number of atoms; 0 for degree 0.
     pub atoms: usize,
-    /// Coefficients of atoms are multiples of 2 to the power of minus this.
-    pub(crate) atom_bits: u32,
     /// How it was made and what it promises.
     pub record: Record,
     /// Comments and marks of the source.
@@ -38,6 +36,35 @@ pub struct PackedHead {
     /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
     /// everywhere.
     pub device: Option<String>,
+    /// What it is decoded with, and where its chunks are.
+    pub(crate) coding: Coding,
+    /// What may be made of it: the limits of the reader, or the default ones.
+    pub(crate) limits: Limits,
+}
+
+/// What a packed scene is decoded with.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) enum Coding {
+    Flat(Flat),
+    /// Version 3, written in full; see `layered/head.rs`.
+    Layered(Vec<u8>),
+}
+
+impl Coding {
+    /// Numbers of 4 bytes, and of bytes, that it holds.
+    pub(crate) fn sizes(&self) -> (usize, usize) {
+        match self {
+            Self::Flat(flat) => (flat.parameters.len() + flat.lengths.len(), flat.tables.len()),
+            Self::Layered(head) => (0, head.len()),
+        }
+    }
+}
+
+/// What files of version 2 are decoded with.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Flat {
+    /// Coefficients of atoms are multiples of 2 to the power of minus this.
+    pub(crate) atom_bits: u32,
     /// Steps and predictors.
     pub(crate) parameters: Vec<f32>,
     /// Probabilities of all symbols.
@@ -45,19 +72,16 @@ pub struct PackedHead {
     /// Bytes of each part of the data: modelled symbols and raw bits, of the dictionary first and then of each
     /// chunk of [`CHUNK`](super::CHUNK) Gaussians.
     pub(crate) lengths: Vec<u32>,
-    /// What may be made of it: the limits of the reader, or the default ones.
-    pub(crate) limits: Limits,
 }
 
 impl PartialEq for PackedHead {
     /// Compares what is written to a file, and neither the name of the file nor the limits of its reader.
     fn eq(&self, other: &Self) -> bool {
-        (self.degree, self.gaussians, self.removed, self.atoms, self.atom_bits)
-            == (other.degree, other.gaussians, other.removed, other.atoms, other.atom_bits)
+        (self.degree, self.gaussians, self.removed, self.atoms)
+            == (other.degree, other.gaussians, other.removed, other.atoms)
             && (&self.record, &self.meta, &self.target, &self.reached, &self.device)
                 == (&other.record, &other.meta, &other.target, &other.reached, &other.device)
-            && (&self.parameters, &self.tables, &self.lengths)
-                == (&other.parameters, &other.tables, &other.lengths)
+            && self.coding == other.coding
     }
 }
 
@@ -151,10 +175,12 @@ impl Packed {
 /// What of a packed scene is as long as the scene, spilled.
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
-    pub(crate) data: Spilled,
-    pub(crate) order: Option<Spilled>,
-    /// Names and types, and values.
-    pub(crate) extras: Vec<(Extra, Spilled)>,
+    /// The passes of the data, one after the other.
+    pub(crate) data: Vec<Spilled>,
+    /// Of each layer.
+    pub(crate) order: Option<Vec<Spilled>>,
+    /// Names and types, and values of each layer.
+    pub(crate) extras: Vec<(Extra, Vec<Spilled>)>,
 }
 
 /// What a search for a quality or a size asked for and reached.

@@ -53,6 +53,11 @@ streams! {
 }
 
 impl Stream {
+    /// Names and attributes of all.
+    pub(super) fn names() -> impl Iterator<Item = (String, &'static str)> {
+        Self::ALL.into_iter().map(|stream| (format!("{stream:?}"), stream.attribute()))
+    }
+
     pub(super) const SCALES: [Self; 3] = [Self::Scale0, Self::Scale1, Self::Scale2];
     pub(super) const POSITIONS: [Self; 3] = [Self::Position0, Self::Position1, Self::Position2];
     pub(super) const DC: [Self; 3] = [Self::Dc0, Self::Dc1, Self::Dc2];
@@ -70,25 +75,27 @@ pub struct StreamBits {
     pub bits: f64,
 }
 
-/// Bits each stream took.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct BitCounts(pub(super) [f64; Stream::ALL.len()]);
+/// Bits each stream took; empty if they were not counted.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct BitCounts(pub(super) Vec<f64>);
 
 impl BitCounts {
+    /// No bits yet of as many streams.
+    pub(super) fn zeros(streams: usize) -> Self {
+        Self(vec![0.0; streams])
+    }
+
     pub(crate) fn add(&mut self, more: &Self) {
-        for (a, b) in self.0.iter_mut().zip(more.0) {
+        self.0.resize(self.0.len().max(more.0.len()), 0.0);
+        for (a, b) in self.0.iter_mut().zip(&more.0) {
             *a += b;
         }
     }
 
-    /// With the streams' names.
-    pub(crate) fn named(&self) -> Vec<StreamBits> {
-        let named = |(stream, bits): (Stream, f64)| StreamBits {
-            name: format!("{stream:?}"),
-            attribute: stream.attribute(),
-            bits,
-        };
-        Stream::ALL.into_iter().zip(self.0).map(named).collect()
+    /// With the names and attributes of the streams.
+    pub(super) fn named(&self, streams: impl Iterator<Item = (String, &'static str)>) -> Vec<StreamBits> {
+        let counts = self.0.iter().copied().chain(std::iter::repeat(0.0));
+        streams.zip(counts).map(|((name, attribute), bits)| StreamBits { name, attribute, bits }).collect()
     }
 }
 
@@ -105,7 +112,7 @@ pub(super) trait Symbols {
 }
 
 /// The encoder of a chunk. It keeps all symbols until the tables are known.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct SymbolEncoder {
     /// Contexts of all streams, and symbols.
     symbols: Vec<[u16; 2]>,
@@ -139,6 +146,13 @@ impl Symbols for SymbolEncoder {
         self.raw.put(count, value);
         self.raw_bits.0[stream as usize] += f64::from(count);
         value
+    }
+}
+
+impl Default for SymbolEncoder {
+    fn default() -> Self {
+        let raw_bits = BitCounts::zeros(Stream::ALL.len());
+        Self { symbols: Vec::new(), raw: BitWriter::default(), raw_bits }
     }
 }
 

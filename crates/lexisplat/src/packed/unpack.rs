@@ -1,7 +1,7 @@
 //! Decoding a packed scene as a whole.
 
-use super::CHUNK;
-use super::chunks::{Decoder, indices, places};
+use super::decoder::Decoder;
+use super::place::{indices, places};
 use super::scene::Packed;
 use super::stream::{BitCounts, StreamBits};
 use crate::scene::splats::Geometry;
@@ -31,7 +31,8 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        Ok(self.decode(true)?.1.named())
+        let (_, bits) = self.decode(true)?;
+        Ok(Decoder::new(self.head(), self.data())?.named(&bits))
     }
 
     /// The dictionary alone.
@@ -39,16 +40,17 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
-        Ok(Decoder::new(self.head(), self.data())?.dictionary)
+        Ok(Decoder::new(self.head(), self.data())?.dictionary().clone())
     }
 
     /// What the limits leave for the codes after `self` and the geometry of the scene.
     fn budget(&self) -> Result<MemoryBudget<'_>> {
         let head = self.head();
-        let words = head.parameters.len() + head.lengths.len() + self.order().map_or(0, <[u32]>::len);
+        let (words, bytes) = head.coding.sizes();
+        let words = words + self.order().map_or(0, <[u32]>::len);
         let extras = self.extras().iter().map(|e| e.values.width()).sum::<usize>();
         let n = self.len();
-        let sizes = [(words, size_of::<u32>()), (head.tables.len(), 1), (self.data().len(), 1), (n, extras)];
+        let sizes = [(words, size_of::<u32>()), (bytes, 1), (self.data().len(), 1), (n, extras)];
         let own = sizes.iter().map(|&(count, each)| (count as u64).saturating_mul(each as u64));
         let budget = MemoryBudget::new(&head.limits, &head.file, own.fold(0, u64::saturating_add));
         for (count, each) in sizes {
@@ -61,15 +63,17 @@ impl Packed {
     fn decode(&self, count_bits: bool) -> Result<(Model, BitCounts)> {
         let head = self.head();
         let decoder = Decoder::new(head, self.data())?;
-        let mut bit_counts = decoder.dictionary_bits;
+        let mut bit_counts = decoder.dictionary_bits().clone();
         let n = self.len();
         let budget = self.budget()?;
         let mut g = Geometry { extras: self.extras().to_vec(), ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
-        let work = places(&mut g, &mut counts).enumerate().collect();
-        let pieces =
-            map_vec(work, |(c, place)| decoder.piece(self.data(), c, c * CHUNK, place, &budget, count_bits));
+        let spans = decoder.spans();
+        let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
+        let pieces = map_vec(work, |(c, (mut place, span))| {
+            decoder.piece(self.data(), c, span.start, &mut place, &budget, count_bits)
+        });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();
         for piece in pieces {
@@ -80,7 +84,7 @@ impl Packed {
             escapes.gaussians.extend(piece.escapes.gaussians);
             escapes.rows.extend(piece.escapes.rows);
         }
-        let dictionary = decoder.dictionary;
+        let dictionary = decoder.dictionary().clone();
         let indices = indices(&dictionary, atoms);
         let codes = SparseCodes::new(&dictionary, counts, indices, Values::F16(values), escapes)
             .map_err(|e| Error::malformed(&head.file, e.to_string()))?;

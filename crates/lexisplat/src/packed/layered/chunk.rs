@@ -9,6 +9,7 @@ use super::symbols::{LANES, Lanes, has};
 use super::tables::Lookup;
 use super::target::Target;
 use super::walk::{Group, Walk};
+use crate::packed::stream::BitCounts;
 
 /// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
 const LEAST_OF_LANE: usize = 1024;
@@ -36,9 +37,9 @@ fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
 
 /// Takes what a chunk decodes to. A trait and not closures, since closures are not inlined into vector code.
 pub(super) trait Sink {
-    /// Takes one Gaussian of each lane in `set`: of each lane the one with this number. `missing` is the number of levels
-    /// that are missing. Returns `None` for what no encoder writes.
-    fn group(&mut self, number: usize, set: u32, group: &Group, missing: usize) -> Option<()>;
+    /// Takes one Gaussian of each lane in `set`: of each lane the one with this number, which is number `in_block` of its
+    /// block. `levels` are those of the chunk, and those that are missing. Returns `None` for what no encoder writes.
+    fn group(&mut self, number: usize, in_block: usize, set: u32, group: &Group, levels: [usize; 2]) -> Option<()>;
 
     /// Takes the SH-rest of a block of Gaussians, of each lane those from this number on.
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
@@ -48,39 +49,37 @@ pub(super) trait Sink {
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Form {
     pub(in crate::packed) steering: Steering,
-    /// Levels of refinement.
-    pub(in crate::packed) levels: usize,
     pub(in crate::packed) rest: RestForm,
 }
 
 impl Form {
-    /// Number of ranges of a chunk: a base, levels of refinement, and parts of nonzeros.
-    pub(in crate::packed) fn ranges(&self) -> usize {
-        1 + self.levels + self.rest.least.len()
+    /// Number of ranges of a chunk of this many levels: a base, the levels of refinement, and parts of nonzeros.
+    pub(in crate::packed) fn ranges(&self, levels: usize) -> usize {
+        1 + levels + self.rest.least.len()
     }
 
-    /// Codes the Gaussians of a chunk, and returns what its ranges hold and the checksums of their integers. `None` if
+    /// Codes the Gaussians of a chunk with `levels` levels of refinement, and returns what its ranges hold and the checksums of their integers. `None` if
     /// there is something no decoder takes.
-    pub(in crate::packed) fn record(&self, targets: &[Target]) -> Option<Vec<(Recorder, u32)>> {
+    pub(in crate::packed) fn record(&self, levels: usize, targets: &[Target]) -> Option<Vec<(Recorder, u32)>> {
         let lanes = lanes(targets.len());
         let starts = starts(targets.len(), lanes);
-        let mut ranges = vec![Recorder::default(); self.ranges()];
-        let mut sums = vec![Sums::default(); self.ranges()];
-        let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
+        let mut ranges = vec![Recorder::default(); self.ranges(levels)];
+        let mut sums = vec![Sums::default(); self.ranges(levels)];
+        let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
         let none = Target::default();
         let sets: Vec<u32> = sets(targets.len(), lanes).collect();
         for (block, sets) in sets.chunks(BLOCK).enumerate() {
             let first = block * BLOCK;
             rest.clear();
             let (base, finer) = ranges.split_first_mut()?;
-            let (levels, parts) = finer.split_at_mut_checked(self.levels)?;
+            let (finer, parts) = finer.split_at_mut_checked(levels)?;
             for (i, &set) in sets.iter().enumerate() {
                 let of = |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
                 let group: [&Target; LANES] = std::array::from_fn(of);
                 let mut group = walk.base(base, set, Some(&group))?;
                 sums[0].base(set, &group);
-                for (k, range) in levels.iter_mut().enumerate() {
-                    refine(range, set, &mut group, self.levels - k);
+                for (k, range) in finer.iter_mut().enumerate() {
+                    refine(range, set, &mut group, levels - k);
                     sums[1 + k].refined(set, &group);
                 }
                 rest.push(set, group.colour);
@@ -91,66 +90,84 @@ impl Form {
             });
             for (part, range) in parts.iter_mut().enumerate() {
                 rest.part(range, Some(&wanted), &self.rest, part)?;
-                sums[1 + self.levels + part].rest(&rest, &self.rest, part);
+                sums[1 + levels + part].rest(&rest, &self.rest, part);
             }
         }
         Some(ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect())
     }
 
-    /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: those that follow one that is missing
-    /// are not looked at. Hands each group of up to eight Gaussians, one of each lane in the set, to `sink`. Returns the checksums of the integers of the ranges if they are wanted; `None`
-    /// if no encoder writes this.
+    /// Decodes a chunk of `gaussians` Gaussians with `levels` levels of refinement from as many ranges as are there: those
+    /// that follow one that is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
     #[inline(always)]
     pub(super) fn play(
         &self,
+        levels: usize,
+        gaussians: usize,
         lookup: &Lookup,
         ranges: &[Option<&[u8]>],
-        gaussians: usize,
-        want_sums: bool,
+        want: Want,
         sink: &mut impl Sink,
-    ) -> Option<Vec<u32>> {
+    ) -> Option<Played> {
         let lanes = lanes(gaussians);
         let of = |k: usize| ranges.get(k).copied().flatten();
-        let mut base = Player::new(lookup, of(0)?, lanes)?;
-        let mut levels = Vec::new();
-        for bytes in (0..self.levels).map_while(|k| of(1 + k)) {
-            levels.push(Player::new(lookup, bytes, lanes)?);
+        let mut base = Player::new(lookup, of(0)?, lanes, want.bits)?;
+        let mut finer = Vec::new();
+        for bytes in (0..levels).map_while(|k| of(1 + k)) {
+            finer.push(Player::new(lookup, bytes, lanes, want.bits)?);
         }
         let mut parts = Vec::new();
-        for bytes in (0..self.rest.least.len()).map_while(|k| of(1 + self.levels + k)) {
-            parts.push(Player::new(lookup, bytes, lanes)?);
+        for bytes in (0..self.rest.least.len()).map_while(|k| of(1 + levels + k)) {
+            parts.push(Player::new(lookup, bytes, lanes, want.bits)?);
         }
-        let missing = self.levels - levels.len();
+        let missing = levels - finer.len();
         let steps = gaussians.div_ceil(lanes);
-        let mut sums = vec![Sums::default(); if want_sums { self.ranges() } else { 0 }];
-        let (mut walk, mut rest) = (Walk::new(&self.steering, self.levels), Rest::default());
+        let mut sums = vec![Sums::default(); if want.sums { self.ranges(levels) } else { 0 }];
+        let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
         for (step, set) in sets(gaussians, lanes).enumerate() {
             let mut group = walk.base(&mut base, set, None)?;
-            if want_sums {
+            if want.sums {
                 sums[0].base(set, &group);
             }
-            for (k, range) in levels.iter_mut().enumerate() {
-                refine(range, set, &mut group, self.levels - k);
-                if want_sums {
+            for (k, range) in finer.iter_mut().enumerate() {
+                refine(range, set, &mut group, levels - k);
+                if want.sums {
                     sums[1 + k].refined(set, &group);
                 }
             }
-            sink.group(step, set, &group, missing)?;
+            sink.group(step, rest.len(), set, &group, [levels, missing])?;
             rest.push(set, group.colour);
             if rest.len() == BLOCK || step + 1 == steps {
                 for (part, range) in parts.iter_mut().enumerate() {
                     rest.part(range, None, &self.rest, part)?;
-                    if want_sums {
-                        sums[1 + self.levels + part].rest(&rest, &self.rest, part);
+                    if want.sums {
+                        sums[1 + levels + part].rest(&rest, &self.rest, part);
                     }
                 }
                 sink.rest(step + 1 - rest.len(), &rest)?;
                 rest.clear();
             }
         }
-        let whole = base.exhausted() && levels.iter().chain(&parts).all(Player::exhausted);
-        whole.then(|| sums.into_iter().map(Sums::finish).collect())
+        let all = || std::iter::once(&base).chain(&finer).chain(&parts);
+        let mut bits = BitCounts::default();
+        all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
+        all().all(Player::exhausted).then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
     }
+}
+
+/// What to find out while a chunk is decoded.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::packed) struct Want {
+    /// Checksums of the integers of its ranges.
+    pub(in crate::packed) sums: bool,
+    /// Bits of its streams.
+    pub(in crate::packed) bits: bool,
+}
+
+/// What was found out.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Played {
+    pub(in crate::packed) sums: Vec<u32>,
+    pub(in crate::packed) bits: BitCounts,
 }
 
 /// CRC-32 of the integers of a range, as i32, Gaussian by Gaussian.

@@ -3,11 +3,11 @@
 use super::bytes::ByteReader;
 use super::chunk::Form;
 use super::index::Index;
+use super::mean_view::{MAX_POINTS, MeanView};
 use super::rest::RestForm;
 use super::steering::{Integers, Step, Steering};
 use super::streams::REST_PARTS;
 use super::unpack::Frame;
-use super::walk::MAX_LEVELS;
 use crate::packed::parameters::{LAST_CLASS, Parameters};
 use crate::support::limits::MAX_ATOMS;
 
@@ -24,8 +24,8 @@ pub(in crate::packed) struct Head {
     pub(in crate::packed) atom_bits: u8,
     /// Binary logarithm of the unit of base colours.
     pub(in crate::packed) dc_exponent: u8,
-    pub(in crate::packed) levels: usize,
     pub(in crate::packed) rest: RestForm,
+    pub(in crate::packed) mean_view: MeanView,
     pub(in crate::packed) integers: Integers,
     /// Its steps of values and its unit of base colours follow from the other fields.
     pub(in crate::packed) frame: Frame,
@@ -41,7 +41,13 @@ pub(in crate::packed) struct Head {
 
 impl Head {
     /// A head without tables, dictionary and index.
-    pub(in crate::packed) fn new(p: &Parameters, most_dc: f64, levels: usize, rest: RestForm, atom_bits: u8) -> Self {
+    pub(in crate::packed) fn new(
+        p: &Parameters,
+        most_dc: f64,
+        rest: RestForm,
+        atom_bits: u8,
+        mean_view: MeanView,
+    ) -> Self {
         let mut dc_exponent = 0;
         while most_dc > MOST_DC * f64::from(dc_exponent).exp2() && dc_exponent < MAX_DC_EXPONENT {
             dc_exponent += 1;
@@ -49,8 +55,8 @@ impl Head {
         let mut head = Self {
             atom_bits,
             dc_exponent,
-            levels,
             rest,
+            mean_view,
             frame: Frame {
                 origin: p.origin,
                 cell: p.cell,
@@ -85,16 +91,26 @@ impl Head {
 
     /// How chunks are coded.
     pub(in crate::packed) fn form(&self) -> Form {
-        Form { steering: Steering::new(&self.integers), levels: self.levels, rest: self.rest.clone() }
+        Form { steering: Steering::new(&self.integers), rest: self.rest.clone() }
     }
 
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut out = Vec::new();
         out.extend((self.rest.atoms as u16).to_le_bytes());
-        out.extend([self.atom_bits, self.dc_exponent, self.levels as u8, self.rest.least.len() as u8]);
+        let points = &self.mean_view.points;
+        out.extend([self.atom_bits, self.dc_exponent, self.rest.least.len() as u8, points.len() as u8]);
         out.extend(self.rest.least.iter().map(|&least| least as u8));
         let f = &self.frame;
-        let floats = [&f.origin[..], &[f.cell], &f.dc_mean, f.dc_axes.as_flattened(), &[self.value_step, self.promised]];
+        let softening: &[f32] = if points.is_empty() { &[] } else { &[self.mean_view.softening] };
+        let floats = [
+            &f.origin[..],
+            &[f.cell],
+            &f.dc_mean,
+            f.dc_axes.as_flattened(),
+            &[self.value_step, self.promised],
+            softening,
+            points.as_flattened(),
+        ];
         out.extend(floats.concat().iter().flat_map(|x| x.to_le_bytes()));
         let p = &self.integers;
         for step in p.steps {
@@ -121,11 +137,11 @@ impl Head {
     pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Option<Self> {
         let mut from = ByteReader(bytes);
         let atoms = usize::from(from.u16()?);
-        let [atom_bits, dc_exponent, levels, parts] = [from.u8()?, from.u8()?, from.u8()?, from.u8()?];
-        let (levels, parts) = (usize::from(levels), usize::from(parts));
+        let [atom_bits, dc_exponent, parts, points] = [from.u8()?, from.u8()?, from.u8()?, from.u8()?];
+        let (parts, points) = (usize::from(parts), usize::from(points));
         let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
         let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
-        let within = atom_bits <= MAX_ATOM_BITS && dc_exponent <= MAX_DC_EXPONENT && levels <= MAX_LEVELS;
+        let within = atom_bits <= MAX_ATOM_BITS && dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
         if !(atoms_can_be && parts_can_be && within) {
             return None;
         }
@@ -136,7 +152,15 @@ impl Head {
         let (origin, cell, dc_mean) = (from.f32s()?, from.f32()?, from.f32s()?);
         let dc_axes = [from.f32s()?, from.f32s()?, from.f32s()?];
         let (value_step, promised) = (from.f32()?, from.f32()?);
-        if cell <= 0.0 || value_step <= 0.0 || promised < 0.0 {
+        let mut mean_view = MeanView::default();
+        if points > 0 {
+            mean_view.softening = from.f32()?;
+        }
+        for _ in 0..points {
+            mean_view.points.push(from.f32s()?);
+        }
+        // Directions are divided by the softening where there is no distance.
+        if cell <= 0.0 || value_step <= 0.0 || promised < 0.0 || (points > 0 && mean_view.softening <= 0.0) {
             return None;
         }
         let mut steps = [Step::default(); 5];
@@ -155,8 +179,8 @@ impl Head {
         let mut head = Self {
             atom_bits,
             dc_exponent,
-            levels,
             rest: RestForm { dim, atoms, least },
+            mean_view,
             integers: Integers { cell: cell_log, shape, steps, turns, moves, means, predictors },
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },
             value_step,
@@ -165,7 +189,7 @@ impl Head {
             dictionary,
             index: Index::default(),
         };
-        head.index = Index::read(&mut from, head.form().ranges())?;
+        head.index = Index::read(&mut from, head.rest.least.len())?;
         head.complete();
         from.0.is_empty().then_some(head)
     }

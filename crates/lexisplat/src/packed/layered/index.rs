@@ -1,11 +1,14 @@
 //! The index of a file: its layers, their chunks, and where the ranges of each lie.
 
 use super::bytes::ByteReader;
+use super::walk::MAX_LEVELS;
 
 /// Most layers of a file.
-pub(super) const MAX_LAYERS: usize = 8;
+const MAX_LAYERS: usize = 8;
+/// Most passes of a file.
+const MAX_PASSES: usize = 64;
 /// Most Gaussians of a chunk. A decoder needs memory for as many.
-pub(super) const MAX_CHUNK: usize = 1 << 16;
+const MAX_CHUNK: usize = 1 << 16;
 /// A Gaussian takes at least this many bits of the base: one for each code of its rotation.
 const LEAST_BITS: u64 = 3;
 
@@ -34,20 +37,27 @@ pub(in crate::packed) struct Chunk {
     pub(in crate::packed) ranges: Vec<Range>,
 }
 
-/// All ranges of one kind of one layer, which lie side by side.
+/// Ranges of one layer that lie side by side: chunk after chunk, of each those in the set in ascending order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::packed) struct Pass {
     pub(in crate::packed) layer: u8,
-    /// Place among the ranges of a chunk.
-    pub(in crate::packed) range: u8,
+    /// A bit for each range of a chunk.
+    pub(in crate::packed) ranges: u8,
+}
+
+impl Pass {
+    pub(in crate::packed) fn has(self, range: usize) -> bool {
+        self.ranges >> range & 1 == 1
+    }
 }
 
 /// The layers, chunks and passes of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Index {
+    /// Levels of refinement of each layer.
+    pub(in crate::packed) levels: Vec<u8>,
     /// In the order of the data.
     pub(in crate::packed) passes: Vec<Pass>,
-    pub(in crate::packed) layers: usize,
     /// Layer by layer.
     pub(in crate::packed) chunks: Vec<Chunk>,
 }
@@ -61,11 +71,13 @@ impl Index {
             first = first.checked_add(chunk.gaussians)?;
         }
         let mut start = 0_u64;
-        for &Pass { layer, range } in &self.passes {
-            for chunk in self.chunks.iter_mut().filter(|chunk| chunk.layer == usize::from(layer)) {
-                let range = chunk.ranges.get_mut(usize::from(range))?;
-                range.start = start;
-                start = start.checked_add(range.length.into())?;
+        for pass in &self.passes {
+            for chunk in self.chunks.iter_mut().filter(|chunk| chunk.layer == usize::from(pass.layer)) {
+                let ranges = chunk.ranges.iter_mut().enumerate().filter(|(k, _)| pass.has(*k));
+                for (_, range) in ranges {
+                    range.start = start;
+                    start = start.checked_add(range.length.into())?;
+                }
             }
         }
         Some(())
@@ -82,12 +94,14 @@ impl Index {
     }
 
     pub(super) fn write(&self, out: &mut Vec<u8>) {
-        out.push(self.layers as u8);
-        for layer in 0..self.layers {
+        out.push(self.levels.len() as u8);
+        for (layer, &levels) in self.levels.iter().enumerate() {
             let chunks = self.chunks.iter().filter(|chunk| chunk.layer == layer).count();
+            out.push(levels);
             out.extend((chunks as u32).to_le_bytes());
         }
-        out.extend(self.passes.iter().flat_map(|pass| [pass.layer, pass.range]));
+        out.push(self.passes.len() as u8);
+        out.extend(self.passes.iter().flat_map(|pass| [pass.layer, pass.ranges]));
         for chunk in &self.chunks {
             out.extend((chunk.gaussians as u32).to_le_bytes());
             out.extend(chunk.bounds.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
@@ -97,24 +111,34 @@ impl Index {
         }
     }
 
-    /// Reads what [`Self::write`] wrote for chunks of `ranges` ranges; `None` for anything else.
-    pub(super) fn read(from: &mut ByteReader<'_>, ranges: usize) -> Option<Self> {
+    /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros; `None` for anything else.
+    pub(super) fn read(from: &mut ByteReader<'_>, parts: usize) -> Option<Self> {
         let layers = usize::from(from.u8()?);
         if layers > MAX_LAYERS {
             return None;
         }
+        let mut index = Self::default();
         let mut counts = Vec::with_capacity(layers);
         for _ in 0..layers {
+            let levels = from.u8()?;
+            if usize::from(levels) > MAX_LEVELS {
+                return None;
+            }
+            index.levels.push(levels);
             counts.push(from.u32()?);
         }
-        let mut index = Self { passes: Vec::new(), layers, chunks: Vec::new() };
-        for _ in 0..layers * ranges {
-            index.passes.push(Pass { layer: from.u8()?, range: from.u8()? });
-        }
-        if !passes_are_whole(&index.passes, layers, ranges) {
+        let passes = usize::from(from.u8()?);
+        if passes > MAX_PASSES {
             return None;
         }
+        for _ in 0..passes {
+            index.passes.push(Pass { layer: from.u8()?, ranges: from.u8()? });
+        }
         for (layer, count) in counts.into_iter().enumerate() {
+            let ranges = 1 + usize::from(index.levels[layer]) + parts;
+            if !passes_are_whole(&index.passes, layer, ranges) {
+                return None;
+            }
             for _ in 0..count {
                 // Every chunk takes bytes of the index, so their number is bounded by its length.
                 let gaussians = from.u32()? as usize;
@@ -131,23 +155,22 @@ impl Index {
                 index.chunks.push(chunk);
             }
         }
+        if index.passes.iter().any(|pass| usize::from(pass.layer) >= layers) {
+            return None;
+        }
         index.place()?;
         Some(index)
     }
 }
 
-/// Whether each range of each layer has one pass, and the base comes before the others.
-fn passes_are_whole(passes: &[Pass], layers: usize, ranges: usize) -> bool {
-    let mut seen = vec![false; layers * ranges];
-    for pass in passes {
-        let (layer, range) = (usize::from(pass.layer), usize::from(pass.range));
-        if layer >= layers || range >= ranges || seen[layer * ranges + range] {
+/// Whether each of the `ranges` of a layer is in one pass, and none in a pass before the base.
+fn passes_are_whole(passes: &[Pass], layer: usize, ranges: usize) -> bool {
+    let mut seen = 0_u8;
+    for pass in passes.iter().filter(|pass| usize::from(pass.layer) == layer) {
+        if pass.ranges == 0 || seen & pass.ranges != 0 || (seen | pass.ranges) & 1 == 0 {
             return false;
         }
-        if range > 0 && !seen[layer * ranges] {
-            return false;
-        }
-        seen[layer * ranges + range] = true;
+        seen |= pass.ranges;
     }
-    seen.len() == passes.len()
+    u32::from(seen) == (1 << ranges) - 1
 }

@@ -3,9 +3,11 @@
 mod around;
 mod bytes;
 mod chunk;
+mod decoder;
 mod fine;
 mod head;
 mod index;
+mod mean_view;
 mod player;
 #[cfg(target_arch = "x86_64")]
 mod player_avx2;
@@ -20,11 +22,15 @@ mod unpack;
 mod values;
 mod walk;
 
-pub(super) use chunk::{Form, lanes};
+pub(super) use chunk::{Form, Want, lanes};
+pub(super) use decoder::{LayeredDecoder, code_atoms};
 pub(super) use head::Head;
 pub(super) use index::{Chunk, Index, Pass, Range};
 pub(super) use rest::RestForm;
+pub(super) use range::Recorder;
 pub(super) use steering::{Integers, Steering};
+pub(super) use streams::Stream;
 pub(super) use tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
 pub(super) use target::Target;
-pub(super) use unpack::{Frame, Place, unpack};
+pub(super) use mean_view::MeanView;
+pub(super) use unpack::Unpacker;

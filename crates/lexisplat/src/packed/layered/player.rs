@@ -4,6 +4,7 @@ use super::range::{LEAST, MOST_BITS};
 use super::streams::{Stream, place};
 use super::symbols::{LANES, Lanes, Symbols, has};
 use super::tables::Lookup;
+use crate::packed::stream::BitCounts;
 
 /// The decoder of a range.
 #[derive(Debug)]
@@ -17,13 +18,15 @@ pub(in crate::packed) struct Player<'a> {
     ends: Lanes<u32>,
     /// Whether something was asked for that no encoder writes.
     pub(super) damaged: bool,
+    /// Bits of each stream, if they are counted.
+    pub(super) bit_counts: Option<BitCounts>,
     #[cfg(target_arch = "x86_64")]
     avx2: Option<pulp::x86::V3>,
 }
 
 impl<'a> Player<'a> {
-    /// `None` if `bytes` cannot be a range of this many lanes.
-    pub(in crate::packed) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize) -> Option<Self> {
+    /// `None` if `bytes` cannot be a range of this many lanes. Bits of streams are counted if `count_bits`.
+    pub(super) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize, count_bits: bool) -> Option<Self> {
         let (lengths, words) = bytes.split_at_checked(size_of::<u32>() * lanes.checked_sub(1)?)?;
         let (words, []) = words.as_chunks::<2>() else { return None };
         let total = u32::try_from(words.len()).ok().filter(|&total| (2..=MAX_WORDS).contains(&total))?;
@@ -34,8 +37,10 @@ impl<'a> Player<'a> {
             next: [2; LANES],
             ends: [2; LANES],
             damaged: false,
+            bit_counts: count_bits.then(|| BitCounts::zeros(Stream::ALL.len())),
+            // The vector code does not count.
             #[cfg(target_arch = "x86_64")]
-            avx2: crate::support::simd::Simd::current().avx2(),
+            avx2: crate::support::simd::Simd::current().avx2().filter(|_| !count_bits),
         };
         let mut end = 0_u32;
         for l in 0..lanes {
@@ -82,6 +87,9 @@ impl<'a> Player<'a> {
             let (symbol, share, over) = self.lookup.entry(start, state & ((1 << precision) - 1));
             self.refill(l, (state >> precision).wrapping_mul(share).wrapping_add(over));
             out[l] = symbol;
+            if let Some(bit_counts) = &mut self.bit_counts {
+                bit_counts.0[stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
+            }
         }
         out
     }
@@ -122,7 +130,11 @@ impl Symbols for Player<'_> {
     }
 
     #[inline(always)]
-    fn bits(&mut self, _: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        if let Some(bit_counts) = &mut self.bit_counts {
+            let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
+            bit_counts.0[stream as usize] += taken.sum::<f64>();
+        }
         let mut first = [0; LANES];
         let mut more = 0;
         for l in 0..LANES {

@@ -68,6 +68,11 @@ streams! { 29:
 }
 
 impl Stream {
+    /// Names and attributes of all.
+    pub(in crate::packed) fn names() -> impl Iterator<Item = (String, &'static str)> {
+        Self::ALL.into_iter().map(|stream| (format!("{stream:?}"), stream.attribute()))
+    }
+
     pub(super) const COUNTS: [Self; REST_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
     pub(super) const ATOMS: [Self; REST_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
     pub(super) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];

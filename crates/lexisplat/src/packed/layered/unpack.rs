@@ -2,15 +2,17 @@
 
 use half::f16;
 
-use super::chunk::{Form, Sink, starts};
-use super::rest::{Coded, Cursor, Rest};
+use super::chunk::{Form, Sink, Want, starts};
+use super::mean_view::{MOST, MeanView, seen, seen_row};
+use super::rest::{BLOCK, Coded, Cursor, Rest};
 use super::steering::VALUE_BITS;
 use super::symbols::{LANES, Lanes, each, has};
 use super::tables::Lookup;
 use super::values::{logits, numbers, powers, rotations};
 use super::walk::{DC, Group, OPACITY, dropped, factor};
 use crate::packed::parameters::{LAST_CLASS, TARGETS};
-use crate::sparse::codes::Escapes;
+use crate::packed::place::{Piece, Place};
+use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::Vec3;
 use crate::support::simd::Simd;
 
@@ -31,49 +33,51 @@ pub(in crate::packed) struct Frame {
     pub(in crate::packed) value_steps: [f32; LAST_CLASS as usize + 1],
 }
 
-/// Where a chunk's geometry goes.
+/// What chunks are decoded with.
 #[derive(Debug)]
-pub(in crate::packed) struct Place<'a> {
-    pub(in crate::packed) positions: &'a mut [Vec3],
-    pub(in crate::packed) dc: &'a mut [Vec3],
-    pub(in crate::packed) opacities: &'a mut [f32],
-    pub(in crate::packed) scales: &'a mut [Vec3],
-    pub(in crate::packed) rotations: &'a mut [[f32; 4]],
-    /// Nonzeros of each Gaussian.
-    pub(in crate::packed) counts: &'a mut [u8],
+pub(in crate::packed) struct Unpacker {
+    pub(in crate::packed) form: Form,
+    pub(in crate::packed) frame: Frame,
+    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) lookup: Lookup,
+    pub(in crate::packed) dictionary: Dictionary,
 }
 
-/// What a chunk holds beside geometry and counts.
-#[derive(Debug, Default)]
-pub(in crate::packed) struct Piece {
-    pub(in crate::packed) atoms: Vec<u16>,
-    pub(in crate::packed) values: Vec<f16>,
-    /// Numbered from the start of the chunk.
-    pub(in crate::packed) escapes: Escapes,
-    /// Checksums of the integers of its ranges, if they were wanted.
-    pub(in crate::packed) sums: Vec<u32>,
+impl Unpacker {
+    /// Decodes a chunk with `levels` levels from the ranges that are there to `place`. Escapes are numbered from its
+    /// start. `None` if no encoder writes it.
+    pub(in crate::packed) fn chunk(
+        &self,
+        levels: usize,
+        ranges: &[Option<&[u8]>],
+        want: Want,
+        place: &mut Place<'_>,
+    ) -> Option<(Piece, Vec<u32>)> {
+        Simd::current().run(Job { with: self, levels, ranges, want, place })
+    }
 }
 
-/// The work of [`unpack`], compiled once for each vector width.
+/// The work of [`Unpacker::chunk`], compiled once for each vector width.
 struct Job<'j, 'p, 'r> {
-    form: &'j Form,
-    frame: &'j Frame,
-    lookup: &'j Lookup,
+    with: &'j Unpacker,
+    levels: usize,
     ranges: &'j [Option<&'r [u8]>],
-    want_sums: bool,
+    want: Want,
     place: &'j mut Place<'p>,
 }
 
 impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
-    type Output = Option<Piece>;
+    type Output = Option<(Piece, Vec<u32>)>;
 
     #[inline(always)]
-    fn call(self) -> Option<Piece> {
-        let Self { form, frame, lookup, ranges, want_sums, place } = self;
+    fn call(self) -> Self::Output {
+        let Self { with, levels, ranges, want, place } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
-        let mut out = Out { form, frame, place, starts, lanes: Lanes::default(), sorted: Vec::new() };
-        let sums = form.play(lookup, ranges, n, want_sums, &mut out)?;
+        let blank = [[0.0; LANES]; MOST];
+        let weights = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
+        let mut out = Out { with, place, starts, lanes: Lanes::default(), sorted: Vec::new(), weights };
+        let played = with.form.play(levels, n, &with.lookup, ranges, want, &mut out)?;
         let [mut all, rest @ ..] = out.lanes;
         for lane in rest {
             all.atoms.extend(lane.atoms);
@@ -81,27 +85,31 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             all.escapes.gaussians.extend(lane.escapes.gaussians);
             all.escapes.rows.extend(lane.escapes.rows);
         }
-        // Large values of f16 are infinite, and no atom occurs twice in a Gaussian.
-        let good = all.values.iter().all(|v| v.is_finite());
-        good.then_some(Piece { sums, ..all })
+        // Large values of f16 are infinite, and base colours may leave f32 by what codes add to them.
+        let good = all.values.iter().all(|v| v.is_finite()) && place.dc.as_flattened().iter().all(|v| v.is_finite());
+        good.then_some((Piece { bit_counts: played.bits, ..all }, played.sums))
     }
 }
 
 /// Where a decoded chunk goes.
 struct Out<'j, 'p> {
-    form: &'j Form,
-    frame: &'j Frame,
+    with: &'j Unpacker,
     place: &'j mut Place<'p>,
     /// First Gaussian of each lane.
     starts: [usize; LANES + 1],
     lanes: Lanes<Piece>,
     sorted: Vec<(u16, f16)>,
+    /// The weights of [`MeanView`] of each Gaussian of the block, if there are points of view.
+    weights: Vec<[Lanes<f32>; MOST]>,
 }
 
 impl Sink for Out<'_, '_> {
     #[inline(always)]
-    fn group(&mut self, number: usize, set: u32, group: &Group, missing: usize) -> Option<()> {
-        let drawn = Drawn::new(self.form, self.frame, group, missing);
+    fn group(&mut self, number: usize, in_block: usize, set: u32, group: &Group, levels: [usize; 2]) -> Option<()> {
+        let drawn = Drawn::new(&self.with.frame, group, levels);
+        if let Some(weights) = self.weights.get_mut(in_block) {
+            *weights = self.with.mean_view.lanes(self.with.dictionary.degree(), &drawn.position);
+        }
         for l in (0..LANES).filter(|&l| has(set, l)) {
             let i = self.starts[l] + number;
             *self.place.positions.get_mut(i)? = drawn.position.map(|x| x[l]);
@@ -115,19 +123,22 @@ impl Sink for Out<'_, '_> {
 
     #[inline(always)]
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()> {
-        let form = &self.form.rest;
+        let form = &self.with.form.rest;
+        let per_channel = self.with.dictionary.degree().rest_per_channel();
         for l in 0..LANES {
             let out = &mut self.lanes[l];
             let mut cursor = Cursor::default();
             for k in (0..rest.len()).filter(|&k| has(rest.of(k).0, l)) {
                 let i = self.starts[l] + number + k;
-                let step = self.frame.value_steps[(rest.of(k).1[l] & u32::from(LAST_CLASS)) as usize];
+                let step = self.with.frame.value_steps[(rest.of(k).1[l] & u32::from(LAST_CLASS)) as usize];
                 self.sorted.clear();
+                let mut exact = None;
                 for part in 0..form.least.len() {
                     match rest.coded(form, part, k, l, &mut cursor) {
                         Coded::Exact(row) => {
                             out.escapes.gaussians.push(u32::try_from(i).ok()?);
                             out.escapes.rows.extend_from_slice(row);
+                            exact = Some(row);
                         }
                         Coded::Code(from, count) => {
                             for (atom, value) in (from..from + count).map(|j| rest.nonzero(part, j, l)) {
@@ -142,22 +153,27 @@ impl Sink for Out<'_, '_> {
                 *self.place.counts.get_mut(i)? = u8::try_from(self.sorted.len()).ok()?;
                 out.atoms.extend(self.sorted.iter().map(|p| p.0));
                 out.values.extend(self.sorted.iter().map(|p| p.1));
+                if let Some(weights) = self.weights.get(k) {
+                    let mut own = [0.0; MOST];
+                    for (own, weight) in own.iter_mut().zip(weights) {
+                        *own = weight[l];
+                    }
+                    let weights = &own[..per_channel.min(MOST)];
+                    let added = match exact {
+                        Some(row) => seen_row(row, weights),
+                        None => {
+                            let code = self.sorted.iter().map(|&(atom, value)| (atom, value.to_f32()));
+                            seen(&self.with.dictionary, code, weights)
+                        }
+                    };
+                    for (dc, added) in self.place.dc.get_mut(i)?.iter_mut().zip(added) {
+                        *dc -= added;
+                    }
+                }
             }
         }
         Some(())
     }
-}
-
-/// Decodes a chunk from the ranges that are there to `place`. `None` if no encoder writes it.
-pub(in crate::packed) fn unpack(
-    form: &Form,
-    frame: &Frame,
-    lookup: &Lookup,
-    ranges: &[Option<&[u8]>],
-    want_sums: bool,
-    place: &mut Place<'_>,
-) -> Option<Piece> {
-    Simd::current().run(Job { form, frame, lookup, ranges, want_sums, place })
 }
 
 /// Eight Gaussians as numbers.
@@ -173,8 +189,8 @@ struct Drawn {
 
 impl Drawn {
     #[inline(always)]
-    fn new(form: &Form, frame: &Frame, group: &Group, missing: usize) -> Self {
-        let (coarse, finer) = (factor(form.levels), factor(missing));
+    fn new(frame: &Frame, group: &Group, [levels, missing]: [usize; 2]) -> Self {
+        let (coarse, finer) = (factor(levels), factor(missing));
         let mut values = group.coarse;
         let mut within = [true; LANES];
         for t in 0..TARGETS {

@@ -1,0 +1,115 @@
+//! Decoding the chunks of a packed scene of any version, each without the others.
+
+use std::ops::Range;
+
+use super::chunks::FlatDecoder;
+use super::layered::LayeredDecoder;
+use super::place::{Piece, Place, indices, places};
+use super::scene::{Coding, PackedHead};
+use super::stream::{BitCounts, StreamBits};
+use super::{layered, stream};
+use crate::scene::splats::Geometry;
+use crate::sparse::codes::{SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+use crate::support::memory_budget::MemoryBudget;
+
+/// What all chunks of a packed scene are decoded with, and where they are.
+#[derive(Debug)]
+pub(crate) struct Decoder {
+    file: String,
+    /// The Gaussians of each chunk.
+    spans: Vec<Range<usize>>,
+    kind: Kind,
+}
+
+#[derive(Debug)]
+enum Kind {
+    Flat(Box<FlatDecoder>),
+    Layered(Box<LayeredDecoder>),
+}
+
+impl Decoder {
+    /// Reads what all chunks need from `head`, and in version 2 from the start of `data`.
+    pub(crate) fn new(head: &PackedHead, data: &[u8]) -> Result<Self> {
+        head.limits.check_gaussians(&head.file, head.gaussians as u64)?;
+        head.limits.check_atoms(&head.file, head.atoms as u64)?;
+        let (kind, spans) = match &head.coding {
+            Coding::Flat(flat) => {
+                let decoder = FlatDecoder::new(head, flat, data)?;
+                let spans = decoder.spans();
+                (Kind::Flat(Box::new(decoder)), spans)
+            }
+            Coding::Layered(bytes) => {
+                let decoder = LayeredDecoder::new(head, bytes, data.len())?;
+                let spans = decoder.spans();
+                (Kind::Layered(Box::new(decoder)), spans)
+            }
+        };
+        Ok(Self { file: head.file.clone(), spans, kind })
+    }
+
+    /// The Gaussians of each chunk.
+    pub(crate) fn spans(&self) -> &[Range<usize>] {
+        &self.spans
+    }
+
+    pub(crate) fn dictionary(&self) -> &Dictionary {
+        match &self.kind {
+            Kind::Flat(decoder) => &decoder.dictionary,
+            Kind::Layered(decoder) => decoder.dictionary(),
+        }
+    }
+
+    /// Bits that the dictionary took.
+    pub(crate) fn dictionary_bits(&self) -> &BitCounts {
+        match &self.kind {
+            Kind::Flat(decoder) => &decoder.dictionary_bits,
+            Kind::Layered(decoder) => &decoder.dictionary_bits,
+        }
+    }
+
+    /// Counted bits with the names of the streams.
+    pub(crate) fn named(&self, bits: &BitCounts) -> Vec<StreamBits> {
+        match &self.kind {
+            Kind::Flat(_) => bits.named(stream::Stream::names()),
+            Kind::Layered(_) => bits.named(layered::Stream::names()),
+        }
+    }
+
+    /// Decodes chunk `c` of `data` without extras. Escapes are numbered from its start. `budget` already holds
+    /// everything except its codes. Its bits are counted if `count_bits`.
+    pub(crate) fn chunk(
+        &self,
+        data: &[u8],
+        c: usize,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<(Geometry, SparseCodes, BitCounts)> {
+        let span = self.spans.get(c).cloned().unwrap_or_default();
+        let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
+        let mut place = places(&mut g, &mut counts, &[0..span.len()]).pop().unwrap_or_default();
+        let piece = self.piece(data, c, 0, &mut place, budget, count_bits)?;
+        let dictionary = self.dictionary();
+        let (indices, values) = (indices(dictionary, piece.atoms), Values::F16(piece.values));
+        let codes = SparseCodes::part(dictionary, span.start, counts, indices, values, piece.escapes)
+            .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
+        Ok((g, codes, piece.bit_counts))
+    }
+
+    /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
+    pub(super) fn piece(
+        &self,
+        data: &[u8],
+        c: usize,
+        first: usize,
+        place: &mut Place<'_>,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
+        match &self.kind {
+            Kind::Flat(decoder) => decoder.piece(data, c, first, place, budget, count_bits),
+            Kind::Layered(decoder) => decoder.piece(data, c, first, place, budget, count_bits),
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Decoding the chunks of a file of version 3.
+
+use std::ops::Range;
+
+use half::f16;
+
+use super::chunk::Want;
+use super::head::Head;
+use super::index::Chunk;
+use super::player::Player;
+use super::streams::Stream;
+use super::symbols::{LANES, Symbols};
+use super::tables::{Lookup, Tables};
+use super::unpack::Unpacker;
+use crate::packed::chunks::rounded_atoms;
+use crate::packed::place::{Piece, Place, indices};
+use crate::packed::scene::PackedHead;
+use crate::packed::stream::BitCounts;
+use crate::scene::sh::ShDegree;
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+use crate::support::memory_budget::MemoryBudget;
+
+/// What all chunks are decoded with, and where they are.
+#[derive(Debug)]
+pub(in crate::packed) struct LayeredDecoder {
+    file: String,
+    limits: Limits,
+    head: Head,
+    unpacker: Unpacker,
+    pub(in crate::packed) dictionary_bits: BitCounts,
+}
+
+impl LayeredDecoder {
+    /// Reads the head, which is `bytes`, of a file whose data has this length.
+    pub(in crate::packed) fn new(packed: &PackedHead, bytes: &[u8], data: usize) -> Result<Self> {
+        let file = packed.file.clone();
+        let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
+        let head = Head::read(bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
+        if head.index.gaussians() != packed.gaussians || head.rest.atoms != packed.atoms {
+            return Err(bad("head does not fit the metadata"));
+        }
+        if head.index.data_bytes() != data as u64 {
+            return Err(bad("ranges do not cover the data"));
+        }
+        let tables = Tables::read(&head.tables).ok_or_else(|| bad("tables are damaged"))?;
+        let lookup = Lookup::new(&tables);
+        let (dictionary, dictionary_bits) =
+            dictionary(&head, packed.degree, &lookup).ok_or_else(|| bad("dictionary is damaged"))?;
+        let unpacker = Unpacker {
+            form: head.form(),
+            frame: head.frame.clone(),
+            mean_view: head.mean_view.clone(),
+            lookup,
+            dictionary,
+        };
+        Ok(Self { file, limits: packed.limits, head, unpacker, dictionary_bits })
+    }
+
+    pub(in crate::packed) fn dictionary(&self) -> &Dictionary {
+        &self.unpacker.dictionary
+    }
+
+    /// The Gaussians of each chunk.
+    pub(in crate::packed) fn spans(&self) -> Vec<Range<usize>> {
+        self.head.index.chunks.iter().map(|chunk| chunk.first..chunk.first + chunk.gaussians).collect()
+    }
+
+    /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
+    pub(in crate::packed) fn piece(
+        &self,
+        data: &[u8],
+        c: usize,
+        first: usize,
+        place: &mut Place<'_>,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
+        let damaged = || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
+        let chunk = self.head.index.chunks.get(c).ok_or_else(damaged)?;
+        let ranges = self.checked(data, c, chunk)?;
+        let want = Want { sums: false, bits: count_bits };
+        let levels = usize::from(self.head.index.levels.get(chunk.layer).copied().unwrap_or(0));
+        let (mut piece, _) = self.unpacker.chunk(levels, &ranges, want, place).ok_or_else(damaged)?;
+        for escape in &mut piece.escapes.gaussians {
+            *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
+        }
+        let most = place.counts.iter().copied().max().unwrap_or(0);
+        if u64::from(most) > self.limits.nonzeros {
+            let i = place.counts.iter().position(|&count| count == most).unwrap_or(0);
+            self.limits.check_nonzeros(&self.file, chunk.first + i, most.into())?;
+        }
+        if piece.atoms.iter().any(|&atom| usize::from(atom) >= self.dictionary().len()) {
+            return Err(damaged());
+        }
+        let width = indices(self.dictionary(), Vec::new()).width() + size_of::<f16>();
+        let row = size_of::<u32>() + self.dictionary().dim() * size_of::<f32>();
+        if !(budget.grow(piece.atoms.len(), width) && budget.grow(piece.escapes.gaussians.len(), row)) {
+            return Err(budget.full());
+        }
+        Ok(piece)
+    }
+
+    /// The ranges of a chunk, if their checksums hold.
+    fn checked<'d>(&self, data: &'d [u8], c: usize, chunk: &Chunk) -> Result<Vec<Option<&'d [u8]>>> {
+        let range = |(k, range): (usize, &super::index::Range)| {
+            let part = || format!("range {k} of chunk {c}");
+            let start = usize::try_from(range.start).ok();
+            let bytes = start.and_then(|start| data.get(start..start.checked_add(range.length as usize)?));
+            let bytes = bytes.filter(|bytes| crc32fast::hash(bytes) == range.checksum);
+            match bytes {
+                Some(bytes) => Ok(Some(bytes)),
+                None => Err(Error::format(&self.file, FormatError::Checksum { part: part() })),
+            }
+        };
+        chunk.ranges.iter().enumerate().map(range).collect()
+    }
+}
+
+/// Lanes of the range of the dictionary.
+const ONE_LANE: u32 = 1;
+
+/// Codes the coefficients of all atoms, and returns unit-norm atoms as the decoder sees them. `whole` holds the encoder's
+/// numbers.
+pub(in crate::packed) fn code_atoms<S: Symbols>(
+    s: &mut S,
+    degree: ShDegree,
+    atoms: usize,
+    bits: u32,
+    whole: impl Fn(usize) -> i32,
+) -> Vec<f32> {
+    rounded_atoms(degree, atoms, bits, |context, place| {
+        let context = [context as u32; LANES];
+        i64::from(s.signed(Stream::Dictionary, context, ONE_LANE, |_| whole(place))[0])
+    })
+}
+
+fn dictionary(head: &Head, degree: ShDegree, lookup: &Lookup) -> Option<(Dictionary, BitCounts)> {
+    if degree.rest() == 0 {
+        return head.dictionary.is_empty().then(|| (Dictionary::empty(), BitCounts::default()));
+    }
+    let mut player = Player::new(lookup, &head.dictionary, 1, true)?;
+    let rows = code_atoms(&mut player, degree, head.rest.atoms, head.atom_bits.into(), |_| 0);
+    if !player.exhausted() {
+        return None;
+    }
+    Some((Dictionary::new(degree, rows).ok()?, player.bit_counts.take().unwrap_or_default()))
+}

@@ -1,0 +1,83 @@
+//! Base colours by what is seen on average.
+//!
+//! The base colour of a Gaussian without its SH-rest is the average over all directions. It is seen from few of them, so
+//! files hold the colour that a few points of view see on average. What SH-rest that is there adds to that average is
+//! taken away again. So a Gaussian shows its best colour whether or not its SH-rest is there.
+
+use super::symbols::{LANES, Lanes};
+use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::maths::Vec3;
+
+/// Most points of view.
+pub(super) const MAX_POINTS: usize = 8;
+/// Longest row of one channel.
+pub(super) const MOST: usize = MAX_COEFFICIENTS - 1;
+
+/// The points of view of a file; none if base colours are those of the source.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct MeanView {
+    pub(in crate::packed) points: Vec<Vec3>,
+    /// Distance, in world units, below which directions shrink to nothing.
+    pub(in crate::packed) softening: f32,
+}
+
+impl MeanView {
+    /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.
+    #[inline(always)]
+    pub(in crate::packed) fn weights(&self, degree: ShDegree, position: Vec3) -> [f32; MOST] {
+        let mut sums = [0.0; MOST];
+        for point in &self.points {
+            let (x, y, z) = (position[0] - point[0], position[1] - point[1], position[2] - point[2]);
+            let scale = 1.0 / (x * x + y * y + z * z + self.softening * self.softening).sqrt();
+            let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
+            for (sum, b) in sums.iter_mut().zip(basis) {
+                *sum += b;
+            }
+        }
+        let share = 1.0 / (C0 * self.points.len().max(1) as f32);
+        sums.map(|sum| sum * share)
+    }
+
+    /// [`Self::weights`] of the positions of all lanes.
+    #[inline(always)]
+    pub(super) fn lanes(&self, degree: ShDegree, positions: &[Lanes<f32>; 3]) -> [Lanes<f32>; MOST] {
+        let mut out = [[0.0; LANES]; MOST];
+        for l in 0..LANES {
+            let weights = self.weights(degree, [positions[0][l], positions[1][l], positions[2][l]]);
+            for (out, weight) in out.iter_mut().zip(weights) {
+                out[l] = weight;
+            }
+        }
+        out
+    }
+}
+
+/// What a code adds to a base colour by these weights, of which there are as many as a channel has coefficients.
+#[inline(always)]
+pub(in crate::packed) fn seen(
+    dictionary: &Dictionary,
+    code: impl Iterator<Item = (u16, f32)>,
+    weights: &[f32],
+) -> [f32; CHANNELS] {
+    let mut sums = [0.0; CHANNELS];
+    for (atom, value) in code {
+        let start = usize::from(atom) * dictionary.dim();
+        let row = dictionary.as_slice().get(start..start + dictionary.dim()).unwrap_or_default();
+        for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(weights.len().max(1))) {
+            let dot = channel.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
+            *sum += value * dot;
+        }
+    }
+    sums
+}
+
+/// [`seen`] of an exact row.
+#[inline(always)]
+pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNELS] {
+    let mut sums = [0.0; CHANNELS];
+    for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(weights.len().max(1))) {
+        *sum = channel.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
+    }
+    sums
+}
