@@ -129,7 +129,7 @@ impl FlatDecoder {
                 (nonzeros, rows) = (0, 0);
             }
         }
-        piece.bit_counts = player.bit_counts.unwrap_or_default();
+        piece.bit_counts = player.bit_counts.take().unwrap_or_default();
         if player.exhausted() { Ok(piece) } else { Err(damaged()) }
     }
 }

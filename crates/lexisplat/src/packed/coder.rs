@@ -4,14 +4,12 @@ use half::f16;
 
 use super::appearance::Appearance;
 use super::canonical::{MortonKey, canonical};
-use super::chunk_codec::{ChunkCodec, GaussianValues};
-use super::chunks::{MAX_ATOM_BITS, code_dictionary, resident};
-use super::layered::Target;
+use super::chunks::{MAX_ATOM_BITS, resident};
+use super::layered::{MeanView, Recorder, Target, code_atoms, seen_row};
 use super::morton;
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::pack::PackOptions;
 use super::parameters::Parameters;
-use super::stream::SymbolEncoder;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
@@ -92,6 +90,7 @@ pub(super) struct ChunkCoder {
     pub(super) parameters: Parameters,
     pub(super) dictionary: Dictionary,
     pub(super) atom_bits: u32,
+    pub(super) mean_view: MeanView,
     book: Option<Codebook>,
     stop: StopRule,
     tolerance: Option<f64>,
@@ -103,9 +102,10 @@ impl ChunkCoder {
         view: View<'_>,
         total: usize,
         mut parameters: Parameters,
+        mean_view: MeanView,
         options: &PackOptions,
         progress: &dyn Progress,
-    ) -> Result<(Self, SymbolEncoder)> {
+    ) -> Result<(Self, Recorder)> {
         let mut stop = StopRule::Balanced;
         #[expect(
             clippy::cast_possible_truncation,
@@ -125,23 +125,29 @@ impl ChunkCoder {
             parameters,
             dictionary: Dictionary::empty(),
             atom_bits: 0,
+            mean_view,
             book: None,
             stop,
             tolerance: options.tolerance,
         };
-        let mut symbols = SymbolEncoder::default();
+        let mut symbols = Recorder::default();
+        let mut coded = |atoms: usize, bits: u32, rows: &[f32]| {
+            #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
+            let whole = |k: usize| (f64::from(rows[k]) * f64::from(1_u32 << bits)).round() as i32;
+            code_atoms(&mut symbols, degree, atoms, bits, whole)
+        };
         if dim > 0 && view.len() > 0 {
             let (rows, costs) = coder.learn(view, total, options, progress)?;
             coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
             let atoms = rows.len() / dim;
-            let rounded = code_dictionary(&mut symbols, degree, atoms, coder.atom_bits, &rows);
+            let rounded = coded(atoms, coder.atom_bits, &rows);
             coder.dictionary = Dictionary::new(degree, rounded.clone())?;
             coder.book = Some(Codebook::new(dim, rounded, costs));
         } else if dim > 0 {
             // A scene without Gaussians still needs one atom to be valid.
             let mut atom = vec![0.0; dim];
             atom[0] = 1.0;
-            let rounded = code_dictionary(&mut symbols, degree, 1, 0, &atom);
+            let rounded = coded(1, 0, &atom);
             coder.dictionary = Dictionary::new(degree, rounded)?;
         }
         Ok((coder, symbols))
@@ -209,7 +215,8 @@ impl ChunkCoder {
             }
             let classes = view.classes[i];
             let centre = parameters.centre(morton::decode(placed.cell).unwrap_or_default());
-            let mut target = Target::new(&form, placed.cell, centre, classes, parameters, dc_unit);
+            let mut shown = [0.0; 3];
+            let (mut code, mut exact) = (Vec::new(), Vec::new());
             if dim > 0 {
                 resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
                 let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
@@ -219,57 +226,27 @@ impl ChunkCoder {
                 let error = squares.sum::<f64>().sqrt();
                 let storable = values.iter().all(|v| v.1.is_finite());
                 if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
-                    target.code = codes.row(i).to_vec();
+                    code = codes.row(i).to_vec();
                     tally.code(values.len(), error, None);
                 } else {
-                    target.exact = row.to_vec();
+                    exact = row.to_vec();
                     tally.escapes += 1;
                 }
+                if !self.mean_view.points.is_empty() {
+                    let weights = self.mean_view.weights(dictionary.degree(), form.position);
+                    let weights = weights.get(..dictionary.degree().rest_per_channel()).unwrap_or_default();
+                    shown = seen_row(if exact.is_empty() { &rebuilt } else { &exact }, weights);
+                }
             }
+            form.dc = std::array::from_fn(|c| form.dc[c] + shown[c]);
+            let mut target = Target::new(&form, placed.cell, centre, classes, parameters, dc_unit);
+            (target.code, target.exact) = (code, exact);
             targets.push(target);
         }
         Ok((tally, targets))
     }
-
-    /// Codes a chunk, all of `view`. Returns its counts and its symbols; an error if a decoder would refuse them.
-    pub(super) fn record(&self, view: View<'_>, codes: &Codes) -> Result<(Tally, SymbolEncoder)> {
-        let (parameters, dictionary) = (&self.parameters, &self.dictionary);
-        let dim = dictionary.dim();
-        let mut walk = ChunkCodec::new(parameters, dim);
-        let (mut tally, mut symbols) = (Tally::new(dim), SymbolEncoder::default());
-        let mut values: Vec<(u16, f16)> = Vec::new();
-        let mut rebuilt = vec![0.0_f32; dim];
-        for i in 0..view.len() {
-            let placed = view.scene[i];
-            let mut form = canonical(&view.splats.geometry, placed.index());
-            if let Some(appearances) = view.appearances {
-                let Appearance { dc, log_opacity } = appearances[i];
-                (form.dc, form.log_opacity) = (dc, log_opacity);
-            }
-            let classes = view.classes[i];
-            let mut target = GaussianValues { cell: placed.cell, classes, form, code: &[], exact: &[] };
-            if dim > 0 {
-                resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
-                let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
-                reconstruct(dictionary, pairs, &mut rebuilt);
-                let row = view.row(i);
-                let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
-                let error = squares.sum::<f64>().sqrt();
-                let storable = values.iter().all(|v| v.1.is_finite());
-                if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
-                    target.code = codes.row(i);
-                    tally.code(values.len(), error, None);
-                } else {
-                    target.exact = row;
-                    tally.escapes += 1;
-                }
-            }
-            walk.step(&mut symbols, &target).ok_or_else(too_large)?;
-        }
-        Ok((tally, symbols))
-    }
 }
 
-fn too_large() -> Error {
+pub(super) fn too_large() -> Error {
     Error::parameter("values", "too large", "positions and colours whose sums f32 can hold")
 }

@@ -1,10 +1,13 @@
 //! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
 
 use super::coder::ChunkCoder;
-use super::entropy::{CONTEXTS, Histogram, Tables};
+use super::layered::{
+    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Range, Recorder, Stream, Tables, lanes,
+};
+use super::layering::Layering;
 use super::pack::PackOptions;
-use super::scene::{PackedHead, UNNAMED};
-use super::stream::{BitCounts, Stream, SymbolEncoder};
+use super::scene::{Coding, PackedHead, UNNAMED};
+use super::stream::BitCounts;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
 use crate::sparse::tally::{CompressReport, Tally};
@@ -23,10 +26,16 @@ pub(super) struct Counts {
 
 impl Counts {
     /// The counts of one chunk or of the dictionary.
-    pub(super) fn of(tally: Tally, symbols: &SymbolEncoder) -> Self {
-        let mut histograms = vec![Histogram::default(); Stream::ALL.len() * CONTEXTS];
-        symbols.count(&mut histograms);
-        Self { tally, histograms, raw_bits: symbols.raw_bits.clone() }
+    pub(super) fn of<'r>(tally: Tally, ranges: impl IntoIterator<Item = &'r Recorder>) -> Self {
+        let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
+        let mut raw_bits = BitCounts::zeros(Stream::ALL.len());
+        for range in ranges {
+            range.each(
+                |context, symbol| histograms[context].add(symbol),
+                |stream, bits| raw_bits.0[stream] += f64::from(bits),
+            );
+        }
+        Self { tally, histograms, raw_bits }
     }
 
     /// Adds the counts of other chunks.
@@ -39,21 +48,34 @@ impl Counts {
     /// Bits of all streams.
     fn bits(&self, tables: &Tables) -> BitCounts {
         let mut bit_counts = self.raw_bits.clone();
-        for (stream, (sum, contexts)) in
-            bit_counts.0.iter_mut().zip(self.histograms.chunks(CONTEXTS)).enumerate()
-        {
-            for (context, histogram) in contexts.iter().enumerate() {
-                if let Some(table) = tables.table(stream, context) {
-                    *sum += histogram.bits(table);
-                }
-            }
+        let contexts = ALL_CONTEXTS / Stream::ALL.len();
+        for (context, histogram) in self.histograms.iter().enumerate() {
+            bit_counts.0[context / contexts] += tables.bits(context, histogram);
         }
         bit_counts
     }
 }
 
-/// Takes the symbols and the raw bits of the next chunk.
-pub(super) type WriteChunk<'a> = dyn FnMut([Vec<u8>; 2]) -> Result<()> + 'a;
+/// A chunk whose ranges are coded.
+#[derive(Debug)]
+pub(super) struct Written {
+    pub(super) layer: usize,
+    gaussians: usize,
+    bounds: [[f32; 3]; 2],
+    /// The bytes of each range, and the checksum of its integers.
+    ranges: Vec<(Vec<u8>, u32)>,
+}
+
+impl Written {
+    pub(super) fn new(layer: usize, chunk: &CodedChunk, tables: &Tables) -> Self {
+        let lanes = lanes(chunk.gaussians);
+        let ranges = chunk.ranges.iter().map(|(range, sum)| (range.finish(tables, lanes), *sum));
+        Self { layer, gaussians: chunk.gaussians, bounds: chunk.bounds, ranges: ranges.collect() }
+    }
+}
+
+/// Takes the next chunk of a layer.
+pub(super) type WriteChunk<'a> = dyn FnMut(Written) -> Result<()> + 'a;
 /// Codes all chunks with the tables.
 type CodeChunks<'a> = dyn FnMut(&Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
 
@@ -61,8 +83,12 @@ type CodeChunks<'a> = dyn FnMut(&Tables, &mut WriteChunk<'_>) -> Result<()> + 'a
 #[derive(Debug, Clone)]
 pub(super) struct Encoding {
     pub(super) coder: ChunkCoder,
+    pub(super) layering: Layering,
+    /// The head without tables, dictionary and index.
+    pub(super) head: Head,
+    pub(super) form: Form,
     /// The symbols of the dictionary.
-    dictionary: SymbolEncoder,
+    dictionary: Recorder,
     pub(super) counts: Counts,
     learn_seconds: f64,
     /// Runs since learning began.
@@ -72,15 +98,28 @@ pub(super) struct Encoding {
 /// A packed scene, its bulk spilled.
 pub(super) struct Finished {
     pub(super) head: PackedHead,
-    pub(super) data: Spilled,
+    /// Of each pass.
+    pub(super) data: Vec<Spilled>,
+    pub(super) data_bytes: usize,
     pub(super) report: CompressReport,
 }
 
 impl Encoding {
-    /// Begins with a coder that has learned since the start of `clock`, and the symbols of its dictionary.
-    pub(super) fn new((coder, dictionary): (ChunkCoder, SymbolEncoder), clock: Stopwatch) -> Self {
-        let counts = Counts::of(Tally::new(coder.dictionary.dim()), &dictionary);
-        Self { coder, dictionary, counts, learn_seconds: clock.seconds(), clock }
+    /// Begins with a coder that has learned since the start of `clock`, and the symbols of its dictionary. `most_dc` is the
+    /// largest coordinate of a base colour.
+    pub(super) fn new(
+        (coder, dictionary): (ChunkCoder, Recorder),
+        layering: Layering,
+        most_dc: f64,
+        clock: Stopwatch,
+    ) -> Self {
+        let counts = Counts::of(Tally::new(coder.dictionary.dim()), [&dictionary]);
+        let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
+        let mean_view = coder.mean_view.clone();
+        let atom_bits = u8::try_from(coder.atom_bits).unwrap_or(u8::MAX);
+        let head = Head::new(&coder.parameters, most_dc, rest, atom_bits, mean_view);
+        let form = head.form();
+        Self { coder, layering, head, form, dictionary, counts, learn_seconds: clock.seconds(), clock }
     }
 
     /// Counts all time so far as time spent on learning.
@@ -97,23 +136,41 @@ impl Encoding {
         to: SpillTo<'_>,
         code_chunks: &mut CodeChunks<'_>,
     ) -> Result<Finished> {
-        let Self { coder, dictionary, counts, learn_seconds, clock } = self;
+        let Self { coder, layering, mut head, dictionary, counts, learn_seconds, clock, .. } = self;
         let tables = Tables::new(&counts.histograms)
             .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
         let stream_bits = counts.bits(&tables).named(Stream::names());
-        let mut data = Spill::new(to)?;
-        let mut lengths = Vec::new();
-        let mut write = |parts: [Vec<u8>; 2]| -> Result<()> {
-            for part in parts {
-                let length = u32::try_from(part.len());
-                let too_long = |_| Error::parameter("chunk", part.len(), "parts of less than 4 GiB");
-                lengths.push(length.map_err(too_long)?);
-                data.push(&part)?;
+        let passes = layering.passes(&head.rest);
+        let mut data = passes.iter().map(|_| Spill::new(to)).collect::<Result<Vec<_>>>()?;
+        let mut chunks = Vec::new();
+        code_chunks(&tables, &mut |written| {
+            let mut chunk = Chunk {
+                layer: written.layer,
+                gaussians: written.gaussians,
+                bounds: written.bounds,
+                ..Chunk::default()
+            };
+            for (bytes, integers) in &written.ranges {
+                let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
+                let length = u32::try_from(bytes.len()).map_err(too_long)?;
+                chunk.ranges.push(Range { start: 0, length, checksum: crc32fast::hash(bytes), integers: *integers });
             }
+            for (pass, spill) in passes.iter().zip(&mut data).filter(|(p, _)| usize::from(p.layer) == written.layer) {
+                let of_pass = written.ranges.iter().enumerate().filter(|(k, _)| pass.has(*k));
+                of_pass.map(|(_, (bytes, _))| spill.push(bytes)).collect::<Result<()>>()?;
+            }
+            chunks.push(chunk);
             Ok(())
-        };
-        write(dictionary.finish(&tables))?;
-        code_chunks(&tables, &mut write)?;
+        })?;
+        chunks.sort_by_key(|chunk: &Chunk| chunk.layer);
+        head.index = Index { levels: layering.levels(), passes, chunks };
+        let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
+        head.index.place().ok_or_else(too_long)?;
+        let data_bytes = usize::try_from(head.index.data_bytes()).map_err(|_| too_long())?;
+        if coder.dictionary.dim() > 0 {
+            head.dictionary = dictionary.finish(&tables, 1);
+        }
+        head.tables = tables.write();
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
         let seconds = [learn_seconds, clock.seconds() - learn_seconds];
         let (record, mut report) = counts.tally.into_report(record, gaussians, None, seconds);
@@ -124,17 +181,25 @@ impl Encoding {
             gaussians,
             removed: 0,
             atoms: coder.dictionary.len(),
-            atom_bits: coder.atom_bits,
             record,
             meta,
             target: None,
             reached: None,
             device: None,
-            parameters: coder.parameters.to_list(),
-            tables: tables.write(),
-            lengths,
+            coding: Coding::Layered(head.write()),
             limits: Limits::default(),
         };
-        Ok(Finished { head, data: data.finish()?, report })
+        let data = data.into_iter().map(Spill::finish).collect::<Result<_>>()?;
+        Ok(Finished { head, data, data_bytes, report })
     }
 }
+
+/// The bytes of passes, one after the other.
+pub(super) fn joined(passes: Vec<Spilled>) -> Result<Vec<u8>> {
+    let mut out = Vec::new();
+    for pass in passes {
+        out.append(&mut pass.into_bytes()?);
+    }
+    Ok(out)
+}
+

@@ -46,6 +46,7 @@ impl Fit {
     /// `scene` is the order of the Gaussians of `geometry`.
     pub(super) fn new(
         geometry: &Geometry,
+        dc: &[Vec3],
         sensitivity: &Sensitivity,
         scene: &[MortonKey],
         grid: &Grid,
@@ -53,7 +54,7 @@ impl Fit {
         let weights: Vec<[f32; 2]> = scene.iter().map(|g| sensitivity.appearance(g.index())).collect();
         let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
         let classes = classes_of(kinds, &weights);
-        let (dc_mean, dc_axes) = colour_axes(geometry, scene);
+        let (dc_mean, dc_axes) = colour_axes(dc, scene);
         let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
         let mut parameters = Parameters {
             origin: grid.origin,
@@ -73,7 +74,7 @@ impl Fit {
             dc_axes,
             ..Parameters::default()
         };
-        predictors(geometry, scene, &classes, &mut parameters);
+        predictors(geometry, dc, scene, &classes, &mut parameters);
         Self { parameters, classes, kinds }
     }
 
@@ -144,8 +145,8 @@ pub(super) fn rounded(class: f32) -> u8 {
 }
 
 /// Mean base colour and its principal axes, strongest first.
-fn colour_axes(geometry: &Geometry, scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
-    let dc = || scene.iter().map(|g| geometry.dc[g.index()]);
+fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
+    let dc = || scene.iter().map(|g| dc[g.index()]);
     let n = scene.len().max(1) as f64;
     let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
     let deviations: Vec<f32> =
@@ -210,7 +211,13 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
 }
 
 /// Fits the predictions to the values of the scene before they are rounded.
-fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[f32; 2]], parameters: &mut Parameters) {
+fn predictors(
+    geometry: &Geometry,
+    dc: &[Vec3],
+    scene: &[MortonKey],
+    classes: &[[f32; 2]],
+    parameters: &mut Parameters,
+) {
     let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
         let dc = parameters.dc_coordinates(g.dc);
         [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
@@ -219,7 +226,8 @@ fn predictors(geometry: &Geometry, scene: &[MortonKey], classes: &[[f32; 2]], pa
     let mut equations = [Equations::<FEATURES>::NONE; TARGETS];
     let mut neighbours = Neighbours::default();
     for (placed, class) in scene.iter().zip(classes) {
-        let g = canonical(geometry, placed.index());
+        let mut g = canonical(geometry, placed.index());
+        g.dc = dc[placed.index()];
         let values = values(&g, parameters);
         for (sum, value) in sums.iter_mut().zip(values) {
             *sum += f64::from(value);

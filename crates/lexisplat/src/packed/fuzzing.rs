@@ -75,38 +75,3 @@ pub fn parts(packed: &Packed) -> [&[u8]; 3] {
     let part = |from: usize, to: usize| packed.data().get(from..to).unwrap_or_default();
     [&packed.head().tables, part(symbols, raw), part(raw, raw + length(3))]
 }
-
-/// Decodes a dump.
-pub fn bench(dump: &[u8]) {
-    use super::layered::*;
-    let number = |k: usize| u64::from_le_bytes(dump[8 * k..8 * k + 8].try_into().unwrap()) as usize;
-    let (dim, length) = (number(0), number(1));
-    let head = Head::read(&dump[16..16 + length], dim).unwrap();
-    let data = &dump[16 + length..];
-    let (form, lookup) = (head.form(), Lookup::new(&Tables::read(&head.tables).unwrap()));
-    let most: usize = std::env::var("MOST").map_or(9, |m| m.parse().unwrap());
-    let mut least = f64::INFINITY;
-    for k in 0..40 {
-        let want = k == 0 && most == 9;
-        let mut seconds = 0.0;
-        let mut crc = crc32fast::Hasher::new();
-        for chunk in &head.index.chunks {
-            let ranges: Vec<Option<&[u8]>> = chunk.ranges.iter().take(most).map(|r| Some(&data[r.start as usize..][..r.length as usize])).collect();
-            let n = chunk.gaussians;
-            let mut g = crate::scene::splats::Geometry::zeros(n);
-            let mut counts = vec![0; n];
-            let mut place = Place { positions: &mut g.positions, dc: &mut g.dc, opacities: &mut g.opacities, scales: &mut g.scales, rotations: &mut g.rotations, counts: &mut counts };
-            let clock = std::time::Instant::now();
-            let piece = unpack(&form, &head.frame, &lookup, &ranges, want, &mut place).unwrap();
-            seconds += clock.elapsed().as_secs_f64();
-            if want {
-                assert_eq!(piece.sums, chunk.ranges.iter().map(|r| r.integers).collect::<Vec<_>>());
-            }
-            for values in g.floats() { crc.update(bytemuck::cast_slice(values)); }
-        }
-        least = least.min(seconds);
-        if k < 39 { continue; }
-        let seconds = least;
-        println!("{:.3} M/s {:.0} ns {:08x}", head.index.gaussians() as f64 / seconds / 1e6, seconds * 1e9 / head.index.gaussians() as f64, crc.finalize());
-    }
-}

@@ -19,7 +19,8 @@ mod encoding;
 mod entropy;
 mod fit;
 mod floor;
-pub(crate) mod layered;
+mod layered;
+mod layering;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;

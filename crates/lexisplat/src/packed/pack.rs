@@ -5,7 +5,9 @@ use std::borrow::Borrow;
 use super::canonical::{Grid, MortonKey};
 use super::fit::Fit;
 use super::floor::Floor;
-use super::quantised::Quantised;
+use super::layered::MeanView;
+use super::parameters::Parameters;
+use super::quantised::{Fitted, Gaussians, Quantised};
 use super::removal::Weights;
 use super::scene::Packed;
 use crate::scene::sensitivity::Sensitivity;
@@ -42,6 +44,11 @@ pub struct PackOptions {
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
+    /// Up to 8 points that the scene is seen from. Base colours are then those that are seen from there on average, so
+    /// that they are right without SH-rest too.
+    pub viewpoints: Vec<[f32; 3]>,
+    /// Write one layer. By default scenes of 8,000 Gaussians and more have two, of which the first draws the whole scene.
+    pub one_layer: bool,
 }
 
 impl PackOptions {
@@ -51,6 +58,8 @@ impl PackOptions {
         with_keep_order(keep_order: bool),
         with_keep_all(keep_all: bool),
         with_seed(seed: u64),
+        with_viewpoints(viewpoints: Vec<[f32; 3]>),
+        with_one_layer(one_layer: bool),
     );
 
     /// Whether Gaussians may be left out, and base colours and opacities changed to make up for errors.
@@ -66,6 +75,7 @@ impl PackOptions {
         {
             return Err(Error::parameter("atoms", atoms, format!("1 to {MAX_ATOMS}")));
         }
+        all_finite([("viewpoints", self.viewpoints.as_flattened())])?;
         if let Some(tol) = self.tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
@@ -82,6 +92,9 @@ pub struct Packer<S> {
     options: PackOptions,
     scene: Vec<MortonKey>,
     fit: Fit,
+    mean_view: MeanView,
+    /// Base colours that files hold.
+    dc: Vec<[f32; 3]>,
     weights: Weights,
 }
 
@@ -98,9 +111,11 @@ impl<S: Borrow<Splats>> Packer<S> {
         let grid = Grid::fit(&g.positions);
         let mut scene = grid.keys(g);
         scene.sort_unstable();
-        let fit = Fit::new(g, sensitivity, &scene, &grid);
+        let mean_view = MeanView::new(&options.viewpoints);
+        let dc = mean_view.colours(splats.borrow());
+        let fit = Fit::new(g, &dc, sensitivity, &scene, &grid);
         let weights = Weights::new(g, sensitivity, &scene, options.may_change());
-        Ok(Self { splats, options: options.clone(), scene, fit, weights })
+        Ok(Self { splats, options: options.clone(), scene, fit, mean_view, dc, weights })
     }
 
     /// Number of Gaussians.
@@ -156,16 +171,16 @@ impl<S: Borrow<Splats>> Packer<S> {
             false => Floor::none(parameters),
         };
         let classes = floor.classes(&classes, geometry, &scene);
-        Quantised::new(
-            self.splats.borrow(),
-            &self.options,
-            scene,
-            classes,
-            weights,
-            floor.parameters,
-            progress,
-        )
+        let gaussians = Gaussians { scene, classes, weights };
+        let fitted = Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
+        Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
     }
+}
+
+/// The largest coordinate of base colours.
+pub(super) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {
+    let coordinates = dc.iter().flat_map(|&dc| parameters.dc_coordinates(dc));
+    coordinates.fold(0.0, |most, x| f64::from(x.abs()).max(most))
 }
 
 /// [`Packer::step_for`] of a scene of `gaussians` Gaussians.

@@ -1,25 +1,60 @@
 //! A scene at one overall step, ready to be written with any base colours and opacities.
 
-use super::CHUNK;
+use std::ops::Range;
+
 use super::appearance::Appearance;
 use super::canonical::MortonKey;
 use super::codebook::Codes;
-use super::coder::{ChunkCoder, View};
-use super::encoding::{Counts, Encoding, Finished, WriteChunk};
-use super::entropy::Tables;
+use super::coder::{ChunkCoder, View, too_large};
+use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written, joined};
+use super::layered::{CodedChunk, MeanView, Tables, Target};
+use super::layering::Layering;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
 use super::reorder::gather;
 use super::scene::Packed;
-use super::stream::SymbolEncoder;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::splats::Splats;
 use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
-use crate::support::parallel::map_chunks;
+use crate::support::parallel::map_vec;
 use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
+
+/// Gaussians that a file has, all in the same order.
+#[derive(Debug, Default)]
+pub(super) struct Gaussians {
+    /// Cells and places in the source.
+    pub(super) scene: Vec<MortonKey>,
+    /// Colour and shape class of each.
+    pub(super) classes: Vec<[u8; 2]>,
+    /// Sensitivities of each to its colour and to the logarithm of its opacity.
+    pub(super) weights: Vec<[f32; 2]>,
+}
+
+impl Gaussians {
+    /// Puts Gaussians in the order of cells in the order of layers. Returns the number of Gaussians of each layer.
+    pub(super) fn in_layers(&mut self, layering: &mut Layering) -> Vec<usize> {
+        let layers: Vec<usize> = self.weights.iter().map(|w| layering.layer(w[1])).collect();
+        let layers = &layers;
+        let of = |layer: usize| (0..layers.len()).filter(move |&i| layers[i] == layer);
+        let count = layering.layers();
+        let order: Vec<usize> = (0..count).flat_map(&of).collect();
+        gather(&mut self.scene, order.iter().copied());
+        gather(&mut self.classes, order.iter().copied());
+        gather(&mut self.weights, order.iter().copied());
+        (0..count).map(|layer| of(layer).count()).collect()
+    }
+}
+
+/// What is known of a scene's base colours before it is coded.
+#[derive(Debug)]
+pub(super) struct Fitted {
+    /// The largest coordinate.
+    pub(super) most_dc: f64,
+    pub(super) mean_view: MeanView,
+}
 
 /// A scene at one overall step: which Gaussians stay, steps, dictionary and codes are settled. [`Self::finish`] makes the
 /// file with the scene's own base colours and opacities or with others, which change nothing else.
@@ -27,11 +62,10 @@ use crate::support::stopwatch::Stopwatch;
 pub struct Quantised<'a> {
     splats: &'a Splats,
     options: &'a PackOptions,
-    scene: Vec<MortonKey>,
-    /// Colour and shape class of each Gaussian.
-    classes: Vec<[u8; 2]>,
-    /// Sensitivities of each to its colour and to the logarithm of its opacity.
-    weights: Vec<[f32; 2]>,
+    gaussians: Gaussians,
+    /// The layer and the Gaussians of each chunk.
+    chunks: Vec<(usize, Range<usize>)>,
+    /// Of each chunk.
     codes: Vec<Codes>,
     encoding: Encoding,
 }
@@ -40,56 +74,69 @@ impl<'a> Quantised<'a> {
     pub(super) fn new(
         splats: &'a Splats,
         options: &'a PackOptions,
-        scene: Vec<MortonKey>,
-        classes: Vec<[u8; 2]>,
-        weights: Vec<[f32; 2]>,
+        gaussians: Gaussians,
         parameters: Parameters,
+        Fitted { most_dc, mean_view }: Fitted,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let n = scene.len();
-        let view = View { splats, scene: &scene, classes: &classes, appearances: None };
+        let n = gaussians.scene.len();
+        let layering = Layering::new(n, !options.one_layer, gaussians.weights.iter().map(|w| w[1]));
+        let view = View { splats, scene: &gaussians.scene, classes: &gaussians.classes, appearances: None };
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, n, parameters, options, progress)?;
-        let encoding = Encoding::new(coder, clock);
+        let coder = ChunkCoder::new(view, n, parameters, mean_view, options, progress)?;
+        let encoding = Encoding::new(coder, layering, most_dc, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);
-        let mut whole = Self::of_part(splats, options, scene, classes, weights, encoding, progress)?;
+        let mut whole = Self::of_part(splats, options, gaussians, encoding, progress)?;
         progress.end();
         whole.encoding.end_learning();
         Ok(whole)
     }
 
-    /// A part of a scene, with what all parts are coded with.
+    /// A part of a scene, with what all parts are coded with. The state of its layering goes on from that of `encoding`.
     pub(super) fn of_part(
         splats: &'a Splats,
         options: &'a PackOptions,
-        scene: Vec<MortonKey>,
-        classes: Vec<[u8; 2]>,
-        weights: Vec<[f32; 2]>,
-        encoding: Encoding,
+        mut gaussians: Gaussians,
+        mut encoding: Encoding,
         progress: &dyn Progress,
     ) -> Result<Self> {
-        let view = View { splats, scene: &scene, classes: &classes, appearances: None };
-        let codes = codes_of(&encoding.coder, view, progress)?;
-        Ok(Self { splats, options, scene, classes, weights, codes, encoding })
+        let counts = gaussians.in_layers(&mut encoding.layering);
+        let mut chunks = Vec::new();
+        let mut start = 0;
+        for (layer, count) in counts.into_iter().enumerate() {
+            let (end, size) = (start + count, encoding.layering.chunk(layer));
+            chunks.extend((start..end).step_by(size).map(|first| (layer, first..end.min(first + size))));
+            start = end;
+        }
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), encoding };
+        let view = part.view(None)?;
+        let codes = part.chunks.iter().map(|(_, range)| {
+            progress.check()?;
+            let codes = part.encoding.coder.codes(view.part(range.clone()));
+            progress.advance(range.len() as u64);
+            Ok(codes)
+        });
+        part.codes = codes.collect::<Result<_>>()?;
+        Ok(part)
     }
 
     /// Number of Gaussians of the file.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.scene.len()
+        self.gaussians.scene.len()
     }
 
     /// Whether the file has no Gaussians.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.scene.is_empty()
+        self.gaussians.scene.is_empty()
     }
 
     /// Sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the file.
     #[must_use]
     pub fn weights(&self) -> &[[f32; 2]] {
-        &self.weights
+        &self.gaussians.weights
     }
 
     /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
@@ -105,84 +152,25 @@ impl<'a> Quantised<'a> {
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
         let view = self.view(appearances)?;
-        if std::env::var_os("LAYERS").is_some() {
-            self.layers(view);
-        }
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.
-        for chunk in self.each_chunk(view, progress, |tally, symbols| Counts::of(tally, &symbols)) {
+        let counted = self.each_chunk(view, progress, |_, tally, coded| {
+            Counts::of(tally, coded.ranges.iter().map(|(range, _)| range))
+        });
+        for chunk in counted {
             encoding.counts.add(&chunk?);
         }
         let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts = self.each_chunk(view, progress, |_, symbols| symbols.finish(tables));
+            let parts = self.each_chunk(view, progress, |layer, _, coded| Written::new(layer, &coded, tables));
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = self.splats.meta.clone();
-        let Finished { mut head, data, report } =
+        let Finished { mut head, data, report, .. } =
             encoding.finish(n, self.options, meta, SpillTo::Memory, &mut code_chunks)?;
         head.removed = (self.splats.len() - n) as u64;
-        let order = self.options.keep_order.then(|| self.scene.iter().map(|g| g.source).collect());
-        Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
-    }
-
-    fn layers(&self, view: View<'_>) {
-        use super::layered::*;
-        let coder = &self.encoding.coder;
-        let parameters = &coder.parameters;
-        let n = view.len();
-        for (levels, least) in [(0, vec![1]), (1, vec![4, 1]), (1, vec![2, 1]), (2, vec![6, 2, 1])] {
-            let steering = Steering::new(&Integers::of(parameters, 1.0));
-            let dim = coder.dictionary.dim();
-            let least = if dim == 0 { vec![] } else { least };
-            let form = Form { steering, levels, rest: RestForm { dim, atoms: coder.dictionary.len(), least: least.clone() } };
-            let mut all = Vec::new();
-            let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
-            let mut raw = vec![0.0; 29];
-            for c in 0..n.div_ceil(CHUNK) {
-                let range = c * CHUNK..n.min((c + 1) * CHUNK);
-                let (_, targets) = coder.targets(view.part(range), &self.codes[c], 1.0).unwrap();
-                let recorded = form.record(&targets).unwrap();
-                for (r, _) in &recorded {
-                    r.each(|context, symbol| histograms[context].add(symbol), |stream, bits| raw[stream] += f64::from(bits));
-                }
-                all.push((targets.len(), recorded));
-            }
-            let tables = Tables::new(&histograms).unwrap();
-            let written = tables.write();
-            let mut head = Head::new(parameters, 0.0, levels, form.rest.clone(), coder.atom_bits as u8);
-            head.tables = written.clone();
-            let mut sizes = vec![0; form.ranges()];
-            let mut passes = vec![Vec::new(); form.ranges()];
-            for (n, recorded) in &all {
-                let lanes = lanes(*n);
-                let bytes: Vec<Vec<u8>> = recorded.iter().map(|r| r.0.finish(&tables, lanes)).collect();
-                let mut chunk = Chunk { gaussians: *n, ..Chunk::default() };
-                for k in 0..bytes.len() {
-                    sizes[k] += bytes[k].len();
-                    passes[k].extend_from_slice(&bytes[k]);
-                    chunk.ranges.push(Range { start: 0, length: bytes[k].len() as u32, checksum: 0, integers: recorded[k].1 });
-                }
-                head.index.chunks.push(chunk);
-            }
-            head.index.layers = 1;
-            head.index.passes = (0..form.ranges()).map(|k| Pass { layer: 0, range: k as u8 }).collect();
-            head.index.place().unwrap();
-            let mut dump = Vec::new();
-            let bytes = head.write();
-            dump.extend((dim as u64).to_le_bytes());
-            dump.extend((bytes.len() as u64).to_le_bytes());
-            dump.extend(bytes);
-            for pass in passes { dump.extend(pass); }
-            std::fs::write(format!("/tmp/w/dump{levels}{}.bin", least.len()), dump).unwrap();
-            let seconds = 1.0;
-            let mut text = String::new();
-            for (k, raw) in raw.iter().enumerate() {
-                let bits: f64 = (0..24).map(|c| tables.bits(k * 24 + c, &histograms[k * 24 + c])).sum::<f64>() + raw;
-                text += &format!(" {k}:{:.2}", bits / n as f64);
-            }
-            println!("levels {levels} {least:?}: ranges {sizes:?} = {} + tables {}; {:.0} ns a Gaussian = {:.2} M/s; {:.3} bits\n  {text}", sizes.iter().sum::<usize>(), written.len(), seconds * 1e9 / n as f64, n as f64 / seconds / 1e6, 8.0 * sizes.iter().sum::<usize>() as f64 / n as f64);
-        }
+        let order = self.options.keep_order.then(|| self.gaussians.scene.iter().map(|g| g.source).collect());
+        Ok((Packed::new(head, self.extras(), order, joined(data)?), report))
     }
 
     /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
@@ -194,45 +182,67 @@ impl<'a> Quantised<'a> {
             }
             all.iter().try_for_each(Appearance::check)?;
         }
-        Ok(View { splats: self.splats, scene: &self.scene, classes: &self.classes, appearances })
+        let Gaussians { scene, classes, .. } = &self.gaussians;
+        Ok(View { splats: self.splats, scene, classes, appearances })
     }
 
-    /// What `with` makes of the counts and the symbols of each chunk of `view`.
-    pub(super) fn each_chunk<T: Send>(
+    /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
+    fn each_chunk<T: Send>(
         &self,
         view: View<'_>,
         progress: &dyn Progress,
-        with: impl Fn(Tally, SymbolEncoder) -> T + Sync,
+        with: impl Fn(usize, Tally, CodedChunk) -> T + Sync,
     ) -> Vec<Result<T>> {
-        map_chunks(self.len(), CHUNK, |range| {
-            progress.check()?;
-            let codes = &self.codes[range.start / CHUNK];
-            let (tally, symbols) = self.encoding.coder.record(view.part(range), codes)?;
-            Ok(with(tally, symbols))
+        let Encoding { form, head, .. } = &self.encoding;
+        let levels = self.encoding.layering.levels();
+        self.each_target(view, progress, |layer, tally, targets| {
+            let levels = levels.get(layer).copied().unwrap_or(0).into();
+            let coded = form.record(&head.frame, levels, &targets).ok_or_else(too_large)?;
+            Ok(with(layer, tally, coded))
         })
     }
 
+    /// What `with` makes of the layer, the counts and the targets of each chunk of `view`.
+    pub(super) fn each_target<T: Send>(
+        &self,
+        view: View<'_>,
+        progress: &dyn Progress,
+        with: impl Fn(usize, Tally, Vec<Target>) -> Result<T> + Sync,
+    ) -> Vec<Result<T>> {
+        let coder = &self.encoding.coder;
+        let unit = self.encoding.head.dc_unit();
+        map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
+            progress.check()?;
+            let (tally, targets) = coder.targets(view.part(range.clone()), codes, unit)?;
+            with(*layer, tally, targets)
+        })
+    }
+
+    /// The layers as they are after these Gaussians.
+    pub(super) fn layering(&self) -> &Layering {
+        &self.encoding.layering
+    }
+
+    /// Number of Gaussians of each layer.
+    pub(super) fn layer_counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.encoding.layering.layers()];
+        self.chunks.iter().for_each(|(layer, range)| counts[*layer] += range.len());
+        counts
+    }
+
+    /// Cells and places in the source, in the order of the file.
+    pub(super) fn sources(&self) -> &[MortonKey] {
+        &self.gaussians.scene
+    }
+
     /// The columns that are not drawn, with the rows of the file.
-    pub(super) fn extras(&self) -> Vec<Extra> {
+    fn extras(&self) -> Vec<Extra> {
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
-            for_extra!(&mut extra.values, v => gather(v, self.scene.iter().map(|g| g.index())));
+            for_extra!(&mut extra.values, v => gather(v, self.gaussians.scene.iter().map(|g| g.index())));
         }
         extras
     }
-}
-
-/// The codes of all of `view`, chunk by chunk.
-fn codes_of(coder: &ChunkCoder, view: View<'_>, progress: &dyn Progress) -> Result<Vec<Codes>> {
-    let n = view.len();
-    let codes = (0..n.div_ceil(CHUNK)).map(|c| {
-        progress.check()?;
-        let part = view.part(c * CHUNK..n.min((c + 1) * CHUNK));
-        let codes = coder.codes(part);
-        progress.advance(part.len() as u64);
-        Ok(codes)
-    });
-    codes.collect()
 }
 
 #[cfg(test)]

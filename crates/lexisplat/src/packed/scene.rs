@@ -177,10 +177,11 @@ impl Packed {
 pub(crate) struct SpilledPacked {
     /// The passes of the data, one after the other.
     pub(crate) data: Vec<Spilled>,
-    /// Of each layer.
-    pub(crate) order: Option<Vec<Spilled>>,
-    /// Names and types, and values of each layer.
-    pub(crate) extras: Vec<(Extra, Vec<Spilled>)>,
+    pub(crate) data_bytes: usize,
+    /// Of each layer the number of Gaussians, and the values.
+    pub(crate) order: Option<Vec<(usize, Spilled)>>,
+    /// Names and types, and the same of each.
+    pub(crate) extras: Vec<(Extra, Vec<(usize, Spilled)>)>,
 }
 
 /// What a search for a quality or a size asked for and reached.

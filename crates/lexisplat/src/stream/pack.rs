@@ -90,7 +90,7 @@ fn run<E: From<Error>>(
     ordered.each(rows, CHUNK, &mut |part| packer.push(part, importance.refit(), progress))?;
     progress.end();
     let (head, spilled, report) = packer.finish(to, importance.device(), progress)?;
-    let writer = LexiWriter::spilled_packed(&head, spilled);
+    let writer = LexiWriter::spilled_packed(&head, spilled)?;
     let tensor_bytes = writer.attribute_bytes().to_vec();
     writer.write(sink, progress)?;
     Ok(PackedFile { head, report, tensor_bytes })

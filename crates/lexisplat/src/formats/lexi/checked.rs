@@ -7,7 +7,7 @@ use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
 use safetensors::{Dtype, SafeTensors};
 
 use super::json;
-use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, key, tensor};
+use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
@@ -105,7 +105,10 @@ impl<'a> Checked<'a> {
 
     fn verify_tensors(&self) -> Result<()> {
         let sums: BTreeMap<String, String> = self.json(key::CHECKSUMS)?;
-        let names: Vec<&String> = self.names.iter().filter(|&name| name != tensor::HEADER_CHECKSUM).collect();
+        // The ranges of packed data have checksums of their own, so that a part of it can be checked.
+        let ranged = self.number::<u64>(key::VERSION)? == PACKED_VERSION;
+        let summed = |name: &&String| *name != tensor::HEADER_CHECKSUM && !(ranged && *name == tensor::DATA);
+        let names: Vec<&String> = self.names.iter().filter(summed).collect();
         if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
         }
@@ -150,6 +153,19 @@ impl<'a> Checked<'a> {
     /// The metadata entry `key`, if it is there.
     pub(super) fn optional<T: std::str::FromStr>(&self, key: &str) -> Result<Option<T>> {
         self.has_text(key).then(|| self.number(key)).transpose()
+    }
+
+    /// Whether the file is of the newest version, in which many metadata entries may be missing.
+    pub(super) fn is_layered(&self) -> bool {
+        self.number::<u64>(key::VERSION).is_ok_and(|version| version == PACKED_VERSION)
+    }
+
+    /// The metadata entry `key` as a number, or as `true` or `false`; its default if it is missing and may be.
+    pub(super) fn number_or_default<T: std::str::FromStr + Default>(&self, key: &str) -> Result<T> {
+        match self.is_layered() {
+            true => Ok(self.optional(key)?.unwrap_or_default()),
+            false => self.number(key),
+        }
     }
 
     /// Whether there is a metadata entry `key`.

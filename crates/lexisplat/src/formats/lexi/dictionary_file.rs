@@ -43,7 +43,7 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
         let layout = fields::layout(&checked)?;
         if layout == Layout::Packed {
             let head = super::packed::head(&checked, limits)?;
-            return Ok(Decoder::new(&head, super::packed::data(&checked)?)?.dictionary);
+            return Ok(Decoder::new(&head, super::packed::data(&checked)?)?.dictionary().clone());
         }
         refuse_unknown(&checked, layout, degree)?;
     } else {

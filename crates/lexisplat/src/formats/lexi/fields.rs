@@ -5,18 +5,22 @@ use std::ops::Range;
 use safetensors::Dtype;
 
 use super::checked::Checked;
+use super::extra_column::{Column, ColumnError};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, PACKED_VERSION, key, tensor};
+use super::schema::{EXTRA_PREFIX, FLAT_VERSION, PACKED_VERSION, key, tensor};
 use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, ScalarType, with_scalar};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Pursuit, Record};
-use crate::support::error::Result;
+use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS};
 
 fn file_layout(checked: &Checked<'_>) -> Result<Layout> {
+    if checked.is_layered() && !checked.has_text(key::LAYOUT) {
+        return Ok(Layout::Packed);
+    }
     checked.text(key::LAYOUT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))
 }
 
@@ -25,7 +29,7 @@ pub(super) fn layout(checked: &Checked<'_>) -> Result<Layout> {
     record(checked)?;
     let layout = file_layout(checked)?;
     let version: u64 = checked.number(key::VERSION)?;
-    if (layout == Layout::Packed) != (version == PACKED_VERSION) {
+    if (layout == Layout::Packed) != (FLAT_VERSION..=PACKED_VERSION).contains(&version) {
         let text = format!("metadata 'version' is {version}, which has no layout '{layout}'");
         return Err(checked.malformed(text));
     }
@@ -38,7 +42,11 @@ pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
 }
 
 pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
-    Ok(SceneMeta { comments: checked.json(key::COMMENTS)?, antialiased: checked.number(key::ANTIALIASED)? })
+    let comments = match checked.is_layered() && !checked.has_text(key::COMMENTS) {
+        true => Vec::new(),
+        false => checked.json(key::COMMENTS)?,
+    };
+    Ok(SceneMeta { comments, antialiased: checked.number_or_default(key::ANTIALIASED)? })
 }
 
 /// The dictionary of a scene or of a dictionary file.
@@ -57,17 +65,19 @@ pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limit
 }
 
 pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
-    let pursuit: Pursuit =
-        checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?;
+    let pursuit = match checked.is_layered() {
+        true => Pursuit::Omp,
+        false => checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?,
+    };
     let packed = file_layout(checked)? == Layout::Packed;
     let record = Record {
         tolerance: checked.optional(key::TOLERANCE)?,
         max_nonzeros: checked.optional(key::MAX_NONZEROS)?,
         pursuit: (!packed).then_some(pursuit),
-        seed: checked.number(key::SEED)?,
+        seed: checked.number_or_default(key::SEED)?,
         max_residual: checked.number(key::MAX_RESIDUAL)?,
         rms_residual: checked.number(key::RMS_RESIDUAL)?,
-        over_tolerance: checked.number(key::OVER_TOLERANCE)?,
+        over_tolerance: checked.number_or_default(key::OVER_TOLERANCE)?,
     };
     let sizes = [
         (key::TOLERANCE, record.tolerance.unwrap_or(1.0)),
@@ -82,6 +92,16 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     Ok(record)
 }
 
+/// The coded column of `n` values in the tensor `name`.
+pub(super) fn column<'c>(checked: &'c Checked<'_>, name: &str, n: usize) -> Result<Column<'c>> {
+    let len = checked.list_len(name)?;
+    Column::new(checked.data(name, Dtype::U8, &[len])?, n).map_err(|e| wrong(checked, name, e))
+}
+
+fn wrong(checked: &Checked<'_>, name: &str, error: ColumnError) -> Error {
+    checked.malformed(format!("tensor '{}': {error}", name.escape_debug()))
+}
+
 /// Properties that 3DGS does not define, of Gaussians `range` of `n`.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
@@ -90,6 +110,12 @@ pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> R
         if !is_extra_name(name) {
             let text = format!("tensor '{}' is not named as a property can be", full.escape_debug());
             return Err(checked.malformed(text));
+        }
+        if checked.is_layered() {
+            let column = column(checked, full, n)?;
+            let values = column.values(range.clone()).map_err(|e| wrong(checked, full, e))?;
+            out.push(Extra { name: name.to_owned(), values });
+            continue;
         }
         let dtype = checked.view(full)?.dtype;
         let ty = ScalarType::of_dtype(dtype)

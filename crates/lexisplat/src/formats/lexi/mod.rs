@@ -7,7 +7,6 @@
 mod checked;
 mod dictionary_file;
 mod exact;
-#[cfg_attr(not(test), expect(dead_code, reason = "no version of the file has such columns yet"))]
 mod extra_column;
 mod fields;
 mod json;

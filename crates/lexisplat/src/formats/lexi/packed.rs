@@ -1,11 +1,14 @@
 //! Packed scenes in the container: a few tensors instead of one for each attribute.
 
+use std::ops::Range;
+
 use safetensors::Dtype;
 
 use super::checked::Checked;
-use super::fields::{degree, extras, meta, record};
+use super::fields::{column, degree, extras, meta, record};
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{CHUNK, Packed, PackedHead};
+use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead};
+use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
@@ -19,8 +22,8 @@ pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
     let head = head(checked, limits)?;
     let n = head.gaussians;
     let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
-    let lists = (head.parameters.len() + head.lengths.len(), size_of::<u32>());
-    for (count, each) in [lists, (head.tables.len(), 1), (data(checked)?.len(), 1)] {
+    let (words, bytes) = head.coding.sizes();
+    for (count, each) in [(words, size_of::<u32>()), (bytes, 1), (data(checked)?.len(), 1)] {
         budget.take(count, each)?;
     }
     for extra in extras(checked, n, &(0..0))? {
@@ -28,7 +31,7 @@ pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
     }
     let order = if checked.has(tensor::ORDER) {
         budget.take(n, size_of::<u32>())?;
-        Some(checked.values(tensor::ORDER, Dtype::U32, &[n])?)
+        Some(order(checked, n, 0..n)?)
     } else {
         None
     };
@@ -55,7 +58,11 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     limits.check_gaussians(&checked.file, gaussians)?;
     let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
     Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
-    let atoms = checked.number(key::ATOMS)?;
+    let coding = coding(checked, gaussians)?;
+    let atoms = match &coding {
+        Coding::Flat(_) => checked.number(key::ATOMS)?,
+        Coding::Layered(head) => head.first_chunk().map_or(0, |atoms| u16::from_le_bytes(*atoms).into()),
+    };
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
     if checked.has(tensor::ORDER) && !is_permutation(checked, gaussians)? {
@@ -63,7 +70,6 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     }
     let known = |name: &str| PACKED.contains(&name) || name.starts_with(EXTRA_PREFIX);
     checked.refuse_unknown(known, "for layout 'packed'")?;
-    let chunks = gaussians.div_ceil(CHUNK);
     let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE)).transpose()?;
     let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED)).transpose()?;
     extras(checked, gaussians, &(0..0))?;
@@ -74,7 +80,6 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         gaussians,
         removed: checked.optional(key::REMOVED)?.unwrap_or(0),
         atoms: usize::try_from(atoms).map_err(|_| checked.malformed("too many atoms"))?,
-        atom_bits: checked.number(key::ATOM_BITS)?,
         record: record(checked)?,
         meta: meta(checked)?,
         target,
@@ -84,11 +89,36 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
             .then(|| checked.text(key::DRAWN_ON))
             .transpose()?
             .map(str::to_owned),
-        parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
-        lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2 * (chunks + 1)])?,
-        tables: list(checked, tensor::TABLES, Dtype::U8)?,
+        coding,
         limits: *limits,
     })
+}
+
+/// What the scene is decoded with, by the version of the file.
+fn coding(checked: &Checked<'_>, gaussians: u64) -> Result<Coding> {
+    if checked.is_layered() {
+        return Ok(Coding::Layered(list(checked, tensor::HEAD, Dtype::U8)?));
+    }
+    let chunks = usize::try_from(gaussians.div_ceil(CHUNK as u64)).unwrap_or(usize::MAX - 1);
+    Ok(Coding::Flat(Flat {
+        atom_bits: checked.number(key::ATOM_BITS)?,
+        parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
+        lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2_usize.saturating_mul(chunks + 1)])?,
+        tables: list(checked, tensor::TABLES, Dtype::U8)?,
+    }))
+}
+
+/// Places in the source of Gaussians `range` of `n`.
+pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Result<Vec<u32>> {
+    if !checked.is_layered() {
+        return checked.part(tensor::ORDER, Dtype::U32, &[n], &range);
+    }
+    let values = column(checked, tensor::ORDER, n)?.values(range);
+    match values {
+        Ok(ExtraValues::U32(order)) => Ok(order),
+        Ok(_) => Err(checked.malformed("tensor 'packed.order' is not of u32")),
+        Err(error) => Err(checked.malformed(format!("tensor 'packed.order': {error}"))),
+    }
 }
 
 /// A tensor that is a list of any length.
@@ -100,18 +130,22 @@ fn list<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
     checked.values(name, dtype, &length(checked, name, dtype)?)
 }
 
+/// Gaussians whose places are looked at together.
+const PLACES_AT_ONCE: usize = 1 << 16;
+
 /// Whether the order names each of `n` Gaussians once.
 fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
-    let data = checked.data(tensor::ORDER, Dtype::U32, &[n])?;
     let mut seen = vec![0_u64; n.div_ceil(64)];
-    for place in data.as_chunks::<4>().0 {
-        let place = u32::from_le_bytes(*place) as usize;
-        let Some(word) = seen.get_mut(place / 64).filter(|_| place < n) else { return Ok(false) };
-        let bit = 1 << (place % 64);
-        if *word & bit != 0 {
-            return Ok(false);
+    for first in (0..n).step_by(PLACES_AT_ONCE) {
+        for place in order(checked, n, first..n.min(first + PLACES_AT_ONCE))? {
+            let place = place as usize;
+            let Some(word) = seen.get_mut(place / 64).filter(|_| place < n) else { return Ok(false) };
+            let bit = 1 << (place % 64);
+            if *word & bit != 0 {
+                return Ok(false);
+            }
+            *word |= bit;
         }
-        *word |= bit;
     }
     Ok(true)
 }

@@ -152,7 +152,7 @@ impl<'a> LexiReader<'a> {
     pub fn dictionary(&self) -> &Dictionary {
         match &self.kind {
             Kind::Exact(exact) => &exact.dictionary,
-            Kind::Packed(packed) => &packed.decoder.dictionary,
+            Kind::Packed(packed) => packed.decoder.dictionary(),
         }
     }
 
@@ -196,7 +196,7 @@ impl<'a> LexiReader<'a> {
     pub fn order(&self, range: Range<usize>) -> Result<Vec<u32>> {
         match &self.kind {
             Kind::Packed(packed) => {
-                packed.checked.part(tensor::ORDER, Dtype::U32, &[packed.head.gaussians], &range)
+                super::packed::order(&packed.checked, packed.head.gaussians, range)
             }
             Kind::Exact(exact) => {
                 let text = "only packed files hold an order; this one is in the order of its source";
@@ -255,13 +255,13 @@ impl<'a> LexiReader<'a> {
                 Ok(Vec::new())
             }
             Kind::Packed(packed) => {
-                let mut bit_counts = packed.decoder.dictionary_bits;
-                let chunks = packed.head.gaussians.div_ceil(CHUNK);
+                let mut bit_counts = packed.decoder.dictionary_bits().clone();
+                let chunks = packed.decoder.spans().len();
                 for first in (0..chunks).step_by(CHUNKS_AT_ONCE) {
                     let at_once = first..chunks.min(first + CHUNKS_AT_ONCE);
                     bit_counts.add(&packed.chunks(at_once, &self.extras, &self.limits, count_bits, take)?);
                 }
-                Ok(bit_counts.named())
+                Ok(packed.decoder.named(&bit_counts))
             }
         }
     }
@@ -290,7 +290,8 @@ impl PackedFile<'_> {
     ) -> Result<crate::packed::BitCounts> {
         let n = self.head.gaussians;
         let extra_bytes = like.iter().map(|e| e.values.width()).sum::<usize>();
-        let held = n.min(chunks.end * CHUNK) - chunks.start * CHUNK;
+        let spans = self.decoder.spans().get(chunks.clone()).unwrap_or_default();
+        let held = spans.iter().map(|span| span.len()).sum();
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
         let data = super::packed::data(&self.checked)?;
@@ -298,14 +299,12 @@ impl PackedFile<'_> {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });
         let mut bit_counts = crate::packed::BitCounts::default();
-        for (c, part) in chunks.zip(parts) {
+        for (range, part) in spans.iter().zip(parts) {
             let (mut geometry, codes, bits) = part?;
             bit_counts.add(&bits);
-            let range = c * CHUNK..n.min((c + 1) * CHUNK);
-            let start = range.start;
-            geometry.extras = extras(&self.checked, n, &range)?;
-            let (meta, dictionary) = (self.head.meta.clone(), self.decoder.dictionary.clone());
-            take(start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
+            geometry.extras = extras(&self.checked, n, range)?;
+            let (meta, dictionary) = (self.head.meta.clone(), self.decoder.dictionary().clone());
+            take(range.start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
         }
         Ok(bit_counts)
     }
@@ -340,7 +339,9 @@ impl SplatSource for LexiReader<'_> {
             Kind::Packed(packed) => packed,
         };
         // Chunks are decoded whole, and the Gaussians around the range left out.
-        let chunks = range.start / CHUNK..range.end.div_ceil(CHUNK);
+        let spans = packed.decoder.spans();
+        let first = spans.partition_point(|span| span.end <= range.start);
+        let chunks = first..spans.partition_point(|span| span.start < range.end).max(first);
         *part = self.empty();
         packed.chunks(chunks, &self.extras, &self.limits, false, &mut |start, model| {
             let chunk = model.into_splats();

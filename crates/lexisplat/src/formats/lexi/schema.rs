@@ -2,10 +2,12 @@
 
 /// Version of files in the layouts `f32`, `f16` and `paper`.
 pub const VERSION: u64 = 1;
+/// Version of files in the layout `packed` before there were layers.
+pub(super) const FLAT_VERSION: u64 = 2;
 /// Version of files in the layout `packed`.
-pub const PACKED_VERSION: u64 = 2;
+pub const PACKED_VERSION: u64 = 3;
 /// Newest version of the format that is read.
-pub const MAX_VERSION: u64 = 2;
+pub const MAX_VERSION: u64 = 3;
 
 /// Header and data start at multiples of this, as the safetensors format asks.
 pub(super) const HEADER_ALIGNMENT: usize = 8;
@@ -34,8 +36,8 @@ pub(super) const GEOMETRY: [(&str, usize); 6] = [
 ];
 
 /// Names of the tensors of a packed file, in the order in which sizes are listed.
-pub(super) const PACKED: [&str; 5] =
-    [tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
+pub(super) const PACKED: [&str; 6] =
+    [tensor::HEAD, tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
 
 /// The shape of a tensor of geometry of `n` Gaussians.
 pub(super) fn geometry_shape(n: usize, width: usize) -> Vec<usize> {
@@ -57,6 +59,7 @@ pub(super) mod tensor {
     pub(crate) const VALUES: &str = "codes.values";
     pub(crate) const ESCAPED: &str = "escapes.gaussians";
     pub(crate) const ESCAPE_ROWS: &str = "escapes.rows";
+    pub(crate) const HEAD: &str = "packed.head";
     pub(crate) const PARAMETERS: &str = "packed.parameters";
     pub(crate) const LENGTHS: &str = "packed.lengths";
     pub(crate) const TABLES: &str = "packed.tables";

@@ -24,6 +24,8 @@ pub(super) struct Tensor<'a> {
     dtype: Dtype,
     shape: Vec<usize>,
     source: Source<'a>,
+    /// Whether its checksum is in the metadata.
+    summed: bool,
 }
 
 /// Makes the words of a tensor one after the other.
@@ -34,6 +36,9 @@ pub(super) enum Source<'a> {
     /// As they lie in memory.
     Bytes(&'a [u8]),
     Spilled(Spilled),
+    /// One after the other. Their checksums are elsewhere.
+    Several(Vec<Spilled>),
+    Owned(Vec<u8>),
     /// Words that are made twice: once for the checksum and once for the file.
     Words(Words<'a>),
 }
@@ -43,6 +48,8 @@ impl std::fmt::Debug for Source<'_> {
         f.write_str(match self {
             Self::Bytes(_) => "Bytes",
             Self::Spilled(_) => "Spilled",
+            Self::Several(_) => "Several",
+            Self::Owned(_) => "Owned",
             Self::Words(_) => "Words",
         })
     }
@@ -61,7 +68,12 @@ impl<'a> Source<'a> {
 
 impl<'a> Tensor<'a> {
     pub(super) fn new(name: &str, dtype: Dtype, shape: &[usize], source: Source<'a>) -> Self {
-        Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source }
+        Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source, summed: true }
+    }
+
+    /// The same, with checksums that are elsewhere in the file.
+    pub(super) fn summed_elsewhere(self) -> Self {
+        Self { summed: false, ..self }
     }
 
     pub(super) fn bytes(&self) -> usize {
@@ -98,10 +110,12 @@ impl<'a> Draft<'a> {
         // Each tensor then starts at a multiple of its entry size, and there are no holes.
         tensors.sort_by_key(|t| std::cmp::Reverse(t.dtype.bitsize()));
         let mut sums = BTreeMap::new();
-        for tensor in &tensors {
+        for tensor in tensors.iter().filter(|tensor| tensor.summed) {
             let mut crc = crc32fast::Hasher::new();
             match &tensor.source {
                 Source::Bytes(bytes) => crc.update(bytes),
+                Source::Owned(bytes) => crc.update(bytes),
+                Source::Several(_) => {}
                 Source::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
                 Source::Words(make) => {
                     // Hashing cannot fail.
@@ -160,6 +174,8 @@ impl<'a> Draft<'a> {
             }
             match tensor.source {
                 Source::Bytes(bytes) => writer.write_all(bytes)?,
+                Source::Owned(bytes) => writer.write_all(&bytes)?,
+                Source::Several(parts) => parts.into_iter().try_for_each(|part| part.copy_to(writer))?,
                 Source::Spilled(spilled) => spilled.copy_to(writer)?,
                 Source::Words(make) => each_block(make(), |block| writer.write_all(block))?,
             }

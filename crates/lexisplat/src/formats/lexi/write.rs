@@ -3,18 +3,22 @@
 use safetensors::Dtype;
 
 use super::layout::{CodeLayout, Layout};
-use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor};
+use super::extra_column::ColumnEncoder;
+use super::schema::{
+    EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor,
+};
 use super::spilled::SpilledModel;
 use super::tensors::{Draft, Metadata, Source, Tensor, json, preamble};
-use crate::packed::{Packed, PackedHead, SpilledPacked};
-use crate::scene::extra::{Extra, for_extra};
+use crate::packed::{Coding, Packed, PackedHead, SpilledPacked};
+use crate::scene::extra::{Extra, ExtraValues, ScalarType, for_extra, with_scalar};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::codes::{Indices, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Pursuit, Record};
 use crate::sparse::pursuit::ValueType;
-use crate::support::error::Result;
+use crate::support::error::{Error, Result};
+use crate::support::spill::Spilled;
 use crate::support::limits::Limits;
 use crate::support::progress::{Progress, Silent};
 use crate::support::sink::Sink;
@@ -49,12 +53,41 @@ impl<'a> LexiWriter<'a> {
         Ok(Self::new(metadata, tensors))
     }
 
-    /// The file of `packed`.
+    /// The file of `packed`, of the version that it was read from or that is written today.
     #[must_use]
     pub fn packed(packed: &'a Packed) -> Self {
-        let extras = packed.extras().iter().map(|extra| extra_tensor(extra, packed.len(), bytes_of(extra)));
-        let order = packed.order().map(Source::of);
-        Self::of_packed(packed.head(), Source::Bytes(packed.data()), order, extras.collect())
+        let head = packed.head();
+        let data = Source::Bytes(packed.data());
+        match &head.coding {
+            Coding::Flat(flat) => {
+                let n = packed.len();
+                let extras = packed.extras().iter().map(|extra| extra_tensor(extra, n, bytes_of(extra)));
+                let order = packed.order().map(|order| list(tensor::ORDER, Dtype::U32, n, Source::of(order)));
+                let mut metadata =
+                    scene_metadata(FLAT_VERSION, Layout::Packed, head.degree, &head.record, &head.meta);
+                metadata.extend([
+                    (key::ATOMS, head.atoms.to_string()),
+                    (key::ATOM_BITS, flat.atom_bits.to_string()),
+                ]);
+                let words = |name, values: &'a [u32]| list(name, Dtype::U32, values.len(), Source::of(values));
+                let parameters = Source::of(&flat.parameters);
+                let mut tensors = vec![
+                    list(tensor::PARAMETERS, Dtype::F32, flat.parameters.len(), parameters),
+                    words(tensor::LENGTHS, &flat.lengths),
+                    list(tensor::TABLES, Dtype::U8, flat.tables.len(), Source::of(&flat.tables)),
+                    list(tensor::DATA, Dtype::U8, packed.data().len(), data),
+                ];
+                tensors.extend(order);
+                tensors.extend(extras);
+                metadata.extend(packed_metadata(head));
+                Self::new(metadata, tensors)
+            }
+            Coding::Layered(bytes) => {
+                let order = packed.order().map(|order| coded(&ExtraValues::U32(order.to_vec())));
+                let extras = packed.extras().iter().map(|extra| (extra.name.as_str(), coded(&extra.values)));
+                Self::layered(head, bytes, packed.data().len(), data, order, extras.collect())
+            }
+        }
     }
 
     /// The exact file of a scene that was spilled.
@@ -70,41 +103,52 @@ impl<'a> LexiWriter<'a> {
     }
 
     /// The file of a packed scene that was spilled.
-    pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Self {
-        let n = head.gaussians;
-        let extras = spilled.extras.into_iter();
-        let extras = extras.map(|(extra, values)| extra_tensor(&extra, n, Source::Spilled(values)));
-        let order = spilled.order.map(Source::Spilled);
-        Self::of_packed(head, Source::Spilled(spilled.data), order, extras.collect())
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`] for temporary files.
+    pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Result<Self> {
+        let SpilledPacked { data, data_bytes, order, extras } = spilled;
+        let order = order.map(|layers| coded_layers(ScalarType::U32, layers)).transpose()?;
+        let column = |(extra, layers): (Extra, Vec<(usize, Spilled)>)| {
+            Ok((extra.name, coded_layers(extra.values.scalar_type(), layers)?))
+        };
+        let extras = extras.into_iter().map(column).collect::<Result<Vec<(String, Vec<u8>)>>>()?;
+        let extras = extras.iter().map(|(name, column)| (name.as_str(), column.clone())).collect();
+        let Coding::Layered(bytes) = &head.coding else { return Err(not_layered()) };
+        Ok(Self::layered(head, bytes, data_bytes, Source::Several(data), order, extras))
     }
 
-    fn of_packed(
+    /// A file of the newest version. `order` and the values of `extras` are coded columns.
+    fn layered(
         head: &'a PackedHead,
+        bytes: &'a [u8],
+        data_bytes: usize,
         data: Source<'a>,
-        order: Option<Source<'a>>,
-        extras: Vec<Tensor<'a>>,
+        order: Option<Vec<u8>>,
+        extras: Vec<(&str, Vec<u8>)>,
     ) -> Self {
-        let degree = head.degree;
-        let mut metadata = scene_metadata(PACKED_VERSION, Layout::Packed, degree, &head.record, &head.meta);
+        let mut metadata = preamble(FORMAT, PACKED_VERSION);
+        let Record { seed, max_residual, rms_residual, over_tolerance, tolerance, .. } = &head.record;
         metadata.extend([
-            (key::GAUSSIANS, head.gaussians.to_string()),
-            (key::ATOMS, head.atoms.to_string()),
-            (key::ATOM_BITS, head.atom_bits.to_string()),
+            (key::DEGREE, head.degree.to_string()),
+            (key::MAX_RESIDUAL, max_residual.to_string()),
+            (key::RMS_RESIDUAL, rms_residual.to_string()),
         ]);
-        metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
-        metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
-        metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
-        metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
-        let bytes = head.lengths.iter().map(|&l| l as usize).sum();
-        let list = |name, dtype, len, source| Tensor::new(name, dtype, &[len], source);
+        // What is missing means nothing, zero or false.
+        metadata.extend((*seed != 0).then(|| (key::SEED, seed.to_string())));
+        metadata.extend((*over_tolerance != 0).then(|| (key::OVER_TOLERANCE, over_tolerance.to_string())));
+        metadata.extend(head.meta.antialiased.then(|| (key::ANTIALIASED, "true".to_owned())));
+        metadata.extend((!head.meta.comments.is_empty()).then(|| (key::COMMENTS, json(&head.meta.comments))));
+        metadata.extend(tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
+        metadata.extend(packed_metadata(head));
+        // What draws the scene comes first.
         let mut tensors = vec![
-            list(tensor::PARAMETERS, Dtype::F32, head.parameters.len(), Source::of(&head.parameters)),
-            list(tensor::LENGTHS, Dtype::U32, head.lengths.len(), Source::of(&head.lengths)),
-            list(tensor::TABLES, Dtype::U8, head.tables.len(), Source::of(&head.tables)),
-            list(tensor::DATA, Dtype::U8, bytes, data),
+            list(tensor::HEAD, Dtype::U8, bytes.len(), Source::Bytes(bytes)),
+            list(tensor::DATA, Dtype::U8, data_bytes, data).summed_elsewhere(),
         ];
-        tensors.extend(order.map(|order| list(tensor::ORDER, Dtype::U32, head.gaussians, order)));
-        tensors.extend(extras);
+        let column = |name: &str, bytes: Vec<u8>| list(name, Dtype::U8, bytes.len(), Source::Owned(bytes));
+        tensors.extend(order.map(|order| column(tensor::ORDER, order)));
+        tensors.extend(extras.into_iter().map(|(name, bytes)| column(&format!("{EXTRA_PREFIX}{name}"), bytes)));
         Self::new(metadata, tensors)
     }
 
@@ -141,6 +185,52 @@ impl<'a> LexiWriter<'a> {
         let bytes = self.file_bytes();
         sink.into().write(bytes, progress, |writer, named| self.draft.write_to(writer).map_err(named))
     }
+}
+
+/// A tensor of one dimension.
+fn list<'a>(name: &str, dtype: Dtype, len: usize, source: Source<'a>) -> Tensor<'a> {
+    Tensor::new(name, dtype, &[len], source)
+}
+
+/// Metadata of packed files of all versions.
+fn packed_metadata(head: &PackedHead) -> Vec<(&'static str, String)> {
+    let mut metadata = vec![(key::GAUSSIANS, head.gaussians.to_string())];
+    metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
+    metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
+    metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
+    metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
+    metadata
+}
+
+/// Values as a coded column.
+fn coded(values: &ExtraValues) -> Vec<u8> {
+    let mut encoder = ColumnEncoder::new(values.scalar_type());
+    let mut out = encoder.push(values);
+    out.extend(encoder.finish());
+    out
+}
+
+/// Values that are coded together while a column is made.
+const COLUMN_PART: usize = 1 << 18;
+
+/// The values of all layers, each with their number, as a coded column of type `ty`.
+fn coded_layers(ty: ScalarType, layers: Vec<(usize, Spilled)>) -> Result<Vec<u8>> {
+    let mut encoder = ColumnEncoder::new(ty);
+    let mut out = Vec::new();
+    for (mut count, mut layer) in layers {
+        while count > 0 {
+            let part = count.min(COLUMN_PART);
+            let values: ExtraValues = with_scalar!(ty, T => layer.take::<T>(part)?.into());
+            out.extend(encoder.push(&values));
+            count -= part;
+        }
+    }
+    out.extend(encoder.finish());
+    Ok(out)
+}
+
+fn not_layered() -> Error {
+    Error::parameter("packed scene", "of version 2", "of version 3 to be spilled")
 }
 
 /// Bytes of the tensors that stand for SH-rest in an exact file.

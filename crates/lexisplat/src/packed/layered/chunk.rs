@@ -8,6 +8,7 @@ use super::steering::Steering;
 use super::symbols::{LANES, Lanes, has};
 use super::tables::Lookup;
 use super::target::Target;
+use super::unpack::{Drawn, Frame};
 use super::walk::{Group, Walk};
 use crate::packed::stream::BitCounts;
 
@@ -58,15 +59,15 @@ impl Form {
         1 + levels + self.rest.least.len()
     }
 
-    /// Codes the Gaussians of a chunk with `levels` levels of refinement, and returns what its ranges hold and the checksums of their integers. `None` if
-    /// there is something no decoder takes.
-    pub(in crate::packed) fn record(&self, levels: usize, targets: &[Target]) -> Option<Vec<(Recorder, u32)>> {
+    /// Codes the Gaussians of a chunk with `levels` levels of refinement. `None` if there is something no decoder takes.
+    pub(in crate::packed) fn record(&self, frame: &Frame, levels: usize, targets: &[Target]) -> Option<CodedChunk> {
         let lanes = lanes(targets.len());
         let starts = starts(targets.len(), lanes);
         let mut ranges = vec![Recorder::default(); self.ranges(levels)];
         let mut sums = vec![Sums::default(); self.ranges(levels)];
         let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
         let none = Target::default();
+        let mut bounds = Extent([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
         let sets: Vec<u32> = sets(targets.len(), lanes).collect();
         for (block, sets) in sets.chunks(BLOCK).enumerate() {
             let first = block * BLOCK;
@@ -83,6 +84,7 @@ impl Form {
                     sums[1 + k].refined(set, &group);
                 }
                 rest.push(set, group.colour);
+                bounds.add(set, &group, frame, levels)?;
             }
             let wanted: Lanes<Vec<&Target>> = std::array::from_fn(|l| {
                 let there = sets.iter().enumerate().filter(|(_, set)| has(**set, l));
@@ -93,7 +95,8 @@ impl Form {
                 sums[1 + levels + part].rest(&rest, &self.rest, part);
             }
         }
-        Some(ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect())
+        let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
+        Some(CodedChunk { gaussians: targets.len(), bounds: bounds.0, ranges })
     }
 
     /// Decodes a chunk of `gaussians` Gaussians with `levels` levels of refinement from as many ranges as are there: those
@@ -151,6 +154,34 @@ impl Form {
         let mut bits = BitCounts::default();
         all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
         all().all(Player::exhausted).then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
+    }
+}
+
+/// A coded chunk.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct CodedChunk {
+    pub(in crate::packed) gaussians: usize,
+    /// Least and largest coordinates of its positions.
+    pub(in crate::packed) bounds: [[f32; 3]; 2],
+    /// What its ranges hold, and the checksums of their integers.
+    pub(in crate::packed) ranges: Vec<(Recorder, u32)>,
+}
+
+/// Least and largest coordinates.
+struct Extent([[f32; 3]; 2]);
+
+impl Extent {
+    /// Includes the positions of the lanes in `set`. `None` if there is something no decoder takes.
+    fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
+        let drawn = Drawn::new(frame, group, [levels, 0]);
+        let [least, most] = &mut self.0;
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            for (k, position) in drawn.position.iter().enumerate() {
+                least[k] = least[k].min(position[l]);
+                most[k] = most[k].max(position[l]);
+            }
+        }
+        drawn.can_be(set).then_some(())
     }
 }
 

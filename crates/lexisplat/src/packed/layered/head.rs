@@ -15,8 +15,9 @@ use crate::support::limits::MAX_ATOMS;
 const MAX_ATOM_BITS: u8 = 14;
 /// Largest binary logarithm of the unit of base colours.
 const MAX_DC_EXPONENT: u8 = 100;
-/// Largest absolute value of a coordinate of a base colour, in units.
-const MOST_DC: f64 = 32.0;
+/// Largest absolute value of a coordinate of a base colour, in units. Targets may be four times as large, since the
+/// largest of a scene may not be in the sample that is known.
+const MOST_DC: f64 = 16.0;
 
 /// The head of a file of version 3.
 #[derive(Debug, Clone, Default, PartialEq)]

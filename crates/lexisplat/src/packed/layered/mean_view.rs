@@ -6,8 +6,10 @@
 
 use super::symbols::{LANES, Lanes};
 use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
+use crate::scene::splats::Splats;
 use crate::sparse::dictionary::Dictionary;
-use crate::support::maths::Vec3;
+use crate::support::maths::{Vec3, at_share};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Most points of view.
 pub(super) const MAX_POINTS: usize = 8;
@@ -22,7 +24,22 @@ pub(in crate::packed) struct MeanView {
     pub(in crate::packed) softening: f32,
 }
 
+/// Softening as a share of the median distance of the points from their middle.
+const SOFTENING: f32 = 0.02;
+
 impl MeanView {
+    /// The view from up to [`MAX_POINTS`] points, more of which are left out.
+    pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
+        let points: Vec<Vec3> = points.iter().copied().take(MAX_POINTS).collect();
+        let middle: Vec3 =
+            std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len().max(1) as f32);
+        let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
+        let mut distances: Vec<f32> = points.iter().map(far).collect();
+        distances.sort_by(f32::total_cmp);
+        let softening = SOFTENING * at_share(&distances, 0.5);
+        Self { softening: if softening > 0.0 { softening } else { f32::MIN_POSITIVE }, points }
+    }
+
     /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.
     #[inline(always)]
     pub(in crate::packed) fn weights(&self, degree: ShDegree, position: Vec3) -> [f32; MOST] {
@@ -37,6 +54,23 @@ impl MeanView {
         }
         let share = 1.0 / (C0 * self.points.len().max(1) as f32);
         sums.map(|sum| sum * share)
+    }
+
+    /// The base colours of `splats` that files hold.
+    pub(in crate::packed) fn colours(&self, splats: &Splats) -> Vec<Vec3> {
+        if self.points.is_empty() || splats.degree.rest() == 0 {
+            return splats.geometry.dc.clone();
+        }
+        let per_channel = splats.degree.rest_per_channel();
+        let parts = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
+            let colour = |i: usize| {
+                let weights = self.weights(splats.degree, splats.geometry.positions[i]);
+                let added = seen_row(splats.rest(i), weights.get(..per_channel).unwrap_or_default());
+                std::array::from_fn(|c| splats.geometry.dc[i][c] + added[c])
+            };
+            range.map(colour).collect::<Vec<Vec3>>()
+        });
+        parts.concat()
     }
 
     /// [`Self::weights`] of the positions of all lanes.

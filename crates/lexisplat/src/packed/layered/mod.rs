@@ -22,15 +22,13 @@ mod unpack;
 mod values;
 mod walk;
 
-pub(super) use chunk::{Form, Want, lanes};
+pub(super) use chunk::{CodedChunk, Form, lanes};
 pub(super) use decoder::{LayeredDecoder, code_atoms};
 pub(super) use head::Head;
 pub(super) use index::{Chunk, Index, Pass, Range};
 pub(super) use rest::RestForm;
 pub(super) use range::Recorder;
-pub(super) use steering::{Integers, Steering};
 pub(super) use streams::Stream;
-pub(super) use tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
+pub(super) use tables::{ALL_CONTEXTS, Histogram, Tables};
 pub(super) use target::Target;
-pub(super) use mean_view::MeanView;
-pub(super) use unpack::Unpacker;
+pub(super) use mean_view::{MeanView, seen_row};

@@ -73,7 +73,11 @@ impl Recorder {
     }
 
     /// A recorder with the entries of another.
-    pub(in crate::packed) fn restore(lanes: [Vec<u32>; LANES]) -> Self {
+    pub(in crate::packed) fn restore(entries: Vec<Vec<u32>>) -> Self {
+        let mut lanes: [Vec<u32>; LANES] = Default::default();
+        for (lane, entries) in lanes.iter_mut().zip(entries) {
+            *lane = entries;
+        }
         Self { lanes }
     }
 

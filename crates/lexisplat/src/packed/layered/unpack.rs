@@ -177,8 +177,8 @@ impl Sink for Out<'_, '_> {
 }
 
 /// Eight Gaussians as numbers.
-struct Drawn {
-    position: [Lanes<f32>; 3],
+pub(super) struct Drawn {
+    pub(super) position: [Lanes<f32>; 3],
     scales: [Lanes<f32>; 3],
     opacity: Lanes<f32>,
     rotation: [Lanes<f32>; 4],
@@ -189,7 +189,7 @@ struct Drawn {
 
 impl Drawn {
     #[inline(always)]
-    fn new(frame: &Frame, group: &Group, [levels, missing]: [usize; 2]) -> Self {
+    pub(super) fn new(frame: &Frame, group: &Group, [levels, missing]: [usize; 2]) -> Self {
         let (coarse, finer) = (factor(levels), factor(missing));
         let mut values = group.coarse;
         let mut within = [true; LANES];
@@ -235,7 +235,7 @@ impl Drawn {
 
     /// Whether the values of all lanes in `set` are within limits and finite.
     #[inline(always)]
-    fn can_be(&self, set: u32) -> bool {
+    pub(super) fn can_be(&self, set: u32) -> bool {
         let all = self.position.iter().chain(&self.dc);
         let mut good = self.within;
         for values in all {
