@@ -173,12 +173,7 @@ fn dictionary(
 
 /// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
 /// the encoder's; decoders have none.
-fn code_dictionary<S: Symbols>(
-    s: &mut S,
-    degree: ShDegree,
-    atoms: usize,
-    bits: u32,
-) -> Vec<f32> {
+fn code_dictionary<S: Symbols>(s: &mut S, degree: ShDegree, atoms: usize, bits: u32) -> Vec<f32> {
     rounded_atoms(degree, atoms, bits, |context, _| unzigzag(s.integer(Stream::Dictionary, context, || 0)))
 }
 

@@ -5,9 +5,9 @@ use half::f16;
 use super::appearance::Appearance;
 use super::canonical::{MortonKey, canonical};
 use super::chunks::{MAX_ATOM_BITS, resident};
+use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::layered::{MeanView, Recorder, Target, code_atoms, seen_row};
 use super::morton;
-use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
 use super::pack::PackOptions;
 use super::parameters::Parameters;
 use crate::scene::splats::Splats;
@@ -199,7 +199,12 @@ impl ChunkCoder {
     }
 
     /// What is to be coded of all of `view`, and its counts. Base colours are in units of `dc_unit`.
-    pub(super) fn targets(&self, view: View<'_>, codes: &Codes, dc_unit: f64) -> Result<(Tally, Vec<Target>)> {
+    pub(super) fn targets(
+        &self,
+        view: View<'_>,
+        codes: &Codes,
+        dc_unit: f64,
+    ) -> Result<(Tally, Vec<Target>)> {
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let dim = dictionary.dim();
         let mut tally = Tally::new(dim);

@@ -3,6 +3,7 @@
 use super::coder::ChunkCoder;
 use super::layered::{
     ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Range, Recorder, Stream, Tables, lanes,
+    stream_of,
 };
 use super::layering::Layering;
 use super::pack::PackOptions;
@@ -48,9 +49,8 @@ impl Counts {
     /// Bits of all streams.
     fn bits(&self, tables: &Tables) -> BitCounts {
         let mut bit_counts = self.raw_bits.clone();
-        let contexts = ALL_CONTEXTS / Stream::ALL.len();
         for (context, histogram) in self.histograms.iter().enumerate() {
-            bit_counts.0[context / contexts] += tables.bits(context, histogram);
+            bit_counts.0[stream_of(context) as usize] += tables.bits(context, histogram);
         }
         bit_counts
     }
@@ -153,9 +153,16 @@ impl Encoding {
             for (bytes, integers) in &written.ranges {
                 let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
                 let length = u32::try_from(bytes.len()).map_err(too_long)?;
-                chunk.ranges.push(Range { start: 0, length, checksum: crc32fast::hash(bytes), integers: *integers });
+                chunk.ranges.push(Range {
+                    start: 0,
+                    length,
+                    checksum: crc32fast::hash(bytes),
+                    integers: *integers,
+                });
             }
-            for (pass, spill) in passes.iter().zip(&mut data).filter(|(p, _)| usize::from(p.layer) == written.layer) {
+            for (pass, spill) in
+                passes.iter().zip(&mut data).filter(|(p, _)| usize::from(p.layer) == written.layer)
+            {
                 let of_pass = written.ranges.iter().enumerate().filter(|(k, _)| pass.has(*k));
                 of_pass.map(|(_, (bytes, _))| spill.push(bytes)).collect::<Result<()>>()?;
             }
@@ -202,4 +209,3 @@ pub(super) fn joined(passes: Vec<Spilled>) -> Result<Vec<u8>> {
     }
     Ok(out)
 }
-

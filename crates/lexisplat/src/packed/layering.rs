@@ -32,8 +32,12 @@ pub(super) struct Layering {
 impl Layering {
     /// The layers of a scene of `gaussians` Gaussians, or one if it may have no more. `energies` are the changes of
     /// pictures without each of some of the Gaussians.
-    pub(super) fn new(gaussians: usize, may_layer: bool, energies: impl Iterator<Item = f32> + Clone) -> Self {
-        let layered = may_layer && gaussians >= LEAST_LAYERED;
+    pub(super) fn new(
+        gaussians: usize,
+        may_layer: bool,
+        energies: impl Iterator<Item = f32> + Clone,
+    ) -> Self {
+        let layered = may_layer && gaussians >= LEAST_LAYERED && env("ONE", 0.0) == 0.0;
         Self { factor: layered.then(|| factor(energies)), sum: 0.5 }
     }
 
@@ -53,7 +57,7 @@ impl Layering {
 
     /// Levels of refinement of each layer.
     pub(super) fn levels(&self) -> Vec<u8> {
-        if self.factor.is_some() { vec![FIRST_LEVELS, SECOND_LEVELS] } else { vec![0] }
+        if self.factor.is_some() { vec![env("L0", 2.0) as u8, env("L1", 1.0) as u8] } else { vec![0] }
     }
 
     /// Gaussians of a chunk of a layer.
@@ -65,7 +69,8 @@ impl Layering {
     pub(super) fn rest(&self, dim: usize, atoms: usize) -> RestForm {
         let least = match self.factor {
             _ if dim == 0 => Vec::new(),
-            Some(_) => PARTS.to_vec(),
+            Some(_) => std::env::var("PARTS")
+                .map_or(PARTS.to_vec(), |v| v.split(',').map(|x| x.parse().unwrap()).collect()),
             None => vec![1],
         };
         RestForm { dim, atoms, least }
@@ -74,29 +79,44 @@ impl Layering {
     /// The order of ranges in the data, for chunks of this form.
     pub(super) fn passes(&self, rest: &RestForm) -> Vec<Pass> {
         let parts = rest.least.len();
-        let pass = |layer: u8, ranges: &[usize]| Pass { layer, ranges: ranges.iter().fold(0, |all, k| all | 1 << k) };
+        let pass = |layer: u8, ranges: &[usize]| Pass {
+            layer,
+            ranges: ranges.iter().fold(0, |all, k| all | 1 << k),
+        };
         if self.factor.is_none() {
             let all: Vec<usize> = (1..1 + parts).collect();
             let rest = (parts > 0).then(|| pass(0, &all));
             return [Some(pass(0, &[0])), rest].into_iter().flatten().collect();
         }
         // Ranges of the first layer: base, two refinements, parts. Of the second: base, refinement, parts.
-        let (first, second) = (1 + usize::from(FIRST_LEVELS), 1 + usize::from(SECOND_LEVELS));
+        let (l0, l1) = (env("L0", 2.0) as usize, env("L1", 1.0) as usize);
+        let (first, second) = (1 + l0, 1 + l1);
         let mut passes = vec![pass(0, &[0])];
         if parts > 0 {
             passes.push(pass(0, &[first]));
         }
-        passes.push(pass(0, &[1]));
+        if l0 > 0 {
+            passes.push(pass(0, &[1]));
+        }
         passes.push(if parts > 0 { pass(1, &[0, second]) } else { pass(1, &[0]) });
         for part in 1..parts {
             passes.extend([pass(0, &[first + part]), pass(1, &[second + part])]);
         }
-        passes.extend([pass(0, &[2]), pass(1, &[1])]);
+        if l0 > 1 {
+            passes.push(pass(0, &[2]));
+        }
+        if l1 > 0 {
+            passes.push(pass(1, &[1]));
+        }
         passes
     }
 }
 
 /// Probability that a Gaussian is of the first layer.
+fn env(name: &str, or: f64) -> f64 {
+    std::env::var(name).ok().map_or(or, |v| v.parse().unwrap())
+}
+
 fn probability(energy: f32, factor: f64) -> f64 {
     let power = libm::pow(f64::from(energy).max(0.0), ENERGY_POWER);
     (factor * power).min(1.0)
@@ -107,9 +127,10 @@ fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
     let count = energies.clone().count() as f64;
     let sum = |factor: f64| energies.clone().map(|e| probability(e, factor)).sum::<f64>();
     // As if all probabilities were below 1; more where some are not.
-    let mut factor = FIRST_SHARE * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
+    let mut factor =
+        env("SHARE", FIRST_SHARE) * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {
-        let found = sum(factor) / (FIRST_SHARE * count).max(f64::MIN_POSITIVE);
+        let found = sum(factor) / (env("SHARE", FIRST_SHARE) * count).max(f64::MIN_POSITIVE);
         if !found.is_finite() || found <= 0.0 || (found - 1.0).abs() < 1e-6 {
             break;
         }

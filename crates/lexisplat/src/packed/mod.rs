@@ -19,11 +19,11 @@ mod encoding;
 mod entropy;
 mod fit;
 mod floor;
-mod layered;
-mod layering;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
+mod layered;
+mod layering;
 mod morton;
 mod neighbours;
 mod pack;

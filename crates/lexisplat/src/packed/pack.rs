@@ -172,7 +172,8 @@ impl<S: Borrow<Splats>> Packer<S> {
         };
         let classes = floor.classes(&classes, geometry, &scene);
         let gaussians = Gaussians { scene, classes, weights };
-        let fitted = Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
+        let fitted =
+            Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
         Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
     }
 }

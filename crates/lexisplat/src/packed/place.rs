@@ -37,7 +37,11 @@ fn take<'a, T>(values: &mut &'a mut [T], count: usize) -> &'a mut [T] {
 }
 
 /// The places of all chunks, which hold these Gaussians one after the other.
-pub(super) fn places<'a>(g: &'a mut Geometry, counts: &'a mut [u8], spans: &[Range<usize>]) -> Vec<Place<'a>> {
+pub(super) fn places<'a>(
+    g: &'a mut Geometry,
+    counts: &'a mut [u8],
+    spans: &[Range<usize>],
+) -> Vec<Place<'a>> {
     let mut rest = Place {
         positions: &mut g.positions,
         dc: &mut g.dc,

@@ -162,7 +162,8 @@ impl<'a> Quantised<'a> {
             encoding.counts.add(&chunk?);
         }
         let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
-            let parts = self.each_chunk(view, progress, |layer, _, coded| Written::new(layer, &coded, tables));
+            let parts =
+                self.each_chunk(view, progress, |layer, _, coded| Written::new(layer, &coded, tables));
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = self.splats.meta.clone();

@@ -67,7 +67,9 @@ pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limit
 pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     let pursuit = match checked.is_layered() {
         true => Pursuit::Omp,
-        false => checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?,
+        false => {
+            checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?
+        }
     };
     let packed = file_layout(checked)? == Layout::Packed;
     let record = Record {

@@ -195,9 +195,7 @@ impl<'a> LexiReader<'a> {
     /// [`crate::Error::Format`] if the file does not hold the order or the range ends after [`Self::len`].
     pub fn order(&self, range: Range<usize>) -> Result<Vec<u32>> {
         match &self.kind {
-            Kind::Packed(packed) => {
-                super::packed::order(&packed.checked, packed.head.gaussians, range)
-            }
+            Kind::Packed(packed) => super::packed::order(&packed.checked, packed.head.gaussians, range),
             Kind::Exact(exact) => {
                 let text = "only packed files hold an order; this one is in the order of its source";
                 Err(exact.checked.malformed(text))

@@ -2,8 +2,8 @@
 
 use safetensors::Dtype;
 
-use super::layout::{CodeLayout, Layout};
 use super::extra_column::ColumnEncoder;
+use super::layout::{CodeLayout, Layout};
 use super::schema::{
     EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor,
 };
@@ -18,10 +18,10 @@ use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Pursuit, Record};
 use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
-use crate::support::spill::Spilled;
 use crate::support::limits::Limits;
 use crate::support::progress::{Progress, Silent};
 use crate::support::sink::Sink;
+use crate::support::spill::Spilled;
 
 /// Writes `model` with [`CodeLayout::Compact`] codes. Returns the number of bytes.
 ///
@@ -69,7 +69,8 @@ impl<'a> LexiWriter<'a> {
                     (key::ATOMS, head.atoms.to_string()),
                     (key::ATOM_BITS, flat.atom_bits.to_string()),
                 ]);
-                let words = |name, values: &'a [u32]| list(name, Dtype::U32, values.len(), Source::of(values));
+                let words =
+                    |name, values: &'a [u32]| list(name, Dtype::U32, values.len(), Source::of(values));
                 let parameters = Source::of(&flat.parameters);
                 let mut tensors = vec![
                     list(tensor::PARAMETERS, Dtype::F32, flat.parameters.len(), parameters),
@@ -148,7 +149,8 @@ impl<'a> LexiWriter<'a> {
         ];
         let column = |name: &str, bytes: Vec<u8>| list(name, Dtype::U8, bytes.len(), Source::Owned(bytes));
         tensors.extend(order.map(|order| column(tensor::ORDER, order)));
-        tensors.extend(extras.into_iter().map(|(name, bytes)| column(&format!("{EXTRA_PREFIX}{name}"), bytes)));
+        tensors
+            .extend(extras.into_iter().map(|(name, bytes)| column(&format!("{EXTRA_PREFIX}{name}"), bytes)));
         Self::new(metadata, tensors)
     }
 

@@ -40,7 +40,14 @@ fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
 pub(super) trait Sink {
     /// Takes one Gaussian of each lane in `set`: of each lane the one with this number, which is number `in_block` of its
     /// block. `levels` are those of the chunk, and those that are missing. Returns `None` for what no encoder writes.
-    fn group(&mut self, number: usize, in_block: usize, set: u32, group: &Group, levels: [usize; 2]) -> Option<()>;
+    fn group(
+        &mut self,
+        number: usize,
+        in_block: usize,
+        set: u32,
+        group: &Group,
+        levels: [usize; 2],
+    ) -> Option<()>;
 
     /// Takes the SH-rest of a block of Gaussians, of each lane those from this number on.
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
@@ -60,7 +67,12 @@ impl Form {
     }
 
     /// Codes the Gaussians of a chunk with `levels` levels of refinement. `None` if there is something no decoder takes.
-    pub(in crate::packed) fn record(&self, frame: &Frame, levels: usize, targets: &[Target]) -> Option<CodedChunk> {
+    pub(in crate::packed) fn record(
+        &self,
+        frame: &Frame,
+        levels: usize,
+        targets: &[Target],
+    ) -> Option<CodedChunk> {
         let lanes = lanes(targets.len());
         let starts = starts(targets.len(), lanes);
         let mut ranges = vec![Recorder::default(); self.ranges(levels)];
@@ -75,7 +87,8 @@ impl Form {
             let (base, finer) = ranges.split_first_mut()?;
             let (finer, parts) = finer.split_at_mut_checked(levels)?;
             for (i, &set) in sets.iter().enumerate() {
-                let of = |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
+                let of =
+                    |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
                 let group: [&Target; LANES] = std::array::from_fn(of);
                 let mut group = walk.base(base, set, Some(&group))?;
                 sums[0].base(set, &group);
@@ -153,7 +166,9 @@ impl Form {
         let all = || std::iter::once(&base).chain(&finer).chain(&parts);
         let mut bits = BitCounts::default();
         all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
-        all().all(Player::exhausted).then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
+        all()
+            .all(Player::exhausted)
+            .then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
     }
 }
 

@@ -77,7 +77,8 @@ impl LayeredDecoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
-        let damaged = || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
+        let damaged =
+            || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
         let chunk = self.head.index.chunks.get(c).ok_or_else(damaged)?;
         let ranges = self.checked(data, c, chunk)?;
         let want = Want { sums: false, bits: count_bits };
@@ -132,7 +133,7 @@ pub(in crate::packed) fn code_atoms<S: Symbols>(
 ) -> Vec<f32> {
     rounded_atoms(degree, atoms, bits, |context, place| {
         let context = [context as u32; LANES];
-        i64::from(s.signed(Stream::Dictionary, context, ONE_LANE, |_| whole(place))[0])
+        i64::from(s.signed(Stream::Dictionary.at(0), context, ONE_LANE, |_| whole(place))[0])
     })
 }
 

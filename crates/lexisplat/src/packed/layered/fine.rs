@@ -17,10 +17,9 @@ const FINENESS_WIDTH: u32 = 3;
 #[inline(always)]
 pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) {
     let finer = factor(level - 1);
-    for k in 0..REFINED {
+    for k in (0..REFINED).filter(|&k| k != OPACITY) {
         let (stream, class, width) = match k {
             0..OPACITY => (Stream::FineScale, &group.shape, CLASS_WIDTH),
-            OPACITY => (Stream::FineOpacity, &group.shape, CLASS_WIDTH),
             DC..TARGETS => (Stream::FineDc, &group.colour, CLASS_WIDTH),
             _ => (Stream::FinePosition, &group.fineness[k - TARGETS], FINENESS_WIDTH),
         };
@@ -30,7 +29,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
             BY_COUNT * (class[l] / width).min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1)
         });
         // Zero is the step towards zero, which is the one that occurs most.
-        let symbols = s.symbols(stream, context, set, |l| {
+        let symbols = s.symbols(stream.at(level), context, set, |l| {
             let rest = coarsened(wanted[l], finer) - FACTOR * counts[l];
             (if counts[l] < 0 { 1 - rest } else { 1 + rest }).cast_unsigned()
         });
@@ -44,7 +43,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
         let full = &group.axis_bits[usize::from(k == 2)];
         let count = each(|l| dropped(full[l], level) - dropped(full[l], level - 1));
         let wanted = &group.wanted_rotation[k];
-        let low = s.bits(Stream::Rotation, count, set, |l| {
+        let low = s.bits(Stream::Rotation.at(level), count, set, |l| {
             wanted[l] >> dropped(full[l], level - 1) & ((1 << count[l]) - 1)
         });
         for l in 0..LANES {

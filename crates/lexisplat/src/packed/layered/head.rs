@@ -5,7 +5,7 @@ use super::chunk::Form;
 use super::index::Index;
 use super::mean_view::{MAX_POINTS, MeanView};
 use super::rest::RestForm;
-use super::steering::{Integers, Step, Steering};
+use super::steering::{Integers, Steering, Step};
 use super::streams::REST_PARTS;
 use super::unpack::Frame;
 use crate::packed::parameters::{LAST_CLASS, Parameters};

@@ -106,7 +106,9 @@ impl Index {
             out.extend((chunk.gaussians as u32).to_le_bytes());
             out.extend(chunk.bounds.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
             for range in &chunk.ranges {
-                out.extend([range.length, range.checksum, range.integers].iter().flat_map(|x| x.to_le_bytes()));
+                out.extend(
+                    [range.length, range.checksum, range.integers].iter().flat_map(|x| x.to_le_bytes()),
+                );
             }
         }
     }
@@ -143,7 +145,8 @@ impl Index {
                 // Every chunk takes bytes of the index, so their number is bounded by its length.
                 let gaussians = from.u32()? as usize;
                 let bounds = [from.f32s()?, from.f32s()?];
-                let mut chunk = Chunk { layer, first: 0, gaussians, bounds, ranges: Vec::with_capacity(ranges) };
+                let mut chunk =
+                    Chunk { layer, first: 0, gaussians, bounds, ranges: Vec::with_capacity(ranges) };
                 for _ in 0..ranges {
                     let (length, checksum, integers) = (from.u32()?, from.u32()?, from.u32()?);
                     chunk.ranges.push(Range { start: 0, length, checksum, integers });

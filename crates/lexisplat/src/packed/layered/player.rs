@@ -1,7 +1,7 @@
 //! The entropy decoder of a range.
 
 use super::range::{LEAST, MOST_BITS};
-use super::streams::{Stream, place};
+use super::streams::{Slot, Stream};
 use super::symbols::{LANES, Lanes, Symbols, has};
 use super::tables::Lookup;
 use crate::packed::stream::BitCounts;
@@ -77,18 +77,18 @@ impl<'a> Player<'a> {
     /// It is called and not inlined: the walk has dozens of places that take symbols, and with this in each of them it
     /// would not fit into the cache of instructions.
     #[inline(never)]
-    fn take(&mut self, stream: Stream, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
-        let precision = stream.precision();
+    fn take(&mut self, slot: Slot, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        let precision = slot.stream.precision();
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l)) {
-            let start = self.lookup.start(place(stream, context[l]));
+            let start = self.lookup.start(slot.place(context[l]));
             self.damaged |= start == 0;
             let state = self.states[l];
             let (symbol, share, over) = self.lookup.entry(start, state & ((1 << precision) - 1));
             self.refill(l, (state >> precision).wrapping_mul(share).wrapping_add(over));
             out[l] = symbol;
             if let Some(bit_counts) = &mut self.bit_counts {
-                bit_counts.0[stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
+                bit_counts.0[slot.stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
             }
         }
         out
@@ -121,19 +121,19 @@ const MAX_WORDS: u32 = 1 << 30;
 
 impl Symbols for Player<'_> {
     #[inline(always)]
-    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+    fn symbols(&mut self, slot: Slot, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
         #[cfg(target_arch = "x86_64")]
         if let Some(avx2) = self.avx2 {
-            return super::player_avx2::take(avx2, self, stream, &context, set);
+            return super::player_avx2::take(avx2, self, slot, &context, set);
         }
-        self.take(stream, &context, set)
+        self.take(slot, &context, set)
     }
 
     #[inline(always)]
-    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
         if let Some(bit_counts) = &mut self.bit_counts {
             let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
-            bit_counts.0[stream as usize] += taken.sum::<f64>();
+            bit_counts.0[slot.stream as usize] += taken.sum::<f64>();
         }
         let mut first = [0; LANES];
         let mut more = 0;

@@ -2,7 +2,7 @@
 //!
 //! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
 
-use super::streams::{CONTEXTS, Stream, place};
+use super::streams::Slot;
 use super::symbols::{LANES, Lanes, Symbols, has};
 use super::tables::{Model, Tables};
 
@@ -26,23 +26,29 @@ fn symbol_entry(context: usize, symbol: u32) -> u32 {
 }
 
 impl Symbols for Recorder {
-    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+    fn symbols(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32> {
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l)) {
             out[l] = value(l);
-            self.lanes[l].push(symbol_entry(place(stream, context[l]), out[l]));
+            self.lanes[l].push(symbol_entry(slot.place(context[l]), out[l]));
         }
         out
     }
 
-    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
         let mut out = [0; LANES];
         for l in (0..LANES).filter(|&l| has(set, l) && count[l] > 0) {
             out[l] = value(l);
             let mut rest = out[l];
             for piece in pieces(count[l]) {
                 let bits = rest & ((1 << piece) - 1);
-                self.lanes[l].push(RAW | (stream as u32) << 24 | piece << 16 | bits);
+                self.lanes[l].push(RAW | (slot.stream as u32) << 24 | piece << 16 | bits);
                 rest = rest.checked_shr(piece).unwrap_or(0);
             }
         }
@@ -107,7 +113,7 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     for &entry in lane.iter().rev() {
         if entry & RAW == 0 {
             let context = (entry >> 8) as usize;
-            let precision = Stream::ALL.get(context / CONTEXTS).map_or(0, |stream| stream.precision());
+            let precision = Slot::stream_of(context).precision();
             let Model { start, share } = tables.model(context, entry.to_le_bytes()[0]);
             make_room(&mut state, u64::from(share) << (32 - precision));
             state = (state / share << precision) + start + state % share;
@@ -122,4 +128,3 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     words.reverse();
     words
 }
-

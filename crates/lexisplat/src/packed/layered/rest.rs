@@ -109,7 +109,14 @@ impl Rest {
 
     /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
     #[inline(always)]
-    pub(super) fn coded(&self, form: &RestForm, part: usize, i: usize, l: usize, cursor: &mut Cursor) -> Coded<'_> {
+    pub(super) fn coded(
+        &self,
+        form: &RestForm,
+        part: usize,
+        i: usize,
+        l: usize,
+        cursor: &mut Cursor,
+    ) -> Coded<'_> {
         let count = self.parts[part].counts.get(i).map_or(0, |counts| counts[l] as usize);
         if count == form.dim + 1 {
             let from = cursor.row;
@@ -139,7 +146,8 @@ impl Rest {
         part: usize,
     ) -> Option<()> {
         let least = *form.least.get(part)?;
-        let most = part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
+        let most =
+            part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
         // Of each lane the nonzeros that belong to this part.
         let mut wanted: Lanes<Vec<(u16, i32)>> = Lanes::default();
         if let Some(targets) = targets {
@@ -160,17 +168,20 @@ impl Rest {
             let plan = self.plan[j];
             let later: Lanes<u32> = each(|l| u32::from(plan[l] == LATER));
             let page = match pages {
-                true => s.symbols(Stream::AtomPage, [part as u32; LANES], set, |l| u32::from(of(l, j).0) / PAGE),
+                true => s.symbols(Stream::AtomPage.at(0), [part as u32; LANES], set, |l| {
+                    u32::from(of(l, j).0) / PAGE
+                }),
                 false => [0; LANES],
             };
             let context = each(|l| 2 * page[l].min(3) + later[l]);
-            let atom = s.symbols(Stream::ATOMS[part], context, set, |l| u32::from(of(l, j).0) % PAGE);
+            let atom = s.symbols(Stream::ATOMS[part].at(0), context, set, |l| u32::from(of(l, j).0) % PAGE);
             let context = each(|l| match later[l] {
                 0 => u32::from(plan[l]),
                 _ => FIRST_CONTEXTS + last[l].min(LATER_CONTEXTS - 1),
             });
-            let size =
-                s.integers(Stream::VALUES[part], context, set, |l| of(l, j).1.unsigned_abs().wrapping_sub(least));
+            let size = s.integers(Stream::VALUES[part].at(0), context, set, |l| {
+                of(l, j).1.unsigned_abs().wrapping_sub(least)
+            });
             last = size;
             let atom = each(|l| PAGE * page[l] + atom[l]);
             for l in 0..LANES {
@@ -184,7 +195,7 @@ impl Rest {
         }
         for from in (0..count).step_by(SIGNS) {
             let taken = each(|l| (totals[l]).saturating_sub(from as u32).min(SIGNS as u32));
-            let signs = s.bits(Stream::VALUES[part], taken, longer(&totals, from), |l| {
+            let signs = s.bits(Stream::VALUES[part].at(0), taken, longer(&totals, from), |l| {
                 (0..taken[l]).fold(0, |bits, k| bits | u32::from(of(l, from + k as usize).1 < 0) << k)
             });
             for (k, values) in self.parts[part].values[from..].iter_mut().take(SIGNS).enumerate() {
@@ -220,9 +231,12 @@ impl Rest {
                 for l in 0..LANES {
                     set &= !(u32::from(exact[l] == escape) << l);
                 }
-                each(|l| BY_BEFORE * (colour[l] / CLASS_WIDTH).min(LATER_CLASSES - 1) + before[l].min(BY_BEFORE - 1))
+                each(|l| {
+                    BY_BEFORE * (colour[l] / CLASS_WIDTH).min(LATER_CLASSES - 1)
+                        + before[l].min(BY_BEFORE - 1)
+                })
             };
-            let counts = s.integers(Stream::COUNTS[part], context, set, |l| {
+            let counts = s.integers(Stream::COUNTS[part].at(0), context, set, |l| {
                 let Some(target) = targets.and_then(|targets| targets[l].get(i)) else { return 0 };
                 if part == 0 && !target.exact.is_empty() {
                     return escape;
@@ -279,7 +293,7 @@ impl Rest {
                         let target = targets.and_then(|targets| targets[l].get(i));
                         target.and_then(|target| target.exact.get(k)).map_or(0, |v| v.to_bits())
                     };
-                    let value = f32::from_bits(s.bits(Stream::Value0, [32; LANES], 1 << l, own)[l]);
+                    let value = f32::from_bits(s.bits(Stream::Value0.at(0), [32; LANES], 1 << l, own)[l]);
                     finite &= value.is_finite();
                     self.rows[l].push(value);
                 }

@@ -105,7 +105,9 @@ impl Integers {
     pub(in crate::packed) fn of(p: &Parameters, dc_unit: f64) -> Self {
         let octaves = |x: f32| fixed(libm::log2(f64::from(x)), FEATURE_BITS);
         let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
-            std::array::from_fn(|k| fixed(f64::from(row[k]), if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS }))
+            std::array::from_fn(|k| {
+                fixed(f64::from(row[k]), if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS })
+            })
         };
         let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
         let [colour, shape] = p.base.map(f64::from);
@@ -115,7 +117,10 @@ impl Integers {
         let predictors = std::array::from_fn(|t| {
             std::array::from_fn(|k| {
                 let own = if k == 1 { 1.0 } else { unit(t) };
-                fixed(f64::from(p.predictors[t][k]) / own, if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS })
+                fixed(
+                    f64::from(p.predictors[t][k]) / own,
+                    if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS },
+                )
             })
         });
         Self {
@@ -196,7 +201,11 @@ impl Steering {
 
     /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
     #[inline(always)]
-    pub(super) fn axis_bits(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> ([Lanes<u32>; 2], Lanes<bool>) {
+    pub(super) fn axis_bits(
+        &self,
+        class: &Lanes<u32>,
+        scales: &[Lanes; 3],
+    ) -> ([Lanes<u32>; 2], Lanes<bool>) {
         let [a, b, c] = &self.turns;
         let log = |row: &[i32; SLOPES]| {
             let logs = Self::logarithms(row, class, scales);

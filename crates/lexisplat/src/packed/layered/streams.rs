@@ -1,5 +1,7 @@
 //! The streams of symbols. Each has contexts, and each context a table of probabilities.
 
+use super::walk::MAX_LEVELS;
+
 /// Contexts of a stream.
 pub(in crate::packed) const CONTEXTS: usize = 24;
 /// Parts into which nonzeros are split by their size, largest first.
@@ -25,7 +27,7 @@ macro_rules! streams {
         }
     };
 }
-streams! { 29:
+streams! { 28:
     /// Gaps between cells along the Morton curve.
     Cell => "position",
     /// Step class of the colour.
@@ -48,7 +50,6 @@ streams! { 29:
     Dc2 => "dc",
     /// What coarse steps leave.
     FineScale => "scale",
-    FineOpacity => "opacity",
     FinePosition => "position",
     FineDc => "dc",
     /// Numbers, atoms and sizes of the nonzeros of each part.
@@ -89,8 +90,58 @@ impl Stream {
     }
 }
 
-/// Number of the context `context` of `stream` among all contexts.
-#[inline(always)]
-pub(super) fn place(stream: Stream, context: u32) -> usize {
-    stream as usize * CONTEXTS + (context as usize).min(CONTEXTS - 1)
+/// Streams of geometry. The step of their values depends on the levels that are missing, and so do their tables.
+const OF_GEOMETRY: usize = Stream::Count0 as usize;
+/// Numbers of levels that may be missing.
+const BY_LEVELS: usize = MAX_LEVELS + 1;
+/// Number of sets of contexts.
+pub(in crate::packed) const SLOTS: usize = BY_LEVELS * OF_GEOMETRY + Stream::ALL.len() - OF_GEOMETRY;
+
+/// A stream, and the number of its set of contexts among all.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Slot {
+    pub(super) stream: Stream,
+    pub(super) number: usize,
+}
+
+impl Slot {
+    /// All sets of contexts in the order of their tables.
+    pub(super) fn all() -> impl Iterator<Item = Self> {
+        let (geometry, others) = Stream::ALL.split_at(OF_GEOMETRY);
+        let geometry = (0..BY_LEVELS).flat_map(|levels| geometry.iter().map(move |stream| stream.at(levels)));
+        geometry.chain(others.iter().map(|stream| stream.at(0)))
+    }
+
+    /// The stream of a context, counted over all.
+    pub(super) fn stream_of(context: usize) -> Stream {
+        stream_of(context)
+    }
+}
+
+impl Slot {
+    /// Number of the context `context` among all contexts.
+    #[inline(always)]
+    pub(super) fn place(self, context: u32) -> usize {
+        self.number * CONTEXTS + (context as usize).min(CONTEXTS - 1)
+    }
+}
+
+impl Stream {
+    /// The contexts of the stream where this many levels are missing.
+    #[inline(always)]
+    pub(super) fn at(self, levels: usize) -> Slot {
+        let number = match self as usize {
+            stream if stream < OF_GEOMETRY => levels.min(MAX_LEVELS) * OF_GEOMETRY + stream,
+            stream => (BY_LEVELS - 1) * OF_GEOMETRY + stream,
+        };
+        Slot { stream: self, number }
+    }
+}
+
+/// The stream of a context, counted over all.
+pub(in crate::packed) fn stream_of(context: usize) -> Stream {
+    let number = context / CONTEXTS;
+    let shared = BY_LEVELS * OF_GEOMETRY;
+    let stream = if number < shared { number % OF_GEOMETRY } else { number - shared + OF_GEOMETRY };
+    Stream::ALL.get(stream).copied().unwrap_or(Stream::Dictionary)
 }

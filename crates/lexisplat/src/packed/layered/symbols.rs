@@ -1,6 +1,6 @@
 //! Runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
 
-use super::streams::Stream;
+use super::streams::Slot;
 
 /// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A symbol of a lane depends on
 /// the one before it, so a CPU is busy only with many lanes. Two vector registers of 256 bits hold one number of each.
@@ -31,45 +31,65 @@ pub(super) fn has(set: u32, lane: usize) -> bool {
 /// Only lanes in `set` are coded. The others get 0.
 pub(super) trait Symbols {
     /// Bytes that are modelled in `context`, one for each lane.
-    fn symbols(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
+    fn symbols(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32>;
 
     /// Numbers of `count` bits each, at most 32, that are not modelled.
-    fn bits(&mut self, stream: Stream, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
 
     /// Whole numbers: a token that is modelled, and for large ones bits that are not.
     #[inline(always)]
-    fn integers(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
-        let tokens = self.symbols(stream, context, set, |l| token(u64::from(value(l))));
+    fn integers(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32> {
+        let tokens = self.symbols(slot, context, set, |l| token(u64::from(value(l))));
         if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
             return tokens;
         }
         let count = each(|l| low_bits(tokens[l]).min(30));
-        let low = self.bits(stream, count, set, |l| value(l) & ((1 << low_bits(token(u64::from(value(l))))) - 1));
+        let low =
+            self.bits(slot, count, set, |l| value(l) & ((1 << low_bits(token(u64::from(value(l))))) - 1));
         each(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
     }
 
     /// Whole numbers with a sign.
     #[inline(always)]
-    fn signed(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
-        let coded = self.integers(stream, context, set, |l| zigzag(value(l)));
+    fn signed(&mut self, slot: Slot, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
+        let coded = self.integers(slot, context, set, |l| zigzag(value(l)));
         each(|l| unzigzag(coded[l]))
     }
 
     /// Whole numbers below 2^63.
     #[inline(always)]
-    fn wide(&mut self, stream: Stream, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> u64) -> Lanes<u64> {
-        let tokens = self.symbols(stream, context, set, |l| token(value(l)));
+    fn wide(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u64,
+    ) -> Lanes<u64> {
+        let tokens = self.symbols(slot, context, set, |l| token(value(l)));
         let mut out = each(|l| u64::from(tokens[l]));
         if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
             return out;
         }
         let count = each(|l| low_bits(tokens[l]).min(61));
         let rest = |l: usize| value(l) & ((1 << low_bits(token(value(l)))) - 1);
-        let low = self.bits(stream, each(|l| count[l].min(32)), set, |l| low_half(rest(l)));
-        let high = self.bits(stream, each(|l| count[l].saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
+        let low = self.bits(slot, each(|l| count[l].min(32)), set, |l| low_half(rest(l)));
+        let high = self.bits(slot, each(|l| count[l].saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
         for l in 0..LANES {
             if tokens[l] >= DIRECT {
-                out[l] = u64::from(2 + (tokens[l] & 1)) << count[l] | u64::from(high[l]) << 32 | u64::from(low[l]);
+                out[l] =
+                    u64::from(2 + (tokens[l] & 1)) << count[l] | u64::from(high[l]) << 32 | u64::from(low[l]);
             }
         }
         out

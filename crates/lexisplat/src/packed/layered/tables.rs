@@ -1,6 +1,6 @@
 //! Tables of probabilities: made of counts, written, read, looked up.
 
-use super::streams::{CONTEXTS, Stream};
+use super::streams::{CONTEXTS, SLOTS, Slot};
 use crate::packed::bits::{BitReader, BitWriter};
 
 /// Bits of a symbol count and of a bit length in a written table.
@@ -17,7 +17,7 @@ const MAX_SYMBOLS: usize = 256;
 /// The table of contexts that are never used.
 const NONE: u8 = u8::MAX;
 /// Number of all contexts.
-pub(in crate::packed) const ALL_CONTEXTS: usize = Stream::ALL.len() * CONTEXTS;
+pub(in crate::packed) const ALL_CONTEXTS: usize = SLOTS * CONTEXTS;
 
 /// How often each symbol occurs in one context.
 #[derive(Debug, Clone, Default)]
@@ -100,7 +100,9 @@ impl Table {
         if total == 0 || counts.len() > MAX_SYMBOLS {
             return None;
         }
-        let share = |&c: &u32| if c == 0 { 0 } else { (u64::from(c) * u64::from(whole) / total).max(1).cast_signed() };
+        let share = |&c: &u32| {
+            if c == 0 { 0 } else { (u64::from(c) * u64::from(whole) / total).max(1).cast_signed() }
+        };
         let mut shares: Vec<i64> = counts.iter().map(share).collect();
         // The difference that rounding leaves goes to the most frequent symbols, where it costs least.
         let mut left = i64::from(whole) - shares.iter().sum::<i64>();
@@ -124,9 +126,9 @@ impl Table {
 /// All tables of a file, and the table of each context of each stream.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Tables {
-    /// The table of every context, stream by stream; [`NONE`] for contexts that are never used.
+    /// The table of every context, set by set; [`NONE`] for contexts that are never used.
     map: Vec<u8>,
-    /// The tables of each stream.
+    /// The tables of each set of contexts.
     tables: Vec<Vec<Table>>,
 }
 
@@ -135,10 +137,11 @@ impl Tables {
     pub(in crate::packed) fn new(histograms: &[Histogram]) -> Option<Self> {
         let mut map = Vec::with_capacity(histograms.len());
         let mut tables = Vec::new();
-        for (stream, contexts) in Stream::ALL.into_iter().zip(histograms.chunks(CONTEXTS)) {
-            let (joined, of) = join(contexts, stream.precision());
+        for (slot, contexts) in Slot::all().zip(histograms.chunks(CONTEXTS)) {
+            let precision = slot.stream.precision();
+            let (joined, of) = join(contexts, precision);
             map.extend(of);
-            let table = |h: &Histogram| Table::new(&h.rounded(), stream.precision());
+            let table = |h: &Histogram| Table::new(&h.rounded(), precision);
             let made: Option<Vec<Table>> = joined.iter().map(table).collect();
             tables.push(made?);
         }
@@ -160,7 +163,7 @@ impl Tables {
     /// Bits of all symbols counted in `histogram` of a context.
     pub(in crate::packed) fn bits(&self, context: usize, histogram: &Histogram) -> f64 {
         let used = (0_u8..=u8::MAX).zip(&histogram.counts).filter(|(_, count)| **count > 0);
-        let precision = Stream::ALL.get(context / CONTEXTS).map_or(0, |stream| stream.precision());
+        let precision = Slot::stream_of(context).precision();
         let cost = |symbol| f64::from(precision) - libm::log2(f64::from(self.model(context, symbol).share));
         used.map(|(symbol, &count)| f64::from(count) * cost(symbol)).sum()
     }
@@ -200,8 +203,8 @@ impl Tables {
     pub(in crate::packed) fn read(bytes: &[u8]) -> Option<Self> {
         let mut bits = BitReader::new(bytes);
         let mut map = Vec::with_capacity(ALL_CONTEXTS);
-        let mut tables = Vec::with_capacity(Stream::ALL.len());
-        for stream in Stream::ALL {
+        let mut tables = Vec::with_capacity(SLOTS);
+        for slot in Slot::all() {
             let count = bits.take(TABLE_BITS);
             let mut last = 0_u8;
             for _ in 0..CONTEXTS {
@@ -224,7 +227,7 @@ impl Tables {
                     let drop = length.saturating_sub(1) - kept;
                     counts.push(if length == 0 { 0 } else { ((1 << kept) | mantissa) << drop });
                 }
-                made.push(Table::new(&counts, stream.precision())?);
+                made.push(Table::new(&counts, slot.stream.precision())?);
             }
             tables.push(made);
         }
@@ -285,7 +288,8 @@ pub(in crate::packed) struct Lookup {
 
 impl Lookup {
     pub(in crate::packed) fn new(tables: &Tables) -> Self {
-        let entry = |symbol: u32, share: u32, over: u32| symbol | (share - 1) << 8 | over << (8 + MOST_PRECISION);
+        let entry =
+            |symbol: u32, share: u32, over: u32| symbol | (share - 1) << 8 | over << (8 + MOST_PRECISION);
         // The first table stands for those that are missing. Its symbols take bits, so that states stay within limits.
         let mut entries: Vec<u32> = (0..1 << MOST_PRECISION).map(|_| entry(0, 1, 0)).collect();
         let mut starts_of = Vec::with_capacity(tables.tables.len());

@@ -40,9 +40,8 @@ impl Target {
         dc_unit: f64,
     ) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-        let value = |x: f64| {
-            libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32
-        };
+        let value =
+            |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;
         let [s0, s1, s2] = form.scales.map(|s| value(f64::from(s)));
         let opacity = value(f64::from(form.log_opacity.max(LEAST_LOG_OPACITY)));
         let [d0, d1, d2] = parameters.dc_coordinates(form.dc).map(|d| value(f64::from(d) / dc_unit));

@@ -86,7 +86,8 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             all.escapes.rows.extend(lane.escapes.rows);
         }
         // Large values of f16 are infinite, and base colours may leave f32 by what codes add to them.
-        let good = all.values.iter().all(|v| v.is_finite()) && place.dc.as_flattened().iter().all(|v| v.is_finite());
+        let good =
+            all.values.iter().all(|v| v.is_finite()) && place.dc.as_flattened().iter().all(|v| v.is_finite());
         good.then_some((Piece { bit_counts: played.bits, ..all }, played.sums))
     }
 }
@@ -105,7 +106,14 @@ struct Out<'j, 'p> {
 
 impl Sink for Out<'_, '_> {
     #[inline(always)]
-    fn group(&mut self, number: usize, in_block: usize, set: u32, group: &Group, levels: [usize; 2]) -> Option<()> {
+    fn group(
+        &mut self,
+        number: usize,
+        in_block: usize,
+        set: u32,
+        group: &Group,
+        levels: [usize; 2],
+    ) -> Option<()> {
         let drawn = Drawn::new(&self.with.frame, group, levels);
         if let Some(weights) = self.weights.get_mut(in_block) {
             *weights = self.with.mean_view.lanes(self.with.dictionary.degree(), &drawn.position);
@@ -195,7 +203,14 @@ impl Drawn {
         let mut within = [true; LANES];
         for t in 0..TARGETS {
             for l in 0..LANES {
-                let over = group.counts[t][l].wrapping_mul(finer).wrapping_sub(group.base[t][l].wrapping_mul(coarse));
+                // Opacities have no coarse steps.
+                if t == OPACITY {
+                    within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
+                    continue;
+                }
+                let over = group.counts[t][l]
+                    .wrapping_mul(finer)
+                    .wrapping_sub(group.base[t][l].wrapping_mul(coarse));
                 values[t][l] = values[t][l].wrapping_add(over.wrapping_mul(group.steps[t][l]));
                 within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
             }
@@ -224,7 +239,11 @@ impl Drawn {
             each(|l| frame.dc_mean[c] + coordinates[0][l] * a + coordinates[1][l] * b + coordinates[2][l] * d)
         };
         Self {
-            position: [each(|l| position[0][l] as f32), each(|l| position[1][l] as f32), each(|l| position[2][l] as f32)],
+            position: [
+                each(|l| position[0][l] as f32),
+                each(|l| position[1][l] as f32),
+                each(|l| position[2][l] as f32),
+            ],
             scales: [numbers(&values[0]), numbers(&values[1]), numbers(&values[2])],
             opacity: logits(&values[OPACITY]),
             rotation: turned.quaternions,

@@ -90,9 +90,11 @@ fn sine_cosine(x: f32) -> (f32, f32) {
     // Taylor series about the middle of the range, of which the error is below 2^-26.
     let x = x - std::f32::consts::FRAC_PI_4;
     let xx = x * x;
-    let sine = x * (1.0 + xx * (-1.0 / 6.0 + xx * (1.0 / 120.0 + xx * (-1.0 / 5040.0 + xx * (1.0 / 362_880.0)))));
-    let cosine =
-        1.0 + xx * (-0.5 + xx * (1.0 / 24.0 + xx * (-1.0 / 720.0 + xx * (1.0 / 40_320.0 + xx * (-1.0 / 3_628_800.0)))));
+    let sine =
+        x * (1.0 + xx * (-1.0 / 6.0 + xx * (1.0 / 120.0 + xx * (-1.0 / 5040.0 + xx * (1.0 / 362_880.0)))));
+    let cosine = 1.0
+        + xx * (-0.5
+            + xx * (1.0 / 24.0 + xx * (-1.0 / 720.0 + xx * (1.0 / 40_320.0 + xx * (-1.0 / 3_628_800.0)))));
     let root = std::f32::consts::FRAC_1_SQRT_2;
     ((cosine + sine) * root, (cosine - sine) * root)
 }

@@ -13,15 +13,8 @@ use crate::packed::morton;
 use crate::packed::parameters::{LAST_CLASS, TARGETS};
 
 /// Streams of the targets of predictions.
-const TARGET_STREAMS: [Stream; TARGETS] = [
-    Stream::Scale0,
-    Stream::Scale1,
-    Stream::Scale2,
-    Stream::Opacity,
-    Stream::Dc0,
-    Stream::Dc1,
-    Stream::Dc2,
-];
+const TARGET_STREAMS: [Stream; TARGETS] =
+    [Stream::Scale0, Stream::Scale1, Stream::Scale2, Stream::Opacity, Stream::Dc0, Stream::Dc1, Stream::Dc2];
 const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Stream::Position2];
 /// Gaps with at least this many bits share a context.
 const GAP_CONTEXTS: u32 = 23;
@@ -92,12 +85,20 @@ impl<'a> Walk<'a> {
     /// Codes the base of the next Gaussian of each lane in `set`. Returns `None` for impossible values, which only
     /// damaged files hold. Decoders pass no targets.
     #[inline(always)]
-    pub(super) fn base<S: Symbols>(&mut self, s: &mut S, set: u32, targets: Option<&[&Target; LANES]>) -> Option<Group> {
+    pub(super) fn base<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        set: u32,
+        targets: Option<&[&Target; LANES]>,
+    ) -> Option<Group> {
         let p = self.steering;
         let target = |l: usize| targets.map(|targets| targets[l]);
         let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
         let before = self.cell;
-        let gap = s.wide(Stream::Cell, context, set, |l| target(l).map_or(0, |t| t.cell.wrapping_sub(before[l])));
+        let slot = |stream: Stream| stream.at(self.levels);
+        let gap = s.wide(slot(Stream::Cell), context, set, |l| {
+            target(l).map_or(0, |t| t.cell.wrapping_sub(before[l]))
+        });
         let mut cell = [[0; LANES]; 3];
         let mut beyond = 0;
         for l in 0..LANES {
@@ -118,7 +119,7 @@ impl<'a> Walk<'a> {
         } else {
             std::array::from_fn(|k| [p.means.get(k).copied().unwrap_or(0); LANES])
         };
-        let [colour, shape] = classes(s, set, targets, known, &around)?;
+        let [colour, shape] = classes(s, set, targets, known, &around, self.levels)?;
 
         let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
         let zeros = [0; LANES];
@@ -150,11 +151,14 @@ impl<'a> Walk<'a> {
             if targets.is_some() {
                 for l in (0..LANES).filter(|&l| has(set, l)) {
                     let wanted = target(l).map_or(0, |target| target.values[t]);
-                    group.wanted[t][l] = nearest((f64::from(wanted) - f64::from(predicted[l])) / f64::from(step[l]));
+                    group.wanted[t][l] =
+                        nearest((f64::from(wanted) - f64::from(predicted[l])) / f64::from(step[l]));
                 }
             }
             let wanted = group.wanted[t];
-            let counts = s.signed(stream, *class, set, |l| coarsened(wanted[l], coarse));
+            // Opacities take few bits, and so much of what is drawn depends on them that they are never coarse.
+            let coarse = if t == OPACITY { 1 } else { coarse };
+            let counts = s.signed(slot(stream), *class, set, |l| coarsened(wanted[l], coarse));
             for l in 0..LANES {
                 let value = predicted[l].wrapping_add(counts[l].wrapping_mul(coarse).wrapping_mul(step[l]));
                 group.coarse[t][l] = value;
@@ -211,15 +215,18 @@ impl<'a> Walk<'a> {
             }
         }
         for k in 0..3 {
-            let (full, left) = if k < 2 { (&group.axis_bits[0], &left[0]) } else { (&group.axis_bits[1], &left[1]) };
+            let (full, left) =
+                if k < 2 { (&group.axis_bits[0], &left[0]) } else { (&group.axis_bits[1], &left[1]) };
             let count = each(|l| full[l] - left[l]);
             let wanted = &group.wanted_rotation[k];
-            group.rotation[k] = s.bits(Stream::Rotation, count, set, |l| wanted[l] >> left[l]);
+            group.rotation[k] =
+                s.bits(Stream::Rotation.at(self.levels), count, set, |l| wanted[l] >> left[l]);
         }
         for (k, stream) in POSITION_STREAMS.into_iter().enumerate() {
             group.fineness[k] = each(|l| p.fineness(group.moves[k][l]));
             let wanted = &group.wanted[TARGETS + k];
-            group.base[TARGETS + k] = s.signed(stream, group.fineness[k], set, |l| coarsened(wanted[l], coarse));
+            group.base[TARGETS + k] =
+                s.signed(stream.at(self.levels), group.fineness[k], set, |l| coarsened(wanted[l], coarse));
         }
     }
 }
@@ -239,13 +246,14 @@ fn classes<S: Symbols>(
     targets: Option<&[&Target; LANES]>,
     known: bool,
     around: &[Lanes; AVERAGED],
+    levels: usize,
 ) -> Option<[Lanes<u32>; 2]> {
     const LAST: i32 = LAST_CLASS as i32;
     let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
     let class = |k: usize, l: usize| targets.map_or(0, |targets| u32::from(targets[l].classes[k]));
     let none = [0; LANES];
     let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
-    let colour = s.symbols(Stream::ColourClass, context, set, |l| class(0, l));
+    let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(0, l));
     let (mut context, mut nearest) = (none, none);
     for l in 0..LANES {
         let own = (colour[l] << FEATURE_BITS).cast_signed();
@@ -255,7 +263,9 @@ fn classes<S: Symbols>(
         context[l] = if known { 1 + level(2 * (expected - below)) } else { 0 };
         nearest[l] = level(expected);
     }
-    let over = s.signed(Stream::ShapeClass, context, set, |l| class(1, l).wrapping_sub(nearest[l]).cast_signed());
+    let over = s.signed(Stream::ShapeClass.at(levels), context, set, |l| {
+        class(1, l).wrapping_sub(nearest[l]).cast_signed()
+    });
     let mut shape = none;
     let mut beyond = false;
     for l in 0..LANES {
