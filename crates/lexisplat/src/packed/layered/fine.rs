@@ -2,7 +2,7 @@
 
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each};
-use super::walk::{DC, FACTOR, Group, OPACITY, REFINED, coarsened, dropped, factor};
+use super::walk::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
 use crate::packed::parameters::TARGETS;
 
 /// Contexts by the number of coarse steps: none, one, more.
@@ -17,9 +17,8 @@ const FINENESS_WIDTH: u32 = 3;
 #[inline(always)]
 pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) {
     let finer = factor(level - 1);
-    for k in (0..REFINED).filter(|&k| k != OPACITY) {
+    for k in DC..REFINED {
         let (stream, class, width) = match k {
-            0..OPACITY => (Stream::FineScale, &group.shape, CLASS_WIDTH),
             DC..TARGETS => (Stream::FineDc, &group.colour, CLASS_WIDTH),
             _ => (Stream::FinePosition, &group.fineness[k - TARGETS], FINENESS_WIDTH),
         };

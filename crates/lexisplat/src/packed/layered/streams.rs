@@ -27,7 +27,7 @@ macro_rules! streams {
         }
     };
 }
-streams! { 28:
+streams! { 27:
     /// Gaps between cells along the Morton curve.
     Cell => "position",
     /// Step class of the colour.
@@ -49,7 +49,6 @@ streams! { 28:
     Dc1 => "dc",
     Dc2 => "dc",
     /// What coarse steps leave.
-    FineScale => "scale",
     FinePosition => "position",
     FineDc => "dc",
     /// Numbers, atoms and sizes of the nonzeros of each part.

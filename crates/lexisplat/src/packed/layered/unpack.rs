@@ -203,8 +203,8 @@ impl Drawn {
         let mut within = [true; LANES];
         for t in 0..TARGETS {
             for l in 0..LANES {
-                // Opacities have no coarse steps.
-                if t == OPACITY {
+                // Scales and opacities have no coarse steps.
+                if t < DC {
                     within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
                     continue;
                 }

@@ -156,8 +156,8 @@ impl<'a> Walk<'a> {
                 }
             }
             let wanted = group.wanted[t];
-            // Opacities take few bits, and so much of what is drawn depends on them that they are never coarse.
-            let coarse = if t == OPACITY { 1 } else { coarse };
+            // The steps of turns and moves, and predictions, depend on scales and opacities.
+            let coarse = if t < DC { 1 } else { coarse };
             let counts = s.signed(slot(stream), *class, set, |l| coarsened(wanted[l], coarse));
             for l in 0..LANES {
                 let value = predicted[l].wrapping_add(counts[l].wrapping_mul(coarse).wrapping_mul(step[l]));
