@@ -97,6 +97,9 @@ fn in_parts(
     Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
 }
 
+/// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md).
+const VIEWPOINTS: usize = 4;
+
 impl Packing {
     fn run(
         &self,
@@ -145,7 +148,11 @@ impl Packing {
             _ => (None, sensitivity),
         };
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
-        let packer = Packer::new(packed_scene, &sensitivity, &self.options)?;
+        let options = match self.options.viewpoints.is_empty() {
+            true => self.options.clone().with_viewpoints(views.viewpoints(VIEWPOINTS)),
+            false => self.options.clone(),
+        };
+        let packer = Packer::new(packed_scene, &sensitivity, &options)?;
         drop(sensitivity);
         let refitting = Refitting::new(packer, fit);
         let (packed, report, judge, score) = match self.quality {

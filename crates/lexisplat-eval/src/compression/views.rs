@@ -38,6 +38,8 @@ const FITTED_AROUND: usize = 8;
 const FITTED_WHOLE: usize = 24;
 /// Largest width of those pictures, in pixels.
 const FITTED_WIDTH: u32 = 340;
+/// Share of the views whose positions are nearest to the one in their middle, which viewpoints are chosen from.
+const USUAL_VIEWS: f32 = 0.67;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
 
@@ -196,6 +198,38 @@ impl PackingViews {
     #[must_use]
     pub fn some_judging(&self, most: usize) -> Vec<&Camera> {
         self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1)).collect()
+    }
+
+    /// Up to `most` points that stand for the positions of the views like photographs: first points far from each other, and
+    /// of the positions nearest to each of them the one in the middle.
+    pub(super) fn viewpoints(&self, most: usize) -> Vec<[f32; 3]> {
+        let mut positions: Vec<[f32; 3]> = self.judging.iter().map(|camera| camera.position).collect();
+        let squared = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
+        let to_nearest = |of: [f32; 3], points: &[[f32; 3]]| {
+            points.iter().map(|&point| squared(of, point)).fold(f32::INFINITY, f32::min)
+        };
+        let least = |cost: &dyn Fn([f32; 3]) -> f32, among: &[[f32; 3]]| {
+            among.iter().copied().min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+        };
+        let to_all =
+            |of: [f32; 3], all: &[[f32; 3]]| all.iter().map(|&other| squared(of, other).sqrt()).sum::<f32>();
+        let mut points: Vec<[f32; 3]> = least(&|p| to_all(p, &positions), &positions).into_iter().collect();
+        if std::env::var_os("PRINTV").is_some() {
+            eprintln!("{positions:?}");
+        }
+        // Found views may be far away, where few photographs are taken.
+        positions.sort_by(|&a, &b| to_nearest(a, &points).total_cmp(&to_nearest(b, &points)));
+        positions.truncate((positions.len() as f32 * USUAL_VIEWS).ceil() as usize);
+        while points.len() < most.min(positions.len()) {
+            let farthest = least(&|p| -to_nearest(p, &points), &positions);
+            points.extend(farthest);
+        }
+        let groups = (0..points.len()).map(|k| {
+            let own = |&&p: &&[f32; 3]| squared(p, points[k]) <= to_nearest(p, &points);
+            let group: Vec<[f32; 3]> = positions.iter().filter(own).copied().collect();
+            least(&|p| to_all(p, &group), &group).unwrap_or(points[k])
+        });
+        groups.collect()
     }
 
     /// The views of `splats` that base colours and opacities are fitted to: some of those that measure and do not judge, evenly

@@ -2,8 +2,8 @@
 
 use super::coder::ChunkCoder;
 use super::layered::{
-    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Range, Recorder, Stream, Tables, lanes,
-    stream_of,
+    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Place, Range, Recorder, Stream, Tables,
+    lanes, stream_of,
 };
 use super::layering::Layering;
 use super::pack::PackOptions;
@@ -14,7 +14,7 @@ use crate::sparse::model::Record;
 use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
-use crate::support::spill::{Spill, SpillTo, Spilled};
+use crate::support::spill::{Spill, SpillTo, Woven};
 use crate::support::stopwatch::Stopwatch;
 
 /// What is counted over chunks before any is coded.
@@ -61,6 +61,7 @@ impl Counts {
 pub(super) struct Written {
     pub(super) layer: usize,
     gaussians: usize,
+    cell: u64,
     bounds: [[f32; 3]; 2],
     /// The bytes of each range, and the checksum of its integers.
     ranges: Vec<(Vec<u8>, u32)>,
@@ -70,7 +71,13 @@ impl Written {
     pub(super) fn new(layer: usize, chunk: &CodedChunk, tables: &Tables) -> Self {
         let lanes = lanes(chunk.gaussians);
         let ranges = chunk.ranges.iter().map(|(range, sum)| (range.finish(tables, lanes), *sum));
-        Self { layer, gaussians: chunk.gaussians, bounds: chunk.bounds, ranges: ranges.collect() }
+        Self {
+            layer,
+            gaussians: chunk.gaussians,
+            cell: chunk.cell,
+            bounds: chunk.bounds,
+            ranges: ranges.collect(),
+        }
     }
 }
 
@@ -98,9 +105,7 @@ pub(super) struct Encoding {
 /// A packed scene, its bulk spilled.
 pub(super) struct Finished {
     pub(super) head: PackedHead,
-    /// Of each pass.
-    pub(super) data: Vec<Spilled>,
-    pub(super) data_bytes: usize,
+    pub(super) data: Woven,
     pub(super) report: CompressReport,
 }
 
@@ -140,40 +145,41 @@ impl Encoding {
         let tables = Tables::new(&counts.histograms)
             .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
         let stream_bits = counts.bits(&tables).named(Stream::names());
-        let passes = layering.passes(&head.rest);
-        let mut data = passes.iter().map(|_| Spill::new(to)).collect::<Result<Vec<_>>>()?;
+        // The ranges of each kind of each layer, which come in the order of chunks.
+        let parts = head.rest.least.len();
+        let kinds: Vec<usize> =
+            layering.levels().iter().map(|&levels| 1 + usize::from(levels) + parts).collect();
+        let number = |layer: usize, kind: usize| kinds.iter().take(layer).sum::<usize>() + kind;
+        let count = kinds.iter().sum::<usize>();
+        let mut spills = (0..count).map(|_| Spill::new(to)).collect::<Result<Vec<_>>>()?;
         let mut chunks = Vec::new();
         code_chunks(&tables, &mut |written| {
-            let mut chunk = Chunk {
-                layer: written.layer,
-                gaussians: written.gaussians,
-                bounds: written.bounds,
-                ..Chunk::default()
-            };
-            for (bytes, integers) in &written.ranges {
+            let Written { layer, gaussians, cell, bounds, ranges } = written;
+            let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
+            for (kind, (bytes, integers)) in ranges.iter().enumerate() {
                 let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
                 let length = u32::try_from(bytes.len()).map_err(too_long)?;
-                chunk.ranges.push(Range {
-                    start: 0,
-                    length,
-                    checksum: crc32fast::hash(bytes),
-                    integers: *integers,
-                });
-            }
-            for (pass, spill) in
-                passes.iter().zip(&mut data).filter(|(p, _)| usize::from(p.layer) == written.layer)
-            {
-                let of_pass = written.ranges.iter().enumerate().filter(|(k, _)| pass.has(*k));
-                of_pass.map(|(_, (bytes, _))| spill.push(bytes)).collect::<Result<()>>()?;
+                let checksum = crc32fast::hash(bytes);
+                chunk.ranges.push(Range { start: 0, length, checksum, integers: *integers });
+                if let Some(spill) = spills.get_mut(number(layer, kind)) {
+                    spill.push(bytes)?;
+                }
             }
             chunks.push(chunk);
             Ok(())
         })?;
         chunks.sort_by_key(|chunk: &Chunk| chunk.layer);
-        head.index = Index { levels: layering.levels(), passes, chunks };
+        let order = layering.order(&chunks, parts);
+        head.index = Index { levels: layering.levels(), chunks, order };
         let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
         head.index.place().ok_or_else(too_long)?;
-        let data_bytes = usize::try_from(head.index.data_bytes()).map_err(|_| too_long())?;
+        let piece = |place: &Place| {
+            let chunk = &head.index.chunks[place.chunk as usize];
+            let kind = usize::from(place.kind);
+            (number(chunk.layer, kind), chunk.ranges[kind].length as usize)
+        };
+        let pieces = head.index.order.iter().map(piece).collect();
+        let data = Woven::new(spills.into_iter().map(Spill::finish).collect::<Result<_>>()?, pieces);
         if coder.dictionary.dim() > 0 {
             head.dictionary = dictionary.finish(&tables, 1);
         }
@@ -196,16 +202,6 @@ impl Encoding {
             coding: Coding::Layered(head.write()),
             limits: Limits::default(),
         };
-        let data = data.into_iter().map(Spill::finish).collect::<Result<_>>()?;
-        Ok(Finished { head, data, data_bytes, report })
+        Ok(Finished { head, data, report })
     }
-}
-
-/// The bytes of passes, one after the other.
-pub(super) fn joined(passes: Vec<Spilled>) -> Result<Vec<u8>> {
-    let mut out = Vec::new();
-    for pass in passes {
-        out.append(&mut pass.into_bytes()?);
-    }
-    Ok(out)
 }

@@ -1,6 +1,6 @@
 //! The layers of a file: which Gaussians come first, and in which order the ranges of all chunks lie.
 
-use super::layered::{Pass, RestForm};
+use super::layered::{Chunk, Place, RestForm};
 
 /// Scenes of fewer Gaussians have one layer. Their files are small.
 const LEAST_LAYERED: usize = 8000;
@@ -13,7 +13,7 @@ const ENERGY_POWER: f64 = 0.6;
 const FACTOR_STEPS: usize = 60;
 /// Gaussians of a chunk of the first layer, and of others. Small ones arrive soon.
 const FIRST_CHUNK: usize = 8192;
-const CHUNK: usize = 32_768;
+const SIZE: usize = 32_768;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
 /// Levels of refinement of the first layer and of the second.
@@ -37,7 +37,7 @@ impl Layering {
         may_layer: bool,
         energies: impl Iterator<Item = f32> + Clone,
     ) -> Self {
-        let layered = may_layer && gaussians >= LEAST_LAYERED && env("ONE", 0.0) == 0.0;
+        let layered = may_layer && gaussians >= LEAST_LAYERED;
         Self { factor: layered.then(|| factor(energies)), sum: 0.5 }
     }
 
@@ -57,66 +57,73 @@ impl Layering {
 
     /// Levels of refinement of each layer.
     pub(super) fn levels(&self) -> Vec<u8> {
-        if self.factor.is_some() { vec![env("L0", 2.0) as u8, env("L1", 1.0) as u8] } else { vec![0] }
+        if self.factor.is_some() { vec![FIRST_LEVELS, SECOND_LEVELS] } else { vec![0] }
     }
 
     /// Gaussians of a chunk of a layer.
     pub(super) fn chunk(&self, layer: usize) -> usize {
-        if self.factor.is_some() && layer == 0 { FIRST_CHUNK } else { CHUNK }
+        if self.factor.is_some() && layer == 0 { FIRST_CHUNK } else { SIZE }
     }
 
     /// How rows of `dim` coefficients are coded with `atoms` atoms.
     pub(super) fn rest(&self, dim: usize, atoms: usize) -> RestForm {
         let least = match self.factor {
             _ if dim == 0 => Vec::new(),
-            Some(_) => std::env::var("PARTS")
-                .map_or(PARTS.to_vec(), |v| v.split(',').map(|x| x.parse().unwrap()).collect()),
+            Some(_) => PARTS.to_vec(),
             None => vec![1],
         };
         RestForm { dim, atoms, least }
     }
 
-    /// The order of ranges in the data, for chunks of this form.
-    pub(super) fn passes(&self, rest: &RestForm) -> Vec<Pass> {
-        let parts = rest.least.len();
-        let pass = |layer: u8, ranges: &[usize]| Pass {
-            layer,
-            ranges: ranges.iter().fold(0, |all, k| all | 1 << k),
+    /// The order of the ranges of `chunks` in the data, of which the first layers come first. Chunks have `parts` parts of
+    /// nonzeros.
+    pub(super) fn order(&self, chunks: &[Chunk], parts: usize) -> Vec<Place> {
+        let mut order = Vec::new();
+        let mut put = |chunk: usize, kind: usize| {
+            order.push(Place { chunk: chunk as u32, kind: kind as u8 });
         };
+        let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
         if self.factor.is_none() {
-            let all: Vec<usize> = (1..1 + parts).collect();
-            let rest = (parts > 0).then(|| pass(0, &all));
-            return [Some(pass(0, &[0])), rest].into_iter().flatten().collect();
+            of(0).for_each(|c| put(c, 0));
+            of(0).for_each(|c| (0..parts).for_each(|part| put(c, 1 + part)));
+            return order;
         }
         // Ranges of the first layer: base, two refinements, parts. Of the second: base, refinement, parts.
-        let (l0, l1) = (env("L0", 2.0) as usize, env("L1", 1.0) as usize);
-        let (first, second) = (1 + l0, 1 + l1);
-        let mut passes = vec![pass(0, &[0])];
+        let (first, second) = (1 + usize::from(FIRST_LEVELS), 1 + usize::from(SECOND_LEVELS));
+        of(0).for_each(|c| put(c, 0));
         if parts > 0 {
-            passes.push(pass(0, &[first]));
+            of(0).for_each(|c| put(c, first));
         }
-        if l0 > 0 {
-            passes.push(pass(0, &[1]));
+        // Where the second layer arrives, the first becomes as fine.
+        let mut finer = of(0).peekable();
+        let mut later = of(1).skip(1).map(|c| chunks[c].cell);
+        for c in of(1) {
+            put(c, 0);
+            if parts > 0 {
+                put(c, second);
+            }
+            let end = later.next().unwrap_or(u64::MAX);
+            while let Some(c) = finer.next_if(|&c| chunks[c].cell < end) {
+                put(c, 1);
+            }
         }
-        passes.push(if parts > 0 { pass(1, &[0, second]) } else { pass(1, &[0]) });
-        for part in 1..parts {
-            passes.extend([pass(0, &[first + part]), pass(1, &[second + part])]);
+        finer.for_each(|c| put(c, 1));
+        let last = parts.saturating_sub(1);
+        for part in 1..last {
+            of(0).for_each(|c| put(c, first + part));
+            of(1).for_each(|c| put(c, second + part));
         }
-        if l0 > 1 {
-            passes.push(pass(0, &[2]));
+        of(0).for_each(|c| put(c, 2));
+        of(1).for_each(|c| put(c, 1));
+        if last > 0 {
+            of(0).for_each(|c| put(c, first + last));
+            of(1).for_each(|c| put(c, second + last));
         }
-        if l1 > 0 {
-            passes.push(pass(1, &[1]));
-        }
-        passes
+        order
     }
 }
 
 /// Probability that a Gaussian is of the first layer.
-fn env(name: &str, or: f64) -> f64 {
-    std::env::var(name).ok().map_or(or, |v| v.parse().unwrap())
-}
-
 fn probability(energy: f32, factor: f64) -> f64 {
     let power = libm::pow(f64::from(energy).max(0.0), ENERGY_POWER);
     (factor * power).min(1.0)
@@ -127,10 +134,9 @@ fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
     let count = energies.clone().count() as f64;
     let sum = |factor: f64| energies.clone().map(|e| probability(e, factor)).sum::<f64>();
     // As if all probabilities were below 1; more where some are not.
-    let mut factor =
-        env("SHARE", FIRST_SHARE) * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
+    let mut factor = FIRST_SHARE * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {
-        let found = sum(factor) / (env("SHARE", FIRST_SHARE) * count).max(f64::MIN_POSITIVE);
+        let found = sum(factor) / (FIRST_SHARE * count).max(f64::MIN_POSITIVE);
         if !found.is_finite() || found <= 0.0 || (found - 1.0).abs() < 1e-6 {
             break;
         }

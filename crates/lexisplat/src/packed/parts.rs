@@ -92,6 +92,7 @@ struct Layer {
 #[derive(Debug)]
 struct SpilledChunk {
     gaussians: usize,
+    cell: u64,
     bounds: [[f32; 3]; 2],
     /// Of each range the number of symbols of each lane, and the checksum of the integers.
     ranges: Vec<(Vec<usize>, u32)>,
@@ -116,7 +117,12 @@ impl Layer {
             range.entries().iter().try_for_each(|lane| self.symbols.push(lane))?;
             ranges.push((range.entries().iter().map(Vec::len).collect(), *sum));
         }
-        self.chunks.push(SpilledChunk { gaussians: chunk.gaussians, bounds: chunk.bounds, ranges });
+        self.chunks.push(SpilledChunk {
+            gaussians: chunk.gaussians,
+            cell: chunk.cell,
+            bounds: chunk.bounds,
+            ranges,
+        });
         Ok(())
     }
 }
@@ -129,7 +135,7 @@ impl SpilledChunk {
             let lanes = lanes.iter().map(|&count| symbols.take(count)).collect::<Result<Vec<Vec<u32>>>>()?;
             ranges.push((Recorder::restore(lanes), *sum));
         }
-        Ok(CodedChunk { gaussians: self.gaussians, bounds: self.bounds, ranges })
+        Ok(CodedChunk { gaussians: self.gaussians, cell: self.cell, bounds: self.bounds, ranges })
     }
 }
 
@@ -274,13 +280,13 @@ impl PartPacker {
             }
             Ok(())
         };
-        let Finished { mut head, data, data_bytes, report } =
+        let Finished { mut head, data, report } =
             self.encoding.finish(self.gaussians, &self.options, self.meta, to, &mut code_chunks)?;
         head.device = device.map(str::to_owned);
         head.removed = self.removed as u64;
         let orders = orders.into_iter().collect::<Result<Vec<_>>>()?;
         let order = (!orders.is_empty()).then_some(orders);
-        Ok((head, SpilledPacked { data, data_bytes, order, extras: by_column(extras) }, report))
+        Ok((head, SpilledPacked { data, order, extras: by_column(extras) }, report))
     }
 }
 

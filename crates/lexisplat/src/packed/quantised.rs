@@ -6,7 +6,7 @@ use super::appearance::Appearance;
 use super::canonical::MortonKey;
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, View, too_large};
-use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written, joined};
+use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
 use super::layered::{CodedChunk, MeanView, Tables, Target};
 use super::layering::Layering;
 use super::pack::PackOptions;
@@ -167,11 +167,11 @@ impl<'a> Quantised<'a> {
             parts.into_iter().try_for_each(|part| write(part?))
         };
         let meta = self.splats.meta.clone();
-        let Finished { mut head, data, report, .. } =
+        let Finished { mut head, data, report } =
             encoding.finish(n, self.options, meta, SpillTo::Memory, &mut code_chunks)?;
         head.removed = (self.splats.len() - n) as u64;
         let order = self.options.keep_order.then(|| self.gaussians.scene.iter().map(|g| g.source).collect());
-        Ok((Packed::new(head, self.extras(), order, joined(data)?), report))
+        Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
     }
 
     /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.

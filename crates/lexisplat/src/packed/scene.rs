@@ -7,7 +7,7 @@ use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
 use crate::support::limits::Limits;
-use crate::support::spill::Spilled;
+use crate::support::spill::{Spilled, Woven};
 
 /// What errors call a packed scene that was not read from a file.
 pub(super) const UNNAMED: &str = "the packed scene";
@@ -175,9 +175,7 @@ impl Packed {
 /// What of a packed scene is as long as the scene, spilled.
 #[derive(Debug)]
 pub(crate) struct SpilledPacked {
-    /// The passes of the data, one after the other.
-    pub(crate) data: Vec<Spilled>,
-    pub(crate) data_bytes: usize,
+    pub(crate) data: Woven,
     /// Of each layer the number of Gaussians, and the values.
     pub(crate) order: Option<Vec<(usize, Spilled)>>,
     /// Names and types, and the same of each.

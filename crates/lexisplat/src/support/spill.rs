@@ -134,6 +134,50 @@ impl Spilled {
     }
 }
 
+/// Spilled bytes that are read in pieces, now from one and then from another.
+#[derive(Debug)]
+pub(crate) struct Woven {
+    spilled: Vec<Spilled>,
+    /// Of each piece the number of the spilled bytes and its length.
+    pieces: Vec<(usize, usize)>,
+}
+
+impl Woven {
+    pub(crate) fn new(spilled: Vec<Spilled>, pieces: Vec<(usize, usize)>) -> Self {
+        Self { spilled, pieces }
+    }
+
+    /// Number of all bytes.
+    pub(crate) fn len(&self) -> usize {
+        self.pieces.iter().map(|piece| piece.1).sum()
+    }
+
+    /// All bytes.
+    pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
+        let mut bytes = Vec::with_capacity(self.len());
+        self.each(|piece| {
+            bytes.extend_from_slice(&piece);
+            Ok(())
+        })?;
+        Ok(bytes)
+    }
+
+    /// Copies them to `writer`.
+    pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
+        self.each(|piece| writer.write_all(&piece).map_err(|e| Error::temporary_file(Path::new("output"), e)))
+            .map_err(io::Error::other)
+    }
+
+    fn each(mut self, mut take: impl FnMut(Vec<u8>) -> Result<()>) -> Result<()> {
+        for (number, length) in self.pieces {
+            if let Some(spilled) = self.spilled.get_mut(number) {
+                take(spilled.take(length)?)?;
+            }
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

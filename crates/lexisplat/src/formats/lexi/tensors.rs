@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use safetensors::Dtype;
 
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, key, tensor};
-use crate::support::spill::Spilled;
+use crate::support::spill::{Spilled, Woven};
 
 #[cfg(target_endian = "big")]
 compile_error!("tensors are little-endian and written as they lie in memory");
@@ -36,8 +36,8 @@ pub(super) enum Source<'a> {
     /// As they lie in memory.
     Bytes(&'a [u8]),
     Spilled(Spilled),
-    /// One after the other. Their checksums are elsewhere.
-    Several(Vec<Spilled>),
+    /// Their checksums are elsewhere.
+    Woven(Woven),
     Owned(Vec<u8>),
     /// Words that are made twice: once for the checksum and once for the file.
     Words(Words<'a>),
@@ -48,7 +48,7 @@ impl std::fmt::Debug for Source<'_> {
         f.write_str(match self {
             Self::Bytes(_) => "Bytes",
             Self::Spilled(_) => "Spilled",
-            Self::Several(_) => "Several",
+            Self::Woven(_) => "Woven",
             Self::Owned(_) => "Owned",
             Self::Words(_) => "Words",
         })
@@ -115,7 +115,7 @@ impl<'a> Draft<'a> {
             match &tensor.source {
                 Source::Bytes(bytes) => crc.update(bytes),
                 Source::Owned(bytes) => crc.update(bytes),
-                Source::Several(_) => {}
+                Source::Woven(_) => {}
                 Source::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
                 Source::Words(make) => {
                     // Hashing cannot fail.
@@ -175,7 +175,7 @@ impl<'a> Draft<'a> {
             match tensor.source {
                 Source::Bytes(bytes) => writer.write_all(bytes)?,
                 Source::Owned(bytes) => writer.write_all(&bytes)?,
-                Source::Several(parts) => parts.into_iter().try_for_each(|part| part.copy_to(writer))?,
+                Source::Woven(woven) => woven.copy_to(writer)?,
                 Source::Spilled(spilled) => spilled.copy_to(writer)?,
                 Source::Words(make) => each_block(make(), |block| writer.write_all(block))?,
             }

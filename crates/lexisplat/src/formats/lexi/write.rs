@@ -108,7 +108,8 @@ impl<'a> LexiWriter<'a> {
     /// # Errors
     /// [`crate::Error::Io`] for temporary files.
     pub(crate) fn spilled_packed(head: &'a PackedHead, spilled: SpilledPacked) -> Result<Self> {
-        let SpilledPacked { data, data_bytes, order, extras } = spilled;
+        let SpilledPacked { data, order, extras } = spilled;
+        let data_bytes = data.len();
         let order = order.map(|layers| coded_layers(ScalarType::U32, layers)).transpose()?;
         let column = |(extra, layers): (Extra, Vec<(usize, Spilled)>)| {
             Ok((extra.name, coded_layers(extra.values.scalar_type(), layers)?))
@@ -116,7 +117,7 @@ impl<'a> LexiWriter<'a> {
         let extras = extras.into_iter().map(column).collect::<Result<Vec<(String, Vec<u8>)>>>()?;
         let extras = extras.iter().map(|(name, column)| (name.as_str(), column.clone())).collect();
         let Coding::Layered(bytes) = &head.coding else { return Err(not_layered()) };
-        Ok(Self::layered(head, bytes, data_bytes, Source::Several(data), order, extras))
+        Ok(Self::layered(head, bytes, data_bytes, Source::Woven(data), order, extras))
     }
 
     /// A file of the newest version. `order` and the values of `extras` are coded columns.

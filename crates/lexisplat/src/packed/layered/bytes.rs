@@ -29,6 +29,10 @@ impl<'a> ByteReader<'a> {
         self.array().map(u32::from_le_bytes)
     }
 
+    pub(super) fn u64(&mut self) -> Option<u64> {
+        self.array().map(u64::from_le_bytes)
+    }
+
     /// A finite number.
     pub(super) fn f32(&mut self) -> Option<f32> {
         self.array().map(f32::from_le_bytes).filter(|x| x.is_finite())

@@ -109,7 +109,8 @@ impl Form {
             }
         }
         let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
-        Some(CodedChunk { gaussians: targets.len(), bounds: bounds.0, ranges })
+        let cell = targets.first().map_or(0, |target| target.cell);
+        Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, ranges })
     }
 
     /// Decodes a chunk of `gaussians` Gaussians with `levels` levels of refinement from as many ranges as are there: those
@@ -176,6 +177,8 @@ impl Form {
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct CodedChunk {
     pub(in crate::packed) gaussians: usize,
+    /// The number of the first of its cells.
+    pub(in crate::packed) cell: u64,
     /// Least and largest coordinates of its positions.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
     /// What its ranges hold, and the checksums of their integers.

@@ -25,7 +25,7 @@ mod walk;
 pub(super) use chunk::{CodedChunk, Form, lanes};
 pub(super) use decoder::{LayeredDecoder, code_atoms};
 pub(super) use head::Head;
-pub(super) use index::{Chunk, Index, Pass, Range};
+pub(super) use index::{Chunk, Index, Place, Range};
 pub(super) use mean_view::{MeanView, seen_row};
 pub(super) use range::Recorder;
 pub(super) use rest::RestForm;
