@@ -116,7 +116,7 @@ impl Head {
         let p = &self.integers;
         for step in p.steps {
             out.extend(step.mantissa.to_le_bytes());
-            out.push(step.shift);
+            out.extend(step.shift.to_le_bytes());
         }
         let integers = [
             &[p.cell, p.shape][..],
@@ -166,8 +166,8 @@ impl Head {
         }
         let mut steps = [Step::default(); 5];
         for step in &mut steps {
-            *step = Step { mantissa: from.u16()?, shift: from.u8()? };
-            if step.shift > 31 {
+            *step = Step { mantissa: from.u16()?, shift: from.u8()?.cast_signed() };
+            if !Step::SHIFTS.contains(&step.shift) {
                 return None;
             }
         }

@@ -47,28 +47,37 @@ pub(super) const COEFFICIENTS: usize = 7;
 /// Coefficients of the logarithm of a step: a constant and those of the scales.
 pub(super) const SLOPES: usize = 4;
 
-/// A step of class 0: a mantissa below 2^16, shifted down.
+/// A step of class 0: a mantissa below 2^16, times 2 to the power of minus `shift`, as a multiple of 2^-20.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Step {
     pub(super) mantissa: u16,
-    pub(super) shift: u8,
+    pub(super) shift: i8,
 }
 
+/// A mantissa is shifted up by at most as many bits: it is then above the largest step.
+const MOST_SHIFT: i32 = 6;
+
 impl Step {
-    /// The step nearest to `x`, as a multiple of 2^-20.
+    /// Smallest and largest shift.
+    pub(super) const SHIFTS: std::ops::RangeInclusive<i8> = -6..=31;
+
+    /// The step nearest to `x`.
     fn of(x: f64) -> Self {
-        let mut scaled = x * f64::from(1_u32 << VALUE_BITS);
-        let mut shift = 0;
-        while shift < 31 && scaled < f64::from(1_u32 << (MANTISSA_BITS - 1)) {
+        let mut scaled = x * f64::from(1_u32 << (VALUE_BITS - MOST_SHIFT.unsigned_abs()));
+        let mut shift = *Self::SHIFTS.start();
+        while shift < *Self::SHIFTS.end() && scaled < f64::from(1_u32 << (MANTISSA_BITS - 1)) {
             scaled *= 2.0;
             shift += 1;
         }
         Self { mantissa: rounded(scaled, 1.0, f64::from(u16::MAX)) as u16, shift }
     }
 
-    /// The step of a class.
+    /// The step of a class, a multiple of 2^-20.
     fn at(self, class: u32) -> u32 {
-        ((u32::from(self.mantissa) << class) >> self.shift).clamp(1, MOST_STEP)
+        let up = class.cast_signed() - i32::from(self.shift);
+        let mantissa = u32::from(self.mantissa);
+        let step = if up >= 0 { mantissa << up.min(MOST_SHIFT) } else { mantissa >> -up };
+        step.clamp(1, MOST_STEP)
     }
 }
 
