@@ -102,16 +102,6 @@ impl Simd {
         self.run(job)
     }
 
-    /// Proof that the CPU has AVX2, if this set has it.
-    #[cfg(target_arch = "x86_64")]
-    pub(crate) fn avx2(self) -> Option<pulp::x86::V3> {
-        match self.0 {
-            Set::Plain => None,
-            Set::V3(simd) => Some(simd),
-            Set::V4(simd) => Some(*simd),
-        }
-    }
-
     /// [`Self::dispatch`] of a job that is no closure.
     #[inline(always)]
     pub(crate) fn run<J: pulp::NullaryFnOnce>(self, job: J) -> J::Output {

@@ -9,8 +9,6 @@ mod head;
 mod index;
 mod mean_view;
 mod player;
-#[cfg(target_arch = "x86_64")]
-mod player_avx2;
 mod range;
 mod rest;
 mod steering;

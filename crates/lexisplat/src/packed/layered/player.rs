@@ -20,8 +20,6 @@ pub(in crate::packed) struct Player<'a> {
     pub(super) damaged: bool,
     /// Bits of each stream, if they are counted.
     pub(super) bit_counts: Option<BitCounts>,
-    #[cfg(target_arch = "x86_64")]
-    avx2: Option<pulp::x86::V3>,
 }
 
 impl<'a> Player<'a> {
@@ -38,9 +36,6 @@ impl<'a> Player<'a> {
             ends: [2; LANES],
             damaged: false,
             bit_counts: count_bits.then(|| BitCounts::zeros(Stream::ALL.len())),
-            // The vector code does not count.
-            #[cfg(target_arch = "x86_64")]
-            avx2: crate::support::simd::Simd::current().avx2().filter(|_| !count_bits),
         };
         let mut end = 0_u32;
         for l in 0..lanes {
@@ -105,27 +100,14 @@ impl<'a> Player<'a> {
         }
         out
     }
-
-    #[inline(always)]
-    fn pieces(&mut self, count: &Lanes<u32>, set: u32) -> Lanes<u32> {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = self.avx2 {
-            return super::player_avx2::take_bits(avx2, self, count, set);
-        }
-        self.take_bits(count, set)
-    }
 }
 
-/// Most words of a range, which gathers of 4 bytes can reach with signed offsets.
+/// Most words of a range.
 const MAX_WORDS: u32 = 1 << 30;
 
 impl Symbols for Player<'_> {
     #[inline(always)]
     fn symbols(&mut self, slot: Slot, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
-        #[cfg(target_arch = "x86_64")]
-        if let Some(avx2) = self.avx2 {
-            return super::player_avx2::take(avx2, self, slot, &context, set);
-        }
         self.take(slot, &context, set)
     }
 
@@ -141,13 +123,13 @@ impl Symbols for Player<'_> {
             first[l] = count[l].min(MOST_BITS);
             more |= count[l];
         }
-        let mut out = self.pieces(&first, set);
+        let mut out = self.take_bits(&first, set);
         if more > MOST_BITS {
             let mut rest = [0; LANES];
             for l in 0..LANES {
                 rest[l] = (count[l] - first[l]).min(MOST_BITS);
             }
-            let high = self.pieces(&rest, set);
+            let high = self.take_bits(&rest, set);
             for l in 0..LANES {
                 out[l] |= high[l] << MOST_BITS;
             }

@@ -322,10 +322,4 @@ impl Lookup {
         let entry = self.entries.get((start + low) as usize).copied().unwrap_or(0);
         (entry & 0xff, (entry >> 8 & ((1 << MOST_PRECISION) - 1)) + 1, entry >> (8 + MOST_PRECISION))
     }
-
-    /// Where the table of each context starts, and all entries: as many for each table as its stream's precision says.
-    #[cfg(target_arch = "x86_64")]
-    pub(super) fn lists(&self) -> (&[u32], &[u32]) {
-        (&self.starts, &self.entries)
-    }
 }
