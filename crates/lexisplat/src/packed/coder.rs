@@ -49,6 +49,8 @@ pub(super) struct View<'a> {
     pub(super) classes: &'a [[u8; 2]],
     /// What each shows, in this order, instead of the base colours and opacities of `splats`.
     pub(super) appearances: Option<&'a [Appearance]>,
+    /// By how much each of the first layer is to change while the second is not there, apart from its growth.
+    pub(super) changes: Option<&'a [Appearance]>,
 }
 
 impl<'a> View<'a> {
@@ -58,7 +60,8 @@ impl<'a> View<'a> {
             splats: self.splats,
             scene: &self.scene[range.clone()],
             classes: &self.classes[range.clone()],
-            appearances: self.appearances.map(|all| &all[range]),
+            appearances: self.appearances.map(|all| &all[range.clone()]),
+            changes: self.changes,
         }
     }
 

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::chunks::FlatDecoder;
-use super::layered::LayeredDecoder;
+use super::layered::{Index, LayeredDecoder};
 use super::place::{Piece, Place, indices, places};
 use super::scene::{Coding, PackedHead};
 use super::stream::{BitCounts, StreamBits};
@@ -18,7 +18,8 @@ use crate::support::memory_budget::MemoryBudget;
 #[derive(Debug)]
 pub(crate) struct Decoder {
     file: String,
-    /// The Gaussians of each chunk.
+    /// The chunks that are there, and the Gaussians of each.
+    chunks: Vec<usize>,
     spans: Vec<Range<usize>>,
     kind: Kind,
 }
@@ -41,12 +42,51 @@ impl Decoder {
                 (Kind::Flat(Box::new(decoder)), spans)
             }
             Coding::Layered(bytes) => {
-                let decoder = LayeredDecoder::new(head, bytes, data.len())?;
-                let spans = decoder.spans();
+                let decoder = LayeredDecoder::new(head, bytes)?;
+                if decoder.index().data_bytes() != data.len() as u64 {
+                    let text = "packed ranges do not cover the data: no encoder writes it";
+                    return Err(Error::malformed(&head.file, text));
+                }
+                let chunks = &decoder.index().chunks;
+                let spans = chunks.iter().map(|chunk| chunk.first..chunk.first + chunk.gaussians).collect();
                 (Kind::Layered(Box::new(decoder)), spans)
             }
         };
-        Ok(Self { file: head.file.clone(), spans, kind })
+        Ok(Self { file: head.file.clone(), chunks: (0..spans.len()).collect(), spans, kind })
+    }
+
+    /// Reads what all chunks need from `head`, for data of which only a first part, `data`, is there. Chunks of which nothing
+    /// is there are left out.
+    pub(crate) fn of_prefix(head: &PackedHead, data: &[u8]) -> Result<Self> {
+        let Coding::Layered(bytes) = &head.coding else { return Self::new(head, data) };
+        head.limits.check_gaussians(&head.file, head.gaussians as u64)?;
+        head.limits.check_atoms(&head.file, head.atoms as u64)?;
+        let decoder = LayeredDecoder::new(head, bytes)?;
+        let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);
+        for (c, chunk) in decoder.index().chunks.iter().enumerate() {
+            if chunk.ranges.first().is_some_and(|base| base.end() <= data.len() as u64) {
+                chunks.push(c);
+                spans.push(first..first + chunk.gaussians);
+                first += chunk.gaussians;
+            }
+        }
+        Ok(Self { file: head.file.clone(), chunks, spans, kind: Kind::Layered(Box::new(decoder)) })
+    }
+
+    /// The same without interim changes but of scales.
+    pub(crate) fn growing_only(mut self) -> Self {
+        if let Kind::Layered(decoder) = &mut self.kind {
+            decoder.grow_only();
+        }
+        self
+    }
+
+    /// The layers, chunks and ranges of a file of version 3.
+    pub(crate) fn index(&self) -> Option<&Index> {
+        match &self.kind {
+            Kind::Flat(_) => None,
+            Kind::Layered(decoder) => Some(decoder.index()),
+        }
     }
 
     /// The Gaussians of each chunk.
@@ -77,7 +117,7 @@ impl Decoder {
         }
     }
 
-    /// Decodes chunk `c` of `data` without extras. Escapes are numbered from its start. `budget` already holds
+    /// Decodes chunk `c` of those that are there without extras. Escapes are numbered from its start. `budget` already holds
     /// everything except its codes. Its bits are counted if `count_bits`.
     pub(crate) fn chunk(
         &self,
@@ -97,7 +137,7 @@ impl Decoder {
         Ok((g, codes, piece.bit_counts))
     }
 
-    /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
+    /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
     pub(super) fn piece(
         &self,
         data: &[u8],
@@ -107,6 +147,7 @@ impl Decoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
+        let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
         match &self.kind {
             Kind::Flat(decoder) => decoder.piece(data, c, first, place, budget, count_bits),
             Kind::Layered(decoder) => decoder.piece(data, c, first, place, budget, count_bits),

@@ -1,5 +1,6 @@
 //! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
 
+use super::alone;
 use super::coder::ChunkCoder;
 use super::layered::{
     ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Place, Range, Recorder, Stream, Tables,
@@ -122,7 +123,10 @@ impl Encoding {
         let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
         let mean_view = coder.mean_view.clone();
         let atom_bits = u8::try_from(coder.atom_bits).unwrap_or(u8::MAX);
-        let head = Head::new(&coder.parameters, most_dc, rest, atom_bits, mean_view);
+        let mut head = Head::new(&coder.parameters, most_dc, rest, atom_bits, mean_view);
+        if layering.layers() > 1 {
+            head = head.with_interim(alone::STEPS);
+        }
         let form = head.form();
         Self { coder, layering, head, form, dictionary, counts, learn_seconds: clock.seconds(), clock }
     }
@@ -147,8 +151,8 @@ impl Encoding {
         let stream_bits = counts.bits(&tables).named(Stream::names());
         // The ranges of each kind of each layer, which come in the order of chunks.
         let parts = head.rest.least.len();
-        let kinds: Vec<usize> =
-            layering.levels().iter().map(|&levels| 1 + usize::from(levels) + parts).collect();
+        let forms = layering.forms(parts);
+        let kinds: Vec<usize> = forms.iter().map(|form| form.ranges()).collect();
         let number = |layer: usize, kind: usize| kinds.iter().take(layer).sum::<usize>() + kind;
         let count = kinds.iter().sum::<usize>();
         let mut spills = (0..count).map(|_| Spill::new(to)).collect::<Result<Vec<_>>>()?;
@@ -170,7 +174,7 @@ impl Encoding {
         })?;
         chunks.sort_by_key(|chunk: &Chunk| chunk.layer);
         let order = layering.order(&chunks, parts);
-        head.index = Index { levels: layering.levels(), chunks, order };
+        head.index = Index { layers: forms, chunks, order };
         let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
         head.index.place().ok_or_else(too_long)?;
         let piece = |place: &Place| {
@@ -179,6 +183,12 @@ impl Encoding {
             (number(chunk.layer, kind), chunk.ranges[kind].length as usize)
         };
         let pieces = head.index.order.iter().map(piece).collect();
+        if std::env::var("PRINTK").is_ok() {
+            let mut sums = std::collections::BTreeMap::new();
+            for chunk in &head.index.chunks { for (k, r) in chunk.ranges.iter().enumerate() { let e = sums.entry((chunk.layer, k)).or_insert((0_u64, 0_usize)); e.0 += u64::from(r.length); e.1 += chunk.gaussians; } }
+            for (k, (b, g)) in sums { eprintln!("{k:?} {b} B {:.1} bits", b as f64 * 8.0 / g as f64); }
+            eprintln!("tables {} dictionary {} chunks {}", tables.write().len(), dictionary.finish(&tables, 1).len(), head.index.chunks.len());
+        }
         let data = Woven::new(spills.into_iter().map(Spill::finish).collect::<Result<_>>()?, pieces);
         if coder.dictionary.dim() > 0 {
             head.dictionary = dictionary.finish(&tables, 1);

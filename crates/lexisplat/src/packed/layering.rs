@@ -1,6 +1,6 @@
 //! The layers of a file: which Gaussians come first, and in which order the ranges of all chunks lie.
 
-use super::layered::{Chunk, Place, RestForm};
+use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Scenes of fewer Gaussians have one layer. Their files are small.
 const LEAST_LAYERED: usize = 8000;
@@ -55,14 +55,20 @@ impl Layering {
         if self.factor.is_some() { 2 } else { 1 }
     }
 
-    /// Levels of refinement of each layer.
-    pub(super) fn levels(&self) -> Vec<u8> {
-        if self.factor.is_some() { vec![FIRST_LEVELS, SECOND_LEVELS] } else { vec![0] }
+    /// How the layers are coded, with `parts` parts of nonzeros.
+    pub(super) fn forms(&self, parts: usize) -> Vec<LayerForm> {
+        let levels: &[u8] = if self.factor.is_some() { &[FIRST_LEVELS, SECOND_LEVELS] } else { &[0] };
+        layer_forms(levels, parts, self.factor.is_some())
+    }
+
+    /// Probability that a Gaussian is of the first layer, of which there are more.
+    pub(super) fn probability(&self, energy: f32) -> f64 {
+        self.factor.map_or(1.0, |factor| probability(energy, factor))
     }
 
     /// Gaussians of a chunk of a layer.
     pub(super) fn chunk(&self, layer: usize) -> usize {
-        if self.factor.is_some() && layer == 0 { FIRST_CHUNK } else { SIZE }
+        if self.factor.is_none() { SIZE } else if layer == 0 { crate::packed::alone::knob("K0", FIRST_CHUNK as f64) as usize } else { crate::packed::alone::knob("K1", SIZE as f64) as usize }
     }
 
     /// How rows of `dim` coefficients are coded with `atoms` atoms.
@@ -88,9 +94,10 @@ impl Layering {
             of(0).for_each(|c| (0..parts).for_each(|part| put(c, 1 + part)));
             return order;
         }
-        // Ranges of the first layer: base, two refinements, parts. Of the second: base, refinement, parts.
+        // Ranges of the first layer: base, two refinements, parts, interim changes. Of the second: base, refinement, parts.
         let (first, second) = (1 + usize::from(FIRST_LEVELS), 1 + usize::from(SECOND_LEVELS));
         of(0).for_each(|c| put(c, 0));
+        of(0).for_each(|c| put(c, first + parts));
         if parts > 0 {
             of(0).for_each(|c| put(c, first));
         }
@@ -125,7 +132,7 @@ impl Layering {
 
 /// Probability that a Gaussian is of the first layer.
 fn probability(energy: f32, factor: f64) -> f64 {
-    let power = libm::pow(f64::from(energy).max(0.0), ENERGY_POWER);
+    let power = libm::pow(f64::from(energy).max(0.0), crate::packed::alone::knob("KE", ENERGY_POWER));
     (factor * power).min(1.0)
 }
 
@@ -134,9 +141,9 @@ fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
     let count = energies.clone().count() as f64;
     let sum = |factor: f64| energies.clone().map(|e| probability(e, factor)).sum::<f64>();
     // As if all probabilities were below 1; more where some are not.
-    let mut factor = FIRST_SHARE * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
+    let mut factor = share() * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {
-        let found = sum(factor) / (FIRST_SHARE * count).max(f64::MIN_POSITIVE);
+        let found = sum(factor) / (share() * count).max(f64::MIN_POSITIVE);
         if !found.is_finite() || found <= 0.0 || (found - 1.0).abs() < 1e-6 {
             break;
         }
@@ -146,5 +153,7 @@ fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
 }
 
 fn sum_of_powers(energies: impl Iterator<Item = f32>) -> f64 {
-    energies.map(|e| libm::pow(f64::from(e).max(0.0), ENERGY_POWER)).sum()
+    energies.map(|e| libm::pow(f64::from(e).max(0.0), crate::packed::alone::knob("KE", ENERGY_POWER))).sum()
 }
+
+fn share() -> f64 { crate::packed::alone::knob("KS", FIRST_SHARE) }

@@ -7,6 +7,7 @@
 //! `encoding.rs` packs a scene whole or in parts. `chunk_codec.rs` goes over the Gaussians of a chunk; encoder and
 //! decoder share it.
 
+mod alone;
 mod appearance;
 mod bits;
 mod canonical;

@@ -44,7 +44,7 @@ pub struct PackOptions {
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Up to 8 points that the scene is seen from. Base colours are then those that are seen from there on average, so
+    /// Up to 16 points that the scene is seen from. Base colours are then those that are seen from there on average, so
     /// that they are right without SH-rest too.
     pub viewpoints: Vec<[f32; 3]>,
     /// Write one layer. By default scenes of 8,000 Gaussians and more have two, of which the first draws the whole scene.
@@ -144,7 +144,7 @@ impl<S: Borrow<Splats>> Packer<S> {
     /// # Errors
     /// As [`Self::quantise`] and [`Quantised::finish`].
     pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
-        self.quantise(step, true, progress)?.finish(None, progress)
+        self.quantise(step, true, progress)?.finish(None, None, progress)
     }
 
     /// Settles everything that does not depend on base colours and opacities, with an overall step as in [`Self::pack`]. Without a

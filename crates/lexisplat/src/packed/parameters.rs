@@ -156,7 +156,11 @@ impl Parameters {
 
     /// The coordinates of a base colour.
     pub(super) fn dc_coordinates(&self, dc: Vec3) -> Vec3 {
-        let d: Vec3 = std::array::from_fn(|c| dc[c] - self.dc_mean[c]);
+        self.dc_turned(std::array::from_fn(|c| dc[c] - self.dc_mean[c]))
+    }
+
+    /// The coordinates of a difference between base colours.
+    pub(super) fn dc_turned(&self, d: Vec3) -> Vec3 {
         self.dc_axes.map(|axis| axis[0] * d[0] + axis[1] * d[1] + axis[2] * d[2])
     }
 

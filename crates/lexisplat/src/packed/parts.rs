@@ -163,7 +163,7 @@ impl PartPacker {
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&classes, &sample.geometry, &scene);
         let layering = Layering::new(total, !options.one_layer, kept.iter().map(|&i| weights.shown[i][1]));
-        let view = View { splats: sample, scene: &scene, classes: &classes, appearances: None };
+        let view = View { splats: sample, scene: &scene, classes: &classes, appearances: None, changes: None };
         let coder = ChunkCoder::new(view, total, floor.parameters.clone(), mean_view, options, progress)?;
         progress.check()?;
         let most_dc = most_dc(&floor.parameters, &dc);
@@ -206,7 +206,7 @@ impl PartPacker {
         let quantised = Quantised::of_part(splats, options, gaussians, blank, progress)?;
         let mut appearances = None;
         if let Some(refit) = refit.filter(|_| options.may_change()) {
-            let model = quantised.finish(None, progress)?.0.unpack()?;
+            let model = quantised.finish(None, None, progress)?.0.unpack()?;
             appearances = Some(refit(splats, &model, quantised.weights())?);
         }
         let view = quantised.view(appearances.as_deref())?;
@@ -235,14 +235,14 @@ impl PartPacker {
 
     /// Codes the chunks that are full, or all that is left.
     fn code_pending(&mut self, all: bool) -> Result<()> {
-        let levels = self.encoding.layering.levels();
+        let forms = self.encoding.layering.forms(self.encoding.head.rest.least.len());
         for (k, layer) in self.layers.iter_mut().enumerate() {
             let size = self.encoding.layering.chunk(k);
             let whole = if all { layer.pending.len() } else { layer.pending.len() / size * size };
-            let levels = levels.get(k).copied().unwrap_or(0).into();
+            let layer_form = forms.get(k).copied().unwrap_or_default();
             let (form, frame) = (&self.encoding.form, &self.encoding.head.frame);
             let chunks: Vec<&[Target]> = layer.pending[..whole].chunks(size).collect();
-            let coded = map_vec(chunks, |targets| form.record(frame, levels, targets).ok_or_else(too_large));
+            let coded = map_vec(chunks, |targets| form.record(frame, layer_form, targets).ok_or_else(too_large));
             for chunk in coded {
                 let chunk = chunk?;
                 let none = Tally::new(self.encoding.coder.dictionary.dim());

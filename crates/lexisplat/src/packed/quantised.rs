@@ -2,6 +2,7 @@
 
 use std::ops::Range;
 
+use super::alone::Alone;
 use super::appearance::Appearance;
 use super::canonical::MortonKey;
 use super::codebook::Codes;
@@ -67,6 +68,8 @@ pub struct Quantised<'a> {
     chunks: Vec<(usize, Range<usize>)>,
     /// Of each chunk.
     codes: Vec<Codes>,
+    /// What the first layer looks like alone.
+    alone: Alone,
     encoding: Encoding,
 }
 
@@ -81,7 +84,7 @@ impl<'a> Quantised<'a> {
     ) -> Result<Self> {
         let n = gaussians.scene.len();
         let layering = Layering::new(n, !options.one_layer, gaussians.weights.iter().map(|w| w[1]));
-        let view = View { splats, scene: &gaussians.scene, classes: &gaussians.classes, appearances: None };
+        let view = View { splats, scene: &gaussians.scene, classes: &gaussians.classes, appearances: None, changes: None };
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, parameters, mean_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
@@ -104,12 +107,17 @@ impl<'a> Quantised<'a> {
         let counts = gaussians.in_layers(&mut encoding.layering);
         let mut chunks = Vec::new();
         let mut start = 0;
-        for (layer, count) in counts.into_iter().enumerate() {
+        for (layer, &count) in counts.iter().enumerate() {
             let (end, size) = (start + count, encoding.layering.chunk(layer));
             chunks.extend((start..end).step_by(size).map(|first| (layer, first..end.min(first + size))));
             start = end;
         }
-        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), encoding };
+        let mut alone = Alone::default();
+        if let (Some(&first), true) = (counts.first(), counts.len() > 1) {
+            let probability = |i: usize| encoding.layering.probability(gaussians.weights[i][1]);
+            alone = Alone::new(&splats.geometry, &gaussians.scene, first, probability);
+        }
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
         let view = part.view(None)?;
         let codes = part.chunks.iter().map(|(_, range)| {
             progress.check()?;
@@ -140,7 +148,8 @@ impl<'a> Quantised<'a> {
     }
 
     /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
-    /// order of the file.
+    /// order of the file. `changes` are what base colours, and logarithms of opacities, of the first layer change by while the
+    /// second is not there, from what [`Packed::first_layer`] shows.
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
@@ -148,10 +157,11 @@ impl<'a> Quantised<'a> {
     pub fn finish(
         &self,
         appearances: Option<&[Appearance]>,
+        changes: Option<&[Appearance]>,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
-        let view = self.view(appearances)?;
+        let view = View { changes, ..self.view(appearances)? };
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.
@@ -184,7 +194,7 @@ impl<'a> Quantised<'a> {
             all.iter().try_for_each(Appearance::check)?;
         }
         let Gaussians { scene, classes, .. } = &self.gaussians;
-        Ok(View { splats: self.splats, scene, classes, appearances })
+        Ok(View { splats: self.splats, scene, classes, appearances, changes: None })
     }
 
     /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
@@ -195,10 +205,10 @@ impl<'a> Quantised<'a> {
         with: impl Fn(usize, Tally, CodedChunk) -> T + Sync,
     ) -> Vec<Result<T>> {
         let Encoding { form, head, .. } = &self.encoding;
-        let levels = self.encoding.layering.levels();
+        let forms = self.encoding.layering.forms(head.rest.least.len());
         self.each_target(view, progress, |layer, tally, targets| {
-            let levels = levels.get(layer).copied().unwrap_or(0).into();
-            let coded = form.record(&head.frame, levels, &targets).ok_or_else(too_large)?;
+            let layer_form = forms.get(layer).copied().unwrap_or_default();
+            let coded = form.record(&head.frame, layer_form, &targets).ok_or_else(too_large)?;
             Ok(with(layer, tally, coded))
         })
     }
@@ -214,7 +224,11 @@ impl<'a> Quantised<'a> {
         let unit = self.encoding.head.dc_unit();
         map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
             progress.check()?;
-            let (tally, targets) = coder.targets(view.part(range.clone()), codes, unit)?;
+            let (tally, mut targets) = coder.targets(view.part(range.clone()), codes, unit)?;
+            for (i, target) in range.clone().zip(&mut targets).filter(|_| *layer == 0) {
+                let change = view.changes.and_then(|changes| changes.get(i));
+                target.interim = self.alone.steps(i, change, &coder.parameters);
+            }
             with(*layer, tally, targets)
         })
     }
@@ -259,7 +273,7 @@ mod tests {
         let options = PackOptions::default();
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
-        let file = |shown| quantised.finish(shown, &Silent).unwrap().0.unpack().unwrap();
+        let file = |shown| quantised.finish(shown, None, &Silent).unwrap().0.unpack().unwrap();
         let own = file(None);
         assert!(own == packer.pack(1e-5, &Silent).unwrap().0.unpack().unwrap());
         let mut expected = own.clone().into_splats();
@@ -288,7 +302,7 @@ mod tests {
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
         assert_eq!((quantised.len(), quantised.weights().len(), quantised.is_empty()), (50, 50, false));
-        let refused = |shown: &[Appearance]| quantised.finish(Some(shown), &Silent).unwrap_err().to_string();
+        let refused = |shown: &[Appearance]| quantised.finish(Some(shown), None, &Silent).unwrap_err().to_string();
         let good = Appearance { dc: [0.0; 3], log_opacity: -1.0 };
         assert!(refused(&[good; 49]).contains("50 entries"));
         assert!(refused(&[Appearance { dc: [f32::NAN; 3], ..good }; 50]).contains("NaN"));

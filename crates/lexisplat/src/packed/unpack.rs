@@ -1,6 +1,7 @@
 //! Decoding a packed scene as a whole.
 
 use super::decoder::Decoder;
+use super::layered::Index;
 use super::place::{indices, places};
 use super::scene::Packed;
 use super::stream::{BitCounts, StreamBits};
@@ -63,16 +64,35 @@ impl Packed {
     fn decode(&self, count_bits: bool) -> Result<(Model, BitCounts)> {
         let head = self.head();
         let decoder = Decoder::new(head, self.data())?;
+        self.decode_with(&decoder, self.data(), count_bits)
+    }
+
+    /// What the first layer of two shows while the second is not there, with its scales grown and no other change; `None` if
+    /// there is one layer. Its Gaussians are the first of those of the scene.
+    ///
+    /// # Errors
+    /// As [`Self::unpack`].
+    pub fn first_layer(&self) -> Result<Option<Model>> {
+        let whole = Decoder::new(self.head(), self.data())?;
+        let Some(end) = whole.index().and_then(Index::first_layer_end) else { return Ok(None) };
+        let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();
+        let decoder = Decoder::of_prefix(self.head(), data)?.growing_only();
+        Ok(Some(self.decode_with(&decoder, data, false)?.0))
+    }
+
+    fn decode_with(&self, decoder: &Decoder, data: &[u8], count_bits: bool) -> Result<(Model, BitCounts)> {
+        let head = self.head();
         let mut bit_counts = decoder.dictionary_bits().clone();
-        let n = self.len();
+        let n = decoder.spans().last().map_or(0, |span| span.end);
         let budget = self.budget()?;
-        let mut g = Geometry { extras: self.extras().to_vec(), ..Geometry::zeros(n) };
+        let extras = if n == self.len() { self.extras().to_vec() } else { Vec::new() };
+        let mut g = Geometry { extras, ..Geometry::zeros(n) };
         let mut counts = vec![0; n];
         // Chunks write straight to where they belong, so that a scene is in memory once.
         let spans = decoder.spans();
         let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
         let pieces = map_vec(work, |(c, (mut place, span))| {
-            decoder.piece(self.data(), c, span.start, &mut place, &budget, count_bits)
+            decoder.piece(data, c, span.start, &mut place, &budget, count_bits)
         });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();

@@ -241,7 +241,7 @@ mod tests {
         let file = |options: &PackOptions, fitted: bool| {
             let packer = Packer::new(&splats, &sensitivity, options).unwrap();
             let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
-            let model = quantised.finish(None, &Silent).unwrap().0.unpack().unwrap();
+            let model = quantised.finish(None, None, &Silent).unwrap().0.unpack().unwrap();
             let shown = fitted.then(|| others(&model));
             let (packed, _) = quantised.finish(shown.as_deref(), &Silent).unwrap();
             let mut bytes = Vec::new();

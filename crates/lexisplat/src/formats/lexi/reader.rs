@@ -91,7 +91,14 @@ impl<'a> LexiReader<'a> {
         let attribute_bytes = sizes(&checked)?;
         let (kind, extras) = if layout == Layout::Packed {
             let head = super::packed::head(&checked, limits)?;
-            let decoder = Decoder::new(&head, super::packed::data(&checked)?)?;
+            let data = super::packed::data(&checked)?;
+            let first = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok());
+            let decoder = match first {
+                Some(f) => Decoder::of_prefix(&head, &data[..((f * checked.bytes().len() as f64) as usize).saturating_sub(checked.bytes().len() - data.len()).min(data.len())])?,
+                None => Decoder::new(&head, data)?,
+            };
+            let mut head = head;
+            head.gaussians = decoder.spans().last().map_or(0, |s| s.end);
             let extras = extras(&checked, head.gaussians, &(0..0))?;
             (Kind::Packed(Box::new(PackedFile { checked, head, decoder })), extras)
         } else {
@@ -292,7 +299,10 @@ impl PackedFile<'_> {
         let held = spans.iter().map(|span| span.len()).sum();
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
-        let data = super::packed::data(&self.checked)?;
+        let mut data = super::packed::data(&self.checked)?;
+        if let Some(f) = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok()) {
+            data = &data[..((f * self.checked.bytes().len() as f64) as usize).saturating_sub(self.checked.bytes().len() - data.len()).min(data.len())];
+        }
         let parts = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });

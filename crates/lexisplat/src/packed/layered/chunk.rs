@@ -1,6 +1,7 @@
-//! Coding of a chunk: ranges of a base, refinements and nonzeros, eight lanes each.
+//! Coding of a chunk: ranges of a base, refinements, nonzeros and interim changes, all in the same lanes.
 
 use super::fine::refine;
+use super::interim::{CHANGES, interim};
 use super::player::Player;
 use super::range::Recorder;
 use super::rest::{BLOCK, Coded, Cursor, Rest, RestForm};
@@ -60,23 +61,42 @@ pub(in crate::packed) struct Form {
     pub(in crate::packed) rest: RestForm,
 }
 
-impl Form {
-    /// Number of ranges of a chunk of this many levels: a base, the levels of refinement, and parts of nonzeros.
-    pub(in crate::packed) fn ranges(&self, levels: usize) -> usize {
-        1 + levels + self.rest.least.len()
+/// How the chunks of a layer are coded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in crate::packed) struct LayerForm {
+    /// Levels of refinement.
+    pub(in crate::packed) levels: usize,
+    /// Parts of nonzeros.
+    pub(in crate::packed) parts: usize,
+    /// Whether there are interim changes.
+    pub(in crate::packed) interim: bool,
+}
+
+impl LayerForm {
+    /// Number of ranges of a chunk: a base, the levels of refinement, parts of nonzeros, and interim changes.
+    pub(in crate::packed) fn ranges(self) -> usize {
+        self.interim_range() + usize::from(self.interim)
     }
 
+    /// The range of interim changes, if there are any.
+    pub(in crate::packed) fn interim_range(self) -> usize {
+        1 + self.levels + self.parts
+    }
+}
+
+impl Form {
     /// Codes the Gaussians of a chunk with `levels` levels of refinement. `None` if there is something no decoder takes.
     pub(in crate::packed) fn record(
         &self,
         frame: &Frame,
-        levels: usize,
+        layer: LayerForm,
         targets: &[Target],
     ) -> Option<CodedChunk> {
+        let levels = layer.levels;
         let lanes = lanes(targets.len());
         let starts = starts(targets.len(), lanes);
-        let mut ranges = vec![Recorder::default(); self.ranges(levels)];
-        let mut sums = vec![Sums::default(); self.ranges(levels)];
+        let mut ranges = vec![Recorder::default(); layer.ranges()];
+        let mut sums = vec![Sums::default(); layer.ranges()];
         let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
         let none = Target::default();
         let mut bounds = Extent([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
@@ -86,15 +106,23 @@ impl Form {
             rest.clear();
             let (base, finer) = ranges.split_first_mut()?;
             let (finer, parts) = finer.split_at_mut_checked(levels)?;
+            let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
             for (i, &set) in sets.iter().enumerate() {
                 let of =
                     |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
                 let group: [&Target; LANES] = std::array::from_fn(of);
-                let mut group = walk.base(base, set, Some(&group))?;
+                let targets = group;
+                let mut group = walk.base(base, set, Some(&targets))?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
                     refine(range, set, &mut group, levels - k);
                     sums[1 + k].refined(set, &group);
+                }
+                if let Some(range) = changed.first_mut() {
+                    let wanted: [Lanes; CHANGES] =
+                        std::array::from_fn(|k| std::array::from_fn(|l| targets[l].interim[k]));
+                    interim(range, set, &mut group, &wanted);
+                    sums[layer.interim_range()].interim(set, &group);
                 }
                 rest.push(set, group.colour);
                 bounds.add(set, &group, frame, levels)?;
@@ -113,18 +141,19 @@ impl Form {
         Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, ranges })
     }
 
-    /// Decodes a chunk of `gaussians` Gaussians with `levels` levels of refinement from as many ranges as are there: those
-    /// that follow one that is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
+    /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that
+    /// is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
     #[inline(always)]
     pub(super) fn play(
         &self,
-        levels: usize,
+        layer: LayerForm,
         gaussians: usize,
         lookup: &Lookup,
         ranges: &[Option<&[u8]>],
         want: Want,
         sink: &mut impl Sink,
     ) -> Option<Played> {
+        let levels = layer.levels;
         let lanes = lanes(gaussians);
         let of = |k: usize| ranges.get(k).copied().flatten();
         let mut base = Player::new(lookup, of(0)?, lanes, want.bits)?;
@@ -133,12 +162,17 @@ impl Form {
             finer.push(Player::new(lookup, bytes, lanes, want.bits)?);
         }
         let mut parts = Vec::new();
-        for bytes in (0..self.rest.least.len()).map_while(|k| of(1 + levels + k)) {
+        for bytes in (0..layer.parts).map_while(|k| of(1 + levels + k)) {
             parts.push(Player::new(lookup, bytes, lanes, want.bits)?);
         }
+        let changed = of(layer.interim_range()).filter(|_| layer.interim);
+        let mut changed = match changed {
+            Some(bytes) => Some(Player::new(lookup, bytes, lanes, want.bits)?),
+            None => None,
+        };
         let missing = levels - finer.len();
         let steps = gaussians.div_ceil(lanes);
-        let mut sums = vec![Sums::default(); if want.sums { self.ranges(levels) } else { 0 }];
+        let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
         let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
         for (step, set) in sets(gaussians, lanes).enumerate() {
             let mut group = walk.base(&mut base, set, None)?;
@@ -149,6 +183,12 @@ impl Form {
                 refine(range, set, &mut group, levels - k);
                 if want.sums {
                     sums[1 + k].refined(set, &group);
+                }
+            }
+            if let Some(range) = &mut changed {
+                interim(range, set, &mut group, &[[0; LANES]; CHANGES]);
+                if want.sums {
+                    sums[layer.interim_range()].interim(set, &group);
                 }
             }
             sink.group(step, rest.len(), set, &group, [levels, missing])?;
@@ -164,7 +204,7 @@ impl Form {
                 rest.clear();
             }
         }
-        let all = || std::iter::once(&base).chain(&finer).chain(&parts);
+        let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
         let mut bits = BitCounts::default();
         all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
         all()
@@ -191,7 +231,7 @@ struct Extent([[f32; 3]; 2]);
 impl Extent {
     /// Includes the positions of the lanes in `set`. `None` if there is something no decoder takes.
     fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
-        let drawn = Drawn::new(frame, group, [levels, 0]);
+        let drawn = Drawn::new(frame, group, [levels, 0], &[false; LANES]);
         let [least, most] = &mut self.0;
         for l in (0..LANES).filter(|&l| has(set, l)) {
             for (k, position) in drawn.position.iter().enumerate() {
@@ -247,6 +287,11 @@ impl Sums {
     fn refined_of(&mut self, l: usize, group: &Group) {
         self.add(l, &group.counts.map(|x| x[l]));
         self.add(l, &group.rotation.map(|x| x[l].cast_signed()));
+    }
+
+    /// Interim changes.
+    fn interim(&mut self, set: u32, group: &Group) {
+        (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.add(l, &group.interim.map(|x| x[l])));
     }
 
     /// Number of nonzeros, atoms with values; -1 and the bits of an exact row.

@@ -1,12 +1,10 @@
 //! Decoding the chunks of a file of version 3.
 
-use std::ops::Range;
-
 use half::f16;
 
 use super::chunk::Want;
 use super::head::Head;
-use super::index::Chunk;
+use super::index::{Chunk, Index};
 use super::player::Player;
 use super::streams::Stream;
 use super::symbols::{LANES, Symbols};
@@ -33,16 +31,13 @@ pub(in crate::packed) struct LayeredDecoder {
 }
 
 impl LayeredDecoder {
-    /// Reads the head, which is `bytes`, of a file whose data has this length.
-    pub(in crate::packed) fn new(packed: &PackedHead, bytes: &[u8], data: usize) -> Result<Self> {
+    /// Reads the head, which is `bytes`.
+    pub(in crate::packed) fn new(packed: &PackedHead, bytes: &[u8]) -> Result<Self> {
         let file = packed.file.clone();
         let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
         let head = Head::read(bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
         if head.index.gaussians() != packed.gaussians || head.rest.atoms != packed.atoms {
             return Err(bad("head does not fit the metadata"));
-        }
-        if head.index.data_bytes() != data as u64 {
-            return Err(bad("ranges do not cover the data"));
         }
         let tables = Tables::read(&head.tables).ok_or_else(|| bad("tables are damaged"))?;
         let lookup = Lookup::new(&tables);
@@ -62,12 +57,18 @@ impl LayeredDecoder {
         &self.unpacker.dictionary
     }
 
-    /// The Gaussians of each chunk.
-    pub(in crate::packed) fn spans(&self) -> Vec<Range<usize>> {
-        self.head.index.chunks.iter().map(|chunk| chunk.first..chunk.first + chunk.gaussians).collect()
+    /// Makes no interim changes but of scales from here on.
+    pub(in crate::packed) fn grow_only(&mut self) {
+        let [growth, ..] = self.unpacker.frame.interim;
+        self.unpacker.frame.interim = [growth, 0, 0];
     }
 
-    /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
+    /// Layers, chunks and ranges.
+    pub(in crate::packed) fn index(&self) -> &Index {
+        &self.head.index
+    }
+
+    /// Decodes chunk `c` to `place` from the ranges that are in `data`, which may end early. Escapes are numbered from `first`.
     pub(in crate::packed) fn piece(
         &self,
         data: &[u8],
@@ -79,11 +80,18 @@ impl LayeredDecoder {
     ) -> Result<Piece> {
         let damaged =
             || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
-        let chunk = self.head.index.chunks.get(c).ok_or_else(damaged)?;
-        let ranges = self.checked(data, c, chunk)?;
+        let index = &self.head.index;
+        let chunk = index.chunks.get(c).ok_or_else(damaged)?;
+        let form = index.layer(chunk.layer);
+        let mut ranges = self.checked(data, c, chunk)?;
+        let alone = index.alone(chunk.layer, |range| range.end() <= data.len() as u64);
+        if alone.is_empty()
+            && let Some(interim) = ranges.get_mut(form.interim_range())
+        {
+            *interim = None;
+        }
         let want = Want { sums: false, bits: count_bits };
-        let levels = usize::from(self.head.index.levels.get(chunk.layer).copied().unwrap_or(0));
-        let (mut piece, _) = self.unpacker.chunk(levels, &ranges, want, place).ok_or_else(damaged)?;
+        let (mut piece, _) = self.unpacker.chunk(form, &alone, &ranges, want, place).ok_or_else(damaged)?;
         for escape in &mut piece.escapes.gaussians {
             *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
         }
@@ -103,17 +111,18 @@ impl LayeredDecoder {
         Ok(piece)
     }
 
-    /// The ranges of a chunk, if their checksums hold.
+    /// The ranges of a chunk that are whole in `data`, if their checksums hold.
     fn checked<'d>(&self, data: &'d [u8], c: usize, chunk: &Chunk) -> Result<Vec<Option<&'d [u8]>>> {
         let range = |(k, range): (usize, &super::index::Range)| {
-            let part = || format!("range {k} of chunk {c}");
-            let start = usize::try_from(range.start).ok();
-            let bytes = start.and_then(|start| data.get(start..start.checked_add(range.length as usize)?));
-            let bytes = bytes.filter(|bytes| crc32fast::hash(bytes) == range.checksum);
-            match bytes {
-                Some(bytes) => Ok(Some(bytes)),
-                None => Err(Error::format(&self.file, FormatError::Checksum { part: part() })),
+            let (start, end) = (usize::try_from(range.start).ok(), usize::try_from(range.end()).ok());
+            let Some(bytes) = start.zip(end).and_then(|(start, end)| data.get(start..end)) else {
+                return Ok(None);
+            };
+            if crc32fast::hash(bytes) != range.checksum {
+                let part = format!("range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { part }));
             }
+            Ok(Some(bytes))
         };
         chunk.ranges.iter().enumerate().map(range).collect()
     }

@@ -3,9 +3,10 @@
 use super::bytes::ByteReader;
 use super::chunk::Form;
 use super::index::Index;
+use super::interim::{KINDS, MOST_STEP};
 use super::mean_view::{MAX_POINTS, MeanView};
 use super::rest::RestForm;
-use super::steering::{Integers, Steering, Step};
+use super::steering::{Integers, Steering, Step, VALUE_BITS};
 use super::streams::REST_PARTS;
 use super::unpack::Frame;
 use crate::packed::parameters::{LAST_CLASS, Parameters};
@@ -26,6 +27,8 @@ pub(in crate::packed) struct Head {
     /// Binary logarithm of the unit of base colours.
     pub(in crate::packed) dc_exponent: u8,
     pub(in crate::packed) rest: RestForm,
+    /// Steps of interim changes, if there are any, of scales, opacities and base colours.
+    pub(in crate::packed) interim: Option<[u32; KINDS]>,
     pub(in crate::packed) mean_view: MeanView,
     pub(in crate::packed) integers: Integers,
     /// Its steps of values and its unit of base colours follow from the other fields.
@@ -74,6 +77,15 @@ impl Head {
         head
     }
 
+    /// The same with interim changes in these steps.
+    pub(in crate::packed) fn with_interim(mut self, [scale, opacity, colour]: [f64; KINDS]) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let step = |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(1.0, f64::from(MOST_STEP)) as u32;
+        self.interim = Some([step(scale), step(opacity), step(colour / self.dc_unit())]);
+        self.complete();
+        self
+    }
+
     /// The unit of base colours.
     pub(in crate::packed) fn dc_unit(&self) -> f64 {
         f64::from_bits((1023 + u64::from(self.dc_exponent)) << 52)
@@ -87,6 +99,7 @@ impl Head {
             // 2 to the power of the class, which is at most 15.
             false => self.value_step * f32::from_bits((127 + class as u32) << 23),
         };
+        self.frame.interim = self.interim.unwrap_or_default();
         self.frame.value_steps = std::array::from_fn::<f32, { LAST_CLASS as usize + 1 }, _>(step);
     }
 
@@ -100,7 +113,9 @@ impl Head {
         out.extend((self.rest.atoms as u16).to_le_bytes());
         let points = &self.mean_view.points;
         out.extend([self.atom_bits, self.dc_exponent, self.rest.least.len() as u8, points.len() as u8]);
+        out.push(u8::from(self.interim.is_some()));
         out.extend(self.rest.least.iter().map(|&least| least as u8));
+        out.extend(self.interim.iter().flatten().flat_map(|step| step.to_le_bytes()));
         let f = &self.frame;
         let softening: &[f32] = if points.is_empty() { &[] } else { &[self.mean_view.softening] };
         let floats = [
@@ -140,14 +155,22 @@ impl Head {
         let atoms = usize::from(from.u16()?);
         let [atom_bits, dc_exponent, parts, points] = [from.u8()?, from.u8()?, from.u8()?, from.u8()?];
         let (parts, points) = (usize::from(parts), usize::from(points));
+        let interim = from.u8()?;
         let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
         let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
         let within = atom_bits <= MAX_ATOM_BITS && dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
-        if !(atoms_can_be && parts_can_be && within) {
+        if !(atoms_can_be && parts_can_be && within && interim <= 1) {
             return None;
         }
         let least: Vec<u32> = from.bytes(parts)?.iter().map(|&least| u32::from(least)).collect();
         if !least.is_sorted_by(|a, b| a > b) || least.last().is_some_and(|&last| last != 1) {
+            return None;
+        }
+        let interim = match interim {
+            0 => None,
+            _ => Some([from.u32()?, from.u32()?, from.u32()?]),
+        };
+        if interim.iter().flatten().any(|step| !(1..=MOST_STEP).contains(step)) {
             return None;
         }
         let (origin, cell, dc_mean) = (from.f32s()?, from.f32()?, from.f32s()?);
@@ -181,6 +204,7 @@ impl Head {
             atom_bits,
             dc_exponent,
             rest: RestForm { dim, atoms, least },
+            interim,
             mean_view,
             integers: Integers { cell: cell_log, shape, steps, turns, moves, means, predictors },
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },
@@ -190,7 +214,7 @@ impl Head {
             dictionary,
             index: Index::default(),
         };
-        head.index = Index::read(&mut from, head.rest.least.len())?;
+        head.index = Index::read(&mut from, head.rest.least.len(), interim.is_some())?;
         head.complete();
         from.0.is_empty().then_some(head)
     }

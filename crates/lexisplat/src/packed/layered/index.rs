@@ -1,6 +1,7 @@
 //! The index of a file: its layers and their chunks, and the ranges of all chunks in the order of the data.
 
 use super::bytes::ByteReader;
+use super::chunk::LayerForm;
 use super::walk::MAX_LEVELS;
 
 /// Most layers of a file.
@@ -22,6 +23,13 @@ pub(in crate::packed) struct Range {
     pub(in crate::packed) integers: u32,
 }
 
+impl Range {
+    /// Where it ends in the data.
+    pub(in crate::packed) fn end(&self) -> u64 {
+        self.start.saturating_add(self.length.into())
+    }
+}
+
 /// A chunk of a layer.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Chunk {
@@ -34,7 +42,7 @@ pub(in crate::packed) struct Chunk {
     pub(in crate::packed) cell: u64,
     /// Least and largest coordinates of its positions. No decoder needs them.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
-    /// A base, levels of refinement, and parts of nonzeros.
+    /// A base, levels of refinement, parts of nonzeros, and interim changes.
     pub(in crate::packed) ranges: Vec<Range>,
 }
 
@@ -48,12 +56,22 @@ pub(in crate::packed) struct Place {
 /// The layers, chunks and ranges of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Index {
-    /// Levels of refinement of each layer.
-    pub(in crate::packed) levels: Vec<u8>,
+    pub(in crate::packed) layers: Vec<LayerForm>,
     /// Layer by layer.
     pub(in crate::packed) chunks: Vec<Chunk>,
     /// All ranges in the order of the data.
     pub(in crate::packed) order: Vec<Place>,
+}
+
+/// The layers with these levels of refinement.
+pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool) -> Vec<LayerForm> {
+    let last = levels.len().saturating_sub(1);
+    let form = |(k, &levels): (usize, &u8)| LayerForm {
+        levels: levels.into(),
+        parts,
+        interim: interim && k < last,
+    };
+    levels.iter().enumerate().map(form).collect()
 }
 
 impl Index {
@@ -84,9 +102,45 @@ impl Index {
         self.chunks.iter().flat_map(|chunk| &chunk.ranges).map(|range| u64::from(range.length)).sum()
     }
 
+    /// How the chunks of a layer are coded.
+    pub(in crate::packed) fn layer(&self, layer: usize) -> LayerForm {
+        self.layers.get(layer).copied().unwrap_or_default()
+    }
+
+    /// Where the second layer starts in the data, if there is one.
+    pub(in crate::packed) fn first_layer_end(&self) -> Option<u64> {
+        let second = |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
+        let place = self.order.iter().find(second)?;
+        self.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind)).map(|range| range.start)
+    }
+
+    /// The cells of a layer around which the next one is not there, if it has interim changes. `there` says which ranges are.
+    pub(in crate::packed) fn alone(
+        &self,
+        layer: usize,
+        there: impl Fn(&Range) -> bool,
+    ) -> Vec<std::ops::Range<u64>> {
+        let mut alone: Vec<std::ops::Range<u64>> = Vec::new();
+        if !self.layer(layer).interim {
+            return alone;
+        }
+        let mut next = self.chunks.iter().filter(|chunk| chunk.layer == layer + 1).peekable();
+        let mut start = 0;
+        while let Some(chunk) = next.next() {
+            let end = next.peek().map_or(u64::MAX, |chunk| chunk.cell);
+            match alone.last_mut() {
+                _ if chunk.ranges.first().is_some_and(&there) => {}
+                Some(last) if last.end == start => last.end = end,
+                _ => alone.push(start..end),
+            }
+            start = end;
+        }
+        alone
+    }
+
     pub(super) fn write(&self, out: &mut Vec<u8>) {
-        out.push(self.levels.len() as u8);
-        out.extend(&self.levels);
+        out.push(self.layers.len() as u8);
+        out.extend(self.layers.iter().map(|layer| layer.levels as u8));
         out.extend((self.chunks.len() as u32).to_le_bytes());
         for chunk in &self.chunks {
             out.push(chunk.layer as u8);
@@ -104,24 +158,25 @@ impl Index {
         }
     }
 
-    /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros; `None` for anything else.
-    pub(super) fn read(from: &mut ByteReader<'_>, parts: usize) -> Option<Self> {
+    /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros, and with interim changes in all layers but
+    /// the last if there are any; `None` for anything else.
+    pub(super) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
         let layers = usize::from(from.u8()?);
-        let levels = from.bytes(layers)?.to_vec();
+        let levels = from.bytes(layers)?;
         if layers > MAX_LAYERS || levels.iter().any(|&levels| usize::from(levels) > MAX_LEVELS) {
             return None;
         }
-        let mut index = Self { levels, ..Self::default() };
+        let mut index = Self { layers: layer_forms(levels, parts, interim), ..Self::default() };
         let (mut ranges, mut last) = (0, 0);
         // Every chunk and every range takes bytes of the index, so their numbers are bounded by its length.
         for _ in 0..from.u32()? {
             let (layer, gaussians) = (usize::from(from.u8()?), from.u32()? as usize);
             let (cell, bounds) = (from.u64()?, [from.f32s()?, from.f32s()?]);
-            let levels = usize::from(*index.levels.get(layer)?);
+            let form = *index.layers.get(layer)?;
             if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last {
                 return None;
             }
-            let blank = vec![Range::default(); 1 + levels + parts];
+            let blank = vec![Range::default(); form.ranges()];
             (ranges, last) = (ranges + blank.len(), layer);
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
         }

@@ -27,7 +27,7 @@ macro_rules! streams {
         }
     };
 }
-streams! { 27:
+streams! { 30:
     /// Gaps between cells along the Morton curve.
     Cell => "position",
     /// Step class of the colour.
@@ -65,6 +65,10 @@ streams! { 27:
     AtomPage => "codes.indices",
     /// Coefficients of the atoms.
     Dictionary => "dictionary",
+    /// How a Gaussian changes while those of the next layer around it are not there.
+    InterimScale => "interim",
+    InterimOpacity => "interim",
+    InterimDc => "interim",
 }
 
 impl Stream {

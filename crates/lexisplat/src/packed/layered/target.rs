@@ -1,5 +1,6 @@
 //! What the encoder is to code of a Gaussian.
 
+use super::interim::CHANGES;
 use super::steering::VALUE_BITS;
 use super::values::across;
 use crate::packed::canonical::Canonical;
@@ -25,8 +26,17 @@ pub(in crate::packed) struct Target {
     pub(super) offset: [f64; 3],
     /// Pairs (atom, value in steps) with values that are not zero, largest first.
     pub(in crate::packed) code: Vec<(u16, i32)>,
+    /// Steps of its interim changes.
+    pub(in crate::packed) interim: [i32; CHANGES],
     /// The exact row, if it has no code; otherwise empty.
     pub(in crate::packed) exact: Vec<f32>,
+}
+
+/// `x` as a value.
+fn value(x: f64) -> i32 {
+    #[expect(clippy::cast_possible_truncation, reason = "clamped")]
+    let value = libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;
+    value
 }
 
 impl Target {
@@ -39,9 +49,6 @@ impl Target {
         parameters: &Parameters,
         dc_unit: f64,
     ) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-        let value =
-            |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(-MOST_VALUE, MOST_VALUE) as i32;
         let [s0, s1, s2] = form.scales.map(|s| value(f64::from(s)));
         let opacity = value(f64::from(form.log_opacity.max(LEAST_LOG_OPACITY)));
         let [d0, d1, d2] = parameters.dc_coordinates(form.dc).map(|d| value(f64::from(d) / dc_unit));
@@ -52,6 +59,7 @@ impl Target {
             axes: form.axes,
             offset: std::array::from_fn(|k| f64::from(form.position[k]) - centre[k]),
             code: Vec::new(),
+            interim: [0; CHANGES],
             exact: Vec::new(),
         }
     }

@@ -1,8 +1,11 @@
 //! Decoding a chunk to what is drawn.
 
+use std::ops::Range;
+
 use half::f16;
 
-use super::chunk::{Form, Sink, Want, starts};
+use super::chunk::{Form, LayerForm, Sink, Want, starts};
+use super::interim::{KINDS, change};
 use super::mean_view::{MOST, MeanView, seen, seen_row};
 use super::rest::{BLOCK, Coded, Cursor, Rest};
 use super::steering::VALUE_BITS;
@@ -29,6 +32,8 @@ pub(in crate::packed) struct Frame {
     pub(in crate::packed) dc_mean: Vec3,
     pub(in crate::packed) dc_axes: [Vec3; 3],
     pub(in crate::packed) dc_unit: f32,
+    /// Steps of interim changes; 0 if there are none.
+    pub(in crate::packed) interim: [u32; KINDS],
     /// Steps of the values of nonzeros, by colour class.
     pub(in crate::packed) value_steps: [f32; LAST_CLASS as usize + 1],
 }
@@ -44,23 +49,25 @@ pub(in crate::packed) struct Unpacker {
 }
 
 impl Unpacker {
-    /// Decodes a chunk with `levels` levels from the ranges that are there to `place`. Escapes are numbered from its
-    /// start. `None` if no encoder writes it.
+    /// Decodes a chunk of a layer from the ranges that are there to `place`. Interim changes are made to Gaussians in the cells
+    /// `alone`. Escapes are numbered from its start. `None` if no encoder writes it.
     pub(in crate::packed) fn chunk(
         &self,
-        levels: usize,
+        layer: LayerForm,
+        alone: &[Range<u64>],
         ranges: &[Option<&[u8]>],
         want: Want,
         place: &mut Place<'_>,
     ) -> Option<(Piece, Vec<u32>)> {
-        Simd::current().run(Job { with: self, levels, ranges, want, place })
+        Simd::current().run(Job { with: self, layer, alone, ranges, want, place })
     }
 }
 
 /// The work of [`Unpacker::chunk`], compiled once for each vector width.
 struct Job<'j, 'p, 'r> {
     with: &'j Unpacker,
-    levels: usize,
+    layer: LayerForm,
+    alone: &'j [Range<u64>],
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
     place: &'j mut Place<'p>,
@@ -71,13 +78,13 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, levels, ranges, want, place } = self;
+        let Self { with, layer, alone, ranges, want, place } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
         let blank = [[0.0; LANES]; MOST];
         let weights = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
-        let mut out = Out { with, place, starts, lanes: Lanes::default(), sorted: Vec::new(), weights };
-        let played = with.form.play(levels, n, &with.lookup, ranges, want, &mut out)?;
+        let mut out = Out { with, place, alone, starts, lanes: Lanes::default(), sorted: Vec::new(), weights };
+        let played = with.form.play(layer, n, &with.lookup, ranges, want, &mut out)?;
         let [mut all, rest @ ..] = out.lanes;
         for lane in rest {
             all.atoms.extend(lane.atoms);
@@ -96,6 +103,8 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 struct Out<'j, 'p> {
     with: &'j Unpacker,
     place: &'j mut Place<'p>,
+    /// Cells around which the next layer is not there.
+    alone: &'j [Range<u64>],
     /// First Gaussian of each lane.
     starts: [usize; LANES + 1],
     lanes: Lanes<Piece>,
@@ -114,7 +123,10 @@ impl Sink for Out<'_, '_> {
         group: &Group,
         levels: [usize; 2],
     ) -> Option<()> {
-        let drawn = Drawn::new(&self.with.frame, group, levels);
+        let is_alone =
+            |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
+        let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };
+        let drawn = Drawn::new(&self.with.frame, group, levels, &alone);
         if let Some(weights) = self.weights.get_mut(in_block) {
             *weights = self.with.mean_view.lanes(self.with.dictionary.degree(), &drawn.position);
         }
@@ -184,7 +196,7 @@ impl Sink for Out<'_, '_> {
     }
 }
 
-/// Eight Gaussians as numbers.
+/// One Gaussian of each lane as numbers.
 pub(super) struct Drawn {
     pub(super) position: [Lanes<f32>; 3],
     scales: [Lanes<f32>; 3],
@@ -197,22 +209,28 @@ pub(super) struct Drawn {
 
 impl Drawn {
     #[inline(always)]
-    pub(super) fn new(frame: &Frame, group: &Group, [levels, missing]: [usize; 2]) -> Self {
+    pub(super) fn new(
+        frame: &Frame,
+        group: &Group,
+        [levels, missing]: [usize; 2],
+        alone: &Lanes<bool>,
+    ) -> Self {
         let (coarse, finer) = (factor(levels), factor(missing));
         let mut values = group.coarse;
-        let mut within = [true; LANES];
-        for t in 0..TARGETS {
+        // Scales and opacities have no coarse steps.
+        for t in DC..TARGETS {
             for l in 0..LANES {
-                // Scales and opacities have no coarse steps.
-                if t < DC {
-                    within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
-                    continue;
-                }
                 let over = group.counts[t][l]
                     .wrapping_mul(finer)
                     .wrapping_sub(group.base[t][l].wrapping_mul(coarse));
                 values[t][l] = values[t][l].wrapping_add(over.wrapping_mul(group.steps[t][l]));
-                within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[t][l]);
+            }
+        }
+        change(&mut values, &group.interim, &frame.interim, alone);
+        let mut within = [true; LANES];
+        for values in &values {
+            for l in 0..LANES {
+                within[l] &= (-VALUE_LIMIT..VALUE_LIMIT).contains(&values[l]);
             }
         }
         let [directions, turns] = &group.axis_bits;

@@ -1,9 +1,10 @@
-//! The walk over the Gaussians of a chunk, eight lanes at a time, which encoder and decoder share.
+//! The walk over the Gaussians of a chunk, all lanes at a time, which encoder and decoder share.
 //!
 //! Every value is coded as the difference from a prediction, in units of a step. Prediction and step are made of coarse
 //! integers alone that the same range holds before, so finer ranges may be missing.
 
 use super::around::{AVERAGED, Around};
+use super::interim::CHANGES;
 use super::steering::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each, has};
@@ -38,10 +39,11 @@ pub(super) fn factor(levels: usize) -> i32 {
     FACTOR.pow(levels as u32)
 }
 
-/// Eight Gaussians as integers.
+/// One Gaussian of each lane as integers.
 #[derive(Debug, Clone)]
 pub(super) struct Group {
-    /// Coordinates of the cell.
+    /// Number of the cell on the Morton curve, and its coordinates.
+    pub(super) number: Lanes<u64>,
     pub(super) cell: [Lanes; 3],
     pub(super) colour: Lanes<u32>,
     pub(super) shape: Lanes<u32>,
@@ -64,6 +66,8 @@ pub(super) struct Group {
     /// What the encoder codes in the end: whole numbers of finest steps, and codes of rotations in full.
     pub(super) wanted: [Lanes; REFINED],
     pub(super) wanted_rotation: [Lanes<u32>; 3],
+    /// Steps of the changes while the next layer is not there: of the scales, the opacity and the base colour.
+    pub(super) interim: [Lanes; CHANGES],
 }
 
 /// The state of the walk over a chunk.
@@ -126,6 +130,7 @@ impl<'a> Walk<'a> {
         let mut features: [Lanes; COEFFICIENTS - 1] =
             [zeros, features_of(&colour), features_of(&shape), zeros, zeros, zeros];
         let mut group = Group {
+            number: self.cell,
             cell,
             colour,
             shape,
@@ -140,6 +145,7 @@ impl<'a> Walk<'a> {
             fineness: [[0; LANES]; 3],
             wanted: [zeros; REFINED],
             wanted_rotation: [[0; LANES]; 3],
+            interim: [zeros; CHANGES],
         };
         let coarse = factor(self.levels);
         let mut remembered = [zeros; AVERAGED];
@@ -283,7 +289,7 @@ const MAX_STEPS: f64 = 1e9;
 
 /// The whole number of steps that stands for `steps`.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-fn nearest(steps: f64) -> i32 {
+pub(super) fn nearest(steps: f64) -> i32 {
     let whole = (steps.abs().min(MAX_STEPS) + 0.5 - DEAD_ZONE).floor() as i32;
     if steps < 0.0 { -whole } else { whole }
 }
