@@ -202,7 +202,8 @@ impl Fit {
         let targets: Vec<Image> = self.targets.iter().step_by(VIEWS_ALONE).cloned().collect();
         let mut adjoint = PictureAdjoint::new(scene, &cameras)?;
         let progress = &OnlyCancels(progress);
-        let PictureErrors { errors, row_sums, opacity_squares, .. } = adjoint.of_errors(&targets, progress)?;
+        let PictureErrors { errors, row_sums, opacity_squares, .. } =
+            adjoint.of_errors(&targets, progress)?;
         let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len().max(1) as f32;
         let (mean_row, mean_square) = (mean(&row_sums), mean(&opacity_squares));
         let (mut ridge, mut diagonal) = (Vec::new(), Vec::new());

@@ -99,6 +99,9 @@ fn in_parts(
 
 /// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md).
 const VIEWPOINTS: usize = 4;
+fn vp() -> usize {
+    std::env::var("KV").ok().and_then(|v| v.parse().ok()).unwrap_or(VIEWPOINTS)
+}
 
 impl Packing {
     fn run(
@@ -149,7 +152,7 @@ impl Packing {
         };
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
         let options = match self.options.viewpoints.is_empty() {
-            true => self.options.clone().with_viewpoints(views.viewpoints(VIEWPOINTS)),
+            true => self.options.clone().with_viewpoints(views.viewpoints(vp())),
             false => self.options.clone(),
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;

@@ -214,9 +214,6 @@ impl PackingViews {
         let to_all =
             |of: [f32; 3], all: &[[f32; 3]]| all.iter().map(|&other| squared(of, other).sqrt()).sum::<f32>();
         let mut points: Vec<[f32; 3]> = least(&|p| to_all(p, &positions), &positions).into_iter().collect();
-        if std::env::var_os("PRINTV").is_some() {
-            eprintln!("{positions:?}");
-        }
         // Found views may be far away, where few photographs are taken.
         positions.sort_by(|&a, &b| to_nearest(a, &points).total_cmp(&to_nearest(b, &points)));
         positions.truncate((positions.len() as f32 * USUAL_VIEWS).ceil() as usize);

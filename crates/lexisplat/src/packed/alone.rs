@@ -34,31 +34,50 @@ pub(super) struct Alone {
     growth: Vec<i32>,
     /// And those by which its opacity grows, if pictures say nothing.
     opacity: Vec<i32>,
+    /// Number of layers that change.
+    layers: usize,
 }
 
 impl Alone {
-    /// The changes of the first `first` of the Gaussians at these places of `g`, which are both layers in the order of the
-    /// file. `probability` says how probable each was to be drawn into the first layer.
+    /// The changes of the Gaussians at these places of `g`, which are all layers in the order of the file, of so many
+    /// Gaussians each. `probability` says how probable a Gaussian was to be drawn into its layer.
     pub(super) fn new(
         g: &Geometry,
         places: &[MortonKey],
-        first: usize,
-        probability: impl Fn(usize) -> f64,
+        layers: &[usize],
+        probability: impl Fn(usize, usize) -> f64,
     ) -> Self {
-        let missing = missing(g, places, first);
-        let (mut growth, mut opacity) = (Vec::new(), Vec::new());
-        for (i, &x) in missing.iter().enumerate() {
-            let rare = libm::log(probability(i).max(f64::MIN_POSITIVE));
-            let grows = knob("KG", GROWTH) * libm::log1p(knob("KM", MISSING) * x) + knob("KR", RARE) * rare;
-            growth.push(steps(grows.clamp(0.0, knob("KMG", MOST_GROWTH) * STEPS[0]), STEPS[0]));
-            opacity.push(steps(knob("KO", OPACITY) * libm::log1p(x), STEPS[1]));
+        let mut alone = Self { layers: layers.len().saturating_sub(1), ..Self::default() };
+        let mut start = 0;
+        for (layer, count) in layers.iter().enumerate().take(alone.layers) {
+            let end = start + count;
+            let missing = missing(g, places, end);
+            for i in start..end {
+                let x = missing[i];
+                let rare = libm::log(probability(layer, i).max(f64::MIN_POSITIVE));
+                let grows =
+                    knob("KG", GROWTH) * libm::log1p(knob("KM", MISSING) * x) + knob("KR", RARE) * rare;
+                alone.growth.push(steps(grows.clamp(0.0, knob("KMG", MOST_GROWTH) * STEPS[0]), STEPS[0]));
+                alone.opacity.push(steps(knob("KO", OPACITY) * libm::log1p(x), STEPS[1]));
+            }
+            start = end;
         }
-        Self { growth, opacity }
+        alone
+    }
+
+    /// Whether Gaussians of a layer change.
+    pub(super) fn has(&self, layer: usize) -> bool {
+        layer < self.layers
     }
 
     /// The steps of Gaussian `i` of the first layer if pictures say nothing, or if they ask for `change`: the change of the
     /// logarithm of its opacity and of its base colour.
-    pub(super) fn steps(&self, i: usize, change: Option<&Appearance>, parameters: &Parameters) -> [i32; CHANGES] {
+    pub(super) fn steps(
+        &self,
+        i: usize,
+        change: Option<&Appearance>,
+        parameters: &Parameters,
+    ) -> [i32; CHANGES] {
         let growth = self.growth.get(i).copied().unwrap_or(0);
         let Some(Appearance { dc, log_opacity }) = change else {
             return [growth, self.opacity.get(i).copied().unwrap_or(0), 0, 0, 0];
@@ -74,8 +93,8 @@ fn steps(x: f64, step: f64) -> i32 {
     libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 
-/// What of opacity times area the second layer has around each Gaussian of the first, over what the Gaussian has. Each
-/// Gaussian of the second layer counts for the nearest one of the first.
+/// What of opacity times area the Gaussians from `first` on have around each of those before, over what that has. Each counts
+/// for the nearest one.
 fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let area = |place: &MortonKey| {
         let mut scales = g.scales[place.index()];
@@ -85,6 +104,9 @@ fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let area: Vec<f32> = places.iter().map(area).collect();
     let mass = |i: usize| f64::from(log_sigmoid(g.opacities[places[i].index()]).exp() * area[i]);
     let (ours, others) = places.split_at(first.min(places.len()));
+    // In the order of cells, which each layer is in.
+    let mut near: Vec<usize> = (0..ours.len()).collect();
+    near.sort_by_key(|&i| ours[i].cell);
     let mut sums = vec![0.0_f64; ours.len()];
     if ours.is_empty() {
         return sums;
@@ -92,14 +114,14 @@ fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let nearest = |j: usize| -> usize {
         let own = others[j];
         let position = g.positions[own.index()];
-        let at = ours.partition_point(|place| place.cell <= own.cell);
-        let near = at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS).min(ours.len());
+        let at = near.partition_point(|&i| ours[i].cell <= own.cell);
+        let near = &near[at.saturating_sub(NEIGHBOURS)..(at + NEIGHBOURS).min(ours.len())];
         let apart = |&i: &usize| {
             let other = g.positions[ours[i].index()];
             let square = (0..3).map(|k| (position[k] - other[k]).powi(2)).sum::<f32>();
             square / (area[i] + area[first + j]).max(f32::MIN_POSITIVE)
         };
-        near.min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(0)
+        near.iter().copied().min_by(|a, b| apart(a).total_cmp(&apart(b))).unwrap_or(0)
     };
     let owners = map_chunks(others.len(), GAUSSIANS_PER_TASK, |range| range.map(nearest).collect::<Vec<_>>());
     for (j, owner) in (first..).zip(owners.concat()) {

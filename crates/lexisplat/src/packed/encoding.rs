@@ -185,9 +185,22 @@ impl Encoding {
         let pieces = head.index.order.iter().map(piece).collect();
         if std::env::var("PRINTK").is_ok() {
             let mut sums = std::collections::BTreeMap::new();
-            for chunk in &head.index.chunks { for (k, r) in chunk.ranges.iter().enumerate() { let e = sums.entry((chunk.layer, k)).or_insert((0_u64, 0_usize)); e.0 += u64::from(r.length); e.1 += chunk.gaussians; } }
-            for (k, (b, g)) in sums { eprintln!("{k:?} {b} B {:.1} bits", b as f64 * 8.0 / g as f64); }
-            eprintln!("tables {} dictionary {} chunks {}", tables.write().len(), dictionary.finish(&tables, 1).len(), head.index.chunks.len());
+            for chunk in &head.index.chunks {
+                for (k, r) in chunk.ranges.iter().enumerate() {
+                    let e = sums.entry((chunk.layer, k)).or_insert((0_u64, 0_usize));
+                    e.0 += u64::from(r.length);
+                    e.1 += chunk.gaussians;
+                }
+            }
+            for (k, (b, g)) in sums {
+                eprintln!("{k:?} {b} B {:.1} bits", b as f64 * 8.0 / g as f64);
+            }
+            eprintln!(
+                "tables {} dictionary {} chunks {}",
+                tables.write().len(),
+                dictionary.finish(&tables, 1).len(),
+                head.index.chunks.len()
+            );
         }
         let data = Woven::new(spills.into_iter().map(Spill::finish).collect::<Result<_>>()?, pieces);
         if coder.dictionary.dim() > 0 {

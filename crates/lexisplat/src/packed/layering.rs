@@ -4,29 +4,30 @@ use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Scenes of fewer Gaussians have one layer. Their files are small.
 const LEAST_LAYERED: usize = 8000;
-/// Share of the Gaussians in the first layer of two.
-const FIRST_SHARE: f64 = 0.22;
-/// A Gaussian is drawn into the first layer with a probability that grows with this power of the change of pictures
-/// without it. With 1 those that show most would stand alone, with holes between them (docs/METHOD.md, "Layers").
+/// Shares of the Gaussians in all layers but the last, where there are several.
+const SHARES: [f64; 2] = [0.13, 0.19];
+/// A Gaussian is drawn into a layer with a probability that grows with this power of the change of pictures without it. With
+/// 1 those that show most would stand alone, with holes between them (docs/METHOD.md, "Layers").
 const ENERGY_POWER: f64 = 0.6;
 /// Steps of the search for the factor of these probabilities.
 const FACTOR_STEPS: usize = 60;
-/// Gaussians of a chunk of the first layer, and of others. Small ones arrive soon.
-const FIRST_CHUNK: usize = 8192;
+/// Gaussians of a chunk of each layer, and of a layer that is alone. Small ones arrive soon.
+const CHUNKS: [usize; LAYERS] = [8192, 8192, 16_384];
 const SIZE: usize = 32_768;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
-/// Levels of refinement of the first layer and of the second.
-const FIRST_LEVELS: u8 = 2;
-const SECOND_LEVELS: u8 = 1;
+/// Levels of refinement of each layer.
+const LEVELS: [u8; LAYERS] = [2, 2, 1];
+/// Number of layers, where there are several.
+const LAYERS: usize = SHARES.len() + 1;
 
 /// The layers of a file.
 #[derive(Debug, Clone)]
 pub(super) struct Layering {
-    /// Factor of the probabilities of the first layer; `None` if there is one layer.
-    factor: Option<f64>,
-    /// Sum of the probabilities so far.
-    sum: f64,
+    /// Factors of the probabilities of all layers but the last; none if there is one layer.
+    factors: Vec<f64>,
+    /// Sums of the probabilities so far.
+    sums: Vec<f64>,
 }
 
 impl Layering {
@@ -37,46 +38,63 @@ impl Layering {
         may_layer: bool,
         energies: impl Iterator<Item = f32> + Clone,
     ) -> Self {
-        let layered = may_layer && gaussians >= LEAST_LAYERED;
-        Self { factor: layered.then(|| factor(energies)), sum: 0.5 }
+        let mut factors = Vec::new();
+        if may_layer && gaussians >= LEAST_LAYERED {
+            let powers: Vec<f64> = energies.map(power).collect();
+            // The probability that a Gaussian is in no layer so far.
+            let mut left = vec![1.0; powers.len()];
+            for share in shares() {
+                let factor = factor(share, &powers, &left);
+                left.iter_mut()
+                    .zip(&powers)
+                    .for_each(|(left, power)| *left *= 1.0 - (factor * power).min(1.0));
+                factors.push(factor);
+            }
+        }
+        Self { sums: vec![0.5; factors.len()], factors }
     }
 
     /// The layer of the next Gaussian in the order of cells.
     pub(super) fn layer(&mut self, energy: f32) -> usize {
-        let Some(factor) = self.factor else { return 0 };
-        // Sums that pass whole numbers draw Gaussians that lie far apart.
-        let before = self.sum.floor();
-        self.sum += probability(energy, factor);
-        usize::from(self.sum.floor() <= before)
+        let power = power(energy);
+        for (layer, (factor, sum)) in self.factors.iter().zip(&mut self.sums).enumerate() {
+            // Sums that pass whole numbers draw Gaussians that lie far apart.
+            let before = sum.floor();
+            *sum += (factor * power).min(1.0);
+            if sum.floor() > before {
+                return layer;
+            }
+        }
+        self.factors.len()
     }
 
     /// Number of layers.
     pub(super) fn layers(&self) -> usize {
-        if self.factor.is_some() { 2 } else { 1 }
+        self.factors.len() + 1
     }
 
     /// How the layers are coded, with `parts` parts of nonzeros.
     pub(super) fn forms(&self, parts: usize) -> Vec<LayerForm> {
-        let levels: &[u8] = if self.factor.is_some() { &[FIRST_LEVELS, SECOND_LEVELS] } else { &[0] };
-        layer_forms(levels, parts, self.factor.is_some())
+        let levels: &[u8] = if self.layers() > 1 { &LEVELS } else { &[0] };
+        layer_forms(levels, parts, self.layers() > 1)
     }
 
-    /// Probability that a Gaussian is of the first layer, of which there are more.
-    pub(super) fn probability(&self, energy: f32) -> f64 {
-        self.factor.map_or(1.0, |factor| probability(energy, factor))
+    /// Probability that a Gaussian is of layer `layer` if it is of no layer before.
+    pub(super) fn probability(&self, layer: usize, energy: f32) -> f64 {
+        self.factors.get(layer).map_or(1.0, |factor| (factor * power(energy)).min(1.0))
     }
 
     /// Gaussians of a chunk of a layer.
     pub(super) fn chunk(&self, layer: usize) -> usize {
-        if self.factor.is_none() { SIZE } else if layer == 0 { crate::packed::alone::knob("K0", FIRST_CHUNK as f64) as usize } else { crate::packed::alone::knob("K1", SIZE as f64) as usize }
+        CHUNKS.get(layer).copied().filter(|_| self.layers() > 1).unwrap_or(SIZE)
     }
 
     /// How rows of `dim` coefficients are coded with `atoms` atoms.
     pub(super) fn rest(&self, dim: usize, atoms: usize) -> RestForm {
-        let least = match self.factor {
+        let least = match self.layers() {
             _ if dim == 0 => Vec::new(),
-            Some(_) => PARTS.to_vec(),
-            None => vec![1],
+            1 => vec![1],
+            _ => PARTS.to_vec(),
         };
         RestForm { dim, atoms, least }
     }
@@ -84,66 +102,78 @@ impl Layering {
     /// The order of the ranges of `chunks` in the data, of which the first layers come first. Chunks have `parts` parts of
     /// nonzeros.
     pub(super) fn order(&self, chunks: &[Chunk], parts: usize) -> Vec<Place> {
+        let forms = self.forms(parts);
         let mut order = Vec::new();
         let mut put = |chunk: usize, kind: usize| {
             order.push(Place { chunk: chunk as u32, kind: kind as u8 });
         };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
-        if self.factor.is_none() {
-            of(0).for_each(|c| put(c, 0));
-            of(0).for_each(|c| (0..parts).for_each(|part| put(c, 1 + part)));
-            return order;
-        }
-        // Ranges of the first layer: base, two refinements, parts, interim changes. Of the second: base, refinement, parts.
-        let (first, second) = (1 + usize::from(FIRST_LEVELS), 1 + usize::from(SECOND_LEVELS));
+        // The first layer at once: base, interim changes, the largest nonzeros.
         of(0).for_each(|c| put(c, 0));
-        of(0).for_each(|c| put(c, first + parts));
+        if forms[0].interim {
+            of(0).for_each(|c| put(c, forms[0].interim_range()));
+        }
         if parts > 0 {
-            of(0).for_each(|c| put(c, first));
+            of(0).for_each(|c| put(c, 1 + forms[0].levels));
         }
-        // Where the second layer arrives, the first becomes as fine.
-        let mut finer = of(0).peekable();
-        let mut later = of(1).skip(1).map(|c| chunks[c].cell);
-        for c in of(1) {
-            put(c, 0);
-            if parts > 0 {
-                put(c, second);
+        // Where the next layer arrives, those before become finer by a level.
+        let mut finer: Vec<usize> = vec![0; forms.len()];
+        for (layer, form) in forms.iter().enumerate().skip(1) {
+            let mut before: Vec<_> = (0..layer).map(|layer| of(layer).peekable()).collect();
+            let mut later = of(layer).skip(1).map(|c| chunks[c].cell);
+            for c in of(layer) {
+                put(c, 0);
+                if form.interim {
+                    put(c, form.interim_range());
+                }
+                if parts > 0 {
+                    put(c, 1 + form.levels);
+                }
+                let end = later.next().unwrap_or(u64::MAX);
+                for (k, before) in before.iter_mut().enumerate().filter(|(k, _)| finer[*k] < forms[*k].levels)
+                {
+                    while let Some(c) = before.next_if(|&c| chunks[c].cell < end) {
+                        put(c, 1 + finer[k]);
+                    }
+                }
             }
-            let end = later.next().unwrap_or(u64::MAX);
-            while let Some(c) = finer.next_if(|&c| chunks[c].cell < end) {
-                put(c, 1);
+            for (k, before) in before.into_iter().enumerate().filter(|(k, _)| finer[*k] < forms[*k].levels) {
+                before.for_each(|c| put(c, 1 + finer[k]));
             }
+            (0..layer).for_each(|k| finer[k] = (finer[k] + 1).min(forms[k].levels));
         }
-        finer.for_each(|c| put(c, 1));
+        // The rest in all layers: larger nonzeros, what is left of coarse steps, the smallest nonzeros.
+        let all = || (0..chunks.len()).map(|c| (c, chunks[c].layer));
         let last = parts.saturating_sub(1);
         for part in 1..last {
-            of(0).for_each(|c| put(c, first + part));
-            of(1).for_each(|c| put(c, second + part));
+            all().for_each(|(c, layer)| put(c, 1 + forms[layer].levels + part));
         }
-        of(0).for_each(|c| put(c, 2));
-        of(1).for_each(|c| put(c, 1));
+        for (c, layer) in all() {
+            (finer[layer]..forms[layer].levels).for_each(|level| put(c, 1 + level));
+        }
         if last > 0 {
-            of(0).for_each(|c| put(c, first + last));
-            of(1).for_each(|c| put(c, second + last));
+            all().for_each(|(c, layer)| put(c, 1 + forms[layer].levels + last));
         }
         order
     }
 }
 
-/// Probability that a Gaussian is of the first layer.
-fn probability(energy: f32, factor: f64) -> f64 {
-    let power = libm::pow(f64::from(energy).max(0.0), crate::packed::alone::knob("KE", ENERGY_POWER));
-    (factor * power).min(1.0)
+/// What probabilities are proportional to, unless they are 1.
+fn power(energy: f32) -> f64 {
+    libm::pow(f64::from(energy).max(0.0), ENERGY_POWER)
 }
 
-/// The factor with which probabilities sum to the share of the first layer.
-fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
-    let count = energies.clone().count() as f64;
-    let sum = |factor: f64| energies.clone().map(|e| probability(e, factor)).sum::<f64>();
+/// The factor with which probabilities sum to `share` of all Gaussians, of which these shares are left.
+fn factor(share: f64, powers: &[f64], left: &[f64]) -> f64 {
+    let wanted = (share * powers.len() as f64).max(f64::MIN_POSITIVE);
+    let sum = |factor: f64| {
+        powers.iter().zip(left).map(|(power, left)| left * (factor * power).min(1.0)).sum::<f64>()
+    };
     // As if all probabilities were below 1; more where some are not.
-    let mut factor = share() * count / sum_of_powers(energies.clone()).max(f64::MIN_POSITIVE);
+    let whole: f64 = powers.iter().zip(left).map(|(power, left)| left * power).sum();
+    let mut factor = wanted / whole.max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {
-        let found = sum(factor) / (share() * count).max(f64::MIN_POSITIVE);
+        let found = sum(factor) / wanted;
         if !found.is_finite() || found <= 0.0 || (found - 1.0).abs() < 1e-6 {
             break;
         }
@@ -152,8 +182,6 @@ fn factor(energies: impl Iterator<Item = f32> + Clone) -> f64 {
     factor
 }
 
-fn sum_of_powers(energies: impl Iterator<Item = f32>) -> f64 {
-    energies.map(|e| libm::pow(f64::from(e).max(0.0), crate::packed::alone::knob("KE", ENERGY_POWER))).sum()
+fn shares() -> [f64; 2] {
+    [crate::packed::alone::knob("KS", SHARES[0]), crate::packed::alone::knob("KS1", SHARES[1])]
 }
-
-fn share() -> f64 { crate::packed::alone::knob("KS", FIRST_SHARE) }

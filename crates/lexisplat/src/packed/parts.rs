@@ -163,7 +163,8 @@ impl PartPacker {
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&classes, &sample.geometry, &scene);
         let layering = Layering::new(total, !options.one_layer, kept.iter().map(|&i| weights.shown[i][1]));
-        let view = View { splats: sample, scene: &scene, classes: &classes, appearances: None, changes: None };
+        let view =
+            View { splats: sample, scene: &scene, classes: &classes, appearances: None, changes: None };
         let coder = ChunkCoder::new(view, total, floor.parameters.clone(), mean_view, options, progress)?;
         progress.check()?;
         let most_dc = most_dc(&floor.parameters, &dc);
@@ -242,7 +243,8 @@ impl PartPacker {
             let layer_form = forms.get(k).copied().unwrap_or_default();
             let (form, frame) = (&self.encoding.form, &self.encoding.head.frame);
             let chunks: Vec<&[Target]> = layer.pending[..whole].chunks(size).collect();
-            let coded = map_vec(chunks, |targets| form.record(frame, layer_form, targets).ok_or_else(too_large));
+            let coded =
+                map_vec(chunks, |targets| form.record(frame, layer_form, targets).ok_or_else(too_large));
             for chunk in coded {
                 let chunk = chunk?;
                 let none = Tally::new(self.encoding.coder.dictionary.dim());

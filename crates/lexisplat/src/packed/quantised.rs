@@ -84,7 +84,13 @@ impl<'a> Quantised<'a> {
     ) -> Result<Self> {
         let n = gaussians.scene.len();
         let layering = Layering::new(n, !options.one_layer, gaussians.weights.iter().map(|w| w[1]));
-        let view = View { splats, scene: &gaussians.scene, classes: &gaussians.classes, appearances: None, changes: None };
+        let view = View {
+            splats,
+            scene: &gaussians.scene,
+            classes: &gaussians.classes,
+            appearances: None,
+            changes: None,
+        };
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, parameters, mean_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
@@ -112,11 +118,9 @@ impl<'a> Quantised<'a> {
             chunks.extend((start..end).step_by(size).map(|first| (layer, first..end.min(first + size))));
             start = end;
         }
-        let mut alone = Alone::default();
-        if let (Some(&first), true) = (counts.first(), counts.len() > 1) {
-            let probability = |i: usize| encoding.layering.probability(gaussians.weights[i][1]);
-            alone = Alone::new(&splats.geometry, &gaussians.scene, first, probability);
-        }
+        let probability =
+            |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.weights[i][1]);
+        let alone = Alone::new(&splats.geometry, &gaussians.scene, &counts, probability);
         let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
         let view = part.view(None)?;
         let codes = part.chunks.iter().map(|(_, range)| {
@@ -225,7 +229,7 @@ impl<'a> Quantised<'a> {
         map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
             progress.check()?;
             let (tally, mut targets) = coder.targets(view.part(range.clone()), codes, unit)?;
-            for (i, target) in range.clone().zip(&mut targets).filter(|_| *layer == 0) {
+            for (i, target) in range.clone().zip(&mut targets).filter(|_| self.alone.has(*layer)) {
                 let change = view.changes.and_then(|changes| changes.get(i));
                 target.interim = self.alone.steps(i, change, &coder.parameters);
             }
@@ -302,7 +306,8 @@ mod tests {
         let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
         let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
         assert_eq!((quantised.len(), quantised.weights().len(), quantised.is_empty()), (50, 50, false));
-        let refused = |shown: &[Appearance]| quantised.finish(Some(shown), None, &Silent).unwrap_err().to_string();
+        let refused =
+            |shown: &[Appearance]| quantised.finish(Some(shown), None, &Silent).unwrap_err().to_string();
         let good = Appearance { dc: [0.0; 3], log_opacity: -1.0 };
         assert!(refused(&[good; 49]).contains("50 entries"));
         assert!(refused(&[Appearance { dc: [f32::NAN; 3], ..good }; 50]).contains("NaN"));

@@ -94,7 +94,12 @@ impl<'a> LexiReader<'a> {
             let data = super::packed::data(&checked)?;
             let first = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok());
             let decoder = match first {
-                Some(f) => Decoder::of_prefix(&head, &data[..((f * checked.bytes().len() as f64) as usize).saturating_sub(checked.bytes().len() - data.len()).min(data.len())])?,
+                Some(f) => Decoder::of_prefix(
+                    &head,
+                    &data[..((f * checked.bytes().len() as f64) as usize)
+                        .saturating_sub(checked.bytes().len() - data.len())
+                        .min(data.len())],
+                )?,
                 None => Decoder::new(&head, data)?,
             };
             let mut head = head;
@@ -301,7 +306,9 @@ impl PackedFile<'_> {
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
         let mut data = super::packed::data(&self.checked)?;
         if let Some(f) = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok()) {
-            data = &data[..((f * self.checked.bytes().len() as f64) as usize).saturating_sub(self.checked.bytes().len() - data.len()).min(data.len())];
+            data = &data[..((f * self.checked.bytes().len() as f64) as usize)
+                .saturating_sub(self.checked.bytes().len() - data.len())
+                .min(data.len())];
         }
         let parts = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)

@@ -115,7 +115,7 @@ impl Form {
                 let mut group = walk.base(base, set, Some(&targets))?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
-                    refine(range, set, &mut group, levels - k);
+                    refine(range, set, &mut group, levels - k)?;
                     sums[1 + k].refined(set, &group);
                 }
                 if let Some(range) = changed.first_mut() {
@@ -180,7 +180,7 @@ impl Form {
                 sums[0].base(set, &group);
             }
             for (k, range) in finer.iter_mut().enumerate() {
-                refine(range, set, &mut group, levels - k);
+                refine(range, set, &mut group, levels - k)?;
                 if want.sums {
                     sums[1 + k].refined(set, &group);
                 }
@@ -199,6 +199,11 @@ impl Form {
                     if want.sums {
                         sums[1 + levels + part].rest(&rest, &self.rest, part);
                     }
+                }
+                // Symbols of damaged files may take no bytes, so they are looked after before anything is made of them.
+                let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
+                if !all().all(Player::good) {
+                    return None;
                 }
                 sink.rest(step + 1 - rest.len(), &rest)?;
                 rest.clear();

@@ -1,7 +1,5 @@
 //! Decoding the chunks of a file of version 3.
 
-use half::f16;
-
 use super::chunk::Want;
 use super::head::Head;
 use super::index::{Chunk, Index};
@@ -9,9 +7,9 @@ use super::player::Player;
 use super::streams::Stream;
 use super::symbols::{LANES, Symbols};
 use super::tables::{Lookup, Tables};
-use super::unpack::Unpacker;
+use super::unpack::{Refusal, Unpacker};
 use crate::packed::chunks::rounded_atoms;
-use crate::packed::place::{Piece, Place, indices};
+use crate::packed::place::{Piece, Place};
 use crate::packed::scene::PackedHead;
 use crate::packed::stream::BitCounts;
 use crate::scene::sh::ShDegree;
@@ -91,7 +89,11 @@ impl LayeredDecoder {
             *interim = None;
         }
         let want = Want { sums: false, bits: count_bits };
-        let (mut piece, _) = self.unpacker.chunk(form, &alone, &ranges, want, place).ok_or_else(damaged)?;
+        let piece = self.unpacker.chunk(form, &alone, &ranges, want, place, budget);
+        let (mut piece, _) = piece.map_err(|refusal| match refusal {
+            Refusal::Damaged => damaged(),
+            Refusal::Full => budget.full(),
+        })?;
         for escape in &mut piece.escapes.gaussians {
             *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
         }
@@ -102,11 +104,6 @@ impl LayeredDecoder {
         }
         if piece.atoms.iter().any(|&atom| usize::from(atom) >= self.dictionary().len()) {
             return Err(damaged());
-        }
-        let width = indices(self.dictionary(), Vec::new()).width() + size_of::<f16>();
-        let row = size_of::<u32>() + self.dictionary().dim() * size_of::<f32>();
-        if !(budget.grow(piece.atoms.len(), width) && budget.grow(piece.escapes.gaussians.len(), row)) {
-            return Err(budget.full());
         }
         Ok(piece)
     }

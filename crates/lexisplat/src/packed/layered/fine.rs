@@ -13,9 +13,10 @@ const CLASSES: u32 = 8;
 const CLASS_WIDTH: u32 = 2;
 const FINENESS_WIDTH: u32 = 3;
 
-/// Codes the refinement of a group from `level` missing levels to one less.
+/// Codes the refinement of a group from `level` missing levels to one less. Returns `None` for impossible values.
 #[inline(always)]
-pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) {
+pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) -> Option<()> {
+    let mut beyond = false;
     let finer = factor(level - 1);
     for k in DC..REFINED {
         let (stream, class, width) = match k {
@@ -33,6 +34,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
             (if counts[l] < 0 { 1 - rest } else { 1 + rest }).cast_unsigned()
         });
         for l in 0..LANES {
+            beyond |= symbols[l] >= FACTOR.cast_unsigned();
             let rest = symbols[l].cast_signed().wrapping_sub(1);
             let rest = if counts[l] < 0 { rest.wrapping_neg() } else { rest };
             group.counts[k][l] = counts[l].wrapping_mul(FACTOR).wrapping_add(rest);
@@ -49,4 +51,5 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
             group.rotation[k][l] = group.rotation[k][l] << count[l] | low[l];
         }
     }
+    (!beyond).then_some(())
 }

@@ -80,7 +80,8 @@ impl Head {
     /// The same with interim changes in these steps.
     pub(in crate::packed) fn with_interim(mut self, [scale, opacity, colour]: [f64; KINDS]) -> Self {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let step = |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(1.0, f64::from(MOST_STEP)) as u32;
+        let step =
+            |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(1.0, f64::from(MOST_STEP)) as u32;
         self.interim = Some([step(scale), step(opacity), step(colour / self.dc_unit())]);
         self.complete();
         self

@@ -66,11 +66,8 @@ pub(in crate::packed) struct Index {
 /// The layers with these levels of refinement.
 pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool) -> Vec<LayerForm> {
     let last = levels.len().saturating_sub(1);
-    let form = |(k, &levels): (usize, &u8)| LayerForm {
-        levels: levels.into(),
-        parts,
-        interim: interim && k < last,
-    };
+    let form =
+        |(k, &levels): (usize, &u8)| LayerForm { levels: levels.into(), parts, interim: interim && k < last };
     levels.iter().enumerate().map(form).collect()
 }
 
@@ -109,7 +106,8 @@ impl Index {
 
     /// Where the second layer starts in the data, if there is one.
     pub(in crate::packed) fn first_layer_end(&self) -> Option<u64> {
-        let second = |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
+        let second =
+            |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
         let place = self.order.iter().find(second)?;
         self.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind)).map(|range| range.start)
     }

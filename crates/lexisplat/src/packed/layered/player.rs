@@ -45,14 +45,15 @@ impl<'a> Player<'a> {
                 None => total,
             };
             let [high, low] = *words.get(start as usize..end as usize)?.first_chunk()?;
-            player.states[l] = u32::from(u16::from_le_bytes(high)) << 16 | u32::from(u16::from_le_bytes(low));
+            let state = u32::from(u16::from_le_bytes(high)) << 16 | u32::from(u16::from_le_bytes(low));
+            player.states[l] = Some(state).filter(|&state| state >= LEAST)?;
             player.next[l] = start + 2;
             player.ends[l] = end;
         }
         Some(player)
     }
 
-    /// Takes a word into the state of a lane if it has room for one. Beyond the end there are zeros.
+    /// Takes a word into the state of a lane if it has room for one. Beyond the end of its words there is anything.
     #[inline(always)]
     fn refill(&mut self, l: usize, state: u32) {
         let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
@@ -60,6 +61,11 @@ impl<'a> Player<'a> {
         let filled = state << 16 | u32::from(u16::from_le_bytes(word));
         self.states[l] = if low { filled } else { state };
         self.next[l] += u32::from(low);
+    }
+
+    /// Whether nothing was asked for that no encoder writes, and no lane was read beyond its end.
+    pub(super) fn good(&self) -> bool {
+        !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
     }
 
     /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.

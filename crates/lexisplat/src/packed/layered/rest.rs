@@ -59,6 +59,8 @@ struct Part {
     /// Of each nonzero of each lane the atom, and the value in steps.
     atoms: Vec<Lanes<u32>>,
     values: Vec<Lanes>,
+    /// Number of nonzeros of each lane.
+    totals: Lanes<u32>,
 }
 
 /// Places in the nonzeros of a lane.
@@ -103,8 +105,17 @@ impl Rest {
             part.counts.clear();
             part.atoms.clear();
             part.values.clear();
+            part.totals = [0; LANES];
         }
         self.rows.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Numbers of nonzeros and of exact rows of the block.
+    pub(super) fn sizes(&self, form: &RestForm) -> (usize, usize) {
+        let nonzeros =
+            self.parts.iter().map(|part| part.totals.iter().map(|&n| n as usize).sum::<usize>()).sum();
+        let rows = self.rows.iter().map(Vec::len).sum::<usize>() / form.dim.max(1);
+        (nonzeros, rows)
     }
 
     /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
@@ -158,6 +169,7 @@ impl Rest {
         }
         self.counts(s, targets, form, part, least..most)?;
         let totals = self.totals(form, part);
+        self.parts[part].totals = totals;
         let count = totals.iter().copied().max().unwrap_or(0) as usize;
         let pages = form.atoms as u32 > PAGE;
         let of = |l: usize, j: usize| wanted[l].get(j).copied().unwrap_or_default();

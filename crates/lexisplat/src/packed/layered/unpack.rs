@@ -14,9 +14,10 @@ use super::tables::Lookup;
 use super::values::{logits, numbers, powers, rotations};
 use super::walk::{DC, Group, OPACITY, dropped, factor};
 use crate::packed::parameters::{LAST_CLASS, TARGETS};
-use crate::packed::place::{Piece, Place};
+use crate::packed::place::{Piece, Place, indices};
 use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::Vec3;
+use crate::support::memory_budget::MemoryBudget;
 use crate::support::simd::Simd;
 
 /// Largest absolute value of a value. Steps of the largest sizes take what encoders accept no farther.
@@ -50,7 +51,7 @@ pub(in crate::packed) struct Unpacker {
 
 impl Unpacker {
     /// Decodes a chunk of a layer from the ranges that are there to `place`. Interim changes are made to Gaussians in the cells
-    /// `alone`. Escapes are numbered from its start. `None` if no encoder writes it.
+    /// `alone`. Escapes are numbered from its start. `budget` holds everything but codes, and takes those.
     pub(in crate::packed) fn chunk(
         &self,
         layer: LayerForm,
@@ -58,8 +59,16 @@ impl Unpacker {
         ranges: &[Option<&[u8]>],
         want: Want,
         place: &mut Place<'_>,
-    ) -> Option<(Piece, Vec<u32>)> {
-        Simd::current().run(Job { with: self, layer, alone, ranges, want, place })
+        budget: &MemoryBudget<'_>,
+    ) -> Result<(Piece, Vec<u32>), Refusal> {
+        Simd::current().run(Job { with: self, layer, alone, ranges, want, place, budget })
+    }
+}
+
+impl Unpacker {
+    /// Bytes of a nonzero in memory.
+    fn nonzero_bytes(&self) -> usize {
+        indices(&self.dictionary, Vec::new()).width() + size_of::<f16>()
     }
 }
 
@@ -71,20 +80,42 @@ struct Job<'j, 'p, 'r> {
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
     place: &'j mut Place<'p>,
+    budget: &'j MemoryBudget<'j>,
+}
+
+/// Why a chunk is not decoded.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::packed) enum Refusal {
+    /// No encoder writes it.
+    Damaged,
+    /// It takes more memory than is left.
+    Full,
 }
 
 impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
-    type Output = Option<(Piece, Vec<u32>)>;
+    type Output = Result<(Piece, Vec<u32>), Refusal>;
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, layer, alone, ranges, want, place } = self;
+        let Self { with, layer, alone, ranges, want, place, budget } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
         let blank = [[0.0; LANES]; MOST];
         let weights = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
-        let mut out = Out { with, place, alone, starts, lanes: Lanes::default(), sorted: Vec::new(), weights };
-        let played = with.form.play(layer, n, &with.lookup, ranges, want, &mut out)?;
+        let mut out = Out {
+            with,
+            place,
+            alone,
+            starts,
+            lanes: Lanes::default(),
+            sorted: Vec::new(),
+            weights,
+            budget,
+            is_full: false,
+        };
+        let Some(played) = with.form.play(layer, n, &with.lookup, ranges, want, &mut out) else {
+            return Err(if out.is_full { Refusal::Full } else { Refusal::Damaged });
+        };
         let [mut all, rest @ ..] = out.lanes;
         for lane in rest {
             all.atoms.extend(lane.atoms);
@@ -95,7 +126,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         // Large values of f16 are infinite, and base colours may leave f32 by what codes add to them.
         let good =
             all.values.iter().all(|v| v.is_finite()) && place.dc.as_flattened().iter().all(|v| v.is_finite());
-        good.then_some((Piece { bit_counts: played.bits, ..all }, played.sums))
+        if good { Ok((Piece { bit_counts: played.bits, ..all }, played.sums)) } else { Err(Refusal::Damaged) }
     }
 }
 
@@ -111,6 +142,9 @@ struct Out<'j, 'p> {
     sorted: Vec<(u16, f16)>,
     /// The weights of [`MeanView`] of each Gaussian of the block, if there are points of view.
     weights: Vec<[Lanes<f32>; MOST]>,
+    budget: &'j MemoryBudget<'j>,
+    /// Whether the budget was too small.
+    is_full: bool,
 }
 
 impl Sink for Out<'_, '_> {
@@ -144,6 +178,12 @@ impl Sink for Out<'_, '_> {
     #[inline(always)]
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()> {
         let form = &self.with.form.rest;
+        let (codes, rows) = rest.sizes(form);
+        let row = size_of::<u32>() + form.dim * size_of::<f32>();
+        if !(self.budget.grow(codes, self.with.nonzero_bytes()) && self.budget.grow(rows, row)) {
+            self.is_full = true;
+            return None;
+        }
         let per_channel = self.with.dictionary.degree().rest_per_channel();
         for l in 0..LANES {
             let out = &mut self.lanes[l];
