@@ -5,19 +5,23 @@ use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
 /// Scenes of fewer Gaussians have one layer. Their files are small.
 const LEAST_LAYERED: usize = 8000;
 /// Shares of the Gaussians in all layers but the last, where there are several.
-const SHARES: [f64; 2] = [0.13, 0.19];
+const SHARES: [f64; 1] = [0.14];
 /// A Gaussian is drawn into a layer with a probability that grows with this power of the change of pictures without it. With
 /// 1 those that show most would stand alone, with holes between them (docs/METHOD.md, "Layers").
 const ENERGY_POWER: f64 = 0.6;
 /// Steps of the search for the factor of these probabilities.
 const FACTOR_STEPS: usize = 60;
-/// Gaussians of a chunk of each layer, and of a layer that is alone. Small ones arrive soon.
-const CHUNKS: [usize; LAYERS] = [8192, 8192, 16_384];
-const SIZE: usize = 32_768;
+/// Least and most Gaussians of a chunk, and a layer's number of chunks of a size between. Small ones arrive soon, and large
+/// ones take fewer bytes.
+const LEAST_CHUNK: usize = 8192;
+const MOST_CHUNK: usize = 32_768;
+const CHUNKS: usize = 8;
+/// A rest of up to this share of a chunk is part of the one before.
+const REST: f64 = 0.5;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
 /// Levels of refinement of each layer.
-const LEVELS: [u8; LAYERS] = [2, 2, 1];
+const LEVELS: [u8; LAYERS] = [2, 1];
 /// Number of layers, where there are several.
 const LAYERS: usize = SHARES.len() + 1;
 
@@ -28,6 +32,8 @@ pub(super) struct Layering {
     factors: Vec<f64>,
     /// Sums of the probabilities so far.
     sums: Vec<f64>,
+    /// Gaussians of a chunk of each layer.
+    chunks: Vec<usize>,
 }
 
 impl Layering {
@@ -51,7 +57,15 @@ impl Layering {
                 factors.push(factor);
             }
         }
-        Self { sums: vec![0.5; factors.len()], factors }
+        let count = factors.len();
+        let last = 1.0 - shares().iter().take(count).sum::<f64>();
+        let shares = shares().into_iter().take(count).chain([last]);
+        let size = |share: f64| {
+            let count = (share * gaussians as f64) as usize;
+            (count / CHUNKS).next_power_of_two().clamp(LEAST_CHUNK, MOST_CHUNK)
+        };
+        let chunks = if count == 0 { vec![MOST_CHUNK] } else { shares.map(size).collect() };
+        Self { sums: vec![0.5; count], factors, chunks }
     }
 
     /// The layer of the next Gaussian in the order of cells.
@@ -84,9 +98,14 @@ impl Layering {
         self.factors.get(layer).map_or(1.0, |factor| (factor * power(energy)).min(1.0))
     }
 
-    /// Gaussians of a chunk of a layer.
-    pub(super) fn chunk(&self, layer: usize) -> usize {
-        CHUNKS.get(layer).copied().filter(|_| self.layers() > 1).unwrap_or(SIZE)
+    /// Gaussians of the next chunk of a layer of which so many are left, or 0 if more may follow and decide.
+    pub(super) fn next_chunk(&self, layer: usize, left: usize, all: bool) -> usize {
+        let size = self.chunks.get(layer).copied().unwrap_or(MOST_CHUNK);
+        match left > size + (REST * size as f64) as usize {
+            true => size,
+            false if all => left,
+            false => 0,
+        }
     }
 
     /// How rows of `dim` coefficients are coded with `atoms` atoms.
@@ -182,6 +201,6 @@ fn factor(share: f64, powers: &[f64], left: &[f64]) -> f64 {
     factor
 }
 
-fn shares() -> [f64; 2] {
-    [crate::packed::alone::knob("KS", SHARES[0]), crate::packed::alone::knob("KS1", SHARES[1])]
+fn shares() -> [f64; 1] {
+    [crate::packed::alone::knob("KS", SHARES[0])]
 }

@@ -238,11 +238,16 @@ impl PartPacker {
     fn code_pending(&mut self, all: bool) -> Result<()> {
         let forms = self.encoding.layering.forms(self.encoding.head.rest.least.len());
         for (k, layer) in self.layers.iter_mut().enumerate() {
-            let size = self.encoding.layering.chunk(k);
-            let whole = if all { layer.pending.len() } else { layer.pending.len() / size * size };
             let layer_form = forms.get(k).copied().unwrap_or_default();
             let (form, frame) = (&self.encoding.form, &self.encoding.head.frame);
-            let chunks: Vec<&[Target]> = layer.pending[..whole].chunks(size).collect();
+            let (mut chunks, mut whole) = (Vec::new(), 0);
+            loop {
+                let left = &layer.pending[whole..];
+                let next = self.encoding.layering.next_chunk(k, left.len(), all);
+                let Some(chunk) = left.get(..next).filter(|chunk| !chunk.is_empty()) else { break };
+                chunks.push(chunk);
+                whole += next;
+            }
             let coded =
                 map_vec(chunks, |targets| form.record(frame, layer_form, targets).ok_or_else(too_large));
             for chunk in coded {

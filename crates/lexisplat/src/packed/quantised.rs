@@ -114,9 +114,12 @@ impl<'a> Quantised<'a> {
         let mut chunks = Vec::new();
         let mut start = 0;
         for (layer, &count) in counts.iter().enumerate() {
-            let (end, size) = (start + count, encoding.layering.chunk(layer));
-            chunks.extend((start..end).step_by(size).map(|first| (layer, first..end.min(first + size))));
-            start = end;
+            let end = start + count;
+            while start < end {
+                let next = start + encoding.layering.next_chunk(layer, end - start, true);
+                chunks.push((layer, start..next));
+                start = next;
+            }
         }
         let probability =
             |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.weights[i][1]);
