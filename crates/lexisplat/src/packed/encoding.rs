@@ -64,6 +64,7 @@ pub(super) struct Written {
     gaussians: usize,
     cell: u64,
     bounds: [[f32; 3]; 2],
+    energy: f64,
     /// The bytes of each range, and the checksum of its integers.
     ranges: Vec<(Vec<u8>, u32)>,
 }
@@ -77,6 +78,7 @@ impl Written {
             gaussians: chunk.gaussians,
             cell: chunk.cell,
             bounds: chunk.bounds,
+            energy: chunk.energy,
             ranges: ranges.collect(),
         }
     }
@@ -149,40 +151,37 @@ impl Encoding {
         let tables = Tables::new(&counts.histograms)
             .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
         let stream_bits = counts.bits(&tables).named(Stream::names());
-        // The ranges of each kind of each layer, which come in the order of chunks.
         let parts = head.rest.least.len();
         let forms = layering.forms(parts);
-        let kinds: Vec<usize> = forms.iter().map(|form| form.ranges()).collect();
-        let number = |layer: usize, kind: usize| kinds.iter().take(layer).sum::<usize>() + kind;
-        let count = kinds.iter().sum::<usize>();
-        let mut spills = (0..count).map(|_| Spill::new(to)).collect::<Result<Vec<_>>>()?;
+        let mut spill = Spill::new(to)?;
+        // Where each range of each chunk starts in it.
+        let mut at = 0_u64;
         let mut chunks = Vec::new();
         code_chunks(&tables, &mut |written| {
-            let Written { layer, gaussians, cell, bounds, ranges } = written;
+            let Written { layer, gaussians, cell, bounds, energy, ranges } = written;
             let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
-            for (kind, (bytes, integers)) in ranges.iter().enumerate() {
+            for (bytes, integers) in &ranges {
                 let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
                 let length = u32::try_from(bytes.len()).map_err(too_long)?;
                 let checksum = crc32fast::hash(bytes);
-                chunk.ranges.push(Range { start: 0, length, checksum, integers: *integers });
-                if let Some(spill) = spills.get_mut(number(layer, kind)) {
-                    spill.push(bytes)?;
-                }
+                chunk.ranges.push(Range { start: at, length, checksum, integers: *integers });
+                at += u64::from(length);
+                spill.push(bytes)?;
             }
-            chunks.push(chunk);
+            chunks.push((chunk, energy));
             Ok(())
         })?;
-        chunks.sort_by_key(|chunk: &Chunk| chunk.layer);
-        let order = layering.order(&chunks, parts);
+        chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
+        let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
+        let order = layering.order(&chunks, &energies, parts);
+        let piece = |place: &Place| {
+            let range = &chunks[place.chunk as usize].ranges[usize::from(place.kind)];
+            (range.start, range.length as usize)
+        };
+        let pieces = order.iter().map(piece).collect();
         head.index = Index { layers: forms, chunks, order };
         let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
         head.index.place().ok_or_else(too_long)?;
-        let piece = |place: &Place| {
-            let chunk = &head.index.chunks[place.chunk as usize];
-            let kind = usize::from(place.kind);
-            (number(chunk.layer, kind), chunk.ranges[kind].length as usize)
-        };
-        let pieces = head.index.order.iter().map(piece).collect();
         if std::env::var("PRINTK").is_ok() {
             let mut sums = std::collections::BTreeMap::new();
             for chunk in &head.index.chunks {
@@ -202,7 +201,7 @@ impl Encoding {
                 head.index.chunks.len()
             );
         }
-        let data = Woven::new(spills.into_iter().map(Spill::finish).collect::<Result<_>>()?, pieces);
+        let data = Woven::new(spill.finish()?, pieces);
         if coder.dictionary.dim() > 0 {
             head.dictionary = dictionary.finish(&tables, 1);
         }

@@ -119,62 +119,108 @@ impl Layering {
     }
 
     /// The order of the ranges of `chunks` in the data, of which the first layers come first. Chunks have `parts` parts of
-    /// nonzeros.
-    pub(super) fn order(&self, chunks: &[Chunk], parts: usize) -> Vec<Place> {
+    /// nonzeros. `energies` are the changes of pictures without each chunk.
+    pub(super) fn order(&self, chunks: &[Chunk], energies: &[f64], parts: usize) -> Vec<Place> {
         let forms = self.forms(parts);
-        let mut order = Vec::new();
-        let mut put = |chunk: usize, kind: usize| {
-            order.push(Place { chunk: chunk as u32, kind: kind as u8 });
-        };
+        let mut order = Order { chunks, parts, order: Vec::new(), finer: vec![0; chunks.len()] };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
-        // The first layer at once: base, interim changes, the largest nonzeros.
-        of(0).for_each(|c| put(c, 0));
-        if forms[0].interim {
-            of(0).for_each(|c| put(c, forms[0].interim_range()));
+        // The first layer at once, one kind of range after the other, and of other layers chunk after chunk those that show
+        // most for their bytes first.
+        for kind in [Order::base, Order::interim, Order::largest] {
+            of(0).for_each(|c| kind(&mut order, c, forms[0]));
         }
-        if parts > 0 {
-            of(0).for_each(|c| put(c, 1 + forms[0].levels));
-        }
-        // Where the next layer arrives, those before become finer by a level.
-        let mut finer: Vec<usize> = vec![0; forms.len()];
         for (layer, form) in forms.iter().enumerate().skip(1) {
-            let mut before: Vec<_> = (0..layer).map(|layer| of(layer).peekable()).collect();
-            let mut later = of(layer).skip(1).map(|c| chunks[c].cell);
-            for c in of(layer) {
-                put(c, 0);
-                if form.interim {
-                    put(c, form.interim_range());
+            let worth = |c: usize| {
+                let bytes = chunks[c].ranges.first().map_or(0, |base| base.length);
+                energies.get(c).copied().unwrap_or(0.0) / f64::from(bytes.max(1))
+            };
+            let mut arriving: Vec<usize> = of(layer).collect();
+            arriving.sort_by(|&a, &b| worth(b).total_cmp(&worth(a)));
+            let mut there = vec![false; chunks.len()];
+            for c in arriving {
+                for kind in [Order::base, Order::interim, Order::largest] {
+                    kind(&mut order, c, *form);
                 }
-                if parts > 0 {
-                    put(c, 1 + form.levels);
-                }
-                let end = later.next().unwrap_or(u64::MAX);
-                for (k, before) in before.iter_mut().enumerate().filter(|(k, _)| finer[*k] < forms[*k].levels)
-                {
-                    while let Some(c) = before.next_if(|&c| chunks[c].cell < end) {
-                        put(c, 1 + finer[k]);
+                there[c] = true;
+                // Where a layer is there, those before become finer by a level.
+                for before in (0..chunks.len()).filter(|&b| chunks[b].layer < layer) {
+                    if !there[before] && overlapping(chunks, before, layer).all(|c| there[c]) {
+                        order.finer(before, forms[chunks[before].layer]);
+                        there[before] = true;
                     }
                 }
             }
-            for (k, before) in before.into_iter().enumerate().filter(|(k, _)| finer[*k] < forms[*k].levels) {
-                before.for_each(|c| put(c, 1 + finer[k]));
-            }
-            (0..layer).for_each(|k| finer[k] = (finer[k] + 1).min(forms[k].levels));
         }
         // The rest in all layers: larger nonzeros, what is left of coarse steps, the smallest nonzeros.
-        let all = || (0..chunks.len()).map(|c| (c, chunks[c].layer));
         let last = parts.saturating_sub(1);
         for part in 1..last {
-            all().for_each(|(c, layer)| put(c, 1 + forms[layer].levels + part));
+            (0..chunks.len()).for_each(|c| order.part(c, forms[chunks[c].layer], part));
         }
-        for (c, layer) in all() {
-            (finer[layer]..forms[layer].levels).for_each(|level| put(c, 1 + level));
+        for c in 0..chunks.len() {
+            let form = forms[chunks[c].layer];
+            while order.finer(c, form) {}
         }
         if last > 0 {
-            all().for_each(|(c, layer)| put(c, 1 + forms[layer].levels + last));
+            (0..chunks.len()).for_each(|c| order.part(c, forms[chunks[c].layer], last));
         }
-        order
+        order.order
     }
+}
+
+/// An order of ranges that is being made.
+struct Order<'c> {
+    chunks: &'c [Chunk],
+    parts: usize,
+    order: Vec<Place>,
+    /// Levels of refinement of each chunk so far.
+    finer: Vec<usize>,
+}
+
+impl Order<'_> {
+    fn put(&mut self, chunk: usize, kind: usize) {
+        self.order.push(Place { chunk: chunk as u32, kind: kind as u8 });
+    }
+
+    fn base(&mut self, chunk: usize, _: LayerForm) {
+        self.put(chunk, 0);
+    }
+
+    fn interim(&mut self, chunk: usize, form: LayerForm) {
+        if form.interim {
+            self.put(chunk, form.interim_range());
+        }
+    }
+
+    fn largest(&mut self, chunk: usize, form: LayerForm) {
+        if self.parts > 0 {
+            self.part(chunk, form, 0);
+        }
+    }
+
+    fn part(&mut self, chunk: usize, form: LayerForm, part: usize) {
+        self.put(chunk, 1 + form.levels + part);
+    }
+
+    /// The next refinement of a chunk, if there is one.
+    fn finer(&mut self, chunk: usize, form: LayerForm) -> bool {
+        let level = self.finer[chunk];
+        if level < form.levels {
+            self.put(chunk, 1 + level);
+            self.finer[chunk] += 1;
+        }
+        level < form.levels
+    }
+}
+
+/// The chunks of a layer whose cells overlap those of a chunk of another.
+fn overlapping(chunks: &[Chunk], own: usize, layer: usize) -> impl Iterator<Item = usize> {
+    let end = |c: usize| match chunks.get(c + 1) {
+        Some(next) if next.layer == chunks[c].layer => next.cell,
+        _ => u64::MAX,
+    };
+    let cells = chunks[own].cell..end(own);
+    let of = (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
+    of.filter(move |&c| chunks[c].cell <= cells.end && end(c) >= cells.start)
 }
 
 /// What probabilities are proportional to, unless they are 1.

@@ -94,6 +94,7 @@ struct SpilledChunk {
     gaussians: usize,
     cell: u64,
     bounds: [[f32; 3]; 2],
+    energy: f64,
     /// Of each range the number of symbols of each lane, and the checksum of the integers.
     ranges: Vec<(Vec<usize>, u32)>,
 }
@@ -121,6 +122,7 @@ impl Layer {
             gaussians: chunk.gaussians,
             cell: chunk.cell,
             bounds: chunk.bounds,
+            energy: chunk.energy,
             ranges,
         });
         Ok(())
@@ -135,7 +137,13 @@ impl SpilledChunk {
             let lanes = lanes.iter().map(|&count| symbols.take(count)).collect::<Result<Vec<Vec<u32>>>>()?;
             ranges.push((Recorder::restore(lanes), *sum));
         }
-        Ok(CodedChunk { gaussians: self.gaussians, cell: self.cell, bounds: self.bounds, ranges })
+        Ok(CodedChunk {
+            gaussians: self.gaussians,
+            cell: self.cell,
+            bounds: self.bounds,
+            energy: self.energy,
+            ranges,
+        })
     }
 }
 

@@ -232,7 +232,11 @@ impl<'a> Quantised<'a> {
         map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
             progress.check()?;
             let (tally, mut targets) = coder.targets(view.part(range.clone()), codes, unit)?;
-            for (i, target) in range.clone().zip(&mut targets).filter(|_| self.alone.has(*layer)) {
+            for (i, target) in range.clone().zip(&mut targets) {
+                target.energy = self.gaussians.weights[i][1];
+                if !self.alone.has(*layer) {
+                    continue;
+                }
                 let change = view.changes.and_then(|changes| changes.get(i));
                 target.interim = self.alone.steps(i, change, &coder.parameters);
             }

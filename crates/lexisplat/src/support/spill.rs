@@ -134,16 +134,16 @@ impl Spilled {
     }
 }
 
-/// Spilled bytes that are read in pieces, now from one and then from another.
+/// Spilled bytes that are read in pieces, in an order of their own.
 #[derive(Debug)]
 pub(crate) struct Woven {
-    spilled: Vec<Spilled>,
-    /// Of each piece the number of the spilled bytes and its length.
-    pieces: Vec<(usize, usize)>,
+    spilled: Spilled,
+    /// Where each piece starts, and its length.
+    pieces: Vec<(u64, usize)>,
 }
 
 impl Woven {
-    pub(crate) fn new(spilled: Vec<Spilled>, pieces: Vec<(usize, usize)>) -> Self {
+    pub(crate) fn new(spilled: Spilled, pieces: Vec<(u64, usize)>) -> Self {
         Self { spilled, pieces }
     }
 
@@ -155,26 +155,27 @@ impl Woven {
     /// All bytes.
     pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
         let mut bytes = Vec::with_capacity(self.len());
-        self.each(|piece| {
-            bytes.extend_from_slice(&piece);
-            Ok(())
-        })?;
+        for piece in self.into_pieces() {
+            bytes.extend(piece?);
+        }
         Ok(bytes)
     }
 
     /// Copies them to `writer`.
     pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
-        self.each(|piece| writer.write_all(&piece).map_err(|e| Error::temporary_file(Path::new("output"), e)))
-            .map_err(io::Error::other)
-    }
-
-    fn each(mut self, mut take: impl FnMut(Vec<u8>) -> Result<()>) -> Result<()> {
-        for (number, length) in self.pieces {
-            if let Some(spilled) = self.spilled.get_mut(number) {
-                take(spilled.take(length)?)?;
-            }
+        for piece in self.into_pieces() {
+            writer.write_all(&piece.map_err(io::Error::other)?)?;
         }
         Ok(())
+    }
+
+    fn into_pieces(self) -> impl Iterator<Item = Result<Vec<u8>>> {
+        let Self { mut spilled, pieces } = self;
+        pieces.into_iter().map(move |(start, length)| {
+            let file = &mut spilled.file;
+            file.file.seek(SeekFrom::Start(start)).map_err(|e| Error::temporary_file(&file.name, e))?;
+            spilled.take(length)
+        })
     }
 }
 

@@ -138,7 +138,8 @@ impl Form {
         }
         let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
         let cell = targets.first().map_or(0, |target| target.cell);
-        Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, ranges })
+        let energy = targets.iter().map(|target| f64::from(target.energy)).sum();
+        Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, energy, ranges })
     }
 
     /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that
@@ -226,6 +227,8 @@ pub(in crate::packed) struct CodedChunk {
     pub(in crate::packed) cell: u64,
     /// Least and largest coordinates of its positions.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
+    /// Sum of the changes of pictures without each of its Gaussians.
+    pub(in crate::packed) energy: f64,
     /// What its ranges hold, and the checksums of their integers.
     pub(in crate::packed) ranges: Vec<(Recorder, u32)>,
 }

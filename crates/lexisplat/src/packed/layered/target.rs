@@ -26,6 +26,8 @@ pub(in crate::packed) struct Target {
     pub(super) offset: [f64; 3],
     /// Pairs (atom, value in steps) with values that are not zero, largest first.
     pub(in crate::packed) code: Vec<(u16, i32)>,
+    /// The change of pictures without it.
+    pub(in crate::packed) energy: f32,
     /// Steps of its interim changes.
     pub(in crate::packed) interim: [i32; CHANGES],
     /// The exact row, if it has no code; otherwise empty.
@@ -59,6 +61,7 @@ impl Target {
             axes: form.axes,
             offset: std::array::from_fn(|k| f64::from(form.position[k]) - centre[k]),
             code: Vec::new(),
+            energy: 0.0,
             interim: [0; CHANGES],
             exact: Vec::new(),
         }
