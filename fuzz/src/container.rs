@@ -1,6 +1,8 @@
 //! Mutations of .lexi files that leave lengths, offsets and checksums right, so that what lies behind them
 //! is reached.
 
+use lexisplat::ShDegree;
+use lexisplat::packed::fuzzing::layered;
 use serde_json::{Map, Value, json};
 
 /// One time in so many the bytes are changed as they lie, and nothing is made to fit.
@@ -22,7 +24,7 @@ const DTYPES: [(&str, usize); 11] = [
     ("BOOL", 1),
 ];
 /// Names of tensors, so that one may turn up where it does not belong.
-const NAMES: [&str; 22] = [
+const NAMES: [&str; 23] = [
     "position",
     "dc",
     "opacity",
@@ -44,6 +46,7 @@ const NAMES: [&str; 22] = [
     "packed.tables",
     "packed.data",
     "packed.order",
+    "packed.head",
     "checksum.header",
 ];
 /// Values of metadata that mean something to some key.
@@ -124,6 +127,17 @@ impl Parts {
             tensors.push(Tensor { name, dtype: entry["dtype"].clone(), shape, bytes });
         }
         Some(Self { metadata, tensors })
+    }
+
+    /// Makes the checksums of the ranges of a packed scene of version 3 fit its data, if its head can be read.
+    fn fit_ranges(&mut self) {
+        let degree = self.metadata.get("degree").and_then(Value::as_str).and_then(|text| text.parse().ok());
+        let Some(degree) = degree.and_then(|degree| ShDegree::new(degree).ok()) else { return };
+        let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);
+        let (Some(head), Some(data)) = (at("packed.head"), at("packed.data")) else { return };
+        let (head, data) = (&self.tensors[head].bytes, &self.tensors[data].bytes);
+        let Some(sealed) = layered::resealed(head, degree, data) else { return };
+        self.tensors.iter_mut().filter(|t| t.name == "packed.head").for_each(|t| t.bytes.clone_from(&sealed));
     }
 
     /// The file, with offsets and checksums that fit, and names that differ.
@@ -284,6 +298,7 @@ pub fn mutate(
         for _ in 0..1 + random.below(3) {
             parts.change(&mut random, &mut mutate);
         }
+        parts.fit_ranges();
         let bytes = parts.sealed();
         if let Some(slot) = data[..max_size].get_mut(..bytes.len()) {
             slot.copy_from_slice(&bytes);

@@ -9,11 +9,12 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::fuzzing::parts;
+use lexisplat::lexi::{LexiReader, LexiWriter};
+use lexisplat::packed::fuzzing::{flat, layered};
 use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
 use lexisplat::{
-    CompressOptions, Extra, ExtraValues, Layout, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
+    CompressOptions, Extra, ExtraValues, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress,
+    lexi, ply,
 };
 use lexisplat_render::{Camera, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -192,18 +193,36 @@ fn packed(root: &Path) -> Done {
                 save(root, "dictionary", &format!("packed-{name}"), &bytes)?;
             }
             // Tables and data without the container.
-            let mut entropy = vec![0];
-            let [tables, symbols, raw] = parts(&packed);
-            for part in [tables, symbols, raw] {
-                entropy.extend(u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
-            }
-            [tables, symbols, raw].iter().for_each(|part| entropy.extend_from_slice(part));
-            entropy.extend((0..64).flat_map(|k| [k, k / 3]));
+            let script: Vec<u8> = (0..64).flat_map(|k: u8| [k % 5, k, k / 3, 1, 0]).collect();
+            let [tables, range] = layered::parts(&packed);
+            let entropy = alone(&[1, 0], &[&tables, &range], &script);
             save(root, "entropy", &format!("decode-{name}"), &entropy)?;
         }
     }
-    let script: Vec<u8> = (0..60).flat_map(|k: u8| [k, k % 24, k % 3, k, k]).collect();
-    save(root, "entropy", "round-trip", &[&[1][..], &script].concat())
+    let script: Vec<u8> = (0..60).flat_map(|k: u8| [k, k % 59, k % 24, k, k, 2, k, k]).collect();
+    save(root, "entropy", "round-trip", &[&[2, 3][..], &script].concat())?;
+    version_2(root)
+}
+
+/// Tables and data with their lengths before them, and a script.
+fn alone(kind: &[u8], parts: &[&[u8]], script: &[u8]) -> Vec<u8> {
+    let lengths = parts.iter().flat_map(|part| u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
+    [kind, &lengths.collect::<Vec<u8>>(), &parts.concat(), script].concat()
+}
+
+/// Packed files of version 2, which is no longer written.
+fn version_2(root: &Path) -> Done {
+    for name in ["packed", "packed_degree0", "packed_escapes"] {
+        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/lexisplat/tests/golden");
+        let bytes = fs::read(Path::new(golden).join(format!("{name}.lexi")))?;
+        save(root, "packed", &format!("version-2-{name}"), &bytes)?;
+        let reader = LexiReader::open(name, &bytes, &Limits::default())?;
+        let packed = reader.packed()?.ok_or("no packed file")?;
+        let script: Vec<u8> = (0..64).flat_map(|k: u8| [k, k / 3]).collect();
+        let entropy = alone(&[0], &flat::parts(&packed), &script);
+        save(root, "entropy", &format!("decode-version-2-{name}"), &entropy)?;
+    }
+    Ok(())
 }
 
 fn cameras(root: &Path) -> Done {

@@ -1,10 +1,12 @@
 //! What a Gaussian shows, apart from its shape and its view-dependent colour.
 
 use super::canonical::MIN_LOG_OPACITY;
-use super::chunk_codec::MAX_LOG_OPACITY;
 use crate::scene::splats::{Geometry, all_finite};
 use crate::support::error::{Error, Result};
 use crate::support::maths::{log_sigmoid, logit_of_log};
+
+/// Largest logarithm of an opacity. Its exponential, 0.9999, counts as opaque.
+pub(super) const MAX_LOG_OPACITY: f32 = -1e-4;
 
 /// The base colour and the opacity of a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,10 +3,10 @@
 use half::f16;
 
 use super::appearance::Appearance;
+use super::atoms::{MAX_ATOM_BITS, resident};
 use super::canonical::{MortonKey, canonical};
-use super::chunks::{MAX_ATOM_BITS, resident};
 use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
-use super::layered::{MeanView, Recorder, Target, code_atoms, seen_row};
+use super::layered::{MeanView, Recorder, Target, record_atoms, seen_row};
 use super::morton;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
@@ -137,7 +137,7 @@ impl ChunkCoder {
         let mut coded = |atoms: usize, bits: u32, rows: &[f32]| {
             #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
             let whole = |k: usize| (f64::from(rows[k]) * f64::from(1_u32 << bits)).round() as i32;
-            code_atoms(&mut symbols, degree, atoms, bits, whole)
+            record_atoms(&mut symbols, degree, atoms, bits, whole)
         };
         if dim > 0 && view.len() > 0 {
             let (rows, costs) = coder.learn(view, total, options, progress)?;

@@ -2,12 +2,11 @@
 
 use std::ops::Range;
 
-use super::chunks::FlatDecoder;
-use super::layered::{Index, LayeredDecoder};
+use super::flat::{self, FlatDecoder};
+use super::layered::{self, Index, LayeredDecoder};
 use super::place::{Piece, Place, indices, places};
 use super::scene::{Coding, PackedHead};
 use super::stream::{BitCounts, StreamBits};
-use super::{layered, stream};
 use crate::scene::splats::Geometry;
 use crate::sparse::codes::{SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
@@ -112,7 +111,7 @@ impl Decoder {
     /// Counted bits with the names of the streams.
     pub(crate) fn named(&self, bits: &BitCounts) -> Vec<StreamBits> {
         match &self.kind {
-            Kind::Flat(_) => bits.named(stream::Stream::names()),
+            Kind::Flat(_) => bits.named(flat::Stream::names()),
             Kind::Layered(_) => bits.named(layered::Stream::names()),
         }
     }

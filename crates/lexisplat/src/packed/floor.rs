@@ -4,9 +4,8 @@
 //! turn, opacity and colour, so that such a view is worse but not broken (docs/METHOD.md, "The floor").
 
 use super::canonical::{MortonKey, canonical};
-use super::chunk_codec::{least_axis, rotation_steps};
 use super::fit::rounded;
-use super::parameters::{LAST_CLASS, Parameters};
+use super::parameters::{LAST_CLASS, Parameters, least_axis, rotation_steps};
 use crate::scene::sh::C0;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{exp, exp2, log2};

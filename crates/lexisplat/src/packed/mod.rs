@@ -4,21 +4,20 @@
 //! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
 //! the mathematics, docs/FORMAT.md the bytes.
 //!
-//! `encoding.rs` packs a scene whole or in parts. `chunk_codec.rs` goes over the Gaussians of a chunk; encoder and
-//! decoder share it.
+//! `encoding.rs` packs a scene whole or in parts. `layered/` holds the format that is written, of which
+//! `layered/walk.rs` goes over the Gaussians of a chunk; encoder and decoder share it. `flat/` reads version 2.
 
 mod alone;
 mod appearance;
+mod atoms;
 mod bits;
 mod canonical;
-mod chunk_codec;
-mod chunks;
 mod codebook;
 mod coder;
 mod decoder;
 mod encoding;
-mod entropy;
 mod fit;
+mod flat;
 mod floor;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]

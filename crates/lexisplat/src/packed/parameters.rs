@@ -173,3 +173,17 @@ impl Parameters {
 fn linear(row: [f32; STEP_FEATURES], scales: Vec3) -> f32 {
     row[0] + row[1] * scales[0] + row[2] * scales[1] + row[3] * scales[2]
 }
+
+/// The axis that a turn about matters least: a needle's longest, and a disc's shortest.
+pub(super) fn least_axis(scales: Vec3) -> usize {
+    if scales[0] - scales[1] >= scales[1] - scales[2] { 0 } else { 2 }
+}
+
+/// The steps of an orientation as it is coded, in radians, for `steps` of turns about each axis: those of
+/// [`least_axis`]'s direction, and of the turn about it.
+pub(super) fn rotation_steps(steps: Vec3, scales: Vec3) -> [f32; 2] {
+    match least_axis(scales) {
+        0 => [(steps[1] * steps[2]).sqrt(), steps[0]],
+        _ => [(steps[0] * steps[1]).sqrt(), steps[2]],
+    }
+}

@@ -5,7 +5,7 @@
 use std::io::{self, BufWriter, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use tempfile::{SpooledData, SpooledTempFile};
+use tempfile::SpooledTempFile;
 
 use crate::support::error::{Error, Result};
 
@@ -108,17 +108,6 @@ impl Spilled {
         Ok(values)
     }
 
-    /// All bytes.
-    pub(crate) fn into_bytes(self) -> Result<Vec<u8>> {
-        let mut file = match self.file.file.into_inner() {
-            SpooledData::InMemory(memory) => return Ok(memory.into_inner()),
-            SpooledData::OnDisk(file) => file,
-        };
-        let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(|e| Error::temporary_file(&self.file.name, e))?;
-        Ok(bytes)
-    }
-
     /// Copies them to `writer`.
     pub(crate) fn copy_to(self, writer: &mut dyn Write) -> io::Result<()> {
         let Temporary { mut file, name } = self.file;
@@ -197,7 +186,7 @@ mod tests {
             assert_eq!(spilled().checksum, crc32fast::hash(expected));
             let mut found = Vec::new();
             spilled().copy_to(&mut found).unwrap();
-            assert!(found == expected && spilled().into_bytes().unwrap() == expected);
+            assert!(found == expected);
             let mut parts = spilled();
             assert_eq!(parts.take::<u32>(3).unwrap(), [0, 1, 2]);
             assert_eq!(parts.take::<u32>(values.len() - 3).unwrap(), values[3..]);

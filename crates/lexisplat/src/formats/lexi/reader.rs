@@ -3,8 +3,6 @@
 use std::ops::Range;
 use std::path::Path;
 
-use safetensors::Dtype;
-
 use super::checked::{Checked, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};

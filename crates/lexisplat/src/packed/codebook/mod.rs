@@ -26,8 +26,8 @@ const MAX_VALUE: f32 = 1e6;
 /// Most atoms taken for each value of a row, counting repeats. A row can be so long that subtracting an atom does not
 /// change it in f32; without this limit the loop would not end.
 const TAKES_PER_VALUE: usize = 8;
-/// Colour classes that numbers of nonzeros are told apart by, both in their cost and in the contexts that code them.
-pub(super) const COUNT_CLASSES: usize = 12;
+/// Colour classes that numbers of nonzeros are told apart by in their cost.
+const COUNT_CLASSES: usize = 12;
 /// The codes of many rows, one after the other.
 #[derive(Debug, Default, Clone)]
 pub(super) struct Codes {
@@ -261,6 +261,3 @@ impl pulp::NullaryFnOnce for Job<'_> {
         }
     }
 }
-
-// Each class has two contexts of `Stream::Count`.
-const _: () = assert!(COUNT_CLASSES * 2 <= super::entropy::CONTEXTS);

@@ -4,11 +4,12 @@ use super::chunk::Want;
 use super::head::Head;
 use super::index::{Chunk, Index};
 use super::player::Player;
+use super::range::Recorder;
 use super::streams::Stream;
 use super::symbols::{LANES, Symbols};
 use super::tables::{Lookup, Tables};
 use super::unpack::{Refusal, Unpacker};
-use crate::packed::chunks::rounded_atoms;
+use crate::packed::atoms::rounded_atoms;
 use crate::packed::place::{Piece, Place};
 use crate::packed::scene::PackedHead;
 use crate::packed::stream::BitCounts;
@@ -128,9 +129,21 @@ impl LayeredDecoder {
 /// Lanes of the range of the dictionary.
 const ONE_LANE: u32 = 1;
 
+/// Records the coefficients of all atoms, which `whole` gives as numbers of steps, and returns unit-norm atoms as the
+/// decoder sees them.
+pub(in crate::packed) fn record_atoms(
+    recorder: &mut Recorder,
+    degree: ShDegree,
+    atoms: usize,
+    bits: u32,
+    whole: impl Fn(usize) -> i32,
+) -> Vec<f32> {
+    code_atoms(recorder, degree, atoms, bits, whole)
+}
+
 /// Codes the coefficients of all atoms, and returns unit-norm atoms as the decoder sees them. `whole` holds the encoder's
 /// numbers.
-pub(in crate::packed) fn code_atoms<S: Symbols>(
+fn code_atoms<S: Symbols>(
     s: &mut S,
     degree: ShDegree,
     atoms: usize,

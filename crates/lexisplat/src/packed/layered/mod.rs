@@ -5,6 +5,8 @@ mod bytes;
 mod chunk;
 mod decoder;
 mod fine;
+#[cfg(feature = "fuzzing")]
+pub mod fuzzing;
 mod head;
 mod index;
 mod interim;
@@ -12,6 +14,8 @@ mod mean_view;
 mod player;
 mod range;
 mod rest;
+#[cfg(any(test, feature = "fuzzing"))]
+mod script;
 mod steering;
 mod streams;
 mod symbols;
@@ -22,7 +26,7 @@ mod values;
 mod walk;
 
 pub(super) use chunk::{CodedChunk, Form, LayerForm, lanes};
-pub(super) use decoder::{LayeredDecoder, code_atoms};
+pub(super) use decoder::{LayeredDecoder, record_atoms};
 pub(super) use head::Head;
 pub(super) use index::{Chunk, Index, Place, Range, layer_forms};
 pub(super) use interim::{CHANGES, KINDS};

@@ -122,7 +122,8 @@ impl<'a> Column<'a> {
     }
 
     /// Type of the values.
-    pub(super) fn scalar_type(&self) -> ScalarType {
+    #[cfg(test)]
+    fn scalar_type(&self) -> ScalarType {
         self.ty
     }
 

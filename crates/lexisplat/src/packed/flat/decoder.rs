@@ -1,25 +1,24 @@
-//! Decoding the chunks of a packed scene, each without the others.
+//! Decoding the chunks of a file of version 2, each without the others.
 
 use std::ops::Range;
 
 use half::f16;
 
-use super::CHUNK;
-use super::bits::unzigzag;
-use super::chunk_codec::{ChunkCodec, GaussianValues};
-use super::entropy::Tables;
-use super::parameters::Parameters;
-use super::place::{Piece, Place, indices};
-use super::scene::{Flat, PackedHead};
-use super::stream::{BitCounts, Stream, SymbolDecoder, Symbols};
-use crate::scene::sh::ShDegree;
+use super::streams::Stream;
+use super::symbols::{SymbolDecoder, unzigzag};
+use super::tables::Tables;
+use super::walk::Walk;
+use crate::packed::CHUNK;
+use crate::packed::atoms::{MAX_ATOM_BITS, resident, rounded_atoms};
+use crate::packed::parameters::Parameters;
+use crate::packed::place::{Piece, Place, indices};
+use crate::packed::scene::{Flat, PackedHead};
+use crate::packed::stream::BitCounts;
 use crate::sparse::dictionary::Dictionary;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS};
 use crate::support::memory_budget::MemoryBudget;
 
-/// Steps of atoms' coefficients are 2^-k for k up to this.
-pub(super) const MAX_ATOM_BITS: u32 = 14;
 /// Gaussians after which the decoder checks that bits and memory are left.
 const LOOK_AFTER: usize = 256;
 
@@ -30,12 +29,12 @@ fn bad(file: &str, what: &str) -> Error {
 
 /// What all chunks of a file of version 2 are decoded with, and where they are.
 #[derive(Debug)]
-pub(super) struct FlatDecoder {
+pub(in crate::packed) struct FlatDecoder {
     /// The file, as the caller named it.
     file: String,
     limits: Limits,
-    pub(super) dictionary: Dictionary,
-    pub(super) dictionary_bits: BitCounts,
+    pub(in crate::packed) dictionary: Dictionary,
+    pub(in crate::packed) dictionary_bits: BitCounts,
     parameters: Parameters,
     tables: Tables,
     /// The parts of the data: two for the dictionary and two for each chunk.
@@ -45,7 +44,7 @@ pub(super) struct FlatDecoder {
 
 impl FlatDecoder {
     /// Reads what all chunks need from `head` and from the start of `data`.
-    pub(super) fn new(head: &PackedHead, flat: &Flat, data: &[u8]) -> Result<Self> {
+    pub(in crate::packed) fn new(head: &PackedHead, flat: &Flat, data: &[u8]) -> Result<Self> {
         let (file, limits, gaussians) = (head.file.clone(), head.limits, head.gaussians);
         let bad = |what| bad(&file, what);
         limits.check_gaussians(&file, gaussians as u64)?;
@@ -64,13 +63,13 @@ impl FlatDecoder {
     }
 
     /// The Gaussians of each chunk.
-    pub(super) fn spans(&self) -> Vec<Range<usize>> {
+    pub(in crate::packed) fn spans(&self) -> Vec<Range<usize>> {
         let n = self.gaussians;
         (0..n).step_by(CHUNK).map(|first| first..n.min(first + CHUNK)).collect()
     }
 
     /// Decodes chunk `c` of `data` to `place`. Escapes are numbered from `first`.
-    pub(super) fn piece(
+    pub(in crate::packed) fn piece(
         &self,
         data: &[u8],
         c: usize,
@@ -87,14 +86,13 @@ impl FlatDecoder {
         player.bit_counts = count_bits.then(|| BitCounts::zeros(Stream::ALL.len()));
         let (parameters, dictionary) = (&self.parameters, &self.dictionary);
         let mut piece = Piece::default();
-        let mut walk = ChunkCodec::new(parameters, dictionary.dim());
-        let unknown = GaussianValues::default();
+        let mut walk = Walk::new(parameters, dictionary.dim());
         let mut code = Vec::with_capacity(dictionary.dim());
         let width = indices(dictionary, Vec::new()).width() + size_of::<f16>();
         let row = size_of::<u32>() + dictionary.dim() * size_of::<f32>();
         let (mut nonzeros, mut rows) = (0, 0);
         for i in 0..place.counts.len() {
-            let decoded = walk.step(&mut player, &unknown).ok_or_else(damaged)?;
+            let decoded = walk.step(&mut player).ok_or_else(damaged)?;
             place.positions[i] = decoded.position;
             place.dc[i] = decoded.dc;
             place.opacities[i] = decoded.opacity;
@@ -164,54 +162,11 @@ fn dictionary(
     }
     let mut player = SymbolDecoder::new(tables, symbols, raw)?;
     player.bit_counts = Some(BitCounts::zeros(Stream::ALL.len()));
-    let rows = code_dictionary(&mut player, head.degree, head.atoms, flat.atom_bits);
+    let rows = rounded_atoms(head.degree, head.atoms, flat.atom_bits, |context, _| {
+        unzigzag(player.integer(Stream::Dictionary, context))
+    });
     if !player.exhausted() {
         return None;
     }
     Some((Dictionary::new(head.degree, rows).ok()?, player.bit_counts.unwrap_or_default()))
-}
-
-/// Codes the coefficients of all atoms; returns unit-norm atoms as the decoder sees them. `target` holds
-/// the encoder's; decoders have none.
-fn code_dictionary<S: Symbols>(s: &mut S, degree: ShDegree, atoms: usize, bits: u32) -> Vec<f32> {
-    rounded_atoms(degree, atoms, bits, |context, _| unzigzag(s.integer(Stream::Dictionary, context, || 0)))
-}
-
-/// Unit-norm atoms of whole numbers. `coded` gives the number of each coefficient, from its context and the number of
-/// the coefficient among all.
-pub(super) fn rounded_atoms(
-    degree: ShDegree,
-    atoms: usize,
-    bits: u32,
-    mut coded: impl FnMut(usize, usize) -> i64,
-) -> Vec<f32> {
-    let (dim, per_channel) = (degree.rest(), degree.rest_per_channel());
-    let steps = f64::from(1_u32 << bits);
-    let mut rows = Vec::with_capacity(atoms * dim);
-    for j in 0..atoms {
-        let mut row = Vec::with_capacity(dim);
-        for d in 0..dim {
-            // Coefficients of one degree are alike, whatever the channel.
-            let context = (d % per_channel + 1).isqrt() - 1;
-            #[expect(clippy::cast_precision_loss, reason = "small, or the norm check refuses it")]
-            row.push(coded(context, j * dim + d) as f64 / steps);
-        }
-        let norm = row.iter().map(|x| x * x).sum::<f64>().sqrt();
-        // An atom of zeros cannot be used; the first axis stands in so that the rest can be read.
-        if norm == 0.0 {
-            row[0] = 1.0;
-        }
-        let norm = if norm == 0.0 { 1.0 } else { norm };
-        #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-        rows.extend(row.iter().map(|x| (x / norm) as f32));
-    }
-    rows
-}
-
-/// A code as it is kept in memory: by ascending atom, values in f16.
-pub(super) fn resident(code: &[(u16, i32)], step: f32, out: &mut Vec<(u16, f16)>) {
-    out.clear();
-    #[expect(clippy::cast_precision_loss, reason = "f16 keeps less")]
-    out.extend(code.iter().map(|&(atom, value)| (atom, f16::from_f32(value as f32 * step))));
-    out.sort_by_key(|p| p.0);
 }
