@@ -26,18 +26,23 @@ pub(in crate::packed) struct MeanView {
 
 /// Softening as a share of the median distance of the points from their middle.
 const SOFTENING: f32 = 0.02;
+/// Least softening, of which the square is a normal number.
+const LEAST_SOFTENING: f32 = 1e-15;
 
 impl MeanView {
     /// The view from up to [`MAX_POINTS`] points, more of which are left out.
     pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
+        if points.is_empty() {
+            return Self::default();
+        }
         let points: Vec<Vec3> = points.iter().copied().take(MAX_POINTS).collect();
         let middle: Vec3 =
-            std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len().max(1) as f32);
+            std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
         let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
         let mut distances: Vec<f32> = points.iter().map(far).collect();
         distances.sort_by(f32::total_cmp);
         let softening = SOFTENING * at_share(&distances, 0.5);
-        Self { softening: if softening > 0.0 { softening } else { f32::MIN_POSITIVE }, points }
+        Self { softening: softening.max(LEAST_SOFTENING), points }
     }
 
     /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.
@@ -114,4 +119,43 @@ pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNEL
         *sum = channel.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
     }
     sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point may be where a Gaussian is, and be the only one.
+    #[test]
+    fn weights_are_finite_wherever_points_are() {
+        let degree = ShDegree::THREE;
+        for points in [vec![[1.0, 2.0, 3.0]], vec![[1.0, 2.0, 3.0]; 8], vec![[0.0; 3], [1.0, 2.0, 3.0]]] {
+            let view = MeanView::new(&points);
+            for position in
+                [[1.0, 2.0, 3.0], [0.0; 3], [1e30; 3], [f32::MAX, 0.0, f32::MIN], [1.0, 2.0, 3.000_001]]
+            {
+                assert!(
+                    view.weights(degree, position).iter().all(|w| w.is_finite()),
+                    "{points:?} {position:?}"
+                );
+            }
+        }
+        assert_eq!(MeanView::new(&[]), MeanView::default());
+    }
+
+    /// From far away a point weighs as the basis does in its direction.
+    #[test]
+    fn weights_are_those_of_directions() {
+        let degree = ShDegree::new(2).unwrap();
+        let view = MeanView::new(&[[3.0, 0.0, 0.0], [0.0, -4.0, 0.0]]);
+        let found = view.weights(degree, [0.0; 3]);
+        let (a, b) = (rest_basis(degree, [-1.0, 0.0, 0.0]), rest_basis(degree, [0.0, 1.0, 0.0]));
+        for ((found, a), b) in found.iter().zip(a).zip(b) {
+            assert!((found * C0 - 0.5 * (a + b)).abs() < 1e-3, "{found} {a} {b}");
+        }
+        assert!(
+            seen_row(&[1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, -1.0], &[0.5, 0.25, 0.125])
+                == [0.5, 0.5, -0.125]
+        );
+    }
 }
