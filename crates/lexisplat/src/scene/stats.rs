@@ -1,7 +1,7 @@
 //! Statistics of a scene's values, and warnings about them.
 //!
-//! The numbers behind `lexisplat info`. Sums are taken over fixed chunks and added in order, so the
-//! result does not depend on the number of threads.
+//! The numbers behind `lexisplat info`. Sums are taken over fixed blocks of Gaussians and added in order, so the
+//! result does not depend on the number of threads or on the parts in which a scene comes.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use crate::scene::extra::for_extra;
 use crate::scene::splats::Splats;
-use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_vec};
 
 /// Lower edges of the bins of [`Lint::rest_norms`]; the last one is open above. The tolerances in
 /// use, 0.03 to 0.3, are edges: the bins below a tolerance hold the Gaussians that need no atom at all.
@@ -82,31 +82,70 @@ pub fn lint(splats: &Splats) -> crate::Result<Lint> {
 pub struct Linter {
     gaussians: u64,
     view_dependent: bool,
-    counts: Counts,
+    counts: Blocks<Counts>,
     /// Name, range and sum of each property.
-    columns: Vec<(String, Span)>,
+    columns: Vec<(String, Blocks<Span>)>,
+}
+
+/// A sum of blocks of [`GAUSSIANS_PER_TASK`] Gaussians, which are added in order.
+#[derive(Debug, Clone, Default)]
+struct Blocks<T> {
+    /// Of all blocks that are full.
+    full: T,
+    /// Of the one that is not.
+    open: T,
+}
+
+impl<T: Add + Default + Send + Sync> Blocks<T> {
+    /// Adds `len` Gaussians after the first `start`. `sum` adds those of a range of them to a sum.
+    fn add(&mut self, start: u64, len: usize, sum: impl Fn(Range<usize>, T) -> T + Sync) {
+        let before = usize::try_from(start % GAUSSIANS_PER_TASK as u64).unwrap_or(0);
+        let mut open = Some(std::mem::take(&mut self.open));
+        let ends = (GAUSSIANS_PER_TASK - before..).step_by(GAUSSIANS_PER_TASK);
+        let mut blocks = Vec::new();
+        let mut first = 0;
+        for end in ends.take_while(|&end| end < len + GAUSSIANS_PER_TASK) {
+            blocks.push((first..end.min(len), open.take().unwrap_or_default()));
+            first = end.min(len);
+        }
+        let full = (before + len) / GAUSSIANS_PER_TASK;
+        for (block, sum) in map_vec(blocks, |(range, from)| sum(range, from)).into_iter().enumerate() {
+            if block < full { self.full.add(&sum) } else { self.open = sum }
+        }
+    }
+
+    /// The sum of all blocks.
+    fn finish(mut self) -> T {
+        self.full.add(&self.open);
+        self.full
+    }
+}
+
+/// What blocks are sums of.
+trait Add {
+    /// Adds the sum of the next block.
+    fn add(&mut self, next: &Self);
 }
 
 impl Linter {
     /// Adds the next Gaussians. All parts are of one scene and have the same properties. The result does not
-    /// depend on the parts, down to the bit, if all but the last are of a multiple of 2048 Gaussians.
+    /// depend on the parts, down to the bit.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] if the part's arrays differ in length.
     pub fn add(&mut self, splats: &Splats) -> crate::Result<()> {
         splats.validate()?;
-        for part in map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| Counts::of(splats, range)) {
-            self.counts.add(&part);
-        }
-        self.gaussians += splats.len() as u64;
+        let (start, len) = (self.gaussians, splats.len());
+        self.counts.add(start, len, |range, counts| counts.and(splats, range));
+        self.gaussians += len as u64;
         self.view_dependent = splats.degree.get() > 0;
         let columns = columns(splats);
         // An empty part may lack properties that the others have.
-        if self.columns.iter().all(|(_, whole)| whole.count == 0) && self.columns.len() <= columns.len() {
-            self.columns = columns.iter().map(|(name, _)| (name.clone(), Span::EMPTY)).collect();
+        if start == 0 && self.columns.len() <= columns.len() {
+            self.columns = columns.iter().map(|(name, _)| (name.clone(), Blocks::default())).collect();
         }
-        for ((_, whole), (_, parts)) in self.columns.iter_mut().zip(columns) {
-            parts.into_iter().for_each(|part| whole.add(part));
+        for ((_, whole), (_, sum)) in self.columns.iter_mut().zip(columns) {
+            whole.add(start, len, sum);
         }
         Ok(())
     }
@@ -114,11 +153,15 @@ impl Linter {
     /// The statistics of all parts together.
     #[must_use]
     pub fn finish(self) -> Lint {
-        let (n, counts) = (self.gaussians, self.counts);
+        let (n, counts) = (self.gaussians, self.counts.finish());
         let [zero_rest, zero_quaternions, non_unit_quaternions, huge_scales, never_drawn] = counts.odd;
         let mut lint = Lint {
             gaussians: n,
-            attributes: self.columns.into_iter().map(|(name, whole)| whole.into_report(name)).collect(),
+            attributes: self
+                .columns
+                .into_iter()
+                .map(|(name, whole)| whole.finish().into_report(name))
+                .collect(),
             rest_norms: counts.rest_norms,
             mean_rest_norm: if n == 0 { 0.0 } else { counts.norm_sum / n as f64 },
             zero_rest,
@@ -166,9 +209,10 @@ struct Counts {
 }
 
 impl Counts {
-    fn of(splats: &Splats, range: Range<usize>) -> Self {
+    /// These, and those of `range`.
+    fn and(mut self, splats: &Splats, range: Range<usize>) -> Self {
         let norm = |values: &[f32]| values.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
-        let mut counts = Self::default();
+        let counts = &mut self;
         let geometry = &splats.geometry;
         for i in range {
             let rest = splats.rest(i);
@@ -187,9 +231,11 @@ impl Counts {
             ];
             counts.odd.iter_mut().zip(odd).for_each(|(count, odd)| *count += u64::from(odd));
         }
-        counts
+        self
     }
+}
 
+impl Add for Counts {
     fn add(&mut self, other: &Self) {
         self.rest_norms.iter_mut().zip(other.rest_norms).for_each(|(a, b)| *a += b);
         self.odd.iter_mut().zip(other.odd).for_each(|(a, b)| *a += b);
@@ -206,16 +252,22 @@ struct Span {
     count: u64,
 }
 
-impl Span {
-    const EMPTY: Self = Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0 };
+impl Default for Span {
+    fn default() -> Self {
+        Self { min: f64::INFINITY, max: f64::NEG_INFINITY, sum: 0.0, count: 0 }
+    }
+}
 
-    fn add(&mut self, next: Self) {
+impl Add for Span {
+    fn add(&mut self, next: &Self) {
         self.min = self.min.min(next.min);
         self.max = self.max.max(next.max);
         self.sum += next.sum;
         self.count += next.count;
     }
+}
 
+impl Span {
     fn into_report(self, name: String) -> AttributeStats {
         match self.count {
             0 => AttributeStats { name, min: 0.0, max: 0.0, mean: 0.0 },
@@ -224,40 +276,44 @@ impl Span {
     }
 }
 
-/// All properties of some Gaussians, in spans of [`GAUSSIANS_PER_TASK`].
-fn columns(splats: &Splats) -> Vec<(String, Vec<Span>)> {
-    let geometry = &splats.geometry;
-    let mut out = Vec::new();
-    let mut columns = |names: &[&str], values: &[f32]| {
-        for (column, name) in names.iter().enumerate() {
-            out.push(((*name).to_owned(), spans(values, column, names.len())));
-        }
-    };
-    columns(&["x", "y", "z"], geometry.positions.as_flattened());
+/// Adds the values of some Gaussians to a span.
+type Sum<'a> = Box<dyn Fn(Range<usize>, Span) -> Span + Sync + 'a>;
+
+/// All properties of a scene.
+fn columns(splats: &Splats) -> Vec<(String, Sum<'_>)> {
+    let (geometry, dim) = (&splats.geometry, splats.degree.rest());
+    let mut out = of_rows(&["x", "y", "z"], geometry.positions.as_flattened());
     if !geometry.normals.is_empty() {
-        columns(&["nx", "ny", "nz"], geometry.normals.as_flattened());
+        out.extend(of_rows(&["nx", "ny", "nz"], geometry.normals.as_flattened()));
     }
-    columns(&["f_dc_0", "f_dc_1", "f_dc_2"], geometry.dc.as_flattened());
-    if splats.degree.rest() > 0 {
-        columns(&["f_rest"], &splats.sh_rest);
+    out.extend(of_rows(&["f_dc_0", "f_dc_1", "f_dc_2"], geometry.dc.as_flattened()));
+    if dim > 0 {
+        let all = every(&splats.sh_rest, 0, 1);
+        let sum: Sum<'_> = Box::new(move |rows, span| all(rows.start * dim..rows.end * dim, span));
+        out.push(("f_rest".to_owned(), sum));
     }
-    columns(&["opacity"], &geometry.opacities);
-    columns(&["scale_0", "scale_1", "scale_2"], geometry.scales.as_flattened());
-    columns(&["rot_0", "rot_1", "rot_2", "rot_3"], geometry.rotations.as_flattened());
+    out.extend(of_rows(&["opacity"], &geometry.opacities));
+    out.extend(of_rows(&["scale_0", "scale_1", "scale_2"], geometry.scales.as_flattened()));
+    out.extend(of_rows(&["rot_0", "rot_1", "rot_2", "rot_3"], geometry.rotations.as_flattened()));
     for extra in &geometry.extras {
-        out.push((extra.name.clone(), for_extra!(&extra.values, v => spans(v, 0, 1))));
+        out.push((extra.name.clone(), for_extra!(&extra.values, v => every(v, 0, 1))));
     }
     out
 }
 
+/// The columns of rows of values.
+fn of_rows<'a>(names: &[&str], values: &'a [f32]) -> Vec<(String, Sum<'a>)> {
+    let column = |(column, name): (usize, &&str)| ((*name).to_owned(), every(values, column, names.len()));
+    names.iter().enumerate().map(column).collect()
+}
+
 /// Every `width`-th value from `column` on.
-fn spans<T: Copy + Into<f64> + Sync>(values: &[T], column: usize, width: usize) -> Vec<Span> {
-    map_chunks(values.len() / width, GAUSSIANS_PER_TASK, |rows| {
-        let mut span = Span::EMPTY;
+fn every<T: Copy + Into<f64> + Sync>(values: &[T], column: usize, width: usize) -> Sum<'_> {
+    Box::new(move |rows, mut span| {
         for row in rows {
             let value: f64 = values[row * width + column].into();
             if !value.is_nan() {
-                span.add(Span { min: value, max: value, sum: value, count: 1 });
+                span.add(&Span { min: value, max: value, sum: value, count: 1 });
             }
         }
         span
@@ -313,6 +369,24 @@ mod tests {
         assert!((stats("red").mean - 0.5).abs() < 1e-9);
         assert_eq!(stats("f_rest").max, 4.0);
         assert_eq!(lint.attributes.last().unwrap().name, "red");
+    }
+
+    #[test]
+    fn parts_of_any_length_give_the_same_bits() {
+        let whole = crate::support::testing::scene(3 * GAUSSIANS_PER_TASK + 700, 3);
+        let expected = lint(&whole).unwrap();
+        for lengths in [&[1_usize][..], &[0, 700, 1347, 2048, 0, 5000], &[2048, 1, 4095]] {
+            let mut linter = Linter::default();
+            let (mut start, mut lengths) = (0, lengths.iter().copied().chain(std::iter::repeat(900)));
+            while start < whole.len() {
+                let end = whole.len().min(start + lengths.next().unwrap());
+                let mut part = whole.clone();
+                part.retain(&(0..whole.len()).map(|i| (start..end).contains(&i)).collect::<Vec<bool>>());
+                linter.add(&part).unwrap();
+                start = end;
+            }
+            assert_eq!(linter.finish(), expected);
+        }
     }
 
     #[test]

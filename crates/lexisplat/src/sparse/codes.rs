@@ -320,10 +320,15 @@ impl SparseCodes {
     #[must_use]
     pub fn resident_bytes(&self) -> usize {
         self.counts.len()
-            + size_of_val(self.checkpoints.as_slice())
+            + Self::checkpoint_bytes(self.counts.len())
             + self.nonzeros() * (self.indices.width() + self.values.width())
             + size_of_val(self.escapes.gaussians.as_slice())
             + size_of_val(self.escapes.rows.as_slice())
+    }
+
+    /// Bytes of memory that the offsets of so many Gaussians take.
+    pub(crate) fn checkpoint_bytes(gaussians: usize) -> usize {
+        gaussians.div_ceil(GAUSSIANS_PER_CHECKPOINT) * size_of::<u64>()
     }
 
     /// The Gaussians stored exactly.

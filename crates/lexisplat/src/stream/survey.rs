@@ -8,6 +8,7 @@ use crate::formats::lexi::LexiReader;
 use crate::packed::StreamBits;
 use crate::scene::source::SplatSource;
 use crate::scene::stats::{Lint, Linter};
+use crate::sparse::codes::SparseCodes;
 use crate::support::error::Result;
 use crate::support::parallel::GAUSSIANS_PER_TASK;
 use crate::support::progress::{Progress, Stage};
@@ -63,7 +64,8 @@ pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
         escapes: 0,
         nonzero_histogram: vec![0; dictionary.dim() + 1],
         atom_usage: vec![0; dictionary.len()],
-        resident_sh_bytes: (dictionary.len() * dictionary.dim() * size_of::<f32>()) as u64,
+        resident_sh_bytes: (dictionary.len() * dictionary.dim() * size_of::<f32>()
+            + SparseCodes::checkpoint_bytes(lexi.len())) as u64,
         stream_bits: Vec::new(),
     };
     let stream_bits = parts_and_source_order(
@@ -79,7 +81,9 @@ pub fn survey(lexi: &LexiReader<'_>, folder: &Path) -> Result<Survey> {
             out.nonzero_histogram[0] -= escapes;
             (0..codes.nonzeros()).for_each(|k| out.atom_usage[codes.indices().get(k)] += 1);
             let base = size_of_val(model.geometry().dc.as_slice());
-            out.resident_sh_bytes += (codes.resident_bytes() + base) as u64;
+            // Parts may end between two checkpoints.
+            let checkpoints = SparseCodes::checkpoint_bytes(model.len());
+            out.resident_sh_bytes += (codes.resident_bytes() - checkpoints + base) as u64;
         },
         &mut |splats| linter.add(&splats),
     )?;

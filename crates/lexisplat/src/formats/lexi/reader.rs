@@ -233,7 +233,7 @@ impl<'a> LexiReader<'a> {
     }
 
     /// Hands all Gaussians to `take`, part after part in the order of the file: the number of the first one,
-    /// and the part. Every part but the last is a multiple of [`CHUNK`] Gaussians long.
+    /// and the part.
     ///
     /// # Errors
     /// As [`read`], and what `take` returns.
