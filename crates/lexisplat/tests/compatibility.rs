@@ -137,7 +137,7 @@ fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
         let parts = Parts::of(&golden(name));
         // A newer file may hold anything else that is not known.
         let layout = parts.with("layout", "holographic").and("codes.more", "F64", &[1], &[0; 8]);
-        for newer in [parts.with("version", "3"), layout.with("version", "4000000000000")] {
+        for newer in [parts.with("version", "4"), layout.with("version", "4000000000000")] {
             let found: u64 = newer.metadata["version"].as_str().unwrap().parse().unwrap();
             let mut damaged = newer.sealed();
             let last = damaged.len() - 1;
@@ -145,7 +145,7 @@ fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
             for bytes in [newer.sealed(), damaged] {
                 for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
                     let said = error.to_string();
-                    let Error::Format { problem: FormatError::Version { found: f, supported: 2 }, .. } =
+                    let Error::Format { problem: FormatError::Version { found: f, supported: 3 }, .. } =
                         error
                     else {
                         panic!("{name}: {said}")
@@ -157,9 +157,9 @@ fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
             }
         }
     }
-    let newer = Parts::of(&dictionary_alone()).with("version", "3").sealed();
+    let newer = Parts::of(&dictionary_alone()).with("version", "4").sealed();
     let error = lexi::read_dictionary_bytes("d.lexi", &newer, &Limits::default()).unwrap_err().to_string();
-    assert!(error.starts_with("d.lexi: format version 3 ") && error.ends_with("update lexisplat"), "{error}");
+    assert!(error.starts_with("d.lexi: format version 4 ") && error.ends_with("update lexisplat"), "{error}");
 }
 
 #[test]
@@ -170,8 +170,10 @@ fn versions_that_never_were_are_damage() {
             assert_refused(&parts.with("version", version), &["metadata 'version' is "]);
         }
         // Each layout belongs to one version.
-        let other = if name.starts_with("packed") { "1" } else { "2" };
-        assert_refused(&parts.with("version", other), &["metadata 'version'", "has no layout"]);
+        let others: &[&str] = if name.starts_with("packed") { &["1"] } else { &["2", "3"] };
+        for other in others {
+            assert_refused(&parts.with("version", other), &["metadata 'version'", "has no layout"]);
+        }
         assert_refused(&parts.with("layout", "holographic"), &["holographic"]);
         assert_refused(&parts.with("format", "lexi-video"), &["metadata 'format' is 'lexi-video'"]);
         for key in ["version", "format", "layout"] {

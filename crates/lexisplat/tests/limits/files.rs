@@ -104,7 +104,15 @@ pub(crate) fn model_bytes(model: &Model) -> u64 {
     (geometry_bytes(model.geometry()) + codes.counts().len() + indices + values + escapes) as u64
 }
 
-/// Bytes of the tensors of a packed file.
+/// Bytes that an opened packed file takes: head and data as they lie, order and extras as numbers.
 pub(crate) fn packed_bytes(packed: &lexisplat::packed::Packed) -> u64 {
-    LexiWriter::packed(packed).attribute_bytes().iter().filter(|t| t.0 != "header").map(|t| t.1).sum()
+    let writer = LexiWriter::packed(packed);
+    let attributes = writer.attribute_bytes();
+    let lie = attributes.iter().filter(|t| ["packed.head", "packed.data"].contains(&t.0.as_str()));
+    let extras = packed.extras().iter().map(|e| match &e.values {
+        ExtraValues::U16(values) => size_of_val(values.as_slice()),
+        other => panic!("{other:?}"),
+    });
+    let numbers = extras.sum::<usize>() + packed.order().map_or(0, size_of_val);
+    lie.map(|t| t.1).sum::<u64>() + numbers as u64
 }

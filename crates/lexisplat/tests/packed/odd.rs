@@ -20,8 +20,8 @@ fn copies_of_one_gaussian_come_back_alike() {
     assert!(g.positions.iter().all(|p| distance(p, &splats.geometry.positions[0]) < 1e-6));
     assert!(g.dc.iter().all(|dc| distance(dc, &splats.geometry.dc[0]) < 1e-6));
     assert!(row_errors(&splats, &back).iter().all(|&e| e < 0.01));
-    // Predictions differ in their last bits, so the copies do too.
-    assert!(g.scales.iter().all(|s| distance(s, &g.scales[0]) < 1e-3));
+    // Predictions are made of features that are multiples of 2^-9, so the copies differ by a few of these.
+    assert!(g.scales.iter().all(|s| distance(s, &g.scales[0]) < 4.0 / 512.0));
     let (packed, _) = pack(&splats, STEP, &PackOptions::default());
     let each = packed.data().len() as f64 / 1000.0;
     assert!(each < 6.0, "{each} bytes for each copy, which says nothing new but a rotation");
@@ -48,7 +48,7 @@ fn no_view_dependence_takes_no_codes() {
     assert_eq!((packed.head().atoms, report.mean_nonzeros, packed.head().record.max_residual), (1, 0.0, 0.0));
 }
 
-/// 0.9999 is the most that is kept apart from opaque; what is too faint to see is as good as 1e-9.
+/// 0.9999 is the most that is kept apart from opaque. The least that is kept is e^-16, of which a byte shows nothing.
 #[test]
 fn extreme_opacities_stay_at_their_end() {
     let (splats, back) = changed(500, |s| {
@@ -67,7 +67,7 @@ fn extreme_opacities_stay_at_their_end() {
     for extreme in [1e30, f32::MAX, -1e30, f32::MIN] {
         let (_, back) = changed(500, |s| s.geometry.opacities[7] = extreme);
         let x = back.geometry.opacities[7];
-        assert!(if extreme > 0.0 { x > 9.0 } else { x < -50.0 }, "{extreme:e} became {x}");
+        assert!(if extreme > 0.0 { x > 9.0 } else { (-16.1..-15.9).contains(&x) }, "{extreme:e} became {x}");
     }
 }
 
@@ -119,8 +119,11 @@ fn numbers_below_normal_come_back_as_good_as_zero() {
         s.sh_rest.fill(tiny);
     });
     let g = &back.geometry;
-    let values = g.positions.as_flattened().iter().chain(g.dc.as_flattened()).chain(&g.opacities);
-    assert!(values.chain(g.scales.as_flattened()).chain(&back.sh_rest).all(|v| v.abs() < 1e-5));
+    let values = g.positions.as_flattened().iter().chain(g.dc.as_flattened()).chain(&back.sh_rest);
+    assert!(values.chain(g.scales.as_flattened()).all(|v| v.abs() < 1e-5));
+    // Its logarithm is that of a half, and has an average that is a multiple of 2^-9 where there are no neighbours. The
+    // logit moves by at most 2 for each 1 of the logarithm there.
+    assert!(g.opacities.iter().all(|v| v.abs() < 2.0 * 2.0 / 512.0));
 }
 
 /// Sizes end where exp leaves f32, and thinness where pictures no longer show it.
@@ -152,7 +155,7 @@ fn what_is_too_large_to_be_drawn_stays_unseen() {
             s.geometry.opacities[3] = 2.0;
         });
         let opacity = back.geometry.opacities[3];
-        assert!(if drawn { opacity > 0.0 } else { opacity < -50.0 }, "{scale:e}: {opacity}");
+        assert!(if drawn { opacity > 0.0 } else { opacity < -15.9 }, "{scale:e}: {opacity}");
     }
 }
 

@@ -1,8 +1,8 @@
 //! What cannot be packed or unpacked is refused, and the error names it.
 
 use lexisplat::lexi::{self, LexiReader};
-use lexisplat::packed::{PackOptions, Packed, Packer};
-use lexisplat::{Error, Limits, Sensitivity, Silent, Splats};
+use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::{Error, Extra, ExtraValues, Limits, Sensitivity, Silent, Splats};
 
 use super::support::{STEP, bytes, options, pack, sample, with_extras};
 use crate::parts::Parts;
@@ -124,39 +124,103 @@ fn words<'a>(parts: &'a mut Parts, name: &str) -> &'a mut [[u8; 4]] {
     parts.tensor(name).unwrap().as_chunks_mut().0
 }
 
-#[test]
-fn a_packed_scene_changed_by_hand_is_refused() {
-    let splats = sample(200, 57, 2);
-    let (good, _) = pack(&with_extras(splats.clone()), STEP, &options(|o| o.keep_order = true));
-    let (plain, _) = pack(&splats, STEP, &options(|_| ()));
-    type Change = fn(&mut Parts);
-    let changes: [(&Packed, &str, Change); 14] = [
-        (&good, "order", |p| cut(p, "packed.order", 4)),
-        (&good, "order", |p| p.tensor("packed.order").unwrap().extend([200, 0, 0, 0])),
-        (&good, "order", |p| words(p, "packed.order")[3] = [200, 0, 0, 0]),
-        (&good, "order", |p| words(p, "packed.order")[3] = words(p, "packed.order")[4]),
-        (&good, "parameters", |p| cut(p, "packed.parameters", 4)),
-        (&good, "parameters", |p| words(p, "packed.parameters")[0] = f32::NAN.to_le_bytes()),
-        (&good, "tables", |p| cut(p, "packed.tables", 1)),
-        (&good, "lengths", |p| words(p, "packed.lengths")[0][0] ^= 1),
-        (&good, "lengths", |p| cut(p, "packed.data", 1)),
-        (&plain, "lengths", |p| set(p, "gaussians", "0")),
-        (&plain, "chunk 0", |p| set(p, "gaussians", "199")),
-        (&plain, "dictionary", |p| set(p, "atoms", "0")),
-        (&plain, "dictionary", |p| set(p, "degree", "0")),
-        (&good, "extra", |p| cut(p, "extra.label", 1)),
-    ];
-    for (packed, name, change) in changes {
-        let mut parts = Parts::of(&bytes(packed));
+type Change = fn(&mut Parts);
+
+/// Each change makes a file that is refused with this word.
+fn assert_refused(bytes: &[u8], changes: &[(&str, Change)]) {
+    for (number, (word, change)) in changes.iter().enumerate() {
+        let mut parts = Parts::of(bytes);
         change(&mut parts);
         parts.fit_shapes();
         let error = lexi::read_bytes("p.lexi", &parts.sealed(), &Limits::default()).unwrap_err();
         let said = error.to_string();
-        assert!(matches!(error, Error::Format { .. }) && said.starts_with("p.lexi: "), "{name}: {said}");
-        assert!(said.contains(name), "{name}: {said}");
+        assert!(matches!(error, Error::Format { .. }) && said.starts_with("p.lexi: "), "{number}: {said}");
+        assert!(said.contains(word), "{number}, {word}: {said}");
     }
-    let unchanged = Parts::of(&bytes(&good)).sealed();
-    assert_eq!(lexi::read_bytes("p.lexi", &unchanged, &Limits::default()).unwrap(), good.unpack().unwrap());
+}
+
+/// Takes the values of a column that is not drawn for the order.
+fn order_from(parts: &mut Parts, column: &str) {
+    let bytes = parts.tensor(column).unwrap().clone();
+    parts.tensors.retain(|t| t.0 != column);
+    *parts.tensor("packed.order").unwrap() = bytes;
+}
+
+#[test]
+fn a_packed_scene_changed_by_hand_is_refused() {
+    let mut splats = with_extras(sample(200, 57, 2));
+    let column = |name: &str, values| Extra { name: name.to_owned(), values };
+    splats.geometry.extras.extend([
+        column("past", ExtraValues::U32((1..=200).collect())),
+        column("real", ExtraValues::F32(vec![0.0; 200])),
+        column("zeros", ExtraValues::U32(vec![0; 200])),
+    ]);
+    let (good, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
+    let (plain, _) = pack(&sample(200, 57, 2), STEP, &options(|_| ()));
+    assert_refused(
+        &bytes(&good),
+        &[
+            ("order", |p| cut(p, "packed.order", 4)),
+            ("order", |p| p.tensor("packed.order").unwrap().extend([200, 0, 0, 0])),
+            ("order", |p| p.tensor("packed.order").unwrap().clear()),
+            ("'packed.order' is not a permutation", |p| order_from(p, "extra.zeros")),
+            ("'packed.order' is not a permutation", |p| order_from(p, "extra.past")),
+            ("'packed.order' is not of u32", |p| order_from(p, "extra.real")),
+            ("head", |p| cut(p, "packed.head", 1)),
+            ("head", |p| p.tensor("packed.head").unwrap().push(0)),
+            ("head", |p| p.tensor("packed.head").unwrap().clear()),
+            ("head", |p| p.tensors.retain(|t| t.0 != "packed.head")),
+            ("checksum of 'range 0 of chunk 0'", |p| p.tensor("packed.data").unwrap()[0] ^= 1),
+            ("ranges", |p| cut(p, "packed.data", 1)),
+            ("ranges", |p| p.tensor("packed.data").unwrap().push(0)),
+            ("extra", |p| cut(p, "extra.label", 1)),
+        ],
+    );
+    assert_refused(
+        &bytes(&plain),
+        &[
+            ("head", |p| set(p, "gaussians", "0")),
+            ("head", |p| set(p, "gaussians", "199")),
+            ("head", |p| set(p, "degree", "0")),
+        ],
+    );
+    for packed in [good, plain] {
+        let unchanged = Parts::of(&bytes(&packed)).sealed();
+        let read = lexi::read_bytes("p.lexi", &unchanged, &Limits::default()).unwrap();
+        assert_eq!(read, packed.unpack().unwrap());
+    }
+}
+
+#[test]
+fn a_packed_scene_of_version_2_changed_by_hand_is_refused() {
+    let golden = |name: &str| {
+        let path = format!("{}/tests/golden/{name}.lexi", env!("CARGO_MANIFEST_DIR"));
+        std::fs::read(path).unwrap()
+    };
+    assert_refused(
+        &golden("packed"),
+        &[
+            ("order", |p| cut(p, "packed.order", 4)),
+            ("order", |p| p.tensor("packed.order").unwrap().extend([44, 1, 0, 0])),
+            ("order", |p| words(p, "packed.order")[3] = [44, 1, 0, 0]),
+            ("order", |p| words(p, "packed.order")[3] = words(p, "packed.order")[4]),
+            ("parameters", |p| cut(p, "packed.parameters", 4)),
+            ("parameters", |p| words(p, "packed.parameters")[0] = f32::NAN.to_le_bytes()),
+            ("tables", |p| cut(p, "packed.tables", 1)),
+            ("lengths", |p| words(p, "packed.lengths")[0][0] ^= 1),
+            ("lengths", |p| cut(p, "packed.data", 1)),
+            ("extra", |p| cut(p, "extra.label", 1)),
+        ],
+    );
+    assert_refused(
+        &golden("packed_escapes"),
+        &[
+            ("lengths", |p| set(p, "gaussians", "0")),
+            ("chunk 0", |p| set(p, "gaussians", "79")),
+            ("dictionary", |p| set(p, "atoms", "0")),
+            ("dictionary", |p| set(p, "degree", "0")),
+        ],
+    );
 }
 
 #[test]
