@@ -12,7 +12,11 @@ use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 /// As derived in `crates/lexisplat/tests/packed_mutation/main.rs`.
 const PER_BYTE: usize = 542;
 /// Tables, a dictionary and what a chunk may hold before it is asked for its bits: as there.
-const BASE: usize = 18 * 31 * (9 << 10) + 1024 * 72 * 4 * 2 + 256 * 72 * 16 + (64 << 10);
+const BASE: usize = (56 * 31 * (4 << 10) + 3 * 31 * (16 << 10)) * 2
+    + 59 * 31 * (1 << 10)
+    + 1024 * 72 * 4 * 2
+    + 64 * 16 * 72 * 16
+    + (64 << 10);
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     container::mutate(data, size, max_size, seed, |buffer, len| {
