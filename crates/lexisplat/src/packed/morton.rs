@@ -43,7 +43,29 @@ fn gather(code: u64) -> u32 {
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
+
+    proptest! {
+        #[test]
+        fn bits_alternate(x in 0..1_u32 << BITS, y in 0..1_u32 << BITS, z in 0..1_u32 << BITS) {
+            let cell = [x, y, z];
+            let mut code = 0_u64;
+            for bit in 0..3 * BITS {
+                code |= u64::from(cell[bit as usize % 3] >> (bit / 3) & 1) << bit;
+            }
+            prop_assert_eq!(encode(cell), code);
+            prop_assert_eq!((decode(code), gathered(code)), (Some(cell), cell));
+        }
+
+        #[test]
+        fn numbers_beyond_are_of_no_cell(code in any::<u64>()) {
+            let fits = code >> (3 * BITS) == 0;
+            prop_assert_eq!(decode(code), fits.then(|| gathered(code)));
+            prop_assert!(gathered(code).iter().all(|x| x >> BITS == 0));
+        }
+    }
 
     #[test]
     fn cells_come_back() {

@@ -81,3 +81,77 @@ fn weights(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
     }
     weight
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// A Gaussian of one lane: its cell, and a feature.
+    type Seen = ([u32; 3], i32);
+
+    fn gaussians() -> impl Strategy<Value = Vec<Seen>> {
+        let cell = prop_oneof![
+            prop::array::uniform3(0_u32..20),
+            prop::array::uniform3(0_u32..1 << 21),
+            Just([1000, 1000, 1000])
+        ];
+        let feature = prop_oneof![-600..600_i32, -(1 << 14) + 1..1 << 14];
+        prop::collection::vec((cell, feature), 2..60)
+    }
+
+    /// The average feature of the last 16 of `seen` about `cell`.
+    fn average(seen: &[Seen], cell: [u32; 3]) -> f64 {
+        let (mut sum, mut total) = (0.0, 0.0);
+        for (other, feature) in seen.iter().rev().take(16) {
+            let far = |k: usize| f64::from(other[k].abs_diff(cell[k]).min(1023));
+            let squares = 4.0 * (far(0).powi(2) + far(1).powi(2) + far(2).powi(2)) + 1.0;
+            // 2^12 over the power of two above the number.
+            let weight = (4096.0 / 2.0_f64.powf(squares.log2().floor() + 1.0)).max(1.0);
+            sum += weight * f64::from(*feature);
+            total += weight;
+        }
+        sum / total
+    }
+
+    proptest! {
+        #[test]
+        fn averages_are_weighted_means(lanes in prop::array::uniform4(gaussians())) {
+            let of = |l: usize, i: usize| lanes[l % 4][i % lanes[l % 4].len()];
+            let mut around = Around::default();
+            for i in 0..60 {
+                let cell = std::array::from_fn(|k| std::array::from_fn(|l| of(l, i).0[k].cast_signed()));
+                prop_assert_eq!(around.is_known(), i > 0);
+                if i > 0 {
+                    let found = around.average(&cell);
+                    for l in 0..LANES {
+                        let seen: Vec<Seen> = (0..i).map(|i| of(l, i)).collect();
+                        let expected = average(&seen, of(l, i).0);
+                        for (a, values) in found.iter().enumerate() {
+                            // Halves of a unit for the sum and for the inverse of the weights, and one for the last shift.
+                            let own = if a % 2 == 0 { expected } else { -expected };
+                            prop_assert!((f64::from(values[l]) - own).abs() <= 3.0, "{} {own}", values[l]);
+                        }
+                    }
+                }
+                let features = |a: usize| {
+                    let feature = |l: usize| if a % 2 == 0 { of(l, i).1 } else { -of(l, i).1 };
+                    std::array::from_fn(feature)
+                };
+                around.push(cell, std::array::from_fn(features));
+            }
+        }
+    }
+
+    /// In damaged files features are any numbers and cells any of 21 bits.
+    #[test]
+    fn wild_features_are_averaged_somehow() {
+        let mut around = Around::default();
+        for wild in [i32::MIN, i32::MAX, -1, 1 << 30].into_iter().cycle().take(40) {
+            let cell = [[wild & 0x1f_ffff; LANES]; 3];
+            around.average(&cell);
+            around.push(cell, [[wild; LANES]; AVERAGED]);
+        }
+    }
+}

@@ -167,3 +167,6 @@ fn dictionary(head: &Head, degree: ShDegree, lookup: &Lookup) -> Option<(Diction
     }
     Some((Dictionary::new(degree, rows).ok()?, player.bit_counts.take().unwrap_or_default()))
 }
+
+#[cfg(test)]
+mod tests;

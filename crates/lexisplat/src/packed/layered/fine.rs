@@ -53,3 +53,91 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
     }
     (!beyond).then_some(())
 }
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::packed::layered::player::Player;
+    use crate::packed::layered::range::Recorder;
+    use crate::packed::layered::script::tables_of;
+    use crate::packed::layered::symbols::has;
+    use crate::packed::layered::tables::Lookup;
+
+    fn of<const N: usize, T: Copy>(values: &[T], first: usize) -> [Lanes<T>; N] {
+        std::array::from_fn(|k| each_of(values, first + 7 * k))
+    }
+
+    fn each_of<T: Copy>(values: &[T], first: usize) -> Lanes<T> {
+        std::array::from_fn(|l| values[(first + 5 * l) % values.len()])
+    }
+
+    /// A group with the base of what it wants.
+    fn group(levels: usize, wanted: &[i32], codes: &[u32]) -> Group {
+        let axis_bits: [Lanes<u32>; 2] = of(codes, 3);
+        let axis_bits = axis_bits.map(|bits| bits.map(|b| 1 + b % 15));
+        let full = |k: usize| &axis_bits[usize::from(k == 2)];
+        let code: [Lanes<u32>; 3] = of(codes, 11);
+        let wanted_rotation = std::array::from_fn(|k| each(|l| code[k][l] & ((1 << full(k)[l]) - 1)));
+        let wanted: [Lanes; REFINED] = of(wanted, 0);
+        let counts = wanted.map(|lanes| lanes.map(|w| coarsened(w, factor(levels))));
+        let zeros = [0; LANES];
+        Group {
+            cell: [zeros; 3],
+            colour: each_of(codes, 1).map(|c| c % 16),
+            shape: [0; LANES],
+            coarse: [zeros; TARGETS],
+            steps: [zeros; TARGETS],
+            base: counts,
+            counts,
+            rotation: std::array::from_fn(|k| each(|l| wanted_rotation[k][l] >> dropped(full(k)[l], levels))),
+            axis_bits,
+            needle: [false; LANES],
+            moves: [zeros; 3],
+            fineness: of(codes, 2).map(|f: Lanes<u32>| f.map(|f| f % 24)),
+            wanted,
+            wanted_rotation,
+        }
+    }
+
+    fn assert_refined(group: &Group, wants: &Group, set: u32, level: usize) {
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            for k in DC..REFINED {
+                assert_eq!(group.counts[k][l], coarsened(wants.wanted[k][l], factor(level)));
+            }
+            for k in 0..3 {
+                let full = wants.axis_bits[usize::from(k == 2)][l];
+                assert_eq!(group.rotation[k][l], wants.wanted_rotation[k][l] >> dropped(full, level));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn refinements_lead_to_what_is_wanted(
+            wanted in prop::collection::vec(prop_oneof![-20..20_i32, -1_000_000_000..=1_000_000_000], 20),
+            codes in prop::collection::vec(any::<u32>(), 30),
+            set in 1_u32..1 << LANES,
+            levels in 1..=crate::packed::layered::walk::MAX_LEVELS,
+        ) {
+            let blank = group(levels, &wanted, &codes);
+            let (mut recorder, mut coded) = (Recorder::default(), blank.clone());
+            for level in (1..=levels).rev() {
+                refine(&mut recorder, set, &mut coded, level);
+                assert_refined(&coded, &blank, set, level - 1);
+            }
+            recorder.each(|_, symbol| assert!(symbol <= 2), |_, _| ());
+            let (_, tables) = tables_of(&recorder).unwrap();
+            let (range, lookup) = (recorder.finish(&tables, LANES), Lookup::new(&tables));
+            let mut player = Player::new(&lookup, &range, LANES, false).unwrap();
+            let zeros = [0; LANES];
+            let mut decoded = Group { wanted: [zeros; REFINED], wanted_rotation: [[0; LANES]; 3], ..blank.clone() };
+            for level in (1..=levels).rev() {
+                refine(&mut player, set, &mut decoded, level);
+                assert_refined(&decoded, &blank, set, level - 1);
+            }
+            prop_assert!(player.exhausted());
+        }
+    }
+}

@@ -3,9 +3,9 @@
 use super::head::Head;
 use super::player::Player;
 use super::range::Recorder;
-use super::script::{Ask, ask};
+use super::script::{Ask, ask, tables_of};
 use super::symbols::LANES;
-use super::tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
+use super::tables::{Lookup, Tables};
 use crate::packed::Packed;
 use crate::packed::scene::Coding;
 use crate::scene::sh::ShDegree;
@@ -55,9 +55,7 @@ pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
     let asks: Vec<Ask> = asks.collect();
     let mut recorder = Recorder::default();
     let coded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut recorder, a)).collect();
-    let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
-    recorder.each(|context, symbol| histograms[context].add(symbol), |_, _| ());
-    let Some(tables) = Tables::new(&histograms) else { return false };
+    let Some((_, tables)) = tables_of(&recorder) else { return false };
     let range = recorder.finish(&tables, lanes);
     let Some(read) = Tables::read(&tables.write()) else { return false };
     let lookup = Lookup::new(&read);

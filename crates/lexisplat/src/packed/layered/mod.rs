@@ -21,6 +21,8 @@ mod streams;
 mod symbols;
 mod tables;
 mod target;
+#[cfg(test)]
+mod tests;
 mod unpack;
 mod values;
 mod walk;

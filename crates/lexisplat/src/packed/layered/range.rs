@@ -128,3 +128,6 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
     words.reverse();
     words
 }
+
+#[cfg(test)]
+mod tests;

@@ -328,3 +328,6 @@ fn longer(totals: &Lanes<u32>, j: usize) -> u32 {
 const _: () = assert!(COUNT_CLASSES as usize * 2 <= super::streams::CONTEXTS);
 const _: () = assert!((FIRST_CONTEXTS + LATER_CONTEXTS) as usize <= super::streams::CONTEXTS);
 const _: () = assert!(REST_PARTS <= super::streams::CONTEXTS);
+
+#[cfg(test)]
+mod tests;

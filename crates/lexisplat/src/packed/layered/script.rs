@@ -1,7 +1,9 @@
 //! Scripts of what is coded one after the other, for tests and fuzz targets of the entropy coder.
 
+use super::range::Recorder;
 use super::streams::Slot;
 use super::symbols::{LANES, Symbols, each};
+use super::tables::{ALL_CONTEXTS, Histogram, Tables};
 
 /// One thing that a script codes.
 #[derive(Debug, Clone, Copy)]
@@ -37,4 +39,12 @@ pub(super) fn ask<S: Symbols>(s: &mut S, ask: &Ask) -> [u64; LANES] {
         3 => s.signed(slot, context, ask.set, |l| word(l).cast_signed()).map(|v| v.cast_unsigned().into()),
         _ => s.wide(slot, context, ask.set, |l| value(l) >> 1),
     }
+}
+
+/// How often each symbol was recorded in each context, and tables of that.
+pub(super) fn tables_of(recorder: &Recorder) -> Option<(Vec<Histogram>, Tables)> {
+    let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
+    recorder.each(|context, symbol| histograms[context].add(symbol), |_, _| ());
+    let tables = Tables::new(&histograms)?;
+    Some((histograms, tables))
 }

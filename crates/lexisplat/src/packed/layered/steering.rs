@@ -262,3 +262,6 @@ fn bits_for(log: i32) -> u32 {
 pub(super) fn feature(value: i32) -> i32 {
     (value >> (VALUE_BITS - FEATURE_BITS)).clamp(-MOST_FEATURE, MOST_FEATURE)
 }
+
+#[cfg(test)]
+mod tests;

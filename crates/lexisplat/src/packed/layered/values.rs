@@ -164,3 +164,6 @@ pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle:
 pub(super) fn powers(logs: &Lanes) -> Lanes<f64> {
     each(|l| exp2(f64::from(logs[l]) / 512.0))
 }
+
+#[cfg(test)]
+mod tests;
