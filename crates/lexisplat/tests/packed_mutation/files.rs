@@ -1,4 +1,4 @@
-//! Small packed files of every kind.
+//! Small packed files of every kind and version.
 
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
@@ -47,6 +47,29 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("pair", packed(&scene(&SampleOptions::new(2, 3)), 1e-3, |_| (), None)),
         ("one", packed(&one, 1e-3, |_| (), None)),
     ]
+}
+
+/// Of version 2, which is no longer written.
+pub(crate) fn golden() -> Vec<(&'static str, Vec<u8>)> {
+    let read = |name: &'static str| {
+        let path = format!("{}/tests/golden/{name}.lexi", env!("CARGO_MANIFEST_DIR"));
+        (name, std::fs::read(path).unwrap())
+    };
+    ["packed", "packed_degree0", "packed_escapes"].map(read).to_vec()
+}
+
+/// Of two layers.
+pub(crate) fn layered() -> Vec<u8> {
+    let mut splats = scene(&SampleOptions::new(8200, 5)).with_degree_cut(ShDegree::ONE);
+    splats.sh_rest[90..99].fill(1e6);
+    packed(&splats, 1e-4, |o| o.atoms = Some(8), None)
+}
+
+/// One Gaussian again and again, with a row that is stored exactly.
+pub(crate) fn rows(count: usize) -> Vec<u8> {
+    let degree = ShDegree::new(4).unwrap();
+    let splats = Splats { degree, sh_rest: vec![1e6; count * degree.rest()], ..common::copies(count) };
+    packed(&splats, 1e300, |_| (), None)
 }
 
 /// One Gaussian again and again.

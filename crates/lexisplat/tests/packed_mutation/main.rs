@@ -3,39 +3,50 @@
 
 mod files;
 mod mutations;
+mod version_2;
+mod version_3;
 
 use crate::allocator::{alone, counted, total};
 use crate::common::count_in_parts;
 use crate::parts::Parts;
-use files::{copies, files};
-use lexisplat::packed::CHUNK;
+use files::{copies, files, golden, layered, rows};
 use lexisplat::{Limits, Model, Splats, lexi};
 use lexisplat_testing::Random;
-use mutations::{change_metadata, change_parameters, change_tensor, make_up};
+use mutations::{change_metadata, change_tensor};
 use serde_json::Value;
+use version_2::{change_parameters, make_up};
+use version_3::Index;
 
 /// A reader may hold this many bytes per byte of input. A byte is at most 3 Gaussians, each 57 bytes as it is
 /// decoded and again in the source's order, with 16 to sort by: 390. Or it is 8 nonzeros of 4 bytes, once in
 /// their chunk, once in the model, and twice while lists grow: 128. And 24 are for the container.
 const ALLOWED_PER_BYTE: usize = 542;
-/// 18 streams of 31 tables, each with a lookup of 2^12 u16 and 1 KiB for itself and what is rounded up. What
-/// grows with its symbols, of which a byte has two, is paid for above.
-const ALLOWED_TABLES: usize = 18 * 31 * (9 << 10);
-/// A dictionary of 1024 atoms of 72 values as it is read, and the 256 Gaussians of 72 values after which
-/// a chunk is asked whether it has bits left, as codes or rows, lists growing.
-const ALLOWED_BASE: usize = 1024 * 72 * 4 * 2 + 256 * 72 * 16 + (64 << 10);
+/// 59 sets of contexts with up to 31 tables, each with a lookup of 2^10 u32, or 2^12 for three of them, in a list that
+/// grows, and 1 KiB for itself. What grows with its symbols, of which a byte has two, is paid for above.
+const ALLOWED_TABLES: usize = (56 * 31 * (4 << 10) + 3 * 31 * (16 << 10)) * 2 + 59 * 31 * (1 << 10);
+/// A dictionary of 1024 atoms of 72 values as it is read.
+const ALLOWED_BASE: usize = 1024 * 72 * 4 * 2 + (64 << 10);
+/// Of each thread the 64 Gaussians of 72 values of 16 lanes after which a chunk is asked whether it has bits left, as codes
+/// or rows, lists growing.
+const ALLOWED_BLOCK: usize = 64 * 16 * 72 * 16;
 /// A reader may allocate this many times what it may hold, what it gives back included: lists that grow are allocated
 /// about twice, and parts one after another. A reader that goes over the same bytes again and again allocates more.
 const ALLOWED_TIMES: usize = 4;
-/// Structured mutations tried.
-const MUTATIONS: usize = 10_000;
+/// Structured mutations tried: of small files, of a larger one of two layers, and of version 2. They are 10,000 in all.
+const MUTATIONS: usize = 7600;
+const LAYERED: usize = 400;
+const FLAT: usize = 2000;
+/// Of a file that takes long only every so many bytes and bits are tried. They are primes, so that bits of all kinds are.
+const PRIME: usize = 1999;
+const STRIDE: usize = 11;
 
 /// Reads `bytes`; asserts the bounds. Whether they were accepted.
 fn accepted(bytes: &[u8]) -> bool {
     let before = total();
     let (result, used) = counted(|| lexi::read_bytes("mutated.lexi", bytes, &Limits::default()));
     let in_all = total() - before;
-    let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_TABLES + ALLOWED_BASE;
+    let threads = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+    let allowed = bytes.len() * ALLOWED_PER_BYTE + ALLOWED_TABLES + ALLOWED_BASE + threads * ALLOWED_BLOCK;
     assert!(in_all <= ALLOWED_TIMES * allowed, "{in_all} bytes in all for a file of {}", bytes.len());
     assert!(used <= allowed, "{used} bytes allocated for a file of {}, {allowed} allowed", bytes.len());
     let (in_parts, used) = counted(|| count_in_parts(bytes));
@@ -62,55 +73,110 @@ fn accepted(bytes: &[u8]) -> bool {
     }
 }
 
+/// Asserts that `bytes` are taken, and refused if they are cut or changed; only every `stride`th byte is tried.
+fn damaged(name: &str, bytes: &[u8], stride: usize) {
+    assert!(accepted(bytes), "{name}");
+    for len in (0..bytes.len()).step_by(stride).chain([bytes.len() - 1]) {
+        assert!(!accepted(&bytes[..len]), "{name} truncated to {len}");
+    }
+    let mut longer = bytes.to_vec();
+    longer.push(0);
+    assert!(!accepted(&longer), "{name} with a byte more");
+    for bit in (0..bytes.len() * 8).step_by(stride) {
+        let mut flipped = bytes.to_vec();
+        flipped[bit / 8] ^= 1 << (bit % 8);
+        assert!(!accepted(&flipped), "{name} with bit {bit} flipped");
+    }
+}
+
+/// Tries `count` mutations of these files, of which `change` makes one. Both must happen, or they do not reach what they
+/// are for: that a file is still taken, and that it is refused.
+fn mutated(seed: u64, files: &[(&str, Vec<u8>)], count: usize, change: impl Fn(&mut Parts, &mut Random)) {
+    let mut random = Random::new(seed);
+    let taken = (0..count).filter(|_| {
+        let (_, bytes) = &files[random.below(files.len())];
+        let mut parts = Parts::of(bytes);
+        change(&mut parts, &mut random);
+        accepted(&parts.sealed())
+    });
+    let taken = taken.count();
+    assert!(taken > count / 50 && taken < count * 3 / 4, "{taken} of {count} taken");
+}
+
 #[test]
 fn damage_is_refused_within_bounds() {
     let _alone = alone();
     let files = files();
     for (name, bytes) in &files {
-        assert!(accepted(bytes), "{name}");
-        assert!(accepted(&Parts::of(bytes).sealed()), "{name} taken apart and put together");
-        for len in 0..bytes.len() {
-            assert!(!accepted(&bytes[..len]), "{name} truncated to {len}");
-        }
-        let mut longer = bytes.clone();
-        longer.push(0);
-        assert!(!accepted(&longer), "{name} with a byte more");
-        for bit in 0..bytes.len() * 8 {
-            let mut flipped = bytes.clone();
-            flipped[bit / 8] ^= 1 << (bit % 8);
-            assert!(!accepted(&flipped), "{name} with bit {bit} flipped");
-        }
+        damaged(name, bytes, 1);
     }
-
-    let mut random = Random::new(1);
-    let (mut taken, mut refused) = (0, 0);
-    for _ in 0..MUTATIONS {
-        let (_, bytes) = &files[random.below(files.len())];
-        let mut parts = Parts::of(bytes);
-        match random.below(8) {
-            0 | 1 => change_metadata(&mut parts, &mut random),
-            2 | 3 => make_up(&mut parts, &mut random),
-            4 => change_parameters(&mut parts, &mut random),
-            _ => (0..1 + random.below(2)).for_each(|_| change_tensor(&mut parts, &mut random)),
+    let layered = vec![("layered", layered())];
+    damaged("layered", &layered[0].1, PRIME);
+    for (files, count) in [(&files, MUTATIONS), (&layered, LAYERED)] {
+        for (name, bytes) in files {
+            assert!(accepted(&Parts::of(bytes).sealed()), "{name} taken apart and put together");
         }
-        if accepted(&parts.sealed()) {
-            taken += 1;
-        } else {
-            refused += 1;
-        }
+        mutated(1, files, count, |parts, random| {
+            let index = Index::of(parts);
+            match random.below(8) {
+                0 => change_metadata(parts, random),
+                1 => change_tensor(parts, &version_3::TENSORS, random),
+                2 | 3 => index.change_head(parts, random),
+                4 | 5 => index.change_index(parts, random),
+                _ => index.change_data(parts, random),
+            }
+            index.seal(parts);
+        });
     }
-    // Both must happen, or the mutations do not reach what they are for.
-    assert!(taken > MUTATIONS / 50 && refused > MUTATIONS / 4, "{taken} taken, {refused} refused");
+}
 
-    // The most that can be made of bytes: Gaussians of which nothing is said but the bits of a rotation.
+#[test]
+fn damage_of_version_2_is_refused_within_bounds() {
+    let _alone = alone();
+    let files = golden();
+    for (name, bytes) in &files {
+        damaged(name, bytes, STRIDE);
+    }
+    mutated(2, &files, FLAT, |parts, random| match random.below(8) {
+        0 | 1 => change_metadata(parts, random),
+        2 | 3 => make_up(parts, random),
+        4 => change_parameters(parts, random),
+        _ => (0..1 + random.below(2)).for_each(|_| change_tensor(parts, &version_2::TENSORS, random)),
+    });
+}
+
+/// The most that can be made of bytes: Gaussians of which nothing is said but the bits of a rotation.
+#[test]
+fn many_gaussians_take_their_bytes() {
+    let _alone = alone();
     let many = copies(200_000);
     assert!(accepted(&many));
     let mut parts = Parts::of(&many);
+    let index = Index::of(&mut parts);
+    for lie in [1, 32_767, 32_769, 65_536, 65_537, 1 << 31] {
+        let mut parts = parts.clone();
+        index.claim(&mut parts, lie);
+        assert!(!accepted(&parts.sealed()), "{lie} Gaussians a chunk");
+    }
     for lie in [200_001, 3 * many.len(), 3 * many.len() + 1, 1000 * many.len(), 1 << 31] {
         parts.metadata.insert("gaussians".to_owned(), Value::from(lie.to_string()));
-        let lengths = parts.tensor("packed.lengths").unwrap();
-        lengths.resize(8 * (lie.min(1000 * many.len()).div_ceil(CHUNK) + 1), 0);
-        parts.fit_shapes();
         assert!(!accepted(&parts.sealed()), "{lie} Gaussians");
+    }
+}
+
+/// Rows that are said to be stored exactly, of which a file does not hold a bit.
+#[test]
+fn rows_that_are_not_there_are_refused_within_bounds() {
+    let _alone = alone();
+    let many = rows(40_000);
+    assert!(accepted(&many));
+    for most in [64, 1000, 100_000] {
+        let mut parts = Parts::of(&many);
+        // Layers have levels of refinement before the parts of their nonzeros.
+        let index = Index::of(&mut parts);
+        for kind in 2..6 {
+            index.shorten(&mut parts, kind, most);
+        }
+        assert!(!accepted(&parts.sealed()), "{most} bytes of a range");
     }
 }
