@@ -101,6 +101,10 @@ mod tests {
         prop::collection::vec((cell, feature), 2..60)
     }
 
+    fn is_even(number: usize) -> bool {
+        number.is_multiple_of(2)
+    }
+
     /// The average feature of the last 16 of `seen` about `cell`.
     fn average(seen: &[Seen], cell: [u32; 3]) -> f64 {
         let (mut sum, mut total) = (0.0, 0.0);
@@ -128,15 +132,15 @@ mod tests {
                     for l in 0..LANES {
                         let seen: Vec<Seen> = (0..i).map(|i| of(l, i)).collect();
                         let expected = average(&seen, of(l, i).0);
-                        for (a, values) in found.iter().enumerate() {
+                        for (a, values) in (0..).zip(&found) {
                             // Halves of a unit for the sum and for the inverse of the weights, and one for the last shift.
-                            let own = if a % 2 == 0 { expected } else { -expected };
+                            let own = if is_even(a) { expected } else { -expected };
                             prop_assert!((f64::from(values[l]) - own).abs() <= 3.0, "{} {own}", values[l]);
                         }
                     }
                 }
                 let features = |a: usize| {
-                    let feature = |l: usize| if a % 2 == 0 { of(l, i).1 } else { -of(l, i).1 };
+                    let feature = |l: usize| if is_even(a) { of(l, i).1 } else { -of(l, i).1 };
                     std::array::from_fn(feature)
                 };
                 around.push(cell, std::array::from_fn(features));

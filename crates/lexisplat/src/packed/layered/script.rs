@@ -21,6 +21,7 @@ pub(super) struct Ask {
 
 /// Codes what a script asks for next. Returns what an encoder coded or a decoder found, with numbers below 2^32 for signed
 /// ones.
+#[expect(clippy::cast_possible_truncation, reason = "lanes are few, and values are cut to their bits")]
 pub(super) fn ask<S: Symbols>(s: &mut S, ask: &Ask) -> [u64; LANES] {
     let slots: Vec<Slot> = Slot::all().collect();
     let slot = slots[usize::from(ask.slot) % slots.len()];

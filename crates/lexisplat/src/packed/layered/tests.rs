@@ -1,5 +1,7 @@
 //! Heads and indexes come back, and nothing else is taken for them.
 
+#![expect(clippy::cast_possible_truncation, reason = "test values fit")]
+
 use proptest::prelude::*;
 
 use super::bytes::ByteReader;

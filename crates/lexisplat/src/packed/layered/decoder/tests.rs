@@ -148,7 +148,6 @@ fn base_colours_are_seen_on_average() {
         let original = colours(&of, &plain, true).geometry;
         let kept = distance(&whole.geometry.dc, &original.dc);
         let differ = distance(&whole.geometry.dc, &bare.geometry.dc);
-        eprintln!("KEPT {kept} DIFFER {differ}");
         assert!(kept < 0.5 * differ, "chunk {c}: {kept}, {differ}");
     }
 }

@@ -1,5 +1,7 @@
 //! The coder of a range against one that is written plainly, a lane at a time.
 
+#![expect(clippy::cast_possible_truncation, reason = "test values fit")]
+
 use proptest::prelude::*;
 
 use super::*;
@@ -109,7 +111,7 @@ impl<'a> Naive<'a> {
         let (mut value, mut taken) = (0, 0);
         while taken < count {
             let piece = 16.min(count - taken);
-            value += self.state % (1 << piece) << taken;
+            value += (self.state % (1 << piece)) << taken;
             self.state /= 1 << piece;
             self.refill();
             taken += piece;
@@ -127,7 +129,7 @@ impl<'a> Naive<'a> {
         // More than 32 bits come in two numbers, low ones first.
         let first = self.bits(low.min(32));
         let second = self.bits(low.saturating_sub(32));
-        (2 + token % 2 << low) + (second << 32) + first
+        ((2 + token % 2) << low) + (second << 32) + first
     }
 
     /// What lane `l` of the entry holds.
@@ -140,7 +142,7 @@ impl<'a> Naive<'a> {
             2 | 4 => self.integer(slot, context),
             _ => {
                 let value = i64::try_from(self.integer(slot, context)).unwrap();
-                let signed = if value % 2 == 0 { value / 2 } else { -(value + 1) / 2 };
+                let signed = if value & 1 == 0 { value / 2 } else { -(value + 1) / 2 };
                 u64::from(i32::try_from(signed).unwrap().cast_unsigned())
             }
         }

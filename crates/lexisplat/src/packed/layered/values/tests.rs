@@ -1,5 +1,7 @@
 //! Values against those of f64 mathematics.
 
+#![expect(clippy::cast_possible_truncation, reason = "test values fit")]
+
 use proptest::prelude::*;
 
 use super::*;
