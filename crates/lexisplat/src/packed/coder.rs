@@ -5,14 +5,15 @@ use half::f16;
 use super::appearance::Appearance;
 use super::atoms::{MAX_ATOM_BITS, resident};
 use super::canonical::{MortonKey, canonical};
-use super::codebook::{Codebook, Codes, Costs, StopRule, first_atoms, learn};
-use super::layered::{MeanView, Recorder, Target, record_atoms, seen_row};
+use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
+use super::layered::{MeanView, Target, WholeAtoms, seen_row};
 use super::morton;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
+use crate::sparse::learn::unit_axis;
 use crate::sparse::tally::Tally;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
@@ -24,9 +25,13 @@ const SAMPLE: usize = 24_576;
 const ATOM_BITS_SAMPLE: usize = 2048;
 /// Gaussians that pay for one more atom.
 const GAUSSIANS_PER_ATOM: usize = 64;
-/// Largest number of atoms that are learned by default: as many as one byte counts. There are at least as many
-/// atoms as coefficients in a row, since fewer do not span the rows.
+/// Largest number of atoms that are learned by default: as many as one byte counts. Where the atoms that are the same in
+/// all files do not follow there are at least as many as coefficients in a row, since fewer do not span the rows.
 const MAX_LEARNED: usize = 256;
+/// Scenes that pay for fewer atoms than this many times the coefficients of a row choose among several numbers of them.
+const CHOICE: usize = 2;
+/// Place of the step of values among the factors of parameters.
+const VALUES: usize = 1;
 /// Rounding steps of a coefficient of an atom, for each step of an average value.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
@@ -92,7 +97,6 @@ impl<'a> View<'a> {
 pub(super) struct ChunkCoder {
     pub(super) parameters: Parameters,
     pub(super) dictionary: Dictionary,
-    pub(super) atom_bits: u32,
     pub(super) mean_view: MeanView,
     book: Option<Codebook>,
     stop: StopRule,
@@ -100,7 +104,7 @@ pub(super) struct ChunkCoder {
 }
 
 impl ChunkCoder {
-    /// Learns from the Gaussians of `view` how to code the `total` of a scene. Returns also the dictionary's symbols.
+    /// Learns from the Gaussians of `view` how to code the `total` of a scene. Returns also the atoms.
     pub(super) fn new(
         view: View<'_>,
         total: usize,
@@ -108,7 +112,7 @@ impl ChunkCoder {
         mean_view: MeanView,
         options: &PackOptions,
         progress: &dyn Progress,
-    ) -> Result<(Self, Recorder)> {
+    ) -> Result<(Self, WholeAtoms)> {
         let mut stop = StopRule::Balanced;
         #[expect(
             clippy::cast_possible_truncation,
@@ -127,33 +131,25 @@ impl ChunkCoder {
         let mut coder = Self {
             parameters,
             dictionary: Dictionary::empty(),
-            atom_bits: 0,
             mean_view,
             book: None,
             stop,
             tolerance: options.tolerance,
         };
-        let mut symbols = Recorder::default();
-        let mut coded = |atoms: usize, bits: u32, rows: &[f32]| {
-            #[expect(clippy::cast_possible_truncation, reason = "unit-norm atoms in at most 2^14 steps")]
-            let whole = |k: usize| (f64::from(rows[k]) * f64::from(1_u32 << bits)).round() as i32;
-            record_atoms(&mut symbols, degree, atoms, bits, whole)
-        };
-        if dim > 0 && view.len() > 0 {
-            let (rows, costs) = coder.learn(view, total, options, progress)?;
-            coder.atom_bits = coder.choose_atom_bits(view, &rows, &costs);
-            let atoms = rows.len() / dim;
-            let rounded = coded(atoms, coder.atom_bits, &rows);
-            coder.dictionary = Dictionary::new(degree, rounded.clone())?;
-            coder.book = Some(Codebook::new(dim, rounded, costs));
-        } else if dim > 0 {
+        let atoms = if dim > 0 && view.len() > 0 {
+            let Choice { atoms, costs, step } = coder.learn(view, total, options, progress)?;
+            coder.parameters.factors[VALUES] *= step;
+            coder.book = Some(Codebook::new(dim, atoms.rows(), costs));
+            atoms
+        } else {
             // A scene without Gaussians still needs one atom to be valid.
-            let mut atom = vec![0.0; dim];
-            atom[0] = 1.0;
-            let rounded = coded(1, 0, &atom);
-            coder.dictionary = Dictionary::new(degree, rounded)?;
+            let first: Vec<f32> = unit_axis(dim, 0).collect();
+            WholeAtoms::new(degree, &first, 0, false)
+        };
+        if dim > 0 {
+            coder.dictionary = Dictionary::new(degree, atoms.rows())?;
         }
-        Ok((coder, symbols))
+        Ok((coder, atoms))
     }
 
     fn learn(
@@ -162,25 +158,39 @@ impl ChunkCoder {
         total: usize,
         options: &PackOptions,
         progress: &dyn Progress,
-    ) -> Result<(Vec<f32>, Costs)> {
-        let dim = view.splats.degree.rest();
+    ) -> Result<Choice> {
+        let degree = view.splats.degree;
+        let dim = degree.rest();
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
         let (rows, classes) = view.scaled(sample, &self.parameters);
+        let pays = (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED);
+        if options.atoms.is_none() && self.stop == StopRule::Balanced && pays < CHOICE * dim {
+            let bits_of = |rows: &[f32], atoms: &[f32], costs: &Costs| {
+                self.choose_atom_bits(dim, rows, &classes, atoms, costs)
+            };
+            return choose(degree, &rows, &classes, pays, bits_of, progress);
+        }
         // More atoms take fewer bits than exact rows to keep a promised tolerance.
         let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
-        let pay = || (total / GAUSSIANS_PER_ATOM).clamp(fewest, MAX_LEARNED);
-        let first = first_atoms(dim, options.atoms.unwrap_or_else(pay), &rows);
-        learn(dim, &rows, &classes, first, self.stop, progress)
+        let first = first_atoms(dim, options.atoms.unwrap_or_else(|| pays.max(fewest)), &rows);
+        let (learned, costs) = learn(dim, &rows, &classes, first, 0, self.stop, progress)?;
+        let stride = view.len().div_ceil(ATOM_BITS_SAMPLE).max(1);
+        let (rows, classes) = view.scaled((0..view.len()).step_by(stride), &self.parameters);
+        let bits = self.choose_atom_bits(dim, &rows, &classes, &learned, &costs);
+        Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
     }
 
-    /// Chooses how finely atoms are rounded. Errors of atoms show more with larger values.
-    fn choose_atom_bits(&self, view: View<'_>, rows: &[f32], costs: &Costs) -> u32 {
-        let dim = view.splats.degree.rest();
-        let n = view.len();
-        let book = Codebook::new(dim, rows.to_vec(), costs.clone());
-        let stride = n.div_ceil(ATOM_BITS_SAMPLE).max(1);
-        let (sample, classes) = view.scaled((0..n).step_by(stride), &self.parameters);
-        let codes = book.encode(&sample, &classes, self.stop);
+    /// Chooses how finely atoms are rounded that code these rows. Errors of atoms show more with larger values.
+    fn choose_atom_bits(
+        &self,
+        dim: usize,
+        rows: &[f32],
+        classes: &[u8],
+        atoms: &[f32],
+        costs: &Costs,
+    ) -> u32 {
+        let book = Codebook::new(dim, atoms.to_vec(), costs.clone());
+        let codes = book.encode(rows, classes, self.stop);
         let (mut sum, mut count) = (0.0_f64, 1.0_f64);
         for i in 0..classes.len() {
             for &(_, value) in codes.row(i) {

@@ -4,7 +4,7 @@ use super::alone;
 use super::coder::ChunkCoder;
 use super::layered::{
     ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Place, Range, Recorder, Stream, Tables,
-    lanes, stream_of,
+    WholeAtoms, lanes, stream_of,
 };
 use super::layering::Layering;
 use super::pack::PackOptions;
@@ -97,8 +97,6 @@ pub(super) struct Encoding {
     /// The head without tables, dictionary and index.
     pub(super) head: Head,
     pub(super) form: Form,
-    /// The symbols of the dictionary.
-    dictionary: Recorder,
     pub(super) counts: Counts,
     learn_seconds: f64,
     /// Runs since learning began.
@@ -113,24 +111,24 @@ pub(super) struct Finished {
 }
 
 impl Encoding {
-    /// Begins with a coder that has learned since the start of `clock`, and the symbols of its dictionary. `most_dc` is the
+    /// Begins with a coder that has learned since the start of `clock`, and its atoms. `most_dc` is the
     /// largest coordinate of a base colour.
     pub(super) fn new(
-        (coder, dictionary): (ChunkCoder, Recorder),
+        (coder, atoms): (ChunkCoder, WholeAtoms),
         layering: Layering,
         most_dc: f64,
         clock: Stopwatch,
     ) -> Self {
-        let counts = Counts::of(Tally::new(coder.dictionary.dim()), [&dictionary]);
+        let mut counts = Counts::of(Tally::new(coder.dictionary.dim()), []);
         let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
         let mean_view = coder.mean_view.clone();
-        let atom_bits = u8::try_from(coder.atom_bits).unwrap_or(u8::MAX);
-        let mut head = Head::new(&coder.parameters, most_dc, rest, atom_bits, mean_view);
+        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, mean_view);
         if layering.layers() > 1 {
             head = head.with_interim(alone::STEPS);
         }
+        counts.raw_bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
         let form = head.form();
-        Self { coder, layering, head, form, dictionary, counts, learn_seconds: clock.seconds(), clock }
+        Self { coder, layering, head, form, counts, learn_seconds: clock.seconds(), clock }
     }
 
     /// Counts all time so far as time spent on learning.
@@ -147,7 +145,7 @@ impl Encoding {
         to: SpillTo<'_>,
         code_chunks: &mut CodeChunks<'_>,
     ) -> Result<Finished> {
-        let Self { coder, layering, mut head, dictionary, counts, learn_seconds, clock, .. } = self;
+        let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
         let tables = Tables::new(&counts.histograms)
             .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
         let stream_bits = counts.bits(&tables).named(Stream::names());
@@ -182,29 +180,7 @@ impl Encoding {
         head.index = Index { layers: forms, chunks, order };
         let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
         head.index.place().ok_or_else(too_long)?;
-        if std::env::var("PRINTK").is_ok() {
-            let mut sums = std::collections::BTreeMap::new();
-            for chunk in &head.index.chunks {
-                for (k, r) in chunk.ranges.iter().enumerate() {
-                    let e = sums.entry((chunk.layer, k)).or_insert((0_u64, 0_usize));
-                    e.0 += u64::from(r.length);
-                    e.1 += chunk.gaussians;
-                }
-            }
-            for (k, (b, g)) in sums {
-                eprintln!("{k:?} {b} B {:.1} bits", b as f64 * 8.0 / g as f64);
-            }
-            eprintln!(
-                "tables {} dictionary {} chunks {}",
-                tables.write().len(),
-                dictionary.finish(&tables, 1).len(),
-                head.index.chunks.len()
-            );
-        }
         let data = Woven::new(spill.finish()?, pieces);
-        if coder.dictionary.dim() > 0 {
-            head.dictionary = dictionary.finish(&tables, 1);
-        }
         head.tables = tables.write();
         let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
         let seconds = [learn_seconds, clock.seconds() - learn_seconds];
@@ -216,7 +192,7 @@ impl Encoding {
             gaussians,
             removed: 0,
             atoms: coder.dictionary.len(),
-            record,
+            record: record.shortened(),
             meta,
             target: None,
             reached: None,

@@ -40,6 +40,7 @@ mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
 pub(crate) use decoder::Decoder;
+pub(crate) use layered::layered_atoms;
 pub(crate) use pack::{check, expected_step};
 pub(crate) use parts::{Part, PartPacker, Whole};
 pub(crate) use removal::{changes_without, is_worth_its_bits};

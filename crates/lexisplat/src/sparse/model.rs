@@ -46,6 +46,30 @@ pub struct Record {
     pub over_tolerance: u64,
 }
 
+/// Significant digits of the errors of packed files.
+const ERROR_DIGITS: usize = 5;
+
+impl Record {
+    /// The same with errors of few digits. The largest error is not below the exact one, and within a tolerance that the
+    /// exact one keeps.
+    pub(crate) fn shortened(self) -> Self {
+        let near = |x: f64| format!("{x:.0$e}", ERROR_DIGITS - 1).parse().unwrap_or(x);
+        let exact = self.max_residual;
+        let mut most = near(exact);
+        if most < exact {
+            // The next number of as many digits, within half of its last place.
+            most = near(exact * (1.0 + 0.5 * 10.0_f64.powi(1 - ERROR_DIGITS as i32)));
+        }
+        if most < exact {
+            most = exact;
+        }
+        if let Some(tolerance) = self.tolerance.filter(|&tolerance| exact <= tolerance) {
+            most = most.min(tolerance);
+        }
+        Self { max_residual: most, rms_residual: near(self.rms_residual), ..self }
+    }
+}
+
 macro_rules! named {
     ($type:ident, $what:literal, $($variant:ident => $name:literal),+) => {
         impl $type {
@@ -186,5 +210,26 @@ impl Model {
     pub fn into_splats(self) -> Splats {
         let sh_rest = self.dense_rest();
         Splats { degree: self.degree(), geometry: self.geometry, sh_rest, meta: self.meta }
+    }
+}
+
+#[cfg(test)]
+mod error_tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_few_digits_keep_promises() {
+        let short = |max_residual: f64, tolerance| {
+            let record = Record { max_residual, rms_residual: max_residual, tolerance, ..Record::default() };
+            record.shortened()
+        };
+        for exact in [0.0, 1.0, 0.123_451, 0.123_449_9, 1.0 / 3.0, 99_999.9, 1.5e-17, 0.999_999] {
+            let most = short(exact, None).max_residual;
+            assert!(exact <= most && most <= exact * 1.0002, "{exact} {most}");
+            assert!((short(exact, None).rms_residual - exact).abs() <= exact * 1e-4);
+            assert_eq!(short(exact, Some(exact)).max_residual, exact);
+        }
+        assert_eq!(short(0.123_451, None).max_residual.to_string(), "0.12346");
+        assert_eq!(short(0.2, Some(0.1)).max_residual, 0.2);
     }
 }

@@ -131,13 +131,13 @@ pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
     };
     let mut sums = serde_json::Map::new();
     let mut own = None;
-    // The ranges of packed data have checksums of their own since version 3.
-    let ranged = header["__metadata__"]["version"] == "3";
+    // In files of version 3 the checksum of the header is in the first four bytes of the head, which it covers too.
+    let sealed = header.get("packed.head").and_then(range);
     for (name, entry) in header.as_object().unwrap() {
         if name == "checksum.header" {
             own = range(entry);
         } else if name != "__metadata__"
-            && !(ranged && name == "packed.data")
+            && (sealed.is_none() || !["packed.head", "packed.data"].contains(&name.as_str()))
             && let Some(bytes) = range(entry).and_then(|r| data.get(r))
         {
             sums.insert(name.clone(), Value::String(format!("{:08x}", crc32fast::hash(bytes))));
@@ -151,7 +151,15 @@ pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
     let text = header.to_string();
     let mut out = (text.len() as u64).to_le_bytes().to_vec();
     out.extend_from_slice(text.as_bytes());
-    let sum = crc32fast::hash(&out).to_le_bytes();
+    let mut sum = crc32fast::hash(&out).to_le_bytes();
+    if let Some((_, head)) =
+        sealed.clone().and_then(|r| data.get(r)).and_then(|head| head.split_first_chunk::<4>())
+    {
+        let mut crc = crc32fast::Hasher::new_with_initial_len(u32::from_le_bytes(sum), out.len() as u64);
+        crc.update(head);
+        sum = crc.finalize().to_le_bytes();
+        own = sealed.map(|r| r.start..r.start + sum.len());
+    }
     if let Some(slot) = own.and_then(|r| data.get_mut(r))
         && slot.len() == sum.len()
     {

@@ -17,9 +17,14 @@ fn assert_kept(splats: &Splats, tolerance: f64, atoms: Option<usize>) -> Compres
     let worst = errors.iter().copied().fold(0.0, f64::max);
     assert!(worst <= tolerance, "tolerance {tolerance}: {worst}");
     let record = &packed.head().record;
-    assert!((worst - record.max_residual).abs() <= 1e-12 * worst, "{worst} {record:?}");
+    // Errors have five digits in files. The largest one is rounded up, within the tolerance.
+    let most = (worst * 1.0002).min(tolerance);
+    assert!(
+        worst * (1.0 - 1e-12) <= record.max_residual && record.max_residual <= most,
+        "{worst} {record:?}"
+    );
     let rms = (errors.iter().map(|e| e * e).sum::<f64>() / errors.len().max(1) as f64).sqrt();
-    assert!((rms - record.rms_residual).abs() <= 1e-9 * rms, "{rms} {record:?}");
+    assert!((rms - record.rms_residual).abs() <= 1e-4 * rms, "{rms} {record:?}");
     assert_eq!((record.tolerance, record.over_tolerance), (Some(tolerance), 0));
     let exact = errors.iter().filter(|&&e| e == 0.0).count() as u64;
     assert!(exact >= report.escapes, "an escape is exact");

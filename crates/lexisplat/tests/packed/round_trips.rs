@@ -90,7 +90,8 @@ fn more_than_a_chunk_travels() {
     let back = packed.unpack().unwrap().into_splats();
     assert_eq!(back.geometry.extras, splats.geometry.extras);
     let worst = row_errors(&splats, &back).into_iter().fold(0.0, f64::max);
-    assert!((worst - packed.head().record.max_residual).abs() < 1e-12);
+    let written = packed.head().record.max_residual;
+    assert!(worst <= written && written <= worst * 1.0002, "{worst} {written}");
 }
 
 fn packed_on(threads: usize, splats: &Splats, options: &PackOptions) -> Vec<u8> {

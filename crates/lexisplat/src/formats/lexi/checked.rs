@@ -95,8 +95,16 @@ impl<'a> Checked<'a> {
         if version == 0 {
             return Err(malformed("metadata 'version' is 0".to_owned()));
         }
-        let stored = checked.values::<u32>(tensor::HEADER_CHECKSUM, Dtype::U32, &[1])?;
-        if stored != [header_checksum] {
+        let (stored, expected) = match version {
+            PACKED_VERSION => {
+                let (sum, head) = checked.sealed_head()?;
+                let mut crc = crc32fast::Hasher::new_with_initial_len(header_checksum, data_start as u64);
+                crc.update(head);
+                (vec![sum], crc.finalize())
+            }
+            _ => (checked.values::<u32>(tensor::HEADER_CHECKSUM, Dtype::U32, &[1])?, header_checksum),
+        };
+        if stored != [expected] {
             return Err(format(FormatError::Checksum { part: "header".to_owned() }));
         }
         checked.verify_tensors()?;
@@ -104,10 +112,16 @@ impl<'a> Checked<'a> {
     }
 
     fn verify_tensors(&self) -> Result<()> {
-        let sums: BTreeMap<String, String> = self.json(key::CHECKSUMS)?;
         // The ranges of packed data have checksums of their own, so that a part of it can be checked.
-        let ranged = self.number::<u64>(key::VERSION)? == PACKED_VERSION;
-        let summed = |name: &&String| *name != tensor::HEADER_CHECKSUM && !(ranged && *name == tensor::DATA);
+        let (layered, elsewhere): (bool, &[&str]) = match self.is_layered() {
+            true => (true, &[tensor::HEAD, tensor::DATA]),
+            false => (false, &[tensor::HEADER_CHECKSUM]),
+        };
+        let sums: BTreeMap<String, String> = match layered && !self.has_text(key::CHECKSUMS) {
+            true => BTreeMap::new(),
+            false => self.json(key::CHECKSUMS)?,
+        };
+        let summed = |name: &&String| !elsewhere.contains(&name.as_str());
         let names: Vec<&String> = self.names.iter().filter(summed).collect();
         if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
@@ -125,6 +139,16 @@ impl<'a> Checked<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The checksum of the header and of the head of a file of the newest version, and the bytes of the head.
+    pub(super) fn sealed_head(&self) -> Result<(u32, &[u8])> {
+        let len = self.list_len(tensor::HEAD)?;
+        let bytes = self.data(tensor::HEAD, Dtype::U8, &[len])?;
+        let (sum, head) = bytes
+            .split_first_chunk()
+            .ok_or_else(|| self.malformed("tensor 'packed.head' is shorter than its checksum"))?;
+        Ok((u32::from_le_bytes(*sum), head))
     }
 
     pub(super) fn malformed(&self, text: impl Into<String>) -> Error {
@@ -204,7 +228,9 @@ impl<'a> Checked<'a> {
 
     /// Refuses tensors that are neither `known` nor to be ignored. `whose` ends the message.
     pub(super) fn refuse_unknown(&self, known: impl Fn(&str) -> bool, whose: &str) -> Result<()> {
-        let ignored = |name: &str| name == tensor::HEADER_CHECKSUM || name.starts_with(IGNORED_PREFIX);
+        let summed = !self.is_layered();
+        let ignored =
+            |name: &str| (summed && name == tensor::HEADER_CHECKSUM) || name.starts_with(IGNORED_PREFIX);
         match self.names.iter().find(|name| !ignored(name) && !known(name)) {
             Some(name) => Err(self.malformed(format!("tensor '{name}' is not known {whose}"))),
             None => Ok(()),

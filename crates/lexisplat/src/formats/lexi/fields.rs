@@ -77,8 +77,8 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
         max_nonzeros: checked.optional(key::MAX_NONZEROS)?,
         pursuit: (!packed).then_some(pursuit),
         seed: checked.number_or_default(key::SEED)?,
-        max_residual: checked.number(key::MAX_RESIDUAL)?,
-        rms_residual: checked.number(key::RMS_RESIDUAL)?,
+        max_residual: checked.number_or_default(key::MAX_RESIDUAL)?,
+        rms_residual: checked.number_or_default(key::RMS_RESIDUAL)?,
         over_tolerance: checked.number_or_default(key::OVER_TOLERANCE)?,
     };
     let sizes = [

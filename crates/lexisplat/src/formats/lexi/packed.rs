@@ -7,7 +7,7 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::fields::{column, degree, extras, meta, record};
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead};
+use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead, layered_atoms};
 use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
@@ -61,7 +61,9 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let coding = coding(checked, gaussians)?;
     let atoms = match &coding {
         Coding::Flat(_) => checked.number(key::ATOMS)?,
-        Coding::Layered(head) => head.first_chunk().map_or(0, |atoms| u16::from_le_bytes(*atoms).into()),
+        Coding::Layered(head) => {
+            layered_atoms(head).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?
+        }
     };
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
@@ -97,7 +99,8 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
 /// What the scene is decoded with, by the version of the file.
 fn coding(checked: &Checked<'_>, gaussians: u64) -> Result<Coding> {
     if checked.is_layered() {
-        return Ok(Coding::Layered(list(checked, tensor::HEAD, Dtype::U8)?));
+        let (_, head) = checked.sealed_head()?;
+        return Ok(Coding::Layered(head.to_vec()));
     }
     let chunks = usize::try_from(gaussians.div_ceil(CHUNK as u64)).unwrap_or(usize::MAX - 1);
     Ok(Coding::Flat(Flat {

@@ -389,7 +389,10 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
         out.push((name.to_owned(), checked.view(name)?.data.len() as u64));
     }
     let length = checked.bytes().first_chunk::<LENGTH_BYTES>().map_or(0, |l| u64::from_le_bytes(*l));
-    let checksum = checked.view(tensor::HEADER_CHECKSUM)?.data.len();
+    let checksum = match checked.has(tensor::HEADER_CHECKSUM) {
+        true => checked.view(tensor::HEADER_CHECKSUM)?.data.len(),
+        false => 0,
+    };
     out.push(("header".to_owned(), length + (LENGTH_BYTES + checksum) as u64));
     Ok(out)
 }

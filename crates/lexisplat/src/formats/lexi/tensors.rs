@@ -24,9 +24,23 @@ pub(super) struct Tensor<'a> {
     dtype: Dtype,
     shape: Vec<usize>,
     source: Source<'a>,
-    /// Whether its checksum is in the metadata.
-    summed: bool,
+    sum: Sum,
 }
+
+/// Where the checksum of a tensor is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Sum {
+    /// In the metadata.
+    Listed,
+    /// Wherever the meaning of the tensor says.
+    Elsewhere,
+    /// In its own first four bytes, which come before those of the source: the checksum of the header and of the source.
+    /// There is no tensor with the checksum of the header then.
+    Sealed,
+}
+
+/// Bytes of a checksum.
+const SUM_BYTES: usize = 4;
 
 /// Makes the words of a tensor one after the other.
 type Words<'a> = Box<dyn Fn() -> Box<dyn Iterator<Item = u32> + 'a> + 'a>;
@@ -61,6 +75,25 @@ impl<'a> Source<'a> {
         Self::Bytes(bytemuck::cast_slice(values))
     }
 
+    /// `crc` of its bytes too.
+    fn hashed(&self, mut crc: crc32fast::Hasher) -> crc32fast::Hasher {
+        match self {
+            Self::Bytes(bytes) => crc.update(bytes),
+            Self::Owned(bytes) => crc.update(bytes),
+            Self::Woven(_) => {}
+            // Nothing is hashed before what was spilled.
+            Self::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
+            Self::Words(make) => {
+                // Hashing cannot fail.
+                let _ = each_block(make(), |block| {
+                    crc.update(block);
+                    Ok(())
+                });
+            }
+        }
+        crc
+    }
+
     pub(super) fn words<I: Iterator<Item = u32> + 'a>(make: impl Fn() -> I + 'a) -> Self {
         Self::Words(Box::new(move || Box::new(make())))
     }
@@ -68,12 +101,17 @@ impl<'a> Source<'a> {
 
 impl<'a> Tensor<'a> {
     pub(super) fn new(name: &str, dtype: Dtype, shape: &[usize], source: Source<'a>) -> Self {
-        Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source, summed: true }
+        Self { name: name.to_owned(), dtype, shape: shape.to_vec(), source, sum: Sum::Listed }
     }
 
     /// The same, with checksums that are elsewhere in the file.
     pub(super) fn summed_elsewhere(self) -> Self {
-        Self { summed: false, ..self }
+        Self { sum: Sum::Elsewhere, ..self }
+    }
+
+    /// The same of bytes, with the checksum of itself and of the header before them. Tensors before it are not wider.
+    pub(super) fn sealed(self) -> Self {
+        Self { shape: vec![self.bytes() + SUM_BYTES], sum: Sum::Sealed, ..self }
     }
 
     pub(super) fn bytes(&self) -> usize {
@@ -100,7 +138,7 @@ fn each_block(
 #[derive(Debug)]
 pub(super) struct Draft<'a> {
     header: Vec<u8>,
-    header_checksum: [u8; 4],
+    header_checksum: [u8; SUM_BYTES],
     tensors: Vec<Tensor<'a>>,
 }
 
@@ -110,31 +148,21 @@ impl<'a> Draft<'a> {
         // Each tensor then starts at a multiple of its entry size, and there are no holes.
         tensors.sort_by_key(|t| std::cmp::Reverse(t.dtype.bitsize()));
         let mut sums = BTreeMap::new();
-        for tensor in tensors.iter().filter(|tensor| tensor.summed) {
-            let mut crc = crc32fast::Hasher::new();
-            match &tensor.source {
-                Source::Bytes(bytes) => crc.update(bytes),
-                Source::Owned(bytes) => crc.update(bytes),
-                Source::Woven(_) => {}
-                Source::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
-                Source::Words(make) => {
-                    // Hashing cannot fail.
-                    let _ = each_block(make(), |block| {
-                        crc.update(block);
-                        Ok(())
-                    });
-                }
-            }
+        for tensor in tensors.iter().filter(|tensor| tensor.sum == Sum::Listed) {
+            let crc = tensor.source.hashed(crc32fast::Hasher::new());
             sums.insert(tensor.name.clone(), format!("{:08x}", crc.finalize()));
         }
-        metadata.insert(key::CHECKSUMS, json(&sums));
+        let sealed = tensors.iter().position(|tensor| tensor.sum == Sum::Sealed);
+        if sealed.is_none() || !sums.is_empty() {
+            metadata.insert(key::CHECKSUMS, json(&sums));
+        }
         let mut text = format!("{{\"__metadata__\":{}", json(&metadata));
         let mut offset = 0;
         let sum_shape: &[usize] = &[1];
         let entries = tensors
             .iter()
             .map(|t| (t.name.as_str(), t.dtype, t.shape.as_slice(), t.bytes()))
-            .chain([(tensor::HEADER_CHECKSUM, Dtype::U32, sum_shape, 4)]);
+            .chain(sealed.is_none().then_some((tensor::HEADER_CHECKSUM, Dtype::U32, sum_shape, SUM_BYTES)));
         // The checksum is four bytes, so it goes before the first narrower tensor.
         let mut entries: Vec<_> = entries.collect();
         entries.sort_by_key(|e| std::cmp::Reverse(e.1.bitsize()));
@@ -153,23 +181,29 @@ impl<'a> Draft<'a> {
         }
         let mut header = (text.len() as u64).to_le_bytes().to_vec();
         header.extend_from_slice(text.as_bytes());
-        let header_checksum = crc32fast::hash(&header).to_le_bytes();
+        let mut crc = crc32fast::Hasher::new();
+        crc.update(&header);
+        if let Some(tensor) = sealed.and_then(|sealed| tensors.get(sealed)) {
+            crc = tensor.source.hashed(crc);
+        }
+        let header_checksum = crc.finalize().to_le_bytes();
         Self { header, header_checksum, tensors }
     }
 
-    /// Bytes of the length, the JSON and the header's checksum.
+    /// Bytes of the length, the JSON and the header's checksum if no tensor holds it.
     pub(super) fn header_bytes(&self) -> u64 {
-        (self.header.len() + self.header_checksum.len()) as u64
+        let is_sealed = self.tensors.iter().any(|tensor| tensor.sum == Sum::Sealed);
+        (self.header.len() + if is_sealed { 0 } else { SUM_BYTES }) as u64
     }
 
     /// Writes the whole file.
     pub(super) fn write_to(self, writer: &mut dyn Write) -> io::Result<()> {
         writer.write_all(&self.header)?;
         let mut checksum = Some(self.header_checksum);
+        let is_sealed = self.tensors.iter().any(|tensor| tensor.sum == Sum::Sealed);
         for tensor in self.tensors {
-            if tensor.dtype.bitsize() < 32
-                && let Some(bytes) = checksum.take()
-            {
+            let is_here = tensor.sum == Sum::Sealed || (!is_sealed && tensor.dtype.bitsize() < 32);
+            if is_here && let Some(bytes) = checksum.take() {
                 writer.write_all(&bytes)?;
             }
             match tensor.source {

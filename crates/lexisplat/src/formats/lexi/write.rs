@@ -130,13 +130,13 @@ impl<'a> LexiWriter<'a> {
         extras: Vec<(&str, Vec<u8>)>,
     ) -> Self {
         let mut metadata = preamble(FORMAT, PACKED_VERSION);
+        metadata.remove(key::GENERATOR);
         let Record { seed, max_residual, rms_residual, over_tolerance, tolerance, .. } = &head.record;
-        metadata.extend([
-            (key::DEGREE, head.degree.to_string()),
-            (key::MAX_RESIDUAL, max_residual.to_string()),
-            (key::RMS_RESIDUAL, rms_residual.to_string()),
-        ]);
+        metadata.extend([(key::DEGREE, head.degree.to_string())]);
         // What is missing means nothing, zero or false.
+        for (key, residual) in [(key::MAX_RESIDUAL, max_residual), (key::RMS_RESIDUAL, rms_residual)] {
+            metadata.extend((*residual != 0.0).then(|| (key, residual.to_string())));
+        }
         metadata.extend((*seed != 0).then(|| (key::SEED, seed.to_string())));
         metadata.extend((*over_tolerance != 0).then(|| (key::OVER_TOLERANCE, over_tolerance.to_string())));
         metadata.extend(head.meta.antialiased.then(|| (key::ANTIALIASED, "true".to_owned())));
@@ -145,7 +145,7 @@ impl<'a> LexiWriter<'a> {
         metadata.extend(packed_metadata(head));
         // What draws the scene comes first.
         let mut tensors = vec![
-            list(tensor::HEAD, Dtype::U8, bytes.len(), Source::Bytes(bytes)),
+            list(tensor::HEAD, Dtype::U8, bytes.len(), Source::Bytes(bytes)).sealed(),
             list(tensor::DATA, Dtype::U8, data_bytes, data).summed_elsewhere(),
         ];
         let column = |name: &str, bytes: Vec<u8>| list(name, Dtype::U8, bytes.len(), Source::Owned(bytes));

@@ -16,8 +16,8 @@ const SETTLING: usize = 4;
 /// Shortest sum that gives an atom a new direction.
 const MIN_NORM: f64 = 0.0;
 
-/// Learns unit-norm atoms from `rows`, beginning with the atoms `first`. Returns them most used first, without unused
-/// ones, and the costs at which they were used.
+/// Learns unit-norm atoms from `rows`, beginning with the atoms `first`, of which the last `fixed` stay as they are. Returns
+/// the others most used first, without unused ones, and then the fixed ones, and the costs at which all were used.
 ///
 /// # Errors
 /// [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels.
@@ -26,10 +26,12 @@ pub(crate) fn learn(
     rows: &[f32],
     classes: &[u8],
     first: Vec<f32>,
+    fixed: usize,
     stop: StopRule,
     progress: &dyn Progress,
 ) -> Result<(Vec<f32>, Costs)> {
     let count = first.len() / dim;
+    let learned = count - fixed.min(count);
     let mut book = Codebook::new(dim, first, Costs::initial(count, dim));
     progress.begin(Stage::Learn, ROUNDS as u64);
     for round in 0..ROUNDS {
@@ -48,12 +50,12 @@ pub(crate) fn learn(
             }
         }
         let mut atoms = book.rows.clone();
-        for (users, atom) in users.iter().zip(atoms.chunks_exact_mut(dim)) {
+        for (users, atom) in users.iter().zip(atoms.chunks_exact_mut(dim)).take(learned) {
             refit(users, atom, &mut residuals);
         }
         let costs = Costs::of(&usage, &book.costs);
         if round + SETTLING < ROUNDS {
-            replace_unused(dim, &usage.atoms, &mut atoms, &residuals);
+            replace_unused(dim, &usage.atoms[..learned], &mut atoms, &residuals);
         }
         book = Codebook::new(dim, atoms, costs);
         progress.advance(1);
@@ -62,8 +64,9 @@ pub(crate) fn learn(
     progress.end();
     let codes = book.encode(rows, classes, stop);
     let usage = Usage::of(&codes, classes, count, dim);
-    let mut order: Vec<usize> = (0..count).filter(|&j| usage.atoms[j] > 0.0).collect();
+    let mut order: Vec<usize> = (0..learned).filter(|&j| usage.atoms[j] > 0.0).collect();
     order.sort_by(|&a, &b| usage.atoms[b].total_cmp(&usage.atoms[a]).then(a.cmp(&b)));
+    order.extend(learned..count);
     if order.is_empty() {
         order.push(0);
     }

@@ -8,6 +8,7 @@
 //! that are corrected one by one. The exact codec compares atoms by the error they remove, while this one also
 //! subtracts what they cost in bits.
 
+mod choice;
 mod costs;
 mod learn;
 
@@ -15,6 +16,7 @@ use crate::sparse::pursuit::lanes::{LANES, Lane, ZERO, accumulate, blocks_of, fi
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 use crate::support::simd::Simd;
 
+pub(super) use choice::{Choice, choose};
 pub(super) use costs::Costs;
 pub(super) use learn::{first_atoms, learn};
 
@@ -118,6 +120,26 @@ impl Codebook {
             all.append(part);
         }
         all
+    }
+
+    /// The squared errors of the codes of all rows, and their bits.
+    fn spent(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
+        let codes = self.encode(rows, classes, StopRule::Balanced);
+        let (mut error, mut bits) = (0.0, 0.0);
+        for (i, (row, &class)) in rows.chunks_exact(self.dim).zip(classes).enumerate() {
+            let mut left = row.to_vec();
+            let code = codes.row(i);
+            bits += f64::from(self.costs.counts(class)[code.len()]);
+            for &(atom, value) in code {
+                bits += f64::from(self.costs.atoms[usize::from(atom)]);
+                bits += f64::from(self.costs.value(value.unsigned_abs() as f32));
+                #[expect(clippy::cast_precision_loss, reason = "values are small")]
+                let value = value as f32;
+                left.iter_mut().zip(self.atom(usize::from(atom))).for_each(|(x, a)| *x -= value * a);
+            }
+            error += f64::from(left.iter().map(|x| x * x).sum::<f32>());
+        }
+        (error, bits)
     }
 
     fn scratch(&self) -> Scratch {

@@ -1,15 +1,12 @@
 //! Decoding the chunks of a file of version 3.
 
+use super::atoms::WholeAtoms;
 use super::chunk::Want;
 use super::head::Head;
 use super::index::{Chunk, Index};
-use super::player::Player;
-use super::range::Recorder;
 use super::streams::Stream;
-use super::symbols::{LANES, Symbols};
 use super::tables::{Lookup, Tables};
 use super::unpack::{Refusal, Unpacker};
-use crate::packed::atoms::rounded_atoms;
 use crate::packed::place::{Piece, Place};
 use crate::packed::scene::PackedHead;
 use crate::packed::stream::BitCounts;
@@ -41,7 +38,7 @@ impl LayeredDecoder {
         let tables = Tables::read(&head.tables).ok_or_else(|| bad("tables are damaged"))?;
         let lookup = Lookup::new(&tables);
         let (dictionary, dictionary_bits) =
-            dictionary(&head, packed.degree, &lookup).ok_or_else(|| bad("dictionary is damaged"))?;
+            dictionary(&head, packed.degree).ok_or_else(|| bad("dictionary is damaged"))?;
         let unpacker = Unpacker {
             form: head.form(),
             frame: head.frame.clone(),
@@ -126,46 +123,15 @@ impl LayeredDecoder {
     }
 }
 
-/// Lanes of the range of the dictionary.
-const ONE_LANE: u32 = 1;
-
-/// Records the coefficients of all atoms, which `whole` gives as numbers of steps, and returns unit-norm atoms as the
-/// decoder sees them.
-pub(in crate::packed) fn record_atoms(
-    recorder: &mut Recorder,
-    degree: ShDegree,
-    atoms: usize,
-    bits: u32,
-    whole: impl Fn(usize) -> i32,
-) -> Vec<f32> {
-    code_atoms(recorder, degree, atoms, bits, whole)
-}
-
-/// Codes the coefficients of all atoms, and returns unit-norm atoms as the decoder sees them. `whole` holds the encoder's
-/// numbers.
-fn code_atoms<S: Symbols>(
-    s: &mut S,
-    degree: ShDegree,
-    atoms: usize,
-    bits: u32,
-    whole: impl Fn(usize) -> i32,
-) -> Vec<f32> {
-    rounded_atoms(degree, atoms, bits, |context, place| {
-        let context = [context as u32; LANES];
-        i64::from(s.signed(Stream::Dictionary.at(0), context, ONE_LANE, |_| whole(place))[0])
-    })
-}
-
-fn dictionary(head: &Head, degree: ShDegree, lookup: &Lookup) -> Option<(Dictionary, BitCounts)> {
+fn dictionary(head: &Head, degree: ShDegree) -> Option<(Dictionary, BitCounts)> {
     if degree.rest() == 0 {
         return head.dictionary.is_empty().then(|| (Dictionary::empty(), BitCounts::default()));
     }
-    let mut player = Player::new(lookup, &head.dictionary, 1, true)?;
-    let rows = code_atoms(&mut player, degree, head.rest.atoms, head.atom_bits.into(), |_| 0);
-    if !player.exhausted() {
-        return None;
-    }
-    Some((Dictionary::new(degree, rows).ok()?, player.bit_counts.take().unwrap_or_default()))
+    let learned = head.rest.atoms.checked_sub(if head.with_axes { degree.rest() } else { 0 })?;
+    let atoms = WholeAtoms::read(&head.dictionary, degree, learned, head.with_axes)?;
+    let mut bits = BitCounts::zeros(Stream::ALL.len());
+    bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
+    Some((Dictionary::new(degree, atoms.rows()).ok()?, bits))
 }
 
 #[cfg(test)]

@@ -1,6 +1,8 @@
 //! What the head of a file holds: how chunks are coded, what values are made with, tables, dictionary and index.
 
-use super::bytes::ByteReader;
+use super::atoms::WholeAtoms;
+use super::axes::{axes_of, turn_of};
+use super::bytes::{ByteReader, put_number, put_short};
 use super::chunk::Form;
 use super::index::Index;
 use super::interim::{KINDS, MOST_STEP};
@@ -9,21 +11,31 @@ use super::rest::RestForm;
 use super::steering::{Integers, Steering, Step, VALUE_BITS};
 use super::streams::REST_PARTS;
 use super::unpack::Frame;
+use crate::packed::bits::{BitReader, BitWriter};
 use crate::packed::parameters::{LAST_CLASS, Parameters};
 use crate::support::limits::MAX_ATOMS;
 
-/// Largest number of bits of the coefficients of atoms.
-const MAX_ATOM_BITS: u8 = 14;
 /// Largest binary logarithm of the unit of base colours.
 const MAX_DC_EXPONENT: u8 = 100;
+/// Bits of the number of points of view, and where the two marks after the number of parts are.
+const POINTS_BITS: u32 = 4;
+const MARKS: u32 = 6;
+/// Bits of the binary logarithm of the unit of base colours, before the mark of interim changes.
+const EXPONENT_BITS: u32 = 7;
 /// Largest absolute value of a coordinate of a base colour, in units. Targets may be four times as large, since the
 /// largest of a scene may not be in the sample that is known.
 const MOST_DC: f64 = 16.0;
 
+/// The number of atoms of a head.
+pub(crate) fn layered_atoms(head: &[u8]) -> Option<u64> {
+    ByteReader(head).number()
+}
+
 /// The head of a file of version 3.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Head {
-    pub(in crate::packed) atom_bits: u8,
+    /// Whether atoms that are the same in all files follow the learned ones.
+    pub(in crate::packed) with_axes: bool,
     /// Binary logarithm of the unit of base colours.
     pub(in crate::packed) dc_exponent: u8,
     pub(in crate::packed) rest: RestForm,
@@ -33,23 +45,23 @@ pub(in crate::packed) struct Head {
     pub(in crate::packed) integers: Integers,
     /// Its steps of values and its unit of base colours follow from the other fields.
     pub(in crate::packed) frame: Frame,
-    /// Step of the values of colour class 0, and of all classes if an error was promised, otherwise 0.
+    /// Step of the values of colour class 0, and of those of all classes if an error was promised. The other one is 0.
     pub(in crate::packed) value_step: f32,
     pub(in crate::packed) promised: f32,
     /// Probabilities of all symbols.
     pub(in crate::packed) tables: Vec<u8>,
-    /// The range of the dictionary, of one lane.
+    /// The learned atoms.
     pub(in crate::packed) dictionary: Vec<u8>,
     pub(in crate::packed) index: Index,
 }
 
 impl Head {
-    /// A head without tables, dictionary and index.
+    /// A head without tables and index.
     pub(in crate::packed) fn new(
         p: &Parameters,
         most_dc: f64,
         rest: RestForm,
-        atom_bits: u8,
+        atoms: &WholeAtoms,
         mean_view: MeanView,
     ) -> Self {
         let mut dc_exponent = 0;
@@ -57,7 +69,8 @@ impl Head {
             dc_exponent += 1;
         }
         let mut head = Self {
-            atom_bits,
+            with_axes: atoms.with_axes(),
+            dictionary: atoms.write(),
             dc_exponent,
             rest,
             mean_view,
@@ -68,7 +81,7 @@ impl Head {
                 dc_axes: p.dc_axes,
                 ..Frame::default()
             },
-            value_step: p.free_value_step(),
+            value_step: if p.promised > 0.0 { 0.0 } else { p.free_value_step() },
             promised: p.promised,
             ..Self::default()
         };
@@ -111,39 +124,30 @@ impl Head {
 
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
         let mut out = Vec::new();
-        out.extend((self.rest.atoms as u16).to_le_bytes());
-        let points = &self.mean_view.points;
-        out.extend([self.atom_bits, self.dc_exponent, self.rest.least.len() as u8, points.len() as u8]);
-        out.push(u8::from(self.interim.is_some()));
-        out.extend(self.rest.least.iter().map(|&least| least as u8));
-        out.extend(self.interim.iter().flatten().flat_map(|step| step.to_le_bytes()));
+        put_number(&mut out, self.rest.atoms as u64);
+        let (points, parts) = (&self.mean_view.points, &self.rest.least);
+        let is_promised = self.promised > 0.0;
+        let marks = u8::from(is_promised) | u8::from(self.with_axes) << 1;
+        out.push(points.len() as u8 | (parts.len() as u8) << POINTS_BITS | marks << MARKS);
+        out.push(self.dc_exponent | u8::from(self.interim.is_some()) << EXPONENT_BITS);
+        // The last part ends with 1.
+        out.extend(parts.iter().rev().skip(1).rev().map(|&least| least as u8));
+        self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
         let f = &self.frame;
-        let softening: &[f32] = if points.is_empty() { &[] } else { &[self.mean_view.softening] };
-        let floats = [
-            &f.origin[..],
-            &[f.cell],
-            &f.dc_mean,
-            f.dc_axes.as_flattened(),
-            &[self.value_step, self.promised],
-            softening,
-            points.as_flattened(),
-        ];
-        out.extend(floats.concat().iter().flat_map(|x| x.to_le_bytes()));
-        let p = &self.integers;
-        for step in p.steps {
+        let step = if is_promised { self.promised } else { self.value_step };
+        out.extend([&f.origin[..], &[f.cell, step]].concat().iter().flat_map(|x| x.to_le_bytes()));
+        f.dc_mean.iter().for_each(|&x| put_short::<2>(&mut out, x));
+        out.extend(turn_of(&f.dc_axes).iter().flat_map(|x| x.to_le_bytes()));
+        let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
+        softening.into_iter().chain(points.as_flattened()).for_each(|&x| put_short::<3>(&mut out, x));
+        for step in self.integers.steps {
             out.extend(step.mantissa.to_le_bytes());
             out.extend(step.shift.to_le_bytes());
         }
-        let integers = [
-            &[p.cell, p.shape][..],
-            p.turns.as_flattened(),
-            p.moves.as_flattened(),
-            &p.means,
-            p.predictors.as_flattened(),
-        ];
-        out.extend(integers.concat().iter().flat_map(|x| x.to_le_bytes()));
-        for part in [&self.tables, &self.dictionary] {
-            out.extend((part.len() as u32).to_le_bytes());
+        let mut bits = BitWriter::default();
+        self.integers.write(&mut bits);
+        for part in [&bits.finish(), &self.tables, &self.dictionary] {
+            put_number(&mut out, part.len() as u64);
             out.extend(part);
         }
         self.index.write(&mut out);
@@ -153,61 +157,71 @@ impl Head {
     /// Reads what [`Self::write`] wrote, for rows of `dim` coefficients; `None` for anything else.
     pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Option<Self> {
         let mut from = ByteReader(bytes);
-        let atoms = usize::from(from.u16()?);
-        let [atom_bits, dc_exponent, parts, points] = [from.u8()?, from.u8()?, from.u8()?, from.u8()?];
-        let (parts, points) = (usize::from(parts), usize::from(points));
-        let interim = from.u8()?;
-        let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
-        let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
-        let within = atom_bits <= MAX_ATOM_BITS && dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
-        if !(atoms_can_be && parts_can_be && within && interim <= 1) {
+        let atoms = from.number32()? as usize;
+        let [flags, exponent] = [from.u8()?, from.u8()?];
+        let (dc_exponent, interim) = (exponent & ((1 << EXPONENT_BITS) - 1), exponent >> EXPONENT_BITS == 1);
+        let points = usize::from(flags & ((1 << POINTS_BITS) - 1));
+        let parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
+        let (is_promised, with_axes) = (flags >> MARKS & 1 == 1, flags >> (MARKS + 1) == 1);
+        if with_axes && (dim == 0 || atoms < dim) {
             return None;
         }
-        let least: Vec<u32> = from.bytes(parts)?.iter().map(|&least| u32::from(least)).collect();
-        if !least.is_sorted_by(|a, b| a > b) || least.last().is_some_and(|&last| last != 1) {
+        let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
+        let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
+        let within = dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
+        if !(atoms_can_be && parts_can_be && within) {
+            return None;
+        }
+        let mut least: Vec<u32> =
+            from.bytes(parts.saturating_sub(1))?.iter().map(|&least| u32::from(least)).collect();
+        least.extend((parts > 0).then_some(1));
+        if !least.is_sorted_by(|a, b| a > b) {
             return None;
         }
         let interim = match interim {
-            0 => None,
-            _ => Some([from.u32()?, from.u32()?, from.u32()?]),
+            false => None,
+            true => Some([from.number32()?, from.number32()?, from.number32()?]),
         };
         if interim.iter().flatten().any(|step| !(1..=MOST_STEP).contains(step)) {
             return None;
         }
-        let (origin, cell, dc_mean) = (from.f32s()?, from.f32()?, from.f32s()?);
-        let dc_axes = [from.f32s()?, from.f32s()?, from.f32s()?];
-        let (value_step, promised) = (from.f32()?, from.f32()?);
+        let (origin, cell, step) = (from.f32s()?, from.f32()?, from.f32()?);
+        let (value_step, promised) = if is_promised { (0.0, step) } else { (step, 0.0) };
+        let dc_mean = [from.short::<2>()?, from.short::<2>()?, from.short::<2>()?];
+        let turn: [i16; 4] = from.i16s()?;
+        let dc_axes = axes_of(turn).filter(|axes| turn_of(axes) == turn)?;
         let mut mean_view = MeanView::default();
         if points > 0 {
-            mean_view.softening = from.f32()?;
+            mean_view.softening = from.short::<3>()?;
         }
         for _ in 0..points {
-            mean_view.points.push(from.f32s()?);
+            mean_view.points.push([from.short::<3>()?, from.short::<3>()?, from.short::<3>()?]);
         }
         // Directions are divided by the softening where there is no distance.
-        if cell <= 0.0 || value_step <= 0.0 || promised < 0.0 || (points > 0 && mean_view.softening <= 0.0) {
+        if cell <= 0.0 || step <= 0.0 || (points > 0 && mean_view.softening <= 0.0) {
             return None;
         }
-        let mut steps = [Step::default(); 5];
-        for step in &mut steps {
+        let mut integers = Integers::default();
+        for step in &mut integers.steps {
             *step = Step { mantissa: from.u16()?, shift: from.u8()?.cast_signed() };
             if !Step::SHIFTS.contains(&step.shift) {
                 return None;
             }
         }
-        let [cell_log, shape] = from.i16s()?;
-        let (turns, moves, means, predictors) = (from.rows()?, from.rows()?, from.i16s()?, from.rows()?);
-        let length = from.u32()? as usize;
-        let tables = from.bytes(length)?.to_vec();
-        let length = from.u32()? as usize;
-        let dictionary = from.bytes(length)?.to_vec();
+        let mut part = || {
+            let length = from.number32()? as usize;
+            from.bytes(length)
+        };
+        let mut bits = BitReader::new(part()?);
+        integers.read(&mut bits).filter(|()| bits.exhausted())?;
+        let (tables, dictionary) = (part()?.to_vec(), part()?.to_vec());
         let mut head = Self {
-            atom_bits,
+            with_axes,
             dc_exponent,
             rest: RestForm { dim, atoms, least },
             interim,
             mean_view,
-            integers: Integers { cell: cell_log, shape, steps, turns, moves, means, predictors },
+            integers,
             frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },
             value_step,
             promised,

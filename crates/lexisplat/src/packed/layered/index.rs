@@ -1,11 +1,13 @@
 //! The index of a file: its layers and their chunks, and the ranges of all chunks in the order of the data.
 
-use super::bytes::ByteReader;
+use super::bytes::{ByteReader, put_number, put_short};
 use super::chunk::LayerForm;
 use super::walk::MAX_LEVELS;
 
 /// Most layers of a file.
 const MAX_LAYERS: usize = 8;
+/// Bits of the number of layers.
+const LAYERS_BITS: u32 = 7;
 /// Most Gaussians of a chunk. A decoder needs memory for as many.
 const MAX_CHUNK: usize = 1 << 16;
 /// A Gaussian takes at least this many bits of the base: one for each code of its rotation.
@@ -40,7 +42,8 @@ pub(in crate::packed) struct Chunk {
     /// The number of the first of its cells. Those of the other Gaussians are not below it, and not above that of the next
     /// chunk of the layer.
     pub(in crate::packed) cell: u64,
-    /// Least and largest coordinates of its positions. No decoder needs them.
+    /// Least and largest coordinates of its positions, or some beyond; zeros if it is the only chunk. No decoder needs
+    /// them.
     pub(in crate::packed) bounds: [[f32; 3]; 2],
     /// A base, levels of refinement, parts of nonzeros, and interim changes.
     pub(in crate::packed) ranges: Vec<Range>,
@@ -73,10 +76,12 @@ pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool)
 
 impl Index {
     /// Numbers the Gaussians and places the ranges of all chunks. `None` if there are more than memory counts, or if the
-    /// order names a range that is not there.
+    /// order names a range that is not there. Makes bounds those that are written.
     pub(in crate::packed) fn place(&mut self) -> Option<()> {
         let mut first = 0_usize;
+        let is_one = self.chunks.len() == 1;
         for chunk in &mut self.chunks {
+            chunk.bounds = if is_one { Default::default() } else { widened(chunk.bounds) };
             chunk.first = first;
             first = first.checked_add(chunk.gaussians)?;
         }
@@ -136,30 +141,43 @@ impl Index {
         alone
     }
 
+    /// Whether the ranges lie chunk by chunk in the order of their kinds.
+    fn is_sorted(&self) -> bool {
+        self.order.is_sorted_by_key(|place| (place.chunk, place.kind))
+    }
+
     pub(super) fn write(&self, out: &mut Vec<u8>) {
-        out.push(self.layers.len() as u8);
+        let is_sorted = self.is_sorted();
+        out.push(self.layers.len() as u8 | u8::from(is_sorted) << LAYERS_BITS);
         out.extend(self.layers.iter().map(|layer| layer.levels as u8));
-        out.extend((self.chunks.len() as u32).to_le_bytes());
+        put_number(out, self.chunks.len() as u64);
         for chunk in &self.chunks {
             out.push(chunk.layer as u8);
-            out.extend((chunk.gaussians as u32).to_le_bytes());
-            out.extend(chunk.cell.to_le_bytes());
-            out.extend(chunk.bounds.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+            put_number(out, chunk.gaussians as u64);
+            put_number(out, chunk.cell);
+            if self.chunks.len() > 1 {
+                chunk.bounds.as_flattened().iter().for_each(|&x| put_short::<2>(out, x));
+            }
         }
         for place in &self.order {
             let chunk = self.chunks.get(place.chunk as usize);
             let range = chunk.and_then(|chunk| chunk.ranges.get(usize::from(place.kind)));
             let Range { length, checksum, integers, .. } = range.copied().unwrap_or_default();
-            out.extend(place.chunk.to_le_bytes());
-            out.push(place.kind);
-            out.extend([length, checksum, integers].iter().flat_map(|x| x.to_le_bytes()));
+            if !is_sorted {
+                put_number(out, place.chunk.into());
+                out.push(place.kind);
+            }
+            put_number(out, length.into());
+            out.extend([checksum, integers].iter().flat_map(|x| x.to_le_bytes()));
         }
     }
 
     /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros, and with interim changes in all layers but
     /// the last if there are any; `None` for anything else.
     pub(super) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
-        let layers = usize::from(from.u8()?);
+        let layers = from.u8()?;
+        let (is_sorted, layers) =
+            (layers >> LAYERS_BITS == 1, usize::from(layers & ((1 << LAYERS_BITS) - 1)));
         let levels = from.bytes(layers)?;
         if layers > MAX_LAYERS || levels.iter().any(|&levels| usize::from(levels) > MAX_LEVELS) {
             return None;
@@ -167,9 +185,16 @@ impl Index {
         let mut index = Self { layers: layer_forms(levels, parts, interim), ..Self::default() };
         let (mut ranges, mut last) = (0, 0);
         // Every chunk and every range takes bytes of the index, so their numbers are bounded by its length.
-        for _ in 0..from.u32()? {
-            let (layer, gaussians) = (usize::from(from.u8()?), from.u32()? as usize);
-            let (cell, bounds) = (from.u64()?, [from.f32s()?, from.f32s()?]);
+        let chunks = from.number32()?;
+        for _ in 0..chunks {
+            let (layer, gaussians) = (usize::from(from.u8()?), from.number32()? as usize);
+            let cell = from.number()?;
+            let mut bounds = [[0.0; 3]; 2];
+            if chunks > 1 {
+                for bound in bounds.as_flattened_mut() {
+                    *bound = from.short::<2>()?;
+                }
+            }
             let form = *index.layers.get(layer)?;
             if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last {
                 return None;
@@ -179,9 +204,19 @@ impl Index {
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
         }
         let mut seen = vec![0_u32; index.chunks.len()];
+        // The places of ranges that are sorted.
+        let mut next = Place { chunk: 0, kind: 0 };
         for _ in 0..ranges {
-            let place = Place { chunk: from.u32()?, kind: from.u8()? };
-            let (length, checksum, integers) = (from.u32()?, from.u32()?, from.u32()?);
+            let place = match is_sorted {
+                true => next,
+                false => Place { chunk: from.number32()?, kind: from.u8()? },
+            };
+            let (length, checksum, integers) = (from.number32()?, from.u32()?, from.u32()?);
+            let last = index.chunks.get(place.chunk as usize)?.ranges.len() - 1;
+            next = match usize::from(place.kind) < last {
+                true => Place { kind: place.kind + 1, ..place },
+                false => Place { chunk: place.chunk + 1, kind: 0 },
+            };
             let range =
                 index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
             *range = Range { start: 0, length, checksum, integers };
@@ -200,7 +235,70 @@ impl Index {
                 return None;
             }
         }
+        if index.is_sorted() != is_sorted {
+            return None;
+        }
+        let bounds: Vec<[[f32; 3]; 2]> = index.chunks.iter().map(|chunk| chunk.bounds).collect();
         index.place()?;
-        Some(index)
+        Some(index).filter(|index| index.chunks.iter().map(|chunk| chunk.bounds).eq(bounds))
+    }
+}
+
+/// The bounds of two bytes a number that hold `bounds`.
+fn widened([least, most]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
+    // The numbers towards zero and away from it.
+    let near = |x: f32| f32::from_bits(x.to_bits() >> 16 << 16);
+    let far = |x: f32| {
+        let wide = f32::from_bits(x.to_bits().wrapping_add(0xffff) >> 16 << 16);
+        if wide.is_finite() { wide } else { near(x) }
+    };
+    [
+        least.map(|x| if x < 0.0 { far(x) } else { near(x) }),
+        most.map(|x| if x < 0.0 { near(x) } else { far(x) }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn index(chunks: usize) -> Index {
+        let chunk = |c: usize| Chunk {
+            gaussians: 100 + c,
+            cell: 1000 * c as u64,
+            bounds: [[-1.01 - c as f32, 0.0, 3.3], [2.2, 1e9, 1e-9]],
+            ranges: vec![Range { length: 300 + c as u32, checksum: 7, integers: 8, start: 0 }; 2],
+            ..Chunk::default()
+        };
+        let place = |chunk: usize, kind| Place { chunk: chunk as u32, kind };
+        let order = (0..2).flat_map(|kind| (0..chunks).map(move |c| place(c, kind))).collect();
+        let mut index =
+            Index { layers: layer_forms(&[0], 1, false), chunks: (0..chunks).map(chunk).collect(), order };
+        index.place().unwrap();
+        index
+    }
+
+    #[test]
+    fn indices_come_back() {
+        for (chunks, bytes) in [(1, 26), (3, 3 + 3 * (1 + 1 + 2 + 12 + 2 * 12) - 1)] {
+            let index = index(chunks);
+            let mut out = Vec::new();
+            index.write(&mut out);
+            assert_eq!(out.len(), bytes);
+            assert_eq!(Index::read(&mut ByteReader(&out), 1, false), Some(index));
+            assert_eq!(Index::read(&mut ByteReader(&out[..bytes - 1]), 1, false), None);
+        }
+    }
+
+    #[test]
+    fn bounds_hold_all_and_have_two_bytes() {
+        let given = [[-1.01, 0.0, 3.3], [2.2, f32::MAX, -1e-9]];
+        let wide = widened(given);
+        assert_eq!(widened(wide), wide);
+        for k in 0..3 {
+            assert!(wide[0][k] <= given[0][k] && given[0][k] - wide[0][k] <= given[0][k].abs() / 128.0);
+            assert!(wide[1][k].is_finite() && wide[1][k] - given[1][k] <= given[1][k].abs() / 128.0);
+        }
+        assert!(wide[1][0] >= given[1][0] && wide[1][2] >= given[1][2]);
     }
 }

@@ -4,6 +4,7 @@
 //! files hold the colour that a few points of view see on average. What SH-rest that is there adds to that average is
 //! taken away again. So a Gaussian shows its best colour whether or not its SH-rest is there.
 
+use super::bytes::shortened;
 use super::symbols::{LANES, Lanes};
 use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
 use crate::scene::splats::Splats;
@@ -35,14 +36,14 @@ impl MeanView {
         if points.is_empty() {
             return Self::default();
         }
-        let points: Vec<Vec3> = points.iter().copied().take(MAX_POINTS).collect();
+        let points: Vec<Vec3> = points.iter().take(MAX_POINTS).map(|point| point.map(shortened::<3>)).collect();
         let middle: Vec3 =
             std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
         let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
         let mut distances: Vec<f32> = points.iter().map(far).collect();
         distances.sort_by(f32::total_cmp);
-        let softening = SOFTENING * at_share(&distances, 0.5);
-        Self { softening: softening.max(LEAST_SOFTENING), points }
+        let softening = shortened::<3>(SOFTENING * at_share(&distances, 0.5));
+        Self { softening: softening.max(shortened::<3>(LEAST_SOFTENING)), points }
     }
 
     /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.

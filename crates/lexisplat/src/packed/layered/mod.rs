@@ -1,6 +1,9 @@
 //! Version 3 of packed files: layers of chunks that are decoded coarse to fine.
 
 mod around;
+mod atoms;
+mod axes;
+mod binary;
 mod bytes;
 mod chunk;
 mod decoder;
@@ -10,6 +13,7 @@ pub mod fuzzing;
 mod head;
 mod index;
 mod interim;
+mod levels;
 mod mean_view;
 mod player;
 mod range;
@@ -27,9 +31,13 @@ mod unpack;
 mod values;
 mod walk;
 
+pub(super) use atoms::{WholeAtoms, axes};
+pub(super) use axes::rounded as rounded_axes;
+pub(super) use bytes::shortened;
 pub(super) use chunk::{CodedChunk, Form, LayerForm, lanes};
-pub(super) use decoder::{LayeredDecoder, record_atoms};
+pub(super) use decoder::LayeredDecoder;
 pub(super) use head::Head;
+pub(crate) use head::layered_atoms;
 pub(super) use index::{Chunk, Index, Place, Range, layer_forms};
 pub(super) use interim::{CHANGES, KINDS};
 pub(super) use mean_view::{MeanView, seen_row};

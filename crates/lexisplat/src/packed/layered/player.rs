@@ -1,6 +1,6 @@
 //! The entropy decoder of a range.
 
-use super::range::{LEAST, MOST_BITS};
+use super::range::{LEAST, MOST_BITS, length_bytes};
 use super::streams::{Slot, Stream};
 use super::symbols::{LANES, Lanes, Symbols, has};
 use super::tables::Lookup;
@@ -25,7 +25,8 @@ pub(in crate::packed) struct Player<'a> {
 impl<'a> Player<'a> {
     /// `None` if `bytes` cannot be a range of this many lanes. Bits of streams are counted if `count_bits`.
     pub(super) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize, count_bits: bool) -> Option<Self> {
-        let (lengths, words) = bytes.split_at_checked(size_of::<u32>() * lanes.checked_sub(1)?)?;
+        let width = length_bytes(bytes.len());
+        let (lengths, words) = bytes.split_at_checked(width * lanes.checked_sub(1)?)?;
         let (words, []) = words.as_chunks::<2>() else { return None };
         let total = u32::try_from(words.len()).ok().filter(|&total| (2..=MAX_WORDS).contains(&total))?;
         let mut player = Self {
@@ -40,8 +41,11 @@ impl<'a> Player<'a> {
         let mut end = 0_u32;
         for l in 0..lanes {
             let start = end;
-            end = match lengths.as_chunks::<4>().0.get(l) {
-                Some(length) => end.checked_add(u32::from_le_bytes(*length)).filter(|&end| end <= total)?,
+            end = match lengths.get(l * width..(l + 1) * width) {
+                Some(bytes) => {
+                    let length = bytes.iter().rev().fold(0, |length, &byte| length << 8 | u32::from(byte));
+                    end.checked_add(length).filter(|&end| end <= total)?
+                }
                 None => total,
             };
             let [high, low] = *words.get(start as usize..end as usize)?.first_chunk()?;

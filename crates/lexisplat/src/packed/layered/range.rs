@@ -10,6 +10,14 @@ use super::tables::{Model, Tables};
 pub(super) const LEAST: u32 = 1 << 16;
 /// Most raw bits that a state gives at once.
 pub(super) const MOST_BITS: u32 = 16;
+/// Ranges of fewer bytes have lanes of which 16 bits count the words.
+const LEAST_LONG: usize = 1 << 17;
+
+/// Bytes of the number of words of a lane in a range of this many bytes. As many or more remain if numbers get longer.
+pub(super) fn length_bytes(range: usize) -> usize {
+    if range < LEAST_LONG { 2 } else { 4 }
+}
+
 /// Marks a recorded entry as raw bits.
 const RAW: u32 = 1 << 31;
 
@@ -87,12 +95,14 @@ impl Recorder {
         Self { lanes }
     }
 
-    /// The bytes of the range: the numbers of words of all lanes in use but the last, as u32, and the words.
+    /// The bytes of the range: the numbers of words of all lanes in use but the last, and the words.
     pub(in crate::packed) fn finish(&self, tables: &Tables, lanes: usize) -> Vec<u8> {
         let words: Vec<Vec<u16>> = self.lanes.iter().take(lanes).map(|lane| encode(lane, tables)).collect();
+        let lengths = words.iter().take(lanes.saturating_sub(1)).map(Vec::len);
+        let short = 2 * (lengths.len() + words.iter().map(Vec::len).sum::<usize>());
         let mut out = Vec::new();
-        for lane in words.iter().take(lanes.saturating_sub(1)) {
-            out.extend((lane.len() as u32).to_le_bytes());
+        for length in lengths {
+            out.extend((length as u32).to_le_bytes().iter().take(length_bytes(short)));
         }
         out.extend(words.iter().flatten().flat_map(|word| word.to_le_bytes()));
         out

@@ -4,6 +4,7 @@
 //! same ones. In damaged files sums wrap around. Floating point only makes values of decoded integers.
 
 use super::symbols::{LANES, Lanes, each};
+use crate::packed::bits::{BitReader, BitWriter};
 use crate::packed::parameters::{LAST_CLASS, Parameters, TARGETS};
 
 /// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
@@ -44,6 +45,8 @@ pub(super) const ONE: i32 = 1 << FEATURE_BITS;
 
 /// Coefficients of a prediction: a constant, and those of the average, the two classes and the scales.
 pub(super) const COEFFICIENTS: usize = 7;
+/// Coefficients of a prediction that are not of scales: of the first scale there are no others.
+const BEFORE_SCALES: usize = 3;
 /// Coefficients of the logarithm of a step: a constant and those of the scales.
 pub(super) const SLOPES: usize = 4;
 
@@ -87,9 +90,25 @@ fn rounded(x: f64, least: f64, most: f64) -> i64 {
     libm::rint(x).clamp(least, most) as i64
 }
 
-/// `x` as a multiple of 2^-`bits`.
-fn fixed(x: f64, bits: u32) -> i16 {
-    rounded(x * f64::from(1_u32 << bits), f64::from(i16::MIN + 1), f64::from(i16::MAX)) as i16
+/// Low bits of constants, means and logarithms that are zero, and of coefficients. With more precise ones files are no
+/// smaller.
+const CONSTANT_ZEROS: u32 = 2;
+const COEFFICIENT_ZEROS: u32 = 4;
+
+/// The multiple of 2^`zeros` that is nearest to `x`.
+fn round_multiple(x: f64, zeros: u32) -> i16 {
+    let most = f64::from(i16::MAX >> zeros);
+    (rounded(x / f64::from(1_u32 << zeros), -most, most) << zeros) as i16
+}
+
+/// A constant or a mean as a feature.
+fn constant(x: f64) -> i16 {
+    round_multiple(x * f64::from(1_u32 << FEATURE_BITS), CONSTANT_ZEROS)
+}
+
+/// A coefficient as a multiple of 2^-12.
+fn coefficient(x: f64) -> i16 {
+    round_multiple(x * f64::from(1_u32 << COEFFICIENT_BITS), COEFFICIENT_ZEROS)
 }
 
 /// The integers of a file's parameters.
@@ -97,11 +116,9 @@ fn fixed(x: f64, bits: u32) -> i16 {
 pub(in crate::packed) struct Integers {
     /// Logarithm of the side of a cell.
     pub(super) cell: i16,
-    /// Logarithm of the step of shape class 0.
-    pub(super) shape: i16,
     /// Steps of class 0 of the three scales, the opacity and the base colour.
     pub(super) steps: [Step; 5],
-    /// Logarithms of the steps of turns and moves.
+    /// Logarithms of the steps of turns and moves at shape class 0.
     pub(super) turns: [[i16; SLOPES]; 3],
     pub(super) moves: [[i16; SLOPES]; 3],
     /// Averages where there are no neighbours, as features.
@@ -112,10 +129,11 @@ pub(in crate::packed) struct Integers {
 impl Integers {
     /// The integers nearest to `p`. Base colours are in units of `dc_unit`.
     pub(in crate::packed) fn of(p: &Parameters, dc_unit: f64) -> Self {
-        let octaves = |x: f32| fixed(libm::log2(f64::from(x)), FEATURE_BITS);
+        let octaves = |x: f32| libm::log2(f64::from(x));
         let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
-            std::array::from_fn(|k| {
-                fixed(f64::from(row[k]), if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS })
+            std::array::from_fn(|k| match k {
+                0 => constant(f64::from(row[0]) + octaves(p.base[1])),
+                _ => coefficient(f64::from(row[k])),
             })
         };
         let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
@@ -126,22 +144,93 @@ impl Integers {
         let predictors = std::array::from_fn(|t| {
             std::array::from_fn(|k| {
                 let own = if k == 1 { 1.0 } else { unit(t) };
-                fixed(
-                    f64::from(p.predictors[t][k]) / own,
-                    if k == 0 { FEATURE_BITS } else { COEFFICIENT_BITS },
-                )
+                let x = f64::from(p.predictors[t][k]) / own;
+                match k {
+                    0 => constant(x),
+                    // The features of a scale are the scales before it.
+                    _ if k > BEFORE_SCALES + t => 0,
+                    _ => coefficient(x),
+                }
             })
         });
         Self {
-            cell: octaves(p.cell),
-            shape: octaves(p.base[1]),
+            cell: constant(octaves(p.cell)),
             steps: steps.map(Step::of),
             turns: p.rotation.map(slopes),
             moves: p.position.map(slopes),
-            means: std::array::from_fn(|t| fixed(f64::from(p.means[t]) / unit(t), FEATURE_BITS)),
+            means: std::array::from_fn(|t| constant(f64::from(p.means[t]) / unit(t))),
             predictors,
         }
     }
+}
+
+/// Bits of the width of a group of numbers.
+const WIDTH_BITS: u32 = 5;
+
+impl Integers {
+    /// The groups of numbers that are written with one width each, with the zeros that all of a group have below.
+    fn groups(&mut self) -> Vec<(Vec<&mut i16>, u32)> {
+        let mut groups = vec![(vec![&mut self.cell], CONSTANT_ZEROS)];
+        for rows in [&mut self.turns, &mut self.moves] {
+            let (mut constants, mut slopes) = (Vec::new(), Vec::new());
+            for [constant, of_scales @ ..] in rows {
+                constants.push(constant);
+                slopes.extend(of_scales);
+            }
+            groups.extend([(constants, CONSTANT_ZEROS), (slopes, COEFFICIENT_ZEROS)]);
+        }
+        groups.push((self.means.iter_mut().collect(), CONSTANT_ZEROS));
+        let mut columns: [Vec<&mut i16>; COEFFICIENTS] = Default::default();
+        for (t, row) in self.predictors.iter_mut().enumerate() {
+            for (k, (column, number)) in columns.iter_mut().zip(row).enumerate() {
+                if k <= BEFORE_SCALES + t {
+                    column.push(number);
+                }
+            }
+        }
+        let zeros = |k: usize| if k == 0 { CONSTANT_ZEROS } else { COEFFICIENT_ZEROS };
+        groups.extend(columns.into_iter().enumerate().map(|(k, column)| (column, zeros(k))));
+        groups
+    }
+
+    /// Writes all but the steps.
+    pub(super) fn write(&self, out: &mut BitWriter) {
+        for (group, zeros) in self.clone().groups() {
+            let numbers: Vec<i16> = group.into_iter().map(|number| *number >> zeros).collect();
+            let width = numbers.iter().copied().map(width).max().unwrap_or(0);
+            out.put(WIDTH_BITS, width.into());
+            for number in numbers {
+                out.put(width, u64::from(number.cast_unsigned()) & ((1 << width) - 1));
+            }
+        }
+    }
+
+    /// Reads what [`Self::write`] wrote; `None` for anything else.
+    pub(super) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
+        for (group, zeros) in self.groups() {
+            let most = from.take(WIDTH_BITS) as u32;
+            if most + zeros > i16::BITS {
+                return None;
+            }
+            let mut used = 0;
+            for number in group {
+                let unused = i16::BITS - most;
+                let bits = (from.take(most) as u16).checked_shl(unused).unwrap_or(0);
+                let read = bits.cast_signed().checked_shr(unused).unwrap_or(0);
+                used = used.max(width(read));
+                *number = read << zeros;
+            }
+            if used != most {
+                return None;
+            }
+        }
+        Some(())
+    }
+}
+
+/// Bits of a number and its sign; 0 for 0.
+fn width(number: i16) -> u32 {
+    if number == 0 { 0 } else { i16::BITS + 1 - (number ^ (number >> 15)).leading_zeros() }
 }
 
 /// The integers of a file's parameters, prepared for the walk.
@@ -150,7 +239,6 @@ pub(in crate::packed) struct Steering {
     cell: i32,
     /// Steps of the scales, the opacity and the base colour at each class.
     steps: [[u32; LAST_CLASS as usize + 1]; 5],
-    /// Constants include the logarithm of the step of shape class 0.
     turns: [[i32; SLOPES]; 3],
     moves: [[i32; SLOPES]; 3],
     pub(super) means: [i32; TARGETS],
@@ -159,16 +247,11 @@ pub(in crate::packed) struct Steering {
 
 impl Steering {
     pub(in crate::packed) fn new(p: &Integers) -> Self {
-        let slopes = |row: [i16; SLOPES]| {
-            let mut row = row.map(i32::from);
-            row[0] += i32::from(p.shape);
-            row
-        };
         Self {
             cell: p.cell.into(),
             steps: p.steps.map(|step| std::array::from_fn(|class| step.at(class as u32))),
-            turns: p.turns.map(slopes),
-            moves: p.moves.map(slopes),
+            turns: p.turns.map(|row| row.map(i32::from)),
+            moves: p.moves.map(|row| row.map(i32::from)),
             means: p.means.map(i32::from),
             predictors: p.predictors.map(|row| row.map(i32::from)),
         }

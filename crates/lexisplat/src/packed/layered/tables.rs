@@ -1,19 +1,14 @@
 //! Tables of probabilities: made of counts, written, read, looked up.
 
+use super::binary::{BitDecoder, BitEncoder, Bits, Odds};
+use super::levels::{Kind, LevelOdds, Levels, MAX_SYMBOLS};
 use super::streams::{CONTEXTS, SLOTS, Slot};
-use crate::packed::bits::{BitReader, BitWriter};
 
-/// Bits of a symbol count and of a bit length in a written table.
-const SYMBOLS_BITS: u32 = 9;
-const LENGTH_BITS: u32 = 4;
-/// Bits kept of a frequency after its leading one.
-const MANTISSA_BITS: u32 = 3;
-/// Bits of a table's number in the map of contexts.
-const TABLE_BITS: u32 = 5;
-/// About the bits of a symbol in a table: its length and its mantissa.
-const SYMBOL_COST: f64 = 6.5;
-/// Largest number of symbols of a table.
-const MAX_SYMBOLS: usize = 256;
+/// About the bits of a table and of each of its symbols, by which contexts are joined first.
+const TABLE_COST: f64 = 8.0;
+const SYMBOL_COST: f64 = 1.0;
+/// Levels an octave, as a binary logarithm, at which joined tables are compared.
+const JOINING_GRAIN: u32 = 1;
 /// The table of contexts that are never used.
 const NONE: u8 = u8::MAX;
 /// Number of all contexts.
@@ -43,36 +38,22 @@ impl Histogram {
         }
     }
 
-    /// Bits of all its symbols when coded with its own probabilities of `precision` bits, and of its table.
+    /// About the bits of all its symbols when coded with its own probabilities of `precision` bits, and of its table.
     fn cost(&self, precision: u32) -> f64 {
         let total: u64 = self.counts.iter().map(|&c| u64::from(c)).sum();
         let total = total as f64;
         let mut bits = 0.0;
-        let mut used = 0;
         for &count in self.counts.iter().filter(|&&c| c > 0) {
             // A probability is at least one unit of precision.
             let share = (f64::from(count) / total).max(1.0 / f64::from(1_u32 << precision));
             bits -= f64::from(count) * libm::log2(share);
-            used += 1;
         }
-        let gaps = self.counts.len() - used;
-        bits + f64::from(SYMBOLS_BITS) + SYMBOL_COST * used as f64 + f64::from(LENGTH_BITS) * gaps as f64
+        bits + TABLE_COST + SYMBOL_COST * self.counts.len() as f64
     }
 
-    /// Counts rounded to those that a table can hold.
-    fn rounded(&self) -> Vec<u32> {
-        let largest = self.counts.iter().copied().max().unwrap_or(0).max(1);
-        let round = |count: u32| {
-            if count == 0 {
-                return 0;
-            }
-            // As 14-bit numbers, so that every length fits its field.
-            let scaled = (u64::from(count) * ((1 << 14) - 1) / u64::from(largest)).max(1);
-            let length = u64::BITS - scaled.leading_zeros();
-            let drop = length.saturating_sub(MANTISSA_BITS + 1);
-            u32::try_from(scaled >> drop << drop).unwrap_or(1)
-        };
-        self.counts.iter().map(|&c| round(c)).collect()
+    /// The same, more exactly.
+    fn fitted_cost(&self, kind: Kind, precision: u32) -> f64 {
+        Levels::fit(&self.counts, kind, precision, JOINING_GRAIN..=JOINING_GRAIN).1
     }
 }
 
@@ -87,23 +68,25 @@ pub(super) struct Model {
 #[derive(Debug, Clone)]
 struct Table {
     /// What is written.
-    counts: Vec<u32>,
+    levels: Levels,
     /// Of each symbol; symbols that do not occur have no share.
     models: Vec<Model>,
 }
 
 impl Table {
-    /// A table of probabilities of `precision` bits from counts; `None` if they are all zero or too many.
-    fn new(counts: &[u32], precision: u32) -> Option<Self> {
+    /// A table of probabilities of `precision` bits; `None` if there are no symbols or too many.
+    fn new(levels: Levels, precision: u32) -> Option<Self> {
         let whole = 1_u32 << precision;
-        let total: u64 = counts.iter().map(|&c| u64::from(c)).sum();
-        if total == 0 || counts.len() > MAX_SYMBOLS {
+        let weights = levels.weights(precision);
+        // Weights are below 2^19, so the total is below 2^27, and a product with the whole below 2^31.
+        let total: u32 = weights.iter().sum();
+        if total == 0 || weights.len() > MAX_SYMBOLS {
             return None;
         }
-        let share = |&c: &u32| {
-            if c == 0 { 0 } else { (u64::from(c) * u64::from(whole) / total).max(1).cast_signed() }
+        let share = |&weight: &u32| {
+            if weight == 0 { 0 } else { i64::from((weight * whole / total).max(1)) }
         };
-        let mut shares: Vec<i64> = counts.iter().map(share).collect();
+        let mut shares: Vec<i64> = weights.iter().map(share).collect();
         // The difference that rounding leaves goes to the most frequent symbols, where it costs least.
         let mut left = i64::from(whole) - shares.iter().sum::<i64>();
         while left != 0 {
@@ -119,7 +102,7 @@ impl Table {
             model
         });
         let models = models.collect();
-        Some(Self { counts: counts.to_vec(), models })
+        Some(Self { levels, models })
     }
 }
 
@@ -138,10 +121,12 @@ impl Tables {
         let mut map = Vec::with_capacity(histograms.len());
         let mut tables = Vec::new();
         for (slot, contexts) in Slot::all().zip(histograms.chunks(CONTEXTS)) {
-            let precision = slot.stream.precision();
-            let (joined, of) = join(contexts, precision);
+            let (kind, precision) = (Kind::of(slot.stream), slot.stream.precision());
+            let (joined, of) = join(contexts, kind, precision);
             map.extend(of);
-            let table = |h: &Histogram| Table::new(&h.rounded(), precision);
+            let table = |h: &Histogram| {
+                Table::new(Levels::fit(&h.counts, kind, precision, Levels::grains(&h.counts)).0, precision)
+            };
             let made: Option<Vec<Table>> = joined.iter().map(table).collect();
             tables.push(made?);
         }
@@ -170,108 +155,152 @@ impl Tables {
 
     /// Writes map and tables.
     pub(in crate::packed) fn write(&self) -> Vec<u8> {
-        let mut out = BitWriter::default();
-        for (tables, map) in self.tables.iter().zip(self.map.chunks(CONTEXTS)) {
-            out.put(TABLE_BITS, tables.len() as u64);
-            if tables.len() > 1 {
-                let mut last = 0;
-                for &table in map {
-                    // An unused context shares its neighbour's table.
-                    let table = if table == NONE { last } else { table };
-                    out.put(1, u64::from(table != last));
-                    if table != last {
-                        out.put(TABLE_BITS, u64::from(table));
-                    }
-                    last = table;
-                }
-            }
-            for counts in tables.iter().map(|t| &t.counts) {
-                out.put(SYMBOLS_BITS, counts.len() as u64);
-                for &count in counts {
-                    let length = u32::BITS - count.leading_zeros();
-                    out.put(LENGTH_BITS, u64::from(length));
-                    let kept = length.saturating_sub(1).min(MANTISSA_BITS);
-                    let drop = length.saturating_sub(1) - kept;
-                    out.put(kept, u64::from(count >> drop) & ((1 << kept) - 1));
-                }
-            }
-        }
-        out.finish()
+        let mut encoder = BitEncoder::default();
+        // What was made or read can be coded.
+        let _ = self.code(&mut encoder);
+        encoder.finish()
     }
 
     /// Reads what [`Self::write`] wrote; `None` for anything else.
     pub(in crate::packed) fn read(bytes: &[u8]) -> Option<Self> {
-        let mut bits = BitReader::new(bytes);
-        let mut map = Vec::with_capacity(ALL_CONTEXTS);
-        let mut tables = Vec::with_capacity(SLOTS);
+        let mut decoder = BitDecoder::new(bytes);
+        let read = Self { map: Vec::new(), tables: Vec::new() }.code(&mut decoder)?;
+        (read.write() == bytes).then_some(read)
+    }
+
+    /// Codes map and tables. The decoder gives empty ones.
+    fn code<B: Bits>(&self, bits: &mut B) -> Option<Self> {
+        let mut odds = TablesOdds::default();
+        let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
+        let mut before = false;
         for slot in Slot::all() {
-            let count = bits.take(TABLE_BITS);
-            let mut last = 0_u8;
-            for _ in 0..CONTEXTS {
-                if count > 1 && bits.take(1) == 1 {
-                    last = u8::try_from(bits.take(TABLE_BITS)).ok()?;
+            let own = self.tables.get(slot.number).map_or(&[][..], Vec::as_slice);
+            before = bits.bit(&mut odds.used[usize::from(before)], !own.is_empty());
+            let mut count = usize::from(before);
+            if !before || !bits.bit(&mut odds.many, own.len() > 1) {
+                all.map.extend([0; CONTEXTS]);
+            } else {
+                let mut last = 0;
+                all.map.push(0);
+                for context in 1..CONTEXTS {
+                    let wanted = self.map.get(slot.number * CONTEXTS + context).copied().unwrap_or(NONE);
+                    // A context that is not used has the table of the one before.
+                    let wanted = if wanted == NONE { last } else { usize::from(wanted) };
+                    let same = &mut odds.same[usize::from(all.map.len() % CONTEXTS > 1 && odds.changed)];
+                    odds.changed = bits.bit(same, wanted != last);
+                    if odds.changed {
+                        last = match bits.bit(&mut odds.new, wanted == count) {
+                            true => count,
+                            false => {
+                                let width = usize::BITS - (count - 1).leading_zeros();
+                                Some(bits.even(width, wanted as u32) as usize)
+                                    .filter(|&table| table < count)?
+                            }
+                        };
+                        count = count.max(last + 1);
+                    }
+                    all.map.push(u8::try_from(last).ok()?);
                 }
-                map.push(last);
             }
-            let mut made = Vec::new();
-            for _ in 0..count {
-                let symbols = usize::try_from(bits.take(SYMBOLS_BITS)).ok()?;
-                if symbols > MAX_SYMBOLS || bits.overrun() {
-                    return None;
-                }
-                let mut counts = Vec::with_capacity(symbols);
-                for _ in 0..symbols {
-                    let length = u32::try_from(bits.take(LENGTH_BITS)).ok()?;
-                    let kept = length.saturating_sub(1).min(MANTISSA_BITS);
-                    let mantissa = u32::try_from(bits.take(kept)).ok()?;
-                    let drop = length.saturating_sub(1) - kept;
-                    counts.push(if length == 0 { 0 } else { ((1 << kept) | mantissa) << drop });
-                }
-                made.push(Table::new(&counts, slot.stream.precision())?);
+            let (kind, precision) = (Kind::of(slot.stream), slot.stream.precision());
+            let mut tables = Vec::with_capacity(count);
+            for k in 0..count {
+                let none = Levels::default();
+                let levels = own.get(k).map_or(&none, |table| &table.levels);
+                tables.push(Table::new(levels.code(bits, &mut odds.levels, kind, precision)?, precision)?);
             }
-            tables.push(made);
+            all.tables.push(tables);
         }
-        bits.exhausted().then_some(Self { map, tables })
+        Some(all)
     }
 }
 
-/// Joins the two histograms that gain most by sharing a table until none gains. Returns the joined histograms, and for
-/// each context the number of its histogram among them. Probabilities have `precision` bits.
-fn join(contexts: &[Histogram], precision: u32) -> (Vec<Histogram>, Vec<u8>) {
-    let mut groups: Vec<(Histogram, Vec<usize>, f64)> = (0..contexts.len())
-        .filter(|&c| !contexts[c].counts.is_empty())
-        .map(|c| (contexts[c].clone(), vec![c], contexts[c].cost(precision)))
-        .collect();
-    let joined = |a: &Histogram, b: &Histogram| {
-        let mut sum = a.clone();
-        sum.merge(b);
-        sum
+/// The odds of what maps and tables consist of.
+#[derive(Debug, Default)]
+struct TablesOdds {
+    /// Whether a stream is used, where the one before is not and is.
+    used: [Odds; 2],
+    /// Whether it has several tables.
+    many: Odds,
+    /// Whether a context has another table than the one before, where that one had not and had.
+    same: [Odds; 2],
+    changed: bool,
+    /// Whether that table is new.
+    new: Odds,
+    levels: LevelOdds,
+}
+
+/// Contexts that share a table.
+struct Group {
+    histogram: Histogram,
+    /// In rising order.
+    members: Vec<usize>,
+    cost: f64,
+}
+
+/// Joins contexts until no two tables gain by being one. Returns the joined histograms in the order of their first
+/// contexts, and for each context the number of its histogram among them. Probabilities have `precision` bits.
+fn join(contexts: &[Histogram], kind: Kind, precision: u32) -> (Vec<Histogram>, Vec<u8>) {
+    let group = |context: usize| Group {
+        histogram: contexts[context].clone(),
+        members: vec![context],
+        cost: contexts[context].cost(precision),
     };
-    loop {
-        let mut best = None;
-        let mut gain = 0.0;
-        for i in 0..groups.len() {
-            for j in i + 1..groups.len() {
-                let cost = joined(&groups[i].0, &groups[j].0).cost(precision);
-                let saved = groups[i].2 + groups[j].2 - cost;
-                if saved > gain {
-                    (best, gain) = (Some((i, j, cost)), saved);
-                }
-            }
-        }
-        let Some((i, j, cost)) = best else { break };
-        let (histogram, members, _) = groups.remove(j);
-        groups[i].0.merge(&histogram);
-        groups[i].1.extend(members);
-        groups[i].2 = cost;
+    let used = (0..contexts.len()).filter(|&context| !contexts[context].counts.is_empty());
+    let mut groups: Vec<Group> = used.map(group).collect();
+    join_groups(&mut groups, |histogram| histogram.cost(precision));
+    for group in &mut groups {
+        group.cost = group.histogram.fitted_cost(kind, precision);
     }
+    join_groups(&mut groups, |histogram| histogram.fitted_cost(kind, precision));
+    groups.sort_by_key(|group| group.members.first().copied());
     let mut map = vec![NONE; contexts.len()];
     for (number, group) in (0..).zip(&groups) {
-        for &context in &group.1 {
+        for &context in &group.members {
             map[context] = number;
         }
     }
-    (groups.into_iter().map(|g| g.0).collect(), map)
+    (groups.into_iter().map(|group| group.histogram).collect(), map)
+}
+
+/// Joins the two groups that gain most until none gain.
+fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
+    let joined = |a: &Group, b: &Group| {
+        let mut sum = a.histogram.clone();
+        sum.merge(&b.histogram);
+        cost(&sum)
+    };
+    // The cost of each pair, of which the second comes after the first.
+    let mut costs: Vec<Vec<f64>> = (0..groups.len())
+        .map(|i| (i + 1..groups.len()).map(|j| joined(&groups[i], &groups[j])).collect())
+        .collect();
+    loop {
+        let (mut best, mut gain) = (None, 0.0);
+        for (i, row) in costs.iter().enumerate() {
+            for (j, cost) in (i + 1..).zip(row) {
+                let saved = groups[i].cost + groups[j].cost - cost;
+                if saved > gain {
+                    (best, gain) = (Some((i, j)), saved);
+                }
+            }
+        }
+        let Some((i, j)) = best else { return };
+        groups[i].cost = costs[i][j - i - 1];
+        let Group { histogram, members, .. } = groups.remove(j);
+        groups[i].histogram.merge(&histogram);
+        groups[i].members.extend(members);
+        groups[i].members.sort_unstable();
+        costs.remove(j);
+        for (k, row) in costs.iter_mut().enumerate().take(j) {
+            row.remove(j - k - 1);
+        }
+        for k in 0..groups.len() {
+            let (a, b) = (k.min(i), k.max(i));
+            if a < b {
+                costs[a][b - a - 1] = joined(&groups[a], &groups[b]);
+            }
+        }
+    }
 }
 
 /// Most bits of a probability.
@@ -321,5 +350,70 @@ impl Lookup {
     pub(super) fn entry(&self, start: u32, low: u32) -> (u32, u32, u32) {
         let entry = self.entries.get((start + low) as usize).copied().unwrap_or(0);
         (entry & 0xff, (entry >> 8 & ((1 << MOST_PRECISION) - 1)) + 1, entry >> (8 + MOST_PRECISION))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::rng::SplitMix64;
+
+    /// Histograms of values that get rarer with their size, of which each context has its own.
+    fn histograms(symbols: u32) -> Vec<Histogram> {
+        let mut rng = SplitMix64::new(11);
+        let mut all = vec![Histogram::default(); ALL_CONTEXTS];
+        for (context, histogram) in all.iter_mut().enumerate().filter(|(context, _)| context % 3 != 1) {
+            for _ in 0..symbols >> (context % 5) {
+                let zeros = (rng.next() | 1 << 30).trailing_zeros();
+                histogram.add((zeros * 2 + (rng.next() & 1) as u32 + (context % 7) as u32) as u8);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn tables_come_back_and_code_all_symbols() {
+        for symbols in [16, 90, 5000] {
+            let counted = histograms(symbols);
+            let tables = Tables::new(&counted).unwrap();
+            let bytes = tables.write();
+            let read = Tables::read(&bytes).unwrap();
+            let (mut bits, mut entropy, mut used) = (0.0, 0.0, 0);
+            for (context, histogram) in counted.iter().enumerate() {
+                let whole = 1_u32 << Slot::stream_of(context).precision();
+                for (symbol, _) in (0..).zip(&histogram.counts).filter(|(_, count)| **count > 0) {
+                    let model = tables.model(context, symbol);
+                    assert!(model.share > 0 && model.start + model.share <= whole);
+                    assert_eq!(read.model(context, symbol), model, "{context} {symbol}");
+                }
+                let total: u32 = histogram.counts.iter().sum();
+                let ideal = |count: u32| f64::from(count) * libm::log2(f64::from(total) / f64::from(count));
+                entropy += histogram
+                    .counts
+                    .iter()
+                    .filter(|&&count| count > 0)
+                    .map(|&count| ideal(count))
+                    .sum::<f64>();
+                bits += tables.bits(context, histogram);
+                used += usize::from(total > 0);
+            }
+            let bits = bits + 8.0 * bytes.len() as f64;
+            assert!(bits < 1.05 * entropy + 40.0 * used as f64, "{bits} {entropy} {used}");
+        }
+    }
+
+    #[test]
+    fn no_other_bytes_are_tables() {
+        let bytes = Tables::new(&histograms(90)).unwrap().write();
+        assert!(Tables::read(&[&bytes[..], &[0]].concat()).is_none());
+        assert!(Tables::read(&[&bytes[..], &[1]].concat()).is_none());
+        assert!(Tables::read(&[0xff; 300]).is_none());
+        let mut rng = SplitMix64::new(5);
+        for _ in 0..200 {
+            let mut damaged = bytes.clone();
+            damaged[rng.below(bytes.len())] ^= 1 << rng.below(8);
+            // What is read of damage is what those bytes are written for.
+            assert!(Tables::read(&damaged).is_none_or(|tables| tables.write() == damaged));
+        }
     }
 }

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::support::rng::SplitMix64;
 
 /// Integers as heads may hold them, wild ones too.
 fn integers() -> impl Strategy<Value = Integers> {
@@ -158,4 +159,32 @@ fn integers_are_nearest_to_parameters() {
     for (t, wanted) in [(0, 0.002), (1, 0.004), (2, 0.006), (3, 0.001), (4, 0.015 / unit)] {
         assert!((step(t) - wanted).abs() <= wanted / 65_536.0 + 1.0 / 1_048_576.0, "{t}: {}", step(t));
     }
+}
+
+#[test]
+fn integers_come_back_in_one_form() {
+    let mut rng = SplitMix64::new(9);
+    for shift in 0..12 {
+        let mut integers = Integers::default();
+        for (group, zeros) in integers.groups() {
+            for number in group {
+                *number = (rng.next() as i16 >> shift) >> zeros << zeros;
+            }
+        }
+        let mut out = BitWriter::default();
+        integers.write(&mut out);
+        let bytes = out.finish();
+        let mut read = Integers::default();
+        let mut from = BitReader::new(&bytes);
+        assert_eq!(read.read(&mut from), Some(()));
+        assert!(from.exhausted());
+        assert_eq!(read, integers);
+    }
+    // A width that no number of the group needs, and one that is too large.
+    for first in [1, 31] {
+        let mut bytes = vec![0; 200];
+        bytes[0] = first;
+        assert_eq!(Integers::default().read(&mut BitReader::new(&bytes)), None);
+    }
+    assert_eq!([0, 1, -1, 3, -4, i16::MAX, i16::MIN].map(width), [0, 2, 1, 3, 3, 16, 16]);
 }
