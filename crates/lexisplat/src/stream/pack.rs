@@ -243,7 +243,7 @@ mod tests {
             let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
             let model = quantised.finish(None, None, &Silent).unwrap().0.unpack().unwrap();
             let shown = fitted.then(|| others(&model));
-            let (packed, _) = quantised.finish(shown.as_deref(), &Silent).unwrap();
+            let (packed, _) = quantised.finish(shown.as_deref(), None, &Silent).unwrap();
             let mut bytes = Vec::new();
             LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
             bytes

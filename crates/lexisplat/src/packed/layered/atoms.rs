@@ -1,12 +1,14 @@
 //! The dictionary in a file: learned atoms in whole numbers, and atoms that are the same in all files.
 
+use std::f64::consts::FRAC_1_SQRT_2;
+
 use super::binary::{BitDecoder, BitEncoder, Bits, SignedOdds};
 use crate::scene::sh::{CHANNELS, ShDegree};
 
 /// Grey, red against blue, and green against both: an orthonormal basis of colours.
 const COLOURS: [[f64; CHANNELS]; CHANNELS] = [
     [0.577_350_269_189_625_7, 0.577_350_269_189_625_7, 0.577_350_269_189_625_7],
-    [0.707_106_781_186_547_6, 0.0, -0.707_106_781_186_547_6],
+    [FRAC_1_SQRT_2, 0.0, -FRAC_1_SQRT_2],
     [0.408_248_290_463_863_1, -0.816_496_580_927_726_1, 0.408_248_290_463_863_1],
 ];
 /// Degrees of coefficients, and sizes of the numbers around, that are told apart.

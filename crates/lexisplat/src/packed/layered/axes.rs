@@ -8,10 +8,8 @@ const MOST: f64 = i16::MAX as f64;
 /// The turn nearest to orthonormal `axes`, of which the third one may be reversed: a quaternion w, x, y, z of any length.
 pub(super) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
     let mut m = axes.map(|axis| axis.map(f64::from));
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
-    m[2] = cross(m[0], m[1]);
+    let [a, b, _] = m;
+    m[2] = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     // Four times the squares of the numbers of the quaternion, of which the largest is taken for its precision.
     let squares = [
         1.0 + m[0][0] + m[1][1] + m[2][2],

@@ -59,9 +59,11 @@ pub(super) trait Bits {
     /// which the first has odds too.
     fn positive(&mut self, odds: &mut [Odds], value: u32) -> u32 {
         let wanted = u32::BITS - value.max(1).leading_zeros();
-        let most = odds.len() as u32;
         let mut length = 1;
-        while length < most && self.bit(&mut odds[length as usize], length < wanted) {
+        for odds in odds.iter_mut().skip(1) {
+            if !self.bit(odds, length < wanted) {
+                break;
+            }
             length += 1;
         }
         1 << (length - 1) | self.even(length - 1, value & !(1 << (length - 1)))
@@ -110,13 +112,13 @@ impl Default for BitEncoder {
 impl BitEncoder {
     /// Moves the highest byte of `low` out.
     fn shift(&mut self) {
-        let carry = (self.low >> 32) as u8;
+        let [_, _, _, byte, carry, ..] = self.low.to_le_bytes();
         if carry == 1 || self.low < 0xff00_0000 {
             if self.started {
                 self.bytes.push(self.held.wrapping_add(carry));
             }
             self.bytes.extend(std::iter::repeat_n(0xff_u8.wrapping_add(carry), self.waiting));
-            (self.held, self.waiting, self.started) = ((self.low >> 24) as u8, 0, true);
+            (self.held, self.waiting, self.started) = (byte, 0, true);
         } else {
             self.waiting += 1;
         }
@@ -175,11 +177,6 @@ impl<'a> BitDecoder<'a> {
         self.code = self.code << 8 | u32::from(self.bytes.get(self.next).copied().unwrap_or(0));
         self.next += 1;
     }
-
-    /// Whether more was read than an encoder wrote. What it wrote ends within four bytes of what is read.
-    pub(super) fn overrun(&self) -> bool {
-        self.next > self.bytes.len() + 4
-    }
 }
 
 impl Bits for BitDecoder<'_> {
@@ -224,7 +221,7 @@ mod tests {
             let read = walk(&mut |odds, lengths, _| (decoder.signed(odds, 0), decoder.positive(lengths, 0)));
             assert_eq!(written, read);
             assert!(written.iter().zip(&values).all(|(w, v)| w.0 == *v));
-            assert!(!decoder.overrun());
+            assert!(decoder.next <= bytes.len() + 4);
         }
     }
 

@@ -84,10 +84,10 @@ impl<'a> ByteReader<'a> {
 /// Writes a whole number in groups of 7 bits, low ones first. All bytes but the last have their highest bit set.
 pub(super) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     while number >= 0x80 {
-        out.push((number & 0x7f) as u8 | 0x80);
+        out.push(number.to_le_bytes()[0] | 0x80);
         number >>= 7;
     }
-    out.push(number as u8);
+    out.push(number.to_le_bytes()[0]);
 }
 
 /// Writes the `N` high bytes of `x`, which is a [short](shortened) number.
@@ -97,10 +97,10 @@ pub(super) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
 
 /// The number nearest to `x` of which all but the `N` high bytes are zero. It is finite if `x` is.
 pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
-    let low = 8 * (4 - N) as u32;
-    let bits = x.to_bits();
-    let near = f32::from_bits((bits.wrapping_add(1 << (low - 1))) >> low << low);
-    if near.is_finite() { near } else { f32::from_bits(bits >> low << low) }
+    let low = u32::BITS - 8 * N as u32;
+    let cut = |bits: u32| f32::from_bits(bits >> low << low);
+    let near = cut(x.to_bits().wrapping_add(1 << (low - 1)));
+    if near.is_finite() { near } else { cut(x.to_bits()) }
 }
 
 #[cfg(test)]
