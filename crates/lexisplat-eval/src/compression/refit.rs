@@ -6,7 +6,7 @@
 
 use std::borrow::Borrow;
 
-use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
+use lexisplat::packed::{Appearance, AppearanceChange, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
 use lexisplat::{CompressReport, Geometry, Model, Progress, Splats};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
@@ -197,7 +197,7 @@ impl Fit {
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(super) fn alone(&self, scene: Scene<'_>, progress: &dyn Progress) -> Result<Vec<Appearance>> {
+    pub(super) fn alone(&self, scene: Scene<'_>, progress: &dyn Progress) -> Result<Vec<AppearanceChange>> {
         let cameras: Vec<Camera> = self.cameras.iter().step_by(VIEWS_ALONE).cloned().collect();
         let targets: Vec<Image> = self.targets.iter().step_by(VIEWS_ALONE).cloned().collect();
         let mut adjoint = PictureAdjoint::new(scene, &cameras)?;
@@ -217,7 +217,7 @@ impl Fit {
             ridge.push(own);
         }
         let found = solve(&mut adjoint, errors, &ridge, &diagonal, STEPS_ALONE, progress)?;
-        let change = |change: &GaussianChange| Appearance {
+        let change = |change: &GaussianChange| AppearanceChange {
             dc: std::array::from_fn(|c| change[c] / C0),
             log_opacity: change[3].clamp(-MOST_LOG_OPACITY_ALONE, MOST_LOG_OPACITY_ALONE),
         };

@@ -97,11 +97,8 @@ fn in_parts(
     Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
 }
 
-/// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md).
-const VIEWPOINTS: usize = 4;
-fn vp() -> usize {
-    std::env::var("KV").ok().and_then(|v| v.parse().ok()).unwrap_or(VIEWPOINTS)
-}
+/// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md, "Layers").
+const VIEWPOINTS: usize = 8;
 
 impl Packing {
     fn run(
@@ -152,7 +149,7 @@ impl Packing {
         };
         let packed_scene = fewer.as_ref().unwrap_or(&splats);
         let options = match self.options.viewpoints.is_empty() {
-            true => self.options.clone().with_viewpoints(views.viewpoints(vp())),
+            true => self.options.clone().with_viewpoints(views.viewpoints(VIEWPOINTS)),
             false => self.options.clone(),
         };
         let packer = Packer::new(packed_scene, &sensitivity, &options)?;

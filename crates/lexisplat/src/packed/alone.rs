@@ -3,7 +3,7 @@
 //! They grow and become more opaque by what is missing around them (docs/METHOD.md, "Layers"). Pictures may say more, and
 //! their colours too.
 
-use super::appearance::Appearance;
+use super::appearance::AppearanceChange;
 use super::canonical::MortonKey;
 use super::layered::{CHANGES, KINDS};
 use super::parameters::Parameters;
@@ -12,7 +12,7 @@ use crate::support::maths::log_sigmoid;
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Steps of the changes: of logarithms of scales and opacities, and of base colours as SH coefficients.
-pub(super) const STEPS: [f64; KINDS] = [0.4, 0.5, 0.4];
+pub(super) const STEPS: [f64; KINDS] = [0.4, 0.5, 0.6];
 /// Most steps by which scales grow.
 const MOST_GROWTH: f64 = 2.0;
 /// Growth of the logarithm of scales by what is missing, GROWTH ln(1 + MISSING x), where x is what of opacity times area is
@@ -55,10 +55,9 @@ impl Alone {
             for i in start..end {
                 let x = missing[i];
                 let rare = libm::log(probability(layer, i).max(f64::MIN_POSITIVE));
-                let grows =
-                    knob("KG", GROWTH) * libm::log1p(knob("KM", MISSING) * x) + knob("KR", RARE) * rare;
-                alone.growth.push(steps(grows.clamp(0.0, knob("KMG", MOST_GROWTH) * STEPS[0]), STEPS[0]));
-                alone.opacity.push(steps(knob("KO", OPACITY) * libm::log1p(x), STEPS[1]));
+                let grows = GROWTH * libm::log1p(MISSING * x) + RARE * rare;
+                alone.growth.push(steps(grows.clamp(0.0, MOST_GROWTH * STEPS[0]), STEPS[0]));
+                alone.opacity.push(steps(OPACITY * libm::log1p(x), STEPS[1]));
             }
             start = end;
         }
@@ -70,19 +69,18 @@ impl Alone {
         layer < self.layers
     }
 
-    /// The steps of Gaussian `i` of the first layer if pictures say nothing, or if they ask for `change`: the change of the
-    /// logarithm of its opacity and of its base colour.
+    /// The steps of Gaussian `i` in the order of the file, if pictures say nothing or if they ask for `change`.
     pub(super) fn steps(
         &self,
         i: usize,
-        change: Option<&Appearance>,
+        change: Option<&AppearanceChange>,
         parameters: &Parameters,
     ) -> [i32; CHANGES] {
         let growth = self.growth.get(i).copied().unwrap_or(0);
-        let Some(Appearance { dc, log_opacity }) = change else {
+        let Some(AppearanceChange { dc, log_opacity }) = change else {
             return [growth, self.opacity.get(i).copied().unwrap_or(0), 0, 0, 0];
         };
-        let [a, b, c] = parameters.dc_turned(*dc).map(|d| steps(f64::from(d), knob("KDC", STEPS[2])));
+        let [a, b, c] = parameters.dc_turned(*dc).map(|d| steps(f64::from(d), STEPS[2]));
         [growth, steps(f64::from(*log_opacity), STEPS[1]), a, b, c]
     }
 }
@@ -128,8 +126,4 @@ fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
         sums[owner] += mass(j);
     }
     (0..ours.len()).map(|i| sums[i] / mass(i).max(f64::MIN_POSITIVE)).collect()
-}
-
-pub(super) fn knob(name: &str, default: f64) -> f64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
 }

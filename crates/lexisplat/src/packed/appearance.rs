@@ -17,6 +17,23 @@ pub struct Appearance {
     pub log_opacity: f32,
 }
 
+/// By how much the look of a Gaussian changes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct AppearanceChange {
+    /// SH coefficients of degree 0.
+    pub dc: [f32; 3],
+    /// Natural logarithm of the opacity after the sigmoid.
+    pub log_opacity: f32,
+}
+
+impl AppearanceChange {
+    /// Refuses values that are not finite.
+    pub(super) fn check(&self) -> Result<()> {
+        let opacity = std::slice::from_ref(&self.log_opacity);
+        all_finite([("changes of base colours", self.dc.as_slice()), ("changes of opacities", opacity)])
+    }
+}
+
 impl Appearance {
     /// That of Gaussian `i` of `geometry`. The logarithm of its opacity is not below -100.
     ///

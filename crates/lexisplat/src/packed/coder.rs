@@ -2,7 +2,7 @@
 
 use half::f16;
 
-use super::appearance::Appearance;
+use super::appearance::{Appearance, AppearanceChange};
 use super::atoms::{MAX_ATOM_BITS, resident};
 use super::canonical::{MortonKey, canonical};
 use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
@@ -55,7 +55,7 @@ pub(super) struct View<'a> {
     /// What each shows, in this order, instead of the base colours and opacities of `splats`.
     pub(super) appearances: Option<&'a [Appearance]>,
     /// By how much each of the first layer is to change while the second is not there, apart from its growth.
-    pub(super) changes: Option<&'a [Appearance]>,
+    pub(super) changes: Option<&'a [AppearanceChange]>,
 }
 
 impl<'a> View<'a> {

@@ -81,7 +81,7 @@ impl Decoder {
     }
 
     /// The layers, chunks and ranges of a file of version 3.
-    pub(crate) fn index(&self) -> Option<&Index> {
+    pub(super) fn index(&self) -> Option<&Index> {
         match &self.kind {
             Kind::Flat(_) => None,
             Kind::Layered(decoder) => Some(decoder.index()),

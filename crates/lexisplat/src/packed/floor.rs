@@ -129,7 +129,8 @@ mod tests {
     fn packed(splats: &Splats, sensitivity: &Sensitivity, step: f64, limited: bool) -> Splats {
         let options = PackOptions::default().with_keep_order(true);
         let packer = Packer::new(splats, sensitivity, &options).unwrap();
-        let (packed, _) = packer.quantise(step, limited, &Silent).unwrap().finish(None, None, &Silent).unwrap();
+        let (packed, _) =
+            packer.quantise(step, limited, &Silent).unwrap().finish(None, None, &Silent).unwrap();
         packed.unpack().unwrap().into_splats()
     }
 

@@ -49,7 +49,7 @@ impl Layering {
             let powers: Vec<f64> = energies.map(power).collect();
             // The probability that a Gaussian is in no layer so far.
             let mut left = vec![1.0; powers.len()];
-            for share in shares() {
+            for share in SHARES {
                 let factor = factor(share, &powers, &left);
                 left.iter_mut()
                     .zip(&powers)
@@ -58,8 +58,8 @@ impl Layering {
             }
         }
         let count = factors.len();
-        let last = 1.0 - shares().iter().take(count).sum::<f64>();
-        let shares = shares().into_iter().take(count).chain([last]);
+        let last = 1.0 - SHARES.iter().sum::<f64>();
+        let shares = SHARES.into_iter().chain([last]);
         let size = |share: f64| {
             let count = (share * gaussians as f64) as usize;
             (count / CHUNKS).next_power_of_two().clamp(LEAST_CHUNK, MOST_CHUNK)
@@ -122,7 +122,7 @@ impl Layering {
     /// nonzeros. `energies` are the changes of pictures without each chunk.
     pub(super) fn order(&self, chunks: &[Chunk], energies: &[f64], parts: usize) -> Vec<Place> {
         let forms = self.forms(parts);
-        let mut order = Order { chunks, parts, order: Vec::new(), finer: vec![0; chunks.len()] };
+        let mut order = Order { parts, order: Vec::new(), finer: vec![0; chunks.len()] };
         let of = |layer: usize| (0..chunks.len()).filter(move |&c| chunks[c].layer == layer);
         // The first layer at once, one kind of range after the other, and of other layers chunk after chunk those that show
         // most for their bytes first.
@@ -168,15 +168,14 @@ impl Layering {
 }
 
 /// An order of ranges that is being made.
-struct Order<'c> {
-    chunks: &'c [Chunk],
+struct Order {
     parts: usize,
     order: Vec<Place>,
     /// Levels of refinement of each chunk so far.
     finer: Vec<usize>,
 }
 
-impl Order<'_> {
+impl Order {
     fn put(&mut self, chunk: usize, kind: usize) {
         self.order.push(Place { chunk: chunk as u32, kind: kind as u8 });
     }
@@ -245,8 +244,4 @@ fn factor(share: f64, powers: &[f64], left: &[f64]) -> f64 {
         factor /= found;
     }
     factor
-}
-
-fn shares() -> [f64; 1] {
-    [crate::packed::alone::knob("KS", SHARES[0])]
 }

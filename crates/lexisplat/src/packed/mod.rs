@@ -47,7 +47,7 @@ pub(crate) use removal::{changes_without, is_worth_its_bits};
 pub(crate) use scene::{Coding, Flat, SpilledPacked};
 pub(crate) use stream::BitCounts;
 
-pub use appearance::Appearance;
+pub use appearance::{Appearance, AppearanceChange};
 pub use pack::{PackOptions, Packer};
 pub use parts::Refit;
 pub use preset::Preset;

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::alone::Alone;
-use super::appearance::Appearance;
+use super::appearance::{Appearance, AppearanceChange};
 use super::canonical::MortonKey;
 use super::codebook::Codes;
 use super::coder::{ChunkCoder, View, too_large};
@@ -164,11 +164,12 @@ impl<'a> Quantised<'a> {
     pub fn finish(
         &self,
         appearances: Option<&[Appearance]>,
-        changes: Option<&[Appearance]>,
+        changes: Option<&[AppearanceChange]>,
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
         let view = View { changes, ..self.view(appearances)? };
+        changes.unwrap_or_default().iter().try_for_each(AppearanceChange::check)?;
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
         // symbols in memory would take more than the scene's geometry.

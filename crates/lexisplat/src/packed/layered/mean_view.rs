@@ -36,7 +36,8 @@ impl MeanView {
         if points.is_empty() {
             return Self::default();
         }
-        let points: Vec<Vec3> = points.iter().take(MAX_POINTS).map(|point| point.map(shortened::<3>)).collect();
+        let points: Vec<Vec3> =
+            points.iter().take(MAX_POINTS).map(|point| point.map(shortened::<3>)).collect();
         let middle: Vec3 =
             std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
         let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
