@@ -33,7 +33,7 @@ fn the_cheapest_gaussians_there_are_can_be_read() {
     let splats = copies(&sample(1, 43, 0), 100_000);
     let sensitivity = Sensitivity::heuristic(&splats.geometry);
     let packer = Packer::new(&splats, &sensitivity, &PackOptions::default()).unwrap();
-    let (packed, _) = packer.quantise(1e300, false, &Silent).unwrap().finish(None, &Silent).unwrap();
+    let (packed, _) = packer.quantise(1e300, false, &Silent).unwrap().finish(None, None, &Silent).unwrap();
     let bytes = bytes(&packed);
     assert!(bytes.len() < 50_000, "{}", bytes.len());
     let model = lexi::read_bytes("copies.lexi", &bytes, &Limits::default()).unwrap();
