@@ -1,7 +1,7 @@
 //! Steps and predictors fitted to a scene.
 
 use super::canonical::{Canonical, Grid, MortonKey, canonical};
-use super::layered::{rounded_axes, shortened};
+use super::layered::rounded_axes;
 use super::neighbours::{AVERAGES, Neighbours};
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::scene::sensitivity::Sensitivity;
@@ -157,7 +157,7 @@ fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     for (row, axis) in out.iter_mut().zip(&axes) {
         *row = std::array::from_fn(|c| single(axis[c]));
     }
-    (mean.map(shortened::<2>), rounded_axes(&out))
+    (mean, rounded_axes(&out))
 }
 
 /// Fits the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of

@@ -96,7 +96,7 @@ impl<'a> Checked<'a> {
             return Err(malformed("metadata 'version' is 0".to_owned()));
         }
         let (stored, expected) = match version {
-            PACKED_VERSION => {
+            PACKED_VERSION if checked.has(tensor::HEAD) => {
                 let (sum, head) = checked.sealed_head()?;
                 let mut crc = crc32fast::Hasher::new_with_initial_len(header_checksum, data_start as u64);
                 crc.update(head);
@@ -113,7 +113,7 @@ impl<'a> Checked<'a> {
 
     fn verify_tensors(&self) -> Result<()> {
         // The ranges of packed data have checksums of their own, so that a part of it can be checked.
-        let (layered, elsewhere): (bool, &[&str]) = match self.is_layered() {
+        let (layered, elsewhere): (bool, &[&str]) = match self.is_layered() && self.has(tensor::HEAD) {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
         };

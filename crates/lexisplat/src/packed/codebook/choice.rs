@@ -4,6 +4,7 @@ use super::costs::Costs;
 use super::{Codebook, PRICE, StopRule, first_atoms, learn};
 use crate::packed::layered::{WholeAtoms, axes};
 use crate::scene::sh::ShDegree;
+use crate::sparse::learn::unit_axis;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
@@ -57,6 +58,11 @@ pub(in crate::packed) fn choose(
         let fixed = fixed.len() / dim;
         let (learned, costs) = learn(dim, &scaled, classes, first, fixed, StopRule::Balanced, progress)?;
         let usual = bits_of(&scaled, &learned, &costs);
+        if !with_axes && Codebook::new(dim, learned.clone(), costs.clone()).uses_nothing(&scaled, classes) {
+            // A dictionary has at least one atom.
+            let atoms = WholeAtoms::new(degree, &unit_axis(dim, 0).collect::<Vec<f32>>(), LEAST_BITS, false);
+            return Ok(Choice { atoms, costs: Costs::initial(1, dim), step });
+        }
         let own = learned.get(..learned.len() - fixed * dim).unwrap_or_default();
         let fewest = if own.is_empty() || !with_axes {
             usual

@@ -122,6 +122,11 @@ impl Codebook {
         all
     }
 
+    /// Whether the codes of all rows are empty.
+    fn uses_nothing(&self, rows: &[f32], classes: &[u8]) -> bool {
+        self.encode(rows, classes, StopRule::Balanced).pairs.is_empty()
+    }
+
     /// The squared errors of the codes of all rows, and their bits.
     fn spent(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
         let codes = self.encode(rows, classes, StopRule::Balanced);

@@ -96,7 +96,7 @@ pub(super) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
 }
 
 /// The number nearest to `x` of which all but the `N` high bytes are zero. It is finite if `x` is.
-pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
+pub(super) fn shortened<const N: usize>(x: f32) -> f32 {
     let low = u32::BITS - 8 * N as u32;
     let cut = |bits: u32| f32::from_bits(bits >> low << low);
     let near = cut(x.to_bits().wrapping_add(1 << (low - 1)));

@@ -135,8 +135,7 @@ impl Head {
         self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
         let f = &self.frame;
         let step = if is_promised { self.promised } else { self.value_step };
-        out.extend([&f.origin[..], &[f.cell, step]].concat().iter().flat_map(|x| x.to_le_bytes()));
-        f.dc_mean.iter().for_each(|&x| put_short::<2>(&mut out, x));
+        out.extend([&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()));
         out.extend(turn_of(&f.dc_axes).iter().flat_map(|x| x.to_le_bytes()));
         let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
         softening.into_iter().chain(points.as_flattened()).for_each(|&x| put_short::<3>(&mut out, x));
@@ -187,7 +186,7 @@ impl Head {
         }
         let (origin, cell, step) = (from.f32s()?, from.f32()?, from.f32()?);
         let (value_step, promised) = if is_promised { (0.0, step) } else { (step, 0.0) };
-        let dc_mean = [from.short::<2>()?, from.short::<2>()?, from.short::<2>()?];
+        let dc_mean = from.f32s()?;
         let turn: [i16; 4] = from.i16s()?;
         let dc_axes = axes_of(turn).filter(|axes| turn_of(axes) == turn)?;
         let mut mean_view = MeanView::default();

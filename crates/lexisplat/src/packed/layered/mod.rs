@@ -33,7 +33,6 @@ mod walk;
 
 pub(super) use atoms::{WholeAtoms, axes};
 pub(super) use axes::rounded as rounded_axes;
-pub(super) use bytes::shortened;
 pub(super) use chunk::{CodedChunk, Form, LayerForm, lanes};
 pub(super) use decoder::LayeredDecoder;
 pub(super) use head::Head;
