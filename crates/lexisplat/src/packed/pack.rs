@@ -44,7 +44,7 @@ pub struct PackOptions {
     pub keep_all: bool,
     /// Seed of the learning sample.
     pub seed: u64,
-    /// Up to 16 points that the scene is seen from. Base colours are then those that are seen from there on average, so
+    /// Up to 15 points that the scene is seen from. Base colours are then those that are seen from there on average, so
     /// that they are right without SH-rest too.
     pub viewpoints: Vec<[f32; 3]>,
     /// Write one layer. By default scenes of 8,000 Gaussians and more have two, of which the first draws the whole scene.

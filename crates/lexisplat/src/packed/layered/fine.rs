@@ -84,6 +84,7 @@ mod tests {
         let counts = wanted.map(|lanes| lanes.map(|w| coarsened(w, factor(levels))));
         let zeros = [0; LANES];
         Group {
+            number: [0; LANES],
             cell: [zeros; 3],
             colour: each_of(codes, 1).map(|c| c % 16),
             shape: [0; LANES],
@@ -98,6 +99,7 @@ mod tests {
             fineness: of(codes, 2).map(|f: Lanes<u32>| f.map(|f| f % 24)),
             wanted,
             wanted_rotation,
+            interim: Default::default(),
         }
     }
 

@@ -135,7 +135,9 @@ impl Head {
         self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
         let f = &self.frame;
         let step = if is_promised { self.promised } else { self.value_step };
-        out.extend([&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()));
+        out.extend(
+            [&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()),
+        );
         out.extend(turn_of(&f.dc_axes).iter().flat_map(|x| x.to_le_bytes()));
         let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
         softening.into_iter().chain(points.as_flattened()).for_each(|&x| put_short::<3>(&mut out, x));

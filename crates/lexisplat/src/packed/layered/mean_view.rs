@@ -13,7 +13,7 @@ use crate::support::maths::{Vec3, at_share};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Most points of view.
-pub(super) const MAX_POINTS: usize = 16;
+pub(super) const MAX_POINTS: usize = 15;
 /// Longest row of one channel.
 pub(super) const MOST: usize = MAX_COEFFICIENTS - 1;
 

@@ -7,21 +7,22 @@ use proptest::prelude::*;
 use super::bytes::ByteReader;
 use super::*;
 use crate::packed::parameters::Parameters;
+use crate::scene::sh::ShDegree;
 
 /// Most Gaussians of a chunk.
 const MOST: usize = 1 << 16;
 
 /// Chunks by layer and number of Gaussians, with ranges long enough, in an order that the index takes.
-fn indexes(parts: usize) -> impl Strategy<Value = Index> {
+fn indexes(parts: usize, interim: bool) -> impl Strategy<Value = Index> {
     let levels = prop::collection::vec(0_u8..=2, 1..4);
     let gaussians = prop_oneof![1..300_usize, Just(1), Just(MOST)];
     let bound = -1e6..1e6_f32;
     let chunk = (any::<u8>(), gaussians, any::<u64>(), prop::array::uniform6(bound), any::<u32>());
     (levels, prop::collection::vec(chunk, 0..6), any::<u64>()).prop_map(move |(levels, chunks, seed)| {
-        let mut index = Index { levels: levels.clone(), ..Index::default() };
+        let mut index = Index { layers: layer_forms(&levels, parts, interim), ..Index::default() };
         for (layer, gaussians, cell, [a, b, c, d, e, f], number) in chunks {
             let layer = usize::from(layer) % levels.len();
-            let count = 1 + usize::from(levels[layer]) + parts;
+            let count = index.layer(layer).ranges();
             let range = |k: u32| {
                 let length = if k == 0 { (3 * gaussians as u32).div_ceil(8) } else { number % 100 };
                 Range { start: 0, length, checksum: number.wrapping_mul(k), integers: number ^ k }
@@ -52,18 +53,21 @@ fn written(index: &Index) -> Vec<u8> {
 }
 
 /// The index that `bytes` are, whole.
-fn read(bytes: &[u8], parts: usize) -> Option<Index> {
+fn read(bytes: &[u8], parts: usize, interim: bool) -> Option<Index> {
     let mut from = ByteReader(bytes);
-    Index::read(&mut from, parts).filter(|_| from.0.is_empty())
+    Index::read(&mut from, parts, interim).filter(|_| from.0.is_empty())
 }
 
 proptest! {
     #[test]
-    fn indexes_come_back((parts, index) in (0_usize..=3).prop_flat_map(|parts| (Just(parts), indexes(parts)))) {
+    fn indexes_come_back(
+        (parts, interim, index) in (0_usize..=3, any::<bool>())
+            .prop_flat_map(|(parts, interim)| (Just(parts), Just(interim), indexes(parts, interim))),
+    ) {
         let bytes = written(&index);
-        prop_assert!(read(&bytes, parts).as_ref() == Some(&index));
+        prop_assert!(read(&bytes, parts, interim).as_ref() == Some(&index));
         for length in 0..bytes.len() {
-            prop_assert!(read(&bytes[..length], parts).is_none(), "{length} of {}", bytes.len());
+            prop_assert!(read(&bytes[..length], parts, interim).is_none(), "{length} of {}", bytes.len());
         }
         let gaussians: usize = index.chunks.iter().map(|chunk| chunk.gaussians).sum();
         prop_assert_eq!(index.gaussians(), gaussians);
@@ -84,11 +88,11 @@ proptest! {
 
     /// What is taken is written again as it was, so nothing of it is ignored.
     #[test]
-    fn changed_indexes_are_others_or_refused(index in indexes(2), at in any::<prop::sample::Index>(), bits in 1..=u8::MAX) {
+    fn changed_indexes_are_others_or_refused(index in indexes(2, true), at in any::<prop::sample::Index>(), bits in 1..=u8::MAX) {
         let mut bytes = written(&index);
         let at = at.index(bytes.len());
         bytes[at] ^= bits;
-        if let Some(other) = read(&bytes, 2) {
+        if let Some(other) = read(&bytes, 2, true) {
             prop_assert!(other != index);
             prop_assert_eq!(written(&other), bytes);
         }
@@ -101,35 +105,37 @@ fn two_layers() -> Index {
         let range = Range { length: (3 * gaussians as u32).div_ceil(8), ..Range::default() };
         Chunk { layer, gaussians, ranges: vec![range; kinds], ..Chunk::default() }
     };
-    let chunks = vec![chunk(0, 20, 5), chunk(0, 9, 5), chunk(1, 1000, 4)];
+    let chunks = vec![chunk(0, 20, 6), chunk(0, 9, 6), chunk(1, 1000, 4)];
     let place = |chunk: u32, kinds: u8| (0..kinds).map(move |kind| Place { chunk, kind });
-    let order = place(0, 5).chain(place(1, 5)).chain(place(2, 4)).collect();
-    let mut index = Index { levels: vec![2, 1], chunks, order };
+    let order = place(0, 6).chain(place(2, 4)).chain(place(1, 6)).collect();
+    let mut index = Index { layers: layer_forms(&[2, 1], 2, true), chunks, order };
     index.place().unwrap();
     index
 }
 
 #[test]
 fn indexes_that_cannot_be_are_refused() {
-    assert_eq!(read(&written(&two_layers()), 2), Some(two_layers()));
-    assert!(read(&written(&two_layers()), 1).is_none() && read(&written(&two_layers()), 3).is_none());
+    assert_eq!(read(&written(&two_layers()), 2, true), Some(two_layers()));
+    for (parts, interim) in [(1, true), (3, true), (2, false)] {
+        assert!(read(&written(&two_layers()), parts, interim).is_none(), "{parts} {interim}");
+    }
     let changes: [fn(&mut Index); 11] = [
-        |i| i.levels[0] = 3,
-        |i| i.levels.extend([0; 7]),
-        |i| i.levels.truncate(1),
+        |i| i.layers[0].levels = 3,
+        |i| i.layers.extend([LayerForm::default(); 7]),
+        |i| i.layers.truncate(1),
         |i| i.chunks[0].gaussians = 0,
         |i| i.chunks[2].gaussians = MOST + 1,
         |i| i.chunks[0].layer = 1,
         |i| i.chunks[1].ranges[0].length = 3,
         |i| i.order.swap(0, 1),
         |i| i.order[1] = i.order[2],
-        |i| i.order[1].kind = 5,
+        |i| i.order[1].kind = 6,
         |i| i.order[1].chunk = 3,
     ];
     for (number, change) in changes.into_iter().enumerate() {
         let mut index = two_layers();
         change(&mut index);
-        assert!(read(&written(&index), 2).is_none(), "{number}");
+        assert!(read(&written(&index), 2, true).is_none(), "{number}");
     }
 }
 
@@ -152,7 +158,12 @@ fn head(dim: usize, points: usize, index: Index) -> Head {
         least: if dim == 0 { vec![] } else { vec![6, 1] },
     };
     let points: Vec<[f32; 3]> = (0..points).map(|k| [k as f32, 1.5, -0.25 * k as f32]).collect();
-    let mut head = Head::new(&p, 77.0, rest, if dim == 0 { 0 } else { 9 }, MeanView::new(&points));
+    let degree = (0..=4).filter_map(|l| ShDegree::new(l).ok()).find(|degree| degree.rest() == dim).unwrap();
+    let atoms = WholeAtoms::new(degree, &vec![0.5; 300 * dim], 4, false);
+    let mut head = Head::new(&p, 77.0, rest, &atoms, MeanView::new(&points));
+    if !index.chunks.is_empty() && dim > 0 {
+        head = head.with_interim([0.4, 0.5, 0.6]);
+    }
     head.tables = vec![3, 1, 4, 1, 5, 9, 2, 6];
     head.dictionary = if dim == 0 { vec![] } else { vec![2, 7, 1, 8] };
     head.index = index;
@@ -204,8 +215,7 @@ fn changed_heads_are_others_or_refused() {
 
 #[test]
 fn heads_with_numbers_no_decoder_takes_are_refused() {
-    let changes: [fn(&mut Head); 14] = [
-        |h| h.atom_bits = 15,
+    let changes: [fn(&mut Head); 15] = [
         |h| h.dc_exponent = 101,
         |h| h.rest.atoms = 0,
         |h| h.rest.atoms = 1025,
@@ -218,7 +228,9 @@ fn heads_with_numbers_no_decoder_takes_are_refused() {
         |h| h.value_step = 0.0,
         |h| h.promised = -1.0,
         |h| h.mean_view.softening = 0.0,
-        |h| h.mean_view.points = vec![[0.0; 3]; 9],
+        |h| h.mean_view.points = vec![[0.0; 3]; 16],
+        |h| h.interim = Some([1, 0, 1]),
+        |h| h.interim = Some([1, 1, 1 << 27]),
     ];
     for (number, change) in changes.into_iter().enumerate() {
         let mut head = head(9, 8, two_layers());

@@ -1,6 +1,7 @@
 //! Chunks of which ranges are missing, and checksums of integers.
 
 use super::*;
+use crate::packed::layered::LayerForm;
 use crate::packed::place::places;
 use crate::packed::scene::Coding;
 use crate::packed::{PackOptions, Packed, Packer};
@@ -22,7 +23,7 @@ fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
 
 fn decoder(packed: &Packed) -> LayeredDecoder {
     let Coding::Layered(bytes) = &packed.head().coding else { panic!("another version") };
-    LayeredDecoder::new(packed.head(), bytes, packed.data().len()).unwrap()
+    LayeredDecoder::new(packed.head(), bytes).unwrap()
 }
 
 /// A decoded chunk.
@@ -36,14 +37,15 @@ struct Decoded {
 /// Decodes chunk `c` of the ranges that `there` says.
 fn decoded(of: &LayeredDecoder, packed: &Packed, c: usize, there: impl Fn(usize) -> bool) -> Option<Decoded> {
     let chunk = &of.head.index.chunks[c];
-    let levels = of.head.index.levels[chunk.layer].into();
+    let form = of.head.index.layer(chunk.layer);
     let mut ranges = of.checked(packed.data(), c, chunk).unwrap();
     ranges.iter_mut().enumerate().for_each(|(k, range)| *range = range.filter(|_| there(k)));
     let (mut geometry, mut counts) = (Geometry::zeros(chunk.gaussians), vec![0; chunk.gaussians]);
     let spans = std::slice::from_ref(&(0..chunk.gaussians)).to_vec();
     let mut place = places(&mut geometry, &mut counts, &spans).pop().unwrap();
     let want = Want { sums: true, bits: false };
-    let (piece, sums) = of.unpacker.chunk(levels, &ranges, want, &mut place)?;
+    let budget = MemoryBudget::new(&packed.head().limits, "test", u64::MAX);
+    let (piece, sums) = of.unpacker.chunk(form, &[], &ranges, want, &mut place, &budget).ok()?;
     Some(Decoded { geometry, counts, piece, sums })
 }
 
@@ -65,10 +67,9 @@ fn assert_finite(d: &Decoded) {
 fn chunks_are_decoded_from_the_ranges_that_are_there() {
     let packed = packed(Some(1e6), Vec::new());
     let of = decoder(&packed);
-    assert_eq!(of.head.index.levels, [2, 1]);
+    assert_eq!(of.head.index.layers.iter().map(|form| form.levels).collect::<Vec<_>>(), [2, 1]);
     for (c, chunk) in of.head.index.chunks.iter().enumerate() {
-        let levels = usize::from(of.head.index.levels[chunk.layer]);
-        let parts = chunk.ranges.len() - 1 - levels;
+        let LayerForm { levels, parts, .. } = of.head.index.layer(chunk.layer);
         let with = |finer: usize, rest: usize| {
             let there = move |k: usize| {
                 k == 0 || (1..=finer).contains(&k) || (1 + levels..1 + levels + rest).contains(&k)
@@ -139,7 +140,7 @@ fn base_colours_are_seen_on_average() {
     let (of, from) = (decoder(&plain), decoder(&seen));
     for c in 0..from.head.index.chunks.len() {
         let colours = |of: &LayeredDecoder, packed: &Packed, codes: bool| {
-            let levels: usize = of.head.index.levels[of.head.index.chunks[c].layer].into();
+            let levels = of.head.index.layer(of.head.index.chunks[c].layer).levels;
             decoded(of, packed, c, |k| codes || k <= levels).unwrap()
         };
         let (whole, bare) = (colours(&from, &seen, true), colours(&from, &seen, false));
