@@ -82,6 +82,7 @@ impl LayeredDecoder {
         let mut ranges = self.checked(data, c, chunk)?;
         let alone = index.alone(chunk.layer, |range| range.end() <= data.len() as u64);
         if alone.is_empty()
+            && !count_bits
             && let Some(interim) = ranges.get_mut(form.interim_range())
         {
             *interim = None;

@@ -9,7 +9,7 @@ use super::steering::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::target::Target;
-use super::values::rotations;
+use super::values::{MAX_LOG_OPACITY, rotations};
 use crate::packed::morton;
 use crate::packed::parameters::{LAST_CLASS, TARGETS};
 
@@ -157,8 +157,12 @@ impl<'a> Walk<'a> {
             if targets.is_some() {
                 for l in (0..LANES).filter(|&l| has(set, l)) {
                     let wanted = target(l).map_or(0, |target| target.values[t]);
-                    group.wanted[t][l] =
-                        nearest((f64::from(wanted) - f64::from(predicted[l])) / f64::from(step[l]));
+                    let steps = |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
+                    // What is opaque stays so: values above the largest count as that.
+                    group.wanted[t][l] = match t == OPACITY && wanted >= MAX_LOG_OPACITY {
+                        true => nearest(steps(MAX_LOG_OPACITY).ceil()),
+                        false => nearest(steps(wanted)),
+                    };
                 }
             }
             let wanted = group.wanted[t];
