@@ -16,6 +16,7 @@ use crate::sparse::tally::CompressReport;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
+use crate::support::maths::at_share;
 use crate::support::progress::Progress;
 
 /// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
@@ -178,10 +179,16 @@ impl<S: Borrow<Splats>> Packer<S> {
     }
 }
 
-/// The largest coordinate of base colours.
+/// Share of the Gaussians whose base colours the unit of base colours is for. A few wild ones must not make all others coarse.
+const USUAL_DC: f64 = 0.999;
+
+/// The largest coordinate of usual base colours.
 pub(super) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {
-    let coordinates = dc.iter().flat_map(|&dc| parameters.dc_coordinates(dc));
-    coordinates.fold(0.0, |most, x| f64::from(x.abs()).max(most))
+    let largest =
+        |&dc: &[f32; 3]| parameters.dc_coordinates(dc).into_iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+    let mut all: Vec<f32> = dc.iter().map(largest).collect();
+    all.sort_by(f32::total_cmp);
+    f64::from(at_share(&all, USUAL_DC))
 }
 
 /// [`Packer::step_for`] of a scene of `gaussians` Gaussians.

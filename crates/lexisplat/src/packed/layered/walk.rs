@@ -157,7 +157,8 @@ impl<'a> Walk<'a> {
             if targets.is_some() {
                 for l in (0..LANES).filter(|&l| has(set, l)) {
                     let wanted = target(l).map_or(0, |target| target.values[t]);
-                    let steps = |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
+                    let steps =
+                        |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
                     // What is opaque stays so: values above the largest count as that.
                     group.wanted[t][l] = match t == OPACITY && wanted >= MAX_LOG_OPACITY {
                         true => nearest(steps(MAX_LOG_OPACITY).ceil()),

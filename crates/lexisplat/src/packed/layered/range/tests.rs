@@ -73,7 +73,8 @@ impl<'a> Naive<'a> {
         let mut out = Vec::new();
         for l in 0..lanes {
             let length = lengths.get(width * l..width * (l + 1));
-            let number = |bytes: &[u8]| bytes.iter().rev().fold(0, |sum, byte| 256 * sum + usize::from(*byte));
+            let number =
+                |bytes: &[u8]| bytes.iter().rev().fold(0, |sum, byte| 256 * sum + usize::from(*byte));
             let length = length.map_or(words.len(), number);
             let mut own: Vec<u64> = words.drain(..length).collect();
             let state = own.remove(0) * 65_536 + own.remove(0);
