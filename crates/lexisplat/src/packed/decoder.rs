@@ -3,7 +3,9 @@
 use std::ops::Range;
 
 use super::flat::{self, FlatDecoder};
-use super::layered::{self, Index, LayeredDecoder};
+use super::held::{Data, Wish};
+use super::layered::{self, Index, LayeredDecoder, Range as DataRange};
+use super::outline::Outline;
 use super::place::{Piece, Place, indices, places};
 use super::scene::{Coding, PackedHead};
 use super::stream::{BitCounts, StreamBits};
@@ -20,6 +22,7 @@ pub(crate) struct Decoder {
     /// The chunks that are there, and the Gaussians of each.
     chunks: Vec<usize>,
     spans: Vec<Range<usize>>,
+    wish: Wish,
     kind: Kind,
 }
 
@@ -32,44 +35,65 @@ enum Kind {
 impl Decoder {
     /// Reads what all chunks need from `head`, and in version 2 from the start of `data`.
     pub(crate) fn new(head: &PackedHead, data: &[u8]) -> Result<Self> {
-        head.limits.check_gaussians(&head.file, head.gaussians as u64)?;
-        head.limits.check_atoms(&head.file, head.atoms as u64)?;
-        let (kind, spans) = match &head.coding {
+        match &head.coding {
             Coding::Flat(flat) => {
+                check(head, head.gaussians)?;
                 let decoder = FlatDecoder::new(head, flat, data)?;
                 let spans = decoder.spans();
-                (Kind::Flat(Box::new(decoder)), spans)
+                let (file, chunks) = (head.file.clone(), (0..spans.len()).collect());
+                Ok(Self { file, chunks, spans, wish: Wish::default(), kind: Kind::Flat(Box::new(decoder)) })
             }
-            Coding::Layered(bytes) => {
-                let decoder = LayeredDecoder::new(head, bytes)?;
-                if decoder.index().data_bytes() != data.len() as u64 {
-                    let text = "packed ranges do not cover the data: no encoder writes it";
-                    return Err(Error::malformed(&head.file, text));
-                }
-                let chunks = &decoder.index().chunks;
-                let spans = chunks.iter().map(|chunk| chunk.first..chunk.first + chunk.gaussians).collect();
-                (Kind::Layered(Box::new(decoder)), spans)
-            }
-        };
-        Ok(Self { file: head.file.clone(), chunks: (0..spans.len()).collect(), spans, kind })
+            Coding::Layered(bytes) => Self::layered(head, bytes, data.len() as u64, |_| true),
+        }
     }
 
-    /// Reads what all chunks need from `head`, for data of which only a first part, `data`, is there. Chunks of which nothing
-    /// is there are left out.
-    pub(crate) fn of_prefix(head: &PackedHead, data: &[u8]) -> Result<Self> {
-        let Coding::Layered(bytes) = &head.coding else { return Self::new(head, data) };
-        head.limits.check_gaussians(&head.file, head.gaussians as u64)?;
-        head.limits.check_atoms(&head.file, head.atoms as u64)?;
+    /// Reads what all chunks need from `head`, for data of `whole` bytes of which only a first part, `data`, is there. Chunks
+    /// of which nothing is there are left out. `None` for version 2.
+    pub(crate) fn of_prefix(head: &PackedHead, data: &[u8], whole: u64) -> Result<Option<Self>> {
+        let Coding::Layered(bytes) = &head.coding else { return Ok(None) };
+        Self::layered(head, bytes, whole, |range| range.end() <= data.len() as u64).map(Some)
+    }
+
+    /// Reads what all chunks need from `head`, for data of `whole` bytes of which any ranges will be there. `None` for
+    /// version 2.
+    pub(crate) fn of_ranges(head: &PackedHead, whole: u64) -> Result<Option<Self>> {
+        let Coding::Layered(bytes) = &head.coding else { return Ok(None) };
+        Self::layered(head, bytes, whole, |_| true).map(Some)
+    }
+
+    /// The decoder of the chunks whose base is `there`, of data of `whole` bytes.
+    fn layered(
+        head: &PackedHead,
+        bytes: &[u8],
+        whole: u64,
+        there: impl Fn(&DataRange) -> bool,
+    ) -> Result<Self> {
         let decoder = LayeredDecoder::new(head, bytes)?;
+        if decoder.index().data_bytes() != whole {
+            let text = "packed ranges do not cover the data: no encoder writes it";
+            return Err(Error::malformed(&head.file, text));
+        }
         let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);
         for (c, chunk) in decoder.index().chunks.iter().enumerate() {
-            if chunk.ranges.first().is_some_and(|base| base.end() <= data.len() as u64) {
+            if chunk.ranges.first().is_some_and(&there) {
                 chunks.push(c);
                 spans.push(first..first + chunk.gaussians);
                 first += chunk.gaussians;
             }
         }
-        Ok(Self { file: head.file.clone(), chunks, spans, kind: Kind::Layered(Box::new(decoder)) })
+        check(head, first)?;
+        let (file, wish) = (head.file.clone(), Wish::default());
+        Ok(Self { file, chunks, spans, wish, kind: Kind::Layered(Box::new(decoder)) })
+    }
+
+    /// What is made of chunks of version 3 from here on.
+    pub(crate) fn wish(&mut self) -> &mut Wish {
+        &mut self.wish
+    }
+
+    /// Layers, chunks and ranges of a scene of version 3 whose data start at `data_start` of the file.
+    pub(crate) fn outline(&self, data_start: u64) -> Option<Outline> {
+        self.index().map(|index| Outline::new(index, data_start))
     }
 
     /// The same without interim changes but of scales.
@@ -120,7 +144,7 @@ impl Decoder {
     /// everything except its codes. Its bits are counted if `count_bits`.
     pub(crate) fn chunk(
         &self,
-        data: &[u8],
+        data: Data<'_>,
         c: usize,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
@@ -139,7 +163,7 @@ impl Decoder {
     /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
     pub(super) fn piece(
         &self,
-        data: &[u8],
+        data: Data<'_>,
         c: usize,
         first: usize,
         place: &mut Place<'_>,
@@ -148,8 +172,14 @@ impl Decoder {
     ) -> Result<Piece> {
         let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
         match &self.kind {
-            Kind::Flat(decoder) => decoder.piece(data, c, first, place, budget, count_bits),
-            Kind::Layered(decoder) => decoder.piece(data, c, first, place, budget, count_bits),
+            Kind::Flat(decoder) => decoder.piece(data.first(), c, first, place, budget, count_bits),
+            Kind::Layered(decoder) => decoder.piece(data, c, first, self.wish, place, budget, count_bits),
         }
     }
+}
+
+/// Refuses more Gaussians or atoms than the limits of the reader allow.
+fn check(head: &PackedHead, gaussians: usize) -> Result<()> {
+    head.limits.check_gaussians(&head.file, gaussians as u64)?;
+    head.limits.check_atoms(&head.file, head.atoms as u64)
 }

@@ -22,10 +22,12 @@ mod floor;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
 pub mod fuzzing;
+mod held;
 mod layered;
 mod layering;
 mod morton;
 mod neighbours;
+mod outline;
 mod pack;
 mod parameters;
 mod parts;
@@ -40,6 +42,7 @@ mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
 pub(crate) use decoder::Decoder;
+pub(crate) use held::{Data, Held};
 pub(crate) use layered::layered_atoms;
 pub(crate) use pack::{check, expected_step};
 pub(crate) use parts::{Part, PartPacker, Whole};
@@ -48,6 +51,7 @@ pub(crate) use scene::{Coding, Flat, SpilledPacked};
 pub(crate) use stream::BitCounts;
 
 pub use appearance::{Appearance, AppearanceChange};
+pub use outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
 pub use pack::{PackOptions, Packer};
 pub use parts::Refit;
 pub use preset::Preset;

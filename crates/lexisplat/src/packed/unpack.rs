@@ -1,6 +1,7 @@
 //! Decoding a packed scene as a whole.
 
 use super::decoder::Decoder;
+use super::held::Data;
 use super::layered::Index;
 use super::place::{indices, places};
 use super::scene::Packed;
@@ -20,7 +21,12 @@ impl Packed {
     /// [`crate::Error::Format`] naming the damaged part, [`crate::Error::Limit`] for a scene larger than the
     /// limits of its reader.
     pub fn unpack(&self) -> Result<Model> {
-        let model = self.decode(false)?.0;
+        self.unpack_with(&Decoder::new(self.head(), self.data())?)
+    }
+
+    /// [`Self::unpack`] with a decoder of this scene, which may leave some of it out.
+    pub(crate) fn unpack_with(&self, decoder: &Decoder) -> Result<Model> {
+        let model = self.decode_with(decoder, self.data(), false)?.0;
         match self.order() {
             Some(order) => super::reorder::reordered(model, order, &self.head().file),
             None => Ok(model),
@@ -32,8 +38,9 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        let (_, bits) = self.decode(true)?;
-        Ok(Decoder::new(self.head(), self.data())?.named(&bits))
+        let decoder = Decoder::new(self.head(), self.data())?;
+        let (_, bits) = self.decode_with(&decoder, self.data(), true)?;
+        Ok(decoder.named(&bits))
     }
 
     /// The dictionary alone.
@@ -61,12 +68,6 @@ impl Packed {
         Ok(budget)
     }
 
-    fn decode(&self, count_bits: bool) -> Result<(Model, BitCounts)> {
-        let head = self.head();
-        let decoder = Decoder::new(head, self.data())?;
-        self.decode_with(&decoder, self.data(), count_bits)
-    }
-
     /// What the first layer of two shows while the second is not there, with its scales grown and no other change; `None` if
     /// there is one layer. Its Gaussians are the first of those of the scene.
     ///
@@ -76,7 +77,8 @@ impl Packed {
         let whole = Decoder::new(self.head(), self.data())?;
         let Some(end) = whole.index().and_then(Index::first_layer_end) else { return Ok(None) };
         let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();
-        let decoder = Decoder::of_prefix(self.head(), data)?.growing_only();
+        let decoder = Decoder::of_prefix(self.head(), data, self.data().len() as u64)?;
+        let Some(decoder) = decoder.map(Decoder::growing_only) else { return Ok(None) };
         Ok(Some(self.decode_with(&decoder, data, false)?.0))
     }
 
@@ -92,7 +94,7 @@ impl Packed {
         let spans = decoder.spans();
         let work: Vec<_> = places(&mut g, &mut counts, spans).into_iter().zip(spans).enumerate().collect();
         let pieces = map_vec(work, |(c, (mut place, span))| {
-            decoder.piece(data, c, span.start, &mut place, &budget, count_bits)
+            decoder.piece(Data::First(data), c, span.start, &mut place, &budget, count_bits)
         });
         let (mut atoms, mut values) = (Vec::new(), Vec::new());
         let mut escapes = Escapes::default();

@@ -27,6 +27,17 @@ pub(super) struct Checked<'a> {
     /// Names of all tensors, sorted.
     pub(super) names: Vec<String>,
     metadata: BTreeMap<String, String>,
+    /// Length of the file by its header.
+    pub(super) file_bytes: u64,
+}
+
+/// How much of a file there may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Extent {
+    /// All of it.
+    Whole,
+    /// Its first bytes, if it is of the newest version.
+    First,
 }
 
 impl std::fmt::Debug for Checked<'_> {
@@ -45,6 +56,7 @@ impl<'a> Checked<'a> {
         file: String,
         shared: FileBytes<'a>,
         formats: &[&str],
+        extent: Extent,
         limits: &Limits,
     ) -> Result<Self> {
         let bytes: &[u8] = (*shared).as_ref();
@@ -53,32 +65,20 @@ impl<'a> Checked<'a> {
             let (what, found) = (what.to_owned(), bytes.len() as u64);
             Error::format(file.as_str(), FormatError::Truncated { what, expected, found })
         };
-        let length = bytes
-            .first_chunk::<LENGTH_BYTES>()
-            .ok_or_else(|| truncated("the header's length", LENGTH_BYTES as u64))?;
-        let length = u64::from_le_bytes(*length);
-        limits.check_header(&file, length)?;
-        let end = length + LENGTH_BYTES as u64;
+        let end = header_end(&file, bytes, limits)?;
         let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
         let header = header.ok_or_else(|| truncated("the header", end))?;
         json::check(&header[LENGTH_BYTES..])
             .map_err(|e| Error::malformed(file.as_str(), format!("the header: {e}")))?;
-        let (_, tensors) = SafeTensors::read_metadata(bytes).map_err(|error| {
-            let text = match error {
-                SafeTensorError::MetadataIncompleteBuffer => {
-                    format!("truncated or too long: {} bytes do not match the header", bytes.len())
-                }
-                other => format!("not a valid safetensors file: {other}"),
-            };
-            Error::malformed(file.as_str(), text)
-        })?;
+        let tensors = tensors(&file, bytes, header, extent)?;
+        let file_bytes = end.saturating_add(tensors.data_len() as u64);
         let header_checksum = crc32fast::hash(header);
         let data_start = header.len();
         let metadata: BTreeMap<String, String> =
             tensors.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
         let mut names = tensors.offset_keys();
         names.sort_unstable();
-        let checked = Self { file, bytes: shared, data_start, tensors, names, metadata };
+        let checked = Self { file, bytes: shared, data_start, tensors, names, metadata, file_bytes };
         let format = |problem| Error::format(&checked.file, problem);
         let malformed = |text: String| checked.malformed(text);
 
@@ -94,6 +94,13 @@ impl<'a> Checked<'a> {
         }
         if version == 0 {
             return Err(malformed("metadata 'version' is 0".to_owned()));
+        }
+        if extent == Extent::First && version != PACKED_VERSION {
+            let text = format!(
+                "version {version} of the format is only read whole; what is written as version \
+                 {PACKED_VERSION}, the layout 'packed', can be read from its first bytes"
+            );
+            return Err(malformed(text));
         }
         let (stored, expected) = match version {
             PACKED_VERSION if checked.has(tensor::HEAD) => {
@@ -122,10 +129,11 @@ impl<'a> Checked<'a> {
             false => self.json(key::CHECKSUMS)?,
         };
         let summed = |name: &&String| !elsewhere.contains(&name.as_str());
-        let names: Vec<&String> = self.names.iter().filter(summed).collect();
+        let mut names: Vec<&String> = self.names.iter().filter(summed).collect();
         if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
             return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
         }
+        names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
             self.view(name).map(|t| format!("{:08x}", crc32fast::hash(t.data)))
@@ -153,6 +161,26 @@ impl<'a> Checked<'a> {
 
     pub(super) fn malformed(&self, text: impl Into<String>) -> Error {
         Error::malformed(&self.file, text)
+    }
+
+    /// Whether all bytes of the file are there.
+    pub(super) fn is_whole(&self) -> bool {
+        self.bytes().len() as u64 == self.file_bytes
+    }
+
+    /// Whether all bytes of the tensor `name` are there.
+    fn is_there(&self, name: &str) -> bool {
+        self.tensors
+            .info(name)
+            .is_some_and(|tensor| tensor.data_offsets.1 <= self.bytes().len() - self.data_start)
+    }
+
+    /// Where the tensor `name` starts in the file, its length, and the first of its bytes, as many as are there.
+    pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
+        let (start, end) = self.tensors.info(name)?.data_offsets;
+        let place = |offset: usize| self.data_start.saturating_add(offset);
+        let there = |offset: usize| place(offset).min(self.bytes().len());
+        Some((place(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
@@ -214,7 +242,11 @@ impl<'a> Checked<'a> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
         let TensorInfo { dtype, shape, data_offsets: (start, end) } =
             self.tensors.info(name).ok_or_else(missing)?;
-        let data = self.bytes().get(self.data_start + start..self.data_start + end).ok_or_else(missing)?;
+        let (start, end) = (self.data_start.saturating_add(*start), self.data_start.saturating_add(*end));
+        let data = self.bytes().get(start..end).ok_or_else(|| {
+            let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
+            Error::format(&self.file, FormatError::Truncated { what, expected: end as u64, found })
+        })?;
         Ok(View { dtype: *dtype, shape, data })
     }
 
@@ -271,6 +303,51 @@ impl<'a> Checked<'a> {
         let data = data.ok_or_else(|| self.malformed(format!("tensor '{name}' is too short")))?;
         Ok(bytemuck::allocation::pod_collect_to_vec(data))
     }
+}
+
+/// Where the header of a file ends that begins with `bytes`, by its length.
+pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u64> {
+    let length = bytes.first_chunk::<LENGTH_BYTES>().ok_or_else(|| {
+        let (what, found) = ("the header's length".to_owned(), bytes.len() as u64);
+        Error::format(file, FormatError::Truncated { what, expected: LENGTH_BYTES as u64, found })
+    })?;
+    let length = u64::from_le_bytes(*length);
+    limits.check_header(file, length)?;
+    Ok(length.saturating_add(LENGTH_BYTES as u64))
+}
+
+/// Where the tensors end that are needed before any data, in a file whose header ends at `header_end`.
+pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64> {
+    let header = usize::try_from(header_end).ok().and_then(|end| bytes.get(..end)).unwrap_or_default();
+    json::check(header.get(LENGTH_BYTES..).unwrap_or_default())
+        .map_err(|e| Error::malformed(file, format!("the header: {e}")))?;
+    let tensors = tensors(file, header, header, Extent::First)?;
+    let end = |name| tensors.info(name).map_or(0, |tensor| tensor.data_offsets.1 as u64);
+    Ok(header_end.saturating_add(end(tensor::HEADER_CHECKSUM).max(end(tensor::HEAD))))
+}
+
+/// The tensors that a header lists, without holes between them. `bytes` are as long as they say, or shorter if they may be.
+fn tensors(file: &str, bytes: &[u8], header: &[u8], extent: Extent) -> Result<Metadata> {
+    let invalid = |error: &dyn std::fmt::Display| {
+        Error::malformed(file, format!("not a valid safetensors file: {error}"))
+    };
+    let mismatch = || {
+        let text = format!("truncated or too long: {} bytes do not match the header", bytes.len());
+        Error::malformed(file, text)
+    };
+    if extent == Extent::Whole {
+        return match SafeTensors::read_metadata(bytes) {
+            Ok((_, tensors)) => Ok(tensors),
+            Err(SafeTensorError::MetadataIncompleteBuffer) => Err(mismatch()),
+            Err(error) => Err(invalid(&error)),
+        };
+    }
+    let json = header.get(LENGTH_BYTES..).unwrap_or_default();
+    let tensors: Metadata = serde_json::from_slice(json).map_err(|error| invalid(&error))?;
+    if bytes.len() - header.len() > tensors.data_len() {
+        return Err(mismatch());
+    }
+    Ok(tensors)
 }
 
 /// One tensor of a file.

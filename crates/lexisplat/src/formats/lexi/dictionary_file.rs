@@ -4,7 +4,7 @@ use std::path::Path;
 
 use safetensors::Dtype;
 
-use super::checked::Checked;
+use super::checked::{Checked, Extent};
 use super::exact::refuse_unknown;
 use super::fields;
 use super::layout::Layout;
@@ -34,7 +34,8 @@ pub fn read_dictionary(path: &Path, limits: &Limits) -> Result<Dictionary> {
 /// # Errors
 /// As [`read_dictionary`].
 pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Result<Dictionary> {
-    let checked = Checked::open(file.to_owned(), Box::new(bytes), &[DICTIONARY_FORMAT, FORMAT], limits)?;
+    let formats = [DICTIONARY_FORMAT, FORMAT];
+    let checked = Checked::open(file.to_owned(), Box::new(bytes), &formats, Extent::Whole, limits)?;
     let degree = fields::degree(&checked)?;
     if degree == ShDegree::ZERO {
         return Err(checked.malformed("a scene of SH degree 0 has no dictionary"));

@@ -104,7 +104,7 @@ fn wrong(checked: &Checked<'_>, name: &str, error: ColumnError) -> Error {
     checked.malformed(format!("tensor '{}': {error}", name.escape_debug()))
 }
 
-/// Properties that 3DGS does not define, of Gaussians `range` of `n`.
+/// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
     for full in &checked.names {
@@ -112,6 +112,9 @@ pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> R
         if !is_extra_name(name) {
             let text = format!("tensor '{}' is not named as a property can be", full.escape_debug());
             return Err(checked.malformed(text));
+        }
+        if !checked.is_whole() {
+            continue;
         }
         if checked.is_layered() {
             let column = column(checked, full, n)?;

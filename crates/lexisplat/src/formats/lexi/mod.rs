@@ -8,6 +8,7 @@ mod checked;
 mod dictionary_file;
 mod exact;
 mod extra_column;
+mod feed;
 mod fields;
 mod json;
 mod layout;
@@ -19,6 +20,7 @@ mod tensors;
 mod write;
 
 pub use dictionary_file::{read_dictionary, read_dictionary_bytes, write_dictionary};
+pub use feed::{FeedOptions, LexiFeed};
 pub use layout::{CodeLayout, Layout};
 pub use reader::{LexiReader, read, read_bytes};
 pub use schema::{MAX_VERSION, PACKED_VERSION, VERSION};

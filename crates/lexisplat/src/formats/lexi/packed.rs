@@ -17,9 +17,8 @@ use crate::support::memory_budget::MemoryBudget;
 /// bits. A header that claims more is refused before anything is allocated.
 const GAUSSIANS_PER_BYTE: u64 = 3;
 
-/// The packed scene of a file whose checksums hold.
-pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
-    let head = head(checked, limits)?;
+/// The packed scene of a file whose checksums hold, and whose [head](head) is `head`.
+pub(super) fn packed(checked: &Checked<'_>, head: PackedHead, limits: &Limits) -> Result<Packed> {
     let n = head.gaussians;
     let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
     let (words, bytes) = head.coding.sizes();
@@ -29,7 +28,7 @@ pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
     for extra in extras(checked, n, &(0..0))? {
         budget.take(n, extra.values.width())?;
     }
-    let order = if checked.has(tensor::ORDER) {
+    let order = if has_order(checked) {
         budget.take(n, size_of::<u32>())?;
         Some(order(checked, n, 0..n)?)
     } else {
@@ -38,9 +37,22 @@ pub(super) fn packed(checked: &Checked<'_>, limits: &Limits) -> Result<Packed> {
     Ok(Packed::new(head, extras(checked, n, &(0..n))?, order, data(checked)?.to_vec()))
 }
 
-/// The data of a packed file.
+/// The data of a packed file, or the first part of them if they are not all there.
 pub(super) fn data<'a>(checked: &'a Checked<'_>) -> Result<&'a [u8]> {
+    if !checked.is_whole() {
+        return Ok(checked.first_of(tensor::DATA).map(|(_, _, data)| data).unwrap_or_default());
+    }
     checked.data(tensor::DATA, Dtype::U8, &length(checked, tensor::DATA, Dtype::U8)?)
+}
+
+/// Where the data of a packed file start, and their length.
+pub(super) fn data_place(checked: &Checked<'_>) -> (u64, u64) {
+    checked.first_of(tensor::DATA).map(|(start, length, _)| (start, length)).unwrap_or_default()
+}
+
+/// Whether the order of the source is there.
+pub(super) fn has_order(checked: &Checked<'_>) -> bool {
+    checked.is_whole() && checked.has(tensor::ORDER)
 }
 
 fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]> {
@@ -55,9 +67,11 @@ fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]>
 pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead> {
     let file_bytes = checked.bytes().len() as u64;
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
-    limits.check_gaussians(&checked.file, gaussians)?;
-    let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
-    Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
+    if checked.is_whole() {
+        limits.check_gaussians(&checked.file, gaussians)?;
+        let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
+        Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
+    }
     let coding = coding(checked, gaussians)?;
     let atoms = match &coding {
         Coding::Flat(_) => checked.number(key::ATOMS)?,
@@ -67,10 +81,15 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     };
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    if checked.has(tensor::ORDER) && !is_permutation(checked, gaussians)? {
+    if has_order(checked) && !is_permutation(checked, gaussians)? {
         return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
     }
-    let known = |name: &str| PACKED.contains(&name) || name.starts_with(EXTRA_PREFIX);
+    let others: &[&str] = match &coding {
+        Coding::Flat(_) => &[tensor::HEAD],
+        Coding::Layered(_) => &[tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES],
+    };
+    let known =
+        |name: &str| name.starts_with(EXTRA_PREFIX) || (PACKED.contains(&name) && !others.contains(&name));
     checked.refuse_unknown(known, "for layout 'packed'")?;
     let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE)).transpose()?;
     let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED)).transpose()?;
@@ -113,6 +132,9 @@ fn coding(checked: &Checked<'_>, gaussians: u64) -> Result<Coding> {
 
 /// Places in the source of Gaussians `range` of `n`.
 pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Result<Vec<u32>> {
+    if !checked.is_whole() {
+        return Err(checked.malformed("only a first part is there, without the order of the source"));
+    }
     if !checked.is_layered() {
         return checked.part(tensor::ORDER, Dtype::U32, &[n], &range);
     }

@@ -3,19 +3,19 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::checked::{Checked, FileBytes};
+use super::checked::{Checked, Extent, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, tensor};
-use crate::packed::{CHUNK, Decoder, Packed, PackedHead, StreamBits};
+use crate::packed::{CHUNK, Data, Decoder, Outline, Packed, PackedHead, StreamBits};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Record};
-use crate::support::error::Result;
+use crate::support::error::{Error, Result};
 use crate::support::input::Input;
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
@@ -68,8 +68,12 @@ enum Kind<'a> {
 #[derive(Debug)]
 struct PackedFile<'a> {
     checked: Checked<'a>,
+    /// Its Gaussians are those that are there.
     head: PackedHead,
     decoder: Decoder,
+    /// Number of Gaussians of the whole file.
+    whole: usize,
+    outline: Option<Outline>,
 }
 
 impl<'a> LexiReader<'a> {
@@ -83,27 +87,41 @@ impl<'a> LexiReader<'a> {
         bytes: impl AsRef<[u8]> + Send + Sync + 'a,
         limits: &Limits,
     ) -> Result<Self> {
-        let bytes: FileBytes<'a> = Box::new(bytes);
-        let checked = Checked::open(file.into(), bytes, &[FORMAT], limits)?;
+        Self::with_extent(file.into(), Box::new(bytes), Extent::Whole, limits)
+    }
+
+    /// Checks the first bytes of a packed .lexi file of version 3, as many as there are. Errors call it `file`.
+    ///
+    /// It then reads the Gaussians whose base is whole there, as fine as the bytes that are there make them. Where the next
+    /// layer is missing they look as the file says to fill its place. Extras and the order of the source are left
+    /// out unless all bytes of the file are there. [`Limits::gaussians`] and [`Limits::bytes`] concern what is there.
+    ///
+    /// # Errors
+    /// As [`Self::open`]. [`crate::FormatError::Truncated`] says how many bytes are needed at least.
+    /// [`crate::FormatError::Malformed`] for files that are only read whole, those of other layouts or versions.
+    pub fn open_first(
+        file: impl Into<String>,
+        bytes: impl AsRef<[u8]> + Send + Sync + 'a,
+        limits: &Limits,
+    ) -> Result<Self> {
+        Self::with_extent(file.into(), Box::new(bytes), Extent::First, limits)
+    }
+
+    fn with_extent(file: String, bytes: FileBytes<'a>, extent: Extent, limits: &Limits) -> Result<Self> {
+        let checked = Checked::open(file, bytes, &[FORMAT], extent, limits)?;
         let layout = layout(&checked)?;
         let attribute_bytes = sizes(&checked)?;
         let (kind, extras) = if layout == Layout::Packed {
-            let head = super::packed::head(&checked, limits)?;
+            let mut head = super::packed::head(&checked, limits)?;
             let data = super::packed::data(&checked)?;
-            let first = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok());
-            let decoder = match first {
-                Some(f) => Decoder::of_prefix(
-                    &head,
-                    &data[..((f * checked.bytes().len() as f64) as usize)
-                        .saturating_sub(checked.bytes().len() - data.len())
-                        .min(data.len())],
-                )?,
-                None => Decoder::new(&head, data)?,
-            };
-            let mut head = head;
-            head.gaussians = decoder.spans().last().map_or(0, |s| s.end);
-            let extras = extras(&checked, head.gaussians, &(0..0))?;
-            (Kind::Packed(Box::new(PackedFile { checked, head, decoder })), extras)
+            let (start, length) = super::packed::data_place(&checked);
+            let first = if checked.is_whole() { None } else { Decoder::of_prefix(&head, data, length)? };
+            let decoder = first.map_or_else(|| Decoder::new(&head, data), Ok)?;
+            let there = decoder.spans().last().map_or(0, |span| span.end);
+            let whole = std::mem::replace(&mut head.gaussians, there);
+            let extras = extras(&checked, there, &(0..0))?;
+            let outline = decoder.outline(start);
+            (Kind::Packed(Box::new(PackedFile { checked, head, decoder, whole, outline })), extras)
         } else {
             let exact = Exact::open(checked, limits)?;
             let extras = extras(&exact.checked, exact.gaussians, &(0..0))?;
@@ -112,7 +130,48 @@ impl<'a> LexiReader<'a> {
         Ok(Self { kind, layout, limits: *limits, extras, attribute_bytes })
     }
 
-    /// Number of Gaussians.
+    /// Decodes at most this many parts of the nonzeros of SH-rest from here on, those of the largest values first. With 0
+    /// there is no SH-rest. Base colours are then those that are seen on average.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a file that is not a packed one of version 3, whose nonzeros have no parts.
+    pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
+        self.layered("sh_parts", parts)?.wish().sh_parts = parts;
+        Ok(self)
+    }
+
+    /// Verifies the checksums of the integers that ranges decode to from here on, which are not verified otherwise.
+    /// Where one is wrong although that of the bytes holds, a decoder is at fault.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a file that is not a packed one of version 3, which has none.
+    pub fn with_integers_verified(mut self) -> Result<Self> {
+        self.layered("verify", true)?.wish().verify = true;
+        Ok(self)
+    }
+
+    /// The decoder of a packed file of version 3. `name` and `value` are what is asked of it.
+    fn layered(&mut self, name: &'static str, value: impl ToString) -> Result<&mut Decoder> {
+        match &mut self.kind {
+            Kind::Packed(packed) if packed.outline.is_some() => Ok(&mut packed.decoder),
+            _ => Err(Error::parameter(name, value, "only for packed .lexi files of version 3")),
+        }
+    }
+
+    /// The layers, chunks and ranges of a packed file of version 3, of the whole file also if only a first part of it is
+    /// there.
+    #[must_use]
+    pub fn outline(&self) -> Option<&Outline> {
+        self.packed_file().and_then(|packed| packed.outline.as_ref())
+    }
+
+    /// Number of Gaussians of the whole file. There are [fewer](Self::len) if only a first part of it is there.
+    #[must_use]
+    pub fn whole_len(&self) -> usize {
+        self.packed_file().map_or(self.len(), |packed| packed.whole)
+    }
+
+    /// Number of Gaussians that are there.
     #[must_use]
     pub fn len(&self) -> usize {
         match &self.kind {
@@ -182,7 +241,7 @@ impl<'a> LexiReader<'a> {
     /// Whether a packed file holds the order of its source.
     #[must_use]
     pub fn order_kept(&self) -> bool {
-        self.packed_file().is_some_and(|packed| packed.checked.has(tensor::ORDER))
+        self.packed_file().is_some_and(|packed| super::packed::has_order(&packed.checked))
     }
 
     /// Bytes of each tensor in the file, and of the header under `header`, as
@@ -220,16 +279,22 @@ impl<'a> LexiReader<'a> {
     pub fn model(&self) -> Result<Model> {
         match &self.kind {
             Kind::Exact(exact) => exact.part(0..exact.gaussians),
-            Kind::Packed(packed) => super::packed::packed(&packed.checked, &self.limits)?.unpack(),
+            Kind::Packed(packed) => packed.take(&self.limits)?.unpack_with(&packed.decoder),
         }
     }
 
     /// The packed scene, not decoded; `None` for exact layouts.
     ///
     /// # Errors
-    /// [`crate::Error::Format`] for damage, [`crate::Error::Limit`] for a scene too large to hold.
+    /// [`crate::Error::Format`] for damage, and if only a first part of the file is there; [`crate::Error::Limit`] for a
+    /// scene too large to hold.
     pub fn packed(&self) -> Result<Option<Packed>> {
-        self.packed_file().map(|packed| super::packed::packed(&packed.checked, &self.limits)).transpose()
+        let Some(packed) = self.packed_file() else { return Ok(None) };
+        if !packed.checked.is_whole() {
+            let text = "only a first part is there, and packed scenes are taken whole";
+            return Err(packed.checked.malformed(text));
+        }
+        packed.take(&self.limits).map(Some)
     }
 
     /// Hands all Gaussians to `take`, part after part in the order of the file: the number of the first one,
@@ -287,6 +352,11 @@ fn exact_parts(
 }
 
 impl PackedFile<'_> {
+    /// The scene that is there, not decoded.
+    fn take(&self, limits: &Limits) -> Result<Packed> {
+        super::packed::packed(&self.checked, self.head.clone(), limits)
+    }
+
     /// Decodes `chunks` together, hands them to `take` one after the other, and returns the bits they took.
     fn chunks(
         &self,
@@ -302,12 +372,7 @@ impl PackedFile<'_> {
         let held = spans.iter().map(|span| span.len()).sum();
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
-        let mut data = super::packed::data(&self.checked)?;
-        if let Some(f) = std::env::var("FIRST").ok().and_then(|v| v.parse::<f64>().ok()) {
-            data = &data[..((f * self.checked.bytes().len() as f64) as usize)
-                .saturating_sub(self.checked.bytes().len() - data.len())
-                .min(data.len())];
-        }
+        let data = Data::First(super::packed::data(&self.checked)?);
         let parts = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });
@@ -369,7 +434,7 @@ impl SplatSource for LexiReader<'_> {
     }
 }
 
-/// Bytes of all tensors that are not to be ignored, in the order in which writers list them, and of the
+/// Bytes that are there of all tensors that are not to be ignored, in the order in which writers list them, and of the
 /// header.
 fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
     const LAST: [&str; 7] = [
@@ -386,7 +451,8 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
     let order = geometry.chain(PACKED).chain(extras).chain(LAST);
     let mut out = Vec::new();
     for name in order.filter(|name| checked.has(name)) {
-        out.push((name.to_owned(), checked.view(name)?.data.len() as u64));
+        let bytes = checked.first_of(name).map_or(0, |(_, _, bytes)| bytes.len());
+        out.push((name.to_owned(), bytes as u64));
     }
     let length = checked.bytes().first_chunk::<LENGTH_BYTES>().map_or(0, |l| u64::from_le_bytes(*l));
     let checksum = match checked.has(tensor::HEADER_CHECKSUM) {

@@ -7,6 +7,8 @@ use super::index::{Chunk, Index};
 use super::streams::Stream;
 use super::tables::{Lookup, Tables};
 use super::unpack::{Refusal, Unpacker};
+use crate::packed::held::{Data, Wish};
+use crate::packed::outline::RangeKind;
 use crate::packed::place::{Piece, Place};
 use crate::packed::scene::PackedHead;
 use crate::packed::stream::BitCounts;
@@ -64,12 +66,14 @@ impl LayeredDecoder {
         &self.head.index
     }
 
-    /// Decodes chunk `c` to `place` from the ranges that are in `data`, which may end early. Escapes are numbered from `first`.
+    /// Decodes chunk `c` to `place` from the ranges that are in `data`. Escapes are numbered from `first`.
+    #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
     pub(in crate::packed) fn piece(
         &self,
-        data: &[u8],
+        data: Data<'_>,
         c: usize,
         first: usize,
+        wish: Wish,
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
@@ -79,20 +83,28 @@ impl LayeredDecoder {
         let index = &self.head.index;
         let chunk = index.chunks.get(c).ok_or_else(damaged)?;
         let form = index.layer(chunk.layer);
-        let mut ranges = self.checked(data, c, chunk)?;
-        let alone = index.alone(chunk.layer, |range| range.end() <= data.len() as u64);
+        let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
+        let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= wish.sh_parts);
+        let mut ranges = self.checked(data, c, chunk, is_wanted)?;
         if alone.is_empty()
             && !count_bits
+            && !wish.verify
             && let Some(interim) = ranges.get_mut(form.interim_range())
         {
             *interim = None;
         }
-        let want = Want { sums: false, bits: count_bits };
+        let want = Want { sums: wish.verify, bits: count_bits };
         let piece = self.unpacker.chunk(form, &alone, &ranges, want, place, budget);
-        let (mut piece, _) = piece.map_err(|refusal| match refusal {
+        let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged => damaged(),
             Refusal::Full => budget.full(),
         })?;
+        for (k, (sum, _)) in sums.iter().zip(&ranges).enumerate().filter(|(_, (_, range))| range.is_some()) {
+            if chunk.ranges.get(k).is_none_or(|range| range.integers != *sum) {
+                let part = format!("the integers of range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+            }
+        }
         for escape in &mut piece.escapes.gaussians {
             *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
         }
@@ -107,20 +119,30 @@ impl LayeredDecoder {
         Ok(piece)
     }
 
-    /// The ranges of a chunk that are whole in `data`, if their checksums hold.
-    fn checked<'d>(&self, data: &'d [u8], c: usize, chunk: &Chunk) -> Result<Vec<Option<&'d [u8]>>> {
-        let range = |(k, range): (usize, &super::index::Range)| {
-            let (start, end) = (usize::try_from(range.start).ok(), usize::try_from(range.end()).ok());
-            let Some(bytes) = start.zip(end).and_then(|(start, end)| data.get(start..end)) else {
-                return Ok(None);
+    /// The ranges of a chunk that are wanted by their numbers and there, if their checksums hold. Those that follow a missing one
+    /// of their kind are left out.
+    fn checked<'d>(
+        &self,
+        data: Data<'d>,
+        c: usize,
+        chunk: &Chunk,
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> Result<Vec<Option<&'d [u8]>>> {
+        let form = self.head.index.layer(chunk.layer);
+        let mut ranges: Vec<Option<&[u8]>> = Vec::with_capacity(chunk.ranges.len());
+        for (k, range) in chunk.ranges.iter().enumerate() {
+            let is_needed = match RangeKind::of(form, k) {
+                RangeKind::Refinement(1..) | RangeKind::Sh(1..) => ranges.last().is_some_and(Option::is_some),
+                _ => true,
             };
-            if crc32fast::hash(bytes) != range.checksum {
+            let wanted = data.range(range.start, range.length).filter(|_| is_needed && is_wanted(k));
+            if wanted.is_some_and(|bytes| crc32fast::hash(bytes) != range.checksum) {
                 let part = format!("range {k} of chunk {c}");
                 return Err(Error::format(&self.file, FormatError::Checksum { part }));
             }
-            Ok(Some(bytes))
-        };
-        chunk.ranges.iter().enumerate().map(range).collect()
+            ranges.push(wanted);
+        }
+        Ok(ranges)
     }
 }
 

@@ -196,7 +196,9 @@ impl Index {
                 }
             }
             let form = *index.layers.get(layer)?;
-            if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last {
+            // Cells do not fall within a layer, so that those of its chunks do not overlap.
+            let falls = index.chunks.last().is_some_and(|before| before.layer == layer && before.cell > cell);
+            if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last || falls {
                 return None;
             }
             let blank = vec![Range::default(); form.ranges()];

@@ -1,4 +1,4 @@
-//! The entropy encoder of a range: eight lanes of rANS, each with a state of 32 bits and words of 16 bits.
+//! The entropy encoder of a range: up to 16 lanes of rANS, each with a state of 32 bits and words of 16 bits.
 //!
 //! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
 

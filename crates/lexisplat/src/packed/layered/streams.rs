@@ -63,12 +63,12 @@ streams! { 30:
     Value2 => "codes.values",
     /// Which 256 atoms an atom is of, if there are more.
     AtomPage => "codes.indices",
-    /// Coefficients of the atoms.
-    Dictionary => "dictionary",
     /// How a Gaussian changes while those of the next layer around it are not there.
     InterimScale => "interim",
     InterimOpacity => "interim",
     InterimDc => "interim",
+    /// Coefficients of the atoms. They are in the head and no symbols of any context.
+    Dictionary => "dictionary",
 }
 
 impl Stream {
@@ -98,7 +98,8 @@ const OF_GEOMETRY: usize = Stream::Count0 as usize;
 /// Numbers of levels that may be missing.
 const BY_LEVELS: usize = MAX_LEVELS + 1;
 /// Number of sets of contexts.
-pub(in crate::packed) const SLOTS: usize = BY_LEVELS * OF_GEOMETRY + Stream::ALL.len() - OF_GEOMETRY;
+pub(in crate::packed) const SLOTS: usize =
+    BY_LEVELS * OF_GEOMETRY + Stream::Dictionary as usize - OF_GEOMETRY;
 
 /// A stream, and the number of its set of contexts among all.
 #[derive(Debug, Clone, Copy)]
@@ -110,7 +111,8 @@ pub(super) struct Slot {
 impl Slot {
     /// All sets of contexts in the order of their tables.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let (geometry, others) = Stream::ALL.split_at(OF_GEOMETRY);
+        let [coded @ .., _] = &Stream::ALL;
+        let (geometry, others) = coded.split_at(OF_GEOMETRY);
         let geometry = (0..BY_LEVELS).flat_map(|levels| geometry.iter().map(move |stream| stream.at(levels)));
         geometry.chain(others.iter().map(|stream| stream.at(0)))
     }

@@ -1,0 +1,260 @@
+//! The ranges of a file, as far as they came.
+
+use std::ops::Range;
+
+use super::FeedOptions;
+use super::run::Run;
+use crate::packed::{Decoder, Held, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::support::error::{Error, FormatError, Result};
+
+/// What a file is decoded with, and its ranges.
+#[derive(Debug)]
+pub(super) struct Ranges {
+    pub(super) head: PackedHead,
+    pub(super) decoder: Decoder,
+    pub(super) outline: Outline,
+    /// Where the data start in the file.
+    data_start: u64,
+    states: Vec<State>,
+    /// The ranges in the order in which they are asked for.
+    order: Vec<usize>,
+    /// The ranges of each chunk.
+    of_chunk: Vec<Vec<usize>>,
+    /// Bytes of ranges that are held, or for which there is room because a part of them is.
+    pub(super) held: u64,
+}
+
+/// How much of a range is there.
+#[derive(Debug)]
+enum State {
+    /// It is not asked for.
+    Unwanted,
+    Missing,
+    Part(Run),
+    /// It is whole, and its checksum holds.
+    Whole(Run),
+    /// It was there.
+    Gone,
+}
+
+impl Ranges {
+    pub(super) fn new(
+        head: PackedHead,
+        decoder: Decoder,
+        outline: Outline,
+        data_start: u64,
+        options: &FeedOptions,
+    ) -> Self {
+        let mut of_chunk = vec![Vec::new(); outline.chunks.len()];
+        for (r, range) in outline.ranges.iter().enumerate() {
+            if let Some(ranges) = of_chunk.get_mut(range.chunk) {
+                ranges.push(r);
+            }
+        }
+        let wanted =
+            |range: &RangeOutline| is_asked_for(range, options) && is_near(&outline, range.chunk, options);
+        let state = |range| if wanted(range) { State::Missing } else { State::Unwanted };
+        let states = outline.ranges.iter().map(state).collect();
+        let order = order(&outline, options);
+        Self { head, decoder, data_start, states, order, of_chunk, held: 0, outline }
+    }
+
+    fn range(&self, r: usize) -> Range<u64> {
+        self.outline.ranges.get(r).map(|range| range.bytes.clone()).unwrap_or_default()
+    }
+
+    /// The next bytes to ask for if there is room for so many.
+    pub(super) fn wants(&self, room: u64) -> Option<Range<u64>> {
+        let mut run: Option<Range<u64>> = None;
+        let mut left = room;
+        for &r in &self.order {
+            match (&mut run, self.states.get(r)?) {
+                (None, State::Part(part)) => return part.gap(),
+                (_, State::Missing) => {
+                    let range = self.range(r);
+                    match left.checked_sub(range.end - range.start) {
+                        Some(rest) => left = rest,
+                        None => return run,
+                    }
+                    match &mut run {
+                        Some(run) if run.end == range.start => run.end = range.end,
+                        Some(_) => return run,
+                        None => run = Some(range),
+                    }
+                }
+                (Some(_), State::Part(_)) => return run,
+                _ => {}
+            }
+        }
+        run
+    }
+
+    /// The ranges of which there is something in these bytes of the file.
+    fn touched(&self, at: u64, end: u64) -> Range<usize> {
+        let first = self.outline.ranges.partition_point(|range| range.bytes.end <= at);
+        first..self.outline.ranges.partition_point(|range| range.bytes.start < end).max(first)
+    }
+
+    /// Bytes that more have to be held if `bytes` from `at` of the file are taken.
+    pub(super) fn more(&self, at: u64, bytes: &[u8]) -> u64 {
+        let end = at.saturating_add(bytes.len() as u64);
+        let missing = self.touched(at, end).filter(|&r| matches!(self.states.get(r), Some(State::Missing)));
+        missing.map(|r| self.range(r)).map(|range| range.end - range.start).fold(0, u64::saturating_add)
+    }
+
+    /// Takes what is wanted of `bytes` from `at` of the file. Ranges whose checksum does not hold are dropped, and the first of
+    /// them is the error.
+    pub(super) fn take(&mut self, at: u64, bytes: &[u8]) -> Result<()> {
+        let mut result = Ok(());
+        for r in self.touched(at, at.saturating_add(bytes.len() as u64)) {
+            let range = self.range(r);
+            let Some(state) = self.states.get_mut(r) else { continue };
+            if matches!(state, State::Missing) {
+                let len = usize::try_from(range.end - range.start);
+                let Ok(len) = len else { continue };
+                self.held += len as u64;
+                *state = State::Part(Run::new(range.start, len));
+            }
+            let State::Part(run) = state else { continue };
+            run.put(at, bytes);
+            let Some(whole) = run.whole() else { continue };
+            let sum = crc32fast::hash(whole);
+            let run = std::mem::replace(run, Run::new(0, 0));
+            match self.outline.ranges.get(r).filter(|range| range.checksum != sum) {
+                None => *state = State::Whole(run),
+                Some(wrong) => {
+                    *state = State::Missing;
+                    self.held -= run.len() as u64;
+                    result = result.and(Err(self.wrong(wrong)));
+                }
+            }
+        }
+        result
+    }
+
+    fn wrong(&self, range: &RangeOutline) -> Error {
+        let k = self.outline.number(range);
+        let part = format!("range {k} of chunk {}", range.chunk);
+        Error::format(&self.head.file, FormatError::Checksum { part })
+    }
+
+    /// The states of the ranges of chunk `c`.
+    fn of(&self, c: usize) -> impl Iterator<Item = (RangeKind, &State)> {
+        let ranges = self.of_chunk.get(c).map(Vec::as_slice).unwrap_or_default();
+        ranges.iter().filter_map(|&r| Some((self.outline.ranges.get(r)?.kind, self.states.get(r)?)))
+    }
+
+    /// Whether chunk `c` can be decoded.
+    pub(super) fn is_ready(&self, c: usize) -> bool {
+        self.of(c).any(|(kind, state)| kind == RangeKind::Base && matches!(state, State::Whole(_)))
+    }
+
+    /// Whether all ranges of chunk `c` that are asked for came.
+    pub(super) fn is_complete(&self, c: usize) -> bool {
+        !self.of(c).any(|(_, state)| matches!(state, State::Missing | State::Part(_)))
+    }
+
+    /// Bytes of chunk `c` that are held.
+    pub(super) fn bytes_of(&self, c: usize) -> u64 {
+        let bytes = self.of(c).map(|(_, state)| match state {
+            State::Part(run) | State::Whole(run) => run.len() as u64,
+            _ => 0,
+        });
+        bytes.sum()
+    }
+
+    /// Drops the bytes of chunk `c`.
+    pub(super) fn forget(&mut self, c: usize) {
+        for &r in self.of_chunk.get(c).map(Vec::as_slice).unwrap_or_default() {
+            let Some(state) = self.states.get_mut(r) else { continue };
+            *state = match std::mem::replace(state, State::Unwanted) {
+                State::Whole(run) => {
+                    self.held -= run.len() as u64;
+                    State::Gone
+                }
+                State::Part(run) => {
+                    self.held -= run.len() as u64;
+                    State::Unwanted
+                }
+                State::Missing => State::Unwanted,
+                other => other,
+            };
+        }
+    }
+
+    /// Asks for chunk `c`.
+    pub(super) fn want(&mut self, c: usize, options: &FeedOptions) {
+        for &r in self.of_chunk.get(c).map(Vec::as_slice).unwrap_or_default() {
+            let asked_for = self.outline.ranges.get(r).is_some_and(|range| is_asked_for(range, options));
+            if let Some(state) = self.states.get_mut(r)
+                && asked_for
+                && matches!(state, State::Unwanted | State::Gone)
+            {
+                *state = State::Missing;
+            }
+        }
+    }
+
+    fn state_at(&self, start: u64) -> Option<&State> {
+        let start = self.data_start.checked_add(start)?;
+        let r = self.outline.ranges.partition_point(|range| range.bytes.end <= start);
+        let is_it = self.outline.ranges.get(r).is_some_and(|range| range.bytes.start == start);
+        self.states.get(r).filter(|_| is_it)
+    }
+}
+
+impl Held for Ranges {
+    fn bytes(&self, start: u64) -> Option<&[u8]> {
+        match self.state_at(start) {
+            Some(State::Whole(run)) => run.whole(),
+            _ => None,
+        }
+    }
+
+    fn came(&self, start: u64) -> bool {
+        matches!(self.state_at(start), Some(State::Whole(_) | State::Gone))
+    }
+}
+
+/// Whether the options ask for ranges of this kind.
+fn is_asked_for(range: &RangeOutline, options: &FeedOptions) -> bool {
+    !matches!(range.kind, RangeKind::Sh(part) if part >= options.sh_parts)
+}
+
+/// Whether the options ask for chunk `c`.
+fn is_near(outline: &Outline, c: usize, options: &FeedOptions) -> bool {
+    let Some(([least, most], chunk)) = options.within.zip(outline.chunks.get(c)) else { return true };
+    let [from, to] = chunk.bounds;
+    // The bounds of an only chunk mean nothing.
+    outline.chunks.len() == 1 || (0..3).all(|k| from[k] <= most[k] && to[k] >= least[k])
+}
+
+/// The ranges in the order in which they are asked for: that of the file, or by the distances of chunks among those of the
+/// same kind in the same layer.
+fn order(outline: &Outline, options: &FeedOptions) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..outline.ranges.len()).collect();
+    let Some(point) = options.nearest else { return order };
+    let squares = outline.chunks.iter().map(|chunk| {
+        let [least, most] = chunk.bounds;
+        let off = |k: usize| (least[k] - point[k]).max(point[k] - most[k]).max(0.0);
+        (0..3).map(|k| off(k) * off(k)).sum::<f32>()
+    });
+    let squares: Vec<f32> = squares.collect();
+    // Layers and kinds follow one another as they first do in the file.
+    let mut phases: Vec<(usize, RangeKind)> = Vec::new();
+    let mut keys = Vec::with_capacity(order.len());
+    for range in &outline.ranges {
+        let phase = (outline.chunks.get(range.chunk).map_or(0, |chunk| chunk.layer), range.kind);
+        let known = phases.iter().position(|&known| known == phase);
+        let known = known.unwrap_or_else(|| {
+            phases.push(phase);
+            phases.len() - 1
+        });
+        keys.push((known, squares.get(range.chunk).copied().unwrap_or(0.0)));
+    }
+    order.sort_by(|&a, &b| match (keys.get(a), keys.get(b)) {
+        (Some(a), Some(b)) => a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)),
+        _ => a.cmp(&b),
+    });
+    order
+}

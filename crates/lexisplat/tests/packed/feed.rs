@@ -1,0 +1,487 @@
+//! Packed files that are read in part: their first bytes, without some of their SH-rest, and from bytes as they come.
+
+use std::ops::Range;
+use std::sync::OnceLock;
+
+use lexisplat::lexi::{FeedOptions, LexiFeed, LexiReader};
+use lexisplat::packed::{Outline, RangeKind};
+use lexisplat::{Error, FormatError, Limits, Model, Result, SplatSource, lexi};
+use lexisplat_testing::Random;
+
+use crate::parts::Parts;
+
+use super::support::{STEP, bytes, options, pack, sample, with_extras};
+
+const NAME: &str = "p.lexi";
+/// Gaussians of the test scene: enough for several layers, and for several chunks of the last.
+const GAUSSIANS: usize = 20_000;
+
+/// A file of several layers, with points of view and without extras.
+fn file() -> &'static [u8] {
+    static FILE: OnceLock<Vec<u8>> = OnceLock::new();
+    FILE.get_or_init(|| {
+        let options = options(|o| o.viewpoints = vec![[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]]);
+        bytes(&pack(&sample(GAUSSIANS, 5, 2), STEP, &options).0)
+    })
+}
+
+fn outline(file: &[u8]) -> Outline {
+    LexiReader::open(NAME, file, &Limits::default()).unwrap().outline().unwrap().clone()
+}
+
+/// What each chunk of `reader` decodes to.
+fn chunks(reader: &LexiReader<'_>) -> Vec<Model> {
+    let mut chunks = Vec::new();
+    reader
+        .each(&mut |_, model| {
+            chunks.push(model);
+            Ok(())
+        })
+        .unwrap();
+    chunks
+}
+
+fn whole(file: &[u8]) -> Vec<Model> {
+    chunks(&LexiReader::open(NAME, file, &Limits::default()).unwrap())
+}
+
+fn feed(options: &FeedOptions) -> LexiFeed {
+    LexiFeed::new(NAME, options, &Limits::default())
+}
+
+/// Gives all that the feed asks for.
+fn fill(feed: &mut LexiFeed, file: &[u8]) {
+    while let Some(range) = feed.wants() {
+        give(feed, file, range).unwrap();
+    }
+}
+
+fn give(feed: &mut LexiFeed, file: &[u8], range: Range<u64>) -> Result<()> {
+    feed.feed(range.start, &file[place(range.start)..place(range.end)])
+}
+
+fn place(offset: u64) -> usize {
+    usize::try_from(offset).unwrap()
+}
+
+fn decoded(feed: &LexiFeed) -> Vec<Model> {
+    feed.ready().into_iter().map(|c| feed.decode(c).unwrap().unwrap()).collect()
+}
+
+#[test]
+fn the_scene_has_several_layers_and_chunks() {
+    let outline = outline(file());
+    assert!(outline.layers.len() > 1 && outline.chunks.len() > outline.layers.len());
+    let kinds = [RangeKind::Base, RangeKind::Refinement(0), RangeKind::Sh(1), RangeKind::Interim];
+    assert!(kinds.iter().all(|kind| outline.ranges.iter().any(|range| range.kind == *kind)));
+    assert_eq!(outline.layers.iter().map(|layer| layer.gaussians).sum::<u64>(), {
+        let reader = LexiReader::open(NAME, file(), &Limits::default()).unwrap();
+        reader.len() as u64
+    });
+    // Ranges follow one another without holes.
+    let mut end = outline.ranges[0].bytes.start;
+    for range in &outline.ranges {
+        assert_eq!((range.bytes.start, range.bytes.is_empty()), (end, false));
+        assert_eq!(crc32fast::hash(&file()[place(end)..place(range.bytes.end)]), range.checksum);
+        end = range.bytes.end;
+    }
+}
+
+#[test]
+fn what_is_asked_for_makes_the_whole_scene() {
+    let file = file();
+    let mut feed = feed(&FeedOptions::default().with_verify_integers(true));
+    assert!(feed.head().is_none() && feed.outline().is_none() && !feed.is_complete());
+    fill(&mut feed, file);
+    assert!(feed.is_complete());
+    assert_eq!(feed.outline(), Some(&outline(file)));
+    assert_eq!(decoded(&feed), whole(file));
+}
+
+#[test]
+fn any_order_and_any_cuts_make_the_whole_scene() {
+    let (file, whole) = (file(), whole(file()));
+    let mut random = Random::new(7);
+    for most in [200, 5000, 70_000, file.len()] {
+        let mut cuts = vec![0];
+        while let Some(&last) = cuts.last().filter(|&&last| last < file.len()) {
+            cuts.push((last + 1 + random.below(most)).min(file.len()));
+        }
+        let mut pieces: Vec<Range<usize>> = cuts.windows(2).map(|cut| cut[0]..cut[1]).collect();
+        for i in (1..pieces.len()).rev() {
+            pieces.swap(i, random.below(i + 1));
+        }
+        let mut feed = feed(&FeedOptions::default());
+        for (i, piece) in pieces.iter().enumerate() {
+            // Some of what is asked for comes too, and again.
+            if i % 50 == 0
+                && let Some(range) = feed.wants()
+            {
+                give(&mut feed, file, range).unwrap();
+            }
+            feed.feed(piece.start as u64, &file[piece.clone()]).unwrap();
+        }
+        assert!(feed.is_complete() && feed.wants().is_none());
+        assert!(decoded(&feed) == whole, "pieces of up to {most} bytes");
+    }
+}
+
+#[test]
+fn bytes_one_by_one_are_taken() {
+    let splats = sample(300, 2, 1);
+    let file = bytes(&pack(&splats, STEP, &options(|_| ())).0);
+    let mut feed = feed(&FeedOptions::default());
+    for (i, byte) in file.iter().enumerate() {
+        feed.feed(i as u64, std::slice::from_ref(byte)).unwrap();
+    }
+    let model = lexi::read_bytes(NAME, &file, &Limits::default()).unwrap();
+    assert_eq!(feed.decode(0).unwrap(), Some(model));
+    // Files of one layer and one chunk have no bounds to compare with a box.
+    let mut boxed = self::feed(&FeedOptions::default().with_within([[1e9; 3], [1e9; 3]]));
+    fill(&mut boxed, &file);
+    assert_eq!(boxed.ready(), [0]);
+}
+
+#[test]
+fn a_wrong_byte_is_found_in_its_range_and_asked_for_again() {
+    let (file, outline) = (file(), outline(file()));
+    let mut random = Random::new(3);
+    for range in &outline.ranges {
+        let mut damaged = file.to_vec();
+        let at = place(range.bytes.start) + random.below(place(range.bytes.end - range.bytes.start));
+        damaged[at] ^= 1 << random.below(8);
+        let mut feed = feed(&FeedOptions::default());
+        let part = loop {
+            let wanted = feed.wants().unwrap();
+            match give(&mut feed, &damaged, wanted) {
+                Ok(()) => {}
+                Err(Error::Format { problem: FormatError::Checksum { part }, .. }) => break part,
+                Err(other) => panic!("{other}"),
+            }
+        };
+        assert!(part.ends_with(&format!("of chunk {}", range.chunk)), "{part}: {range:?}");
+        // The message of the reader of whole files is the same.
+        let error = lexi::read_bytes(NAME, &damaged, &Limits::default()).unwrap_err().to_string();
+        assert!(error.contains(&format!("'{part}'")), "{error}: {part}");
+        assert_eq!(feed.wants(), Some(range.bytes.clone()));
+        fill(&mut feed, file);
+        assert!(feed.is_complete());
+    }
+}
+
+#[test]
+fn damage_at_the_start_is_found_before_any_range() {
+    let file = file();
+    let start = place(outline(file).ranges[0].bytes.start);
+    let mut random = Random::new(5);
+    for _ in 0..200 {
+        let mut damaged = file.to_vec();
+        damaged[random.below(start)] ^= 1 << random.below(8);
+        let mut feed = feed(&FeedOptions::default().with_most_bytes(file.len() as u64));
+        let mut result = Ok(());
+        while result.is_ok() && feed.head().is_none() {
+            let wanted = feed.wants().unwrap();
+            let end = wanted.end.min(damaged.len() as u64);
+            // A length that is too large asks for more than there is.
+            if wanted.start >= end {
+                break;
+            }
+            result = give(&mut feed, &damaged, wanted.start..end);
+        }
+        assert!(feed.head().is_none());
+        if result.is_err() {
+            fill(&mut feed, file);
+            assert!(feed.is_complete());
+        }
+    }
+}
+
+#[test]
+fn the_allowance_is_kept() {
+    let (file, whole) = (file(), whole(file()));
+    let outline = outline(file);
+    let start = outline.ranges[0].bytes.start;
+    let of = |c: usize| -> u64 {
+        let ranges = outline.ranges.iter().filter(|range| range.chunk == c);
+        ranges.map(|range| range.bytes.end - range.bytes.start).sum()
+    };
+    let largest = (0..outline.chunks.len()).map(of).max().unwrap();
+    // With room for the start and for all chunks but one, and chunks that are forgotten once they are complete.
+    let most = start + (0..outline.chunks.len()).map(of).sum::<u64>() - largest / 2;
+    let mut feed = feed(&FeedOptions::default().with_most_bytes(most));
+    let mut models: Vec<Option<Model>> = vec![None; outline.chunks.len()];
+    while let Some(range) = feed.wants() {
+        assert!(range.end - range.start + feed.held_bytes() <= most || range.start < start);
+        give(&mut feed, file, range).unwrap();
+        assert!(feed.held_bytes() <= most);
+        // Only when there is no room, so that no chunk is decoded while the next layer is not there.
+        if feed.wants().is_none() && !feed.is_complete() {
+            for c in feed.ready().into_iter().filter(|&c| feed.is_chunk_complete(c)).collect::<Vec<_>>() {
+                models[c] = feed.decode(c).unwrap();
+                feed.forget(c);
+                assert!(feed.decode(c).unwrap().is_none());
+            }
+        }
+    }
+    assert!(feed.is_complete());
+    for c in feed.ready() {
+        models[c] = feed.decode(c).unwrap();
+    }
+    assert!(models.into_iter().map(Option::unwrap).eq(whole));
+
+    // What is given beyond it is refused, and nothing of it taken.
+    let mut tight = self::feed(&FeedOptions::default().with_most_bytes(start + 10));
+    fill(&mut tight, file);
+    assert!(tight.head().is_some() && !tight.is_complete() && tight.held_bytes() <= start + 10);
+    let range = outline.ranges[0].bytes.clone();
+    let refused = give(&mut tight, file, range.clone()).unwrap_err();
+    assert!(matches!(refused, Error::Limit { limit, .. } if limit == start + 10), "{refused}");
+    assert_eq!(tight.held_bytes(), start);
+    // So is a start that is too long, and what comes before it is known what it is.
+    let mut none = self::feed(&FeedOptions::default().with_most_bytes(100));
+    give(&mut none, file, 0..9).unwrap_err();
+    assert!(matches!(none.feed(5000, &[0; 200]), Err(Error::Limit { .. })));
+    assert!(none.held_bytes() <= 100);
+    // What is not asked for takes no room.
+    let mut without = self::feed(&FeedOptions::default().with_sh_parts(0).with_most_bytes(start));
+    fill(&mut without, file);
+    let sh = outline.ranges.iter().find(|range| matches!(range.kind, RangeKind::Sh(_))).unwrap();
+    give(&mut without, file, sh.bytes.clone()).unwrap();
+    assert_eq!(without.held_bytes(), start);
+}
+
+#[test]
+fn chunks_are_chosen_and_ordered_by_where_they_are() {
+    let (file, outline) = (file(), outline(file()));
+    let last = outline.chunks.len() - 1;
+    let holds_point = |c: usize, point: [f32; 3]| {
+        let [least, most] = outline.chunks[c].bounds;
+        (0..3).all(|k| (least[k]..=most[k]).contains(&point[k]))
+    };
+    // A corner of a chunk of the last layer that is not in all others.
+    let layer = outline.layers.last().unwrap().chunks.clone();
+    let corners = layer.clone().flat_map(|c| {
+        let bounds = outline.chunks[c].bounds;
+        (0..8).map(move |i| std::array::from_fn(|k| bounds[i >> k & 1][k]))
+    });
+    let point = corners.into_iter().find(|&point| (0..=last).any(|c| !holds_point(c, point))).unwrap();
+    let holds = |c: usize| holds_point(c, point);
+    let mut boxed = feed(&FeedOptions::default().with_within([point, point]));
+    fill(&mut boxed, file);
+    let expected: Vec<usize> = (0..=last).filter(|&c| holds(c)).collect();
+    assert!(boxed.is_complete() && expected.len() <= last);
+    assert_eq!(boxed.ready(), expected);
+    // Another one is asked for by its number.
+    let other = (0..=last).find(|&c| !holds(c)).unwrap();
+    boxed.want(other);
+    fill(&mut boxed, file);
+    assert!(boxed.ready().contains(&other));
+    boxed.forget(other);
+    boxed.want(other);
+    assert!(!boxed.is_complete());
+
+    // Near chunks of a layer first, and bases of all before what makes them finer.
+    let mut near = feed(&FeedOptions::default().with_nearest(point));
+    let mut bases = Vec::new();
+    while let Some(range) = near.wants() {
+        let first = outline.ranges.iter().find(|r| r.bytes.contains(&range.start));
+        if let Some(first) = first {
+            bases.extend((first.kind == RangeKind::Base).then_some(first.chunk));
+            give(&mut near, file, first.bytes.clone()).unwrap();
+        } else {
+            give(&mut near, file, range).unwrap();
+        }
+    }
+    assert_eq!(bases.len(), outline.chunks.len());
+    let first = *bases.iter().find(|c| layer.contains(c)).unwrap();
+    assert!(holds(first), "{first}: {bases:?}");
+    assert!(decoded(&near) == whole(file));
+}
+
+#[test]
+fn the_first_bytes_are_read_as_they_come() {
+    let file = file();
+    let outline = outline(file);
+    let whole = LexiReader::open(NAME, file, &Limits::default()).unwrap();
+    assert_eq!(whole.whole_len(), whole.len());
+    let mut before = 0;
+    for share in [0.15, 0.3, 0.45, 0.6, 0.8, 0.999] {
+        let first = &file[..(share * file.len() as f64) as usize];
+        let reader = LexiReader::open_first(NAME, first, &Limits::default()).unwrap();
+        let bases: usize = outline
+            .ranges
+            .iter()
+            .filter(|range| range.kind == RangeKind::Base && range.bytes.end <= first.len() as u64)
+            .map(|range| outline.chunks[range.chunk].gaussians)
+            .sum();
+        assert_eq!((reader.len(), reader.whole_len()), (bases, whole.len()), "{share}");
+        assert!(reader.len() >= before);
+        before = reader.len();
+        // As a feed that got no more, and in all ways to read.
+        let mut feed = feed(&FeedOptions::default());
+        feed.feed(0, first).unwrap();
+        let parts = chunks(&reader);
+        assert!(parts == decoded(&feed), "{share}");
+        let model = reader.model().unwrap();
+        assert_eq!(model.len(), reader.len());
+        let dense: Vec<f32> = parts.iter().flat_map(Model::dense_rest).collect();
+        assert_eq!(model.dense_rest(), dense);
+        let positions: Vec<[f32; 3]> = parts.iter().flat_map(|p| p.geometry().positions.clone()).collect();
+        assert_eq!(model.geometry().positions, positions);
+        let mut splats = reader.empty();
+        reader.read(0..reader.len(), &mut splats).unwrap();
+        assert_eq!(splats, model.into_splats());
+        assert!(reader.packed().is_err() && reader.order(0..1).is_err() && !reader.order_kept());
+    }
+    assert_eq!(before, whole.len());
+    let all = LexiReader::open_first(NAME, file, &Limits::default()).unwrap();
+    assert_eq!(all.model().unwrap(), whole.model().unwrap());
+    assert_eq!(all.packed().unwrap(), whole.packed().unwrap());
+}
+
+#[test]
+fn first_bytes_without_a_head_are_refused() {
+    let file = file();
+    let start = place(outline(file).ranges[0].bytes.start);
+    for len in [0, 5, 9, 200, start - 1] {
+        let error = LexiReader::open_first(NAME, &file[..len], &Limits::default()).unwrap_err();
+        assert!(len < 8 || error.to_string().contains("truncated"), "{len}: {error}");
+    }
+    assert_eq!(LexiReader::open_first(NAME, &file[..start], &Limits::default()).unwrap().len(), 0);
+    let long = [file, &[0]].concat();
+    let error = LexiReader::open_first(NAME, &long, &Limits::default()).unwrap_err();
+    assert!(error.to_string().contains("too long"), "{error}");
+    // Limits concern what is there.
+    let first = &file[..file.len() / 4];
+    let there = LexiReader::open_first(NAME, first, &Limits::default()).unwrap().len() as u64;
+    assert!(LexiReader::open_first(NAME, first, &Limits::default().with_gaussians(there)).is_ok());
+    let few = Limits::default().with_gaussians(there - 1);
+    assert!(matches!(LexiReader::open_first(NAME, first, &few), Err(Error::Limit { .. })));
+    let golden =
+        |name: &str| std::fs::read(format!("{}/tests/golden/{name}", env!("CARGO_MANIFEST_DIR"))).unwrap();
+    for name in ["f16.lexi", "paper.lexi", "packed.lexi"] {
+        let bytes = golden(name);
+        let version = LexiReader::open(name, &bytes, &Limits::default()).unwrap();
+        if version.outline().is_some() {
+            continue;
+        }
+        for len in [bytes.len(), bytes.len() - 1] {
+            let error = LexiReader::open_first(name, &bytes[..len], &Limits::default()).unwrap_err();
+            assert!(error.to_string().contains("only read whole"), "{name}: {error}");
+        }
+        assert!(matches!(version.with_sh_parts(0), Err(Error::Parameter { .. })));
+        let error = feed(&FeedOptions::default()).feed(0, &bytes).unwrap_err();
+        assert!(error.to_string().contains("only read whole"), "{name}: {error}");
+    }
+}
+
+#[test]
+fn extras_are_left_out_of_a_first_part() {
+    let splats = with_extras(sample(500, 3, 1));
+    let file = bytes(&pack(&splats, STEP, &options(|o| o.keep_order = true)).0);
+    let end = outline(&file).ranges.last().unwrap().bytes.end;
+    let reader = LexiReader::open_first(NAME, &file[..place(end)], &Limits::default()).unwrap();
+    assert!(reader.empty().geometry.extras.is_empty() && !reader.order_kept());
+    let model = reader.model().unwrap();
+    assert_eq!(model.len(), 500);
+    let mut feed = feed(&FeedOptions::default());
+    fill(&mut feed, &file);
+    assert_eq!(feed.decode(0).unwrap(), Some(model));
+    let all = LexiReader::open_first(NAME, &file[..], &Limits::default()).unwrap();
+    assert_eq!(all.empty().geometry.extras.len(), 2);
+}
+
+#[test]
+fn parts_of_sh_are_dropped_and_colours_seen_stay() {
+    let file = file();
+    let open = || LexiReader::open(NAME, file, &Limits::default()).unwrap();
+    let parts = outline(file).layers[0].sh_parts;
+    let full = open().model().unwrap();
+    assert_eq!(open().with_sh_parts(parts).unwrap().model().unwrap(), full);
+    let mut before = full.codes().nonzeros();
+    for sh_parts in (0..parts).rev() {
+        let model = open().with_sh_parts(sh_parts).unwrap().model().unwrap();
+        assert!(model.codes().nonzeros() < before);
+        before = model.codes().nonzeros();
+        assert_eq!(model.geometry().positions, full.geometry().positions);
+        assert_ne!(model.geometry().dc, full.geometry().dc);
+        let mut feed = feed(&FeedOptions::default().with_sh_parts(sh_parts));
+        fill(&mut feed, file);
+        let chunks = chunks(&open().with_sh_parts(sh_parts).unwrap());
+        assert!(decoded(&feed) == chunks);
+    }
+    assert_eq!(before, 0);
+    // From the points of view the scene has on average the colour that it has with SH-rest.
+    let without = open().with_sh_parts(0).unwrap().model().unwrap();
+    let dense = full.clone().into_splats();
+    let points = [[0.0, -1.0, -4.0], [3.0, -1.0, 2.0_f32]];
+    for i in (0..dense.len()).step_by(97) {
+        let position = dense.geometry.positions[i];
+        let mut expected = dense.geometry.dc[i];
+        for point in points {
+            let off: [f32; 3] = std::array::from_fn(|k| position[k] - point[k]);
+            let length = off.iter().map(|x| x * x).sum::<f32>().sqrt();
+            let basis = lexisplat::sh::rest_basis(dense.degree, off.map(|x| x / length));
+            let per_channel = dense.degree.rest_per_channel();
+            for (c, expected) in expected.iter_mut().enumerate() {
+                let row = &dense.rest(i)[c * per_channel..][..per_channel];
+                let seen: f32 = row.iter().zip(basis).map(|(a, b)| a * b).sum();
+                *expected += seen / (0.282_094_8 * points.len() as f32);
+            }
+        }
+        for (found, expected) in without.geometry().dc[i].iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-2 + 1e-2 * expected.abs(), "{i}: {found} {expected}");
+        }
+    }
+}
+
+#[test]
+fn integers_are_verified_when_asked_for() {
+    let file = file();
+    let open = |file| LexiReader::open(NAME, file, &Limits::default()).unwrap();
+    let verified = open(file).with_integers_verified().unwrap();
+    assert_eq!(verified.model().unwrap(), open(file).model().unwrap());
+    for share in [0.2, 0.5] {
+        let first = &file[..(share * file.len() as f64) as usize];
+        let reader = LexiReader::open_first(NAME, first, &Limits::default()).unwrap();
+        reader.with_integers_verified().unwrap().model().unwrap();
+    }
+    let reader = open(file).with_sh_parts(1).unwrap();
+    reader.with_integers_verified().unwrap().model().unwrap();
+}
+
+#[test]
+fn wrong_sums_of_integers_are_found_when_asked_for() {
+    let mut parts = Parts::of(file());
+    // The head ends with the sum of the last range.
+    *parts.tensor("packed.head").unwrap().last_mut().unwrap() ^= 1;
+    let file = parts.sealed();
+    let last = outline(&file).ranges.last().unwrap().clone();
+    assert_ne!(outline(super::feed::file()).ranges.last().unwrap().integers, last.integers);
+    let open = || LexiReader::open(NAME, &file[..], &Limits::default()).unwrap();
+    assert!(open().model().is_ok());
+    let said = |error: Error| {
+        let expected =
+            format!("the integers of range {} of chunk {}'", number(&last.kind, &file), last.chunk);
+        assert!(error.to_string().contains(&expected), "{error}: {expected}");
+    };
+    said(open().with_integers_verified().unwrap().model().unwrap_err());
+    for (verify, fails) in [(false, false), (true, true)] {
+        let mut feed = feed(&FeedOptions::default().with_verify_integers(verify));
+        fill(&mut feed, &file);
+        let result = feed.decode(last.chunk);
+        assert_eq!(result.is_err(), fails);
+        result.err().map_or((), said);
+    }
+}
+
+/// The number by which errors name a range of the last layer.
+fn number(kind: &RangeKind, file: &[u8]) -> usize {
+    let levels = outline(file).layers.last().unwrap().levels;
+    match kind {
+        RangeKind::Base => 0,
+        RangeKind::Refinement(level) => 1 + level,
+        RangeKind::Sh(part) => 1 + levels + part,
+        other => panic!("{other:?} in the last layer"),
+    }
+}
