@@ -38,7 +38,7 @@ struct Decoded {
 fn decoded(of: &LayeredDecoder, packed: &Packed, c: usize, there: impl Fn(usize) -> bool) -> Option<Decoded> {
     let chunk = &of.head.index.chunks[c];
     let form = of.head.index.layer(chunk.layer);
-    let mut ranges = of.checked(packed.data(), c, chunk).unwrap();
+    let mut ranges = of.checked(Data::First(packed.data()), c, chunk, |_| true).unwrap();
     ranges.iter_mut().enumerate().for_each(|(k, range)| *range = range.filter(|_| there(k)));
     let (mut geometry, mut counts) = (Geometry::zeros(chunk.gaussians), vec![0; chunk.gaussians]);
     let spans = std::slice::from_ref(&(0..chunk.gaussians)).to_vec();
