@@ -151,7 +151,8 @@ impl Decoder {
     ) -> Result<(Geometry, SparseCodes, BitCounts)> {
         let span = self.spans.get(c).cloned().unwrap_or_default();
         let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
-        let mut place = places(&mut g, &mut counts, &[0..span.len()]).pop().unwrap_or_default();
+        let own = 0..span.len();
+        let mut place = places(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
         let piece = self.piece(data, c, 0, &mut place, budget, count_bits)?;
         let dictionary = self.dictionary();
         let (indices, values) = (indices(dictionary, piece.atoms), Values::F16(piece.values));

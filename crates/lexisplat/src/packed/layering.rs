@@ -16,8 +16,8 @@ const FACTOR_STEPS: usize = 60;
 const LEAST_CHUNK: usize = 8192;
 const MOST_CHUNK: usize = 32_768;
 const CHUNKS: usize = 8;
-/// A rest of up to this share of a chunk is part of the one before.
-const REST: f64 = 0.5;
+/// A rest of up to a chunk over this is part of the one before.
+const REST: usize = 2;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
 /// Levels of refinement of each layer.
@@ -61,6 +61,7 @@ impl Layering {
         let last = 1.0 - SHARES.iter().sum::<f64>();
         let shares = SHARES.into_iter().chain([last]);
         let size = |share: f64| {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
             let count = (share * gaussians as f64) as usize;
             (count / CHUNKS).next_power_of_two().clamp(LEAST_CHUNK, MOST_CHUNK)
         };
@@ -101,7 +102,7 @@ impl Layering {
     /// Gaussians of the next chunk of a layer of which so many are left, or 0 if more may follow and decide.
     pub(super) fn next_chunk(&self, layer: usize, left: usize, all: bool) -> usize {
         let size = self.chunks.get(layer).copied().unwrap_or(MOST_CHUNK);
-        match left > size + (REST * size as f64) as usize {
+        match left > size + size / REST {
             true => size,
             false if all => left,
             false => 0,
@@ -177,6 +178,7 @@ struct Order {
 
 impl Order {
     fn put(&mut self, chunk: usize, kind: usize) {
+        #[expect(clippy::cast_possible_truncation, reason = "files have fewer chunks, and chunks few kinds")]
         self.order.push(Place { chunk: chunk as u32, kind: kind as u8 });
     }
 

@@ -38,7 +38,9 @@ fn gather(code: u64) -> u32 {
         let mask = if k == 0 { (1 << BITS) - 1 } else { MASKS[k - 1].1 };
         x = (x | (x >> MASKS[k].0)) & mask;
     }
-    (x & u64::from(u32::MAX)) as u32
+    #[expect(clippy::cast_possible_truncation, reason = "masked")]
+    let low = (x & u64::from(u32::MAX)) as u32;
+    low
 }
 
 #[cfg(test)]

@@ -46,19 +46,21 @@ pub struct Record {
     pub over_tolerance: u64,
 }
 
-/// Significant digits of the errors of packed files.
-const ERROR_DIGITS: usize = 5;
+/// Digits of the errors of packed files after the first one, and half a step of a number that has the smallest first digit,
+/// as a share of it.
+const ERROR_DIGITS: usize = 4;
+const HALF_STEP: f64 = 0.5e-4;
 
 impl Record {
     /// The same with errors of few digits. The largest error is not below the exact one, and within a tolerance that the
     /// exact one keeps.
     pub(crate) fn shortened(self) -> Self {
-        let near = |x: f64| format!("{x:.0$e}", ERROR_DIGITS - 1).parse().unwrap_or(x);
+        let near = |x: f64| format!("{x:.ERROR_DIGITS$e}").parse().unwrap_or(x);
         let exact = self.max_residual;
         let mut most = near(exact);
         if most < exact {
-            // The next number of as many digits, within half of its last place.
-            most = near(exact * (1.0 + 0.5 * 10.0_f64.powi(1 - ERROR_DIGITS as i32)));
+            // The next number of as many digits.
+            most = near(exact * (1.0 + HALF_STEP));
         }
         if most < exact {
             most = exact;

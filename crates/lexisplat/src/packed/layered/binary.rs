@@ -202,13 +202,16 @@ mod tests {
     use super::*;
     use crate::support::rng::SplitMix64;
 
+    /// Codes a number in two ways.
+    type Coder<'c> = dyn FnMut(&mut SignedOdds, &mut [Odds], i32) -> (i32, u32) + 'c;
+
     #[test]
     fn numbers_come_back() {
         let mut rng = SplitMix64::new(3);
         for count in [0, 1, 2, 7, 300, 5000] {
             let values: Vec<i32> =
                 (0..count).map(|_| (rng.next() as i32 >> 17) >> (rng.next() % 15)).collect();
-            let walk = |bits: &mut dyn FnMut(&mut SignedOdds, &mut [Odds], i32) -> (i32, u32)| {
+            let walk = |bits: &mut Coder<'_>| {
                 let (mut odds, mut lengths) = (SignedOdds::default(), [Odds::default(); 15]);
                 values.iter().map(|&v| bits(&mut odds, &mut lengths, v)).collect::<Vec<_>>()
             };

@@ -1,5 +1,15 @@
 //! Version 3 of packed files: layers of chunks that are decoded coarse to fine.
 
+#![expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    reason = "a chunk has at most 65,536 Gaussians, and values are within limits that are checked or clamped"
+)]
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over lanes are written out, since iterators over several arrays do not become vector code"
+)]
+
 mod around;
 mod atoms;
 mod axes;

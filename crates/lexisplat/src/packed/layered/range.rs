@@ -126,7 +126,7 @@ fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
             let precision = Slot::stream_of(context).precision();
             let Model { start, share } = tables.model(context, entry.to_le_bytes()[0]);
             make_room(&mut state, u64::from(share) << (32 - precision));
-            state = (state / share << precision) + start + state % share;
+            state = ((state / share) << precision) + start + state % share;
         } else {
             let count = entry >> 16 & 0xff;
             make_room(&mut state, 1 << (32 - count));

@@ -283,9 +283,9 @@ impl Steering {
     fn logarithms(row: &[i32; SLOPES], class: &Lanes<u32>, scales: &[Lanes; 3]) -> Lanes {
         let mut logs = [0; LANES];
         for l in 0..LANES {
-            let slopes = (row[1] * scales[0][l] >> COEFFICIENT_BITS)
-                + (row[2] * scales[1][l] >> COEFFICIENT_BITS)
-                + (row[3] * scales[2][l] >> COEFFICIENT_BITS);
+            let slopes = ((row[1] * scales[0][l]) >> COEFFICIENT_BITS)
+                + ((row[2] * scales[1][l]) >> COEFFICIENT_BITS)
+                + ((row[3] * scales[2][l]) >> COEFFICIENT_BITS);
             logs[l] = row[0] + (class[l].cast_signed() << FEATURE_BITS) + slopes;
         }
         logs
@@ -318,7 +318,7 @@ impl Steering {
     /// Logarithms of the steps of the position along each axis.
     #[inline(always)]
     pub(super) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
-        let most = each(|l| MOST_MOVE + (scales[0][l] * OCTAVES_PER_E >> FEATURE_BITS));
+        let most = each(|l| MOST_MOVE + ((scales[0][l] * OCTAVES_PER_E) >> FEATURE_BITS));
         let log = |row: &[i32; SLOPES]| {
             let logs = Self::logarithms(row, class, scales);
             each(|l| logs[l].min(most[l]))

@@ -26,14 +26,14 @@ pub(super) fn numbers(values: &Lanes) -> Lanes<f32> {
 fn exp2(x: f64) -> f64 {
     // Taylor series of (2^f - 1) / f for f from -0.5 to 0.5, of which the error is below 2^-31.
     const TERMS: [f64; 8] = [
-        0.693_147_180_559_945_3,
+        std::f64::consts::LN_2,
         0.240_226_506_959_100_7,
         0.055_504_108_664_821_58,
         0.009_618_129_107_628_477,
         0.001_333_355_814_642_844_3,
         0.000_154_035_303_933_816_1,
         0.000_015_252_733_804_059_84,
-        0.000_001_321_548_679_014_430_9,
+        0.000_001_321_548_679_014_431,
     ];
     let x = x.clamp(-1000.0, 1000.0);
     // Adding and taking away this number rounds to a whole one.

@@ -1,7 +1,5 @@
 //! The coder of a range against one that is written plainly, a lane at a time.
 
-#![expect(clippy::cast_possible_truncation, reason = "test values fit")]
-
 use proptest::prelude::*;
 
 use super::*;
