@@ -85,17 +85,6 @@ impl RangeKind {
             _ => Self::Interim,
         }
     }
-
-    /// Its name in reports.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Base => "base",
-            Self::Refinement(_) => "refinements",
-            Self::Sh(_) => "SH parts",
-            Self::Interim => "interim changes",
-        }
-    }
 }
 
 impl Outline {

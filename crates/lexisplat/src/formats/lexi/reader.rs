@@ -7,7 +7,9 @@ use super::checked::{Checked, Extent, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, tensor};
+use super::schema::{
+    EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor,
+};
 use crate::packed::{CHUNK, Data, Decoder, Outline, Packed, PackedHead, StreamBits};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
@@ -190,6 +192,16 @@ impl<'a> LexiReader<'a> {
     #[must_use]
     pub fn layout(&self) -> Layout {
         self.layout
+    }
+
+    /// Version of the format that the file is of.
+    #[must_use]
+    pub fn version(&self) -> u64 {
+        match &self.kind {
+            Kind::Exact(_) => VERSION,
+            Kind::Packed(packed) if packed.outline.is_some() => PACKED_VERSION,
+            Kind::Packed(_) => FLAT_VERSION,
+        }
     }
 
     /// SH degree.
