@@ -31,7 +31,7 @@ fn indexes(parts: usize, interim: bool) -> impl Strategy<Value = Index> {
             let bounds = [[a, b, c], [d, e, f]];
             index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges });
         }
-        index.chunks.sort_by_key(|chunk| chunk.layer);
+        index.chunks.sort_by_key(|chunk| (chunk.layer, chunk.cell));
         let all = index.chunks.iter().zip(0_u32..);
         let place = |(chunk, number): (&Chunk, u32)| {
             (0..chunk.ranges.len() as u8).map(move |kind| Place { chunk: number, kind })
