@@ -6,14 +6,16 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
 use anyhow::Result;
+use lexisplat::lexi::LexiReader;
 use lexisplat::output::{Existing, Output, OutputGroup};
+use lexisplat::packed::RangeKind;
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::{SceneFile, png};
 use lexisplat_render::Image;
 use serde::Serialize;
 
-use crate::args::Common;
+use crate::args::{Common, Part};
 use crate::exit::{Misuse, OutputExists};
 use crate::terminal::STANDARD_OUTPUT;
 pub(crate) use crate::terminal::{note, print, print_json, warn};
@@ -52,6 +54,42 @@ pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
     let (name, bytes) = input(path, common)?;
     let options = ReadOptions::default().with_limits(common.limits()?);
     Ok(SceneFile::read_bytes(&name, &bytes, &options)?)
+}
+
+/// Opens the .lexi file `bytes`, which messages call `name`, or the part of it that is asked for.
+pub(crate) fn open_lexi<'a>(
+    name: &str,
+    bytes: &'a [u8],
+    part: &Part,
+    common: &Common,
+) -> Result<LexiReader<'a>> {
+    let limits = common.limits()?;
+    let lexi = match part.first {
+        None => LexiReader::open(name, bytes, &limits)?,
+        Some(first) => LexiReader::open_first(name, first.of(bytes), &limits)?,
+    };
+    if lexi.is_empty() && lexi.whole_len() > 0 {
+        let bases = lexi.outline().map(|outline| outline.ranges.iter());
+        let bases = bases.into_iter().flatten().filter(|range| range.kind == RangeKind::Base);
+        let least = bases.map(|range| range.bytes.end).min().unwrap_or(0);
+        let problem = format!("{name}: no Gaussian is whole in the first part that is asked for");
+        let help = format!("the first Gaussians need {least} bytes: --first {least}");
+        return Err(Misuse { problem, help }.into());
+    }
+    match part.sh_parts {
+        Some(parts) => Ok(lexi.with_sh_parts(parts)?),
+        None => Ok(lexi),
+    }
+}
+
+/// Reads a scene of any kind, or the part of a packed file that is asked for.
+pub(crate) fn load_part(path: &Path, part: &Part, common: &Common) -> Result<SceneFile> {
+    if !part.is_given() {
+        return load(path, common);
+    }
+    let (name, bytes) = input(path, common)?;
+    let lexi = open_lexi(&name, &bytes, part, common)?;
+    Ok(SceneFile::of_lexi(&lexi, &name, bytes.len() as u64)?)
 }
 
 /// Returns the output of a command that turns the scene `input` into a file of the kind `extension`: `output` if

@@ -6,6 +6,7 @@ mod cli;
 mod demo;
 mod determinism;
 mod eval;
+mod first;
 mod folder;
 mod gpu;
 #[cfg(target_os = "linux")]

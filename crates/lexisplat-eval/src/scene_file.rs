@@ -61,6 +61,16 @@ impl SceneFile {
         Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
     }
 
+    /// The scene that is there of a .lexi file called `name`, of `bytes` bytes in all, with what `reader` was told to leave
+    /// out.
+    ///
+    /// # Errors
+    /// What [`LexiReader::model`] says.
+    pub fn of_lexi(reader: &LexiReader<'_>, name: &str, bytes: u64) -> Result<Self> {
+        let loaded = Loaded::Lexi(Box::new(reader.model()?), None);
+        Ok(Self { loaded, name: name.to_owned(), bytes })
+    }
+
     /// The scene, to draw.
     #[must_use]
     pub fn scene(&self) -> Scene<'_> {

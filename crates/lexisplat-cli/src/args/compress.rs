@@ -8,6 +8,7 @@ use lexisplat::{Layout, Pursuit};
 use lexisplat_eval::SceneKind;
 use lexisplat_render::Device;
 
+use super::part::Part;
 use super::values::{preset, scene_kind, size, whole};
 
 /// Heading of the options that say how good or how small the file shall be.
@@ -179,4 +180,6 @@ pub(crate) struct Decompress {
     /// The PLY; `-` writes to standard output [default: the input's name with extension .ply].
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) part: Part,
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat_render::gpu::ShPath;
 
+use super::part::Part;
 use super::values::{sh_path, whole};
 use super::views::Views;
 
@@ -16,6 +17,8 @@ pub(crate) struct Render {
     /// Folder for the pictures [default: the scene's name with `-views` added].
     #[arg(short, long, value_name = "DIR")]
     pub(crate) output: Option<PathBuf>,
+    #[command(flatten)]
+    pub(crate) part: Part,
     #[command(flatten)]
     pub(crate) views: Views,
 }

@@ -4,6 +4,7 @@ mod compress;
 mod draw;
 mod eval;
 mod limits;
+mod part;
 mod values;
 mod views;
 
@@ -18,6 +19,7 @@ pub(crate) use self::compress::{Compress, Decompress};
 pub(crate) use self::draw::View;
 pub(crate) use self::draw::{Bench, Compare, Render};
 pub(crate) use self::eval::{Eval, Measures, Sweep};
+pub(crate) use self::part::Part;
 use self::values::whole;
 pub(crate) use self::views::Views;
 use crate::exit::AFTER_HELP;
@@ -104,6 +106,9 @@ pub(crate) struct Info {
     /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
+    /// Verify the checksums of all numbers that a packed file decodes to, too. Those of its bytes are always verified.
+    #[arg(long)]
+    pub(crate) verify: bool,
 }
 
 /// List the GPUs that can draw, the best first.

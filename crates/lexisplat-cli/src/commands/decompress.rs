@@ -3,14 +3,13 @@
 use std::time::Instant;
 
 use anyhow::Result;
-use lexisplat::lexi::LexiReader;
 use lexisplat::stream;
 use serde_json::json;
 
 use lexisplat_eval::format;
 
 use crate::args::{Common, Decompress};
-use crate::files::{check_output, input, is_pipe, output_path, tell, write_output};
+use crate::files::{check_output, input, is_pipe, open_lexi, output_path, tell, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -20,7 +19,7 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     check_output(&output, &[&args.input], common.overwrite)?;
     stop::while_writing(if is_pipe(&output) { Work::Stream } else { Work::Files(1) });
     let (name, bytes) = input(&args.input, common)?;
-    let lexi = LexiReader::open(&name, &bytes, &common.limits()?)?;
+    let lexi = open_lexi(&name, &bytes, &args.part, common)?;
     let bars = Bars::new(common.quiet);
     let bytes = write_output(&output, common.overwrite, |sink| stream::decompress(&lexi, sink, &bars))?;
     let seconds = start.elapsed().as_secs_f64();
@@ -31,12 +30,16 @@ pub(crate) fn run(args: &Decompress, common: &Common) -> Result<()> {
     let json = json!({
         "output": name.to_string(),
         "gaussians": lexi.len(),
+        "gaussians_in_file": lexi.whole_len(),
         "sh_degree": lexi.degree().get(),
         "ply_bytes": bytes,
         "total_seconds": seconds,
     });
     tell(common, json, || {
-        let count = format::count(lexi.len() as u64);
+        let mut count = format::count(lexi.len() as u64);
+        if lexi.len() < lexi.whole_len() {
+            count = format!("{count} of {}", format::count(lexi.whole_len() as u64));
+        }
         let (degree, bytes) = (lexi.degree(), format::bytes(bytes));
         Ok(format!("wrote {name}: {count} Gaussians, SH degree {degree}, {bytes}, {seconds:.1} s\n"))
     })

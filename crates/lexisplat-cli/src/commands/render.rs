@@ -10,7 +10,7 @@ use serde_json::json;
 
 use crate::args::{Common, Render};
 use crate::device::open_renderer;
-use crate::files::{check_free, is_pipe, load, make_folder, tell, view_name, warn_of, write_picture};
+use crate::files::{check_free, is_pipe, load_part, make_folder, tell, view_name, warn_of, write_picture};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -19,7 +19,7 @@ const STANDARD_INPUT_VIEWS: &str = "stdin-views";
 
 pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     let folder = args.output.clone().unwrap_or_else(|| folder_for(&args.file));
-    let input = load(&args.file, common)?;
+    let input = load_part(&args.file, &args.part, common)?;
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;

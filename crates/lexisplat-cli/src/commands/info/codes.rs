@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::Record;
-use lexisplat::lexi::{self, LexiReader};
+use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{ReachedRecord, StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
 use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
@@ -13,6 +13,7 @@ use lexisplat_eval::format;
 use serde::Serialize;
 
 use super::bars;
+use super::layers::LayersFacts;
 use crate::commands::compress::{error_line, record_line, removed_line};
 
 /// Bytes of a Gaussian's SH in a dense scene of degree 3, DC included, in f32.
@@ -37,6 +38,8 @@ pub(super) struct LexiFacts<'a> {
     resident_sh_bytes: u64,
     resident_sh_bytes_per_gaussian: f64,
     checksums: &'static str,
+    /// Whether the checksums of integers match, if they were verified.
+    integer_checksums: Option<&'static str>,
     sh_bytes: ByteCount,
     attribute_bytes: BTreeMap<&'a str, ByteCount>,
     #[serde(flatten)]
@@ -59,6 +62,8 @@ struct PackedFacts<'a> {
     device: &'a str,
     order_kept: bool,
     stream_bits_per_gaussian: BTreeMap<&'a str, f64>,
+    #[serde(flatten)]
+    layers: Option<LayersFacts>,
     #[serde(skip)]
     streams: &'a [StreamBits],
 }
@@ -69,7 +74,14 @@ pub(super) fn parts(lexi: &LexiReader<'_>, survey: &Survey) -> Vec<(String, f64)
 }
 
 impl<'a> LexiFacts<'a> {
-    pub(super) fn new(lexi: &'a LexiReader<'_>, survey: &'a Survey, parts: &'a [(String, f64)]) -> Self {
+    /// The facts about the file that `lexi` read. `verified` tells whether the checksums of integers were verified.
+    pub(super) fn new(
+        lexi: &'a LexiReader<'_>,
+        survey: &'a Survey,
+        parts: &'a [(String, f64)],
+        file_bytes: u64,
+        verified: bool,
+    ) -> Self {
         let (record, gaussians) = (lexi.record(), lexi.len());
         let each = |value: f64| value / gaussians.max(1) as f64;
         let streams = &survey.stream_bits;
@@ -80,10 +92,11 @@ impl<'a> LexiFacts<'a> {
             device: head.device.as_deref().unwrap_or(CPU),
             order_kept: lexi.order_kept(),
             stream_bits_per_gaussian: streams.iter().map(|s| (s.name.as_str(), each(s.bits))).collect(),
+            layers: lexi.outline().map(|outline| LayersFacts::new(outline, file_bytes)),
             streams,
         });
         Self {
-            version: if packed.is_some() { lexi::PACKED_VERSION } else { lexi::VERSION },
+            version: lexi.version(),
             layout: lexi.layout().name(),
             made: record.into(),
             atoms: lexi.dictionary().len(),
@@ -94,6 +107,7 @@ impl<'a> LexiFacts<'a> {
             resident_sh_bytes: survey.resident_sh_bytes,
             resident_sh_bytes_per_gaussian: each(survey.resident_sh_bytes as f64),
             checksums: "ok",
+            integer_checksums: verified.then_some("ok"),
             sh_bytes: sh_bytes(parts).into(),
             attribute_bytes: parts.iter().map(|(name, bytes)| (name.as_str(), (*bytes).into())).collect(),
             packed,
@@ -114,7 +128,11 @@ impl<'a> LexiFacts<'a> {
             (Some(_), _) => ", order of the source not kept".to_owned(),
             (None, pursuit) => pursuit.map(|name| format!(", pursuit {name}")).unwrap_or_default(),
         };
-        writeln!(out, ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match")?;
+        let sums = if self.integer_checksums.is_some() { ", also those of integers" } else { "" };
+        writeln!(
+            out,
+            ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match{sums}"
+        )?;
         if let Some(line) = packed.as_ref().and_then(|packed| record_line(packed.reached, packed.promise)) {
             writeln!(out, "pictures: {line}")?;
         }
@@ -135,6 +153,9 @@ impl<'a> LexiFacts<'a> {
             self.resident_sh_bytes_per_gaussian
         )?;
         self.parts_text(out)?;
+        if let Some(layers) = packed.as_ref().and_then(|packed| packed.layers.as_ref()) {
+            layers.text(out)?;
+        }
         if *atoms > 0 {
             writeln!(out, "\nGaussians by nonzeros")?;
             let last = self.nonzero_histogram.iter().rposition(|&n| n > 0).unwrap_or(0);

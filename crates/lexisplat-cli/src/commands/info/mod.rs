@@ -1,6 +1,7 @@
 //! `lexisplat info`.
 
 mod codes;
+mod layers;
 
 use std::fmt::Write as _;
 
@@ -8,7 +9,7 @@ use anyhow::Result;
 use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
-use lexisplat::{FileKind, SplatSource as _, Splats, stream};
+use lexisplat::{Error, FileKind, SplatSource as _, Splats, stream};
 use lexisplat_eval::format;
 use serde::Serialize;
 
@@ -26,12 +27,18 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
     if FileKind::of(&name, &bytes) == FileKind::Lexi {
-        let lexi = LexiReader::open(&name, &bytes, &limits)?;
+        let mut lexi = LexiReader::open(&name, &bytes, &limits)?;
+        if args.verify {
+            lexi = lexi.with_integers_verified()?;
+        }
         let survey = stream::survey(&lexi, &std::env::temp_dir())?;
         let parts = codes::parts(&lexi, &survey);
-        let lexi_facts = LexiFacts::new(&lexi, &survey, &parts);
+        let lexi_facts = LexiFacts::new(&lexi, &survey, &parts, file.1, args.verify);
         return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: Box::new(lexi_facts) })
             .print(common);
+    }
+    if args.verify {
+        return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let ply = PlySource::open(&name, &bytes, &read, &bars)?;
