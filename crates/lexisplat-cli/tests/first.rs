@@ -65,9 +65,9 @@ fn parts_that_hold_nothing_or_cannot_be_read_are_refused() {
     assert!(error.contains("truncated"), "{error}");
     // The advice is followed.
     let layers = folder.json(&["info", "large.lexi"]);
-    let complete = number(&layers["lexi"]["first_layer"]["bytes"]);
-    let base = number(&layers["lexi"]["layers"][0]["bytes"]["base"]);
-    let before = ((complete - base) as u64).to_string();
+    let complete = layers["lexi"]["first_layer"]["bytes"].as_u64().unwrap();
+    let base = layers["lexi"]["layers"][0]["bytes"]["base"].as_u64().unwrap();
+    let before = (complete - base).to_string();
     let error = folder.fail(&["decompress", "large.lexi", "--first", &before, "-o", "x.ply"], 5);
     let advice = error.split("--first ").nth(1).unwrap().split_whitespace().next().unwrap().to_owned();
     folder.run(&["decompress", "large.lexi", "--first", &advice, "-o", "least.ply"]);
