@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
-"""Decodes .lexi files twice, by decode_lexi.py and by the program, and compares every bit.
+"""Decodes .lexi files twice, by decode_lexi.py and by the program, and compares them.
 
     python3 scripts/check_decoder.py LEXISPLAT FILE.lexi ...
 
-LEXISPLAT is the program. Needs NumPy.
+LEXISPLAT is the program. Needs NumPy. Of versions 1 and 2 every bit is the same. Of version 3 the integers of every
+range have the CRC-32 of the index, scales, SH-rest and extras are the same, and all else is within the bounds of
+docs/FORMAT.md.
 """
 
 import subprocess
@@ -38,22 +40,40 @@ def read_ply(path):
 
 
 def differences(file, program, folder):
-    """Return the names of the columns that differ."""
+    """Return what is wrong, and a few words on what was compared."""
     ply = Path(folder) / "decoded.ply"
     subprocess.run([program, "decompress", "--quiet", "--overwrite", file, "-o", ply], check=True, stderr=subprocess.DEVNULL)
     theirs = read_ply(ply)
     _, ours = decode(Path(file).read_bytes())
     ours = in_source_order(ours)
-    columns = dict(ours["extras"])
-    for name, parts in COLUMNS.items():
-        values = ours[name].reshape(len(ours["position"]), -1)
-        columns.update({part: values[:, k] for k, part in enumerate(parts)})
-    columns.update({f"f_rest_{k}": ours["sh_rest"][:, k] for k in range(ours["sh_rest"].shape[1])})
+    found, words = [], "the same"
+    if "integers" in ours:
+        ranges = ours["integers"]
+        found = [f"integers of range {k}" for k, (_, right) in sorted(ranges.items()) if not right]
+        found += [f"range {k} was not decoded" for k in sorted(set(ours["ranges"]) - set(ranges))]
+        words = f"{len(ranges)} ranges, {sum(n for n, _ in ranges.values())} integers"
     if len(theirs) != len(ours["position"]):
-        return ["number of Gaussians"]
-    missing = set(theirs.dtype.names) - set(columns) - {"nx", "ny", "nz"}
-    return sorted(missing) + [name for name, values in columns.items()
-                              if name not in theirs.dtype.names or values.tobytes() != theirs[name].tobytes()]
+        return found + ["number of Gaussians"], words
+    columns = dict(ours["extras"])
+    columns.update({f"f_rest_{k}": ours["sh_rest"][:, k] for k in range(ours["sh_rest"].shape[1])})
+    known = set(columns) | {"nx", "ny", "nz"}
+    for name, parts in COLUMNS.items():
+        known |= set(parts)
+        if not set(parts) <= set(theirs.dtype.names):
+            found.append(name)
+        elif name in ours.get("ideal", {}):
+            ideal, bound = (x.reshape(len(theirs), len(parts)) for x in ours["ideal"][name])
+            far = abs(np.stack([theirs[p] for p in parts], 1).astype(np.float64) - ideal)
+            if not (far <= bound).all():                # NaNs are not
+                found.append(name)
+            ratio = np.divide(far, bound, out=np.zeros_like(far), where=far > 0).max(initial=0)
+            words += f", {name} {ratio:.2f}"
+        else:
+            values = ours[name].reshape(len(theirs), len(parts))
+            columns.update({part: values[:, k] for k, part in enumerate(parts)})
+    return found + sorted(set(theirs.dtype.names) - known) + [
+        name for name, values in columns.items()
+        if name not in theirs.dtype.names or values.tobytes() != theirs[name].tobytes()], words
 
 
 def main():
@@ -62,9 +82,9 @@ def main():
     bad = False
     with tempfile.TemporaryDirectory() as folder:
         for file in sys.argv[2:]:
-            found = differences(file, sys.argv[1], folder)
+            found, words = differences(file, sys.argv[1], folder)
             bad |= bool(found)
-            print(f"{file}: {'differs in ' + ', '.join(found) if found else 'the same'}")
+            print(f"{file}: {'differs in ' + ', '.join(found) if found else words}")
     sys.exit(bad)
 
 

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Decoder of .lexi files (layouts packed, f32, f16 and paper) with NumPy alone.
 
-It is written from docs/FORMAT.md. Usage: decode_lexi.py FILE.lexi OUT.npz
+It is written from docs/FORMAT.md and docs/FORMAT-2.md; lexi3.py beside it holds what is of version 3 alone.
+Usage: decode_lexi.py FILE.lexi OUT.npz [BYTES], where BYTES is how much of the beginning to decode.
 """
 import json
 import math
@@ -13,10 +14,13 @@ from bisect import bisect_right
 
 import numpy as np
 
+import lexi3
+from lexi3 import LexiError, check
+
 F = np.float32
 CHUNK = 32768
 MAX_HEADER = 4 << 20
-NEWEST = 2
+NEWEST = 3
 TINY = F(2.0 ** -126)
 SQRT2, PI, HALF, ONE, TWO = F(math.sqrt(2)), F(math.pi), F(0.5), F(1), F(2)
 FINE = F(0.2102241)
@@ -30,15 +34,6 @@ RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_(0|[1-9][0-9]*)|scale_[0
 INTEGER = re.compile(r"0|[1-9][0-9]*")
 NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 CELL, COLOUR, SHAPE, SCALE, POSITION, OPACITY, DC, COUNT, ATOM, VALUE, DICTIONARY = 0, 1, 2, 3, 7, 10, 11, 14, 15, 16, 17
-
-
-class LexiError(ValueError):
-    """The file is damaged or of an unsupported kind."""
-
-
-def check(good, text):
-    if not good:
-        raise LexiError(text)
 
 
 # The container
@@ -56,8 +51,11 @@ def parse_json(text):
         raise LexiError(f"bad JSON: {e}") from e
 
 
-def read_container(data):
-    """Return the metadata and the tensors as {name: (dtype, array)}."""
+def read_container(data, beginning=False):
+    """Return the metadata, the tensors as {name: (dtype, array)}, the bytes of the header, and where tensors begin and end.
+
+    If data is the beginning of a file, that is only tensors that are whole, and what is there of packed.data.
+    """
     check(len(data) >= 8, "the file is too short")
     length = int.from_bytes(data[:8], "little")
     check(length <= MAX_HEADER and 8 + length <= len(data), "bad length of the header")
@@ -81,11 +79,14 @@ def read_container(data):
         entries.append((ends[0], ends[1], name, dtype, shape))
     at, tensors = 0, {}
     for begin, end, name, dtype, shape in sorted(entries):
-        check(begin == at and end <= len(body), f"{name} leaves a hole, overlaps or ends after the file")
+        check(begin == at and (end <= len(body) or beginning), f"{name} leaves a hole, overlaps or ends after the file")
         at = end
-        tensors[name] = (dtype, np.frombuffer(body[begin:end], DTYPES[dtype]).reshape(shape))
-    check(at == len(body), "bytes follow the last tensor")
-    return meta, tensors, data[:8 + length]
+        if end <= len(body):
+            tensors[name] = (dtype, np.frombuffer(body[begin:end], DTYPES[dtype]).reshape(shape))
+        elif name == "packed.data":
+            tensors[name] = (dtype, np.frombuffer(body[begin:], "u1"))
+    check(at == len(body) or beginning, "bytes follow the last tensor")
+    return meta, tensors, data[:8 + length], {name: (begin, end) for begin, end, name, _, _ in entries}
 
 
 def check_version(meta):
@@ -94,17 +95,32 @@ def check_version(meta):
     check(version <= NEWEST, f"version {version} is above {NEWEST}, the newest known")
     check(version >= 1, "there is no version 0")
     check(meta["format"] == "lexi", "this is a dictionary alone, not a scene")
-    layout = meta.get("layout")
+    layout = meta.get("layout", "packed" if version == 3 else None)
     check(layout in (("f32", "f16", "paper") if version == 1 else ("packed",)), f"no layout {layout} in this version")
-    return layout
+    return version, layout
 
 
-def check_sums(meta, tensors, head):
+def check_sums(meta, tensors, head, version, beginning):
+    if version == 3:
+        dtype, own = tensors.get("packed.head", (None, None))
+        check(dtype == "U8" and own.ndim == 1 and len(own) >= 4, "no packed.head")
+        own = own.tobytes()
+        check(zlib.crc32(head + own[4:]) == int.from_bytes(own[:4], "little"), "the header or packed.head is damaged")
+        bare = {"packed.head", "packed.data"}
+        sums = parse_json(meta.get("checksums", "{}"))
+        check(isinstance(sums, dict) and (beginning or set(sums) == set(tensors) - bare) and not set(sums) & bare,
+              "checksums do not fit the tensors")
+        check_tensors({k: v for k, v in sums.items() if k in tensors}, tensors)
+        return
     dtype, value = tensors.get("checksum.header", (None, None))
     check(dtype == "U32" and value.shape == (1,), "no checksum of the header")
     check(zlib.crc32(head) == int(value[0]), "the header is damaged")
     sums = parse_json(meta.get("checksums", ""))
     check(isinstance(sums, dict) and set(sums) == set(tensors) - {"checksum.header"}, "checksums do not fit the tensors")
+    check_tensors(sums, tensors)
+
+
+def check_tensors(sums, tensors):
     for name, text in sums.items():
         check(text == f"{zlib.crc32(tensors[name][1].tobytes()):08x}", f"tensor {name} is damaged")
 
@@ -132,6 +148,24 @@ def check_object(meta, key, numbers, target):
     check(all(type(o[k]) in (int, float) and math.isfinite(o[k]) for k in numbers), f"bad numbers of {key}")
     check(type(o["views"]) is int and o["views"] >= 0 and type(o["cameras"]) is bool, f"bad views or cameras of {key}")
     check(not target or o["target"] in ("psnr", "min-psnr", "size"), f"bad target of {key}")
+
+
+def check_metadata_3(meta):
+    """Check every key of version 3, and return the degree."""
+    degree = whole(meta, "degree", 5)
+    whole(meta, "gaussians", (1 << 32) - 1)
+    for key in ("seed", "over_tolerance", "removed"):
+        if key in meta:
+            whole(meta, key, 1 << 64)
+    for key in ("tolerance", "max_residual", "rms_residual"):
+        if key in meta:
+            real(meta, key)
+    check(meta.get("antialiased", "false") in ("true", "false"), "bad metadata antialiased")
+    comments = parse_json(meta.get("comments", "[]"))
+    check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
+    check_object(meta, "promise", ("asked", "mean_psnr", "min_psnr"), True)
+    check_object(meta, "reached", ("judged_psnr", "mean_psnr", "min_psnr"), False)
+    return degree
 
 
 def check_metadata(meta, layout):
@@ -180,12 +214,15 @@ class Tensors:
               and all(s is None or s == a for s, a in zip(shape, array.shape)), f"bad type or shape of {name}")
         return array
 
-    def extras(self, n):
+    def extras(self, n, coded=False):
         result = {}
         for name in [x for x in self.left if x.startswith("extra.")]:
             own = name[6:]
             check(own and not any(c.isspace() or unicodedata.category(c) == "Cc" for c in own) and not RESERVED.fullmatch(own),
                   f"bad name {name}")
+            if coded:
+                result[own] = lexi3.read_column(self.take(name, "U8", (None,)).tobytes(), n)
+                continue
             check(self.left[name][0] in EXTRA_TYPES, f"bad type of {name}")
             result[own] = self.take(name, self.left[name][0], (n,))
         return result
@@ -614,15 +651,47 @@ def decode_packed(t, meta, d, file_size):
     return out
 
 
-def decode(data):
-    """Decode the bytes of a file. The arrays are in the order of the file."""
+def decode_version_3(t, meta, d, header, places, beginning):
+    n = int(meta["gaussians"])
+    check(n <= 3 * (header + max(end for _, end in places.values())), "more Gaussians than the file has room for")
+    check("packed.data" in places, "no packed.data")
+    begin, end = places["packed.data"]
+    size = len(t.left["packed.data"][1]) if "packed.data" in t.left else 0
+    data = t.take("packed.data", "U8", (size,)).tobytes() if "packed.data" in t.left or not beginning else b""
+    head = lexi3.Head(t.take("packed.head", "U8", (None,)).tobytes(), n, end - begin, d)
+    order = None
+    if "packed.order" in t.left:
+        order = lexi3.read_column(t.take("packed.order", "U8", (None,)).tobytes(), n)
+        check(order.dtype == np.dtype("<u4") and (np.sort(order) == np.arange(n)).all(), "the order is no permutation")
+    extras = t.extras(n, True)
+    t.finish()
+    integers, there, sums = lexi3.decode_ranges(head, data)
+    check(beginning or there.all(), "a base is missing")
+    out = lexi3.values_of(head, integers, there)
+    out["extras"] = {k: v[there] for k, v in extras.items()}
+    if order is not None:
+        out["order"] = order[there]
+    return out | {"there": there, "integers": sums, "ranges": head.ranges}
+
+
+def decode(data, beginning=False):
+    """Decode the bytes of a file. The arrays are in the order of the file.
+
+    If `beginning`, the bytes may be the first ones of a file of version 3; they hold the header and packed.head. The
+    arrays are then of the Gaussians that have a base. Of version 3 also returned are `there`, which Gaussians these
+    are; `integers`, of each range how many integers it decoded to and whether their CRC-32 is right; and `ideal`, for
+    some arrays the values before they are rounded to f32, and how far from these others may be.
+    """
     with np.errstate(all="ignore"):
-        meta, tensors, head = read_container(data)
-        layout = check_version(meta)
-        check_sums(meta, tensors, head)
-        degree = check_metadata(meta, layout)
+        meta, tensors, head, places = read_container(data, beginning)
+        version, layout = check_version(meta)
+        check(version == 3 or not beginning, "only version 3 can be decoded in part")
+        check_sums(meta, tensors, head, version, beginning)
+        degree = check_metadata_3(meta) if version == 3 else check_metadata(meta, layout)
         d = 3 * ((degree + 1) ** 2 - 1)
         t = Tensors(tensors)
+        if version == 3:
+            return meta, decode_version_3(t, meta, d, len(head), places, beginning)
         t.left.pop("checksum.header")
         out = decode_packed(t, meta, d, len(data)) if layout == "packed" else decode_plain(t, layout, d)
         t.finish()
@@ -634,24 +703,30 @@ def in_source_order(out):
     if "order" not in out:
         return out
     back = np.argsort(out["order"])
-    moved = {k: v[back] for k, v in out.items() if k not in ("extras", "order", "dictionary")}
+    moved = {k: out[k][back] for k in ("position", "scale", "rotation", "dc", "opacity", "sh_rest", "exact")}
     moved["extras"] = {k: v[back] for k, v in out["extras"].items()}
-    return moved | {"dictionary": out["dictionary"]}
+    if "ideal" in out:
+        moved["ideal"] = {k: (v[back], bound[back]) for k, (v, bound) in out["ideal"].items()}
+    return out | moved
 
 
 def main():
-    if len(sys.argv) != 3:
-        sys.exit("usage: decode_lexi.py FILE.lexi OUT.npz")
+    if len(sys.argv) not in (3, 4):
+        sys.exit("usage: decode_lexi.py FILE.lexi OUT.npz [BYTES]")
     with open(sys.argv[1], "rb") as f:
-        data = f.read()
+        data = f.read(int(sys.argv[3]) if len(sys.argv) == 4 else -1)
     try:
-        meta, out = decode(data)
+        meta, out = decode(data, len(sys.argv) == 4)
     except LexiError as e:
         sys.exit(f"{sys.argv[1]}: {e}")
-    arrays = {k: v for k, v in out.items() if k != "extras"}
+    arrays = {k: v for k, v in out.items() if isinstance(v, np.ndarray)}
     arrays.update({f"extra.{k}": v for k, v in out["extras"].items()})
     np.savez(sys.argv[2], **arrays)
-    print(f"{len(out['position'])} Gaussians, layout {meta['layout']}, SH degree {meta['degree']}")
+    print(f"{len(out['position'])} Gaussians, layout {meta.get('layout', 'packed')}, SH degree {meta['degree']}")
+    if "integers" in out:
+        good = [right for _, right in out["integers"].values()]
+        print(f"{len(good)} ranges, the integers of {sum(good)} are right")
+        sys.exit(0 if all(good) else 1)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,896 @@
+"""Version 3 of layout packed: head, tables, ranges and values. Names are those of docs/FORMAT.md.
+
+All lanes of all chunks are decoded side by side: every variable of a Gaussian is a vector with one element a lane, and
+the i-th Gaussians of all lanes are decoded together. Lanes are sorted by falling length, so those that still have a
+Gaussian i are always the first ones.
+"""
+import math
+import struct
+import zlib
+
+import numpy as np
+
+F = np.float32
+I = np.int64
+CELL, COLOUR, SHAPE, SCALE, OPACITY, POSITION, DC, FINE_POSITION, FINE_DC = 0, 1, 2, 3, 6, 8, 11, 14, 15
+COUNT, ATOM, VALUE, PAGE, INTERIM_SCALE, INTERIM_OPACITY, INTERIM_DC = 16, 19, 22, 25, 26, 27, 28
+TARGETS = (SCALE, SCALE + 1, SCALE + 2, OPACITY, DC, DC + 1, DC + 2)
+# Order of the sets of contexts: streams 0 to 15 three times, then the others.
+SETS = [*range(16)] * 3 + [*range(16, 29)]
+KIND = [3, 0] + [2] * 14 + [1] * 3 + [0] * 3 + [1] * 3 + [0] + [2] * 3
+DROP = np.array([0, 2, 3], I)
+POWERS = np.array([1 << k for k in range(63)], I)
+WEIGHTS = [32, 35, 38, 41, 45, 49, 54, 59]
+S, T, U, V = 0.5773502691896257, 0.7071067811865476, 0.4082482904638631, 0.8164965809277261
+COLUMN_TYPES = ("i1", "u1", "<i2", "<u2", "<i4", "<u4", "<f4", "<f8")
+
+
+class LexiError(ValueError):
+    """The file is damaged or of an unsupported kind."""
+
+
+def check(good, text):
+    if not good:
+        raise LexiError(text)
+
+
+class Bytes:
+    """Reads numbers one after another."""
+
+    def __init__(self, data):
+        self.data, self.at = bytes(data), 0
+
+    def take(self, n):
+        check(self.at + n <= len(self.data), "something goes beyond its end")
+        self.at += n
+        return self.data[self.at - n:self.at]
+
+    def unpack(self, kinds):
+        return struct.unpack("<" + kinds, self.take(struct.calcsize("<" + kinds)))
+
+    def u8(self):
+        return self.take(1)[0]
+
+    def varint(self, top=32):
+        value = shift = 0
+        while True:
+            byte = self.u8()
+            value |= (byte & 127) << shift
+            check(value < 1 << top, "a varint is too large")
+            if byte < 128:
+                check(byte or not shift, "a varint is longer than it need be")
+                return value
+            shift += 7
+
+    def short(self, n):
+        return struct.unpack("<f", bytes(4 - n) + self.take(n))[0]
+
+    def end(self):
+        return self.at == len(self.data)
+
+
+# Bits with odds: tables and dictionary
+
+class Odds:
+    def __init__(self):
+        self.zero, self.seen = 2048, 0
+
+
+def odds(*shape):
+    return [odds(*shape[1:]) for _ in range(shape[0])] if shape else Odds()
+
+
+def either_odds():
+    return odds(), odds(), odds(16)
+
+
+class OddBits:
+    def __init__(self, data):
+        self.data, self.at = data, 4
+        self.range, self.code = 2 ** 32 - 1, int.from_bytes((data + bytes(4))[:4], "big")
+
+    def split(self, p):
+        bound = (self.range >> 12) * p
+        b = int(self.code >= bound)
+        if b:
+            self.code -= bound
+            self.range -= bound
+        else:
+            self.range = bound
+        while self.range < 1 << 24:
+            self.range <<= 8
+            self.code = (self.code << 8) % 2 ** 32 + (self.data[self.at] if self.at < len(self.data) else 0)
+            self.at += 1
+        return b
+
+    def bit(self, o):
+        b = self.split(o.zero)
+        rate = (1, 2, 3, 4, 4, 5)[min(o.seen, 5)]
+        o.seen += 1
+        zero = o.zero - (o.zero >> rate) if b else o.zero + (4096 - o.zero >> rate)
+        o.zero = min(max(zero, 48), 4048)
+        return b
+
+    def even(self, n):
+        value = 0
+        for _ in range(n):
+            value = 2 * value + self.split(2048)
+        return value
+
+    def positive(self, o):
+        n = 1
+        while n < len(o) and self.bit(o[n]):
+            n += 1
+        return (1 << n - 1) + self.even(n - 1)
+
+    def either(self, o):
+        nonzero, negative, size = o
+        if not self.bit(nonzero):
+            return 0
+        s = self.bit(negative)
+        u = self.positive(size)
+        return -u if s else u
+
+
+def probabilities(weights, w):
+    total = sum(weights)
+    p = [max((x << w) // total, 1) if x else 0 for x in weights]
+    left = (1 << w) - sum(p)
+    while left:
+        s = p.index(max(p))
+        d = left if left > 0 else max(left, -(p[s] // 2))
+        p[s] += d
+        left -= d
+    return p
+
+
+class Tables:
+    """For each number of 0 to 2^w - 1, and each table, the symbol and what becomes of the state."""
+
+    def __init__(self, data):
+        bits = OddBits(data)
+        self.used, self.many, self.same, self.new, self.grain = odds(2), odds(), odds(2), odds(), odds(3)
+        self.counts, self.present = odds(4, 10), odds(4, 2, 2)
+        self.deltas = [[[either_odds() for _ in range(3)] for _ in range(2)] for _ in range(4)]
+        self.place = np.full(len(SETS) * 24, -1, I)     # where the table of a context begins, -1 if there is none
+        p, rest, symbol = [], [], []
+        at = before = 0
+        for number, stream in enumerate(SETS):
+            before = bits.bit(self.used[before])
+            if not before:
+                continue
+            count, table_of = self.contexts(bits)
+            w = 12 if ATOM <= stream < ATOM + 3 else 10
+            for _ in range(count):
+                probability = self.table(bits, KIND[stream], w)
+                p.append(np.repeat(probability, probability))
+                symbol.append(np.repeat(np.arange(len(probability)), probability))
+                rest.append(np.arange(1 << w) - np.repeat(np.cumsum(probability) - probability, probability))
+            self.place[number * 24:number * 24 + 24] = at + (np.array(table_of) << w)
+            at += count << w
+        self.p, self.rest, self.symbol = (np.concatenate(x or [[0]]).astype(I) for x in (p, rest, symbol))
+
+    def contexts(self, bits):
+        tables, last, changed, table_of = 1, 0, 0, [0]
+        several = bits.bit(self.many)
+        for context in range(1, 24):
+            if several:
+                changed = bits.bit(self.same[1 if context > 1 and changed else 0])
+                if changed:
+                    last = tables if bits.bit(self.new) else bits.even((tables - 1).bit_length())
+                    check(last <= tables, "a table is named that is not there")
+                tables = max(tables, last + 1)
+            table_of.append(last)
+        return tables, table_of
+
+    def table(self, bits, kind, w):
+        size = bits.positive(self.counts[kind])
+        check(size <= 256, "a table has too many symbols")
+        h = bits.bit(self.grain[0])
+        g = 2 * h + bits.bit(self.grain[1 + h])
+        sign, occurs, levels, weights = 0, [], [], []
+        for i in range(size):
+            parent = i - 2 if kind == 2 and 2 <= i < 16 else i - 1
+            which = self.present[kind][i == 0 or occurs[parent]][i == 0 or occurs[i - 1]]
+            occurs.append(1 if i == size - 1 else bits.bit(which))
+            if i == 0:
+                level = bits.even(4 + g)
+            else:
+                level = max(levels[parent] - (3 << g if i == 16 and kind > 0 else 0), 0)
+                if occurs[i]:
+                    delta = bits.either(self.deltas[kind][i >= 16][sign])
+                    level += delta
+                    sign = 0 if delta == 0 else 1 if delta > 0 else 2
+            check(0 <= level <= w << g, "a level of a table is out of range")
+            levels.append(level)
+            up = 8 * w - (level << 3 - g)
+            weights.append(WEIGHTS[up % 8] << (up >> 3) if occurs[i] else 0)
+        return np.array(probabilities(weights, w))
+
+
+def read_dictionary(data, m, d, fixed):
+    if d == 0:
+        check(not data, "a dictionary at degree 0")
+        return np.zeros((0, 0), F)
+    bits, n = OddBits(data), d // 3
+    o = [[[either_odds() for _ in range(5)] for _ in range(3)] for _ in range(4)]
+    atoms = np.zeros((m, d), F)
+    for atom in atoms[:m - d if fixed else m]:
+        x = [[0, 0, 0] for _ in range(n)]
+        for k in range(n):
+            for a in range(3):
+                def size(j, b):
+                    return abs(x[j][b]) if j >= 0 else 0
+                near = size(k - 1, 0) + size(k - 2, 0) if a == 0 else size(k - 1, a) + (size(k, 0) >> 1)
+                x[k][a] = bits.either(o[min(math.isqrt(k + 1) - 1, 3)][a][min(near.bit_length(), 4)])
+                check(abs(x[k][a]) < 1 << 15, "a number of the dictionary is too large")
+        c = ([v[0] * S + v[1] * T + v[2] * U for v in x] + [v[0] * S + v[1] * 0.0 - v[2] * V for v in x]
+             + [v[0] * S - v[1] * T + v[2] * U for v in x])
+        norm = 0.0
+        for v in c:
+            norm += v * v
+        if norm == 0:
+            c[0] = norm = 1.0
+        atom[:] = np.array(c) / math.sqrt(norm)
+    if fixed:
+        for a, parts in enumerate(((S, S, S), (T, 0, -T), (U, -V, U))):
+            for k in range(n):
+                atoms[m - d + a * n + k, [k, n + k, 2 * n + k]] = parts
+    return atoms
+
+
+# Head and index
+
+class Head:
+    def __init__(self, data, total, size, d):
+        b = Bytes(data)
+        b.take(4)                                        # the CRC-32, which decode_lexi.py has checked
+        self.d, self.m = d, b.varint()
+        flags = b.u8()
+        views, self.parts, self.promised = flags & 15, flags >> 4 & 3, flags >> 6 & 1
+        check(self.m <= 1024 and (self.m > 0) == (d > 0) and (self.parts > 0) == (d > 0), "bad numbers of atoms or parts")
+        check(flags < 128 or self.m >= d > 0, "bad fixed atoms")
+        self.dc_exponent = b.u8()
+        self.interim, self.dc_exponent = self.dc_exponent >> 7, self.dc_exponent & 127
+        check(self.dc_exponent <= 100, "bad dc_exponent")
+        self.least = [*b.take(self.parts - 1), 1] if self.parts else []
+        check(all(x > y for x, y in zip(self.least, self.least[1:])), "least sizes do not fall")
+        self.interim_step = [b.varint() for _ in range(3)] if self.interim else [1] * 3
+        check(all(1 <= x <= 1 << 26 for x in self.interim_step), "bad interim_step")
+        *origin, self.side, self.value_step = b.unpack("5f")
+        self.origin, self.dc_mean = np.array(origin), np.array(b.unpack("3f"))
+        turn = b.unpack("4h")
+        check(any(turn), "dc_turn is 0")
+        self.dc_axes = axes_of(*turn)
+        self.softening = b.short(3) if views else 1.0
+        self.points = np.array([[b.short(3) for _ in range(3)] for _ in range(views)]).reshape(views, 3)
+        check(np.isfinite([*origin, self.side, self.value_step, *self.dc_mean, self.softening]).all()
+              and np.isfinite(self.points).all() and min(self.side, self.value_step, self.softening) > 0,
+              "a number of the head is out of range")
+        steps = [b.unpack("Hb") for _ in range(5)]
+        check(all(-6 <= h <= 31 for _, h in steps), "bad shift of a step")
+        self.steps = np.array([[min(max(M << min(c - h, 6) if c >= h else M >> h - c, 1), 3 << 19) for c in range(16)]
+                               for M, h in steps], I)
+        self.read_integers(b.take(b.varint()))
+        self.tables = Tables(b.take(b.varint()))
+        self.atoms = read_dictionary(b.take(b.varint()), self.m, d, flags >> 7)
+        self.read_index(b, total, size)
+        check(b.end(), "bytes of the head are left")
+
+    def read_integers(self, data):
+        number, at = int.from_bytes(data, "little"), 0
+
+        def bits(n):
+            nonlocal at
+            check(at + n <= 8 * len(data), "the integers go beyond their end")
+            at += n
+            return number >> at - n & (1 << n) - 1
+
+        def group(count, zeros):
+            width = bits(5)
+            check(width + zeros <= 16, "an integer is too wide")
+            values = np.array([bits(width) for _ in range(count)], I)
+            return (values - (values >> max(width - 1, 0) << width)) << zeros
+        self.cell_log = int(group(1, 2)[0])
+        self.turn, self.move, self.predictor = np.zeros((3, 4), I), np.zeros((3, 4), I), np.zeros((7, 7), I)
+        for rows in (self.turn, self.move):
+            rows[:, 0] = group(3, 2)
+            rows[:, 1:] = group(9, 4).reshape(3, 3)
+        self.means = group(7, 2)
+        self.predictor[:, 0] = group(7, 2)
+        for k in range(1, 7):
+            first = max(k - 3, 0)
+            self.predictor[first:, k] = group(7 - first, 4)
+        check(8 * len(data) - at < 8 and bits(8 * len(data) - at) == 0, "bits of the integers are left")
+
+    def read_index(self, b, total, size):
+        layers = b.u8()
+        in_order, layers = layers >> 7, layers & 127
+        check(layers <= 8, "too many layers")
+        levels = list(b.take(layers))
+        check(all(r <= 2 for r in levels), "too many refinements")
+        self.layer, self.count, self.cell, self.bounds = [], [], [], []
+        chunks = b.varint()
+        for c in range(chunks):
+            self.layer.append(b.u8())
+            self.count.append(b.varint())
+            self.cell.append(b.varint(64))
+            self.bounds.append([b.short(2) for _ in range(6)] if chunks > 1 else None)
+            check(1 <= self.count[c] <= 65536 and self.layer[c] < layers, "bad chunk")
+            check(not self.bounds[c] or np.isfinite(self.bounds[c]).all(), "a bound is not finite")
+            check(c == 0 or (self.layer[c - 1], self.cell[c - 1]) <= (self.layer[c], self.cell[c]), "chunks are not in order")
+        check(sum(self.count) == total, "chunks do not have N Gaussians")
+        self.first = np.concatenate([[0], np.cumsum(self.count)]).astype(I)
+        self.refinements = [levels[layer] for layer in self.layer]
+        kinds = [1 + r + self.parts + int(self.interim and layer < layers - 1)
+                 for r, layer in zip(self.refinements, self.layer)]
+        in_turn = [(c, k) for c in range(chunks) for k in range(kinds[c])]
+        self.ranges, start = {}, 0                       # of (chunk, kind): start, length and both CRC-32
+        order = []
+        for key in in_turn:
+            if not in_order:
+                key = (b.varint(), b.u8())
+                check(key[0] < chunks and key[1] < kinds[key[0]] and key not in self.ranges, "bad range")
+                check(key[1] == 0 or (key[0], 0) in self.ranges, "a range is before its base")
+            length, *sums = b.varint(), *b.unpack("2I")
+            check(key[1] or 8 * length >= 3 * self.count[key[0]], "a base is too short")
+            self.ranges[key] = (start, length, *sums)
+            start += length
+            order.append(key)
+        check(bool(in_order) == (order == in_turn), "`sorted` is not true")
+        check(size == start, "ranges do not have the length of packed.data")
+
+
+def axes_of(w, x, y, z):
+    n = w * w + x * x + y * y + z * z
+    rows = ((w * w + x * x - y * y - z * z, 2 * (x * y - w * z), 2 * (x * z + w * y)),
+            (2 * (x * y + w * z), w * w - x * x + y * y - z * z, 2 * (y * z - w * x)),
+            (2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z))
+    return np.array([[F(v / n) for v in row] for row in rows], np.float64)
+
+
+# Lanes
+
+class Lanes:
+    """The lanes of some ranges, the longest first. `who` are those that a call is for: a slice or their numbers."""
+
+    def __init__(self, tables, ranges):
+        """Each of the ranges is its bytes, the first of its Gaussians, their number, and the set of its stream 0."""
+        self.tables = tables
+        lanes, words, begin = [], [], 0
+        for data, first, n, base in ranges:
+            q = min(max(n // 1024, 1), 16)
+            width = 2 if len(data) < 1 << 17 else 4
+            head = width * (q - 1)
+            check(len(data) % 2 == 0 and len(data) >= head, "a range is not of whole words")
+            sizes = np.frombuffer(data[:head], f"<u{width}").tolist()
+            sizes.append((len(data) - head) // 2 - sum(sizes))
+            check(min(sizes) >= 2, "a lane is too short")
+            words.append(data[head:])
+            for k, size in enumerate(sizes):
+                length = n // q + (k < n % q)
+                lanes.append((-length, first, base, begin, begin + size))
+                first += length
+                begin += size
+        lanes = np.array(sorted(lanes), I).reshape(-1, 5)
+        self.words = np.frombuffer(b"".join(words), "<u2").astype(I)
+        self.length, self.first, self.set = -lanes[:, 0], lanes[:, 1], lanes[:, 2] * 24
+        self.next, self.stop = lanes[:, 3] + 2, lanes[:, 4]
+        self.state = (self.words[self.next - 2] << 16) + self.words[self.next - 1]
+        self.lane, self.steps = np.arange(len(lanes)), int(self.length.max(initial=0))
+        check((self.state >= 1 << 16).all(), "a first state is too small")
+
+    def gaussians(self, block=64):
+        """Yield for each i the lanes that have a Gaussian i, and the numbers of these Gaussians."""
+        n = len(self.length)
+        for i in range(self.steps):
+            while self.length[n - 1] <= i:
+                n -= 1
+            if i % block == 0:
+                self.check_words()
+            yield i, slice(0, n), self.first[:n] + i
+
+    def check_words(self):
+        check((self.next <= self.stop).all(), "a lane goes beyond its words")
+
+    def finish(self):
+        check((self.next == self.stop).all() and (self.state == 1 << 16).all(), "words of a lane are left")
+
+    def put(self, state, who):
+        at, low = self.next[who], state < 1 << 16
+        # A lane that goes beyond its words takes some others, until check_words finds it.
+        self.state[who] = np.where(low, (state << 16) + self.words.take(at, mode="clip"), state)
+        self.next[who] = at + low
+
+    def symbol(self, stream, context, who):
+        sets = self.set[who] + stream * 24 if stream < 16 else (stream + 32) * 24
+        place = self.tables.place[sets + context]
+        check(place.size == 0 or place.min() >= 0, "a context has no table")
+        w = 12 if ATOM <= stream < ATOM + 3 else 10
+        state = self.state[who]
+        slot = place + (state & (1 << w) - 1)
+        self.put((state >> w) * self.tables.p.take(slot) + self.tables.rest.take(slot), who)
+        return self.tables.symbol.take(slot)
+
+    def bits(self, n, who):
+        """Take n bits, n being a vector or one number."""
+        value, shift = 0, 0
+        while True:
+            now, state = np.minimum(n, 16), self.state[who]
+            value = value + ((state & (1 << now) - 1) << shift)
+            self.put(state >> now, who)
+            n, shift = n - now, shift + 16
+            if not np.any(n):
+                return value
+
+    def integer(self, stream, context, who, top=30):
+        t = self.symbol(stream, context, who)
+        far = np.flatnonzero(t >= 16)
+        if len(far):
+            token = t[far]
+            n = np.minimum((token - 16 >> 1) + 3, top)
+            t[far] = ((2 + (token & 1)) << n) + self.bits(n, self.lane[who][far])
+        return t
+
+    def signed(self, stream, context, who):
+        u = self.integer(stream, context, who)
+        return np.where(u & 1, -(u + 1 >> 1), u >> 1)
+
+
+def wrap(x):
+    """Take integers modulo 2^32 into signed 32 bits."""
+    return (x + (1 << 31) & (1 << 32) - 1) - (1 << 31)
+
+
+def level(x):
+    return np.clip(x + 256 >> 9, 0, 15)
+
+
+def bitlength(x):
+    return np.searchsorted(POWERS, x, side="right")
+
+
+def drop(x, lack):
+    return np.minimum(DROP[lack], x - 1)
+
+
+def xyz_of(z):
+    """Every third bit, from bits 0, 1 and 2 on: 21 bits of each coordinate, moved together in steps."""
+    x = z >> np.arange(3, dtype=I)[:, None] & 0x1249249249249249
+    for shift, mask in ((2, 0x10c30c30c30c30c3), (4, 0x100f00f00f00f00f), (8, 0x1f0000ff0000ff),
+                        (16, 0x1f00000000ffff), (32, 0x1fffff)):
+        x = (x ^ x >> shift) & mask
+    return x
+
+
+class Integers:
+    """All that is decoded, one row a variable and one column a Gaussian of the file."""
+
+    def __init__(self, n):
+        self.z, self.cell = np.zeros(n, I), np.zeros((3, n), I)
+        self.colour, self.shape, self.needle = (np.zeros(n, I) for _ in range(3))
+        self.count, self.rotation = np.zeros((10, n), I), np.zeros((3, n), I)
+        self.predicted = np.zeros((7, n), I)
+        self.full, self.move_log, self.fineness = (np.zeros((3, n), I) for _ in range(3))
+        self.lack, self.change = np.zeros(n, I), np.zeros((5, n), I)
+        self.nonzeros, self.exact = np.zeros((3, n), I), np.zeros(n, bool)      # counts of each part
+        self.codes = []                                  # of each part: Gaussian, atom and signed size of each nonzero
+        self.rows = {}                                   # SH-rest of exact Gaussians, as bits
+
+
+def decode_base(head, lanes, out):
+    width = len(lanes.length)
+    R = lanes.set // (16 * 24)
+    C = 3 ** R
+    z, g = np.zeros(width, I), np.zeros(width, I)
+    cells, memory = np.zeros((16, 3, width), I), np.zeros((16, 9, width), I)
+    for i, who, here in lanes.gaussians():
+        a = len(here)
+        gap = lanes.integer(CELL, np.minimum(g[who], 23), who, 61)
+        z[who] += gap
+        check((z[who] >= 0).all(), "a cell is out of range")            # below 2^63, else it has become negative
+        g[who] = bitlength(gap)
+        cell = xyz_of(z[who])
+
+        used = min(i, 16)
+        if used:
+            D = np.minimum(abs(cell - cells[:used, :, who]), 1023)
+            weight = 1 << 12 - np.minimum(np.frexp((4 * (D * D).sum(1) + 1).astype(float))[1], 12).astype(I)
+            total = weight.sum(0)
+            B = bitlength(total)
+            inverse = (1 << 31) // (total << 16 - B)
+            sums = (weight[:, None] * memory[:used, :, who]).sum(0)
+            around = (sums + (1 << B - 1) >> B) * inverse >> 15
+        else:
+            around = np.concatenate([head.means, [0, 0]])[:, None].repeat(a, 1)
+
+        colour = lanes.symbol(COLOUR, 1 + level(around[7]) if used else 0, who)
+        check((colour <= 15).all(), "a class is out of range")
+        expected = np.clip(512 * colour + around[8], 0, 15 * 512)
+        below = (expected - 128 >> 9) << 9
+        shape = level(expected) + lanes.signed(SHAPE, 1 + level(2 * (expected - below)) if used else 0, who)
+        check(((shape >= 0) & (shape <= 15)).all(), "a class is out of range")
+
+        features = np.zeros((9, a), I)
+        known = np.zeros((6, a), I)                      # F; scales come as they are decoded
+        known[1], known[2], s = 512 * colour, 512 * shape, known[3:]
+        counts, predicted = [], []
+        for t in range(7):
+            P, steps = head.predictor[t], head.steps[min(t, 4)]
+            known[0] = around[t]
+            total = (P[0] << 8) + (P[1:, None] * known >> 4).sum(0)
+            predicted.append(np.clip(total, -1 << 25, 1 << 25) << 3)
+            counts.append(lanes.signed(TARGETS[t], shape if t < 4 else colour, who))
+            step = steps[shape] if t < 4 else steps[colour] * C[who]
+            features[t] = np.clip(wrap(predicted[t] + counts[t] * step) >> 11, -16383, 16383)
+            if t < 3:
+                s[t] = features[t]
+
+        def slope(row):
+            return row[0] + 512 * shape + (row[1:, None] * s >> 12).sum(0)
+        q = [np.minimum(slope(row), 135) for row in head.turn]
+        needle = s[0] - s[1] >= s[1] - s[2]
+        axis_bits = np.clip(677 - (q[1] + np.where(needle, q[2], q[0]) >> 1) + 255 >> 9, 0, 15)
+        turn_bits = np.clip(846 - np.where(needle, q[0], q[2]) + 255 >> 9, 0, 15)
+        full = [axis_bits, axis_bits, turn_bits]
+        move_log = [np.minimum(slope(row), 512 + (739 * s[0] >> 9)) for row in head.move]
+        fineness = [np.clip(head.cell_log - x + 1152 >> 8, 0, 23) for x in move_log]
+        rotation = [lanes.bits(x - drop(x, R[who]), who) for x in full]
+        counts += [lanes.signed(POSITION + k, fineness[k], who) for k in range(3)]
+
+        features[7], features[8] = 512 * colour, 512 * (shape - colour)
+        cells[i % 16, :, who], memory[i % 16, :, who] = cell, features
+        for where, value in ((out.z, z[who]), (out.cell, cell), (out.colour, colour), (out.shape, shape),
+                             (out.needle, needle), (out.count, counts), (out.rotation, rotation),
+                             (out.predicted, predicted), (out.full, full), (out.move_log, move_log),
+                             (out.fineness, fineness)):
+            where[..., here] = value
+
+
+def decode_refinement(head, lanes, out):
+    lack = lanes.set // (16 * 24)                        # before this refinement
+    for _, who, here in lanes.gaussians():
+        for j in range(4, 10):
+            count = out.count[j, here]
+            stream, context = (FINE_DC, out.colour[here] // 2) if j < 7 else (FINE_POSITION, out.fineness[j - 7, here] // 3)
+            t = lanes.symbol(stream, 3 * context + np.minimum(abs(count), 2), who)
+            check((t <= 2).all(), "a refinement is out of range")
+            out.count[j, here] = wrap(3 * count + np.where(count >= 0, t - 1, 1 - t))
+        for j in range(3):
+            full = out.full[j, here]
+            y = drop(full, lack[who]) - drop(full, lack[who] - 1)
+            out.rotation[j, here] = (out.rotation[j, here] << y) + lanes.bits(y, who)
+        out.lack[here] = lack[who] - 1
+
+
+def decode_interim(head, lanes, out):
+    for _, who, here in lanes.gaussians():
+        shape, colour = out.shape[here] // 2, out.colour[here] // 2
+        first = out.change[0, here] = lanes.signed(INTERIM_SCALE, shape, who)
+        out.change[1, here] = lanes.signed(INTERIM_OPACITY, 8 * np.minimum(abs(first), 2) + shape, who)
+        for k in range(2, 5):
+            out.change[k, here] = lanes.signed(INTERIM_DC, 8 * (k - 2) + colour, who)
+
+
+def decode_part(head, p, lanes, out):
+    top = head.least[p - 1] - head.least[p] if p else (1 << 30) - head.least[0]
+    last = np.zeros(len(lanes.length), I)
+    found, block = [[np.zeros(0, I)] * 3], []
+    for i, who, here in lanes.gaussians():
+        colour, exact = out.colour[here], out.exact[here]
+        if p == 0:
+            count = lanes.integer(COUNT, 2 * np.minimum(colour, 11) + (last[who] > 1), who)
+            check((count <= head.d + 1).all(), "a Gaussian has too many nonzeros")
+            exact = out.exact[here] = count == head.d + 1
+            count = last[who] = np.where(exact, 0, count)
+        else:
+            count, plain = np.zeros(len(here), I), np.flatnonzero(~exact)
+            before = out.nonzeros[p - 1, here[plain]]
+            count[plain] = lanes.integer(COUNT + p, 3 * (colour[plain] // 2) + np.minimum(before, 2), plain)
+            check((count <= head.d).all(), "a Gaussian has too many nonzeros")
+        out.nonzeros[p, here] = count
+        block.append((here, count, exact))
+        if i % 64 == 63 or i == lanes.steps - 1:
+            lanes.check_words()
+            found.append(decode_nonzeros(head, p, lanes, block, top))
+            if p == 0:
+                decode_exact(head, lanes, block, out)
+            block = []
+    out.codes.append([np.concatenate(x) for x in zip(*found)])
+
+
+def decode_nonzeros(head, p, lanes, block, top):
+    """Decode the nonzeros of a block of each lane: return the Gaussian, atom and signed size of each."""
+    counts = np.zeros((len(block[0][0]), len(block)), I)
+    for k, (_, count, _) in enumerate(block):
+        counts[:len(count), k] = count
+    total = counts.sum(1)
+    begin = np.cumsum(total) - total
+    # Of each nonzero, lane by lane: which Gaussian of the block it belongs to, and whether it is that one's first.
+    lane = np.repeat(np.arange(len(total)), total)
+    each = np.repeat(np.arange(counts.size), counts.ravel())
+    count = counts.ravel()[each]
+    first = np.diff(each, prepend=-1) != 0
+    atom, size = np.zeros(len(each), I), np.zeros(len(each), I)
+    for j in range(int(total.max())):
+        who = np.flatnonzero(total > j)
+        at = begin[who] + j
+        page = lanes.symbol(PAGE, p, who) if head.m > 256 else 0
+        atom[at] = 256 * page + lanes.symbol(ATOM + p, 2 * np.minimum(page, 3) + np.where(first[at], 0, 1), who)
+        context = np.where(first[at], np.minimum(count[at] - 1, 7), 8 + np.minimum(size[at - 1], 15))
+        size[at] = lanes.integer(VALUE + p, context, who)
+    check((atom < head.m).all(), "an atom is out of range")
+    check((size < top).all(), "a size is not one of its part")
+    size += head.least[p]
+    for j in range(0, int(total.max()), 16):
+        who = np.flatnonzero(total > j)
+        n = np.minimum(total[who] - j, 16)
+        signs = lanes.bits(n, who)
+        for k in range(int(n.max())):
+            negative = np.flatnonzero((n > k) & (signs >> k & 1 == 1))
+            size[begin[who[negative]] + j + k] *= -1
+    return lanes.first[lane] + (block[0][0][0] - lanes.first[0]) + each % len(block), atom, size
+
+
+def decode_exact(head, lanes, block, out):
+    which = np.zeros((len(block[0][0]), len(block)), bool)
+    for k, (_, _, exact) in enumerate(block):
+        which[:len(exact), k] = exact
+    of = [np.flatnonzero(x) for x in which]
+    for j in range(max(map(len, of))):
+        who = np.array([lane for lane, x in enumerate(of) if len(x) > j])
+        rows = np.stack([lanes.bits(32, who) for _ in range(head.d)], 1).astype("<u4")
+        for lane, row in zip(who, rows):
+            check(np.isfinite(row.view("<f4")).all(), "an exact value is not finite")
+            out.rows[int(block[of[lane][j]][0][lane])] = row
+
+
+# Ranges
+
+def decode_ranges(head, data):
+    """Decode the ranges that lie within data, which may be the beginning of packed.data.
+
+    Return the integers, the Gaussians that have a base, and of each range that was decoded whether the CRC-32 of its
+    integers is right, as {(chunk, kind): (number of integers, whether)}.
+    """
+    n, chunks = int(head.first[-1]), range(len(head.count))
+    out, sums = Integers(n), {}
+    whole = {key for key, (start, length, *_) in head.ranges.items() if start + length <= len(data)}
+    for key in whole:
+        start, length, crc, _ = head.ranges[key]
+        check(zlib.crc32(data[start:start + length]) == crc, f"range {key} is damaged")
+
+    def run(kind_of, decoder, row_of, set_of=lambda c: 0):
+        """Decode the range of kind kind_of(c) of every chunk c that has it and all that it needs."""
+        keys = [(c, kind_of(c)) for c in chunks if kind_of(c) is not None and needs(c, kind_of(c)) <= whole]
+        pieces = [(data[head.ranges[k][0]:head.ranges[k][0] + head.ranges[k][1]], int(head.first[k[0]]), head.count[k[0]],
+                   set_of(k[0])) for k in keys]
+        lanes = Lanes(head.tables, pieces)
+        decoder(lanes)
+        lanes.finish()
+        ends, values = row_of()
+        for c, kind in keys:
+            mine = values[ends[head.first[c]]:ends[head.first[c + 1]]].astype("<i4")
+            sums[c, kind] = (len(mine), zlib.crc32(mine.tobytes()) == head.ranges[c, kind][3])
+
+    def needs(c, kind):
+        R = head.refinements[c]
+        first = 1 if kind <= R else R + 1 if kind <= R + head.parts else kind
+        return {(c, 0), *((c, k) for k in range(first, kind + 1))}
+
+    def rows(*variables):
+        values = np.vstack(variables).T
+        return np.arange(n + 1) * values.shape[1], values.ravel()
+
+    R = head.refinements
+    for c in chunks:
+        out.lack[head.first[c]:head.first[c + 1]] = R[c]
+    run(lambda c: 0, lambda lanes: decode_base(head, lanes, out),
+        lambda: rows(out.cell, out.colour, out.shape, out.count, out.rotation), lambda c: 16 * R[c])
+    for k in range(1, max(R, default=0) + 1):
+        run(lambda c: k if k <= R[c] else None, lambda lanes: decode_refinement(head, lanes, out),
+            lambda: rows(out.count, out.rotation), lambda c: 16 * (R[c] + 1 - k))
+    for p in range(head.parts):
+        run(lambda c: R[c] + 1 + p, lambda lanes: decode_part(head, p, lanes, out), lambda: part_rows(head, p, out))
+    interim = [R[c] + head.parts + 1 for c in chunks]
+    run(lambda c: interim[c] if (c, interim[c]) in head.ranges else None,
+        lambda lanes: decode_interim(head, lanes, out), lambda: rows(out.change))
+    there = np.zeros(n, bool)
+    for c in chunks:
+        there[head.first[c]:head.first[c + 1]] = (c, 0) in whole
+    return out, there, sums
+
+
+def part_rows(head, p, out):
+    """The integers of a part, as the index has their CRC-32, and where those of each Gaussian begin."""
+    who, atom, size = (x[np.argsort(out.codes[p][0], kind="stable")] for x in out.codes[p])
+    exact = out.exact & (p == 0)
+    count = out.nonzeros[p]
+    ends = np.concatenate([[0], np.cumsum(1 + np.where(exact, head.d, 2 * count))])
+    values = np.zeros(ends[-1], I)
+    values[ends[:-1]] = np.where(exact, -1, count)
+    place = ends[who] + 1 + 2 * (np.arange(len(who)) - (np.cumsum(count) - count)[who])
+    values[place], values[place + 1] = atom, size
+    for g, row in out.rows.items() if p == 0 else ():
+        values[ends[g] + 1:ends[g + 1]] = row.view("<i4")
+    return ends, values
+
+
+# Values
+
+def apply_interim(head, out, there, values):
+    """Change values of Gaussians in whose cell the next layer has no base yet."""
+    layers, cells = np.array(head.layer, I), np.array(head.cell, np.uint64)
+    has = there[head.first[:-1]] if len(layers) else np.zeros(0, bool)
+    layer_of = np.repeat(layers, head.count)
+    for layer in range(int(layers.max(initial=0))):
+        mine, chunks = np.flatnonzero(there & (layer_of == layer)), np.flatnonzero(layers == layer + 1)
+        if not len(chunks):
+            continue
+        # Of several chunks that begin in one cell the last is responsible for it: those before it have no cell at all.
+        which = np.searchsorted(cells[chunks], out.z[mine].astype(np.uint64), side="right") - 1
+        mine = mine[~has[chunks[np.maximum(which, 0)]]]
+        for t in range(7):
+            change = out.change[max(t - 2, 0), mine] * head.interim_step[min(max(t - 2, 0), 2)]
+            values[t, mine] = wrap(values[t, mine] + change)
+
+
+def values_of(head, out, there):
+    """Return all that is drawn of the Gaussians that have a base.
+
+    `ideal` are the values before they are rounded to f32, and how far from these others may be.
+    """
+    H = 3 ** out.lack
+    values = []
+    for t in range(7):
+        step = head.steps[min(t, 4)][out.shape if t < 4 else out.colour]
+        values.append(wrap(out.predicted[t] + (out.count[t] if t < 4 else wrap(H * out.count[t])) * step))
+    values = np.array(values).reshape(7, -1)
+    apply_interim(head, out, there, values)
+    values = values[:, there]
+    check(((values >= -1 << 27) & (values < 1 << 27)).all(), "a value of a target is out of range")
+    lack, full = out.lack[there], out.full[:, there]
+    size = 2.0 ** (full - drop(full, lack))
+    i, j, h = (out.rotation[:, there] + 0.5) / size
+    needle = out.needle[there] == 1
+
+    x, y = i + j - 1, i - j
+    u = np.stack([x, y, np.maximum(1 - abs(x) - abs(y), 0)])
+    u = u / np.sqrt((u * u).sum(0))
+    first = np.stack([1 - u[0] * u[0] / (1 + u[2]), -u[0] * u[1] / (1 + u[2]), -u[0]])
+    second = np.stack([-u[0] * u[1] / (1 + u[2]), 1 - u[1] * u[1] / (1 + u[2]), -u[1]])
+    v = np.cos(np.pi * h) * first + np.sin(np.pi * h) * second
+    w = np.cos(np.pi * h) * second - np.sin(np.pi * h) * first
+    axes = np.where(needle, [u, v, w], [v, w, u])
+    c, s, g = np.cos(np.pi * h / 2), np.sin(np.pi * h / 2), 1 / np.sqrt(2 + 2 * u[2])
+    W, X, Y, Z = (1 + u[2]) * g * c, (u[0] * s - u[1] * c) * g, (u[0] * c + u[1] * s) * g, (1 + u[2]) * g * s
+    half = np.stack([W + X + Y + Z, X - W - Y + Z, Y - W - Z + X, Z - W - X + Y]) / 2
+    rotation = np.where(needle, half, [W, X, Y, Z])
+
+    moves = wrap(3 ** lack * out.count[7:, there]) * 2.0 ** (out.move_log[:, there] / 512)
+    position = head.origin[:, None] + (out.cell[:, there] + 0.5) * head.side
+    for k in range(3):
+        position = position + moves[k] * axes[k]
+    o = np.minimum(values[3], -105) / 2 ** 20
+    opacity = o - np.log(-np.expm1(o))
+
+    rest, exact = sh_rest(head, out, there)
+    ideal = position
+    with np.errstate(over="ignore"):
+        position, unit = ideal.astype(F), 2.0 ** head.dc_exponent
+    terms = [values[4 + k] / 2 ** 20 * unit * head.dc_axes[k][:, None] for k in range(3)]
+    dc = head.dc_mean[:, None] + terms[0] + terms[1] + terms[2]
+    summed = abs(terms[0]) + abs(terms[1]) + abs(terms[2])
+    if len(head.points) and head.d:
+        n = head.d // 3
+        weight = np.zeros((n, len(lack)))
+        for point in head.points:
+            D = position.astype(float) - point[:, None]
+            weight += basis(*(D / np.sqrt((D * D).sum(0) + head.softening ** 2)))[:n]
+        weight /= 0.28209479 * len(head.points)
+        for k in range(3):
+            mine = rest[:, k * n:k * n + n].T.astype(float)
+            dc[k] -= (weight * mine).sum(0)
+            summed[k] += 3 * abs(mine).sum(0)
+    ideal = {"position": (ideal.T, 2.0 ** -20 * abs(moves).sum(0)[:, None] + 2.0 ** -23 * abs(ideal.T)),
+             "rotation": (rotation.T, np.full((len(lack), 4), 2.0 ** -20)), "dc": (dc.T, 2.0 ** -18 * summed.T + 2.0 ** -22 * abs(head.dc_mean)),
+             "opacity": (opacity, 2.0 ** -20 * np.maximum(1, abs(opacity)))}
+    result = {"scale": (values[:3] / 2 ** 20).T.astype(F), "sh_rest": rest}
+    with np.errstate(over="ignore"):
+        result |= {k: np.ascontiguousarray(v.astype(F)) for k, (v, _) in ideal.items()}
+    check(all(np.isfinite(x).all() for x in result.values()), "something decoded is not finite")
+    return result | {"exact": exact, "dictionary": head.atoms, "ideal": ideal}
+
+
+def sh_rest(head, out, there):
+    n = len(out.z)
+    rest = np.zeros((n, head.d), F)
+    if head.d:
+        who, atom, size = (np.concatenate(x) for x in zip(*out.codes))
+        sort = np.lexsort((atom, who))
+        who, atom, size = who[sort], atom[sort], size[sort]
+        check(not ((np.diff(who) == 0) & (np.diff(atom) == 0)).any(), "a Gaussian has an atom twice")
+        count = out.nonzeros.sum(0)
+        check((count <= head.d).all(), "a Gaussian has too many nonzeros")
+        with np.errstate(over="ignore"):
+            steps = np.array([F(head.value_step) * (F(1) if head.promised else F(2) ** c) for c in range(16)], F)
+            value = (size.astype(F) * steps[out.colour[who]]).astype(np.float16).astype(F)
+        check(np.isfinite(value).all(), "a value is not finite")
+        # The k-th nonzeros of all Gaussians together: each product and each sum is rounded to f32.
+        place = np.arange(len(who)) - (np.cumsum(count) - count)[who]
+        for k in range(int(count.max(initial=0))):
+            at = np.flatnonzero(place == k)
+            rest[who[at]] += value[at, None] * head.atoms[atom[at]]
+        for g, row in out.rows.items():
+            rest[g] = row.view("<f4")
+    return rest[there], out.exact[there]
+
+
+def basis(x, y, z):
+    """The basis functions of SH of degrees 1 to 4 as in 3DGS. The argument may be shorter than 1."""
+    xx, yy, zz, xy, yz, xz = x * x, y * y, z * z, x * y, y * z, x * z
+    return np.array([
+        -0.48860251 * y, 0.48860251 * z, -0.48860251 * x,
+        1.0925484 * xy, -1.0925484 * yz, 0.31539157 * (2 * zz - xx - yy), -1.0925484 * xz, 0.5462742 * (xx - yy),
+        -0.5900436 * y * (3 * xx - yy), 2.8906114 * xy * z, -0.4570458 * y * (4 * zz - xx - yy),
+        0.37317634 * z * (2 * zz - 3 * xx - 3 * yy), -0.4570458 * x * (4 * zz - xx - yy), 1.4453057 * z * (xx - yy),
+        -0.5900436 * x * (xx - 3 * yy),
+        2.5033429 * xy * (xx - yy), -1.7701308 * yz * (3 * xx - yy), 0.9461747 * xy * (7 * zz - 1),
+        -0.6690465 * yz * (7 * zz - 3), 0.10578555 * (zz * (35 * zz - 30) + 3), -0.6690465 * xz * (7 * zz - 3),
+        0.47308734 * (xx - yy) * (7 * zz - 1), -1.7701308 * xz * (xx - 3 * yy),
+        0.6258357 * (xx * (xx - 3 * yy) - yy * (3 * xx - yy))])
+
+
+# Coded columns
+
+def read_column(data, n):
+    b = Bytes(data)
+    kind = b.u8()
+    check(kind < 8, "a column is of an unknown type")
+    kind = np.dtype(COLUMN_TYPES[kind])
+    values = []
+    for first in range(0, n, 65536):
+        values.append(read_block(Bytes(b.take(b.unpack("I")[0])), min(65536, n - first), kind.itemsize))
+    check(b.end(), "bytes follow the last block of a column")
+    return np.concatenate([np.zeros(0, "<u8"), *values]).astype(f"<u{kind.itemsize}").view(kind)
+
+
+def read_block(b, n, w):
+    how = b.u8()
+    if how == 0:
+        values = np.full(n, int.from_bytes(b.take(w), "little"), "<u8")
+    elif how == 4:
+        size = b.unpack("H")[0] + 1
+        check(size <= n, "a palette is too large")
+        palette = numbers(b, b.u8(), size, w)
+        places = numbers(b, b.u8(), n, 1 if size <= 256 else 2)
+        check((places < size).all(), "a place of a palette is out of range")
+        values = palette[places.astype(I)]
+    else:
+        values = numbers(b, how, n, w)
+    check(b.end(), "bytes follow what is in a block")
+    return values
+
+
+def numbers(b, how, c, w):
+    check(1 <= how <= 3, "unknown numbers in a column")
+    if how == 1:
+        return np.frombuffer(stream(b, c * w), f"<u{w}").astype("<u8")
+    x = np.zeros(c, "<u8")
+    for k in range(w):
+        x |= np.frombuffer(stream(b, c), "u1").astype("<u8") << np.uint64(8 * k)
+    if how == 3:
+        half = x >> np.uint64(1)
+        x = np.cumsum(np.where(x & np.uint64(1), ~half, half), dtype="<u8") & np.uint64((1 << 8 * w) - 1)
+    return x
+
+
+def stream(b, size):
+    inflate = zlib.decompressobj(-15)
+    try:
+        data = inflate.decompress(b.take(b.unpack("I")[0]), size + 1)
+        check(len(data) == size and inflate.eof and not inflate.unused_data and not inflate.unconsumed_tail,
+              "a stream of a column is of another length")
+    except zlib.error as e:
+        raise LexiError(f"a stream of a column is damaged: {e}") from e
+    return data
