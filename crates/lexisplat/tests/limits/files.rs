@@ -104,7 +104,10 @@ pub(crate) fn model_bytes(model: &Model) -> u64 {
     (geometry_bytes(model.geometry()) + codes.counts().len() + indices + values + escapes) as u64
 }
 
-/// Bytes that an opened packed file takes: head and data as they lie, order and extras as numbers.
+/// Bytes of the checksum that the tensor of the head starts with. It is not kept.
+const SEAL: u64 = 4;
+
+/// Bytes that an opened packed file takes: head without its checksum and data as they lie, order and extras as numbers.
 pub(crate) fn packed_bytes(packed: &lexisplat::packed::Packed) -> u64 {
     let writer = LexiWriter::packed(packed);
     let attributes = writer.attribute_bytes();
@@ -114,5 +117,5 @@ pub(crate) fn packed_bytes(packed: &lexisplat::packed::Packed) -> u64 {
         other => panic!("{other:?}"),
     });
     let numbers = extras.sum::<usize>() + packed.order().map_or(0, size_of_val);
-    lie.map(|t| t.1).sum::<u64>() + numbers as u64
+    lie.map(|t| t.1).sum::<u64>() - SEAL + numbers as u64
 }
