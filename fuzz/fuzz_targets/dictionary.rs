@@ -2,14 +2,13 @@
 #![no_main]
 
 use lexisplat::lexi::read_dictionary_bytes;
-use lexisplat_fuzz::allocator::bounded;
+use lexisplat_fuzz::allocator::{PACKED_HEAD, PACKED_PER_BYTE, bounded};
 use lexisplat_fuzz::{container, limits, one_thread};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 
-/// As of `.lexi` files of the layout packed.
-const PER_BYTE: usize = 542;
-/// Tables, and a dictionary as it is read.
-const BASE: usize = 18 * 31 * (9 << 10) + 1024 * 72 * 4 * 2 + (1 << 20);
+const PER_BYTE: usize = PACKED_PER_BYTE;
+/// Tables and a dictionary as they are read, and the container.
+const BASE: usize = PACKED_HEAD + (1 << 20);
 /// How far from 1 a norm may be, squared.
 const NORM_SLACK: f64 = 1e-4;
 

@@ -5,18 +5,13 @@
 use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::packed::Packed;
 use lexisplat::{Error, Silent};
-use lexisplat_fuzz::allocator::bounded;
+use lexisplat_fuzz::allocator::{PACKED_HEAD, PACKED_PER_BYTE, bounded};
 use lexisplat_fuzz::{container, invariants, limits, one_thread, parts};
 use libfuzzer_sys::{fuzz_mutator, fuzz_target, fuzzer_mutate};
 
-/// As derived in `crates/lexisplat/tests/packed_mutation/main.rs`.
-const PER_BYTE: usize = 542;
-/// Tables, a dictionary and what a chunk may hold before it is asked for its bits: as there.
-const BASE: usize = (56 * 31 * (4 << 10) + 3 * 31 * (16 << 10)) * 2
-    + 59 * 31 * (1 << 10)
-    + 1024 * 72 * 4 * 2
-    + 64 * 16 * 72 * 16
-    + (64 << 10);
+const PER_BYTE: usize = PACKED_PER_BYTE;
+/// Tables, a dictionary, and what a chunk may hold before it is asked for its bits.
+const BASE: usize = PACKED_HEAD + 64 * 16 * 72 * 16;
 
 fuzz_mutator!(|data: &mut [u8], size: usize, max_size: usize, seed: u32| {
     container::mutate(data, size, max_size, seed, |buffer, len| {

@@ -7,6 +7,8 @@ use serde_json::{Map, Value, json};
 
 /// One time in so many the bytes are changed as they lie, and nothing is made to fit.
 const RAW: usize = 8;
+/// Bytes of the checksum of header and head that a packed head of version 3 starts with.
+const SEAL: usize = 4;
 /// Most bytes a tensor may grow by in one mutation.
 const GROWTH: usize = 64;
 /// Types of tensors, known ones and one that no reader takes.
@@ -135,15 +137,19 @@ impl Parts {
         let Some(degree) = degree.and_then(|degree| ShDegree::new(degree).ok()) else { return };
         let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);
         let (Some(head), Some(data)) = (at("packed.head"), at("packed.data")) else { return };
-        let (head, data) = (&self.tensors[head].bytes, &self.tensors[data].bytes);
-        let Some(sealed) = layered::resealed(head, degree, data) else { return };
-        self.tensors.iter_mut().filter(|t| t.name == "packed.head").for_each(|t| t.bytes.clone_from(&sealed));
+        let data = &self.tensors[data].bytes;
+        let Some((own, rest)) = self.tensors[head].bytes.split_first_chunk::<SEAL>() else { return };
+        let Some(sealed) = layered::resealed(rest, degree, data) else { return };
+        self.tensors[head].bytes = [own, &sealed[..]].concat();
     }
 
     /// The file, with offsets and checksums that fit, and names that differ.
     fn sealed(&self) -> Vec<u8> {
         let (mut header, mut sums, mut data, mut own) = (Map::new(), Map::new(), Vec::new(), None);
-        let ranged = self.metadata.get("version").and_then(Value::as_str) == Some("3");
+        // Since version 3 the head has the checksum of header and head, and those of the ranges of the data.
+        let is_version_3 = self.metadata.get("version").and_then(Value::as_str) == Some("3");
+        let is_layered = is_version_3 && self.tensors.iter().any(|tensor| tensor.name == "packed.head");
+        let mut sealed = &[][..];
         for tensor in &self.tensors {
             if header.contains_key(&tensor.name) {
                 continue;
@@ -154,12 +160,15 @@ impl Parts {
             let entry =
                 json!({"dtype": tensor.dtype, "shape": tensor.shape, "data_offsets": [start, data.len()]});
             header.insert(tensor.name.clone(), entry);
-            // The ranges of packed data have checksums of their own since version 3.
-            if ranged && tensor.name == "packed.data" {
+            if is_layered && tensor.name == "packed.data" {
                 continue;
             }
-            if tensor.name == "checksum.header" {
-                own = (range.len() == 4).then_some(range);
+            if is_layered && tensor.name == "packed.head" {
+                if let Some((_, rest)) = tensor.bytes.split_first_chunk::<SEAL>() {
+                    (own, sealed) = (Some(range.start..range.start + SEAL), rest);
+                }
+            } else if !is_layered && tensor.name == "checksum.header" {
+                own = (range.len() == SEAL).then_some(range);
             } else {
                 let sum = format!("{:08x}", crc32fast::hash(&tensor.bytes));
                 sums.insert(tensor.name.clone(), Value::String(sum));
@@ -173,9 +182,11 @@ impl Parts {
         let text = Value::Object(header).to_string();
         let mut out = (text.len() as u64).to_le_bytes().to_vec();
         out.extend_from_slice(text.as_bytes());
-        let sum = crc32fast::hash(&out).to_le_bytes();
+        let mut sum = crc32fast::Hasher::new();
+        sum.update(&out);
+        sum.update(sealed);
         if let Some(slot) = own {
-            data[slot].copy_from_slice(&sum);
+            data[slot].copy_from_slice(&sum.finalize().to_le_bytes());
         }
         out.extend_from_slice(&data);
         out

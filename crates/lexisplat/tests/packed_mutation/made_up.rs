@@ -106,7 +106,7 @@ pub(crate) fn all_tables() -> Vec<u8> {
     let mut out = Writer::new();
     let (mut used, mut same) = ([Odds::default(); 2], [Odds::default(); 2]);
     let (mut many, mut new, mut grain) = (Odds::default(), Odds::default(), [Odds::default(); 2]);
-    let mut counts = [[Odds::default(); COUNT_BITS + 1]; 4];
+    let mut counts = [[Odds::default(); COUNT_BITS]; 4];
     let mut present = [[Odds::default(); 2]; 4];
     let mut nonzero = [Odds::default(); 4];
     for set in 0..SETS {
@@ -118,8 +118,8 @@ pub(crate) fn all_tables() -> Vec<u8> {
         }
         let kind = kind(set);
         for _ in 0..CONTEXTS {
-            for length in 1..=COUNT_BITS {
-                out.bit(&mut counts[kind][length], length < COUNT_BITS);
+            for (length, odds) in (1..=COUNT_BITS).zip(&mut counts[kind]) {
+                out.bit(odds, length < COUNT_BITS);
             }
             out.zeros(SYMBOLS.trailing_zeros());
             grain.iter_mut().for_each(|odds| out.bit(odds, false));

@@ -81,13 +81,14 @@ mod tests {
     fn pieces_in_any_order_make_a_run() {
         let file: Vec<u8> = (0..40).collect();
         // Beyond both ends, twice, touching and apart.
-        let pieces = [(30, 40), (0, 4), (12, 15), (10, 12), (11, 14), (20, 21), (22, 31), (14, 20), (21, 22)];
+        let pieces: [(u8, u8); 9] =
+            [(30, 40), (0, 4), (12, 15), (10, 12), (11, 14), (20, 21), (22, 31), (14, 20), (21, 22)];
         let mut run = Run::new(10, 20);
         let mut there = [false; 40];
         for (i, (from, to)) in pieces.into_iter().enumerate() {
             assert!(run.whole().is_none(), "{i}");
-            run.put(from, &file[from as usize..to]);
-            there[from as usize..to].fill(true);
+            run.put(from.into(), &file[from.into()..to.into()]);
+            there[from.into()..to.into()].fill(true);
             let gap = (10..30).find(|&i| !there[i]).map(|start| {
                 let end = (start..30).find(|&i| there[i]).unwrap_or(30);
                 start as u64..end as u64
