@@ -15,7 +15,7 @@ const FACTOR_STEPS: usize = 60;
 /// ones take fewer bytes.
 const LEAST_CHUNK: usize = 8192;
 const MOST_CHUNK: usize = 32_768;
-const CHUNKS: usize = 8;
+const CHUNKS: usize = 6;
 /// A rest of up to a chunk over this is part of the one before.
 const REST: usize = 2;
 /// Sizes of nonzeros at which their parts end, where there are layers.

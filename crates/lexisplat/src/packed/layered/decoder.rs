@@ -94,7 +94,7 @@ impl LayeredDecoder {
             *interim = None;
         }
         let want = Want { sums: wish.verify, bits: count_bits };
-        let piece = self.unpacker.chunk(form, &alone, &ranges, want, place, budget);
+        let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged => damaged(),
             Refusal::Full => budget.full(),

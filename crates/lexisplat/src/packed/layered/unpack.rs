@@ -50,18 +50,20 @@ pub(in crate::packed) struct Unpacker {
 }
 
 impl Unpacker {
-    /// Decodes a chunk of a layer from the ranges that are there to `place`. Interim changes are made to Gaussians in the cells
-    /// `alone`. Escapes are numbered from its start. `budget` holds everything but codes, and takes those.
+    /// Decodes a chunk of a layer from the ranges that are there to `place`. Its first Gaussian is in cell `cell`. Interim
+    /// changes are made to Gaussians in the cells `alone`. Escapes are numbered from its start. `budget` holds everything but codes, and takes those.
+    #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
     pub(in crate::packed) fn chunk(
         &self,
         layer: LayerForm,
+        cell: u64,
         alone: &[Range<u64>],
         ranges: &[Option<&[u8]>],
         want: Want,
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
     ) -> Result<(Piece, Vec<u32>), Refusal> {
-        Simd::current().run(Job { with: self, layer, alone, ranges, want, place, budget })
+        Simd::current().run(Job { with: self, layer, cell, alone, ranges, want, place, budget })
     }
 }
 
@@ -76,6 +78,7 @@ impl Unpacker {
 struct Job<'j, 'p, 'r> {
     with: &'j Unpacker,
     layer: LayerForm,
+    cell: u64,
     alone: &'j [Range<u64>],
     ranges: &'j [Option<&'r [u8]>],
     want: Want,
@@ -97,7 +100,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Self { with, layer, alone, ranges, want, place, budget } = self;
+        let Self { with, layer, cell, alone, ranges, want, place, budget } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
         let blank = [[0.0; LANES]; MOST];
@@ -105,6 +108,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         let mut out = Out {
             with,
             place,
+            cell,
             alone,
             starts,
             lanes: Lanes::default(),
@@ -134,6 +138,8 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 struct Out<'j, 'p> {
     with: &'j Unpacker,
     place: &'j mut Place<'p>,
+    /// The cell of the first Gaussian.
+    cell: u64,
     /// Cells around which the next layer is not there.
     alone: &'j [Range<u64>],
     /// First Gaussian of each lane.
@@ -157,6 +163,9 @@ impl Sink for Out<'_, '_> {
         group: &Group,
         levels: [usize; 2],
     ) -> Option<()> {
+        if number == 0 && group.number[0] != self.cell {
+            return None;
+        }
         let is_alone =
             |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
         let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };

@@ -45,7 +45,7 @@ fn decoded(of: &LayeredDecoder, packed: &Packed, c: usize, there: impl Fn(usize)
     let mut place = places(&mut geometry, &mut counts, &spans).pop().unwrap();
     let want = Want { sums: true, bits: false };
     let budget = MemoryBudget::new(&packed.head().limits, "test", u64::MAX);
-    let (piece, sums) = of.unpacker.chunk(form, &[], &ranges, want, &mut place, &budget).ok()?;
+    let (piece, sums) = of.unpacker.chunk(form, chunk.cell, &[], &ranges, want, &mut place, &budget).ok()?;
     Some(Decoded { geometry, counts, piece, sums })
 }
 
@@ -150,5 +150,17 @@ fn base_colours_are_seen_on_average() {
         let kept = distance(&whole.geometry.dc, &original.dc);
         let differ = distance(&whole.geometry.dc, &bare.geometry.dc);
         assert!(kept < 0.5 * differ, "chunk {c}: {kept}, {differ}");
+    }
+}
+
+#[test]
+fn cells_are_those_of_the_index() {
+    let packed = packed(None, Vec::new());
+    let mut of = decoder(&packed);
+    assert!(of.head.index.chunks.len() > 1);
+    for c in 0..of.head.index.chunks.len() {
+        assert!(decoded(&of, &packed, c, |_| true).is_some());
+        of.head.index.chunks[c].cell ^= 1;
+        assert!(decoded(&of, &packed, c, |_| true).is_none());
     }
 }

@@ -45,8 +45,9 @@ proptest! {
     #[test]
     fn logarithms_are_those_of_libm(mantissa in 1.0..2.0_f64, exponent in -60..1_i32) {
         let x = libm::ldexp(mantissa, exponent);
-        // The first term that is left out is 2 / 17 of 0.1716^17.
-        prop_assert!((ln(x) - libm::log(x)).abs() <= 2e-14, "{x}");
+        // The first term that is left out is 2 / 17 of 0.1716^17. A few roundings of the sum add to it.
+        let expected = libm::log(x);
+        prop_assert!((ln(x) - expected).abs() <= 1.2e-14 + 4.0 * f64::EPSILON * expected.abs(), "{x}");
     }
 
     #[test]
