@@ -2,8 +2,8 @@
 
 use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
-/// Scenes of fewer Gaussians have one layer. Their files are small.
-const LEAST_LAYERED: usize = 8000;
+/// Scenes of fewer Gaussians have one layer by default. Their files are small.
+pub(super) const LEAST_LAYERED: usize = 8000;
 /// Shares of the Gaussians in all layers but the last, where there are several.
 const SHARES: [f64; 1] = [0.14];
 /// A Gaussian is drawn into a layer with a probability that grows with this power of the change of pictures without it. With
@@ -37,15 +37,15 @@ pub(super) struct Layering {
 }
 
 impl Layering {
-    /// The layers of a scene of `gaussians` Gaussians, or one if it may have no more. `energies` are the changes of
-    /// pictures without each of some of the Gaussians.
+    /// The layers of a scene of `gaussians` Gaussians, or one if these are fewer than `layers_from`. `energies` are the
+    /// changes of pictures without each of some of the Gaussians.
     pub(super) fn new(
         gaussians: usize,
-        may_layer: bool,
+        layers_from: usize,
         energies: impl Iterator<Item = f32> + Clone,
     ) -> Self {
         let mut factors = Vec::new();
-        if may_layer && gaussians >= LEAST_LAYERED {
+        if gaussians >= layers_from.max(1) {
             let powers: Vec<f64> = energies.map(power).collect();
             // The probability that a Gaussian is in no layer so far.
             let mut left = vec![1.0; powers.len()];

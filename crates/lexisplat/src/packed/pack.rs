@@ -6,6 +6,7 @@ use super::canonical::{Grid, MortonKey};
 use super::fit::Fit;
 use super::floor::Floor;
 use super::layered::MeanView;
+use super::layering::LEAST_LAYERED;
 use super::parameters::Parameters;
 use super::quantised::{Fitted, Gaussians, Quantised};
 use super::removal::Weights;
@@ -31,7 +32,7 @@ const DB_PER_OCTAVE_2: f64 = 0.15;
 const MOST_DB: f64 = 100.0;
 
 /// How to pack.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct PackOptions {
     /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are then as exact as
@@ -48,8 +49,23 @@ pub struct PackOptions {
     /// Up to 15 points that the scene is seen from. Base colours are then those that are seen from there on average, so
     /// that they are right without SH-rest too.
     pub viewpoints: Vec<[f32; 3]>,
-    /// Write one layer. By default scenes of 8,000 Gaussians and more have two, of which the first draws the whole scene.
-    pub one_layer: bool,
+    /// Scenes of at least so many Gaussians have two layers, of which the first draws the whole scene, and others have one.
+    /// Default 8,000; `usize::MAX` for one layer always.
+    pub layers_from: usize,
+}
+
+impl Default for PackOptions {
+    fn default() -> Self {
+        Self {
+            tolerance: None,
+            atoms: None,
+            keep_order: false,
+            keep_all: false,
+            seed: 0,
+            viewpoints: Vec::new(),
+            layers_from: LEAST_LAYERED,
+        }
+    }
 }
 
 impl PackOptions {
@@ -60,7 +76,7 @@ impl PackOptions {
         with_keep_all(keep_all: bool),
         with_seed(seed: u64),
         with_viewpoints(viewpoints: Vec<[f32; 3]>),
-        with_one_layer(one_layer: bool),
+        with_layers_from(layers_from: usize),
     );
 
     /// Whether Gaussians may be left out, and base colours and opacities changed to make up for errors.

@@ -170,7 +170,7 @@ impl PartPacker {
         let clock = Stopwatch::start();
         let floor = Floor::new(fit.with_step(step), &sample.geometry, &scene);
         let classes = floor.classes(&classes, &sample.geometry, &scene);
-        let layering = Layering::new(total, !options.one_layer, kept.iter().map(|&i| weights.shown[i][1]));
+        let layering = Layering::new(total, options.layers_from, kept.iter().map(|&i| weights.shown[i][1]));
         let view =
             View { splats: sample, scene: &scene, classes: &classes, appearances: None, changes: None };
         let coder = ChunkCoder::new(view, total, floor.parameters.clone(), mean_view, options, progress)?;

@@ -83,7 +83,7 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = gaussians.scene.len();
-        let layering = Layering::new(n, !options.one_layer, gaussians.weights.iter().map(|w| w[1]));
+        let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| w[1]));
         let view = View {
             splats,
             scene: &gaussians.scene,

@@ -37,6 +37,8 @@ mod tables;
 mod target;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod trace;
 mod unpack;
 mod values;
 mod walk;
