@@ -2,8 +2,8 @@
 """Decoder of .lexi files (layouts packed, f32, f16 and paper) with NumPy alone.
 
 It is written from docs/FORMAT.md and docs/FORMAT-2.md; lexi3.py beside it holds what is of version 3 alone.
-Usage: decode_lexi.py FILE.lexi OUT.npz [BYTES], where BYTES is how much of the beginning to decode.
 """
+import argparse
 import json
 import math
 import re
@@ -34,6 +34,19 @@ RESERVED = re.compile(r"x|y|z|opacity|f_dc_[0-2]|f_rest_(0|[1-9][0-9]*)|scale_[0
 INTEGER = re.compile(r"0|[1-9][0-9]*")
 NUMBER = re.compile(r"-?(0|[1-9][0-9]*)(\.[0-9]+)?([eE][+-]?[0-9]+)?")
 CELL, COLOUR, SHAPE, SCALE, POSITION, OPACITY, DC, COUNT, ATOM, VALUE, DICTIONARY = 0, 1, 2, 3, 7, 10, 11, 14, 15, 16, 17
+
+TRACE = """
+A trace is of lane 0 of chunk 0 of a file of version 3, range by range in ascending order of kinds (0 is the base), and
+in the order in which the lane is decoded. Each symbol and each piece of raw bits, of at most 16, has a line:
+
+    RANGE GAUSSIAN STREAM CONTEXT SYMBOL STATE
+    RANGE GAUSSIAN bits COUNT VALUE STATE
+
+RANGE is the kind of the range, GAUSSIAN the number of the Gaussian in the lane, STREAM the name of the stream in
+docs/FORMAT.md, and STATE the state of the lane after the step and its refill, in hexadecimal. Other numbers are decimal.
+Signs of nonzeros are of several Gaussians: GAUSSIAN is then "-". Nothing is printed for other Gaussians than the first K,
+though they are decoded. A piece of signs is printed if one of its signs is of the first K.
+"""
 
 
 # The container
@@ -154,9 +167,9 @@ def check_metadata_3(meta):
     """Check every key of version 3, and return the degree."""
     degree = whole(meta, "degree", 5)
     whole(meta, "gaussians", (1 << 32) - 1)
-    for key in ("seed", "over_tolerance", "removed"):
+    for key, limit in (("seed", 1 << 64), ("over_tolerance", 1 << 64), ("removed", 1 << 64), ("max_nonzeros", 256)):
         if key in meta:
-            whole(meta, key, 1 << 64)
+            whole(meta, key, limit)
     for key in ("tolerance", "max_residual", "rms_residual"):
         if key in meta:
             real(meta, key)
@@ -175,7 +188,7 @@ def check_metadata(meta, layout):
     check(meta.get("pursuit") in (("omp",) if packed else ("omp", "ols")), "bad metadata pursuit")
     if "max_nonzeros" in meta:
         check(not packed, "max_nonzeros in layout packed")
-        whole(meta, "max_nonzeros", 1 << 64)
+        whole(meta, "max_nonzeros", 256)
     elif not packed:
         check("tolerance" in meta, "neither tolerance nor max_nonzeros")
     for key in ("tolerance", "max_residual", "rms_residual"):
@@ -651,7 +664,7 @@ def decode_packed(t, meta, d, file_size):
     return out
 
 
-def decode_version_3(t, meta, d, header, places, beginning):
+def decode_version_3(t, meta, d, header, places, beginning, trace):
     n = int(meta["gaussians"])
     check(n <= 3 * (header + max(end for _, end in places.values())), "more Gaussians than the file has room for")
     check("packed.data" in places, "no packed.data")
@@ -665,33 +678,35 @@ def decode_version_3(t, meta, d, header, places, beginning):
         check(order.dtype == np.dtype("<u4") and (np.sort(order) == np.arange(n)).all(), "the order is no permutation")
     extras = t.extras(n, True)
     t.finish()
-    integers, there, sums = lexi3.decode_ranges(head, data)
+    integers, there, sums = lexi3.decode_ranges(head, data, trace)
     check(beginning or there.all(), "a base is missing")
     out = lexi3.values_of(head, integers, there)
-    out["extras"] = {k: v[there] for k, v in extras.items()}
-    if order is not None:
-        out["order"] = order[there]
+    out["extras"] = extras if there.all() else {}
+    if order is not None and there.all():
+        out["order"] = order
     return out | {"there": there, "integers": sums, "ranges": head.ranges}
 
 
-def decode(data, beginning=False):
+def decode(data, beginning=False, trace=None):
     """Decode the bytes of a file. The arrays are in the order of the file.
 
     If `beginning`, the bytes may be the first ones of a file of version 3; they hold the header and packed.head. The
     arrays are then of the Gaussians that have a base. Of version 3 also returned are `there`, which Gaussians these
     are; `integers`, of each range how many integers it decoded to and whether their CRC-32 is right; and `ideal`, for
-    some arrays the values before they are rounded to f32, and how far from these others may be.
+    some arrays the values before they are rounded to f32, and how far from these others may be. `trace` may be a
+    lexi3.Trace, for files of version 3.
     """
     with np.errstate(all="ignore"):
         meta, tensors, head, places = read_container(data, beginning)
         version, layout = check_version(meta)
         check(version == 3 or not beginning, "only version 3 can be decoded in part")
+        check(version == 3 or trace is None, "only version 3 can be traced")
         check_sums(meta, tensors, head, version, beginning)
         degree = check_metadata_3(meta) if version == 3 else check_metadata(meta, layout)
         d = 3 * ((degree + 1) ** 2 - 1)
         t = Tensors(tensors)
         if version == 3:
-            return meta, decode_version_3(t, meta, d, len(head), places, beginning)
+            return meta, decode_version_3(t, meta, d, len(head), places, beginning, trace)
         t.left.pop("checksum.header")
         out = decode_packed(t, meta, d, len(data)) if layout == "packed" else decode_plain(t, layout, d)
         t.finish()
@@ -711,17 +726,25 @@ def in_source_order(out):
 
 
 def main():
-    if len(sys.argv) not in (3, 4):
-        sys.exit("usage: decode_lexi.py FILE.lexi OUT.npz [BYTES]")
-    with open(sys.argv[1], "rb") as f:
-        data = f.read(int(sys.argv[3]) if len(sys.argv) == 4 else -1)
+    parser = argparse.ArgumentParser(description=__doc__, epilog=TRACE, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("file", metavar="FILE.lexi")
+    parser.add_argument("out", metavar="OUT.npz", nargs="?", help="the arrays that it decodes to")
+    parser.add_argument("bytes", metavar="BYTES", nargs="?", type=int, help="how much of the beginning to decode")
+    parser.add_argument("--trace", metavar="K", type=int, help="print what the first K Gaussians are decoded from")
+    given = parser.parse_args()
+    if given.out is None and given.trace is None:
+        parser.error("neither OUT.npz nor --trace is given")
+    with open(given.file, "rb") as f:
+        data = f.read(-1 if given.bytes is None else given.bytes)
     try:
-        meta, out = decode(data, len(sys.argv) == 4)
+        meta, out = decode(data, given.bytes is not None, None if given.trace is None else lexi3.Trace(given.trace))
     except LexiError as e:
-        sys.exit(f"{sys.argv[1]}: {e}")
+        sys.exit(f"{given.file}: {e}")
+    if given.out is None:
+        return
     arrays = {k: v for k, v in out.items() if isinstance(v, np.ndarray)}
     arrays.update({f"extra.{k}": v for k, v in out["extras"].items()})
-    np.savez(sys.argv[2], **arrays)
+    np.savez(given.out, **arrays)
     print(f"{len(out['position'])} Gaussians, layout {meta.get('layout', 'packed')}, SH degree {meta['degree']}")
     if "integers" in out:
         good = [right for _, right in out["integers"].values()]

@@ -14,6 +14,9 @@ F = np.float32
 I = np.int64
 CELL, COLOUR, SHAPE, SCALE, OPACITY, POSITION, DC, FINE_POSITION, FINE_DC = 0, 1, 2, 3, 6, 8, 11, 14, 15
 COUNT, ATOM, VALUE, PAGE, INTERIM_SCALE, INTERIM_OPACITY, INTERIM_DC = 16, 19, 22, 25, 26, 27, 28
+NAMES = ("Cell", "ColourClass", "ShapeClass", "Scale0", "Scale1", "Scale2", "Opacity", "Rotation", "Position0", "Position1",
+         "Position2", "Dc0", "Dc1", "Dc2", "FinePosition", "FineDc", "Count0", "Count1", "Count2", "Atom0", "Atom1",
+         "Atom2", "Value0", "Value1", "Value2", "AtomPage", "InterimScale", "InterimOpacity", "InterimDc")
 TARGETS = (SCALE, SCALE + 1, SCALE + 2, OPACITY, DC, DC + 1, DC + 2)
 # Order of the sets of contexts: streams 0 to 15 three times, then the others.
 SETS = [*range(16)] * 3 + [*range(16, 29)]
@@ -290,7 +293,9 @@ class Head:
             width = bits(5)
             check(width + zeros <= 16, "an integer is too wide")
             values = np.array([bits(width) for _ in range(count)], I)
-            return (values - (values >> max(width - 1, 0) << width)) << zeros
+            values -= values >> max(width - 1, 0) << width
+            check(width == (1 + bitlength(values ^ values >> 63)[values != 0]).max(initial=0), "a width is not the least")
+            return values << zeros
         self.cell_log = int(group(1, 2)[0])
         self.turn, self.move, self.predictor = np.zeros((3, 4), I), np.zeros((3, 4), I), np.zeros((7, 7), I)
         for rows in (self.turn, self.move):
@@ -351,12 +356,19 @@ def axes_of(w, x, y, z):
 
 # Lanes
 
+class Trace:
+    """Writes what lane 0 of chunk 0 takes for its first Gaussians: lines of symbols and of pieces of raw bits."""
+
+    def __init__(self, gaussians, write=print):
+        self.gaussians, self.write, self.kind = gaussians, write, 0
+
+
 class Lanes:
     """The lanes of some ranges, the longest first. `who` are those that a call is for: a slice or their numbers."""
 
-    def __init__(self, tables, ranges):
+    def __init__(self, tables, ranges, trace=None):
         """Each of the ranges is its bytes, the first of its Gaussians, their number, and the set of its stream 0."""
-        self.tables = tables
+        self.tables, self.trace = tables, trace
         lanes, words, begin = [], [], 0
         for data, first, n, base in ranges:
             q = min(max(n // 1024, 1), 16)
@@ -366,6 +378,7 @@ class Lanes:
             sizes = np.frombuffer(data[:head], f"<u{width}").tolist()
             sizes.append((len(data) - head) // 2 - sum(sizes))
             check(min(sizes) >= 2, "a lane is too short")
+            check(sum(sizes) <= 1 << 30, "a range has too many words")
             words.append(data[head:])
             for k, size in enumerate(sizes):
                 length = n // q + (k < n % q)
@@ -379,6 +392,22 @@ class Lanes:
         self.state = (self.words[self.next - 2] << 16) + self.words[self.next - 1]
         self.lane, self.steps = np.arange(len(lanes)), int(self.length.max(initial=0))
         check((self.state >= 1 << 16).all(), "a first state is too small")
+        # The lane that is traced, none if it has no such range, and of which Gaussian what it takes is.
+        self.traced = np.flatnonzero(self.first == 0) if trace else self.lane[:0]
+        self.of(0)
+
+    def of(self, gaussian, name=None):
+        """Say that what the traced lane takes from here on is of this Gaussian of the lane, and what a trace calls it."""
+        self.gaussian, self.name = gaussian, gaussian if name is None else name
+
+    def note(self, who, *what):
+        """Trace a step. Each of what is a text, a number of all lanes, or the numbers of the lanes that the step is of."""
+        lanes = self.lane[who]
+        at = np.flatnonzero(lanes == self.traced)
+        if len(at) and self.gaussian < self.trace.gaussians:
+            what = [x if isinstance(x, str) else np.broadcast_to(x, len(lanes))[at[0]] for x in what]
+            if what[0] != "bits" or what[1]:
+                self.trace.write(self.trace.kind, self.name, *what, f"{self.state[self.traced[0]]:08x}")
 
     def gaussians(self, block=64):
         """Yield for each i the lanes that have a Gaussian i, and the numbers of these Gaussians."""
@@ -388,6 +417,7 @@ class Lanes:
                 n -= 1
             if i % block == 0:
                 self.check_words()
+            self.of(i)
             yield i, slice(0, n), self.first[:n] + i
 
     def check_words(self):
@@ -410,15 +440,21 @@ class Lanes:
         state = self.state[who]
         slot = place + (state & (1 << w) - 1)
         self.put((state >> w) * self.tables.p.take(slot) + self.tables.rest.take(slot), who)
-        return self.tables.symbol.take(slot)
+        symbol = self.tables.symbol.take(slot)
+        if len(self.traced):
+            self.note(who, NAMES[stream], context, symbol)
+        return symbol
 
     def bits(self, n, who):
         """Take n bits, n being a vector or one number."""
         value, shift = 0, 0
         while True:
             now, state = np.minimum(n, 16), self.state[who]
-            value = value + ((state & (1 << now) - 1) << shift)
+            piece = state & (1 << now) - 1
+            value = value + (piece << shift)
             self.put(state >> now, who)
+            if len(self.traced):
+                self.note(who, "bits", now, piece)
             n, shift = n - now, shift + 16
             if not np.any(n):
                 return value
@@ -611,25 +647,32 @@ def decode_nonzeros(head, p, lanes, block, top):
     each = np.repeat(np.arange(counts.size), counts.ravel())
     count = counts.ravel()[each]
     first = np.diff(each, prepend=-1) != 0
-    atom, size = np.zeros(len(each), I), np.zeros(len(each), I)
+    atom, excess = np.zeros(len(each), I), np.zeros(len(each), I)
+    begun = block[0][0][0] - lanes.first[0]
+    traced = [x for x in lanes.traced if x < len(total)]
+    of = [begun + each[begin[x]:begin[x] + total[x]] % len(block) for x in traced]
     for j in range(int(total.max())):
         who = np.flatnonzero(total > j)
+        if of and j < len(of[0]):
+            lanes.of(of[0][j])
         at = begin[who] + j
         page = lanes.symbol(PAGE, p, who) if head.m > 256 else 0
         atom[at] = 256 * page + lanes.symbol(ATOM + p, 2 * np.minimum(page, 3) + np.where(first[at], 0, 1), who)
-        context = np.where(first[at], np.minimum(count[at] - 1, 7), 8 + np.minimum(size[at - 1], 15))
-        size[at] = lanes.integer(VALUE + p, context, who)
+        context = np.where(first[at], np.minimum(count[at] - 1, 7), 8 + np.minimum(excess[at - 1], 15))
+        excess[at] = lanes.integer(VALUE + p, context, who)
     check((atom < head.m).all(), "an atom is out of range")
-    check((size < top).all(), "a size is not one of its part")
-    size += head.least[p]
+    check((excess < top).all(), "a size is not one of its part")
+    size = excess + head.least[p]
     for j in range(0, int(total.max()), 16):
         who = np.flatnonzero(total > j)
         n = np.minimum(total[who] - j, 16)
+        if of and j < len(of[0]):
+            lanes.of(of[0][j], "-")
         signs = lanes.bits(n, who)
         for k in range(int(n.max())):
             negative = np.flatnonzero((n > k) & (signs >> k & 1 == 1))
             size[begin[who[negative]] + j + k] *= -1
-    return lanes.first[lane] + (block[0][0][0] - lanes.first[0]) + each % len(block), atom, size
+    return lanes.first[lane] + begun + each % len(block), atom, size
 
 
 def decode_exact(head, lanes, block, out):
@@ -639,6 +682,8 @@ def decode_exact(head, lanes, block, out):
     of = [np.flatnonzero(x) for x in which]
     for j in range(max(map(len, of))):
         who = np.array([lane for lane, x in enumerate(of) if len(x) > j])
+        for lane in np.intersect1d(who, lanes.traced):
+            lanes.of(block[of[lane][j]][0][0] - lanes.first[0])
         rows = np.stack([lanes.bits(32, who) for _ in range(head.d)], 1).astype("<u4")
         for lane, row in zip(who, rows):
             check(np.isfinite(row.view("<f4")).all(), "an exact value is not finite")
@@ -647,8 +692,8 @@ def decode_exact(head, lanes, block, out):
 
 # Ranges
 
-def decode_ranges(head, data):
-    """Decode the ranges that lie within data, which may be the beginning of packed.data.
+def decode_ranges(head, data, trace=None):
+    """Decode the ranges that lie within data, which may be the beginning of packed.data. `trace` may be a Trace.
 
     Return the integers, the Gaussians that have a base, and of each range that was decoded whether the CRC-32 of its
     integers is right, as {(chunk, kind): (number of integers, whether)}.
@@ -665,7 +710,9 @@ def decode_ranges(head, data):
         keys = [(c, kind_of(c)) for c in chunks if kind_of(c) is not None and needs(c, kind_of(c)) <= whole]
         pieces = [(data[head.ranges[k][0]:head.ranges[k][0] + head.ranges[k][1]], int(head.first[k[0]]), head.count[k[0]],
                    set_of(k[0])) for k in keys]
-        lanes = Lanes(head.tables, pieces)
+        lanes = Lanes(head.tables, pieces, trace if (0, kind_of(0) if chunks else None) in keys else None)
+        if lanes.trace:
+            trace.kind = kind_of(0)
         decoder(lanes)
         lanes.finish()
         ends, values = row_of()
@@ -687,6 +734,7 @@ def decode_ranges(head, data):
         out.lack[head.first[c]:head.first[c + 1]] = R[c]
     run(lambda c: 0, lambda lanes: decode_base(head, lanes, out),
         lambda: rows(out.cell, out.colour, out.shape, out.count, out.rotation), lambda c: 16 * R[c])
+    check(all(int(out.z[head.first[c]]) == head.cell[c] for c in chunks if (c, 0) in whole), "`cell` is not true")
     for k in range(1, max(R, default=0) + 1):
         run(lambda c: k if k <= R[c] else None, lambda lanes: decode_refinement(head, lanes, out),
             lambda: rows(out.count, out.rotation), lambda c: 16 * (R[c] + 1 - k))
