@@ -119,15 +119,15 @@ fn newer_versions_are_refused_by_number() {
     );
 }
 
-/// docs/FORMAT.md shows a file byte by byte; it must be this one.
+/// docs/FORMAT-EXAMPLES.md shows a file byte by byte; it must be this one.
 #[test]
 fn the_documented_example_is_true() {
-    let Some(document) = repository_file("docs/FORMAT.md") else { return };
+    let Some(document) = repository_file("docs/FORMAT-EXAMPLES.md") else { return };
     let document = std::fs::read_to_string(document).unwrap();
     let bytes = std::fs::read(golden("degree0")).unwrap();
     for (row, chunk) in bytes.chunks(16).enumerate() {
         let hex: Vec<String> = chunk.iter().map(|b| format!("{b:02x}")).collect();
         let line = format!("{:04x}  {}", row * 16, hex.join(" "));
-        assert!(document.contains(&line), "docs/FORMAT.md lacks the line\n{line}");
+        assert!(document.contains(&line), "docs/FORMAT-EXAMPLES.md lacks the line\n{line}");
     }
 }
