@@ -26,6 +26,8 @@ pub(super) struct Checked<'a> {
     tensors: Metadata,
     /// Names of all tensors, sorted.
     pub(super) names: Vec<String>,
+    /// The same in the order in which the tensors lie.
+    pub(super) by_place: Vec<String>,
     metadata: BTreeMap<String, String>,
     /// Length of the file by its header.
     pub(super) file_bytes: u64,
@@ -76,9 +78,11 @@ impl<'a> Checked<'a> {
         let data_start = header.len();
         let metadata: BTreeMap<String, String> =
             tensors.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
-        let mut names = tensors.offset_keys();
+        let by_place = tensors.offset_keys();
+        let mut names = by_place.clone();
         names.sort_unstable();
-        let checked = Self { file, bytes: shared, data_start, tensors, names, metadata, file_bytes };
+        let checked =
+            Self { file, bytes: shared, data_start, tensors, names, by_place, metadata, file_bytes };
         let format = |problem| Error::format(&checked.file, problem);
         let malformed = |text: String| checked.malformed(text);
 

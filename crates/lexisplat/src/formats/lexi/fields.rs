@@ -104,10 +104,12 @@ fn wrong(checked: &Checked<'_>, name: &str, error: ColumnError) -> Error {
     checked.malformed(format!("tensor '{}': {error}", name.escape_debug()))
 }
 
-/// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there.
+/// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there. In
+/// version 3 they lie in the order of the source, in files of other versions by their sizes.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     let mut out = Vec::new();
-    for full in &checked.names {
+    let names = if checked.is_layered() { &checked.by_place } else { &checked.names };
+    for full in names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         if !is_extra_name(name) {
             let text = format!("tensor '{}' is not named as a property can be", full.escape_debug());
