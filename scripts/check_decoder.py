@@ -5,7 +5,7 @@
 
 LEXISPLAT is the program. Needs NumPy. Of versions 1 and 2 every bit is the same. Of version 3 the integers of every
 range have the CRC-32 of the index, scales, SH-rest and extras are the same, and all else is within the bounds of
-docs/FORMAT.md.
+docs/FORMAT.md. Where FILE.trace lies beside FILE.lexi, `decode_lexi.py --trace 3` prints just that.
 """
 
 import subprocess
@@ -52,6 +52,12 @@ def differences(file, program, folder):
         found = [f"integers of range {k}" for k, (_, right) in sorted(ranges.items()) if not right]
         found += [f"range {k} was not decoded" for k in sorted(set(ours["ranges"]) - set(ranges))]
         words = f"{len(ranges)} ranges, {sum(n for n, _ in ranges.values())} integers"
+    trace = Path(file).with_suffix(".trace")
+    if trace.exists():
+        script = Path(__file__).with_name("decode_lexi.py")
+        printed = subprocess.run([sys.executable, script, file, "--trace", "3"], check=True, capture_output=True, text=True)
+        found += [] if printed.stdout == trace.read_text() else ["its trace"]
+        words += ", its trace"
     if len(theirs) != len(ours["position"]):
         return found + ["number of Gaussians"], words
     columns = dict(ours["extras"])

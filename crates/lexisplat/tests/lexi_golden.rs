@@ -124,10 +124,26 @@ fn newer_versions_are_refused_by_number() {
 fn the_documented_example_is_true() {
     let Some(document) = repository_file("docs/FORMAT-EXAMPLES.md") else { return };
     let document = std::fs::read_to_string(document).unwrap();
-    let bytes = std::fs::read(golden("degree0")).unwrap();
-    for (row, chunk) in bytes.chunks(16).enumerate() {
-        let hex: Vec<String> = chunk.iter().map(|b| format!("{b:02x}")).collect();
-        let line = format!("{:04x}  {}", row * 16, hex.join(" "));
-        assert!(document.contains(&line), "docs/FORMAT-EXAMPLES.md lacks the line\n{line}");
+    let has = |line: &str| {
+        assert!(document.contains(&format!("{line}\n")), "docs/FORMAT-EXAMPLES.md lacks the line\n{line}");
+    };
+    // Of the packed file the header is shown as text.
+    for (name, from) in [("degree0", 0), ("packed3_degree0", 0x120)] {
+        let bytes = std::fs::read(golden(name)).unwrap();
+        for (row, chunk) in bytes.chunks(16).enumerate().skip(from / 16) {
+            let hex: Vec<String> = chunk.iter().map(|b| format!("{b:02x}")).collect();
+            has(&format!("{:04x}  {}", row * 16, hex.join(" ")));
+        }
+        let length = u64::from_le_bytes(*bytes.first_chunk().unwrap());
+        has(std::str::from_utf8(&bytes[8..8 + usize::try_from(length).unwrap()]).unwrap().trim_end());
     }
+    let trace = std::fs::read_to_string(golden("packed3_degree0").with_extension("trace")).unwrap();
+    trace.lines().filter(|line| line.starts_with("0 0 ")).for_each(has);
+    let splats = lexi::read(&golden("packed3_degree0"), &Limits::default()).unwrap().into_splats();
+    let g = &splats.geometry;
+    has(&format!("| opacity | {:.5} |", g.opacities[0]));
+    has(&format!(
+        "| dc | {} |",
+        g.dc[0].map(|x| format!("{:.6}", x).trim_end_matches('0').to_owned()).join(", ")
+    ));
 }

@@ -12,8 +12,7 @@ use lexisplat_sample::{SampleOptions, scene};
 /// Files of version 2 and of version 3. Of each there is what it decodes to.
 const NAMES: [&str; 6] =
     ["packed", "packed_degree0", "packed_escapes", "packed3", "packed3_degree0", "packed3_escapes"];
-/// A file of two layers, and the CRC-32 of the PLY that its first tenths decode to, from 2 to 10 of them. Its first layer is
-/// there with the fifth.
+/// A file of two layers, and the CRC-32 of the PLY that its first tenths decode to, from 2 to 10 of them.
 const LAYERS: (&str, [u32; 9]) = (
     "packed3_layers",
     [
