@@ -133,6 +133,23 @@ fn a_packed_file_in_either_order_comes_out_as_if_read_whole() {
 }
 
 #[test]
+fn no_ply_is_left_half_made_of_a_scene_with_two_properties_of_a_name() {
+    let mut whole = splats(500);
+    whole.geometry.extras[0].name = "nx".into();
+    let (model, _) = compress(whole, &options(Layout::F16), &Silent).unwrap();
+    let mut bytes = Vec::new();
+    lexi::write(&mut bytes, &model).unwrap();
+    let chunks = LexiReader::open("t.lexi", &bytes, &Limits::default()).unwrap();
+    assert!(chunks.has_normals());
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.ply");
+    let error = stream::decompress(&chunks, &output, &Silent).unwrap_err().to_string();
+    assert!(error.contains("nx"), "{error}");
+    assert_eq!(ply::write(&output, &model.into_splats()).unwrap_err().to_string(), error);
+    assert_eq!(files(folder.path()), 0);
+}
+
+#[test]
 fn a_ply_is_refused_left_out_and_looked_over_as_when_read_whole() {
     let mut whole = splats(70_000);
     for i in [3, 65_535, 65_536, 69_999] {

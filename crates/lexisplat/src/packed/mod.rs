@@ -59,6 +59,6 @@ pub use quantised::Quantised;
 pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};
 pub use stream::StreamBits;
 
-/// Gaussians of a chunk. Chunks are decoded independently of each other, so that decoding is parallel and a
-/// viewer need not wait for the whole file.
+/// Gaussians of a chunk of version 2, in which each chunk is decoded without the others. A file of version 3 says how many
+/// Gaussians each of its chunks has. Scenes larger than memory are sorted and coded in parts of multiples of this.
 pub const CHUNK: usize = 32_768;

@@ -21,7 +21,7 @@ pub fn decompress<'a>(
 ) -> Result<u64> {
     let sink = sink.into();
     let folder = sink.spill_folder()?;
-    write_parts(sink, &lexi.empty(), lexi.len(), progress, |write| {
+    write_parts(sink, &lexi.empty(), lexi.has_normals(), lexi.len(), progress, |write| {
         in_source_order(lexi, &folder, &mut |splats| {
             progress.check()?;
             write(&splats)

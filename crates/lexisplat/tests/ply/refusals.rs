@@ -239,6 +239,37 @@ fn the_writer_refuses_what_it_could_not_read_back() {
     assert!(ply::write(&mut Vec::new(), &splats).is_err());
 }
 
+#[test]
+fn extras_have_the_names_of_normals_where_there_are_none() {
+    let mut splats = scene(1, 2, 0);
+    splats.geometry.normals.clear();
+    let extra = |name: &str, values: Vec<f32>| Extra { name: name.to_owned(), values: values.into() };
+    splats.geometry.extras = vec![extra("nx", vec![1.0, 2.0]), extra("label", vec![7.0, 8.0])];
+    let mut bytes = Vec::new();
+    ply::write(&mut bytes, &splats).unwrap();
+    let header = String::from_utf8_lossy(&bytes);
+    assert!(header.contains("property float z\nproperty float f_dc_0\n"), "{header}");
+    assert!(header.contains("property float nx\nproperty float label\nend_header"), "{header}");
+    // A normal needs all three.
+    let found = ply::read_bytes("t.ply", &bytes, &ReadOptions::default()).unwrap();
+    assert!(found.warnings.contains(&"only part of a normal is there, dropped: nx".to_owned()));
+    let mut expected = splats.clone();
+    expected.geometry.extras.remove(0);
+    assert_same(&found.splats, &expected, "one of a normal");
+    splats.geometry.extras =
+        vec![extra("nz", vec![1.0, 2.0]), extra("nx", vec![3.0, 4.0]), extra("ny", vec![5.0, 6.0])];
+    bytes.clear();
+    ply::write(&mut bytes, &splats).unwrap();
+    let found = ply::read_bytes("t.ply", &bytes, &ReadOptions::default()).unwrap();
+    splats.geometry.extras.clear();
+    splats.geometry.normals = vec![[3.0, 5.0, 1.0], [4.0, 6.0, 2.0]];
+    assert_same(&found.splats, &splats, "a whole normal");
+    // With normals it would be a second property of that name.
+    splats.geometry.extras = vec![extra("nx", vec![1.0, 2.0])];
+    let error = ply::write(&mut Vec::new(), &splats).expect_err("must be refused");
+    assert!(matches!(error, Error::Parameter { name: "extra", .. }), "{error}");
+}
+
 /// Found by fuzzing: a name that was read but that the writer refused.
 #[test]
 fn names_that_cannot_be_written_are_not_read() {

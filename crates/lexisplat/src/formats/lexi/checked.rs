@@ -135,7 +135,11 @@ impl<'a> Checked<'a> {
         let summed = |name: &&String| !elsewhere.contains(&name.as_str());
         let mut names: Vec<&String> = self.names.iter().filter(summed).collect();
         if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
-            return Err(self.malformed(format!("metadata 'checksums' names '{name}', which is no tensor")));
+            let why = match elsewhere.contains(&name.as_str()) {
+                true => "whose checksum is elsewhere",
+                false => "which is no tensor",
+            };
+            return Err(self.malformed(format!("metadata 'checksums' names '{name}', {why}")));
         }
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {

@@ -10,7 +10,7 @@ use super::layout::Layout;
 use super::schema::{
     EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor,
 };
-use crate::packed::{CHUNK, Data, Decoder, Outline, Packed, PackedHead, StreamBits};
+use crate::packed::{Data, Decoder, Outline, Packed, PackedHead, StreamBits};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -23,8 +23,8 @@ use crate::support::limits::Limits;
 use crate::support::memory_budget::{COUNT_BYTES, GEOMETRY_BYTES, MemoryBudget};
 use crate::support::parallel::map_chunks;
 
-/// Gaussians of a part of an exact layout: a multiple of a packed chunk.
-const PART: usize = 2 * CHUNK;
+/// Gaussians of a part of an exact layout.
+const PART: usize = 1 << 16;
 /// Packed chunks decoded before they are handed on.
 const CHUNKS_AT_ONCE: usize = 16;
 
@@ -382,17 +382,21 @@ impl PackedFile<'_> {
         let extra_bytes = like.iter().map(|e| e.values.width()).sum::<usize>();
         let spans = self.decoder.spans().get(chunks.clone()).unwrap_or_default();
         let held = spans.iter().map(|span| span.len()).sum();
+        let first = spans.first().map_or(0, |span| span.start);
         let budget = MemoryBudget::new(limits, &self.checked.file, self.checked.bytes().len() as u64);
         budget.take(held, GEOMETRY_BYTES + COUNT_BYTES + extra_bytes)?;
         let data = Data::First(super::packed::data(&self.checked)?);
         let parts = map_chunks(chunks.len(), 1, |c| {
             self.decoder.chunk(data, chunks.start + c.start, &budget, count_bits)
         });
+        // Those of all chunks at once: a block of a column holds rows of several.
+        let own_extras = extras(&self.checked, n, &(first..first + held))?;
         let mut bit_counts = crate::packed::BitCounts::default();
         for (range, part) in spans.iter().zip(parts) {
             let (mut geometry, codes, bits) = part?;
             bit_counts.add(&bits);
-            geometry.extras = extras(&self.checked, n, range)?;
+            let rows = range.start - first..range.end - first;
+            geometry.extras = own_extras.iter().map(|extra| extra.slice(rows.clone())).collect();
             let (meta, dictionary) = (self.head.meta.clone(), self.decoder.dictionary().clone());
             take(range.start, Model::new(geometry, meta, dictionary, codes, self.head.record.clone())?)?;
         }

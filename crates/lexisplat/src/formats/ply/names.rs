@@ -18,7 +18,7 @@ pub(super) const ROTATION: [&str; 4] = ["rot_0", "rot_1", "rot_2", "rot_3"];
 pub(super) const VERTEX: &str = "vertex";
 
 /// Whether a property that 3DGS does not define can have this name. A name with a line break could add lines to a header.
-/// A file with one or two of the normals has them as such properties.
+/// The names of normals are such names, since a scene need not have normals.
 pub(crate) fn is_extra_name(name: &str) -> bool {
     let fixed = [&POSITION[..], &DC, &OPACITY, &SCALE, &ROTATION].concat();
     let rest = name.strip_prefix(REST_PREFIX).and_then(|digits| digits.parse::<u64>().ok());

@@ -5,6 +5,7 @@ use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::for_extra;
+use crate::scene::source::SplatSource;
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::for_each_chunk_mut;
@@ -16,35 +17,36 @@ use std::io::{self, Write};
 /// Rows formatted in memory before they are written: 8 MiB at 248 bytes a row.
 const BLOCK_ROWS: usize = 32 * ROWS_PER_TASK;
 
-/// Floats of a row besides SH-rest.
-const FIXED_FLOATS: usize =
-    POSITION.len() + NORMAL.len() + DC.len() + OPACITY.len() + SCALE.len() + ROTATION.len();
+/// Floats of a row besides normals and SH-rest.
+const FIXED_FLOATS: usize = POSITION.len() + DC.len() + OPACITY.len() + SCALE.len() + ROTATION.len();
 
 /// Writes `splats`. Returns the number of bytes written.
 ///
 /// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
-/// own types. Normals are zeros if the scene has none. The scene's comments are written too. If the scene is
-/// anti-aliased and no comment says so, a comment is added.
+/// own types. Normals are zeros if the scene has none, and left out if an extra besides has one of their names. The
+/// scene's comments are written too. If the scene is anti-aliased and no comment says so, a comment is added.
 ///
 /// # Errors
 /// [`Error::Io`] and [`Error::Writer`] for the sink, [`Error::Parameter`] if the arrays differ in length or an extra's
 /// name cannot stand in a header.
 pub fn write<'a>(sink: impl Into<Sink<'a>>, splats: &Splats) -> Result<u64> {
-    write_parts(sink.into(), splats, splats.len(), &Silent, |write| write(splats))
+    write_parts(sink.into(), splats, splats.has_normals(), splats.len(), &Silent, |write| write(splats))
 }
 
-/// Writes a scene of `count` Gaussians that `each` hands on part by part. `like` gives its properties and comments and
-/// may hold any number of Gaussians. Returns the number of bytes written.
+/// Writes a scene of `count` Gaussians that `each` hands on part by part, with normals if `has_normals`. `like` gives its
+/// other properties and comments and may hold any number of Gaussians. Returns the number of bytes written.
 pub(crate) fn write_parts(
     sink: Sink<'_>,
     like: &Splats,
+    has_normals: bool,
     count: usize,
     progress: &dyn Progress,
     each: impl FnOnce(&mut dyn FnMut(&Splats) -> Result<()>) -> Result<()>,
 ) -> Result<u64> {
-    check(like)?;
-    let header = header(like, count);
-    let layout = RowLayout::new(like);
+    let normal = normal_names(like, has_normals);
+    check(like, normal)?;
+    let header = header(like, normal, count);
+    let layout = RowLayout::new(like, normal);
     let bytes = header.len() as u64 + layout.row_bytes as u64 * count as u64;
     sink.write(bytes, progress, |writer, named| {
         writer.write_all(header.as_bytes()).map_err(named)?;
@@ -53,11 +55,20 @@ pub(crate) fn write_parts(
     })
 }
 
-/// Returns the names of the properties that every file has, in order.
-fn names(rest: usize) -> impl Iterator<Item = String> {
+/// Returns the names of the normals' properties, of which there are none if an extra has one of the names instead.
+fn normal_names(splats: &Splats, has_normals: bool) -> &'static [&'static str] {
+    let stands_for = |name: &String| NORMAL.contains(&name.as_str());
+    match has_normals || !splats.geometry.extras.iter().any(|extra| stands_for(&extra.name)) {
+        true => &NORMAL,
+        false => &[],
+    }
+}
+
+/// Returns the names of the properties that 3DGS defines, in order. Those of the normals are `normal`.
+fn names(rest: usize, normal: &'static [&'static str]) -> impl Iterator<Item = String> {
     let fixed = |names: &'static [&'static str]| names.iter().map(|&n| n.to_owned());
     fixed(&POSITION)
-        .chain(fixed(&NORMAL))
+        .chain(fixed(normal))
         .chain(fixed(&DC))
         .chain((0..rest).map(rest_name))
         .chain(fixed(&OPACITY))
@@ -66,9 +77,9 @@ fn names(rest: usize) -> impl Iterator<Item = String> {
 }
 
 /// Refuses a scene that no PLY can hold.
-fn check(splats: &Splats) -> Result<()> {
+fn check(splats: &Splats, normal: &'static [&'static str]) -> Result<()> {
     splats.validate()?;
-    let mut taken: HashSet<String> = names(splats.degree.rest()).collect();
+    let mut taken: HashSet<String> = names(splats.degree.rest(), normal).collect();
     for extra in &splats.geometry.extras {
         let name = &extra.name;
         if !taken.insert(name.clone()) {
@@ -79,14 +90,14 @@ fn check(splats: &Splats) -> Result<()> {
 }
 
 /// Returns the header of a scene of `count` Gaussians with the properties and comments of `splats`.
-fn header(splats: &Splats, count: usize) -> String {
+fn header(splats: &Splats, normal: &'static [&'static str], count: usize) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     for comment in comments(&splats.meta) {
         text.push_str(format!("comment {comment}").trim_end());
         text.push('\n');
     }
     text.push_str(&format!("element vertex {count}\n"));
-    for name in names(splats.degree.rest()) {
+    for name in names(splats.degree.rest(), normal) {
         text.push_str(&format!("property float {name}\n"));
     }
     for extra in &splats.geometry.extras {
@@ -111,12 +122,15 @@ fn comments(meta: &SceneMeta) -> Vec<String> {
 /// How scenes with the same properties become rows.
 struct RowLayout {
     row_bytes: usize,
+    /// Floats of a normal; 0 if normals are left out.
+    normal: usize,
 }
 
 impl RowLayout {
-    fn new(splats: &Splats) -> Self {
+    fn new(splats: &Splats, normal: &[&str]) -> Self {
         let extras: usize = splats.geometry.extras.iter().map(|e| e.values.width()).sum();
-        Self { row_bytes: (FIXED_FLOATS + splats.degree.rest()) * size_of::<f32>() + extras }
+        let floats = FIXED_FLOATS + normal.len() + splats.degree.rest();
+        Self { row_bytes: floats * size_of::<f32>() + extras, normal: normal.len() }
     }
 
     /// Writes `splats` to `writer` by way of `block`.
@@ -136,11 +150,11 @@ impl RowLayout {
         let count = rows.len() / self.row_bytes;
         let range = start..start + count;
         let geometry = &splats.geometry;
-        let no_normals = vec![0.0; if geometry.normals.is_empty() { NORMAL.len() * count } else { 0 }];
+        let no_normals = vec![0.0; if geometry.normals.is_empty() { self.normal * count } else { 0 }];
         let [positions, dc, opacities, scales, rotations, normals] = geometry.floats();
         let groups = [
             (positions, POSITION.len()),
-            (normals, NORMAL.len()),
+            (normals, self.normal),
             (dc, DC.len()),
             (&splats.sh_rest, splats.degree.rest()),
             (opacities, OPACITY.len()),

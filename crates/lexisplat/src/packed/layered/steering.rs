@@ -1,7 +1,7 @@
 //! What steers the decoder: steps, predictions and contexts, in integers that 32 bits hold.
 //!
-//! In files that an encoder wrote no product and no sum leaves the range of an `i32`, so every language computes the
-//! same ones. In damaged files sums wrap around. Floating point only makes values of decoded integers.
+//! No product and no sum of these leaves the range of an `i32`, whatever a file holds, so every language computes the same
+//! ones. Floating point only makes values of decoded integers.
 
 use super::symbols::{LANES, Lanes, each};
 use crate::packed::bits::{BitReader, BitWriter};
