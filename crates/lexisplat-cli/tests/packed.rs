@@ -173,10 +173,10 @@ fn info_says_what_a_packed_file_is_made_of() {
     let lexi = &info["lexi"];
     assert_eq!(
         (&lexi["layout"], &lexi["version"], &lexi["order_kept"]),
-        (&"packed".into(), &2.into(), &false.into())
+        (&"packed".into(), &3.into(), &false.into())
     );
     let bits = lexi["stream_bits_per_gaussian"].as_object().unwrap();
-    assert_eq!(bits.len(), 18);
+    assert_eq!(bits.len(), 30);
     let listed: f64 = lexi["attribute_bytes"].as_object().unwrap().values().map(number).sum();
     assert!((listed - number(&info["file_bytes"])).abs() < 8.0);
     let histogram = lexi["nonzero_histogram"].as_array().unwrap();

@@ -4,7 +4,7 @@ use std::process::{Command, Output, Stdio};
 
 use lexisplat_testing::{Need, missing};
 
-use super::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready};
+use super::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready, said};
 use crate::folder::Folder;
 
 /// Mounts a disk of `$SIZE` on `disk`, puts an output there, runs the command, and shows what is left.
@@ -40,8 +40,7 @@ pub(crate) fn on_a_disk(
     let old = String::from_utf8(old.unwrap_or(b"no").to_vec()).unwrap();
     let mut command = unshare(&[&["sh", "-c", ON_A_DISK, "sh", PROGRAM], arguments].concat());
     let ended = command.env("OPTIONS", options).env("OLD", old).env("TMPDIR", "disk").output().unwrap();
-    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-    let (error, left) = (text(&ended.stderr), text(&ended.stdout));
+    let (error, left) = (said(ended.stderr.clone()), String::from_utf8_lossy(&ended.stdout).into_owned());
     Some((ended, error, left))
 }
 
@@ -119,7 +118,7 @@ fn standard_output_that_is_full_is_an_error() {
     ] {
         let mut command = Command::new(PROGRAM);
         let ended = command.current_dir(folder.0.path()).args(arguments).stdout(full()).output().unwrap();
-        let error = String::from_utf8(ended.stderr).unwrap();
+        let error = said(ended.stderr);
         assert_eq!(ended.status.code(), Some(3), "{arguments:?}: {error}");
         assert!(
             error.starts_with("error: standard output: No space left") && error.contains("help: "),
@@ -151,7 +150,7 @@ fn a_file_over_the_limit_of_its_size_is_an_error() {
             .args(job)
             .output()
             .unwrap();
-        let error = String::from_utf8(ended.stderr).unwrap();
+        let error = said(ended.stderr);
         assert_eq!(ended.status.code(), Some(3), "{job:?}: {error}");
         assert!(error.contains("File too large") && error.contains("ulimit -f"), "{error}");
         assert_eq!(folder.names(), ["cameras.json", "kept.lexi", "scene.ply"]);

@@ -75,6 +75,13 @@ pub(crate) fn undisturbed(folder: &Folder, job: &[&str]) -> (Vec<u8>, Duration) 
     (bytes, seconds)
 }
 
+/// What a program printed to standard error, without the lines that it prints every ten seconds where a machine is slow.
+pub(crate) fn said(error: Vec<u8>) -> String {
+    let text = String::from_utf8(error).unwrap();
+    let is_progress = |line: &str| line.starts_with("progress: ") && line.ends_with(" s since the start\n");
+    text.split_inclusive('\n').filter(|line| !is_progress(line)).collect()
+}
+
 /// Sends a signal, named as `kill` names it.
 pub(crate) fn send(child: &Child, signal: &str) {
     let sent =

@@ -9,7 +9,7 @@ use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_testing::{Need, missing};
 
 use super::runs::{
-    JOBS, OLD, OUTPUT, PATIENCE, PROGRAM, assert_old_or_new, code, program, ready, send, undisturbed,
+    JOBS, OLD, OUTPUT, PATIENCE, PROGRAM, assert_old_or_new, code, program, ready, said, send, undisturbed,
     wait_until_watching,
 };
 use crate::folder::Folder;
@@ -43,7 +43,7 @@ fn signals_have_their_codes_and_leave_nothing_half() {
                 send(&child, signal);
                 let ended = child.wait_with_output().unwrap();
                 let new = assert_old_or_new(&folder, &before, old, &whole);
-                let text = String::from_utf8(ended.stderr).unwrap();
+                let text = said(ended.stderr);
                 if new {
                     assert!(ended.status.success(), "{job:?}: {text}");
                 } else {
@@ -83,7 +83,7 @@ fn what_is_said_fits_what_was_written() {
         // Until here, or the command would find the input's end, and an error of its own.
         drop(stdin);
         assert_eq!(code(ended.status), 143);
-        assert_eq!(String::from_utf8(ended.stderr).unwrap(), expected);
+        assert_eq!(said(ended.stderr), expected);
     }
     assert_eq!(folder.names(), ["scene.ply"]);
 }
@@ -132,7 +132,7 @@ fn pictures_that_were_written_are_whole() {
     }
     send(&child, "INT");
     let ended = child.wait_with_output().unwrap();
-    let text = String::from_utf8(ended.stderr).unwrap();
+    let text = said(ended.stderr);
     let found = pictures();
     assert_eq!(code(ended.status), 130, "{text}");
     let outcome = format!("; {} outputs are complete, no other was written\n", found.len());

@@ -216,7 +216,9 @@ impl PackingViews {
         let mut points: Vec<[f32; 3]> = least(&|p| to_all(p, &positions), &positions).into_iter().collect();
         // Found views may be far away, where few photographs are taken.
         positions.sort_by(|&a, &b| to_nearest(a, &points).total_cmp(&to_nearest(b, &points)));
-        positions.truncate((positions.len() as f32 * USUAL_VIEWS).ceil() as usize);
+        #[expect(clippy::cast_possible_truncation, reason = "a share of a count")]
+        let usual = (positions.len() as f32 * USUAL_VIEWS).ceil() as usize;
+        positions.truncate(usual);
         while points.len() < most.min(positions.len()) {
             let farthest = least(&|p| -to_nearest(p, &points), &positions);
             points.extend(farthest);
