@@ -48,8 +48,8 @@ pub(crate) struct Compress {
     /// photographs [default: auto].
     #[arg(long, value_parser = scene_kind(), conflicts_with = "cameras")]
     pub(crate) scene: Option<SceneKind>,
-    /// Store the index that each Gaussian has in the source, 4 bytes each. Without it packed files lose the order
-    /// of the source.
+    /// Store the index that each Gaussian has in the source, 1 to 3 bytes each. Without it packed files lose the
+    /// order of the source.
     #[arg(long)]
     pub(crate) keep_order: bool,
     /// Leave no Gaussian out. Otherwise those that show less than their bits are worth are left out, and base colours
