@@ -1,6 +1,6 @@
 # What fuzz/run and fuzz/long share. Both change to this folder before they read it.
 
-all_targets=(packed lexi ply entropy scene dictionary colmap transforms cameras_json)
+all_targets=(packed feed lexi ply entropy scene dictionary colmap transforms cameras_json)
 corpus=${FUZZ_CORPUS:-$PWD/corpus}
 toolchain=${FUZZ_TOOLCHAIN:-nightly}
 
@@ -20,7 +20,7 @@ fuzz() {
   local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=1)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
-    lexi | packed | dictionary) options+=(-max_len=16384) ;;
+    lexi | packed | feed | dictionary) options+=(-max_len=16384) ;;
     cameras_json | transforms) options+=(-max_len=8192 -dict=dictionaries/json.dict) ;;
     colmap) options+=(-max_len=8192 -dict=dictionaries/colmap.dict) ;;
     *) options+=(-max_len=2048) ;;

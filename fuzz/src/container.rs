@@ -5,6 +5,8 @@ use lexisplat::ShDegree;
 use lexisplat::packed::fuzzing::layered;
 use serde_json::{Map, Value, json};
 
+/// Bytes after a file that say how it is fed, in the target `feed`.
+pub const FEED_SCRIPT: usize = 32;
 /// One time in so many the bytes are changed as they lie, and nothing is made to fit.
 const RAW: usize = 8;
 /// Bytes of the checksum of header and head that a packed head of version 3 starts with.
@@ -104,6 +106,14 @@ struct Tensor {
     bytes: Vec<u8>,
 }
 
+impl Tensor {
+    /// Puts other bytes into a list of bytes.
+    fn replace(&mut self, bytes: Vec<u8>) {
+        self.shape = vec![bytes.len() as u64];
+        self.bytes = bytes;
+    }
+}
+
 /// A file as its parts.
 struct Parts {
     metadata: Map<String, Value>,
@@ -133,10 +143,7 @@ impl Parts {
 
     /// Makes the checksums of the ranges of a packed scene of version 3 fit its data, if its head can be read.
     fn fit_ranges(&mut self) {
-        let degree = self.metadata.get("degree").and_then(Value::as_str).and_then(|text| text.parse().ok());
-        let Some(degree) = degree.and_then(|degree| ShDegree::new(degree).ok()) else { return };
-        let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);
-        let (Some(head), Some(data)) = (at("packed.head"), at("packed.data")) else { return };
+        let Some((degree, [head, data])) = self.layered() else { return };
         let data = &self.tensors[data].bytes;
         let Some((own, rest)) = self.tensors[head].bytes.split_first_chunk::<SEAL>() else { return };
         let Some(sealed) = layered::resealed(rest, degree, data) else { return };
@@ -195,7 +202,7 @@ impl Parts {
     /// Changes one thing. `mutate` changes a buffer's first bytes and returns how many then count.
     fn change(&mut self, random: &mut Random, mutate: &mut dyn FnMut(&mut [u8], usize) -> usize) {
         let which = random.below(self.tensors.len());
-        match random.below(16) {
+        match random.below(18) {
             0..=8 => {
                 let Some(tensor) = self.tensors.get_mut(which) else { return };
                 change_bytes(tensor, random, mutate);
@@ -215,6 +222,7 @@ impl Parts {
                 }
             }
             14 => self.cut(random),
+            16 | 17 => self.rearrange(random),
             _ => {
                 let name = random.pick(&NAMES).to_owned();
                 let bytes = self.tensors.get(which).map(|t| t.bytes.clone()).unwrap_or_default();
@@ -227,6 +235,26 @@ impl Parts {
                 }
             }
         }
+    }
+
+    /// Changes what the index of a packed scene of version 3 says of chunks and ranges.
+    fn rearrange(&mut self, random: &mut Random) {
+        let Some((degree, [head, data])) = self.layered() else { return };
+        let Some((own, rest)) = self.tensors[head].bytes.split_first_chunk::<SEAL>() else { return };
+        let changed =
+            layered::rearranged(rest, degree, &self.tensors[data].bytes, &mut |bound| random.below(bound));
+        let Some((rest, bytes, gaussians)) = changed else { return };
+        let head_bytes = [own, &rest[..]].concat();
+        self.tensors[head].replace(head_bytes);
+        self.tensors[data].replace(bytes);
+        self.metadata.insert("gaussians".to_owned(), Value::from(gaussians.to_string()));
+    }
+
+    /// Degree, and places of head and data of a packed scene of version 3.
+    fn layered(&self) -> Option<(ShDegree, [usize; 2])> {
+        let degree = self.metadata.get("degree")?.as_str()?.parse().ok()?;
+        let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);
+        Some((ShDegree::new(degree).ok()?, [at("packed.head")?, at("packed.data")?]))
     }
 
     /// Takes Gaussians off the end of every tensor that has one entry for each, or adds copies of the last.
@@ -322,4 +350,32 @@ pub fn mutate(
         }
     }
     mutate(&mut data[..max_size], size)
+}
+
+/// [`mutate`] for inputs that end with `after` bytes that are no part of the file, of which some change too.
+pub fn mutate_before(
+    data: &mut [u8],
+    size: usize,
+    max_size: usize,
+    seed: u32,
+    after: usize,
+    mut mutate: impl FnMut(&mut [u8], usize) -> usize,
+) -> usize {
+    let (Some(file), Some(room)) = (size.checked_sub(after), max_size.checked_sub(after)) else {
+        return mutate(&mut data[..max_size], size);
+    };
+    let mut tail = data[file..size].to_vec();
+    let mut random = Random(u64::from(seed));
+    let which = random.below(4);
+    if which == 0 {
+        let at = random.below(after);
+        tail[at] = random.below(1 << 8).to_le_bytes()[0];
+    }
+    if which < 2 {
+        let new = mutate(&mut tail, after);
+        tail[new.min(after)..].fill(0);
+    }
+    let file = if which > 0 { self::mutate(data, file, room, seed.rotate_left(7), mutate) } else { file };
+    data[file..file + after].copy_from_slice(&tail);
+    file + after
 }

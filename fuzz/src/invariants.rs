@@ -49,6 +49,18 @@ fn codes(codes: &SparseCodes, atoms: usize, dim: usize) {
     assert!(escapes.gaussians.iter().all(|&g| (g as usize) < codes.len()));
 }
 
+/// As [`splats`] for a model, of which nothing is made dense.
+///
+/// # Panics
+/// If not.
+pub fn decoded(model: &Model) {
+    geometry(model.geometry());
+    model.geometry().validate().expect("arrays fit");
+    assert_eq!(model.codes().len(), model.len());
+    codes(model.codes(), model.dictionary().len(), model.dictionary().dim());
+    assert!(model.dense_rest().iter().all(|v| v.is_finite()), "SH-rest not finite");
+}
+
 /// As [`splats`] for a model, and that small ones decode and can be written and read again.
 ///
 /// # Panics

@@ -103,6 +103,26 @@ pub fn lexi(data: &[u8], at_once: usize, whole: Result<&Model, &Error>, [per_byt
     assert!(at_once == in_parts, "decompressed in parts differs");
 }
 
+/// The same Gaussians in two models, extras apart.
+///
+/// # Panics
+/// If they differ.
+pub fn decoded(a: &Model, b: &Model) {
+    let (own, other) = (a.geometry(), b.geometry());
+    assert_eq!(a.len(), b.len());
+    assert_eq!((a.record(), a.meta()), (b.record(), b.meta()));
+    assert!(a.dictionary() == b.dictionary() && a.codes() == b.codes(), "codes differ");
+    for (own, other) in [
+        (own.positions.as_flattened(), other.positions.as_flattened()),
+        (own.dc.as_flattened(), other.dc.as_flattened()),
+        (&own.opacities, &other.opacities),
+        (own.scales.as_flattened(), other.scales.as_flattened()),
+        (own.rotations.as_flattened(), other.rotations.as_flattened()),
+    ] {
+        same(own, other);
+    }
+}
+
 fn same_splat(a: &Splats, i: usize, b: &Splats, j: usize) {
     same_geometry(&a.geometry, i, &b.geometry, j);
     same(a.rest(i), b.rest(j));

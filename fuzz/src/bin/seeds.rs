@@ -4,6 +4,7 @@
 //! `seeds corpus` writes to `corpus/TARGET/seed-NAME`. Built by `cargo fuzz build` with the targets, so that there
 //! is one build.
 
+use std::collections::HashSet;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
@@ -11,11 +12,12 @@ use std::path::{Path, PathBuf};
 
 use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::packed::fuzzing::{flat, layered};
-use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
+use lexisplat::packed::{PackOptions, Packer, RangeKind, ReachedRecord, TargetRecord};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress,
     lexi, ply,
 };
+use lexisplat_fuzz::container::FEED_SCRIPT;
 use lexisplat_render::{Camera, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 // What the build with coverage calls.
@@ -189,6 +191,7 @@ fn packed(root: &Path) -> Done {
             LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;
             let name = format!("{degree}-{gaussians}{}", if rich { "-rich" } else { "" });
             save(root, "packed", &name, &bytes)?;
+            fed(root, &name, &bytes)?;
             if gaussians == 2 {
                 save(root, "dictionary", &format!("packed-{name}"), &bytes)?;
             }
@@ -201,7 +204,54 @@ fn packed(root: &Path) -> Done {
     }
     let script: Vec<u8> = (0..60).flat_map(|k: u8| [k, k % 59, k % 24, k, k, 2, k, k]).collect();
     save(root, "entropy", "round-trip", &[&[2, 3][..], &script].concat())?;
+    several_layers(root)?;
     version_2(root)
+}
+
+/// Packed files of two layers, with interim changes, two levels of refinement and three parts of nonzeros.
+fn several_layers(root: &Path) -> Done {
+    for degree in degrees() {
+        for (gaussians, points) in [(20, 0), (60, 2)] {
+            let mut splats = sample(gaussians, degree);
+            let mut options = PackOptions::default();
+            options.layers_from = Some(0);
+            options.viewpoints = [[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]][..points].to_vec();
+            if degree != ShDegree::ZERO {
+                options.atoms = Some(ATOMS);
+                splats.sh_rest[..degree.rest()].fill(1e6);
+            }
+            let sensitivity = Sensitivity::heuristic(&splats.geometry);
+            let (packed, _) = Packer::new(&splats, &sensitivity, &options)?.pack(1e-4, &Silent)?;
+            let mut bytes = Vec::new();
+            LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;
+            let reader = LexiReader::open("layered", &bytes, &Limits::default())?;
+            let outline = reader.outline().ok_or("no packed file of version 3")?;
+            let kinds: HashSet<RangeKind> = outline.ranges.iter().map(|range| range.kind).collect();
+            let mut wanted = vec![RangeKind::Base, RangeKind::Refinement(1), RangeKind::Interim];
+            wanted.extend((degree != ShDegree::ZERO).then_some(RangeKind::Sh(2)));
+            if outline.layers.len() < 2 || !wanted.iter().all(|kind| kinds.contains(kind)) {
+                return Err(
+                    format!("a scene of {gaussians} has no layers, or not all kinds of ranges").into()
+                );
+            }
+            let name = format!("layered-{degree}-{gaussians}");
+            save(root, "packed", &name, &bytes)?;
+            fed(root, &name, &bytes)?;
+        }
+    }
+    Ok(())
+}
+
+/// A file, and how it is fed.
+fn fed(root: &Path, name: &str, bytes: &[u8]) -> Done {
+    for how in 0..3_u8 {
+        let script =
+            (0..FEED_SCRIPT).map(|k| (how * 91).wrapping_add(u8::try_from(k * 67 % 251).unwrap_or(0)));
+        // One without limits, all of it.
+        let script: Vec<u8> = script.map(|byte| if how == 0 { 0 } else { byte }).collect();
+        save(root, "feed", &format!("{name}-{how}"), &[bytes, &script].concat())?;
+    }
+    Ok(())
 }
 
 /// Tables and data with their lengths before them, and a script.

@@ -1,6 +1,7 @@
 //! The entropy coder of version 3 by itself, for the fuzz targets. No part of the crate's interface.
 
 use super::head::Head;
+use super::index::Place;
 use super::player::Player;
 use super::range::Recorder;
 use super::script::{Ask, ask, tables_of};
@@ -87,4 +88,64 @@ pub fn resealed(head: &[u8], degree: ShDegree, data: &[u8]) -> Option<Vec<u8>> {
         range.checksum = crc32fast::hash(bytes.unwrap_or_default());
     }
     Some(head.write())
+}
+
+/// Gaussians up to which chunks are copied.
+const MOST_COPIED: usize = 1 << 12;
+
+/// `head`, of a scene of this degree, and `data` with a change of chunks or ranges: one more, one fewer, others first, longer
+/// and shorter ones, or elsewhere. Checksums of ranges are not changed. Returns head, data and number of Gaussians, or `None`
+/// if there is nothing to change. `below` gives numbers below another.
+#[must_use]
+pub fn rearranged(
+    head: &[u8],
+    degree: ShDegree,
+    data: &[u8],
+    below: &mut dyn FnMut(usize) -> usize,
+) -> Option<(Vec<u8>, Vec<u8>, usize)> {
+    let mut head = Head::read(head, degree.rest())?;
+    let index = &mut head.index;
+    let bytes = |place: &Place| {
+        let range = index.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind))?;
+        let rest = data.get(usize::try_from(range.start).ok()?..)?;
+        Some((*place, rest.get(..range.length as usize)?.to_vec()))
+    };
+    let mut ranges: Vec<(Place, Vec<u8>)> = index.order.iter().map(bytes).collect::<Option<_>>()?;
+    let c = below(index.chunks.len());
+    let chunk = index.chunks.get(c)?.clone();
+    let c = u32::try_from(c).ok()?;
+    let (a, b) = (below(ranges.len()), below(ranges.len()));
+    match below(8) {
+        0..=2 if index.gaussians() < MOST_COPIED => {
+            let own: Vec<(Place, Vec<u8>)> = ranges.iter().filter(|(p, _)| p.chunk == c).cloned().collect();
+            ranges.iter_mut().filter(|(p, _)| p.chunk > c).for_each(|(p, _)| p.chunk += 1);
+            ranges.extend(own.into_iter().map(|(p, bytes)| (Place { chunk: c + 1, ..p }, bytes)));
+            index.chunks.insert(c as usize + 1, chunk);
+        }
+        3 => {
+            index.chunks.remove(c as usize);
+            ranges.retain(|(p, _)| p.chunk != c);
+            ranges.iter_mut().filter(|(p, _)| p.chunk > c).for_each(|(p, _)| p.chunk -= 1);
+        }
+        4 | 5 => ranges.swap(a, b),
+        6 => {
+            let at = below(ranges.get(a)?.1.len() + 1);
+            let moved = ranges.get_mut(a)?.1.split_off(at);
+            ranges.get_mut(b)?.1.extend(moved);
+        }
+        _ => {
+            let chunk = index.chunks.get_mut(c as usize)?;
+            chunk.cell = chunk.cell.wrapping_add(1 << below(64));
+            chunk.bounds.iter_mut().for_each(|bound| bound.rotate_left(1));
+        }
+    }
+    index.order = ranges.iter().map(|(place, _)| *place).collect();
+    for (place, bytes) in &ranges {
+        let range = index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+        range.length = u32::try_from(bytes.len()).ok()?;
+    }
+    index.place()?;
+    let gaussians = index.gaussians();
+    let data = ranges.into_iter().flat_map(|(_, bytes)| bytes).collect();
+    Some((head.write(), data, gaussians))
 }
