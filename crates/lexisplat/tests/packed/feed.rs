@@ -248,6 +248,13 @@ fn the_allowance_is_kept() {
     let sh = outline.ranges.iter().find(|range| matches!(range.kind, RangeKind::Sh(_))).unwrap();
     give(&mut without, file, sh.bytes.clone()).unwrap();
     assert_eq!(without.held_bytes(), start);
+    // Neither do no bytes in the middle of a range.
+    let inside = outline.ranges[0].bytes.start + 1;
+    tight.feed(inside, &[]).unwrap();
+    let mut open = self::feed(&FeedOptions::default());
+    open.feed(0, &file[..place(start)]).unwrap();
+    open.feed(inside, &[]).unwrap();
+    assert_eq!((tight.held_bytes(), open.held_bytes()), (start, start));
 }
 
 #[test]

@@ -92,6 +92,9 @@ impl Ranges {
     /// The ranges of which there is something in these bytes of the file.
     fn touched(&self, at: u64, end: u64) -> Range<usize> {
         let first = self.outline.ranges.partition_point(|range| range.bytes.end <= at);
+        if at >= end {
+            return first..first;
+        }
         first..self.outline.ranges.partition_point(|range| range.bytes.start < end).max(first)
     }
 
