@@ -214,7 +214,7 @@ fn several_layers(root: &Path) -> Done {
         for (gaussians, points) in [(20, 0), (60, 2)] {
             let mut splats = sample(gaussians, degree);
             let mut options = PackOptions::default();
-            options.layers_from = Some(0);
+            options.layers_from = 0;
             options.viewpoints = [[0.0, -1.0, -4.0], [3.0, -1.0, 2.0]][..points].to_vec();
             if degree != ShDegree::ZERO {
                 options.atoms = Some(ATOMS);
