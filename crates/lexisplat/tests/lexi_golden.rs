@@ -144,6 +144,6 @@ fn the_documented_example_is_true() {
     has(&format!("| opacity | {:.5} |", g.opacities[0]));
     has(&format!(
         "| dc | {} |",
-        g.dc[0].map(|x| format!("{:.6}", x).trim_end_matches('0').to_owned()).join(", ")
+        g.dc[0].map(|x| format!("{x:.6}").trim_end_matches('0').to_owned()).join(", ")
     ));
 }
