@@ -1,6 +1,6 @@
 //! Traces: what the first Gaussians of a golden file decode to, symbol by symbol, as a new decoder can print it too.
 //!
-//! docs/FORMAT-EXAMPLES.md says what the lines mean. They were compared with those of scripts/decode_lexi.py.
+//! docs/FORMAT-EXAMPLES.md says what the lines mean. They were compared with those of `scripts/decode_lexi.py`.
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
