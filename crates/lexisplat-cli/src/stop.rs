@@ -90,13 +90,14 @@ mod unix {
         // The second signal ends the program at once. The handler that ends it is registered before the one that
         // sets the flag, so that the first signal does not find the flag set.
         let once = Arc::new(AtomicBool::new(false));
+        // First of all, or a signal between would set the flag and do nothing else.
+        let mut watched = Signals::new(signals)?;
         for &signal in signals {
             flag::register_conditional_default(signal, Arc::clone(&once))?;
             flag::register(signal, Arc::clone(&once))?;
         }
-        let mut signals = Signals::new(signals)?;
         std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
-            for signal in signals.forever() {
+            for signal in watched.forever() {
                 if super::stopped_by(name(signal)) {
                     end(signal);
                 }
