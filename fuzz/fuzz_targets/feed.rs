@@ -224,6 +224,8 @@ fn first(file: &[u8], options: &FeedOptions) {
     let mut feed = LexiFeed::new(NAME, &options, &limits());
     let fed = feed.feed(0, file);
     match (feed.head().is_some(), reader(file, &options)) {
+        // What is damaged is dropped, and what is there is decoded.
+        (true, Ok(_)) if fed.is_err() => {}
         (true, Ok(reader)) => compare(&feed, &reader),
         (false, Ok(_)) => assert!(fed.is_err_and(|e| e.to_string().contains("range without bytes"))),
         // It looks at what follows the ranges too.

@@ -231,3 +231,17 @@ fn more_gaussians_than_a_file_can_hold_are_refused_before_decoding() {
     let error = LexiReader::open("p.lexi", parts.sealed(), &Limits::default()).unwrap_err();
     assert!(matches!(error, Error::Limit { .. }), "{error}");
 }
+
+/// Found by the fuzz target `packed`: the reader in parts took it.
+#[test]
+fn an_order_of_no_gaussians_has_no_bytes_after_it() {
+    let packed = pack(&sample(0, 1, 1), STEP, &options(|o| o.keep_order = true)).0;
+    let file = bytes(&packed);
+    assert!(LexiReader::open("empty.lexi", &file[..], &Limits::default()).is_ok());
+    let mut parts = Parts::of(&file);
+    parts.tensor("packed.order").unwrap().extend([0; 84]);
+    parts.fit_shapes();
+    let file = parts.sealed();
+    let error = LexiReader::open("empty.lexi", &file[..], &Limits::default()).unwrap_err();
+    assert!(error.to_string().contains("packed.order"), "{error}");
+}

@@ -161,7 +161,8 @@ const PLACES_AT_ONCE: usize = 1 << 16;
 /// Whether the order names each of `n` Gaussians once.
 fn is_permutation(checked: &Checked<'_>, n: usize) -> Result<bool> {
     let mut seen = vec![0_u64; n.div_ceil(64)];
-    for first in (0..n).step_by(PLACES_AT_ONCE) {
+    // The column is looked at once also if it has no values.
+    for first in (0..n.max(1)).step_by(PLACES_AT_ONCE) {
         for place in order(checked, n, first..n.min(first + PLACES_AT_ONCE))? {
             let place = place as usize;
             let Some(word) = seen.get_mut(place / 64).filter(|_| place < n) else { return Ok(false) };
