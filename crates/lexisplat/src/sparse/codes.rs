@@ -64,6 +64,28 @@ impl Indices {
         }
     }
 
+    /// Whether those of each Gaussian are at most `dim`, ascending and below `atoms`. `counts` add up to their number.
+    fn are_sound(&self, counts: &[u8], dim: usize, atoms: usize) -> bool {
+        fn sound<T: Copy + Ord + Into<usize>>(
+            indices: &[T],
+            counts: &[u8],
+            dim: usize,
+            atoms: usize,
+        ) -> bool {
+            let mut rest = indices;
+            let ascending = |column: &[T]| column.iter().zip(&column[1..]).all(|(a, b)| a < b);
+            indices.iter().max().is_none_or(|&last| last.into() < atoms)
+                && counts.iter().all(|&count| {
+                    let column = rest.split_off(..usize::from(count)).unwrap_or_default();
+                    usize::from(count) <= dim && (column.len() < 2 || ascending(column))
+                })
+        }
+        match self {
+            Self::U8(v) => sound(v, counts, dim, atoms),
+            Self::U16(v) => sound(v, counts, dim, atoms),
+        }
+    }
+
     /// Bytes of one index.
     #[must_use]
     pub fn width(&self) -> usize {
@@ -111,6 +133,15 @@ impl Values {
         match self {
             Self::F32(v) => v[k],
             Self::F16(v) => v[k].to_f32(),
+        }
+    }
+
+    /// Whether none is infinite or no number.
+    fn are_finite(&self) -> bool {
+        // Without a way out the loop is vectorised.
+        match self {
+            Self::F32(v) => v.iter().fold(true, |good, v| good & v.is_finite()),
+            Self::F16(v) => v.iter().fold(true, |good, v| good & v.is_finite()),
         }
     }
 
@@ -245,7 +276,8 @@ impl SparseCodes {
             }
         }
         let mut start = 0;
-        for (i, &count) in counts.iter().enumerate() {
+        let unsound = if indices.are_sound(&counts, dim, atoms) { &[][..] } else { &counts };
+        for (i, &count) in unsound.iter().enumerate() {
             let end = start + usize::from(count);
             if usize::from(count) > dim {
                 return Err(Error::parameter(
@@ -263,7 +295,9 @@ impl SparseCodes {
             }
             start = end;
         }
-        if let Some(k) = (0..values.len()).find(|&k| !values.get(k).is_finite()) {
+        if !values.are_finite()
+            && let Some(k) = (0..values.len()).find(|&k| !values.get(k).is_finite())
+        {
             return Err(Error::parameter("codes.values", values.get(k), "finite values"));
         }
         let mut checkpoints = Vec::with_capacity(counts.len().div_ceil(GAUSSIANS_PER_CHECKPOINT));

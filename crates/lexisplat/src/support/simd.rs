@@ -82,6 +82,15 @@ impl Simd {
         }
     }
 
+    /// This set with registers of at most 256 bits, which are faster between look-ups of single numbers.
+    pub(crate) fn narrow(self) -> Self {
+        match self.0 {
+            #[cfg(target_arch = "x86_64")]
+            Set::V4(simd) => Self(Set::V3(*simd)),
+            _ => self,
+        }
+    }
+
     /// Calls `work`, in which [`Self::current`] is this set on the calling thread and on the threads of parallel
     /// loops. A thread that `work` starts by itself begins outside of all scopes.
     pub fn scope<R>(self, work: impl FnOnce() -> R) -> R {

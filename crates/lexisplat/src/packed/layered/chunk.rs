@@ -112,7 +112,8 @@ impl Form {
                     |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
                 let group: [&Target; LANES] = std::array::from_fn(of);
                 let targets = group;
-                let mut group = walk.base(base, set, Some(&targets))?;
+                let mut group = Group::default();
+                walk.base(base, set, Some(&targets), &mut group)?;
                 sums[0].base(set, &group);
                 for (k, range) in finer.iter_mut().enumerate() {
                     refine(range, set, &mut group, levels - k)?;
@@ -175,8 +176,10 @@ impl Form {
         let steps = gaussians.div_ceil(lanes);
         let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
         let (mut walk, mut rest) = (Walk::new(&self.steering, levels), Rest::default());
+        // Groups are large, so all are made in one place.
+        let mut group = Group::default();
         for (step, set) in sets(gaussians, lanes).enumerate() {
-            let mut group = walk.base(&mut base, set, None)?;
+            walk.base(&mut base, set, None, &mut group)?;
             if want.sums {
                 sums[0].base(set, &group);
             }
@@ -314,7 +317,7 @@ impl Sums {
                     }
                     Coded::Code(from, count) => {
                         self.add(l, &[count as i32]);
-                        for (atom, value) in (from..from + count).map(|j| rest.nonzero(part, j, l)) {
+                        for (atom, value) in rest.nonzeros(part, from, count, l) {
                             self.add(l, &[atom.into(), value]);
                         }
                     }

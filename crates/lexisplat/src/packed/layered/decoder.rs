@@ -113,7 +113,7 @@ impl LayeredDecoder {
             let i = place.counts.iter().position(|&count| count == most).unwrap_or(0);
             self.limits.check_nonzeros(&self.file, chunk.first + i, most.into())?;
         }
-        if piece.atoms.iter().any(|&atom| usize::from(atom) >= self.dictionary().len()) {
+        if piece.atoms.iter().max().is_some_and(|&atom| usize::from(atom) >= self.dictionary().len()) {
             return Err(damaged());
         }
         Ok(piece)

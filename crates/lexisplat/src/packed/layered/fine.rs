@@ -19,15 +19,18 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
     let mut beyond = false;
     let finer = factor(level - 1);
     for k in DC..REFINED {
-        let (stream, class, width) = match k {
-            DC..TARGETS => (Stream::FineDc, &group.colour, CLASS_WIDTH),
-            _ => (Stream::FinePosition, &group.fineness[k - TARGETS], FINENESS_WIDTH),
+        // Divisors are constants in each branch: vector registers divide by nothing else.
+        let (stream, class): (_, Lanes<u32>) = match k {
+            DC..TARGETS => (Stream::FineDc, each(|l| group.colour[l] / CLASS_WIDTH)),
+            _ => {
+                let fineness = &group.fineness[k - TARGETS];
+                (Stream::FinePosition, each(|l| fineness[l] / FINENESS_WIDTH))
+            }
         };
         let counts = group.counts[k];
         let wanted = &group.wanted[k];
-        let context: Lanes<u32> = each(|l| {
-            BY_COUNT * (class[l] / width).min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1)
-        });
+        let context: Lanes<u32> =
+            each(|l| BY_COUNT * class[l].min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1));
         // Zero is the step towards zero, which is the one that occurs most.
         let symbols = s.symbols(stream.at(level), context, set, |l| {
             let rest = coarsened(wanted[l], finer) - FACTOR * counts[l];

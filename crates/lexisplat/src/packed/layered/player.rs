@@ -1,10 +1,11 @@
 //! The entropy decoder of a range.
 
 use super::range::{LEAST, MOST_BITS, length_bytes};
-use super::streams::{Slot, Stream};
-use super::symbols::{LANES, Lanes, Symbols, has};
-use super::tables::Lookup;
+use super::streams::{CONTEXTS, Slot, Stream};
+use super::symbols::{LANES, Lanes, Symbols, each, has};
+use super::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::packed::stream::BitCounts;
+use crate::support::simd::Simd;
 
 /// The decoder of a range.
 #[derive(Debug)]
@@ -16,6 +17,8 @@ pub(in crate::packed) struct Player<'a> {
     /// Next word of each lane, and the end of its words.
     pub(super) next: Lanes<u32>,
     ends: Lanes<u32>,
+    /// Vector instructions of the look-ups.
+    simd: Simd,
     /// Whether something was asked for that no encoder writes.
     pub(super) damaged: bool,
     /// Bits of each stream, if they are counted.
@@ -35,6 +38,7 @@ impl<'a> Player<'a> {
             states: [LEAST; LANES],
             next: [2; LANES],
             ends: [2; LANES],
+            simd: Simd::current().narrow(),
             damaged: false,
             bit_counts: count_bits.then(|| BitCounts::zeros(Stream::ALL.len())),
         };
@@ -57,16 +61,6 @@ impl<'a> Player<'a> {
         Some(player)
     }
 
-    /// Takes a word into the state of a lane if it has room for one. Beyond the end of its words there is anything.
-    #[inline(always)]
-    fn refill(&mut self, l: usize, state: u32) {
-        let word = self.words.get(self.next[l] as usize).copied().unwrap_or_default();
-        let low = state < LEAST;
-        let filled = state << 16 | u32::from(u16::from_le_bytes(word));
-        self.states[l] = if low { filled } else { state };
-        self.next[l] += u32::from(low);
-    }
-
     /// Whether nothing was asked for that no encoder writes, and no lane was read beyond its end.
     pub(super) fn good(&self) -> bool {
         !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
@@ -77,40 +71,176 @@ impl<'a> Player<'a> {
         !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
     }
 
-    /// The next symbol of each lane in `set`, by the table of its context.
+    /// The next symbol of each lane that is not [`IDLE`], by the table of its context.
     ///
     /// It is called and not inlined: the walk has dozens of places that take symbols, and with this in each of them it
     /// would not fit into the cache of instructions.
     #[inline(never)]
-    fn take(&mut self, slot: Slot, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
-        let precision = slot.stream.precision();
+    fn take<const PRECISION: u32>(&mut self, number: usize, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        let Some(tables) = self.lookup.set(number) else {
+            self.damaged |= set != 0;
+            return [0; LANES];
+        };
+        if set.count_ones() <= FEW {
+            return self.take_few::<PRECISION>(tables, context, set);
+        }
+        let simd = self.simd;
+        simd.run(Take::<PRECISION> { player: self, tables, context, set })
+    }
+
+    /// [`Self::take`] lane by lane.
+    #[inline(always)]
+    fn take_few<const PRECISION: u32>(
+        &mut self,
+        tables: Set<'_>,
+        context: &Lanes<u32>,
+        mut set: u32,
+    ) -> Lanes<u32> {
         let mut out = [0; LANES];
-        for l in (0..LANES).filter(|&l| has(set, l)) {
-            let start = self.lookup.start(slot.place(context[l]));
-            self.damaged |= start == 0;
+        while set != 0 {
+            let l = set.trailing_zeros() as usize % LANES;
             let state = self.states[l];
-            let (symbol, share, over) = self.lookup.entry(start, state & ((1 << precision) - 1));
-            self.refill(l, (state >> precision).wrapping_mul(share).wrapping_add(over));
-            out[l] = symbol;
-            if let Some(bit_counts) = &mut self.bit_counts {
-                bit_counts.0[slot.stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
-            }
+            let entry = tables.entry(context[l], state & ((1 << PRECISION) - 1));
+            let state = after::<PRECISION>(state, entry);
+            (self.states[l], self.next[l]) = refilled(state, self.next[l], word(self.words, self.next[l]));
+            out[l] = symbol(entry);
+            set &= set - 1;
         }
         out
     }
 
-    /// The next `count` raw bits of each lane in `set`, at most 16.
+    /// Adds the bits of the symbols that are taken next.
+    #[cold]
     #[inline(never)]
-    fn take_bits(&mut self, count: &Lanes<u32>, set: u32) -> Lanes<u32> {
-        let mut out = [0; LANES];
+    fn count(&mut self, slot: Slot, context: &Lanes<u32>, set: u32) {
+        let (Some(bit_counts), Some(tables)) = (&mut self.bit_counts, self.lookup.set(slot.number)) else {
+            return;
+        };
+        let precision = slot.stream.precision();
         for l in (0..LANES).filter(|&l| has(set, l)) {
-            let state = self.states[l];
-            self.refill(l, state >> count[l]);
-            out[l] = state & ((1 << count[l]) - 1);
+            let entry = tables.entry(context[l], self.states[l] & ((1 << precision) - 1));
+            let share = less_share(entry) + 1;
+            bit_counts.0[slot.stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
+        }
+    }
+
+    /// The next `count` raw bits of each lane, at most 16. Lanes that are not in use have none.
+    #[inline(always)]
+    fn take_bits(&mut self, count: &Lanes<u32>) -> Lanes<u32> {
+        let out = each(|l| self.states[l] & ((1 << count[l]) - 1));
+        self.states = each(|l| self.states[l] >> count[l]);
+        self.refill();
+        out
+    }
+
+    /// Takes words into the states of all lanes that have room for one.
+    #[inline(never)]
+    fn refill(&mut self) {
+        let simd = self.simd;
+        simd.run(Refill { player: self });
+    }
+}
+
+/// The work of [`Player::take`]. All but the look-ups is done in vector registers.
+struct Take<'p, 'l, const PRECISION: u32> {
+    player: &'p mut Player<'l>,
+    tables: Set<'l>,
+    context: &'p Lanes<u32>,
+    set: u32,
+}
+
+impl<const PRECISION: u32> pulp::NullaryFnOnce for Take<'_, '_, PRECISION> {
+    type Output = Lanes<u32>;
+
+    #[inline(always)]
+    fn call(mut self) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        self.half::<0>(&mut out);
+        if self.set >> HALF != 0 {
+            self.half::<HALF>(&mut out);
         }
         out
     }
 }
+
+impl<const PRECISION: u32> Take<'_, '_, PRECISION> {
+    /// Takes the symbols of half of the lanes, which fill a vector register, from lane `FIRST` on.
+    #[inline(always)]
+    fn half<const FIRST: usize>(&mut self, out: &mut Lanes<u32>) {
+        let mut entries = [0; HALF];
+        for l in 0..HALF {
+            let low = self.player.states[FIRST + l] & ((1 << PRECISION) - 1);
+            entries[l] = self.tables.entry(self.context[FIRST + l], low);
+        }
+        let mut states = [0; HALF];
+        for l in 0..HALF {
+            states[l] = after::<PRECISION>(self.player.states[FIRST + l], entries[l]);
+            out[FIRST + l] = symbol(entries[l]);
+        }
+        self.player.put::<FIRST>(&states);
+    }
+}
+
+/// The work of [`Player::refill`].
+struct Refill<'p, 'l> {
+    player: &'p mut Player<'l>,
+}
+
+impl pulp::NullaryFnOnce for Refill<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.player.refill_half::<0>();
+        self.player.refill_half::<HALF>();
+    }
+}
+
+impl Player<'_> {
+    #[inline(always)]
+    fn refill_half<const FIRST: usize>(&mut self) {
+        let states = self.states.as_chunks().0[FIRST / HALF];
+        self.put::<FIRST>(&states);
+    }
+
+    /// Sets the states of half of the lanes, and takes words into those that have room for one.
+    #[inline(always)]
+    fn put<const FIRST: usize>(&mut self, states: &[u32; HALF]) {
+        let mut words = [0; HALF];
+        for l in 0..HALF {
+            words[l] = word(self.words, self.next[FIRST + l]);
+        }
+        for l in 0..HALF {
+            let lane = FIRST + l;
+            (self.states[lane], self.next[lane]) = refilled(states[l], self.next[lane], words[l]);
+        }
+    }
+}
+
+/// The state after a symbol.
+#[inline(always)]
+fn after<const PRECISION: u32>(state: u32, entry: Entry) -> u32 {
+    let rest = state >> PRECISION;
+    rest.wrapping_mul(less_share(entry)).wrapping_add(rest.wrapping_add(over(entry)))
+}
+
+/// A word by its number. Beyond the end of the words there is anything.
+#[inline(always)]
+fn word(words: &[[u8; 2]], number: u32) -> u32 {
+    u16::from_le_bytes(words.get(number as usize).copied().unwrap_or_default()).into()
+}
+
+/// A state and the number of its lane's next word, after that word is taken if there is room for it.
+#[inline(always)]
+fn refilled(state: u32, next: u32, word: u32) -> (u32, u32) {
+    let low = state < LEAST;
+    (if low { state << 16 | word } else { state }, next.wrapping_add(u32::from(low)))
+}
+
+/// Half of the lanes.
+const HALF: usize = LANES / 2;
+/// Of so many lanes symbols are taken one by one. The others are idle.
+const FEW: u32 = 3;
 
 /// Most words of a range.
 const MAX_WORDS: u32 = 1 << 30;
@@ -118,7 +248,15 @@ const MAX_WORDS: u32 = 1 << 30;
 impl Symbols for Player<'_> {
     #[inline(always)]
     fn symbols(&mut self, slot: Slot, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
-        self.take(slot, &context, set)
+        const LAST: u32 = CONTEXTS as u32 - 1;
+        let context = each(|l| if has(set, l) { context[l].min(LAST) } else { IDLE });
+        if self.bit_counts.is_some() {
+            self.count(slot, &context, set);
+        }
+        match slot.stream.precision() {
+            12 => self.take::<12>(slot.number, &context, set),
+            _ => self.take::<10>(slot.number, &context, set),
+        }
     }
 
     #[inline(always)]
@@ -127,22 +265,12 @@ impl Symbols for Player<'_> {
             let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
             bit_counts.0[slot.stream as usize] += taken.sum::<f64>();
         }
-        let mut first = [0; LANES];
-        let mut more = 0;
-        for l in 0..LANES {
-            first[l] = count[l].min(MOST_BITS);
-            more |= count[l];
-        }
-        let mut out = self.take_bits(&first, set);
-        if more > MOST_BITS {
-            let mut rest = [0; LANES];
-            for l in 0..LANES {
-                rest[l] = (count[l] - first[l]).min(MOST_BITS);
-            }
-            let high = self.take_bits(&rest, set);
-            for l in 0..LANES {
-                out[l] |= high[l] << MOST_BITS;
-            }
+        let count = each(|l| if has(set, l) { count[l] } else { 0 });
+        let first = each(|l| count[l].min(MOST_BITS));
+        let mut out = self.take_bits(&first);
+        if count.iter().fold(0, |all, count| all | count) > MOST_BITS {
+            let high = self.take_bits(&each(|l| (count[l] - first[l]).min(MOST_BITS)));
+            out = each(|l| out[l] | high[l] << MOST_BITS);
         }
         out
     }

@@ -139,11 +139,24 @@ impl Rest {
         Coded::Code(from, count)
     }
 
-    /// Nonzero `j` of lane `l` of a part: atom and value in steps.
+    /// The `count` nonzeros of lane `l` of a part from the one with number `from` on: atoms and values in steps.
     #[inline(always)]
-    pub(super) fn nonzero(&self, part: usize, j: usize, l: usize) -> (u16, i32) {
+    pub(super) fn nonzeros(
+        &self,
+        part: usize,
+        from: usize,
+        count: usize,
+        l: usize,
+    ) -> impl Iterator<Item = (u16, i32)> {
         let part = &self.parts[part];
-        (part.atoms[j][l] as u16, part.values[j][l])
+        let atoms = part.atoms.get(from..from + count).unwrap_or_default();
+        let values = part.values.get(from..from + count).unwrap_or_default();
+        atoms.iter().zip(values).map(move |(atoms, values)| (atoms[l] as u16, values[l]))
+    }
+
+    /// Number of nonzeros of lane `l`.
+    pub(super) fn total(&self, l: usize) -> usize {
+        self.parts.iter().map(|part| part.totals[l] as usize).sum()
     }
 
     /// Codes one part of the nonzeros of the block. `targets` holds the Gaussians of each lane. Returns `None` for
@@ -270,20 +283,23 @@ impl Rest {
     #[inline(always)]
     fn totals(&mut self, form: &RestForm, part: usize) -> Lanes<u32> {
         let escape = form.dim as u32 + 1;
+        let number = |count: u32| if count == escape { 0 } else { count };
         let mut totals = [0; LANES];
-        self.plan.clear();
-        self.plan.resize(self.len() * form.dim, [0; LANES]);
         for counts in &self.parts[part].counts {
             for l in 0..LANES {
-                if counts[l] == 0 || counts[l] == escape {
-                    continue;
-                }
-                let from = totals[l] as usize;
-                totals[l] += counts[l];
-                for plan in &mut self.plan[from..totals[l] as usize] {
-                    plan[l] = LATER;
-                }
-                self.plan[from][l] = (counts[l] - 1).min(FIRST_CONTEXTS - 1) as u8;
+                totals[l] += number(counts[l]);
+            }
+        }
+        let most = totals.iter().copied().max().unwrap_or(0) as usize;
+        self.plan.clear();
+        self.plan.resize(most + 1, [LATER; LANES]);
+        let mut next = [0_u32; LANES];
+        for counts in &self.parts[part].counts {
+            for l in 0..LANES {
+                let count = number(counts[l]);
+                // What a Gaussian without nonzeros writes the next one overwrites, or no one reads.
+                self.plan[next[l] as usize][l] = count.wrapping_sub(1).min(FIRST_CONTEXTS - 1) as u8;
+                next[l] += count;
             }
         }
         totals

@@ -305,14 +305,18 @@ fn join_groups(groups: &mut Vec<Group>, cost: impl Fn(&Histogram) -> f64) {
 
 /// Most bits of a probability.
 const MOST_PRECISION: u32 = 12;
+/// Places of the contexts of a set. It is a power of two, so that a masked number is one of them.
+const PLACES: usize = CONTEXTS.next_power_of_two();
+/// The context of lanes that take no symbol. They get 0, and their states stay.
+pub(super) const IDLE: u32 = CONTEXTS as u32;
 
 /// The tables as a decoder looks symbols up: for each value of a state's low bits the symbol, its share less 1, and how
 /// far the value lies above the symbol's start.
 #[derive(Debug, Clone)]
 pub(in crate::packed) struct Lookup {
-    /// Where the table of each context starts in `entries`.
-    starts: Vec<u32>,
-    entries: Vec<u32>,
+    /// Where the table of each context starts in `entries`, set by set.
+    sets: Vec<[u32; PLACES]>,
+    entries: Vec<Entry>,
 }
 
 impl Lookup {
@@ -321,37 +325,83 @@ impl Lookup {
             |symbol: u32, share: u32, over: u32| symbol | (share - 1) << 8 | over << (8 + MOST_PRECISION);
         // The first table stands for those that are missing. Its symbols take bits, so that states stay within limits.
         let mut entries: Vec<u32> = (0..1 << MOST_PRECISION).map(|_| entry(0, 1, 0)).collect();
-        let mut starts_of = Vec::with_capacity(tables.tables.len());
-        for stream in &tables.tables {
-            let mut starts = Vec::with_capacity(stream.len());
-            for table in stream {
+        // With the next ones states stay as they are.
+        let mut idle = [0; MOST_PRECISION as usize + 1];
+        for slot in Slot::all() {
+            let precision = slot.stream.precision();
+            let start = &mut idle[precision as usize];
+            if *start == 0 {
+                *start = entries.len() as u32;
+                entries.extend((0..1 << precision).map(|over| entry(0, 1 << precision, over)));
+            }
+        }
+        let mut sets = Vec::with_capacity(tables.tables.len());
+        for ((slot, map), of_slot) in Slot::all().zip(tables.map.chunks(CONTEXTS)).zip(&tables.tables) {
+            let mut starts = Vec::with_capacity(of_slot.len());
+            for table in of_slot {
                 starts.push(entries.len() as u32);
                 for (symbol, model) in (0_u32..).zip(&table.models) {
                     entries.extend((0..model.share).map(|over| entry(symbol, model.share, over)));
                 }
             }
-            starts_of.push(starts);
+            let mut set = [idle[slot.stream.precision() as usize]; PLACES];
+            let mut last = 0;
+            for (start, &table) in set.iter_mut().zip(map) {
+                // A context that is not used has the table of the one before, as it is written.
+                last = if table == NONE { last } else { usize::from(table) };
+                *start = starts.get(last).copied().unwrap_or(0);
+            }
+            sets.push(set);
         }
-        let start = |(context, &table): (usize, &u8)| {
-            let starts = starts_of.get(context / CONTEXTS).and_then(|starts| starts.get(usize::from(table)));
-            starts.copied().unwrap_or(0)
-        };
-        Self { starts: tables.map.iter().enumerate().map(start).collect(), entries }
+        Self { sets, entries }
     }
 
-    /// Where the table of a context starts; 0 if it is missing.
+    /// The tables of a set of contexts; `None` if there are none.
     #[inline(always)]
-    pub(super) fn start(&self, context: usize) -> u32 {
-        self.starts.get(context).copied().unwrap_or(0)
-    }
-
-    /// The symbol, its share, and how far `low` lies above its start, by the table that starts at `start`.
-    #[inline(always)]
-    pub(super) fn entry(&self, start: u32, low: u32) -> (u32, u32, u32) {
-        let entry = self.entries.get((start + low) as usize).copied().unwrap_or(0);
-        (entry & 0xff, (entry >> 8 & ((1 << MOST_PRECISION) - 1)) + 1, entry >> (8 + MOST_PRECISION))
+    pub(super) fn set(&self, number: usize) -> Option<Set<'_>> {
+        let starts = self.sets.get(number)?;
+        (starts[0] != 0).then_some(Set { starts, entries: &self.entries })
     }
 }
+
+/// The tables of a set of contexts.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Set<'l> {
+    starts: &'l [u32; PLACES],
+    entries: &'l [Entry],
+}
+
+/// What a table says of a state's low bits.
+pub(super) type Entry = u32;
+
+impl Set<'_> {
+    /// What the table of `context`, which is below [`CONTEXTS`] or [`IDLE`], says of `low`.
+    #[inline(always)]
+    pub(super) fn entry(&self, context: u32, low: u32) -> Entry {
+        let start = self.starts[context as usize % PLACES];
+        self.entries.get((start + low) as usize).copied().unwrap_or(0)
+    }
+}
+
+/// The symbol.
+#[inline(always)]
+pub(super) fn symbol(entry: Entry) -> u32 {
+    entry & 0xff
+}
+
+/// Its share less 1.
+#[inline(always)]
+pub(super) fn less_share(entry: Entry) -> u32 {
+    entry >> 8 & ((1 << MOST_PRECISION) - 1)
+}
+
+/// How far the low bits lie above its start.
+#[inline(always)]
+pub(super) fn over(entry: Entry) -> u32 {
+    entry >> (8 + MOST_PRECISION)
+}
+
+const _: () = assert!((IDLE as usize) < PLACES);
 
 #[cfg(test)]
 mod tests {

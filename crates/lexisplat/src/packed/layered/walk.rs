@@ -40,7 +40,7 @@ pub(super) fn factor(levels: usize) -> i32 {
 }
 
 /// One Gaussian of each lane as integers.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Group {
     /// Number of the cell on the Morton curve, and its coordinates.
     pub(super) number: Lanes<u64>,
@@ -86,15 +86,16 @@ impl<'a> Walk<'a> {
         Self { steering, levels, around: Around::default(), cell: [0; LANES], gap_bits: [0; LANES] }
     }
 
-    /// Codes the base of the next Gaussian of each lane in `set`. Returns `None` for impossible values, which only
-    /// damaged files hold. Decoders pass no targets.
+    /// Codes the base of the next Gaussian of each lane in `set` to `group`, which holds another or is new. Returns `None`
+    /// for impossible values, which only damaged files hold. Decoders pass no targets.
     #[inline(always)]
     pub(super) fn base<S: Symbols>(
         &mut self,
         s: &mut S,
         set: u32,
         targets: Option<&[&Target; LANES]>,
-    ) -> Option<Group> {
+        group: &mut Group,
+    ) -> Option<()> {
         let p = self.steering;
         let target = |l: usize| targets.map(|targets| targets[l]);
         let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
@@ -129,30 +130,14 @@ impl<'a> Walk<'a> {
         let zeros = [0; LANES];
         let mut features: [Lanes; COEFFICIENTS - 1] =
             [zeros, features_of(&colour), features_of(&shape), zeros, zeros, zeros];
-        let mut group = Group {
-            number: self.cell,
-            cell,
-            colour,
-            shape,
-            coarse: [zeros; TARGETS],
-            steps: [zeros; TARGETS],
-            base: [zeros; REFINED],
-            counts: [zeros; REFINED],
-            rotation: [[0; LANES]; 3],
-            axis_bits: [[0; LANES]; 2],
-            needle: [false; LANES],
-            moves: [zeros; 3],
-            fineness: [[0; LANES]; 3],
-            wanted: [zeros; REFINED],
-            wanted_rotation: [[0; LANES]; 3],
-            interim: [zeros; CHANGES],
-        };
+        (group.number, group.cell, group.colour, group.shape) = (self.cell, cell, colour, shape);
         let coarse = factor(self.levels);
         let mut remembered = [zeros; AVERAGED];
+        // All base colours have the same steps.
+        let colour_step = p.step(DC, &colour);
         for (t, stream) in TARGET_STREAMS.into_iter().enumerate() {
             features[0] = around[t];
-            let class = if t < DC { &shape } else { &colour };
-            let step = p.step(t, class);
+            let (class, step) = if t < DC { (&shape, p.step(t, &shape)) } else { (&colour, colour_step) };
             let predicted = p.predict(t, &features);
             if targets.is_some() {
                 for l in (0..LANES).filter(|&l| has(set, l)) {
@@ -182,14 +167,14 @@ impl<'a> Walk<'a> {
             group.base[t] = counts;
         }
         let scales = [features[3], features[4], features[5]];
-        self.turns_and_moves(s, set, targets, scales, &mut group);
+        self.turns_and_moves(s, set, targets, scales, group);
         group.counts = group.base;
         remembered[COLOUR] = features[1];
         for l in 0..LANES {
             remembered[SHAPE][l] = features[2][l] - features[1][l];
         }
         self.around.push(cell, remembered);
-        Some(group)
+        Some(())
     }
 
     /// Codes rotations and positions.

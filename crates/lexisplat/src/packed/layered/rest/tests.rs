@@ -129,7 +129,7 @@ proptest! {
                                 Coded::Code(from, count) => {
                                     assert!(part > 0 || target.exact.is_empty());
                                     let found: Vec<(u16, i32)> =
-                                        (from..from + count).map(|j| rest.nonzero(part, j, l)).collect();
+                                        rest.nonzeros(part, from, count, l).collect();
                                     assert_eq!(found, expected, "part {part} of {there}");
                                 }
                             }
