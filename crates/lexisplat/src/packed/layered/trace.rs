@@ -14,7 +14,7 @@ use super::rest::{BLOCK, Coded, Cursor, Rest};
 use super::streams::{Slot, Stream};
 use super::symbols::{LANES, Lanes, Symbols, has, low_bits};
 use super::tables::{Lookup, Tables};
-use super::walk::Walk;
+use super::walk::{Group, Walk};
 use super::{Head, lanes};
 use crate::lexi::LexiReader;
 use crate::packed::scene::Coding;
@@ -164,7 +164,8 @@ fn trace(name: &str, shown: usize) -> String {
     for i in 0..count {
         let own = |l: usize| u32::from(starts[l] + i < starts[l + 1]) << l;
         let set = (0..lanes).map(own).sum();
-        let mut group = walk.base(&mut ranges[0], set, None).unwrap();
+        let mut group = Group::default();
+        walk.base(&mut ranges[0], set, None, &mut group).unwrap();
         for k in 1..=levels {
             refine(&mut ranges[k], set, &mut group, levels + 1 - k).unwrap();
         }
