@@ -32,6 +32,10 @@ const POSITION_FACTOR: f64 = 1.12;
 const STEPS: [f64; 2] = [1.0 / 16_777_216.0, 1e6];
 /// Keeps the normal equations solvable.
 const RIDGE: f64 = 1e-6;
+/// Growth of the ridge while coefficients are too large.
+const RIDGE_GROWTH: f64 = 4.0;
+/// Largest slope of the logarithm of a step. Files hold slopes below 8.
+const MOST_SLOPE: f64 = 7.9;
 
 /// Everything but the overall step.
 #[derive(Debug, Clone)]
@@ -186,7 +190,7 @@ fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKe
     }
     let rows = |kind: usize, factor: f64| {
         std::array::from_fn(|axis| {
-            let mut row: [f64; 4] = equations[kind][axis].solve();
+            let mut row = equations[kind][axis].solve_within(MOST_SLOPE);
             row[0] += libm::log2(factor);
             row
         })
@@ -271,12 +275,29 @@ impl<const N: usize> Equations<N> {
         }
     }
 
+    /// The coefficients, those but the first at most `most` in size. Features that hardly vary, or together, have large ones
+    /// that a file cannot hold; with them cut off, what they are to cancel would stay.
+    fn solve_within(&self, most: f64) -> [f64; N] {
+        let mut ridge = RIDGE;
+        loop {
+            let found = self.solve_with(ridge);
+            if found.iter().skip(1).all(|x| x.abs() <= most) || ridge >= 1.0 {
+                return found;
+            }
+            ridge *= RIDGE_GROWTH;
+        }
+    }
+
     /// The coefficients; 0 for features that are always 0.
     fn solve(&self) -> [f64; N] {
+        self.solve_with(RIDGE)
+    }
+
+    fn solve_with(&self, ridge: f64) -> [f64; N] {
         let (mut m, mut r) = (self.matrix, self.right);
         let scale = (0..N).map(|i| m[i][i]).fold(1e-30, f64::max);
         for (i, row) in m.iter_mut().enumerate() {
-            row[i] += RIDGE * (row[i] + 1e-6 * scale);
+            row[i] += ridge * (row[i] + 1e-6 * scale);
         }
         for c in 0..N {
             let pivot = m[c];
@@ -298,5 +319,23 @@ impl<const N: usize> Equations<N> {
             x[c] = if m[c][c] > 0.0 { (r[c] - known) / m[c][c] } else { 0.0 };
         }
         x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scales of few kinds, which differ together but for a little.
+    #[test]
+    fn coefficients_of_features_that_vary_together_are_small() {
+        let mut equations = Equations::<4>::NONE;
+        for i in 0..60 {
+            let (x, noise) = (f64::from(i % 3), 1e-2 * f64::from(i * 7 % 5));
+            equations.add([1.0, x, x + noise, 2.0 * x - noise], x + 50.0 * noise);
+        }
+        assert!(equations.solve().iter().any(|x| x.abs() > MOST_SLOPE));
+        let found = equations.solve_within(MOST_SLOPE);
+        assert!(found.iter().skip(1).all(|x| x.abs() <= MOST_SLOPE), "{found:?}");
     }
 }
