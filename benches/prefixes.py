@@ -51,8 +51,9 @@ def main():
     parser.add_argument("--only", nargs="+", default=[])
     parser.add_argument("--shares", nargs="+", type=float, default=SHARES)
     parser.add_argument("--binary", default=ROOT / "target/release/lexisplat")
-    parser.add_argument("options", nargs="*")
-    args = parser.parse_args()
+    words = sys.argv[1:]
+    end = words.index("--") if "--" in words else len(words)
+    args, options = parser.parse_args(words[:end]), words[end + 1 :]
     print("| model | " + " | ".join(f"{share:g} %" for share in args.shares) + " | bytes | first layer |")
     print("|---" * (len(args.shares) + 3) + "|")
     for model in sorted(args.folder.glob("*.ply")):
@@ -60,7 +61,7 @@ def main():
         if cameras is None or args.only and model.stem not in args.only:
             continue
         with tempfile.TemporaryDirectory() as folder:
-            words, size, first = measured(args.binary, model, cameras, args.options, args.shares, folder)
+            words, size, first = measured(args.binary, model, cameras, options, args.shares, folder)
         print(f"| {model.stem} | " + " | ".join(words) + f" | {size:,} | {first} |", flush=True)
 
 

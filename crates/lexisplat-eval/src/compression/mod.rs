@@ -19,6 +19,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod alone;
 mod facts;
 mod fewer;
 mod found;
@@ -28,6 +29,7 @@ mod packing;
 mod refit;
 mod report;
 mod run;
+mod solve;
 mod target;
 mod views;
 

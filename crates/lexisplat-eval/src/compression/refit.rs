@@ -6,12 +6,14 @@
 
 use std::borrow::Borrow;
 
-use lexisplat::packed::{Appearance, AppearanceChange, Packed, Packer, Quantised};
+use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
 use lexisplat::{CompressReport, Geometry, Model, Progress, Splats};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
+use super::alone::alone;
 use super::only_cancels::OnlyCancels;
+use super::solve::{ROW, kinds, solve};
 use super::views::PackingViews;
 use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
@@ -23,23 +25,10 @@ const STEPS_FOUND: usize = 3;
 /// Weight of the distance to the colours and opacities before, as a share of a Gaussian's weight in pictures. Other views
 /// than those that are fitted to depend on them too.
 const RIDGE: f32 = 0.5;
-/// Share of the sums of rows in the preconditioner of colours. The diagonal of the matrix is smaller than those.
-const ROW: f32 = 0.2;
 /// Multiple of the diagonal of the matrix in the preconditioner of opacities.
 const OPACITY_DIAGONAL: f32 = 4.0;
 /// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small ones.
 const MOST_LOG_OPACITY: f32 = 0.5;
-/// Of the views that are fitted to, every such one says what a first layer alone shows.
-const VIEWS_ALONE: usize = 2;
-/// Steps of the method of conjugate gradients for a first layer alone.
-const STEPS_ALONE: usize = 3;
-/// The ridge of a first layer alone, as a share of sums of rows and of the diagonal, and of their means.
-const RIDGE_ALONE: f32 = 0.1;
-const RIDGE_MEAN: f32 = 0.1;
-/// Multiple of the diagonal of the matrix in the preconditioner of opacities of a first layer alone.
-const OPACITY_DIAGONAL_ALONE: f32 = 2.0;
-/// Largest change of the logarithm of an opacity of a first layer alone.
-const MOST_LOG_OPACITY_ALONE: f32 = 1.0;
 /// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
 const GAIN_GIVEN: f64 = 2.4;
 const GAIN_FOUND: f64 = 0.5;
@@ -132,8 +121,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         let file = quantised.finish(Some(&fitted), None, progress)?;
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
-        let changes = fit.alone(Scene::from(&first), progress)?;
-        drop(first);
+        let changes = alone(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
         Ok(quantised.finish(Some(&fitted), Some(&changes), progress)?)
     }
 }
@@ -180,116 +168,28 @@ impl Fit {
         let PictureErrors { errors, row_sums, opacity_squares, .. } =
             adjoint.of_errors(&self.targets, progress)?;
         // Sensitivities are averaged over three channels, and products with the adjoint are not.
-        let ridge: Vec<[f32; 2]> = weights.iter().map(|w| w.map(|w| RIDGE * 3.0 * w)).collect();
+        let ridge: Vec<GaussianChange<4>> =
+            weights.iter().map(|w| kinds(w.map(|w| RIDGE * 3.0 * w))).collect();
         let mut diagonal = Vec::with_capacity(ridge.len());
-        for (i, [colour, opacity]) in ridge.iter().enumerate() {
+        for (i, [colour, _, _, opacity]) in ridge.iter().enumerate() {
             let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
-            diagonal.push(own.map(|v| v.max(f32::MIN_POSITIVE)));
+            diagonal.push(kinds(own));
         }
         let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
         let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, progress)?;
         let geometry = scene.geometry();
         Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())
     }
-
-    /// Changes of base colours, and of logarithms of opacities, with which pictures of `scene`, a first layer alone, are
-    /// nearest to the targets.
-    ///
-    /// # Errors
-    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(super) fn alone(&self, scene: Scene<'_>, progress: &dyn Progress) -> Result<Vec<AppearanceChange>> {
-        let cameras: Vec<Camera> = self.cameras.iter().step_by(VIEWS_ALONE).cloned().collect();
-        let targets: Vec<Image> = self.targets.iter().step_by(VIEWS_ALONE).cloned().collect();
-        let mut adjoint = PictureAdjoint::new(scene, &cameras)?;
-        let progress = &OnlyCancels(progress);
-        let PictureErrors { errors, row_sums, opacity_squares, .. } =
-            adjoint.of_errors(&targets, progress)?;
-        let mean = |values: &[f32]| values.iter().sum::<f32>() / values.len().max(1) as f32;
-        let (mean_row, mean_square) = (mean(&row_sums), mean(&opacity_squares));
-        let (mut ridge, mut diagonal) = (Vec::new(), Vec::new());
-        for (row, square) in row_sums.iter().zip(&opacity_squares) {
-            let own = [
-                RIDGE_ALONE * (0.5 * row + RIDGE_MEAN * mean_row),
-                RIDGE_ALONE * (square + RIDGE_MEAN * mean_square),
-            ];
-            let scale = [ROW * row + own[0], OPACITY_DIAGONAL_ALONE * square + own[1]];
-            diagonal.push(scale.map(|v| v.max(f32::MIN_POSITIVE)));
-            ridge.push(own);
-        }
-        let found = solve(&mut adjoint, errors, &ridge, &diagonal, STEPS_ALONE, progress)?;
-        let change = |change: &GaussianChange| AppearanceChange {
-            dc: std::array::from_fn(|c| change[c] / C0),
-            log_opacity: change[3].clamp(-MOST_LOG_OPACITY_ALONE, MOST_LOG_OPACITY_ALONE),
-        };
-        Ok(found.iter().map(change).collect())
-    }
-}
-
-/// The change with which the squared errors of pictures, and the ridge, are least: the solution by conjugate gradients, with a
-/// diagonal preconditioner. `errors` are the products of the adjoint with the errors of pictures.
-fn solve(
-    adjoint: &mut PictureAdjoint<'_>,
-    mut errors: Vec<GaussianChange>,
-    ridge: &[[f32; 2]],
-    diagonal: &[[f32; 2]],
-    steps: usize,
-    progress: &OnlyCancels<'_>,
-) -> Result<Vec<GaussianChange>> {
-    let scaled = |rows: &[GaussianChange]| -> Vec<GaussianChange> {
-        let divided = |([r, g, b, a], [c, o]): (&GaussianChange, &[f32; 2])| [r / c, g / c, b / c, a / o];
-        rows.iter().zip(diagonal).map(divided).collect()
-    };
-    let mut found = vec![[0.0_f32; 4]; ridge.len()];
-    let mut direction = scaled(&errors);
-    let mut norm = dot(&errors, &direction);
-    for _ in 0..steps {
-        let mut product = adjoint.of_changes(&direction, progress)?;
-        for ((product, direction), [colour, opacity]) in product.iter_mut().zip(&direction).zip(ridge) {
-            let ridge = [*colour, *colour, *colour, *opacity];
-            (0..4).for_each(|k| product[k] += ridge[k] * direction[k]);
-        }
-        let along = dot(&direction, &product);
-        if along <= 0.0 {
-            break;
-        }
-        let length = single(norm / along);
-        for i in 0..found.len() {
-            add(&mut found[i], length, &direction[i]);
-            add(&mut errors[i], -length, &product[i]);
-        }
-        let next = scaled(&errors);
-        let before = std::mem::replace(&mut norm, dot(&errors, &next));
-        let share = single(norm / before);
-        for (direction, next) in direction.iter_mut().zip(next) {
-            let old = std::mem::replace(direction, next);
-            add(direction, share, &old);
-        }
-    }
-    Ok(found)
 }
 
 /// What Gaussian `i` shows after a change.
-fn changed(geometry: &Geometry, i: usize, change: &GaussianChange) -> Appearance {
+fn changed(geometry: &Geometry, i: usize, change: &GaussianChange<4>) -> Appearance {
     let Appearance { dc, log_opacity } = Appearance::of(geometry, i);
     let more = change[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
     Appearance {
         dc: std::array::from_fn(|c| dc[c] + change[c] / C0),
         log_opacity: (log_opacity + more).min(0.0),
     }
-}
-
-/// Adds `factor` times `row` to `sum`.
-fn add(sum: &mut GaussianChange, factor: f32, row: &GaussianChange) {
-    sum.iter_mut().zip(row).for_each(|(sum, value)| *sum += factor * value);
-}
-
-fn dot(a: &[GaussianChange], b: &[GaussianChange]) -> f64 {
-    a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| f64::from(*a) * f64::from(*b)).sum()
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "a factor, to single precision")]
-fn single(x: f64) -> f32 {
-    x as f32
 }
 
 #[cfg(test)]

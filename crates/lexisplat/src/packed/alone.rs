@@ -76,17 +76,18 @@ impl Alone {
         parameters: &Parameters,
     ) -> [i32; CHANGES] {
         let growth = self.growth.get(i).copied().unwrap_or(0);
-        let Some(AppearanceChange { dc, log_opacity }) = change else {
+        let Some(AppearanceChange { dc, log_opacity, log_scale }) = change else {
             return [growth, self.opacity.get(i).copied().unwrap_or(0), 0, 0, 0];
         };
         let [a, b, c] = parameters.dc_turned(*dc).map(|d| steps(f64::from(d), STEPS[2]));
-        [growth, steps(f64::from(*log_opacity), STEPS[1]), a, b, c]
+        let grows = growth + steps(f64::from(*log_scale), STEPS[0]);
+        [grows, steps(f64::from(*log_opacity), STEPS[1]), a, b, c]
     }
 }
 
 /// The nearest number of steps.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-fn steps(x: f64, step: f64) -> i32 {
+pub(super) fn steps(x: f64, step: f64) -> i32 {
     libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 

@@ -1,5 +1,6 @@
 //! What a Gaussian shows, apart from its shape and its view-dependent colour.
 
+use super::alone::{STEPS, steps};
 use super::canonical::MIN_LOG_OPACITY;
 use crate::scene::splats::{Geometry, all_finite};
 use crate::support::error::{Error, Result};
@@ -24,13 +25,39 @@ pub struct AppearanceChange {
     pub dc: [f32; 3],
     /// Natural logarithm of the opacity after the sigmoid.
     pub log_opacity: f32,
+    /// Natural logarithms of all scales.
+    pub log_scale: f32,
 }
 
 impl AppearanceChange {
+    /// The nearest change of scales and of the opacity that a file holds.
+    #[must_use]
+    pub fn rounded(self) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "to single precision")]
+        let [log_scale, log_opacity] = [(self.log_scale, STEPS[0]), (self.log_opacity, STEPS[1])]
+            .map(|(x, step)| (f64::from(steps(f64::from(x), step)) * step) as f32);
+        Self { log_opacity, log_scale, ..self }
+    }
+
+    /// Makes the change to Gaussian `i` of `geometry`. The logarithm of the opacity is then not above -0.0001.
+    ///
+    /// # Panics
+    /// If there is no Gaussian `i`.
+    pub fn make(&self, geometry: &mut Geometry, i: usize) {
+        let Appearance { dc, log_opacity } = Appearance::of(geometry, i);
+        let dc = std::array::from_fn(|c| dc[c] + self.dc[c]);
+        Appearance { dc, log_opacity: log_opacity + self.log_opacity }.give(geometry, i);
+        geometry.scales[i].iter_mut().for_each(|scale| *scale += self.log_scale);
+    }
+
     /// Refuses values that are not finite.
     pub(super) fn check(&self) -> Result<()> {
-        let opacity = std::slice::from_ref(&self.log_opacity);
-        all_finite([("changes of base colours", self.dc.as_slice()), ("changes of opacities", opacity)])
+        let [opacity, scale] = [&self.log_opacity, &self.log_scale].map(std::slice::from_ref);
+        all_finite([
+            ("changes of base colours", self.dc.as_slice()),
+            ("changes of opacities", opacity),
+            ("changes of scales", scale),
+        ])
     }
 }
 
@@ -79,6 +106,25 @@ mod tests {
         assert!(geometry.opacities[1].is_finite() && Appearance::of(&geometry, 1).log_opacity > -1.1e-4);
         geometry.opacities[1] = -1000.0;
         assert!((Appearance::of(&geometry, 1).log_opacity - MIN_LOG_OPACITY).abs() < 1e-6);
+    }
+
+    #[test]
+    fn changes_are_rounded_and_made() {
+        let change = AppearanceChange { dc: [0.1, 0.0, -0.2], log_opacity: -0.3, log_scale: 0.7 };
+        let rounded = change.rounded();
+        assert!(rounded.log_opacity == -0.5 && (rounded.log_scale - 0.8).abs() < 1e-6, "{rounded:?}");
+        assert_eq!((rounded.dc, rounded.rounded()), (change.dc, rounded));
+        let mut geometry = crate::support::testing::scene(3, 1).geometry;
+        geometry.opacities[1] = 1.0;
+        let (before, scales) = (Appearance::of(&geometry, 1), geometry.scales[1]);
+        rounded.make(&mut geometry, 1);
+        let after = Appearance::of(&geometry, 1);
+        assert!((after.log_opacity - before.log_opacity + 0.5).abs() < 1e-6, "{after:?} {before:?}");
+        assert!((after.dc[2] - before.dc[2] + 0.2).abs() < 1e-6, "{after:?} {before:?}");
+        assert_eq!(geometry.scales[1], scales.map(|scale| scale + rounded.log_scale));
+        AppearanceChange { log_opacity: 9.0, ..rounded }.make(&mut geometry, 1);
+        assert!(geometry.opacities[1].is_finite());
+        assert!(AppearanceChange { log_scale: f32::NAN, ..rounded }.check().is_err());
     }
 
     #[test]

@@ -54,7 +54,7 @@ pub(super) struct View<'a> {
     pub(super) classes: &'a [[u8; 2]],
     /// What each shows, in this order, instead of the base colours and opacities of `splats`.
     pub(super) appearances: Option<&'a [Appearance]>,
-    /// By how much each of the first layer is to change while the second is not there, apart from its growth.
+    /// By how much each of the first layer is to change while the second is not there, beside its growth.
     pub(super) changes: Option<&'a [AppearanceChange]>,
 }
 

@@ -155,8 +155,8 @@ impl<'a> Quantised<'a> {
     }
 
     /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
-    /// order of the file. `changes` are what base colours, and logarithms of opacities, of the first layer change by while the
-    /// second is not there, from what [`Packed::first_layer`] shows.
+    /// order of the file. `changes` are what Gaussians of the first layer change by while the second is not there, from what
+    /// [`Packed::first_layer`] shows.
     ///
     /// # Errors
     /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
