@@ -64,7 +64,7 @@ pub use scene::extra::{Extra, ExtraValues};
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;
-pub use scene::splats::{Geometry, SceneMeta, Splats};
+pub use scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
 pub use scene::{sh, stats};
 pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 pub use sparse::compress::{CompressOptions, DEFAULT_TOLERANCE, compress};

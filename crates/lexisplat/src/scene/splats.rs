@@ -5,6 +5,11 @@ use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
 
+/// Stands for an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid; in f32 the sigmoid of
+/// this value is 1 and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply) write
+/// infinities for 255 and 0.
+pub const SURE_OPACITY: f32 = 100.0;
+
 /// Everything of a scene but its SH-rest coefficients, one entry a Gaussian in every array.
 ///
 /// Values are as the trainer stored them, before any activation.
@@ -195,8 +200,8 @@ impl Splats {
         }
     }
 
-    /// Appends the Gaussians of `other`, which has the same degree and the same extras.
-    pub(crate) fn append(&mut self, other: Self) {
+    /// Appends the Gaussians of `other`, which has the same degree, the same extras, and normals if this one has any.
+    pub fn append(&mut self, other: Self) {
         let (to, from) = (&mut self.geometry, other.geometry);
         to.positions.extend(from.positions);
         to.normals.extend(from.normals);

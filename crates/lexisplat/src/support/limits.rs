@@ -3,6 +3,7 @@
 use crate::scene::sh::MAX_REST;
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
+use crate::support::memory_budget::MemoryBudget;
 
 /// Most atoms a dictionary may have: indices fit in 10 bits, and the Gram matrix in 4 MiB.
 pub const MAX_ATOMS: usize = 1024;
@@ -115,8 +116,11 @@ impl Limits {
         if found <= limit { Ok(()) } else { Err(Error::limit(what, found, limit, None)) }
     }
 
-    /// Refuses a file with too many Gaussians. [`MAX_GAUSSIANS`] cannot be raised.
-    pub(crate) fn check_gaussians(&self, file: &str, found: u64) -> Result<()> {
+    /// Refuses a file with too many Gaussians. No file may have `u32::MAX` or more. For readers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Limit`].
+    pub fn check_gaussians(&self, file: &str, found: u64) -> Result<()> {
         Self::check(&format!("Gaussians in {file}"), found, MAX_GAUSSIANS)?;
         raisable("Gaussians in", file, found, self.gaussians, "gaussians")
     }
@@ -136,13 +140,25 @@ impl Limits {
         raisable(&what, file, found, self.nonzeros, "nonzeros")
     }
 
+    /// Refuses `count` Gaussians of `each` bytes in memory, made from a file of `file_bytes` bytes, if [`Self::bytes`] or
+    /// [`Self::expansion`] do not allow them. For readers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Limit`].
+    pub fn check_arrays(&self, file: &str, file_bytes: u64, count: usize, each: usize) -> Result<()> {
+        MemoryBudget::new(self, file, file_bytes).take(count, each)
+    }
+
     /// Refuses a file of too many bytes that has to be held in memory.
     pub(crate) fn check_file(&self, file: &str, found: u64) -> Result<()> {
         raisable("bytes of", file, found, self.bytes, "bytes")
     }
 
-    /// Refuses a file whose header has too many bytes.
-    pub(crate) fn check_header(&self, file: &str, found: u64) -> Result<()> {
+    /// Refuses a file whose header has too many bytes. For readers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Limit`].
+    pub fn check_header(&self, file: &str, found: u64) -> Result<()> {
         raisable("bytes in the header of", file, found, self.header_bytes, "header_bytes")
     }
 

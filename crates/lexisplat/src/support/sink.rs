@@ -64,6 +64,14 @@ impl Sink<'_> {
         }
     }
 
+    /// Writes `bytes` and returns their number. Reports [`Stage::Write`]. For writers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Io`] or [`Error::Writer`], and [`Error::Cancelled`] if `progress` asks for it.
+    pub fn write_bytes(self, bytes: &[u8], progress: &dyn Progress) -> Result<u64> {
+        self.write(bytes.len() as u64, progress, |writer, refused| writer.write_all(bytes).map_err(refused))
+    }
+
     /// Lets `fill` write all of the `bytes` bytes of a result, and returns their number. The second argument of
     /// `fill` makes an [`Error`] of an error of the writer.
     ///

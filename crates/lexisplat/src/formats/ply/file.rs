@@ -1,6 +1,6 @@
 //! A PLY whose header was read and whose values were not.
 
-use super::fill::{Found, SURE_OPACITY};
+use super::fill::Found;
 use super::header::Header;
 use super::layout::Layout;
 use super::marks::marks;
@@ -8,7 +8,7 @@ use super::names::NORMAL;
 use super::read::ReadOptions;
 use super::rows::Rows;
 use super::summary::PlySummary;
-use crate::scene::splats::SceneMeta;
+use crate::scene::splats::{SURE_OPACITY, SceneMeta};
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{GEOMETRY_BYTES, MemoryBudget};

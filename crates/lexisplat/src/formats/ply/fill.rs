@@ -8,15 +8,10 @@ use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, REST, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
-use crate::scene::splats::{Geometry, SceneMeta, Splats};
+use crate::scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
-
-/// Replaces an infinite opacity, which keeps its sign. Opacities are stored before the sigmoid; in f32 the sigmoid of
-/// this value is 1 and that of its negative is 0, to the last bit. Decoders of 8-bit opacities (SPZ, compressed.ply)
-/// write infinities for 255 and 0.
-pub(super) const SURE_OPACITY: f32 = 100.0;
 
 /// A scene of this layout without Gaussians.
 pub(super) fn empty(layout: &Layout) -> Splats {

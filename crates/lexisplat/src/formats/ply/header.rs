@@ -25,16 +25,22 @@ pub enum Format {
 
 /// A property's shape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub enum Kind {
     /// One value.
     Scalar(ScalarType),
     /// A count, then that many items.
-    List { count: ScalarType, item: ScalarType },
+    List {
+        /// Type of the count.
+        count: ScalarType,
+        /// Type of an item.
+        item: ScalarType,
+    },
 }
 
 impl Kind {
     /// The type of a single value.
-    pub(super) fn scalar(self) -> Option<ScalarType> {
+    #[must_use]
+    pub fn scalar(self) -> Option<ScalarType> {
         match self {
             Self::Scalar(ty) => Some(ty),
             Self::List { .. } => None,
@@ -44,40 +50,52 @@ impl Kind {
 
 /// A named column of an element.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Property {
-    pub(super) name: String,
-    pub(super) kind: Kind,
+pub struct Property {
+    /// The name.
+    pub name: String,
+    /// The shape.
+    pub kind: Kind,
 }
 
 /// An element: rows of properties.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Element {
-    pub(super) name: String,
-    pub(super) count: u64,
-    pub(super) properties: Vec<Property>,
+pub struct Element {
+    /// The name.
+    pub name: String,
+    /// Number of rows.
+    pub count: u64,
+    /// The columns in file order.
+    pub properties: Vec<Property>,
 }
 
 impl Element {
     /// Bytes of one binary row; `None` if a list makes rows differ.
-    pub(super) fn row_bytes(&self) -> Option<usize> {
+    #[must_use]
+    pub fn row_bytes(&self) -> Option<usize> {
         self.properties.iter().map(|p| p.kind.scalar().map(ScalarType::bytes)).sum()
     }
 }
 
-/// A parsed header.
+/// The header of any PLY.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Header {
-    pub(super) format: Format,
+#[non_exhaustive]
+pub struct Header {
+    /// How values are stored.
+    pub format: Format,
     /// Comment texts in order, without the keyword and outer spaces.
-    pub(super) comments: Vec<String>,
-    pub(super) elements: Vec<Element>,
+    pub comments: Vec<String>,
+    /// The elements in file order.
+    pub elements: Vec<Element>,
     /// Bytes of the header; the data start here.
-    pub(super) bytes: usize,
+    pub bytes: usize,
 }
 
 impl Header {
-    /// Parses the header at the start of `bytes`, which came from the file called `file`.
-    pub(super) fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
+    /// Parses the header at the start of `bytes`, which came from the file called `file`. For readers of further formats.
+    ///
+    /// # Errors
+    /// [`Error::Format`] for bytes that are no PLY header, [`Error::Limit`] for one that asks for too much.
+    pub fn parse(file: &str, bytes: &[u8], limits: &Limits) -> Result<Self> {
         FileKind::Ply.expect(file, bytes)?;
         let mut lines = Lines::new(file, bytes, *limits);
         let (mut format, mut comments, mut elements) = (None, Vec::new(), Vec::<Element>::new());

@@ -53,7 +53,7 @@ mod write;
 
 pub use crate::scene::extra::ScalarType;
 pub use chunks::PlySource;
-pub use header::Format;
+pub use header::{Element, Format, Header, Kind as PropertyKind, Property};
 pub(crate) use names::is_extra_name;
 pub use read::{PlyRead, ReadOptions, read, read_bytes};
 pub use summary::{Dialect, PlySummary};

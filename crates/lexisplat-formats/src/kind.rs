@@ -1,0 +1,181 @@
+//! What format a file is in.
+
+use std::fmt;
+
+use lexisplat::FileKind;
+use serde_json::Value;
+
+use crate::{compressed_ply, ksplat, splat};
+
+/// First bytes of a glb.
+const GLB: &[u8] = b"glTF";
+
+/// A format of scenes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum Kind {
+    /// The PLY of trainers.
+    Ply,
+    /// This project's own.
+    Lexi,
+    /// Niantic's SPZ, versions 1 to 4.
+    Spz,
+    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures.
+    Sog,
+    /// `PlayCanvas`' compressed PLY.
+    CompressedPly,
+    /// The rows of 32 bytes of antimatter15's viewer.
+    Splat,
+    /// The `.ksplat` of mkkellogg's viewer.
+    Ksplat,
+    /// glTF or glb with `KHR_gaussian_splatting`.
+    Gltf,
+}
+
+impl Kind {
+    /// All formats.
+    pub const ALL: [Self; 8] = [
+        Self::Ply,
+        Self::Lexi,
+        Self::Spz,
+        Self::Sog,
+        Self::CompressedPly,
+        Self::Splat,
+        Self::Ksplat,
+        Self::Gltf,
+    ];
+
+    /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
+    #[must_use]
+    pub fn of(name: &str, bytes: &[u8]) -> Option<Self> {
+        match bytes {
+            [b'N', b'G', b'S', b'P', ..] => return Some(Self::Spz),
+            [b'P', b'K', 3, 4, ..] => return Some(Self::Sog),
+            bytes if bytes.starts_with(GLB) => return Some(Self::Gltf),
+            _ => {}
+        }
+        match FileKind::of(name, bytes) {
+            FileKind::Ply if compressed_ply::is_likely(bytes) => return Some(Self::CompressedPly),
+            FileKind::Ply => return Some(Self::Ply),
+            FileKind::Lexi => return Some(Self::Lexi),
+            FileKind::Empty => return None,
+            _ => {}
+        }
+        if bytes.starts_with(&[0x1f, 0x8b]) {
+            return Some(Self::Spz);
+        }
+        if bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
+            return of_json(bytes);
+        }
+        if ksplat::is_likely(bytes) {
+            return Some(Self::Ksplat);
+        }
+        if splat::is_likely(bytes) {
+            return Some(Self::Splat);
+        }
+        Self::of_extension(name).filter(|kind| matches!(kind, Self::Splat | Self::Ksplat))
+    }
+
+    /// The format that files called `name` have by their extension.
+    #[must_use]
+    pub fn of_extension(name: &str) -> Option<Self> {
+        let name = name.to_ascii_lowercase();
+        // The longest first: a compressed.ply is called .ply too.
+        let ends = [
+            (".compressed.ply", Self::CompressedPly),
+            (".ply", Self::Ply),
+            (".lexi", Self::Lexi),
+            (".spz", Self::Spz),
+            (".sog", Self::Sog),
+            (".splat", Self::Splat),
+            (".ksplat", Self::Ksplat),
+            (".glb", Self::Gltf),
+            (".gltf", Self::Gltf),
+        ];
+        ends.into_iter().find(|(end, _)| name.ends_with(end)).map(|(_, kind)| kind)
+    }
+
+    /// The extension of files of this format, which also names it in options.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Ply => "ply",
+            Self::Lexi => "lexi",
+            Self::Spz => "spz",
+            Self::Sog => "sog",
+            Self::CompressedPly => "compressed.ply",
+            Self::Splat => "splat",
+            Self::Ksplat => "ksplat",
+            Self::Gltf => "glb",
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Ply => "PLY",
+            Self::Lexi => ".lexi",
+            Self::Spz => "SPZ",
+            Self::Sog => "SOG",
+            Self::CompressedPly => "compressed.ply",
+            Self::Splat => ".splat",
+            Self::Ksplat => ".ksplat",
+            Self::Gltf => "glTF",
+        })
+    }
+}
+
+/// The format of a file of JSON.
+fn of_json(bytes: &[u8]) -> Option<Kind> {
+    let value: Value = serde_json::from_slice(bytes).ok()?;
+    if value.get("asset").is_some() {
+        Some(Kind::Gltf)
+    } else if value.get("means").is_some() && value.get("quats").is_some() {
+        Some(Kind::Sog)
+    } else {
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn kinds_are_told_by_their_bytes() {
+        let cases: [(&str, &[u8], Option<Kind>); 14] = [
+            ("a.spz", b"", None),
+            ("a.spz", b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", Some(Kind::Ply)),
+            (
+                "a.ply",
+                b"ply\nformat binary_little_endian 1.0\nelement chunk 0\nelement vertex 0\nend_header\n",
+                Some(Kind::CompressedPly),
+            ),
+            ("a", b"NGSP\x04\0\0\0{", Some(Kind::Spz)),
+            ("a", b"\x1f\x8b\x08\0", Some(Kind::Spz)),
+            ("a", b"PK\x03\x04", Some(Kind::Sog)),
+            ("a", b"\x50\0\0\0\0\0\0\0{\"", Some(Kind::Lexi)),
+            // The low byte of a length may be an opening brace.
+            ("a", b"glTF\x02\0\0\0{\0\0\0", Some(Kind::Gltf)),
+            ("a", b" {\"asset\":{}}", Some(Kind::Gltf)),
+            ("a", b"{\"means\":{},\"quats\":{}}", Some(Kind::Sog)),
+            ("a", b"{\"other\":{}}", None),
+            ("a.SPLAT", &[0; 32], Some(Kind::Splat)),
+            ("a.ksplat", &[0; 7], Some(Kind::Ksplat)),
+            ("a", b"anything", None),
+        ];
+        for (name, bytes, kind) in cases {
+            assert_eq!(Kind::of(name, bytes), kind, "{name} {bytes:?}");
+        }
+    }
+
+    #[test]
+    fn extensions_name_their_formats() {
+        for kind in Kind::ALL {
+            assert_eq!(Kind::of_extension(&format!("a.{}", kind.extension())), Some(kind));
+        }
+        assert_eq!(Kind::of_extension("b/A.COMPRESSED.PLY"), Some(Kind::CompressedPly));
+        assert_eq!(Kind::of_extension("a.txt"), None);
+    }
+}

@@ -1,0 +1,26 @@
+//! Scenes in the formats of other programs, in and out.
+//!
+//! [`open`] tells by content what a file is and gives a [`SplatSource`](lexisplat::SplatSource), which everything of this
+//! project reads. [`write`](fn@write) writes a scene in any of the formats that can be written. docs/FORMATS.md says what
+//! each format holds, which axes it has, and what is lost on the way.
+//!
+//! Scenes in memory have the axes of a trainer's PLY: readers turn to them, writers turn back.
+
+mod axes;
+mod compressed_ply;
+mod gltf;
+mod kind;
+mod ksplat;
+mod opacity;
+mod open;
+mod rows;
+mod sog;
+mod source;
+mod splat;
+mod spz;
+mod write;
+
+pub use kind::Kind;
+pub use open::{Opened, Siblings, open};
+pub use source::FormatSource;
+pub use write::{Lost, WriteOptions, write};

@@ -1,0 +1,241 @@
+//! A file of another format as a source of splats.
+
+use std::ops::Range;
+
+use lexisplat::ply::ReadOptions;
+use lexisplat::{Error, FormatError, Geometry, Limits, Result, SURE_OPACITY, SplatSource, Splats};
+use serde_json::Value;
+
+use crate::rows::{Described, RowsMut};
+
+/// Gaussians that one task decodes.
+const GAUSSIANS_PER_TASK: usize = 8192;
+/// Gaussians looked at together when a file is opened.
+const SCAN: usize = 8 * GAUSSIANS_PER_TASK;
+/// Bytes of a Gaussian's position, base colour, opacity, scales and rotation.
+const GEOMETRY_BYTES: usize = (3 + 3 + 1 + 3 + 4) * size_of::<f32>();
+/// Names of the arrays in errors, in the order of a PLY: those of a Gaussian's first property of each.
+const PROPERTIES: [&str; 6] = ["x", "f_dc_0", "f_rest_0", "opacity", "scale_0", "rot_0"];
+
+/// A file of another format, whose Gaussians are read a part at a time.
+#[derive(Debug)]
+pub struct FormatSource<'a> {
+    name: String,
+    file_bytes: u64,
+    limits: Limits,
+    file: Described<'a>,
+    /// Gaussians left out, ascending.
+    dropped: Vec<usize>,
+}
+
+impl<'a> FormatSource<'a> {
+    /// Looks once at all values of `file`, called `name`, of `file_bytes` bytes.
+    pub(crate) fn new(
+        name: &str,
+        file_bytes: u64,
+        mut file: Described<'a>,
+        options: &ReadOptions,
+    ) -> Result<Self> {
+        options.limits.check_gaussians(name, file.len as u64)?;
+        if file.len == 0 {
+            file.warnings.push("the scene holds no Gaussians".to_owned());
+        }
+        let limits = options.limits;
+        let mut source = Self { name: name.to_owned(), file_bytes, limits, file, dropped: Vec::new() };
+        if !source.file.rows.is_finite() {
+            source.look(options)?;
+        }
+        Ok(source)
+    }
+
+    /// Finds the Gaussians that hold NaN or infinite values.
+    fn look(&mut self, options: &ReadOptions) -> Result<()> {
+        let mut part = self.empty();
+        let mut dropped = Vec::new();
+        let mut property = None;
+        for start in (0..self.file.len).step_by(SCAN) {
+            let range = start..(start + SCAN).min(self.file.len);
+            self.fill(range.clone(), &mut part)?;
+            for i in 0..range.len() {
+                if let Some(found) = not_finite(&part, i) {
+                    property = property.or(Some(found));
+                    dropped.push(start + i);
+                }
+            }
+        }
+        let Some(&first) = dropped.first() else { return Ok(()) };
+        let count = dropped.len() as u64;
+        if !options.drop_invalid {
+            let property = property.unwrap_or_default().to_owned();
+            let problem = FormatError::NotFinite { count, first: first as u64, property };
+            return Err(Error::format(&*self.name, problem));
+        }
+        self.file.warnings.push(format!("{count} Gaussians with NaN or infinite values are left out"));
+        self.dropped = dropped;
+        Ok(())
+    }
+
+    /// What `lexisplat info` says of the file, in order: names as in JSON, and values.
+    #[must_use]
+    pub fn facts(&self) -> &[(&'static str, Value)] {
+        &self.file.facts
+    }
+
+    /// Decodes all Gaussians `rows` of the file into `part`, those that are left out too.
+    fn fill(&self, rows: Range<usize>, part: &mut Splats) -> Result<()> {
+        let (n, rest) = (rows.len(), self.file.degree.rest());
+        self.limits.check_arrays(&self.name, self.file_bytes, n, GEOMETRY_BYTES + rest * size_of::<f32>())?;
+        resize(part, n, rest);
+        let Geometry { positions, dc, opacities, scales, rotations, .. } = &mut part.geometry;
+        let mut left = RowsMut { positions, dc, opacities, scales, rotations, sh_rest: &mut part.sh_rest };
+        let mut pieces = Vec::with_capacity(n.div_ceil(GAUSSIANS_PER_TASK));
+        for start in rows.clone().step_by(GAUSSIANS_PER_TASK) {
+            let n = GAUSSIANS_PER_TASK.min(rows.end - start);
+            pieces.push((start..start + n, left.take(n, rest)));
+        }
+        let fill = |(range, mut out): (Range<usize>, RowsMut<'_>)| {
+            self.file.rows.fill(range, out.reborrow());
+            for opacity in out.opacities.iter_mut().filter(|v| v.is_infinite()) {
+                *opacity = SURE_OPACITY.copysign(*opacity);
+            }
+        };
+        #[cfg(feature = "parallel")]
+        {
+            use rayon::prelude::*;
+            pieces.into_par_iter().for_each(fill);
+        }
+        #[cfg(not(feature = "parallel"))]
+        pieces.into_iter().for_each(fill);
+        Ok(())
+    }
+
+    /// The row of Gaussian `gaussian`.
+    fn row(&self, gaussian: usize) -> usize {
+        // `dropped[j] - j` Gaussians come before the dropped row number j.
+        let (mut low, mut high) = (0, self.dropped.len());
+        while low < high {
+            let middle = low.midpoint(high);
+            if self.dropped[middle] - middle <= gaussian {
+                low = middle + 1;
+            } else {
+                high = middle;
+            }
+        }
+        gaussian + low
+    }
+}
+
+impl RowsMut<'_> {
+    fn reborrow(&mut self) -> RowsMut<'_> {
+        RowsMut {
+            positions: self.positions,
+            dc: self.dc,
+            opacities: self.opacities,
+            scales: self.scales,
+            rotations: self.rotations,
+            sh_rest: self.sh_rest,
+        }
+    }
+}
+
+impl<'a> RowsMut<'a> {
+    /// Takes away the first `n` Gaussians, of `rest` values of SH-rest each.
+    fn take(&mut self, n: usize, rest: usize) -> Self {
+        fn split<'a, T>(from: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+            from.split_off_mut(..n).unwrap_or_default()
+        }
+        RowsMut {
+            positions: split(&mut self.positions, n),
+            dc: split(&mut self.dc, n),
+            opacities: split(&mut self.opacities, n),
+            scales: split(&mut self.scales, n),
+            rotations: split(&mut self.rotations, n),
+            sh_rest: split(&mut self.sh_rest, n * rest),
+        }
+    }
+}
+
+/// Resizes all arrays to `n` Gaussians. Their contents have no meaning afterwards.
+fn resize(part: &mut Splats, n: usize, rest: usize) {
+    /// New memory comes zeroed from the system. The threads that fill it are the first to touch it.
+    fn sized<T: Copy>(values: &mut Vec<T>, len: usize, zero: T) {
+        if values.is_empty() {
+            *values = vec![zero; len];
+        } else {
+            values.resize(len, zero);
+        }
+    }
+    let geometry = &mut part.geometry;
+    sized(&mut geometry.positions, n, [0.0; 3]);
+    sized(&mut geometry.dc, n, [0.0; 3]);
+    sized(&mut geometry.opacities, n, 0.0);
+    sized(&mut geometry.scales, n, [0.0; 3]);
+    sized(&mut geometry.rotations, n, [0.0; 4]);
+    sized(&mut part.sh_rest, n * rest, 0.0);
+}
+
+/// The property of Gaussian `i` of `part` that holds a value which is not finite.
+fn not_finite(part: &Splats, i: usize) -> Option<&'static str> {
+    let geometry = &part.geometry;
+    let values: [&[f32]; 6] = [
+        &geometry.positions[i],
+        &geometry.dc[i],
+        part.rest(i),
+        &geometry.opacities[i..=i],
+        &geometry.scales[i],
+        &geometry.rotations[i],
+    ];
+    let bad = |values: &[f32]| values.iter().any(|v| !v.is_finite());
+    values.into_iter().zip(PROPERTIES).find(|(values, _)| bad(values)).map(|(_, name)| name)
+}
+
+impl SplatSource for FormatSource<'_> {
+    fn len(&self) -> usize {
+        self.file.len - self.dropped.len()
+    }
+
+    fn empty(&self) -> Splats {
+        Splats {
+            geometry: Geometry::default(),
+            degree: self.file.degree,
+            sh_rest: Vec::new(),
+            meta: self.file.meta.clone(),
+        }
+    }
+
+    fn has_normals(&self) -> bool {
+        false
+    }
+
+    fn row_bytes(&self) -> u64 {
+        self.file_bytes / (self.file.len as u64).max(1)
+    }
+
+    fn source_bytes(&self) -> u64 {
+        self.file_bytes
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.file.warnings
+    }
+
+    fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()> {
+        if range.start > range.end || range.end > self.len() {
+            let expected = format!("at most {} Gaussians", self.len());
+            return Err(Error::parameter("range", format!("{range:?}"), expected));
+        }
+        let Some(last) = range.end.checked_sub(1).filter(|&last| last >= range.start) else {
+            return self.fill(0..0, part);
+        };
+        let rows = self.row(range.start)..self.row(last) + 1;
+        self.fill(rows.clone(), part)?;
+        let from = |row: usize| self.dropped.partition_point(|&dropped| dropped < row);
+        let dropped = &self.dropped[from(rows.start)..from(rows.end)];
+        if !dropped.is_empty() {
+            let mut keep = vec![true; rows.len()];
+            dropped.iter().for_each(|&row| keep[row - rows.start] = false);
+            part.retain(&keep);
+        }
+        Ok(())
+    }
+}

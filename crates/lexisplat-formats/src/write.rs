@@ -1,0 +1,87 @@
+//! Writes a scene in any of the formats that can be written.
+
+use lexisplat::{Error, Progress, Result, ShDegree, Sink, Splats, ply};
+use serde::Serialize;
+
+use crate::kind::Kind;
+use crate::{compressed_ply, gltf, sog, splat, spz};
+
+/// How to write.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct WriteOptions {
+    /// Version of SPZ: 2, 3 or 4. Default 4.
+    pub spz_version: u8,
+    /// Bits of SPZ's SH coefficients of degree 1, and of higher degrees, 1 to 8 each. Default 5 and 4, as its own library.
+    pub sh_bits: [u8; 2],
+    /// Whether a glb holds SPZ (`KHR_gaussian_splatting_compression_spz_2`) instead of arrays. Default `false`.
+    pub glb_spz: bool,
+}
+
+impl Default for WriteOptions {
+    fn default() -> Self {
+        Self { spz_version: 4, sh_bits: [5, 4], glb_spz: false }
+    }
+}
+
+/// What a written file lacks of its scene.
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
+#[non_exhaustive]
+pub struct Lost {
+    /// SH degrees of the scene and of the file, if the file's is lower.
+    pub sh_degree: Option<[u8; 2]>,
+    /// Names of extra properties.
+    pub extras: Vec<String>,
+    /// Whether normals were left out.
+    pub normals: bool,
+    /// Whether the mark of anti-aliasing was left out.
+    pub antialiased: bool,
+    /// What values are rounded to, one phrase each; empty if they are exact.
+    pub precision: Vec<String>,
+    /// How many values were out of the format's range and are at its end now.
+    pub limited: u64,
+}
+
+impl Lost {
+    /// What a file of `degree`, without extras, normals and marks, lacks of `splats`.
+    pub(crate) fn beside(splats: &Splats, degree: ShDegree, antialiased: bool) -> Self {
+        Self {
+            sh_degree: (degree < splats.degree).then(|| [splats.degree.get(), degree.get()]),
+            extras: splats.geometry.extras.iter().map(|extra| extra.name.clone()).collect(),
+            normals: !splats.geometry.normals.is_empty(),
+            antialiased: splats.meta.antialiased && !antialiased,
+            ..Self::default()
+        }
+    }
+}
+
+/// Writes `splats` in the format `kind`. Returns the number of bytes, and what they lack.
+///
+/// The bytes depend on the scene and the options alone.
+///
+/// # Errors
+/// [`Error::Parameter`] for a kind that cannot be written (.ksplat; .lexi has its own writer), for options out of range, and
+/// for a scene whose arrays differ in length; [`Error::Limit`] for a scene too large for the format; errors of the sink.
+pub fn write<'a>(
+    kind: Kind,
+    splats: &Splats,
+    options: &WriteOptions,
+    sink: impl Into<Sink<'a>>,
+    progress: &dyn Progress,
+) -> Result<(u64, Lost)> {
+    splats.validate()?;
+    let (bytes, lost) = match kind {
+        Kind::Ply => return Ok((ply::write(sink, splats)?, Lost::default())),
+        Kind::Spz => spz::write(splats, options)?,
+        Kind::Sog => sog::write(splats, options)?,
+        Kind::CompressedPly => compressed_ply::write(splats, options)?,
+        Kind::Splat => splat::write(splats),
+        Kind::Gltf => gltf::write(splats, options)?,
+        Kind::Lexi | Kind::Ksplat => {
+            let expected = "ply, spz, sog, compressed.ply, splat or glb";
+            return Err(Error::parameter("format", kind.extension(), expected));
+        }
+    };
+    progress.check()?;
+    Ok((sink.into().write_bytes(&bytes, progress)?, lost))
+}
