@@ -137,7 +137,7 @@ fn codec(error: &lexisplat::Error) -> Blame {
             let advice = match found {
                 FileKind::Ply => Some("`lexisplat compress` makes a .lexi of a PLY".into()),
                 FileKind::Lexi => Some("`lexisplat decompress` makes a PLY of a .lexi".into()),
-                _ => None,
+                _ => Some("`lexisplat convert` reads and writes other formats".into()),
             };
             (Kind::Format, advice)
         }

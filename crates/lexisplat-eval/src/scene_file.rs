@@ -1,18 +1,32 @@
-//! Scenes of either kind from files, told apart by content.
+//! Scenes of any format from files, told apart by content.
 
 use std::path::Path;
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{Packed, PackedHead};
-use lexisplat::ply::{self, PlyRead, ReadOptions};
-use lexisplat::{FileKind, Input, Model, Result};
+use lexisplat::ply::{PlyRead, ReadOptions};
+use lexisplat::{Error, FileKind, FormatError, Input, Model, Result, Silent, Splats};
+use lexisplat_formats::{Kind, Opened, Siblings};
 use lexisplat_render::Scene;
 
-/// A scene of either kind.
+/// A scene of another format than PLY and .lexi.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OtherRead {
+    /// The format.
+    pub kind: Kind,
+    /// The scene.
+    pub splats: Splats,
+    /// Oddities that did not prevent reading, one plain sentence each.
+    pub warnings: Vec<String>,
+}
+
+/// A scene of any format.
 #[derive(Debug)]
 pub enum Loaded {
     /// A PLY.
     Ply(Box<PlyRead>),
+    /// A scene of another format with dense SH.
+    Other(Box<OtherRead>),
     /// A .lexi, and before it was decoded if it is a packed one.
     Lexi(Box<Model>, Option<Box<Packed>>),
 }
@@ -38,14 +52,14 @@ pub struct SceneFile {
 }
 
 impl SceneFile {
-    /// Reads a PLY or a .lexi, whichever the bytes say it is. Of the options only the limits concern a .lexi.
+    /// Reads a scene of any format, which the bytes tell. Of the options only the limits concern a .lexi.
     ///
     /// # Errors
-    /// What [`Input::open_within`], [`ply::read_bytes`] and [`LexiReader::open`] say.
+    /// What [`Input::open_within`] and [`lexisplat_formats::open`] say.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         // Once, for a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
-        Self::read_bytes(&path.display().to_string(), &bytes, options)
+        Self::read_beside(&path.display().to_string(), &bytes, Siblings::beside(path), options)
     }
 
     /// [`Self::read`] of a file in memory, called `name` in errors.
@@ -53,10 +67,27 @@ impl SceneFile {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
-        let loaded = if FileKind::of(name, bytes) == FileKind::Lexi {
-            Loaded::lexi(&LexiReader::open(name, bytes, &options.limits)?)?
-        } else {
-            Loaded::Ply(Box::new(ply::read_bytes(name, bytes, options)?))
+        Self::read_beside(name, bytes, Siblings::NONE, options)
+    }
+
+    /// [`Self::read_bytes`] of a file that may name others, which are found among `siblings`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_beside(
+        name: &str,
+        bytes: &[u8],
+        siblings: Siblings<'_>,
+        options: &ReadOptions,
+    ) -> Result<Self> {
+        let loaded = match lexisplat_formats::open(name, bytes, siblings, options, true, &Silent)? {
+            Opened::Ply(source) => Loaded::Ply(Box::new(source.into_read()?)),
+            Opened::Lexi(reader) => Loaded::lexi(&reader)?,
+            opened => {
+                let (kind, source) = (opened.kind(), opened.source());
+                let (splats, warnings) = (source.whole()?.into_owned(), source.warnings().to_vec());
+                Loaded::Other(Box::new(OtherRead { kind, splats, warnings }))
+            }
         };
         Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
     }
@@ -76,7 +107,43 @@ impl SceneFile {
     pub fn scene(&self) -> Scene<'_> {
         match &self.loaded {
             Loaded::Ply(read) => Scene::from(&read.splats),
+            Loaded::Other(read) => Scene::from(&read.splats),
             Loaded::Lexi(model, _) => Scene::from(&**model),
+        }
+    }
+
+    /// The scene with dense SH, if the file is no .lexi.
+    #[must_use]
+    pub fn splats(&self) -> Option<&Splats> {
+        match &self.loaded {
+            Loaded::Ply(read) => Some(&read.splats),
+            Loaded::Other(read) => Some(&read.splats),
+            Loaded::Lexi(..) => None,
+        }
+    }
+
+    /// [`Self::splats`], taken out.
+    ///
+    /// # Errors
+    /// [`lexisplat::Error::Format`] for a .lexi.
+    pub fn into_splats(self) -> Result<Splats> {
+        match self.loaded {
+            Loaded::Ply(read) => Ok(read.splats),
+            Loaded::Other(read) => Ok(read.splats),
+            Loaded::Lexi(..) => {
+                let problem = FormatError::OtherKind { found: FileKind::Lexi, expected: FileKind::Ply };
+                Err(Error::format(self.name, problem))
+            }
+        }
+    }
+
+    /// The format.
+    #[must_use]
+    pub fn kind(&self) -> Kind {
+        match &self.loaded {
+            Loaded::Ply(_) => Kind::Ply,
+            Loaded::Other(read) => read.kind,
+            Loaded::Lexi(..) => Kind::Lexi,
         }
     }
 
@@ -94,6 +161,7 @@ impl SceneFile {
     pub fn warnings(&self) -> &[String] {
         match &self.loaded {
             Loaded::Ply(read) => &read.warnings,
+            Loaded::Other(read) => &read.warnings,
             Loaded::Lexi(..) => &[],
         }
     }

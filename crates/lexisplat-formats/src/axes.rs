@@ -1,42 +1,61 @@
-//! Half a turn about x, which leads from the axes of a trainer's PLY (y down, z forward) to those of SPZ and glTF (y up,
-//! z back), and back.
+//! Axes that point the other way.
 //!
-//! Both are right-handed. y and z change their signs; so do the quaternion's, and the SH functions that are odd in y and z
-//! together.
+//! A trainer's PLY has x right, y down, z forward (RDF); SPZ and glTF have y up and z back (RUB). Half a turn about x leads
+//! from one to the other. In general each axis keeps its sign or changes it; if one or three change, the scene is mirrored.
 
 use lexisplat::sh::MAX_COEFFICIENTS;
 
-/// Turns a position.
-pub(crate) fn turn_position([x, y, z]: [f32; 3]) -> [f32; 3] {
-    [x, -y, -z]
-}
+/// The signs that the three axes get.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Flip([f32; 3]);
 
-/// Turns a rotation (w, x, y, z): the same ellipsoid seen along turned axes.
-pub(crate) fn turn_rotation([w, x, y, z]: [f32; 4]) -> [f32; 4] {
-    [w, x, -y, -z]
-}
+impl Flip {
+    /// Between RDF and RUB.
+    pub(crate) const HALF_TURN: Self = Self([1.0, -1.0, -1.0]);
 
-/// The signs of the SH functions without DC, in order, when y and z change theirs.
-pub(crate) const TURN_REST: [f32; MAX_COEFFICIENTS - 1] = turn_signs();
-
-/// Function m of a degree l is even or odd in y as m is not negative or negative. Together with z its sign is that of
-/// (-1)^l, which all three axes give, times that of x alone: (-1)^m for m of 0 and more, (-1)^(m+1) for others.
-const fn turn_signs() -> [f32; MAX_COEFFICIENTS - 1] {
-    let mut signs = [1.0; MAX_COEFFICIENTS - 1];
-    let (mut l, mut k) = (1, 0);
-    while k < signs.len() {
-        let mut m = -l;
-        while m <= l {
-            let x_odd = if m < 0 { (m + 1) % 2 != 0 } else { m % 2 != 0 };
-            if (l % 2 != 0) != x_odd {
-                signs[k] = -1.0;
-            }
-            m += 1;
-            k += 1;
-        }
-        l += 1;
+    /// The axes whose entry is true change their signs.
+    pub(crate) fn of(changes: [bool; 3]) -> Self {
+        Self(changes.map(|change| if change { -1.0 } else { 1.0 }))
     }
-    signs
+
+    /// A position along the flipped axes.
+    pub(crate) fn position(self, position: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|k| self.0[k] * position[k])
+    }
+
+    /// The factors on the parts (x, y, z) of a quaternion: those of the planes that are turned in.
+    pub(crate) fn turns(self) -> [f32; 3] {
+        let [x, y, z] = self.0;
+        [y * z, x * z, x * y]
+    }
+
+    /// A rotation (w, x, y, z) of the same ellipsoid along the flipped axes.
+    pub(crate) fn rotation(self, [w, x, y, z]: [f32; 4]) -> [f32; 4] {
+        let [a, b, c] = self.turns();
+        [w, a * x, b * y, c * z]
+    }
+
+    /// The factors on SH-rest, in the order of one channel.
+    ///
+    /// Function m of degree l is the real part of (x + i y)^m times a polynomial of z for m of 0 and more, the imaginary
+    /// part of (x + i y)^|m| for others. Its sign changes with x, y and z as these are odd in them; with all three it
+    /// changes as l is odd.
+    pub(crate) fn rest(self) -> [f32; MAX_COEFFICIENTS - 1] {
+        let mut signs = [1.0; MAX_COEFFICIENTS - 1];
+        let (mut l, mut k) = (1_i32, 0);
+        while k < signs.len() {
+            for m in -l..=l {
+                let odd_x = if m < 0 { -m - 1 } else { m };
+                let odd = [odd_x, i32::from(m < 0), l - m.abs()];
+                for (axis, odd) in self.0.iter().zip(odd) {
+                    signs[k] *= if odd % 2 == 1 { *axis } else { 1.0 };
+                }
+                k += 1;
+            }
+            l += 1;
+        }
+        signs
+    }
 }
 
 #[cfg(test)]
@@ -46,32 +65,35 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn signs_are_those_of_the_basis() {
-        let degree = ShDegree::new(4).unwrap();
-        for direction in [[0.6, 0.0, 0.8], [0.36, 0.48, 0.8], [-0.48, 0.64, -0.6]] {
-            let [plain, turned] = [direction, turn_position(direction)].map(|d| rest_basis(degree, d));
-            for k in 0..plain.len() {
-                assert!((plain[k] * TURN_REST[k] - turned[k]).abs() < 1e-6, "{k}");
-            }
-        }
+    fn all() -> impl Iterator<Item = Flip> {
+        (0..8).map(|k| Flip::of([k & 1 != 0, k & 2 != 0, k & 4 != 0]))
     }
 
-    /// Rotating a vector and turning it is turning it and rotating by the turned quaternion.
     #[test]
-    fn turned_rotations_rotate_turned_vectors() {
-        let rotate = |[w, x, y, z]: [f32; 4], v: [f32; 3]| {
-            let cross = |a: [f32; 3], b: [f32; 3]| {
-                [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-            };
-            let u = [x, y, z];
-            let (once, twice) = (cross(u, v), cross(u, cross(u, v)));
-            [0, 1, 2].map(|k| v[k] + 2.0 * (w * once[k] + twice[k]))
-        };
-        let (q, v) = ([0.5, 0.1, -0.7, 0.5], [1.0, -2.0, 3.0]);
-        let [a, b] = [turn_position(rotate(q, v)), rotate(turn_rotation(q), turn_position(v))];
-        for k in 0..3 {
-            assert!((a[k] - b[k]).abs() < 1e-5);
+    fn factors_of_sh_are_those_of_the_basis() {
+        let degree = ShDegree::new(4).unwrap();
+        for flip in all() {
+            for direction in [[0.6, 0.0, 0.8], [0.36, 0.48, 0.8], [-0.48, 0.64, -0.6]] {
+                let [plain, turned] = [direction, flip.position(direction)].map(|d| rest_basis(degree, d));
+                let signs = flip.rest();
+                assert!((0..plain.len()).all(|k| (plain[k] * signs[k] - turned[k]).abs() < 1e-6), "{flip:?}");
+            }
+        }
+        assert_eq!(Flip::of([false, true, true]), Flip::HALF_TURN);
+    }
+
+    /// The axis of an ellipsoid along x, turned and flipped, is that of the flipped rotation, or its opposite.
+    #[test]
+    fn flipped_rotations_are_those_of_flipped_ellipsoids() {
+        let q = [0.5, 0.1, -0.7, 0.5_f64];
+        for flip in all() {
+            for axis in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]] {
+                let expected = flip.position(crate::edit::turned(q, axis).map(|v| v as f32));
+                let flipped = flip.rotation(q.map(|v| v as f32)).map(f64::from);
+                let found = crate::edit::turned(flipped, axis).map(|v| v as f32);
+                let along: f32 = (0..3).map(|k| expected[k] * found[k]).sum();
+                assert!((along.abs() - 1.0).abs() < 1e-5, "{flip:?} {along}");
+            }
         }
     }
 }

@@ -8,9 +8,11 @@
 
 mod axes;
 mod compressed_ply;
+mod edit;
 mod gltf;
 mod kind;
 mod ksplat;
+mod merge;
 mod opacity;
 mod open;
 mod rows;
@@ -18,9 +20,12 @@ mod sog;
 mod source;
 mod splat;
 mod spz;
+mod turn_sh;
 mod write;
 
+pub use edit::Edits;
 pub use kind::Kind;
+pub use merge::merge;
 pub use open::{Opened, Siblings, open};
 pub use source::FormatSource;
 pub use write::{Lost, WriteOptions, write};

@@ -113,7 +113,7 @@ pub(crate) fn write(splats: &Splats) -> (Vec<u8>, Lost) {
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::{Silent, SplatSource as _};
+    use lexisplat::Silent;
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;

@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lexisplat::ply::{self, ReadOptions};
+use lexisplat::ply::ReadOptions;
 use lexisplat::{Input, Layout, Splats};
 use lexisplat_eval::compression::Looked;
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    BenchOptions, Comparison, Error, Result, Scorer, bench_cpu, bench_gpu, draw_views, png, score_views,
+    BenchOptions, Comparison, Error, Result, SceneFile, Scorer, bench_cpu, bench_gpu, draw_views, png, score_views,
 };
 use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};
@@ -114,11 +114,12 @@ impl Evaluator<'_> {
         }
         let fingerprint = fingerprint(&entry.model)?;
         let options = ReadOptions::default().with_limits(self.options.limits);
-        let read = ply::read(&entry.model, &options)?;
-        for warning in &read.warnings {
+        let read = SceneFile::read(&entry.model, &options)?;
+        for warning in read.warnings() {
             self.progress.warn(&entry.name, warning);
         }
-        let splats = read.splats;
+        let source_bytes = read.bytes;
+        let splats = read.into_splats()?;
         let found = find_views(&self.view_options(entry), &splats.geometry)?;
         for warning in &found.warnings {
             self.progress.warn(&entry.name, warning);
@@ -157,7 +158,7 @@ impl Evaluator<'_> {
             model: entry.model.display().to_string(),
             gaussians,
             sh_degree,
-            ply_bytes: read.summary.file_bytes,
+            ply_bytes: source_bytes,
             shipped_bytes,
             views_from: found.from,
             views: count,

@@ -51,6 +51,7 @@ impl OpenModel {
         let bulk = bulk(geometry);
         let (layout, guarantee) = match &scene.loaded {
             Loaded::Ply(read) => (dialect(read.summary.dialect), None),
+            Loaded::Other(read) => (read.kind.to_string(), None),
             Loaded::Lexi(model, packed) => {
                 let exact = Layout::of(CodeLayout::Compact, model.codes().values().value_type());
                 let layout = if packed.is_some() { Layout::Packed } else { exact };
@@ -74,12 +75,9 @@ impl OpenModel {
         self.scene.scene().len()
     }
 
-    /// Returns the scene with dense SH, if it is a PLY.
+    /// Returns the scene with dense SH, if it is no .lexi.
     pub(crate) fn splats(&self) -> Option<&Splats> {
-        match &self.scene.loaded {
-            Loaded::Ply(read) => Some(&read.splats),
-            Loaded::Lexi(..) => None,
-        }
+        self.scene.splats()
     }
 
     /// Returns how many times smaller a compressed model is than `original`, or than its own PLY in INRIA's layout
@@ -223,7 +221,7 @@ pub(crate) fn open(
     })
 }
 
-/// Starts a job that makes the second model by compressing `original`, which must be a PLY. Sensitivity is
+/// Starts a job that makes the second model by compressing `original`, which must not be a .lexi. Sensitivity is
 /// measured from `cameras` if there are any, else from generated views.
 pub(crate) fn compress_to(
     id: u64,
@@ -237,7 +235,7 @@ pub(crate) fn compress_to(
     let title = name.clone();
     spawn(id, Slot::Second, name, notifier, move |progress| {
         let Some(splats) = original.splats() else {
-            let expected = "a PLY; a compressed scene cannot be compressed again";
+            let expected = "no .lexi; a compressed scene cannot be compressed again";
             return Err(lexisplat::Error::parameter("scene", &original.scene.name, expected).into());
         };
         let scene = compressed(splats, &title, quality, cameras.as_deref(), progress)?;

@@ -16,10 +16,11 @@ const TARGET: &str = "Target, at most one of";
 /// Heading of the options that packed files do not have.
 const EXACT: &str = "Options of the layouts f16, f32 and paper";
 
-/// Compress a trained PLY to a .lexi file. Needs no photos, no cameras and no retraining.
+/// Compress a trained scene to a .lexi file. Needs no photos, no cameras and no retraining.
 #[derive(Debug, Args)]
 pub(crate) struct Compress {
-    /// The scene, a PLY file; `-` reads standard input.
+    /// The scene: a PLY, best the trainer's own, or SPZ, SOG, compressed.ply, .splat, .ksplat, glTF; `-` reads standard
+    /// input.
     pub(crate) input: PathBuf,
     /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi].
     #[arg(short, long)]
@@ -37,7 +38,7 @@ pub(crate) struct Compress {
     /// Make the best file of at most this size, such as 10MB or 800kB.
     #[arg(long, group = "goal", value_name = "BYTES", value_parser = size, help_heading = TARGET)]
     pub(crate) size: Option<u64>,
-    /// Make the best file that is at least this many times smaller than the PLY, above 1.
+    /// Make the best file that is at least this many times smaller than the source, above 1.
     #[arg(long, group = "goal", value_name = "R", help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
     /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default:

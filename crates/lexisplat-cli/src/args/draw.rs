@@ -12,7 +12,7 @@ use super::views::Views;
 /// Draw a scene to PNG files. A .lexi is drawn straight from its sparse codes.
 #[derive(Debug, Args)]
 pub(crate) struct Render {
-    /// The scene, a PLY or .lexi file; `-` reads standard input.
+    /// The scene, of any format (docs/FORMATS.md); `-` reads standard input.
     pub(crate) file: PathBuf,
     /// Folder for the pictures [default: the scene's name with `-views` added].
     #[arg(short, long, value_name = "DIR")]
@@ -27,9 +27,9 @@ pub(crate) struct Render {
 /// like photographs are looked for, of 384 x 256 pixels, as `compress` does.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
-    /// The original, a PLY or .lexi file.
+    /// The original, of any format.
     pub(crate) a: PathBuf,
-    /// The scene to score, a PLY or .lexi file.
+    /// The scene to score, of any format.
     pub(crate) b: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,
@@ -51,7 +51,7 @@ pub(crate) struct Compare {
 #[derive(Debug, Args)]
 #[command(after_long_help = lexisplat_view::SCRIPT_WORDS)]
 pub(crate) struct View {
-    /// One or two scenes, PLY or .lexi files.
+    /// One or two scenes, of any format.
     #[arg(required = true, num_args = 1..=2, value_name = "FILE")]
     pub(crate) files: Vec<PathBuf>,
     #[command(flatten)]
@@ -66,7 +66,7 @@ pub(crate) struct View {
 /// Each view is drawn repeatedly after a warm-up. Only drawing is timed. On a GPU its own time stamps are used.
 #[derive(Debug, Args)]
 pub(crate) struct Bench {
-    /// The scene, a PLY or .lexi file. A .lexi is also drawn as a dense scene.
+    /// The scene, of any format. A .lexi is also drawn as a dense scene.
     pub(crate) file: PathBuf,
     #[command(flatten)]
     pub(crate) views: Views,

@@ -29,10 +29,10 @@ pub(crate) struct Measures {
 /// Score models against photos, against their original, or both.
 #[derive(Debug, Args)]
 pub(crate) struct Eval {
-    /// The models to score, PLY or .lexi files.
+    /// The models to score, of any format.
     #[arg(required = true, value_name = "MODEL")]
     pub(crate) models: Vec<PathBuf>,
-    /// The model that the others were made from, a PLY or .lexi file. They are scored against its pictures.
+    /// The model that the others were made from, of any format. They are scored against its pictures.
     #[arg(long, value_name = "FILE")]
     pub(crate) original: Option<PathBuf>,
     #[command(flatten)]
@@ -55,7 +55,7 @@ pub(crate) struct Eval {
 /// Finished points are kept in the output folder. To continue after an interruption, run the same command again.
 #[derive(Debug, Args)]
 pub(crate) struct Sweep {
-    /// The models, PLY files.
+    /// The models, of any format but .lexi.
     #[arg(value_name = "MODEL", required_unless_present = "manifest")]
     pub(crate) models: Vec<PathBuf>,
     /// Name of the first model's scene, which the tables show. May be given again for the next models, in their order

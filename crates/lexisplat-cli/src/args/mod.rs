@@ -1,6 +1,7 @@
 //! The command line, as typed. Nothing here reads a file or prints.
 
 mod compress;
+mod convert;
 mod draw;
 mod eval;
 mod limits;
@@ -15,6 +16,7 @@ use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use lexisplat::Limits;
 
 pub(crate) use self::compress::{Compress, Decompress};
+pub(crate) use self::convert::Convert;
 #[cfg(feature = "view")]
 pub(crate) use self::draw::View;
 pub(crate) use self::draw::{Bench, Compare, Render};
@@ -74,6 +76,7 @@ impl Common {
 pub(crate) enum Command {
     Compress(Compress),
     Decompress(Decompress),
+    Convert(Box<Convert>),
     Info(Info),
     Render(Render),
     Compare(Compare),
@@ -98,7 +101,7 @@ impl Command {
     }
 }
 
-/// Print what a PLY or .lexi file holds, and warn about what looks wrong with it.
+/// Print what a scene's file holds, and warn about what looks wrong with it.
 #[derive(Debug, Args)]
 pub(crate) struct Info {
     /// The file; `-` reads standard input.

@@ -73,6 +73,15 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Parses `N` finite numbers with commas between them.
+pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    match <[f64; N]>::try_from(parts) {
+        Ok(numbers) if text.split(',').count() == N && numbers.iter().all(|v| v.is_finite()) => Ok(numbers),
+        _ => Err(format!("expected {N} numbers with commas between them")),
+    }
+}
+
 /// Parses a colour: a name, or three numbers from 0 to 1.
 pub(super) fn colour(text: &str) -> Result<[f32; 3], String> {
     match text {
@@ -111,6 +120,14 @@ mod tests {
         assert_eq!(whole::<u64>(0..=u64::MAX)("-1"), Err("expected a whole number, at least 0".to_owned()));
         // The type has a range too.
         assert!(whole::<u8>(0..=u64::MAX)("256").is_err());
+    }
+
+    #[test]
+    fn numbers_are_counted() {
+        assert_eq!(numbers::<3>("1, -2.5,3e1"), Ok([1.0, -2.5, 30.0]));
+        for bad in ["1,2", "1,2,3,4", "1,2,x", "1,2,inf", ""] {
+            assert!(numbers::<3>(bad).is_err(), "{bad}");
+        }
     }
 
     #[test]

@@ -77,6 +77,7 @@ fn photographs(
     let count = usize::from(views.orbit);
     let found = match &a.loaded {
         Loaded::Ply(read) => judging_views(renderer, &read.splats, count, progress)?,
+        Loaded::Other(read) => judging_views(renderer, &read.splats, count, progress)?,
         Loaded::Lexi(model, _) => {
             judging_views(renderer, &Model::clone(model).into_splats(), count, progress)?
         }

@@ -6,15 +6,22 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::packed::{PackOptions, Preset, ReachedRecord, TargetRecord};
-use lexisplat::ply::{PlySource, ReadOptions};
-use lexisplat::{CompressOptions, DEFAULT_TOLERANCE, Layout, Limits, Record, lexi};
+use lexisplat::ply::ReadOptions;
+use lexisplat::{
+    CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Layout, Limits, Record, SplatSource,
+    lexi,
+};
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
+use lexisplat_formats::{Opened, open};
 use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
-use crate::files::{check_output, input, is_pipe, new_output, note, output_path, tell, warn, write_output};
+use crate::files::{
+    check_output, first_file, input, is_pipe, new_output, note, output_path, siblings, tell, warn,
+    write_output,
+};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -45,19 +52,20 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         );
     }
 
-    let (name, bytes) = input(&args.input, common)?;
+    let path = first_file(&args.input);
+    let (name, bytes) = input(&path, common)?;
     let read = ReadOptions::default()
         .with_drop_invalid(args.drop_invalid)
         .with_drop_extras(args.drop_extras)
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
     let whole = compression.holds_whole(bytes.len() as u64);
-    let open = if whole { PlySource::open_whole } else { PlySource::open };
-    let source = open(&name, &bytes, &read, &bars)?;
+    let opened = open(&name, &bytes, siblings(&path), &read, whole, &bars)?;
+    let source = source_to_compress(&name, &opened)?;
     warn(&name, source.warnings());
-    let opened = start.elapsed().as_secs_f64();
+    let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
-        compression.run(&source, sink, &bars).map_err(|error| match error {
+        compression.run(source, sink, &bars).map_err(|error| match error {
             lexisplat_eval::Error::Codec(error) => anyhow::Error::from(error),
             error => error.into(),
         })
@@ -65,7 +73,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if let (Some(path), Some(dictionary)) = (&args.save_dictionary, &report.dictionary) {
         lexi::write_dictionary(new_output(path, common.overwrite), dictionary)?;
     }
-    report.read_seconds += opened;
+    report.read_seconds += open_seconds;
     report.total_seconds = start.elapsed().as_secs_f64();
     warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
     warn(&name, report.target.as_ref().and_then(costly).as_slice());
@@ -83,6 +91,17 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let mut json = serde_json::to_value(&report)?;
     json["output"] = output.display().to_string().into();
     tell(common, json, || text(&report, &output))
+}
+
+/// The scene of `opened`, which messages call `name`, unless it is compressed already.
+pub(crate) fn source_to_compress<'a>(name: &str, opened: &'a Opened<'_>) -> Result<&'a dyn SplatSource> {
+    match opened {
+        Opened::Lexi(_) => {
+            let problem = FormatError::OtherKind { found: FileKind::Lexi, expected: FileKind::Ply };
+            Err(Error::format(name, problem).into())
+        }
+        opened => Ok(opened.source()),
+    }
 }
 
 /// The choices of the library that the options mean.
@@ -149,7 +168,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     line(
         "file bytes",
         format!(
-            "{} of {}: {} smaller (whole file against the PLY), {:.2} bytes a Gaussian",
+            "{} of {}: {} smaller (whole file against the source), {:.2} bytes a Gaussian",
             format::bytes(report.file_bytes),
             format::bytes(report.source_bytes),
             format::ratio(report.source_bytes, report.file_bytes),

@@ -5,6 +5,7 @@ mod bench;
 mod compare;
 mod completions;
 mod compress;
+mod convert;
 mod decompress;
 mod demo;
 mod devices;
@@ -47,6 +48,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
     simd.scope(|| match command {
         Command::Compress(args) => compress::run(&args, &common),
         Command::Decompress(args) => decompress::run(&args, &common),
+        Command::Convert(args) => convert::run(&args, &common),
         Command::Info(args) => info::run(&args, &common),
         Command::Render(args) => render::run(&args, &common),
         Command::Compare(args) => compare::run(&args, &common),

@@ -3,26 +3,30 @@
 mod codes;
 mod layers;
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::lexi::LexiReader;
-use lexisplat::ply::{PlySource, PlySummary, ReadOptions};
+use lexisplat::ply::{PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
 use lexisplat::{Error, FileKind, SplatSource as _, Splats, stream};
 use lexisplat_eval::format;
+use lexisplat_formats::{Opened, open};
 use serde::Serialize;
+use serde_json::Value;
 
 use self::codes::LexiFacts;
 use crate::args::{Common, Info};
-use crate::files::{input, tell, warn};
+use crate::files::{first_file, input, siblings, tell, warn};
 use crate::progress::Bars;
 
 /// Width of the longest bar of a histogram, in characters.
 const BAR: usize = 40;
 
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
-    let (name, bytes) = input(&args.file, common)?;
+    let path = first_file(&args.file);
+    let (name, bytes) = input(&path, common)?;
     let bars = Bars::new(common.quiet || common.json);
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
@@ -41,11 +45,20 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
-    let ply = PlySource::open(&name, &bytes, &read, &bars)?;
-    warn(&name, ply.warnings());
-    let lint = stream::lint(&ply, &bars)?;
-    let kind = Kind::Ply { ply: ply.summary(), warnings: ply.warnings() };
-    Facts::new(file, &ply.empty(), &lint, kind).print(common)
+    let opened = open(&name, &bytes, siblings(&path), &read, false, &bars)?;
+    let source = opened.source();
+    warn(&name, source.warnings());
+    let lint = stream::lint(source, &bars)?;
+    let kind = match &opened {
+        Opened::Ply(ply) => Kind::Ply { ply: ply.summary(), warnings: ply.warnings() },
+        Opened::Other(format, other) => Kind::Other {
+            format: format.extension(),
+            about: other.facts().iter().cloned().collect(),
+            warnings: other.warnings(),
+        },
+        _ => return Err(Error::malformed(&*name, "the format is not known").into()),
+    };
+    Facts::new(file, &source.empty(), &lint, kind).print(common)
 }
 
 /// The facts about a scene's file.
@@ -69,6 +82,7 @@ struct Facts<'a> {
 enum Kind<'a> {
     Ply { ply: &'a PlySummary, warnings: &'a [String] },
     Lexi { lexi: Box<LexiFacts<'a>> },
+    Other { format: &'static str, about: BTreeMap<&'static str, Value>, warnings: &'a [String] },
 }
 
 impl<'a> Facts<'a> {
@@ -112,7 +126,7 @@ impl<'a> Facts<'a> {
         }
         match &self.kind {
             Kind::Ply { ply, .. } => {
-                let name = |value: serde_json::Value| value.as_str().unwrap_or_default().to_owned();
+                let name = |value: Value| value.as_str().unwrap_or_default().to_owned();
                 let format = name(serde_json::to_value(ply.format)?);
                 let dialect = name(serde_json::to_value(ply.dialect)?);
                 let (properties, row_bytes) = (ply.properties.len(), ply.row_bytes);
@@ -122,6 +136,13 @@ impl<'a> Facts<'a> {
                 )?;
             }
             Kind::Lexi { lexi } => lexi.text(&mut out)?,
+            Kind::Other { format, about, .. } => {
+                write!(out, "{format}")?;
+                for (name, value) in about {
+                    write!(out, ", {} {value}", name.replace('_', " "))?;
+                }
+                writeln!(out, ", axes turned to those of a PLY where they differ")?;
+            }
         }
         writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
         for a in &self.statistics.attributes {

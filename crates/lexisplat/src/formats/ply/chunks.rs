@@ -8,7 +8,7 @@ use super::columns::Packed;
 use super::file::PlyFile;
 use super::fill::{Found, empty};
 use super::layout::REST;
-use super::read::ReadOptions;
+use super::read::{PlyRead, ReadOptions};
 use super::rows::ROWS_PER_TASK;
 use super::summary::PlySummary;
 use crate::scene::sh::ShDegree;
@@ -24,7 +24,7 @@ const SCAN_ROWS: usize = 64 * ROWS_PER_TASK;
 /// [`read_bytes`](super::read_bytes), but no array is as long as the scene.
 #[derive(Debug)]
 pub struct PlySource<'a> {
-    pub(super) file: PlyFile<'a>,
+    file: PlyFile<'a>,
     /// Rows left out, ascending.
     dropped: Vec<usize>,
     /// Whether any Gaussian has a normal.
@@ -102,6 +102,16 @@ impl<'a> PlySource<'a> {
             splats.retain(&keep);
         }
         Ok(())
+    }
+
+    /// The whole scene and the description of its file.
+    ///
+    /// # Errors
+    /// As [`SplatSource::whole`].
+    pub fn into_read(self) -> Result<PlyRead> {
+        let splats = self.whole()?.into_owned();
+        let PlyFile { warnings, summary, .. } = self.file;
+        Ok(PlyRead { splats, warnings, summary })
     }
 
     /// SH degree.

@@ -3,9 +3,7 @@
 use std::path::Path;
 
 use super::chunks::PlySource;
-use super::file::PlyFile;
 use super::summary::PlySummary;
-use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::support::builder::builder_methods;
 use crate::support::error::Result;
@@ -64,8 +62,5 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 /// [`ReadOptions::drop_invalid`] is not set. [`crate::Error::Limit`] if the file asks for more than
 /// [`ReadOptions::limits`] allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {
-    let source = PlySource::open_whole(name, bytes, options, &Silent)?;
-    let splats = source.whole()?.into_owned();
-    let PlyFile { warnings, summary, .. } = source.file;
-    Ok(PlyRead { splats, warnings, summary })
+    PlySource::open_whole(name, bytes, options, &Silent)?.into_read()
 }

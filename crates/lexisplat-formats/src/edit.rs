@@ -1,0 +1,223 @@
+//! Changes of a whole scene: cut, scaled, turned, moved, of a lower SH degree.
+
+use lexisplat::{Error, Result, ShDegree, Splats};
+
+use crate::turn_sh::ShRotation;
+
+/// Changes, made in the order of the fields. All are along the axes of a trainer's PLY.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Edits {
+    /// SH above this degree are cut off.
+    pub degree: Option<ShDegree>,
+    /// Corners of a box, the lower ones first. Gaussians whose centres are outside are left out.
+    pub crop_box: Option<[[f32; 3]; 2]>,
+    /// Centre and radius of a sphere. Gaussians whose centres are outside are left out.
+    pub crop_sphere: Option<([f32; 3], f32)>,
+    /// Factor on positions and sizes, above 0.
+    pub scale: Option<f64>,
+    /// Angles of rotations about x, then y, then z, through the origin, in degrees.
+    pub rotate: Option<[f64; 3]>,
+    /// Added to positions.
+    pub translate: Option<[f64; 3]>,
+}
+
+impl Edits {
+    /// Makes the changes.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a scale that is not above 0, values that are not finite, and changes after which a position
+    /// is not finite.
+    pub fn apply(&self, splats: &mut Splats) -> Result<()> {
+        self.check()?;
+        if let Some(degree) = self.degree.filter(|degree| *degree < splats.degree) {
+            *splats = splats.with_degree_cut(degree);
+        }
+        if self.crop_box.is_some() || self.crop_sphere.is_some() {
+            let keep: Vec<bool> = splats.geometry.positions.iter().map(|p| self.keeps(*p)).collect();
+            splats.retain(&keep);
+        }
+        if let Some(scale) = self.scale {
+            scale_by(splats, scale);
+        }
+        if let Some(angles) = self.rotate {
+            rotate_by(splats, quaternion(angles));
+        }
+        if let Some(by) = self.translate {
+            for position in &mut splats.geometry.positions {
+                (0..3).for_each(|k| position[k] = single(f64::from(position[k]) + by[k]));
+            }
+        }
+        match splats.geometry.positions.as_flattened().iter().find(|v| !v.is_finite()) {
+            Some(value) => Err(Error::parameter("position", value, "finite positions after all changes")),
+            None => Ok(()),
+        }
+    }
+
+    fn check(&self) -> Result<()> {
+        if let Some(scale) = self.scale.filter(|scale| !(scale.is_finite() && *scale > 0.0)) {
+            return Err(Error::parameter("scale", scale, "a number above 0"));
+        }
+        let finite = |name, values: Option<[f64; 3]>| match values {
+            Some(v) if v.iter().any(|v| !v.is_finite()) => {
+                Err(Error::parameter(name, format!("{v:?}"), "three finite numbers"))
+            }
+            _ => Ok(()),
+        };
+        finite("rotate", self.rotate)?;
+        finite("translate", self.translate)
+    }
+
+    /// Whether a Gaussian at `position` is within box and sphere.
+    fn keeps(&self, position: [f32; 3]) -> bool {
+        let in_box = |[low, high]: [[f32; 3]; 2]| (0..3).all(|k| (low[k]..=high[k]).contains(&position[k]));
+        let in_sphere = |(centre, radius): ([f32; 3], f32)| {
+            let squares = (0..3).map(|k| (f64::from(position[k]) - f64::from(centre[k])).powi(2));
+            squares.sum::<f64>() <= f64::from(radius).powi(2)
+        };
+        self.crop_box.is_none_or(in_box) && self.crop_sphere.is_none_or(in_sphere)
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
+fn single(x: f64) -> f32 {
+    x as f32
+}
+
+fn scale_by(splats: &mut Splats, scale: f64) {
+    let more = single(libm::log(scale));
+    let geometry = &mut splats.geometry;
+    geometry.positions.as_flattened_mut().iter_mut().for_each(|v| *v = single(f64::from(*v) * scale));
+    geometry.scales.as_flattened_mut().iter_mut().for_each(|v| *v += more);
+}
+
+/// The quaternion (w, x, y, z) of rotations by `angles`, in degrees, about x, then y, then z.
+fn quaternion(angles: [f64; 3]) -> [f64; 4] {
+    let [(sx, cx), (sy, cy), (sz, cz)] = angles.map(|angle| libm::sincos(angle.to_radians() / 2.0));
+    product([cz, 0.0, 0.0, sz], product([cy, 0.0, sy, 0.0], [cx, sx, 0.0, 0.0]))
+}
+
+/// The rotation by `b` and then by `a`.
+pub(crate) fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    let ([aw, ax, ay, az], [bw, bx, by, bz]) = (a, b);
+    [
+        aw * bw - ax * bx - ay * by - az * bz,
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+    ]
+}
+
+/// `v` turned by the quaternion `q`, of length 1.
+pub(crate) fn turned(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
+    let [w, x, y, z] = q;
+    let cross = |a: [f64; 3], b: [f64; 3]| {
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    };
+    let u = [x, y, z];
+    let once = cross(u, v);
+    let twice = cross(u, once);
+    [0, 1, 2].map(|k| v[k] + 2.0 * (w * once[k] + twice[k]))
+}
+
+/// Turns a scene about the origin by the quaternion `q`, of length 1.
+pub(crate) fn rotate_by(splats: &mut Splats, q: [f64; 4]) {
+    let geometry = &mut splats.geometry;
+    for v in geometry.positions.iter_mut().chain(&mut geometry.normals) {
+        *v = turned(q, v.map(f64::from)).map(single);
+    }
+    for rotation in &mut geometry.rotations {
+        *rotation = product(q, rotation.map(f64::from)).map(single);
+    }
+    let (degree, rest) = (splats.degree, splats.degree.rest());
+    if rest > 0 {
+        let turn = ShRotation::new(q);
+        splats.sh_rest.chunks_exact_mut(rest).for_each(|row| turn.apply(degree, row));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::sh::rest_basis;
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+
+    fn sample() -> Splats {
+        scene(&SampleOptions::new(200, 3))
+    }
+
+    #[test]
+    fn positions_are_cut_scaled_turned_and_moved_in_this_order() {
+        let mut splats = sample();
+        splats.geometry.positions[7] = [1.0, 2.0, 3.0];
+        splats.geometry.positions[8] = [1.0, 2.0, 3.5];
+        let scales = splats.geometry.scales[7];
+        let edits = Edits {
+            crop_box: Some([[0.9, 1.9, 2.9], [1.1, 2.1, 3.1]]),
+            crop_sphere: Some(([1.0, 2.0, 3.0], 0.2)),
+            scale: Some(2.0),
+            // A quarter about x takes y to z and z to -y, one about z takes x to y and y to -x.
+            rotate: Some([90.0, 0.0, 90.0]),
+            translate: Some([10.0, 0.0, 0.0]),
+            ..Edits::default()
+        };
+        edits.apply(&mut splats).unwrap();
+        assert_eq!(splats.len(), 1);
+        let expected = [16.0, 2.0, 4.0];
+        assert!((0..3).all(|k| (splats.geometry.positions[0][k] - expected[k]).abs() < 1e-5));
+        assert!((splats.geometry.scales[0][0] - scales[0] - 2.0_f32.ln()).abs() < 1e-6);
+    }
+
+    /// A turned scene shows from a turned direction what the scene showed from that direction.
+    #[test]
+    fn turned_scenes_look_the_same_from_turned_directions() {
+        let plain = sample();
+        let mut splats = plain.clone();
+        let edits = Edits { rotate: Some([30.0, -50.0, 110.0]), ..Edits::default() };
+        edits.apply(&mut splats).unwrap();
+        let q = quaternion([30.0, -50.0, 110.0]);
+        let direction = [0.36, 0.48, 0.8];
+        let seen = turned(q, direction).map(single);
+        let [before, after] =
+            [direction.map(single), seen].map(|direction| rest_basis(plain.degree, direction));
+        let per = plain.degree.rest_per_channel();
+        let colour = |splats: &Splats, i: usize, basis: &[f32], c: usize| -> f32 {
+            splats.rest(i)[c * per..(c + 1) * per].iter().zip(basis).map(|(a, b)| a * b).sum()
+        };
+        for i in 0..plain.len() {
+            for c in 0..3 {
+                assert!((colour(&plain, i, &before, c) - colour(&splats, i, &after, c)).abs() < 1e-5);
+            }
+            // The axes of the ellipsoid turn too: that of x, and both have the same sign.
+            let axis = |q: [f32; 4]| {
+                let length = q.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
+                turned(q.map(|v| f64::from(v) / length), [1.0, 0.0, 0.0])
+            };
+            let expected = turned(q, axis(plain.geometry.rotations[i]));
+            let found = axis(splats.geometry.rotations[i]);
+            assert!((0..3).all(|k| (expected[k] - found[k]).abs() < 1e-5));
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_meant_is_refused() {
+        for edits in [
+            Edits { scale: Some(0.0), ..Edits::default() },
+            Edits { scale: Some(f64::NAN), ..Edits::default() },
+            Edits { translate: Some([f64::INFINITY, 0.0, 0.0]), ..Edits::default() },
+            Edits { translate: Some([1e300, 0.0, 0.0]), ..Edits::default() },
+        ] {
+            assert!(edits.apply(&mut sample()).is_err(), "{edits:?}");
+        }
+    }
+
+    #[test]
+    fn degrees_are_cut_and_never_raised() {
+        let mut splats = sample();
+        Edits { degree: Some(ShDegree::ONE), ..Edits::default() }.apply(&mut splats).unwrap();
+        assert_eq!((splats.degree, splats.sh_rest.len()), (ShDegree::ONE, 9 * splats.len()));
+        Edits { degree: Some(ShDegree::THREE), ..Edits::default() }.apply(&mut splats).unwrap();
+        assert_eq!(splats.degree, ShDegree::ONE);
+    }
+}
