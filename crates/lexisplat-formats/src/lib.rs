@@ -16,6 +16,7 @@ mod merge;
 mod opacity;
 mod open;
 mod rows;
+mod settle;
 mod sog;
 mod source;
 mod splat;

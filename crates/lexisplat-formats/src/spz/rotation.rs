@@ -3,6 +3,8 @@
 //! Rounding may change which component is the largest. Encoders here go on encoding what a decoder gives until that changes
 //! nothing, so what is read and written again has the same bits.
 
+use crate::settle::settled;
+
 /// Bits of a component's magnitude.
 const BITS: u32 = 9;
 const MASK: u32 = (1 << BITS) - 1;
@@ -10,33 +12,12 @@ const MASK: u32 = (1 << BITS) - 1;
 const LARGEST: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Half of the range of 8 bits, for components from -1 to 1.
 const HALF: f32 = 127.5;
-/// Most rounds until nothing changes.
-const ROUNDS: usize = 8;
 
 /// A rotation (w, x, y, z) of length 1, as (x, y, z, w). One of length 0 stands for none.
 fn unit([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     let wide = [x, y, z, w].map(f64::from);
     let length = wide.iter().map(|v| v * v).sum::<f64>().sqrt();
     if length > 0.0 { wide.map(|v| (v / length) as f32) } else { [0.0, 0.0, 0.0, 1.0] }
-}
-
-/// Encodes until decoding and encoding again gives the same, or the smallest of those that take turns.
-fn settled<T: Copy + Ord>(first: T, again: impl Fn(T) -> T) -> T {
-    let mut code = first;
-    for _ in 0..ROUNDS {
-        let next = again(code);
-        if next == code {
-            return code;
-        }
-        code = next;
-    }
-    // Codes take turns.
-    let mut least = code;
-    for _ in 0..ROUNDS {
-        code = again(code);
-        least = least.min(code);
-    }
-    least
 }
 
 /// The rotation (w, x, y, z) of 32 bits: 2 for the place of the largest component among (x, y, z, w), then sign and magnitude

@@ -3,6 +3,8 @@
 //! Brush writes `SplatRenderMode: mip` or `SplatRenderMode: default`, Postshot `antialiased 1` or
 //! `antialiased 0`. The mark decides how a scene is drawn, so it must survive every conversion.
 
+use crate::scene::splats::SceneMeta;
+
 /// Postshot's mark. The writer adds it if no comment has a mark.
 pub(super) const ANTIALIASED: &str = "antialiased 1";
 
@@ -36,6 +38,13 @@ pub(super) fn marks<S: AsRef<str>>(comments: &[S]) -> Marks {
         no |= !said;
     }
     Marks { antialiased: yes, contradict: yes && no }
+}
+
+/// What `comments` say of a scene, of which they are a part. For readers of further formats.
+#[must_use]
+pub fn meta_of(comments: Vec<String>) -> SceneMeta {
+    let antialiased = marks(&comments).antialiased;
+    SceneMeta { comments, antialiased }
 }
 
 #[cfg(test)]

@@ -107,8 +107,10 @@ fn header(splats: &Splats, normal: &'static [&'static str], count: usize) -> Str
     text
 }
 
-/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark.
-fn comments(meta: &SceneMeta) -> Vec<String> {
+/// Returns the scene's comments, each on one line, changed to agree with the scene's anti-aliasing mark. For writers of
+/// further formats.
+#[must_use]
+pub fn comments(meta: &SceneMeta) -> Vec<String> {
     let mut out: Vec<String> =
         meta.comments.iter().map(|c| c.replace(char::is_control, " ").trim().to_owned()).collect();
     if meta.antialiased && !marks(&out).antialiased {

@@ -1,0 +1,138 @@
+//! The codes of compressed.ply: values of 32 bits beside the bounds of a chunk (splat-transform, `compressed-chunk.ts` and
+//! `decompress-ply.ts`).
+
+use crate::settle::settled;
+
+/// Least and largest value of a chunk along each axis, or of each colour.
+pub(super) type Bounds = [[f32; 3]; 2];
+
+/// Bits of three values in 32, the first one on top.
+const BITS: [u32; 3] = [11, 10, 11];
+/// Bits of a component of a rotation.
+const TURN_BITS: u32 = 10;
+/// Half of the range of these components, which is from -1 / sqrt 2 to 1 / sqrt 2, times the square root of 2.
+const TURN_HALF: f64 = 0.5;
+
+/// The largest number of `bits` bits.
+fn most(bits: u32) -> f64 {
+    f64::from((1_u32 << bits) - 1)
+}
+
+/// `share` of 0 to 1 as a number of `bits` bits.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited")]
+pub(super) fn to_bits(share: f64, bits: u32) -> u32 {
+    (share * most(bits) + 0.5).floor().clamp(0.0, most(bits)) as u32
+}
+
+/// The value between `low` and `high` at `share`.
+#[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
+fn between(low: f32, high: f32, share: f64) -> f32 {
+    (f64::from(low) * (1.0 - share) + f64::from(high) * share) as f32
+}
+
+/// The code of `bits` bits of `value` between `low` and `high`, whose decoding has the same code.
+pub(super) fn to_code(value: f32, low: f32, high: f32, bits: u32) -> u32 {
+    let once = |value: f32| {
+        let range = f64::from(high) - f64::from(low);
+        if range > 0.0 { to_bits((f64::from(value) - f64::from(low)) / range, bits) } else { 0 }
+    };
+    settled(once(value), |code| once(of_code(code, low, high, bits)))
+}
+
+/// The value between `low` and `high` of a code of `bits` bits.
+pub(super) fn of_code(code: u32, low: f32, high: f32, bits: u32) -> f32 {
+    between(low, high, f64::from(code) / most(bits))
+}
+
+/// Three values of a code of 32 bits.
+pub(super) fn three(code: u32, [low, high]: &Bounds) -> [f32; 3] {
+    let codes = [code >> 21, code >> 11 & 0x3ff, code & 0x7ff];
+    [0, 1, 2].map(|k| of_code(codes[k], low[k], high[k], BITS[k]))
+}
+
+/// The code of three values.
+pub(super) fn to_three(values: [f32; 3], [low, high]: &Bounds) -> u32 {
+    let [a, b, c] = [0, 1, 2].map(|k| to_code(values[k], low[k], high[k], BITS[k]));
+    a << 21 | b << 11 | c
+}
+
+/// The rotation (w, x, y, z) of a code: 2 bits for the place of the largest component in this order, 10 for each other.
+#[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
+pub(super) fn rotation(code: u32) -> [f32; 4] {
+    let place = (code >> 30) as usize;
+    let mut parts = [0.0_f64; 4];
+    let (mut left, mut squares) = (code, 0.0);
+    for k in (0..4).rev().filter(|k| *k != place) {
+        let share = f64::from(left & ((1 << TURN_BITS) - 1)) / most(TURN_BITS);
+        parts[k] = (share - TURN_HALF) * std::f64::consts::SQRT_2;
+        squares += parts[k] * parts[k];
+        left >>= TURN_BITS;
+    }
+    parts[place] = (1.0 - squares).max(0.0).sqrt();
+    parts.map(|v| v as f32)
+}
+
+/// The code of a rotation (w, x, y, z), whose decoding has the same code.
+pub(super) fn to_rotation(turn: [f32; 4]) -> u32 {
+    settled(once(turn), |code| once(rotation(code)))
+}
+
+fn once(turn: [f32; 4]) -> u32 {
+    let wide = turn.map(f64::from);
+    let length = wide.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let mut parts = if length > 0.0 { wide.map(|v| v / length) } else { [1.0, 0.0, 0.0, 0.0] };
+    let mut place = 0;
+    for k in 1..4 {
+        if parts[k].abs() > parts[place].abs() {
+            place = k;
+        }
+    }
+    if parts[place] < 0.0 {
+        parts = parts.map(|v| -v);
+    }
+    let mut code = place as u32;
+    for k in (0..4).filter(|k| *k != place) {
+        let share = parts[k] * std::f64::consts::FRAC_1_SQRT_2 + TURN_HALF;
+        code = code << TURN_BITS | to_bits(share, TURN_BITS);
+    }
+    code
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat_testing::Random;
+
+    use super::*;
+
+    #[test]
+    fn codes_come_back() {
+        let mut random = Random::new(5);
+        for k in 0..40_000 {
+            let low: [f32; 3] = std::array::from_fn(|_| random.within(-1000.0, 1000.0));
+            let size = 10.0_f32.powi(k % 9 - 6);
+            let high = low.map(|v| v + size * random.unit());
+            let bounds = [low, high];
+            let value = [0, 1, 2].map(|k| random.within(low[k], high[k].max(low[k])));
+            let code = to_three(value, &bounds);
+            assert_eq!(to_three(three(code, &bounds), &bounds), code, "{value:?} {bounds:?}");
+            // The ends are exact.
+            assert_eq!((three(0, &bounds), three(u32::MAX, &bounds)), (low, high));
+            let turn = std::array::from_fn(|_| random.signed());
+            let code = to_rotation(turn);
+            let read = rotation(code);
+            assert_eq!(to_rotation(read), code, "{turn:?}");
+            let dot = |a: [f32; 4], b: [f32; 4]| -> f32 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
+            let cosine = dot(turn, read) / (dot(turn, turn) * dot(read, read)).sqrt();
+            assert!(cosine.abs() > 1.0 - 4e-6, "{turn:?} {read:?}");
+        }
+    }
+
+    #[test]
+    fn equal_components_settle() {
+        let levels = [0.0, 0.5, -0.5, 0.7071, 0.7075, -0.499, 0.501, 1.0];
+        for k in 0..4096_usize {
+            let code = to_rotation(std::array::from_fn(|j| levels[k >> (3 * j) & 7]));
+            assert_eq!(to_rotation(rotation(code)), code, "{k}");
+        }
+    }
+}
