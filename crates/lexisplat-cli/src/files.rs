@@ -1,6 +1,5 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
-use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -13,7 +12,6 @@ use lexisplat::packed::RangeKind;
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::{SceneFile, png};
-use lexisplat_formats::Siblings;
 use lexisplat_render::Image;
 use serde::Serialize;
 
@@ -24,8 +22,6 @@ pub(crate) use crate::terminal::{note, print, print_json, warn};
 
 /// What messages call standard input.
 const STANDARD_INPUT: &str = "standard input";
-/// The file that a folder of SOG begins with.
-const FOLDER_META: &str = "meta.json";
 /// Extensions of scene formats. An output of one kind under the extension of another would mislead.
 const SCENE_EXTENSIONS: [&str; 8] = ["lexi", "ply", "splat", "ksplat", "spz", "sog", "glb", "gltf"];
 /// Extensions of pictures, which the names of cameras often end in.
@@ -53,23 +49,11 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     Ok((path.display().to_string(), Input::open_within(path, &limits)?))
 }
 
-/// The file that a scene begins with: `path`, or the [`FOLDER_META`] in it if it is a folder that has one.
-pub(crate) fn first_file(path: &Path) -> Cow<'_, Path> {
-    let meta = path.join(FOLDER_META);
-    if path.is_dir() && meta.is_file() { meta.into() } else { path.into() }
-}
-
-/// Where the scene `path` finds the files that it names.
-pub(crate) fn siblings(path: &Path) -> Siblings<'_> {
-    if is_pipe(path) { Siblings::NONE } else { Siblings::beside(path) }
-}
-
 /// Reads a scene of any format, which its bytes tell.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
-    let path = first_file(path);
-    let (name, bytes) = input(&path, common)?;
+    let (name, bytes) = input(path, common)?;
     let options = ReadOptions::default().with_limits(common.limits()?);
-    Ok(SceneFile::read_beside(&name, &bytes, siblings(&path), &options)?)
+    Ok(SceneFile::read_bytes(&name, &bytes, &options)?)
 }
 
 /// Opens the .lexi file `bytes`, which messages call `name`, or the part of it that is asked for.

@@ -6,7 +6,7 @@ use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{Packed, PackedHead};
 use lexisplat::ply::{PlyRead, ReadOptions};
 use lexisplat::{Error, FileKind, FormatError, Input, Model, Result, Silent, Splats};
-use lexisplat_formats::{Kind, Opened, Siblings};
+use lexisplat_formats::{Kind, Opened};
 use lexisplat_render::Scene;
 
 /// A scene of another format than PLY and .lexi.
@@ -59,7 +59,7 @@ impl SceneFile {
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
         // Once, for a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
-        Self::read_beside(&path.display().to_string(), &bytes, Siblings::beside(path), options)
+        Self::read_bytes(&path.display().to_string(), &bytes, options)
     }
 
     /// [`Self::read`] of a file in memory, called `name` in errors.
@@ -67,20 +67,7 @@ impl SceneFile {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
-        Self::read_beside(name, bytes, Siblings::NONE, options)
-    }
-
-    /// [`Self::read_bytes`] of a file that may name others, which are found among `siblings`.
-    ///
-    /// # Errors
-    /// As [`Self::read`].
-    pub fn read_beside(
-        name: &str,
-        bytes: &[u8],
-        siblings: Siblings<'_>,
-        options: &ReadOptions,
-    ) -> Result<Self> {
-        let loaded = match lexisplat_formats::open(name, bytes, siblings, options, true, &Silent)? {
+        let loaded = match lexisplat_formats::open(name, bytes, options, true, &Silent)? {
             Opened::Ply(source) => Loaded::Ply(Box::new(source.into_read()?)),
             Opened::Lexi(reader) => Loaded::lexi(&reader)?,
             opened => {

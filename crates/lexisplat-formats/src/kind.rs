@@ -5,7 +5,7 @@ use std::fmt;
 use lexisplat::FileKind;
 use serde_json::Value;
 
-use crate::{compressed_ply, ksplat, splat};
+use crate::{compressed_ply, splat};
 
 /// First bytes of a glb.
 const GLB: &[u8] = b"glTF";
@@ -20,15 +20,15 @@ pub enum Kind {
     Lexi,
     /// Niantic's SPZ, versions 1 to 4.
     Spz,
-    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures.
+    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures. Known, and not read yet.
     Sog,
     /// `PlayCanvas`' compressed PLY.
     CompressedPly,
     /// The rows of 32 bytes of antimatter15's viewer.
     Splat,
-    /// The `.ksplat` of mkkellogg's viewer.
+    /// The `.ksplat` of mkkellogg's viewer. Known, and not read yet.
     Ksplat,
-    /// glTF or glb with `KHR_gaussian_splatting`.
+    /// glTF or glb with `KHR_gaussian_splatting`. Known, and not read yet.
     Gltf,
 }
 
@@ -44,6 +44,9 @@ impl Kind {
         Self::Ksplat,
         Self::Gltf,
     ];
+
+    /// The formats that [`write`](fn@crate::write) writes.
+    pub const WRITTEN: [Self; 4] = [Self::Ply, Self::Spz, Self::CompressedPly, Self::Splat];
 
     /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
     #[must_use]
@@ -66,9 +69,6 @@ impl Kind {
         }
         if bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
             return of_json(bytes);
-        }
-        if ksplat::is_likely(bytes) {
-            return Some(Self::Ksplat);
         }
         if splat::is_likely(bytes) {
             return Some(Self::Splat);

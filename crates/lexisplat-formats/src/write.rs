@@ -4,7 +4,7 @@ use lexisplat::{Error, Progress, Result, ShDegree, Sink, Splats, ply};
 use serde::Serialize;
 
 use crate::kind::Kind;
-use crate::{compressed_ply, gltf, sog, splat, spz};
+use crate::{compressed_ply, splat, spz};
 
 /// How to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,13 +14,11 @@ pub struct WriteOptions {
     pub spz_version: u8,
     /// Bits of SPZ's SH coefficients of degree 1, and of higher degrees, 1 to 8 each. Default 5 and 4, as its own library.
     pub sh_bits: [u8; 2],
-    /// Whether a glb holds SPZ (`KHR_gaussian_splatting_compression_spz_2`) instead of arrays. Default `false`.
-    pub glb_spz: bool,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { spz_version: 4, sh_bits: [5, 4], glb_spz: false }
+        Self { spz_version: 4, sh_bits: [5, 4] }
     }
 }
 
@@ -60,7 +58,7 @@ impl Lost {
 /// The bytes depend on the scene and the options alone.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a kind that cannot be written (.ksplat; .lexi has its own writer), for options out of range, and
+/// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, and
 /// for a scene whose arrays differ in length; [`Error::Limit`] for a scene too large for the format; errors of the sink.
 pub fn write<'a>(
     kind: Kind,
@@ -73,12 +71,10 @@ pub fn write<'a>(
     let (bytes, lost) = match kind {
         Kind::Ply => return Ok((ply::write(sink, splats)?, Lost::default())),
         Kind::Spz => spz::write(splats, options)?,
-        Kind::Sog => sog::write(splats, options)?,
-        Kind::CompressedPly => compressed_ply::write(splats, options)?,
+        Kind::CompressedPly => compressed_ply::write(splats),
         Kind::Splat => splat::write(splats),
-        Kind::Gltf => gltf::write(splats, options)?,
-        Kind::Lexi | Kind::Ksplat => {
-            let expected = "ply, spz, sog, compressed.ply, splat or glb";
+        Kind::Lexi | Kind::Sog | Kind::Ksplat | Kind::Gltf => {
+            let expected = "ply, spz, compressed.ply or splat";
             return Err(Error::parameter("format", kind.extension(), expected));
         }
     };

@@ -10,7 +10,8 @@ use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    BenchOptions, Comparison, Error, Result, SceneFile, Scorer, bench_cpu, bench_gpu, draw_views, png, score_views,
+    BenchOptions, Comparison, Error, Result, SceneFile, Scorer, bench_cpu, bench_gpu, draw_views, png,
+    score_views,
 };
 use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};

@@ -16,8 +16,8 @@ const FORMATS: &str = "Options of formats";
 
 /// Convert scenes between formats. Several scenes become one.
 ///
-/// Reads PLY, .lexi, SPZ, SOG, compressed.ply, .splat, .ksplat and glTF, which are told by content, and writes all of them
-/// but .ksplat. What a format cannot hold is printed. A .lexi is made as by `lexisplat compress` without options, which
+/// Reads and writes PLY, .lexi, SPZ, compressed.ply and .splat. What a file is, its content tells. What a format cannot hold
+/// is printed. A .lexi is made as by `lexisplat compress` without options, which
 /// reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
@@ -62,9 +62,6 @@ pub(crate) struct Convert {
     /// [default: 5,4, as SPZ's own library].
     #[arg(long, value_name = "N,N", value_parser = sh_bits, help_heading = FORMATS)]
     pub(crate) sh_bits: Option<[u8; 2]>,
-    /// Write the scene of a glb as SPZ (`KHR_gaussian_splatting_compression_spz_2`), which is smaller than arrays of floats.
-    #[arg(long, help_heading = FORMATS)]
-    pub(crate) glb_spz: bool,
 }
 
 impl Convert {
@@ -86,7 +83,6 @@ impl Convert {
         let mut options = WriteOptions::default();
         options.spz_version = self.spz_version.unwrap_or(options.spz_version);
         options.sh_bits = self.sh_bits.unwrap_or(options.sh_bits);
-        options.glb_spz = self.glb_spz;
         options
     }
 }
@@ -98,7 +94,7 @@ fn single(x: f64) -> f32 {
 
 /// Returns the parser of a format that can be written, which also lists the names in the help.
 fn format() -> impl TypedValueParser<Value = Kind> {
-    let names = Kind::ALL.into_iter().filter(|kind| *kind != Kind::Ksplat).map(Kind::extension);
+    let names = Kind::WRITTEN.into_iter().chain([Kind::Lexi]).map(Kind::extension);
     PossibleValuesParser::new(names)
         .map(|name| Kind::ALL.into_iter().find(|kind| kind.extension() == name).unwrap_or(Kind::Ply))
 }

@@ -9,14 +9,14 @@ use lexisplat::ply::ReadOptions;
 use lexisplat::{Input, Splats};
 use lexisplat_eval::compression::judging_views;
 use lexisplat_eval::{Compression, DrawOptions, Packing, SceneFile, compare, format};
-use lexisplat_formats::{Kind, Lost, Siblings, merge, open, write};
+use lexisplat_formats::{Kind, Lost, merge, open, write};
 use lexisplat_render::{Device, Scene};
 use serde_json::{Value, json};
 
 use crate::args::{Common, Convert};
 use crate::device::open_renderer;
 use crate::exit::Misuse;
-use crate::files::{check_output, first_file, input, is_pipe, siblings, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -81,15 +81,15 @@ fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
     }
     let name = output.display().to_string();
     match Kind::of_extension(&name) {
-        Some(Kind::Ksplat) => Err(Misuse {
-            problem: format!("{name}: .ksplat is read and not written"),
-            help: "name an output of another format, such as .spz or .sog".to_owned(),
+        Some(kind) if kind != Kind::Lexi && !Kind::WRITTEN.contains(&kind) => Err(Misuse {
+            problem: format!("{name}: {kind} is not written"),
+            help: "name an output of another format, such as .spz or .compressed.ply".to_owned(),
         }
         .into()),
         Some(kind) => Ok(kind),
         None => Err(Misuse {
             problem: format!("{name}: the extension names no format"),
-            help: "end the output with .ply, .lexi, .spz, .sog, .compressed.ply, .splat or .glb, or say --to FORMAT"
+            help: "end the output with .ply, .lexi, .spz, .compressed.ply or .splat, or say --to FORMAT"
                 .to_owned(),
         }
         .into()),
@@ -109,10 +109,9 @@ fn read_all(
         .with_limits(common.limits()?);
     let (mut all, mut lost, mut bytes_in) = (None::<Splats>, Vec::new(), 0);
     for path in inputs {
-        let path = first_file(path);
-        let (name, bytes) = input(&path, common)?;
+        let (name, bytes) = input(path, common)?;
         bytes_in += bytes.len() as u64;
-        let opened = open(&name, &bytes, siblings(&path), &options, true, bars)?;
+        let opened = open(&name, &bytes, &options, true, bars)?;
         warn(&name, opened.source().warnings());
         let next = opened.source().whole()?.into_owned();
         match &mut all {
@@ -139,7 +138,7 @@ fn read_all(
 fn psnr(output: &Path, splats: &Splats, common: &Common, bars: &Bars) -> Result<Value> {
     let options = ReadOptions::default().with_limits(common.limits()?);
     let bytes = Input::open_within(output, &options.limits)?;
-    let written = SceneFile::read_beside(&output.display().to_string(), &bytes, Siblings::NONE, &options)?;
+    let written = SceneFile::read_bytes(&output.display().to_string(), &bytes, &options)?;
     let mut renderer = open_renderer(Device::Cpu)?;
     let cameras = judging_views(&mut renderer, splats, VIEWS, bars)?;
     let draw = DrawOptions::default();
@@ -188,7 +187,7 @@ mod tests {
         assert_eq!(kind("a.SPZ", None).unwrap(), Kind::Spz);
         assert_eq!(kind("a.compressed.ply", None).unwrap(), Kind::CompressedPly);
         assert_eq!(kind("a.ply", Some(Kind::CompressedPly)).unwrap(), Kind::CompressedPly);
-        assert!(kind("a.ksplat", None).unwrap_err().to_string().contains("read and not written"));
+        assert!(kind("a.ksplat", None).unwrap_err().to_string().contains("not written"));
         assert!(kind("a", None).is_err());
     }
 }

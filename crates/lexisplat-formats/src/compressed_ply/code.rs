@@ -90,7 +90,7 @@ fn once(turn: [f32; 4]) -> u32 {
     if parts[place] < 0.0 {
         parts = parts.map(|v| -v);
     }
-    let mut code = place as u32;
+    let mut code = u32::try_from(place).unwrap_or(0);
     for k in (0..4).filter(|k| *k != place) {
         let share = parts[k] * std::f64::consts::FRAC_1_SQRT_2 + TURN_HALF;
         code = code << TURN_BITS | to_bits(share, TURN_BITS);

@@ -2,22 +2,19 @@
 
 use std::fmt::Write as _;
 
-use lexisplat::{Geometry, Result, ShDegree, Splats, ply};
+use lexisplat::{Geometry, ShDegree, Splats, ply};
 
 use super::code::{Bounds, to_code, to_rotation, to_three};
 use super::order::order;
 use super::{CHUNK, CHUNK_PROPERTIES, ChunkBounds, ROW, SH_LEVELS, SH_RANGE, VERTEX_PROPERTIES, colour, dc};
 use crate::opacity::{sigmoid, to_byte};
-use crate::write::{Lost, WriteOptions};
+use crate::write::Lost;
 
 /// Largest logarithm of a scale, either way (`compressed-chunk.ts`).
 const MOST_LOG_SCALE: f32 = 20.0;
 
 /// Writes `splats` as a compressed PLY, with SH of degree 3 at most.
-///
-/// # Errors
-/// None so far.
-pub(crate) fn write(splats: &Splats, _options: &WriteOptions) -> Result<(Vec<u8>, Lost)> {
+pub(crate) fn write(splats: &Splats) -> (Vec<u8>, Lost) {
     let degree = splats.degree.min(ShDegree::THREE);
     let mut lost = Lost::beside(splats, degree, true);
     for phrase in [
@@ -47,7 +44,7 @@ pub(crate) fn write(splats: &Splats, _options: &WriteOptions) -> Result<(Vec<u8>
             bytes.extend(channel[..per].iter().map(|v| to_coefficient(*v, &mut lost.limited)));
         }
     }
-    Ok((bytes, lost))
+    (bytes, lost)
 }
 
 fn header(splats: &Splats, degree: ShDegree, count: usize) -> String {

@@ -218,11 +218,11 @@ mod tests {
     use lexisplat_testing::{Need, missing, real_data};
 
     use super::*;
-    use crate::open::{Siblings, open};
+    use crate::open::open;
     use crate::write::WriteOptions;
 
     fn opened(bytes: &[u8]) -> Result<Splats> {
-        let opened = open("a.spz", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;
+        let opened = open("a.spz", bytes, &ReadOptions::default(), true, &Silent)?;
         Ok(opened.source().whole()?.into_owned())
     }
 

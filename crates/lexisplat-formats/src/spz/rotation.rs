@@ -13,6 +13,7 @@ const LARGEST: f32 = std::f32::consts::FRAC_1_SQRT_2;
 /// Half of the range of 8 bits, for components from -1 to 1.
 const HALF: f32 = 127.5;
 
+#[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
 /// A rotation (w, x, y, z) of length 1, as (x, y, z, w). One of length 0 stands for none.
 fn unit([w, x, y, z]: [f32; 4]) -> [f32; 4] {
     let wide = [x, y, z, w].map(f64::from);

@@ -131,7 +131,6 @@ fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64)
 }
 
 /// The middle of the bucket of `value` of which `bits` bits are kept; 128 is the middle of one (`quantizeSH`).
-#[expect(clippy::cast_possible_truncation, reason = "at most 255")]
 fn to_bucket(value: u8, bits: u8) -> u8 {
     let size = 1_u16 << (8 - bits);
     ((u16::from(value) + size / 2) / size * size).min(255) as u8

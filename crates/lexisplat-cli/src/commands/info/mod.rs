@@ -18,15 +18,14 @@ use serde_json::Value;
 
 use self::codes::LexiFacts;
 use crate::args::{Common, Info};
-use crate::files::{first_file, input, siblings, tell, warn};
+use crate::files::{input, tell, warn};
 use crate::progress::Bars;
 
 /// Width of the longest bar of a histogram, in characters.
 const BAR: usize = 40;
 
 pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
-    let path = first_file(&args.file);
-    let (name, bytes) = input(&path, common)?;
+    let (name, bytes) = input(&args.file, common)?;
     let bars = Bars::new(common.quiet || common.json);
     let limits = common.limits()?;
     let file = (name.as_str(), bytes.len() as u64);
@@ -45,7 +44,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
-    let opened = open(&name, &bytes, siblings(&path), &read, false, &bars)?;
+    let opened = open(&name, &bytes, &read, false, &bars)?;
     let source = opened.source();
     warn(&name, source.warnings());
     let lint = stream::lint(source, &bars)?;
