@@ -82,6 +82,7 @@ mod tests {
         assert_eq!(Flip::of([false, true, true]), Flip::HALF_TURN);
     }
 
+    #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
     /// The axis of an ellipsoid along x, turned and flipped, is that of the flipped rotation, or its opposite.
     #[test]
     fn flipped_rotations_are_those_of_flipped_ellipsoids() {

@@ -97,6 +97,7 @@ mod tests {
 
     use super::*;
 
+    #[expect(clippy::cast_possible_truncation, reason = "directions are in single precision")]
     #[test]
     fn turned_coefficients_show_the_same_from_turned_directions() {
         let mut random = Random::new(3);

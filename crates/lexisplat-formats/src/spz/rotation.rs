@@ -97,7 +97,7 @@ mod tests {
     fn rotations() -> Vec<[f32; 4]> {
         let mut random = Random::new(7);
         let mut all: Vec<[f32; 4]> = (0..20_000).map(|_| std::array::from_fn(|_| random.signed())).collect();
-        let levels = [0.0, 0.5, 0.499, 0.501, 0.7071, -0.7075, -0.5, 1.0];
+        let levels = [0.0, 0.5, 0.499, 0.501, 0.7069, -0.7075, -0.5, 1.0];
         for k in 0..4096_usize {
             let jitter = [0; 4].map(|_: i32| 0.002 * random.signed());
             all.push(std::array::from_fn(|j| levels[k >> (3 * j) & 7] + jitter[j]));
