@@ -101,7 +101,7 @@ fn format() -> impl TypedValueParser<Value = Kind> {
 
 /// Parses two numbers of bits.
 fn sh_bits(text: &str) -> Result<[u8; 2], String> {
-    let bits: Vec<u8> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+    let bits: Vec<u8> = text.split(',').filter_map(|part| part.trim().parse::<u8>().ok()).collect();
     match <[u8; 2]>::try_from(bits) {
         Ok(bits) if bits.iter().all(|b| (1..=8).contains(b)) && text.split(',').count() == 2 => Ok(bits),
         _ => Err("expected two numbers from 1 to 8, such as 8,8".to_owned()),
