@@ -138,7 +138,9 @@ fn step(feed: &mut LexiFeed, file: &[u8], script: &Script<'_>, most: u64) {
             let wanted = feed.wants().map_or(0..0, |range| range);
             let start = usize::try_from(wanted.start).unwrap_or(usize::MAX).min(file.len());
             let end = start
-                .saturating_add(1 + script.below(2 * (wanted.end - wanted.start) as usize))
+                .saturating_add(
+                    1 + script.below(usize::try_from(2 * (wanted.end - wanted.start)).unwrap_or(usize::MAX)),
+                )
                 .min(file.len());
             give(feed, &file[start..end], start, most);
         }

@@ -494,3 +494,15 @@ fn number(kind: &RangeKind, file: &[u8]) -> usize {
         other => panic!("{other:?} in the last layer"),
     }
 }
+
+#[test]
+fn ranges_before_the_head_are_taken_with_it() {
+    let mut parts = Parts::of(file());
+    parts.tensors.sort_by_key(|t| t.0 == "packed.head");
+    let file = parts.sealed();
+    let mut feed = feed(&FeedOptions::default());
+    feed.feed(0, &file).unwrap();
+    assert!(feed.is_complete());
+    assert_eq!(decoded(&feed), whole(&file));
+    assert_eq!(whole(&file), whole(super::feed::file()));
+}

@@ -221,15 +221,27 @@ impl LexiFeed {
             None => return Ok(()),
         };
         self.ranges = Some(Box::new(ranges));
-        let mut result = Ok(());
+        // What there is no room for is asked for later.
+        let unless_full = |result: Result<()>| match result {
+            Err(Error::Limit { .. }) => Ok(()),
+            other => other,
+        };
+        let mut result = unless_full(self.take_from_start());
         for (at, bytes) in std::mem::take(&mut self.early) {
-            match self.feed(at, &bytes) {
-                // What there is no room for is asked for later.
-                Err(Error::Limit { .. }) => {}
-                other => result = result.and(other),
-            }
+            result = result.and(unless_full(self.feed(at, &bytes)));
         }
         result
+    }
+
+    /// Takes the ranges that lie within the start. There are some where the head comes after them.
+    fn take_from_start(&mut self) -> Result<()> {
+        let (Some(ranges), Some(start)) = (&self.ranges, self.start.whole()) else { return Ok(()) };
+        let more = ranges.more(0, start);
+        self.check_room(more)?;
+        match (&mut self.ranges, self.start.whole()) {
+            (Some(ranges), Some(start)) => ranges.take(0, start),
+            _ => Ok(()),
+        }
     }
 
     fn read_start(&self, start: &[u8]) -> Result<Ranges> {
