@@ -5,7 +5,7 @@ use std::fmt;
 use lexisplat::FileKind;
 use serde_json::Value;
 
-use crate::{compressed_ply, splat};
+use crate::{compressed_ply, ksplat, splat};
 
 /// First bytes of a glb.
 const GLB: &[u8] = b"glTF";
@@ -26,7 +26,7 @@ pub enum Kind {
     CompressedPly,
     /// The rows of 32 bytes of antimatter15's viewer.
     Splat,
-    /// The `.ksplat` of mkkellogg's viewer. Known, and not read yet.
+    /// The `.ksplat` of mkkellogg's viewer, compression levels 0 to 2.
     Ksplat,
     /// glTF or glb with `KHR_gaussian_splatting`. Known, and not read yet.
     Gltf,
@@ -69,6 +69,9 @@ impl Kind {
         }
         if bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
             return of_json(bytes);
+        }
+        if ksplat::is_likely(bytes) {
+            return Some(Self::Ksplat);
         }
         if splat::is_likely(bytes) {
             return Some(Self::Splat);

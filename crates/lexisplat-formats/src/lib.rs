@@ -10,6 +10,7 @@ mod axes;
 mod compressed_ply;
 mod edit;
 mod kind;
+mod ksplat;
 mod merge;
 mod opacity;
 mod open;

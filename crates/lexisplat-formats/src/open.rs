@@ -6,7 +6,7 @@ use lexisplat::{Error, FileKind, Progress, Result, SplatSource};
 
 use crate::kind::Kind;
 use crate::source::FormatSource;
-use crate::{compressed_ply, splat, spz};
+use crate::{compressed_ply, ksplat, splat, spz};
 
 /// A scene of any format, opened.
 #[derive(Debug)]
@@ -57,7 +57,7 @@ pub fn open<'a>(
     let kind = Kind::of(name, bytes);
     let file = match kind {
         // The PLY reader refuses other files by what they are.
-        None | Some(Kind::Ply | Kind::Sog | Kind::Ksplat | Kind::Gltf) => {
+        None | Some(Kind::Ply | Kind::Sog | Kind::Gltf) => {
             if kind.is_none() && FileKind::of(name, bytes) == FileKind::Unknown {
                 return Err(Error::malformed(name, "the format is not known"));
             }
@@ -70,6 +70,7 @@ pub fn open<'a>(
         Some(Kind::Spz) => spz::read(name, bytes, options)?,
         Some(Kind::CompressedPly) => compressed_ply::read(name, bytes, options)?,
         Some(Kind::Splat) => splat::read(name, bytes, options)?,
+        Some(Kind::Ksplat) => ksplat::read(name, bytes, options)?,
     };
     progress.check()?;
     let source = FormatSource::new(name, bytes.len() as u64, file, options)?;

@@ -1,0 +1,164 @@
+//! `.ksplat`: the format of mkkellogg's `GaussianSplats3D` (`src/loaders/SplatBuffer.js`), compression levels 0 to 2.
+//!
+//! A file is a header, headers of sections, and the data of the sections one after another: sizes of buckets that are not
+//! full, centres of buckets, and rows. At levels 1 and 2 positions are 16 bits about the centre of their bucket. The axes are
+//! those of a PLY. [`layout`] checks everything that steers reading.
+
+mod layout;
+
+use std::ops::Range;
+
+use half::f16;
+use lexisplat::ply::ReadOptions;
+use lexisplat::sh::{C0, COLOUR_OFFSET};
+use lexisplat::{Result, SceneMeta, ShDegree};
+use serde_json::json;
+
+use self::layout::{Layout, Level, Section};
+use crate::opacity::{MOST, logits};
+use crate::rows::{Described, Rows, RowsMut};
+
+/// Natural logarithm of 2^-25, half of the smallest value of f16 above 0: stands for a scale of 0, whose logarithm is not
+/// finite.
+const LEAST_SCALE: f32 = -17.328_68;
+/// SH coefficients of a colour channel in each degree from 1 on.
+const IN_DEGREE: [usize; 3] = [3, 5, 7];
+
+/// Whether `bytes` are a .ksplat: nothing marks the format but that all of its headers fit.
+pub(crate) fn is_likely(bytes: &[u8]) -> bool {
+    Layout::of("", bytes).is_ok()
+}
+
+/// Reads the .ksplat in `bytes`, which messages call `name`.
+///
+/// # Errors
+/// [`lexisplat::Error::Format`] for headers that contradict each other or the length of the file.
+pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Result<Described<'a>> {
+    let layout = Layout::of(name, bytes)?;
+    options.limits.check_gaussians(name, layout.gaussians as u64)?;
+    let degree = layout.degree;
+    let facts = vec![
+        ("compression_level", json!(layout.level.number())),
+        ("sections", json!(layout.sections.len())),
+        ("version", json!(layout.version)),
+    ];
+    Ok(Described {
+        len: layout.gaussians,
+        degree,
+        rows: Box::new(KsplatRows(layout)),
+        meta: SceneMeta::default(),
+        warnings: Vec::new(),
+        facts,
+    })
+}
+
+#[derive(Debug)]
+struct KsplatRows<'a>(Layout<'a>);
+
+impl Rows for KsplatRows<'_> {
+    fn fill(&self, range: Range<usize>, out: RowsMut<'_>) {
+        let layout = &self.0;
+        let logits = logits();
+        let rest = layout.degree.rest();
+        let mut next = layout.sections.partition_point(|section| section.end() <= range.start);
+        for (i, gaussian) in range.enumerate() {
+            while layout.sections.get(next).is_some_and(|section| section.end() <= gaussian) {
+                next += 1;
+            }
+            let Some(section) = layout.sections.get(next) else { return };
+            let row = section.row(gaussian - section.first);
+            let reader = RowReader { level: layout.level, row };
+            out.positions[i] = position(section, gaussian - section.first, reader);
+            out.scales[i] = reader.numbers::<3>(layout.level.scales()).map(log_scale);
+            out.rotations[i] = reader.numbers::<4>(layout.level.rotation());
+            let at = layout.level.colour();
+            out.dc[i] = [0, 1, 2].map(|k| (f32::from(row[at + k]) / MOST - COLOUR_OFFSET) / C0);
+            out.opacities[i] = logits[usize::from(row[at + 3])];
+            sh(layout, section.degree, reader, &mut out.sh_rest[i * rest..(i + 1) * rest]);
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        false
+    }
+}
+
+fn log_scale(scale: f32) -> f32 {
+    if scale == 0.0 { LEAST_SCALE } else { libm::logf(scale) }
+}
+
+/// The bytes of a Gaussian.
+#[derive(Clone, Copy)]
+struct RowReader<'r> {
+    level: Level,
+    row: &'r [u8],
+}
+
+impl RowReader<'_> {
+    /// `N` values from byte `at`, 32 bits each at level 0 and 16 bits above.
+    fn numbers<const N: usize>(self, at: usize) -> [f32; N] {
+        match self.level {
+            Level::Whole => std::array::from_fn(|k| f32_at(self.row, at + k * size_of::<f32>())),
+            Level::Half | Level::Bytes => {
+                std::array::from_fn(|k| f16::from_bits(u16_at(self.row, at + k * size_of::<f16>())).to_f32())
+            }
+        }
+    }
+
+    /// SH value `k` of the row. `range` is that of bytes.
+    fn sh(self, k: usize, range: [f32; 2]) -> f32 {
+        let at = self.level.harmonics();
+        match self.level {
+            Level::Whole | Level::Half => {
+                let [value] = self.numbers(at + k * self.level.harmonic_bytes());
+                value
+            }
+            Level::Bytes => {
+                let [least, most] = range;
+                least + f32::from(self.row[at + k]) / MOST * (most - least)
+            }
+        }
+    }
+}
+
+/// The position of Gaussian `i` of a section.
+#[expect(clippy::cast_possible_truncation, reason = "f32 is what the file promises")]
+fn position(section: &Section<'_>, i: usize, reader: RowReader<'_>) -> [f32; 3] {
+    if reader.level == Level::Whole {
+        return reader.numbers(0);
+    }
+    let centre = section.centre(i);
+    let step = f64::from(section.block) / 2.0 / f64::from(section.range);
+    std::array::from_fn(|k| {
+        let offset = f64::from(u16_at(reader.row, k * size_of::<u16>())) - f64::from(section.range);
+        (offset * step + f64::from(centre[k])) as f32
+    })
+}
+
+/// SH of a row of `degree` to `out`, which holds those of the degree of the scene: each degree of a row is channel-major by
+/// itself.
+fn sh(layout: &Layout<'_>, degree: ShDegree, reader: RowReader<'_>, out: &mut [f32]) {
+    out.fill(0.0);
+    let channel = out.len() / 3;
+    let (mut value, mut first) = (0, 0);
+    for n in IN_DEGREE.into_iter().take(degree.get().into()) {
+        for c in 0..3 {
+            for k in 0..n {
+                out[c * channel + first + k] = reader.sh(value, layout.sh_range);
+                value += 1;
+            }
+        }
+        first += n;
+    }
+}
+
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([bytes[at], bytes[at + 1]])
+}
+
+fn f32_at(bytes: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+#[cfg(test)]
+mod tests;
