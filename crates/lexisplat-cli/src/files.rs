@@ -12,6 +12,7 @@ use lexisplat::packed::RangeKind;
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Error, Input, Sink};
 use lexisplat_eval::{SceneFile, png};
+use lexisplat_formats::{Siblings, scene_path};
 use lexisplat_render::Image;
 use serde::Serialize;
 
@@ -39,21 +40,27 @@ pub(crate) fn is_pipe(path: &Path) -> bool {
     path.as_os_str() == OsStr::new("-")
 }
 
-/// Reads a file, mapped where possible, or standard input. Returns what messages call it, and its bytes.
+/// Reads a file, mapped where possible, or standard input. A folder with `meta.json` stands for that file. Returns what messages call it, and its bytes.
 pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
     let limits = common.limits()?;
     if is_pipe(path) {
         let bytes = Input::read(STANDARD_INPUT, std::io::stdin().lock(), &limits)?;
         return Ok((STANDARD_INPUT.to_owned(), bytes));
     }
+    let path = &*scene_path(path);
     Ok((path.display().to_string(), Input::open_within(path, &limits)?))
+}
+
+/// The files beside the one that [`input`] calls `name`.
+pub(crate) fn siblings(name: &str) -> Siblings<'_> {
+    if name == STANDARD_INPUT { Siblings::NONE } else { Siblings::of(Path::new(name)) }
 }
 
 /// Reads a scene of any format, which its bytes tell.
 pub(crate) fn load(path: &Path, common: &Common) -> Result<SceneFile> {
     let (name, bytes) = input(path, common)?;
     let options = ReadOptions::default().with_limits(common.limits()?);
-    Ok(SceneFile::read_bytes(&name, &bytes, &options)?)
+    Ok(SceneFile::read_files(&name, &bytes, siblings(&name), &options)?)
 }
 
 /// Opens the .lexi file `bytes`, which messages call `name`, or the part of it that is asked for.

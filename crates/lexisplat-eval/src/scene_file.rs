@@ -6,7 +6,7 @@ use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{Packed, PackedHead};
 use lexisplat::ply::{PlyRead, ReadOptions};
 use lexisplat::{Error, FileKind, FormatError, Input, Model, Result, Silent, Splats};
-use lexisplat_formats::{Kind, Opened};
+use lexisplat_formats::{Kind, Opened, Siblings, scene_path};
 use lexisplat_render::Scene;
 
 /// A scene of another format than PLY and .lexi.
@@ -57,9 +57,10 @@ impl SceneFile {
     /// # Errors
     /// What [`Input::open_within`] and [`lexisplat_formats::open`] say.
     pub fn read(path: &Path, options: &ReadOptions) -> Result<Self> {
+        let path = &*scene_path(path);
         // Once, for a pipe gives its bytes once.
         let bytes = Input::open_within(path, &options.limits)?;
-        Self::read_bytes(&path.display().to_string(), &bytes, options)
+        Self::read_files(&path.display().to_string(), &bytes, Siblings::of(path), options)
     }
 
     /// [`Self::read`] of a file in memory, called `name` in errors.
@@ -67,7 +68,20 @@ impl SceneFile {
     /// # Errors
     /// As [`Self::read`].
     pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Self> {
-        let loaded = match lexisplat_formats::open(name, bytes, options, true, &Silent)? {
+        Self::read_files(name, bytes, Siblings::NONE, options)
+    }
+
+    /// [`Self::read_bytes`] of a scene that may have several files; it takes the others from `siblings`.
+    ///
+    /// # Errors
+    /// As [`Self::read`].
+    pub fn read_files(
+        name: &str,
+        bytes: &[u8],
+        siblings: Siblings<'_>,
+        options: &ReadOptions,
+    ) -> Result<Self> {
+        let loaded = match lexisplat_formats::open(name, bytes, siblings, options, true, &Silent)? {
             Opened::Ply(source) => Loaded::Ply(Box::new(source.into_read()?)),
             Opened::Lexi(reader) => Loaded::lexi(&reader)?,
             opened => {

@@ -20,7 +20,7 @@ pub enum Kind {
     Lexi,
     /// Niantic's SPZ, versions 1 to 4.
     Spz,
-    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures. Known, and not read yet.
+    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures.
     Sog,
     /// `PlayCanvas`' compressed PLY.
     CompressedPly,
@@ -46,7 +46,7 @@ impl Kind {
     ];
 
     /// The formats that [`write`](fn@crate::write) writes.
-    pub const WRITTEN: [Self; 4] = [Self::Ply, Self::Spz, Self::CompressedPly, Self::Splat];
+    pub const WRITTEN: [Self; 5] = [Self::Ply, Self::Spz, Self::Sog, Self::CompressedPly, Self::Splat];
 
     /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
     #[must_use]

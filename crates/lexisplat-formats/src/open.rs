@@ -5,8 +5,9 @@ use lexisplat::ply::{PlySource, ReadOptions};
 use lexisplat::{Error, FileKind, Progress, Result, SplatSource};
 
 use crate::kind::Kind;
+use crate::siblings::Siblings;
 use crate::source::FormatSource;
-use crate::{compressed_ply, ksplat, splat, spz};
+use crate::{compressed_ply, ksplat, sog, splat, spz};
 
 /// A scene of any format, opened.
 #[derive(Debug)]
@@ -42,7 +43,8 @@ impl Opened<'_> {
     }
 }
 
-/// Opens the scene in `bytes`, of any format, which its content tells; messages call it `name`. `whole` says that the
+/// Opens the scene in `bytes`, of any format, which its content tells; messages call it `name`. A scene of several
+/// files takes the others from `siblings`. `whole` says that the
 /// whole scene will be held anyway ([`PlySource::open_whole`]). Reports [`Stage::Read`](lexisplat::Stage::Read).
 ///
 /// # Errors
@@ -50,14 +52,16 @@ impl Opened<'_> {
 pub fn open<'a>(
     name: &'a str,
     bytes: &'a [u8],
+    siblings: Siblings<'a>,
     options: &ReadOptions,
     whole: bool,
     progress: &dyn Progress,
 ) -> Result<Opened<'a>> {
     let kind = Kind::of(name, bytes);
+    let mut file_bytes = bytes.len() as u64;
     let file = match kind {
         // The PLY reader refuses other files by what they are.
-        None | Some(Kind::Ply | Kind::Sog | Kind::Gltf) => {
+        None | Some(Kind::Ply | Kind::Gltf) => {
             if kind.is_none() && FileKind::of(name, bytes) == FileKind::Unknown {
                 return Err(Error::malformed(name, "the format is not known"));
             }
@@ -68,11 +72,16 @@ pub fn open<'a>(
             return Ok(Opened::Lexi(Box::new(LexiReader::open(name, bytes, &options.limits)?)));
         }
         Some(Kind::Spz) => spz::read(name, bytes, options)?,
+        Some(Kind::Sog) => {
+            let (file, all_bytes) = sog::read(name, bytes, siblings, options)?;
+            file_bytes = all_bytes;
+            file
+        }
         Some(Kind::CompressedPly) => compressed_ply::read(name, bytes, options)?,
         Some(Kind::Splat) => splat::read(name, bytes, options)?,
         Some(Kind::Ksplat) => ksplat::read(name, bytes, options)?,
     };
     progress.check()?;
-    let source = FormatSource::new(name, bytes.len() as u64, file, options)?;
+    let source = FormatSource::new(name, file_bytes, file, options)?;
     Ok(Opened::Other(kind.unwrap_or(Kind::Ply), Box::new(source)))
 }

@@ -119,6 +119,7 @@ mod tests {
     use super::*;
     use crate::kind::Kind;
     use crate::open::open;
+    use crate::siblings::Siblings;
 
     #[test]
     fn what_is_written_is_read() {
@@ -126,7 +127,7 @@ mod tests {
         let (bytes, lost) = write(&splats);
         assert!(is_likely(&bytes));
         assert_eq!(lost.sh_degree, Some([3, 0]));
-        let opened = open("a", &bytes, &ReadOptions::default(), true, &Silent).unwrap();
+        let opened = open("a", &bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent).unwrap();
         assert_eq!(opened.kind(), Kind::Splat);
         let read = opened.source().whole().unwrap().into_owned();
         assert_eq!(read.geometry.positions, splats.geometry.positions);

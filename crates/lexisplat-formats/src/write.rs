@@ -4,7 +4,7 @@ use lexisplat::{Error, Progress, Result, ShDegree, Sink, Splats, ply};
 use serde::Serialize;
 
 use crate::kind::Kind;
-use crate::{compressed_ply, splat, spz};
+use crate::{compressed_ply, sog, splat, spz};
 
 /// How to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -14,11 +14,14 @@ pub struct WriteOptions {
     pub spz_version: u8,
     /// Bits of SPZ's SH coefficients of degree 1, and of higher degrees, 1 to 8 each. Default 5 and 4, as its own library.
     pub sh_bits: [u8; 2],
+    /// Most entries of SOG's palette of SH, up to 65,536, which is the default; 0 leaves SH out. There are no more than the
+    /// largest power of two that is no larger than the number of Gaussians.
+    pub sog_palette: u32,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { spz_version: 4, sh_bits: [5, 4] }
+        Self { spz_version: 4, sh_bits: [5, 4], sog_palette: 1 << 16 }
     }
 }
 
@@ -71,10 +74,11 @@ pub fn write<'a>(
     let (bytes, lost) = match kind {
         Kind::Ply => return Ok((ply::write(sink, splats)?, Lost::default())),
         Kind::Spz => spz::write(splats, options)?,
+        Kind::Sog => sog::write(splats, options)?,
         Kind::CompressedPly => compressed_ply::write(splats),
         Kind::Splat => splat::write(splats),
-        Kind::Lexi | Kind::Sog | Kind::Ksplat | Kind::Gltf => {
-            let expected = "ply, spz, compressed.ply or splat";
+        Kind::Lexi | Kind::Ksplat | Kind::Gltf => {
+            let expected = "ply, spz, sog, compressed.ply or splat";
             return Err(Error::parameter("format", kind.extension(), expected));
         }
     };

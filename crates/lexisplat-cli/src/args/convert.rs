@@ -16,9 +16,8 @@ const FORMATS: &str = "Options of formats";
 
 /// Convert scenes between formats. Several scenes become one.
 ///
-/// Reads and writes PLY, .lexi, SPZ, compressed.ply and .splat. What a file is, its content tells. What a format cannot hold
-/// is printed. A .lexi is made as by `lexisplat compress` without options, which
-/// reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
+/// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply and .splat. What a file is, its content tells. What a format cannot
+/// hold is printed. A .lexi is made as by `lexisplat compress` without options, which reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
     /// One or more scenes, and the file to write last.
@@ -58,6 +57,10 @@ pub(crate) struct Convert {
     /// Version of SPZ: 2, 3 or 4 [default: 4].
     #[arg(long, value_name = "N", value_parser = whole::<u8>(2..=4), help_heading = FORMATS)]
     pub(crate) spz_version: Option<u8>,
+    /// Most entries of SOG's palette of SH, 0 to 65536; 0 leaves SH out. There are no more than the largest power of two
+    /// that is no larger than the number of Gaussians [default: 65536].
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(0..=65_536), help_heading = FORMATS)]
+    pub(crate) sog_palette: Option<u32>,
     /// Bits of SPZ's SH coefficients of degree 1, and of higher degrees, 1 to 8 each. 8,8 is what SPZ can hold at most
     /// [default: 5,4, as SPZ's own library].
     #[arg(long, value_name = "N,N", value_parser = sh_bits, help_heading = FORMATS)]
@@ -82,6 +85,7 @@ impl Convert {
     pub(crate) fn write_options(&self) -> WriteOptions {
         let mut options = WriteOptions::default();
         options.spz_version = self.spz_version.unwrap_or(options.spz_version);
+        options.sog_palette = self.sog_palette.unwrap_or(options.sog_palette);
         options.sh_bits = self.sh_bits.unwrap_or(options.sh_bits);
         options
     }

@@ -18,7 +18,9 @@ use lexisplat_render::read_views;
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
-use crate::files::{check_output, input, is_pipe, new_output, note, output_path, tell, warn, write_output};
+use crate::files::{
+    check_output, input, is_pipe, new_output, note, output_path, siblings, tell, warn, write_output,
+};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -56,7 +58,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
     let whole = compression.holds_whole(bytes.len() as u64);
-    let opened = open(&name, &bytes, &read, whole, &bars)?;
+    let opened = open(&name, &bytes, siblings(&name), &read, whole, &bars)?;
     let source = source_to_compress(&name, &opened)?;
     warn(&name, source.warnings());
     let open_seconds = start.elapsed().as_secs_f64();

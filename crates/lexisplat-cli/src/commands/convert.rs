@@ -16,7 +16,7 @@ use serde_json::{Value, json};
 use crate::args::{Common, Convert};
 use crate::device::open_renderer;
 use crate::exit::Misuse;
-use crate::files::{check_output, input, is_pipe, tell, warn, write_output};
+use crate::files::{check_output, input, is_pipe, siblings, tell, warn, write_output};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -89,8 +89,9 @@ fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
         Some(kind) => Ok(kind),
         None => Err(Misuse {
             problem: format!("{name}: the extension names no format"),
-            help: "end the output with .ply, .lexi, .spz, .compressed.ply or .splat, or say --to FORMAT"
-                .to_owned(),
+            help:
+                "end the output with .ply, .lexi, .spz, .sog, .compressed.ply or .splat, or say --to FORMAT"
+                    .to_owned(),
         }
         .into()),
     }
@@ -111,7 +112,7 @@ fn read_all(
     for path in inputs {
         let (name, bytes) = input(path, common)?;
         bytes_in += bytes.len() as u64;
-        let opened = open(&name, &bytes, &options, true, bars)?;
+        let opened = open(&name, &bytes, siblings(&name), &options, true, bars)?;
         warn(&name, opened.source().warnings());
         let next = opened.source().whole()?.into_owned();
         match &mut all {

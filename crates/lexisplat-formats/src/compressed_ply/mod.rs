@@ -251,9 +251,10 @@ mod tests {
     use super::*;
     use crate::kind::Kind;
     use crate::open::open;
+    use crate::siblings::Siblings;
 
     fn opened(bytes: &[u8]) -> Result<Splats> {
-        let opened = open("a.ply", bytes, &ReadOptions::default(), true, &Silent)?;
+        let opened = open("a.ply", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;
         assert_eq!(opened.kind(), Kind::CompressedPly);
         Ok(opened.source().whole()?.into_owned())
     }
@@ -309,7 +310,7 @@ mod tests {
             let mut bad = bytes.clone();
             bad[bit / 8] ^= 1 << (bit % 8);
             if is_likely(&bad) {
-                let _ = open("a", &bad, &ReadOptions::default(), true, &Silent);
+                let _ = open("a", &bad, Siblings::NONE, &ReadOptions::default(), true, &Silent);
             }
         }
     }

@@ -6,6 +6,7 @@ use super::layout::{HEADER, SECTION_HEADER};
 use super::*;
 use crate::kind::Kind;
 use crate::open::open;
+use crate::siblings::Siblings;
 
 /// Files that the format's own program made, with their level and degree (tests/data/README.md).
 const FILES: [(&[u8], u8, u8); 5] = [
@@ -21,7 +22,7 @@ const GAUSSIANS: usize = 60;
 const BLOCK: f32 = 1.0;
 
 fn opened(bytes: &[u8]) -> Result<Splats> {
-    let opened = open("a", bytes, &ReadOptions::default(), true, &Silent)?;
+    let opened = open("a", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;
     assert_eq!(opened.kind(), Kind::Ksplat);
     Ok(opened.source().whole()?.into_owned())
 }
@@ -109,7 +110,7 @@ fn buckets_and_sections_are_where_they_say() {
     assert_eq!(x, [-1.0, 0.0, 11.0, 99.0, 100.0, 111.0]);
     assert_eq!(read.geometry.positions[2][1..], [10.0, 11.0]);
     assert_eq!(read.geometry.scales[0], [LEAST_SCALE; 3]);
-    let opened = open("a", &bytes, &ReadOptions::default(), true, &Silent).unwrap();
+    let opened = open("a", &bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent).unwrap();
     let mut part = opened.source().empty();
     opened.source().read(2..5, &mut part).unwrap();
     assert_eq!(part.geometry.positions[..], read.geometry.positions[2..5]);

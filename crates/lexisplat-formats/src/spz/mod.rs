@@ -219,10 +219,11 @@ mod tests {
 
     use super::*;
     use crate::open::open;
+    use crate::siblings::Siblings;
     use crate::write::WriteOptions;
 
     fn opened(bytes: &[u8]) -> Result<Splats> {
-        let opened = open("a.spz", bytes, &ReadOptions::default(), true, &Silent)?;
+        let opened = open("a.spz", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;
         Ok(opened.source().whole()?.into_owned())
     }
 

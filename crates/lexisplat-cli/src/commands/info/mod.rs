@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use self::codes::LexiFacts;
 use crate::args::{Common, Info};
-use crate::files::{input, tell, warn};
+use crate::files::{input, siblings, tell, warn};
 use crate::progress::Bars;
 
 /// Width of the longest bar of a histogram, in characters.
@@ -44,7 +44,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
-    let opened = open(&name, &bytes, &read, false, &bars)?;
+    let opened = open(&name, &bytes, siblings(&name), &read, false, &bars)?;
     let source = opened.source();
     warn(&name, source.warnings());
     let lint = stream::lint(source, &bars)?;

@@ -1,0 +1,272 @@
+//! `PlayCanvas`' SOG: values of 8 bits in pictures, and `meta.json` that says what they mean (specification: "The SOG
+//! format", developer.playcanvas.com; splat-transform, `write-sog.ts`, `read-sog.ts` and `read-sog-v1.ts`).
+//!
+//! A pixel of each picture belongs to a Gaussian. Positions have 16 bits along each axis, in two pictures, between ends that
+//! `meta.json` has as logarithms. Scales and colours are numbers of entries of a list of 256 values, rotations the three
+//! smallest parts. SH are numbers of entries of a palette, which is a picture too. Version 1 has steps between two ends in
+//! place of lists, and is read.
+
+mod archive;
+mod code;
+mod codebook;
+mod meta;
+mod palette;
+mod picture;
+mod tree;
+mod write;
+
+use std::ops::Range;
+
+use lexisplat::ply::ReadOptions;
+use lexisplat::sh::CHANNELS;
+use lexisplat::{Error, Limits, Result, SceneMeta, ShDegree};
+use serde_json::json;
+
+use self::archive::{Archive, Files};
+use self::meta::{Meta, Table};
+use self::picture::{Budget, Picture};
+use crate::rows::{Described, Rows, RowsMut};
+use crate::siblings::Siblings;
+
+pub(crate) use self::write::write;
+
+/// The name of the file that describes the others.
+const META: &str = "meta.json";
+/// Values of a byte.
+const LEVELS: usize = 256;
+/// Entries of the palette in a row of its picture.
+const ENTRIES_PER_ROW: usize = 64;
+/// Most entries of a palette, whose numbers have 16 bits.
+const MOST_ENTRIES: usize = 1 << 16;
+/// First bytes of a zip archive.
+const ZIP: &[u8] = b"PK";
+
+/// Reads the SOG in `bytes`, which messages call `name`: an archive, or `meta.json` beside the pictures that `siblings`
+/// gives. Also returns the number of bytes of all files that it read.
+///
+/// # Errors
+/// [`Error::Format`] for what is missing or damaged, [`Error::Limit`] for pictures that are too large, and errors of
+/// `siblings`.
+pub(crate) fn read<'a>(
+    name: &'a str,
+    bytes: &'a [u8],
+    siblings: Siblings<'a>,
+    options: &ReadOptions,
+) -> Result<(Described<'a>, u64)> {
+    let limits = &options.limits;
+    let is_archive = bytes.starts_with(ZIP);
+    let (files, meta) = if is_archive {
+        let files = Files::Archive(Archive::open(name, bytes)?);
+        let meta = files.get(META, limits)?;
+        limits.check_header(name, meta.len() as u64)?;
+        let meta = Meta::parse(name, &meta)?;
+        (files, meta)
+    } else {
+        limits.check_header(name, bytes.len() as u64)?;
+        (Files::Beside(name, siblings), Meta::parse(name, bytes)?)
+    };
+    limits.check_gaussians(name, meta.count)?;
+    let len = usize::try_from(meta.count).unwrap_or(usize::MAX);
+    let mut loader = Loader {
+        files,
+        is_archive,
+        len,
+        lossy: Vec::new(),
+        budget: Budget { name, limits, file_bytes: bytes.len() as u64, taken: 0 },
+    };
+    let [low, high] = &meta.means_files;
+    let [low, high] = [loader.load(low)?, loader.load(high)?];
+    let quats = loader.load(&meta.quats_file)?;
+    let scales = loader.load(&meta.scales_file)?;
+    let colours = loader.load(&meta.sh0_file)?;
+    let palette = meta.sh.as_ref().map(|sh| loader.palette(sh)).transpose()?;
+    let mut warnings = meta.warnings;
+    let odd = (0..len).filter(|&i| quats.pixel(i)[3] < code::FIRST_MODE).count();
+    if odd > 0 {
+        warnings.push(format!("{odd} rotations have no mode from 252 to 255, and are taken as none"));
+    }
+    for file in &loader.lossy {
+        warnings.push(format!("the picture '{file}' was written with loss: its values are not exact"));
+    }
+    let file_bytes = loader.budget.file_bytes;
+    let mut facts = vec![("version", json!(meta.version)), ("archive", json!(is_archive))];
+    facts.extend(meta.generator.map(|generator| ("generator", json!(generator))));
+    facts.push(("width", json!(low.width)));
+    facts.push(("height", json!(low.height)));
+    facts.extend(palette.as_ref().map(|palette| ("palette", json!(palette.entries))));
+    let degree = palette.as_ref().map_or(ShDegree::ZERO, |palette| palette.degree);
+    let rows = SogRows {
+        ends: meta.ends,
+        means: [low, high],
+        quats,
+        scales,
+        scale_values: meta.scales,
+        colours,
+        colour_values: meta.colours,
+        opacity_values: meta.opacities,
+        palette,
+    };
+    let described = Described {
+        rows: Box::new(rows),
+        len,
+        degree,
+        meta: SceneMeta { antialiased: meta.antialiased, ..SceneMeta::default() },
+        warnings,
+        facts,
+    };
+    Ok((described, file_bytes))
+}
+
+/// Decodes the pictures of a scene.
+struct Loader<'a> {
+    files: Files<'a>,
+    is_archive: bool,
+    /// Number of Gaussians.
+    len: usize,
+    /// Files that were written with loss.
+    lossy: Vec<String>,
+    budget: Budget<'a>,
+}
+
+impl Loader<'_> {
+    fn malformed(&self, text: String) -> Error {
+        Error::malformed(self.budget.name, text)
+    }
+
+    /// The picture in the file `called`.
+    fn picture(&mut self, called: &str) -> Result<Picture> {
+        let limits: &Limits = self.budget.limits;
+        let bytes = self.files.get(called, limits)?;
+        if !self.is_archive {
+            self.budget.file_bytes = self.budget.file_bytes.saturating_add(bytes.len() as u64);
+        }
+        let picture = Picture::read(called, &bytes, &mut self.budget)?;
+        if picture.is_lossy {
+            self.lossy.push(called.escape_debug().to_string());
+        }
+        Ok(picture)
+    }
+
+    /// The picture in the file `called`, which has a pixel for each Gaussian.
+    fn load(&mut self, called: &str) -> Result<Picture> {
+        let picture = self.picture(called)?;
+        if picture.len() < self.len {
+            let (width, height, len) = (picture.width, picture.height, self.len);
+            let text = format!("the picture '{called}' has {width} x {height} pixels for {len} Gaussians");
+            return Err(self.malformed(text));
+        }
+        Ok(picture)
+    }
+
+    fn palette(&mut self, sh: &meta::ShMeta) -> Result<Palette> {
+        let [palette, labels] = &sh.files;
+        let picture = self.picture(palette)?;
+        let (width, height) = (picture.width, picture.height);
+        let odd = |expected: String| format!("the picture '{palette}' is {width} x {height}, not {expected}");
+        let of_width = |degree: &ShDegree| ENTRIES_PER_ROW * degree.rest_per_channel() == width;
+        let (degree, entries) = match sh.palette {
+            Some((degree, entries)) if of_width(&degree) && entries <= ENTRIES_PER_ROW * height => {
+                (degree, entries)
+            }
+            Some((degree, entries)) => {
+                let rows = entries.div_ceil(ENTRIES_PER_ROW);
+                let expected = ENTRIES_PER_ROW * degree.rest_per_channel();
+                return Err(self.malformed(odd(format!("{expected} x {rows} for {entries} entries"))));
+            }
+            None => {
+                let degrees = [9, 24, 45].into_iter().filter_map(ShDegree::from_rest);
+                let degree = degrees.into_iter().find(of_width);
+                let degree = degree.ok_or_else(|| self.malformed(odd("192, 512 or 960 wide".to_owned())))?;
+                (degree, ENTRIES_PER_ROW * height)
+            }
+        };
+        if entries > MOST_ENTRIES {
+            return Err(
+                self.malformed(format!("{entries} entries of the palette, and {MOST_ENTRIES} are most"))
+            );
+        }
+        let labels = self.load(labels)?;
+        let palette = Palette { degree, entries, picture, labels, values: sh.values };
+        if let Some(i) = (0..self.len).find(|&i| palette.label(i) >= entries) {
+            let label = palette.label(i);
+            let text = format!("Gaussian {i} has entry {label} of the palette, which has {entries}");
+            return Err(self.malformed(text));
+        }
+        Ok(palette)
+    }
+}
+
+/// SH of some Gaussians in common.
+#[derive(Debug)]
+struct Palette {
+    degree: ShDegree,
+    entries: usize,
+    /// A pixel for each coefficient of an entry.
+    picture: Picture,
+    /// The entry of each Gaussian.
+    labels: Picture,
+    values: Table,
+}
+
+impl Palette {
+    /// The entry of Gaussian `i`.
+    fn label(&self, i: usize) -> usize {
+        let [low, high, ..] = self.labels.pixel(i);
+        u16::from_le_bytes([low, high]).into()
+    }
+
+    /// Decodes the SH of Gaussian `i`, channel by channel.
+    fn fill(&self, i: usize, rest: &mut [f32]) {
+        let per = self.degree.rest_per_channel();
+        // Entries follow each other, for a row of the picture ends with an entry.
+        let at = self.label(i) * per;
+        for k in 0..per {
+            let pixel = self.picture.pixel(at + k);
+            for c in 0..CHANNELS {
+                rest[c * per + k] = self.values[usize::from(pixel[c])];
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct SogRows {
+    ends: [[f64; 2]; 3],
+    /// The low and high bytes of positions.
+    means: [Picture; 2],
+    quats: Picture,
+    scales: Picture,
+    scale_values: [Table; 3],
+    /// Colours and opacities.
+    colours: Picture,
+    colour_values: [Table; 3],
+    opacity_values: Table,
+    palette: Option<Palette>,
+}
+
+impl Rows for SogRows {
+    fn fill(&self, range: Range<usize>, out: RowsMut<'_>) {
+        let per = self.palette.as_ref().map_or(0, |palette| palette.degree.rest());
+        for (j, i) in range.enumerate() {
+            let [low, high] = [self.means[0].pixel(i), self.means[1].pixel(i)];
+            out.positions[j] =
+                [0, 1, 2].map(|k| code::position(u16::from_le_bytes([low[k], high[k]]), self.ends[k]));
+            out.rotations[j] = code::rotation(self.quats.pixel(i));
+            let scales = self.scales.pixel(i);
+            out.scales[j] = [0, 1, 2].map(|k| self.scale_values[k][usize::from(scales[k])]);
+            let colours = self.colours.pixel(i);
+            out.dc[j] = [0, 1, 2].map(|k| self.colour_values[k][usize::from(colours[k])]);
+            out.opacities[j] = self.opacity_values[usize::from(colours[3])];
+            if let Some(palette) = &self.palette {
+                palette.fill(i, &mut out.sh_rest[j * per..(j + 1) * per]);
+            }
+        }
+    }
+
+    fn is_finite(&self) -> bool {
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests;

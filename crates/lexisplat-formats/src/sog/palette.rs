@@ -1,0 +1,304 @@
+//! A palette of SH: rows of coefficients that stand for many.
+//!
+//! First groups are split where the error is largest ([`super::tree`]). Then a few rounds of Lloyd's algorithm move the
+//! entries. An exact search for the nearest of 65,536 entries would take minutes for each round, so a row looks only at the
+//! entries of the groups of entries that are nearest to it.
+//!
+//! All sums are taken in one order, whatever the number of threads.
+
+use std::collections::HashMap;
+
+use super::tree;
+
+/// Sums that are taken side by side. Rows are multiples of it.
+pub(super) const LANES: usize = 8;
+/// Rounds of Lloyd's algorithm.
+const ROUNDS: usize = 6;
+/// Groups of entries whose entries a row looks at.
+const PROBES: usize = 16;
+/// Most groups of entries.
+const MOST_GROUPS: usize = 512;
+/// Most rows that the entries are found from; if there are more, every second, third... counts.
+const MOST_TRAINING: usize = 1 << 20;
+/// Rows of one task.
+const ROWS_PER_TASK: usize = 1024;
+
+/// Rows of numbers.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Rows<'a> {
+    /// Values of all, row by row.
+    pub(super) values: &'a [f32],
+    /// Values of one, a multiple of [`LANES`]; the last may be padding, which is 0.
+    pub(super) width: usize,
+}
+
+impl<'a> Rows<'a> {
+    pub(super) fn len(self) -> usize {
+        self.values.len() / self.width
+    }
+
+    pub(super) fn get(self, i: usize) -> &'a [f32] {
+        &self.values[i * self.width..(i + 1) * self.width]
+    }
+}
+
+/// Entries, and which of them each row has.
+#[derive(Debug, PartialEq)]
+pub(super) struct Palette {
+    /// Rows of the same width. No row comes before one that an earlier row of the scene has.
+    pub(super) entries: Vec<f32>,
+    pub(super) labels: Vec<u32>,
+}
+
+/// A palette of at most `most` entries for `rows`; with as few different rows, it is they themselves.
+pub(super) fn palette(rows: Rows<'_>, most: usize) -> Palette {
+    if let Some(palette) = distinct(rows, most) {
+        return palette;
+    }
+    let step = rows.len().div_ceil(MOST_TRAINING).max(1);
+    let sample: Vec<f32> = (0..rows.len()).step_by(step).flat_map(|i| rows.get(i)).copied().collect();
+    let sample = Rows { values: &sample, width: rows.width };
+    let mut entries = tree::split(sample, most);
+    let mut labels = vec![0; sample.len()];
+    for _ in 0..ROUNDS {
+        let distances = assign(sample, &entries, &mut labels);
+        update(sample, &labels, &distances, &mut entries);
+    }
+    labels = vec![0; rows.len()];
+    assign(rows, &entries, &mut labels);
+    by_appearance(&entries, labels, rows.width)
+}
+
+/// The different rows, if they are no more than `most`.
+fn distinct(rows: Rows<'_>, most: usize) -> Option<Palette> {
+    let mut seen = HashMap::new();
+    let mut palette = Palette { entries: Vec::new(), labels: Vec::with_capacity(rows.len()) };
+    for row in rows.values.chunks_exact(rows.width) {
+        let bits: Vec<u32> = row.iter().map(|v| v.to_bits()).collect();
+        let next = u32::try_from(seen.len()).ok()?;
+        let label = *seen.entry(bits).or_insert(next);
+        if label == next {
+            palette.entries.extend_from_slice(row);
+        }
+        if seen.len() > most {
+            return None;
+        }
+        palette.labels.push(label);
+    }
+    Some(palette)
+}
+
+/// Orders entries as the rows have them first, and leaves out those that none has.
+fn by_appearance(entries: &[f32], mut labels: Vec<u32>, width: usize) -> Palette {
+    let entries = Rows { values: entries, width };
+    let mut places = vec![u32::MAX; entries.len()];
+    let mut ordered = Vec::with_capacity(entries.values.len());
+    let mut count = 0;
+    for label in &mut labels {
+        let place = &mut places[*label as usize];
+        if *place == u32::MAX {
+            *place = count;
+            count += 1;
+            ordered.extend_from_slice(entries.get(*label as usize));
+        }
+        *label = *place;
+    }
+    Palette { entries: ordered, labels }
+}
+
+/// The squared distance of two rows.
+pub(super) fn distance(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; LANES];
+    for (a, b) in a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0) {
+        for k in 0..LANES {
+            let v = a[k] - b[k];
+            sums[k] += v * v;
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = sums;
+    ((a + b) + (c + d)) + ((e + f) + (g + h))
+}
+
+/// Adds a row to sums.
+pub(super) fn add(sums: &mut [f64], row: &[f32]) {
+    sums.iter_mut().zip(row).for_each(|(sum, v)| *sum += f64::from(*v));
+}
+
+/// Entries in groups of like ones.
+struct Groups {
+    means: Vec<f32>,
+    /// The entries, group by group, and their numbers.
+    entries: Vec<f32>,
+    numbers: Vec<u32>,
+    /// Where each group starts, and where the last ends.
+    starts: Vec<usize>,
+}
+
+impl Groups {
+    fn new(entries: Rows<'_>) -> Self {
+        let count = entries.len().isqrt().saturating_mul(2).clamp(1, MOST_GROUPS);
+        let means = tree::split(entries, count);
+        let of_means = Rows { values: &means, width: entries.width };
+        let mut nearest = vec![0_u32; entries.len()];
+        each_part(&mut nearest, |first, nearest| {
+            for (i, nearest) in (first..).zip(nearest) {
+                let row = entries.get(i);
+                *nearest = best((0_u32..).zip(of_means.values.chunks_exact(entries.width)), row).0;
+            }
+        });
+        let mut numbers: Vec<u32> = (0_u32..).take(entries.len()).collect();
+        numbers.sort_by_key(|&i| nearest[i as usize]);
+        let values = numbers.iter().flat_map(|&i| entries.get(i as usize)).copied().collect();
+        let group_of = |place: &u32| nearest[*place as usize] as usize;
+        let starts = (0..=of_means.len()).map(|g| numbers.partition_point(|i| group_of(i) < g)).collect();
+        Self { means, entries: values, numbers, starts }
+    }
+
+    /// The entry near to `row`, and its squared distance. `order` is scratch.
+    fn nearest(&self, row: &[f32], order: &mut Vec<(f32, usize)>) -> (u32, f32) {
+        let width = row.len();
+        order.clear();
+        order.extend(self.means.chunks_exact(width).enumerate().map(|(g, mean)| (distance(row, mean), g)));
+        let compare = |a: &(f32, usize), b: &(f32, usize)| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1));
+        if order.len() > PROBES {
+            order.select_nth_unstable_by(PROBES, compare);
+            order.truncate(PROBES);
+        }
+        order.sort_unstable_by(compare);
+        let mut found = (0, f32::INFINITY);
+        for &(_, g) in order.iter() {
+            let range = self.starts[g]..self.starts[g + 1];
+            let rows = self.entries[range.start * width..range.end * width].chunks_exact(width);
+            let nearer = best(self.numbers[range].iter().copied().zip(rows), row);
+            if nearer.1 < found.1 {
+                found = nearer;
+            }
+        }
+        found
+    }
+}
+
+/// The first of the nearest of `rows`, and its squared distance.
+fn best<'a>(rows: impl Iterator<Item = (u32, &'a [f32])>, row: &[f32]) -> (u32, f32) {
+    let mut found = (0, f32::INFINITY);
+    for (number, other) in rows {
+        let d = distance(row, other);
+        if d < found.1 {
+            found = (number, d);
+        }
+    }
+    found
+}
+
+/// Gives each row an entry near to it. Returns the squared distances.
+fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32]) -> Vec<f32> {
+    let groups = Groups::new(Rows { values: entries, width: rows.width });
+    let mut found: Vec<(u32, f32)> = vec![(0, 0.0); rows.len()];
+    each_part(&mut found, |first, part| {
+        let mut order = Vec::new();
+        for (i, found) in (first..).zip(part) {
+            *found = groups.nearest(rows.get(i), &mut order);
+        }
+    });
+    labels.iter_mut().zip(&found).for_each(|(label, found)| *label = found.0);
+    found.iter().map(|found| found.1).collect()
+}
+
+/// Moves each entry to the mean of its rows. Entries without rows go to the rows that are farthest from theirs.
+fn update(rows: Rows<'_>, labels: &[u32], distances: &[f32], entries: &mut [f32]) {
+    let width = rows.width;
+    let mut sums = vec![0.0_f64; entries.len()];
+    let mut counts = vec![0_u32; entries.len() / width];
+    for (i, &label) in labels.iter().enumerate() {
+        let at = label as usize;
+        add(&mut sums[at * width..(at + 1) * width], rows.get(i));
+        counts[at] += 1;
+    }
+    let mut far: Vec<usize> = Vec::new();
+    if counts.contains(&0) {
+        far = (0..rows.len()).collect();
+        far.sort_by(|&a, &b| distances[b].total_cmp(&distances[a]));
+    }
+    let mut far = far.into_iter();
+    for ((entry, sums), count) in entries.chunks_exact_mut(width).zip(sums.chunks_exact(width)).zip(counts) {
+        if count > 0 {
+            #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
+            entry.iter_mut().zip(sums).for_each(|(v, sum)| *v = (sum / f64::from(count)) as f32);
+        } else if let Some(row) = far.next() {
+            entry.copy_from_slice(rows.get(row));
+        }
+    }
+}
+
+/// Works on parts of `items`, on all cores if there are threads. The work gets the number of the first item.
+fn each_part<T: Send>(items: &mut [T], work: impl Fn(usize, &mut [T]) + Sync) {
+    #[cfg(feature = "parallel")]
+    {
+        use rayon::prelude::*;
+        let parts = items.par_chunks_mut(ROWS_PER_TASK).enumerate();
+        parts.for_each(|(k, part)| work(k * ROWS_PER_TASK, part));
+    }
+    #[cfg(not(feature = "parallel"))]
+    items.chunks_mut(ROWS_PER_TASK).enumerate().for_each(|(k, part)| work(k * ROWS_PER_TASK, part));
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat_testing::Random;
+
+    use super::*;
+
+    fn rows(count: usize, width: usize) -> Vec<f32> {
+        let mut random = Random::new(7);
+        (0..count * width).map(|_| random.unit() * random.unit()).collect()
+    }
+
+    fn error(rows: Rows<'_>, palette: &Palette) -> f64 {
+        let entries = Rows { values: &palette.entries, width: rows.width };
+        let pairs = palette.labels.iter().enumerate();
+        pairs.map(|(i, &label)| f64::from(distance(rows.get(i), entries.get(label as usize)))).sum()
+    }
+
+    /// Plain Lloyd from every eighth row, with all distances.
+    fn plain(rows: Rows<'_>, most: usize) -> f64 {
+        let step = rows.len() / most;
+        let mut entries: Vec<f32> = (0..most).flat_map(|k| rows.get(k * step)).copied().collect();
+        let mut labels = vec![0_u32; rows.len()];
+        let mut error = 0.0;
+        for _ in 0..10 {
+            let width = rows.width;
+            let found: Vec<(u32, f32)> =
+                (0..rows.len()).map(|i| best((0..).zip(entries.chunks_exact(width)), rows.get(i))).collect();
+            labels.iter_mut().zip(&found).for_each(|(label, found)| *label = found.0);
+            let distances: Vec<f32> = found.iter().map(|found| found.1).collect();
+            error = distances.iter().map(|v| f64::from(*v)).sum();
+            update(rows, &labels, &distances, &mut entries);
+        }
+        error
+    }
+
+    #[test]
+    fn palettes_are_as_near_as_plain_ones_on_any_number_of_threads() {
+        let values = rows(4000, 16);
+        let rows = Rows { values: &values, width: 16 };
+        let found = palette(rows, 500);
+        assert!(found.entries.len() / 16 <= 500);
+        let [ours, theirs] = [error(rows, &found), plain(rows, 500)];
+        assert!(ours < 1.03 * theirs, "{ours} {theirs}");
+        #[cfg(feature = "parallel")]
+        for threads in [1, 3] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            assert!(pool.install(|| palette(rows, 500)) == found);
+        }
+    }
+
+    #[test]
+    fn few_rows_are_kept_in_their_order() {
+        let values: Vec<f32> = [3.0, 1.0, 3.0, 2.0].iter().flat_map(|v| [*v; LANES]).collect();
+        let rows = Rows { values: &values, width: LANES };
+        let found = palette(rows, 3);
+        assert_eq!((found.entries.len(), found.labels), (3 * LANES, vec![0, 1, 0, 2]));
+        assert_eq!(palette(rows, 2).labels, [0, 1, 0, 1]);
+        assert_eq!(palette(Rows { values: &[], width: LANES }, 1).labels, [0_u32; 0]);
+    }
+}
