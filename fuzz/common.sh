@@ -21,9 +21,10 @@ fuzz() {
   local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=1)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
-    lexi | packed | feed | dictionary | spz | sog | compressed_ply | splat | ksplat) options+=(-max_len=16384) ;;
+    lexi | packed | feed | dictionary | spz | compressed_ply | splat | ksplat) options+=(-max_len=16384) ;;
     cameras_json | transforms) options+=(-max_len=8192 -dict=dictionaries/json.dict) ;;
     colmap) options+=(-max_len=8192 -dict=dictionaries/colmap.dict) ;;
+    sog) options+=(-max_len=32768) ;;
     gltf) options+=(-max_len=16384 -dict=dictionaries/json.dict) ;;
     *) options+=(-max_len=2048) ;;
   esac
