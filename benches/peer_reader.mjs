@@ -18,7 +18,9 @@ const bufferOf = (file) => {
     const bytes = fs.readFileSync(file);
     return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
 };
-// Degree 1 and up, of one channel.
+// gaussian-splats-3d waits with it between steps.
+globalThis.window = globalThis;
+// SH coefficients of one channel above degree 0, by degree.
 const REST = [0, 3, 8, 15];
 
 function writePly(file, names, count, fill) {
@@ -55,14 +57,14 @@ async function reader(peer, file) {
     }
     const theirs = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
     // Not optimised: nothing is sorted or left out.
-    const bySection = {
+    const readers = {
         ".spz": () => theirs.SpzLoader.loadFromFileData(buffer, 1, 0, false, 2),
         ".splat": () => theirs.SplatLoader.loadFromFileData(buffer, 0, 0, false),
         ".ksplat": () => theirs.KSplatLoader.loadFromFileData(buffer),
         ".ply": () => theirs.PlyLoader.loadFromFileData(buffer, 0, 0, false, 2),
     }[kind];
     return async () => {
-        const splats = await bySection();
+        const splats = await readers();
         return { count: splats.getSplatCount(), splats };
     };
 }
@@ -94,6 +96,11 @@ async function dumpSplats(splats, out) {
     const [centre, scale, turn, colour] = [new Vector3(), new Vector3(), new Quaternion(), new Vector4()];
     const sh = new Float32Array(count * 3 * per);
     if (degree > 0) splats.fillSphericalHarmonicsArray(sh, degree, undefined, 0, count - 1, 0, 0);
+    if (splats.compressionLevel === 2) {
+        // These come as bytes.
+        const { minSphericalHarmonicsCoeff: low, maxSphericalHarmonicsCoeff: high } = splats;
+        sh.forEach((byte, k) => (sh[k] = low + (byte / 255) * (high - low)));
+    }
     const tail = ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
     const names = ["x", "y", "z", "red", "green", "blue", "alpha", ...tail, ...restNames(per)];
     writePly(out, names, count, (i, row) => {
@@ -102,13 +109,8 @@ async function dumpSplats(splats, out) {
         splats.getSplatColor(i, colour);
         row.set([centre.x, centre.y, centre.z, colour.x, colour.y, colour.z, colour.w]);
         row.set([Math.log(scale.x), Math.log(scale.y), Math.log(scale.z), turn.w, turn.x, turn.y, turn.z], 7);
-        // Degree by degree, and channel by channel within each.
-        for (let l = 1; l <= degree; l++) {
-            for (let c = 0; c < 3; c++) {
-                for (let k = 0; k < 2 * l + 1; k++) {
-                    row[14 + c * per + REST[l - 1] + k] = sh[3 * (i * per + REST[l - 1] + k) + c];
-                }
-            }
+        for (let k = 0; k < per; k++) {
+            for (let c = 0; c < 3; c++) row[14 + c * per + k] = sh[3 * (i * per + k) + c];
         }
     });
 }
