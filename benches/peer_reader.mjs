@@ -1,0 +1,147 @@
+// The readers of npm's packages, for formats_beside_peers.py. PACKAGES is a folder `node_modules`.
+//
+//   node peer_reader.mjs PACKAGES versions
+//   node peer_reader.mjs PACKAGES read PEER FILE OUT.ply    PEER is three or gaussian-splats-3d
+//   node peer_reader.mjs PACKAGES time PEER FILE ROUNDS     or splat-transform; seconds of the fastest round, and Gaussians
+//   node peer_reader.mjs PACKAGES ksplat FILE.ply OUT.ksplat LEVEL DEGREE
+//
+// three keeps covariances instead of scales and rotations, and colours of 8 bits: its OUT.ply has the properties cov_0 to
+// cov_5, red, green, blue and alpha. All that is written is what the reader gave, in its own axes.
+
+import fs from "node:fs";
+import path from "node:path";
+import { pathToFileURL } from "node:url";
+
+const [packages, task, ...words] = process.argv.slice(2);
+const load = (name) => import(pathToFileURL(path.resolve(packages, name)).href);
+const bufferOf = (file) => {
+    const bytes = fs.readFileSync(file);
+    return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
+};
+// gaussian-splats-3d waits with it between steps.
+globalThis.window = globalThis;
+// SH coefficients of one channel above degree 0, by degree.
+const REST = [0, 3, 8, 15];
+
+function writePly(file, names, count, fill) {
+    const lines = names.map((name) => `property float ${name}\n`).join("");
+    const rows = new Float32Array(count * names.length);
+    for (let i = 0; i < count; i++) fill(i, rows.subarray(i * names.length, (i + 1) * names.length));
+    fs.writeFileSync(file, `ply\nformat binary_little_endian 1.0\nelement vertex ${count}\n${lines}end_header\n`);
+    fs.appendFileSync(file, new Uint8Array(rows.buffer));
+}
+
+const restNames = (per) => Array.from({ length: 3 * per }, (_, k) => `f_rest_${k}`);
+
+// A function that reads the bytes again each time, and gives the number of Gaussians and what was read.
+async function reader(peer, file) {
+    const kind = path.extname(file);
+    const buffer = bufferOf(file);
+    if (peer === "splat-transform") {
+        const { readFile, getInputFormat, MemoryReadFileSystem } = await load("@playcanvas/splat-transform/dist/index.mjs");
+        const fileSystem = new MemoryReadFileSystem();
+        fileSystem.set(file, new Uint8Array(buffer));
+        const inputFormat = getInputFormat(file);
+        return async () => {
+            const [table] = await readFile({ filename: file, inputFormat, options: {}, params: [], fileSystem });
+            return { count: table.numRows };
+        };
+    }
+    if (peer === "three") {
+        const name = { ".spz": "SPZLoader", ".splat": "SPLATLoader", ".ksplat": "KSPLATLoader", ".ply": "GaussianSplatPLYLoader" }[kind];
+        const Loader = (await load(`three/examples/jsm/loaders/${name}.js`))[name];
+        return async () => {
+            const geometry = await new Loader().parse(buffer);
+            return { count: geometry.attributes.position.count, geometry };
+        };
+    }
+    const theirs = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
+    // Not optimised: nothing is sorted or left out.
+    const readers = {
+        ".spz": () => theirs.SpzLoader.loadFromFileData(buffer, 1, 0, false, 2),
+        ".splat": () => theirs.SplatLoader.loadFromFileData(buffer, 0, 0, false),
+        ".ksplat": () => theirs.KSplatLoader.loadFromFileData(buffer),
+        ".ply": () => theirs.PlyLoader.loadFromFileData(buffer, 0, 0, false, 2),
+    }[kind];
+    return async () => {
+        const splats = await readers();
+        return { count: splats.getSplatCount(), splats };
+    };
+}
+
+async function dumpThree(geometry, out) {
+    const { position, covariance, color } = geometry.attributes;
+    // The band's bytes of one Gaussian: coefficient by coefficient with the colour inside.
+    const bands = [1, 2, 3].map((l) => geometry.attributes[`sphericalHarmonics${l}`]).filter(Boolean);
+    const per = REST[bands.length];
+    const bytes = bands.map((band) => new Uint8Array(band.array.buffer, band.array.byteOffset, band.array.byteLength));
+    const names = ["x", "y", "z", ...[0, 1, 2, 3, 4, 5].map((k) => `cov_${k}`), "red", "green", "blue", "alpha", ...restNames(per)];
+    writePly(out, names, position.count, (i, row) => {
+        row.set(position.array.subarray(3 * i, 3 * i + 3));
+        row.set(covariance.array.subarray(6 * i, 6 * i + 6), 3);
+        row.set(color.array.subarray(4 * i, 4 * i + 4), 9);
+        bands.forEach((band, l) => {
+            const from = i * band.itemSize * 4;
+            for (let k = 0; k < 2 * l + 3; k++) {
+                for (let c = 0; c < 3; c++) row[13 + c * per + REST[l] + k] = (bytes[l][from + 3 * k + c] - 128) / 128;
+            }
+        });
+    });
+}
+
+async function dumpSplats(splats, out) {
+    const { Vector3, Quaternion, Vector4 } = await load("three/build/three.module.js");
+    const degree = splats.getMinSphericalHarmonicsDegree();
+    const per = REST[degree], count = splats.getSplatCount();
+    const [centre, scale, turn, colour] = [new Vector3(), new Vector3(), new Quaternion(), new Vector4()];
+    const sh = new Float32Array(count * 3 * per);
+    if (degree > 0) splats.fillSphericalHarmonicsArray(sh, degree, undefined, 0, count - 1, 0, 0);
+    if (splats.compressionLevel === 2) {
+        // These come as bytes.
+        const { minSphericalHarmonicsCoeff: low, maxSphericalHarmonicsCoeff: high } = splats;
+        sh.forEach((byte, k) => (sh[k] = low + (byte / 255) * (high - low)));
+    }
+    const tail = ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
+    const names = ["x", "y", "z", "red", "green", "blue", "alpha", ...tail, ...restNames(per)];
+    writePly(out, names, count, (i, row) => {
+        splats.getSplatCenter(i, centre);
+        splats.getSplatScaleAndRotation(i, scale, turn);
+        splats.getSplatColor(i, colour);
+        row.set([centre.x, centre.y, centre.z, colour.x, colour.y, colour.z, colour.w]);
+        row.set([Math.log(scale.x), Math.log(scale.y), Math.log(scale.z), turn.w, turn.x, turn.y, turn.z], 7);
+        for (let k = 0; k < per; k++) {
+            for (let c = 0; c < 3; c++) row[14 + c * per + k] = sh[3 * (i * per + k) + c];
+        }
+    });
+}
+
+if (task === "versions") {
+    for (const name of ["@playcanvas/splat-transform", "@adobe/spz", "three", "@mkkellogg/gaussian-splats-3d"]) {
+        const file = path.resolve(packages, name, "package.json");
+        if (fs.existsSync(file)) console.log(`${name} ${JSON.parse(fs.readFileSync(file)).version}`);
+    }
+    console.log(`node ${process.version}`);
+} else if (task === "time") {
+    const [peer, file, rounds] = words;
+    const read = await reader(peer, file);
+    let best = Infinity, count = 0;
+    for (let round = 0; round < Number(rounds); round++) {
+        const start = performance.now();
+        ({ count } = await read());
+        best = Math.min(best, (performance.now() - start) / 1000);
+    }
+    console.log(`${best.toFixed(4)} ${count}`);
+} else if (task === "read") {
+    const [peer, file, out] = words;
+    const { geometry, splats } = await (await reader(peer, file))();
+    await (geometry ? dumpThree(geometry, out) : dumpSplats(splats, out));
+} else if (task === "ksplat") {
+    const [file, out, level, degree] = words;
+    const { PlyParser, SplatBufferGenerator } = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
+    const splats = PlyParser.parseToUncompressedSplatArray(bufferOf(file), Number(degree));
+    const made = SplatBufferGenerator.getStandardGenerator(1, Number(level)).generateFromUncompressedSplatArray(splats);
+    fs.writeFileSync(out, Buffer.from(made.bufferData));
+} else {
+    console.error("versions | read PEER FILE OUT.ply | time PEER FILE ROUNDS | ksplat FILE.ply OUT.ksplat LEVEL DEGREE");
+    process.exit(2);
+}
