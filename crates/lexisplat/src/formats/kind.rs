@@ -8,8 +8,8 @@ use crate::support::error::{Error, FormatError, Result};
 const SPLAT_EXTENSION: &str = ".splat";
 /// Extension of the files that [`Unsupported::Ksplat`] means. Their bytes have no mark.
 const KSPLAT_EXTENSION: &str = ".ksplat";
-/// What to do with most kinds of file that are not read.
-const CONVERT: &str = "convert it to PLY first, for example with splat-transform";
+/// What to do with a scene of another format where this crate alone reads.
+const CONVERT: &str = "'lexisplat convert' makes a PLY of it, and the crate lexisplat-formats reads it";
 /// Where the JSON header of a safetensors file begins: after its length, a u64.
 const JSON_OFFSET: usize = 8;
 
@@ -121,11 +121,7 @@ impl Unsupported {
                 "it is never read here: load it where it was made and write a PLY, for EAGLES with \
                  load_compressed_pkl and save_ply",
             ],
-            Self::CompressedPly => [
-                "a PlayCanvas compressed.ply",
-                "unpack it first with 'splat-transform in.compressed.ply out.ply', or better, start from the \
-                 trainer's own PLY",
-            ],
+            Self::CompressedPly => ["a PlayCanvas compressed.ply", CONVERT],
             Self::Anchors => [
                 "a Scaffold-GS anchor model",
                 "its Gaussians come out of a network; export them as plain 3DGS first",
@@ -136,7 +132,7 @@ impl Unsupported {
             ],
             Self::TwoDimensional => [
                 "a 2D Gaussian Splatting model (no scale_2)",
-                "give it a third axis first: splat-transform writes one, or add a column scale_2 of about -20",
+                "give it a third axis first: add a column scale_2 of about -20",
             ],
         }
     }

@@ -319,7 +319,7 @@ mod tests {
             assert!(!said.contains('\n') && !said.contains('\x1b'), "{said:?}");
         }
         let gzip = Header::parse("a.spz", &[0x1f, 0x8b, 8], &Limits::default()).unwrap_err().to_string();
-        assert!(gzip.contains("SPZ") && gzip.contains("splat-transform"), "{gzip}");
+        assert!(gzip.contains("SPZ") && gzip.contains("lexisplat convert"), "{gzip}");
     }
 
     #[test]
