@@ -19,7 +19,8 @@ const EXACT: &str = "Options of the layouts f16, f32 and paper";
 /// Compress a trained scene to a .lexi file. Needs no photos, no cameras and no retraining.
 #[derive(Debug, Args)]
 pub(crate) struct Compress {
-    /// The scene: a PLY, best the trainer's own, or SPZ, compressed.ply or .splat; `-` reads standard input.
+    /// The scene: a PLY, best the trainer's own, or SPZ, SOG, compressed.ply, .splat, .ksplat or glTF;
+    /// `-` reads standard input.
     pub(crate) input: PathBuf,
     /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi].
     #[arg(short, long)]

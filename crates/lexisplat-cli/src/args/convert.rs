@@ -16,7 +16,8 @@ const FORMATS: &str = "Options of formats";
 
 /// Convert scenes between formats. Several scenes become one.
 ///
-/// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply and .splat. What a file is, its content tells. What a format cannot
+/// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply, .splat and glb, and reads .ksplat and .gltf. What a file is, its
+/// content tells. What a format cannot
 /// hold is printed. A .lexi is made as by `lexisplat compress` without options, which reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
@@ -65,6 +66,10 @@ pub(crate) struct Convert {
     /// [default: 5,4, as SPZ's own library].
     #[arg(long, value_name = "N,N", value_parser = sh_bits, help_heading = FORMATS)]
     pub(crate) sh_bits: Option<[u8; 2]>,
+    /// Write the splats of a glb as an SPZ, as CesiumJS takes them, and not as floats. The extension of glTF for it is a
+    /// draft.
+    #[arg(long, help_heading = FORMATS)]
+    pub(crate) glb_spz: bool,
 }
 
 impl Convert {
@@ -87,6 +92,7 @@ impl Convert {
         options.spz_version = self.spz_version.unwrap_or(options.spz_version);
         options.sog_palette = self.sog_palette.unwrap_or(options.sog_palette);
         options.sh_bits = self.sh_bits.unwrap_or(options.sh_bits);
+        options.glb_spz = self.glb_spz;
         options
     }
 }

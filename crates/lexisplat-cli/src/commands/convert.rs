@@ -81,6 +81,11 @@ fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
     }
     let name = output.display().to_string();
     match Kind::of_extension(&name) {
+        Some(Kind::Gltf) if !name.to_ascii_lowercase().ends_with(Kind::Gltf.extension()) => Err(Misuse {
+            problem: format!("{name}: glTF is written as one file, a .glb"),
+            help: "end the output with .glb".to_owned(),
+        }
+        .into()),
         Some(kind) if kind != Kind::Lexi && !Kind::WRITTEN.contains(&kind) => Err(Misuse {
             problem: format!("{name}: {kind} is not written"),
             help: "name an output of another format, such as .spz or .compressed.ply".to_owned(),
@@ -90,7 +95,7 @@ fn kind_of(output: &Path, asked: Option<Kind>) -> Result<Kind> {
         None => Err(Misuse {
             problem: format!("{name}: the extension names no format"),
             help:
-                "end the output with .ply, .lexi, .spz, .sog, .compressed.ply or .splat, or say --to FORMAT"
+                "end the output with .ply, .lexi, .spz, .sog, .compressed.ply, .splat or .glb, or say --to FORMAT"
                     .to_owned(),
         }
         .into()),
@@ -188,6 +193,8 @@ mod tests {
         assert_eq!(kind("a.SPZ", None).unwrap(), Kind::Spz);
         assert_eq!(kind("a.compressed.ply", None).unwrap(), Kind::CompressedPly);
         assert_eq!(kind("a.ply", Some(Kind::CompressedPly)).unwrap(), Kind::CompressedPly);
+        assert_eq!(kind("a.glb", None).unwrap(), Kind::Gltf);
+        assert!(kind("a.gltf", None).unwrap_err().to_string().contains(".glb"));
         assert!(kind("a.ksplat", None).unwrap_err().to_string().contains("not written"));
         assert!(kind("a", None).is_err());
     }

@@ -121,9 +121,11 @@ fn spread(scale: f32) -> (f32, bool) {
 /// The share of 0 to 1 that `opacity`, which is before the sigmoid, means.
 #[expect(clippy::cast_possible_truncation, reason = "the file has single precision")]
 pub(super) fn share(opacity: f32) -> f32 {
-    let sigmoid = |opacity: f32| {
-        (1.0 / (1.0 + libm::exp(-f64::from(opacity.clamp(-SURE_OPACITY, SURE_OPACITY))))) as f32
-    };
+    // This value stands for infinity, and its negative for that of 0.
+    if opacity <= -SURE_OPACITY {
+        return 0.0;
+    }
+    let sigmoid = |opacity: f32| (1.0 / (1.0 + libm::exp(-f64::from(opacity)))) as f32;
     f32::from_bits(settled(sigmoid(opacity).to_bits(), |bits| sigmoid(logit(f32::from_bits(bits))).to_bits()))
 }
 
