@@ -1,6 +1,7 @@
 # What fuzz/run and fuzz/long share. Both change to this folder before they read it.
 
-all_targets=(packed feed lexi ply entropy scene dictionary colmap transforms cameras_json)
+all_targets=(packed feed lexi ply entropy scene dictionary colmap transforms cameras_json
+  spz sog compressed_ply splat ksplat gltf)
 corpus=${FUZZ_CORPUS:-$PWD/corpus}
 toolchain=${FUZZ_TOOLCHAIN:-nightly}
 
@@ -20,9 +21,11 @@ fuzz() {
   local options=(-malloc_limit_mb=512 -rss_limit_mb=2048 -timeout="${FUZZ_TIMEOUT:-60}" -report_slow_units=1)
   case $2 in
     ply) options+=(-max_len=16384 -dict=dictionaries/ply.dict) ;;
-    lexi | packed | feed | dictionary) options+=(-max_len=16384) ;;
+    lexi | packed | feed | dictionary | spz | compressed_ply | splat | ksplat) options+=(-max_len=16384) ;;
     cameras_json | transforms) options+=(-max_len=8192 -dict=dictionaries/json.dict) ;;
     colmap) options+=(-max_len=8192 -dict=dictionaries/colmap.dict) ;;
+    sog) options+=(-max_len=32768) ;;
+    gltf) options+=(-max_len=16384 -dict=dictionaries/json.dict) ;;
     *) options+=(-max_len=2048) ;;
   esac
   mkdir -p "artifacts/$2" "$corpus/$2"

@@ -4,6 +4,7 @@
 #[allow(dead_code, reason = "the tests of the codec use more of it")]
 pub mod allocator;
 pub mod container;
+pub mod formats;
 pub mod invariants;
 pub mod made;
 pub mod parts;

@@ -48,6 +48,25 @@ pub fn ply(
     });
 }
 
+/// Reads `source`, the file `data`, in parts, whose sizes follow from `data`, and compares with `whole`.
+///
+/// # Panics
+/// If they differ.
+pub fn source(data: &[u8], source: &dyn SplatSource, whole: &Splats) {
+    assert_eq!(source.len(), whole.len());
+    let mut part = source.empty();
+    assert_eq!((&part.meta, part.degree), (&whole.meta, whole.degree));
+    let (mut start, mut sizes) = (0, sizes(data, whole.len()));
+    while start < whole.len() {
+        let end = whole.len().min(start + sizes.next().unwrap_or(1));
+        source.read(start..end, &mut part).expect("all was looked at");
+        assert_eq!(part.len(), end - start);
+        part.validate().expect("arrays fit");
+        (start..end).enumerate().for_each(|(k, j)| same_splat(&part, k, whole, j));
+        start = end;
+    }
+}
+
 /// Sizes of parts: some of 0 to 4 Gaussians, then some of a quarter or more.
 fn sizes(data: &[u8], gaussians: usize) -> impl Iterator<Item = usize> {
     // A stride that is prime, so that files of any length give sizes of all kinds.

@@ -3,12 +3,10 @@
 use std::fmt;
 
 use lexisplat::FileKind;
-use serde_json::Value;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
 
-use crate::{compressed_ply, ksplat, splat};
-
-/// First bytes of a glb.
-const GLB: &[u8] = b"glTF";
+use crate::{compressed_ply, gltf, ksplat, splat};
 
 /// A format of scenes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -28,7 +26,7 @@ pub enum Kind {
     Splat,
     /// The `.ksplat` of mkkellogg's viewer, compression levels 0 to 2.
     Ksplat,
-    /// glTF or glb with `KHR_gaussian_splatting`. Known, and not read yet.
+    /// glTF 2.0 with `KHR_gaussian_splatting`: a glb, or JSON with its data inside.
     Gltf,
 }
 
@@ -46,7 +44,8 @@ impl Kind {
     ];
 
     /// The formats that [`write`](fn@crate::write) writes.
-    pub const WRITTEN: [Self; 5] = [Self::Ply, Self::Spz, Self::Sog, Self::CompressedPly, Self::Splat];
+    pub const WRITTEN: [Self; 6] =
+        [Self::Ply, Self::Spz, Self::Sog, Self::CompressedPly, Self::Splat, Self::Gltf];
 
     /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
     #[must_use]
@@ -54,7 +53,7 @@ impl Kind {
         match bytes {
             [b'N', b'G', b'S', b'P', ..] => return Some(Self::Spz),
             [b'P', b'K', 3, 4, ..] => return Some(Self::Sog),
-            bytes if bytes.starts_with(GLB) => return Some(Self::Gltf),
+            bytes if bytes.starts_with(gltf::MAGIC) => return Some(Self::Gltf),
             _ => {}
         }
         match FileKind::of(name, bytes) {
@@ -68,7 +67,7 @@ impl Kind {
             return Some(Self::Spz);
         }
         if bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
-            return of_json(bytes);
+            return of_json(bytes).or(Self::of_extension(name).filter(|kind| *kind == Self::Gltf));
         }
         if ksplat::is_likely(bytes) {
             return Some(Self::Ksplat);
@@ -129,15 +128,21 @@ impl fmt::Display for Kind {
     }
 }
 
+/// Names in a file of JSON that tell what it is.
+#[derive(Deserialize)]
+struct Marks {
+    asset: Option<IgnoredAny>,
+    means: Option<IgnoredAny>,
+    quats: Option<IgnoredAny>,
+}
+
 /// The format of a file of JSON.
 fn of_json(bytes: &[u8]) -> Option<Kind> {
-    let value: Value = serde_json::from_slice(bytes).ok()?;
-    if value.get("asset").is_some() {
-        Some(Kind::Gltf)
-    } else if value.get("means").is_some() && value.get("quats").is_some() {
-        Some(Kind::Sog)
-    } else {
-        None
+    let marks: Marks = serde_json::from_slice(bytes).ok()?;
+    match (marks.asset, marks.means, marks.quats) {
+        (Some(_), ..) => Some(Kind::Gltf),
+        (None, Some(_), Some(_)) => Some(Kind::Sog),
+        _ => None,
     }
 }
 

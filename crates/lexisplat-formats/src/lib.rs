@@ -9,6 +9,7 @@
 mod axes;
 mod compressed_ply;
 mod edit;
+mod gltf;
 mod kind;
 mod ksplat;
 mod merge;

@@ -7,7 +7,7 @@ use lexisplat::{Error, FileKind, Progress, Result, SplatSource};
 use crate::kind::Kind;
 use crate::siblings::Siblings;
 use crate::source::FormatSource;
-use crate::{compressed_ply, ksplat, sog, splat, spz};
+use crate::{compressed_ply, gltf, ksplat, sog, splat, spz};
 
 /// A scene of any format, opened.
 #[derive(Debug)]
@@ -61,7 +61,7 @@ pub fn open<'a>(
     let mut file_bytes = bytes.len() as u64;
     let file = match kind {
         // The PLY reader refuses other files by what they are.
-        None | Some(Kind::Ply | Kind::Gltf) => {
+        None | Some(Kind::Ply) => {
             if kind.is_none() && FileKind::of(name, bytes) == FileKind::Unknown {
                 return Err(Error::malformed(name, "the format is not known"));
             }
@@ -80,6 +80,7 @@ pub fn open<'a>(
         Some(Kind::CompressedPly) => compressed_ply::read(name, bytes, options)?,
         Some(Kind::Splat) => splat::read(name, bytes, options)?,
         Some(Kind::Ksplat) => ksplat::read(name, bytes, options)?,
+        Some(Kind::Gltf) => gltf::read(name, bytes, options)?,
     };
     progress.check()?;
     let source = FormatSource::new(name, file_bytes, file, options)?;

@@ -32,6 +32,37 @@ pub(crate) struct RowsMut<'a> {
     pub(crate) sh_rest: &'a mut [f32],
 }
 
+impl RowsMut<'_> {
+    /// The same arrays for a while.
+    pub(crate) fn reborrow(&mut self) -> RowsMut<'_> {
+        RowsMut {
+            positions: self.positions,
+            dc: self.dc,
+            opacities: self.opacities,
+            scales: self.scales,
+            rotations: self.rotations,
+            sh_rest: self.sh_rest,
+        }
+    }
+}
+
+impl<'a> RowsMut<'a> {
+    /// Takes away the first `n` Gaussians, of `rest` values of SH-rest each.
+    pub(crate) fn take(&mut self, n: usize, rest: usize) -> Self {
+        fn split<'a, T>(from: &mut &'a mut [T], n: usize) -> &'a mut [T] {
+            from.split_off_mut(..n).unwrap_or_default()
+        }
+        RowsMut {
+            positions: split(&mut self.positions, n),
+            dc: split(&mut self.dc, n),
+            opacities: split(&mut self.opacities, n),
+            scales: split(&mut self.scales, n),
+            rotations: split(&mut self.rotations, n),
+            sh_rest: split(&mut self.sh_rest, n * rest),
+        }
+    }
+}
+
 /// A file whose header is valid and whose Gaussians are all there.
 #[derive(Debug)]
 pub(crate) struct Described<'a> {

@@ -125,36 +125,6 @@ impl<'a> FormatSource<'a> {
     }
 }
 
-impl RowsMut<'_> {
-    fn reborrow(&mut self) -> RowsMut<'_> {
-        RowsMut {
-            positions: self.positions,
-            dc: self.dc,
-            opacities: self.opacities,
-            scales: self.scales,
-            rotations: self.rotations,
-            sh_rest: self.sh_rest,
-        }
-    }
-}
-
-impl<'a> RowsMut<'a> {
-    /// Takes away the first `n` Gaussians, of `rest` values of SH-rest each.
-    fn take(&mut self, n: usize, rest: usize) -> Self {
-        fn split<'a, T>(from: &mut &'a mut [T], n: usize) -> &'a mut [T] {
-            from.split_off_mut(..n).unwrap_or_default()
-        }
-        RowsMut {
-            positions: split(&mut self.positions, n),
-            dc: split(&mut self.dc, n),
-            opacities: split(&mut self.opacities, n),
-            scales: split(&mut self.scales, n),
-            rotations: split(&mut self.rotations, n),
-            sh_rest: split(&mut self.sh_rest, n * rest),
-        }
-    }
-}
-
 /// Resizes all arrays to `n` Gaussians. Their contents have no meaning afterwards.
 fn resize(part: &mut Splats, n: usize, rest: usize) {
     /// New memory comes zeroed from the system. The threads that fill it are the first to touch it.

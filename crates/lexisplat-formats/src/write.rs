@@ -4,7 +4,7 @@ use lexisplat::{Error, Progress, Result, ShDegree, Sink, Splats, ply};
 use serde::Serialize;
 
 use crate::kind::Kind;
-use crate::{compressed_ply, sog, splat, spz};
+use crate::{compressed_ply, gltf, sog, splat, spz};
 
 /// How to write.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,11 +17,14 @@ pub struct WriteOptions {
     /// Most entries of SOG's palette of SH, up to 65,536, which is the default; 0 leaves SH out. There are no more than the
     /// largest power of two that is no larger than the number of Gaussians.
     pub sog_palette: u32,
+    /// Whether the splats of a glb are an SPZ (`KHR_gaussian_splatting_compression_spz_2`, a draft) and not floats. Default
+    /// false.
+    pub glb_spz: bool,
 }
 
 impl Default for WriteOptions {
     fn default() -> Self {
-        Self { spz_version: 4, sh_bits: [5, 4], sog_palette: 1 << 16 }
+        Self { spz_version: 4, sh_bits: [5, 4], sog_palette: 1 << 16, glb_spz: false }
     }
 }
 
@@ -61,8 +64,8 @@ impl Lost {
 /// The bytes depend on the scene and the options alone.
 ///
 /// # Errors
-/// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, and
-/// for a scene whose arrays differ in length; [`Error::Limit`] for a scene too large for the format; errors of the sink.
+/// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, for
+/// a scene whose arrays differ in length, and for an empty one as glTF; [`Error::Limit`] for a scene too large for the format; errors of the sink.
 pub fn write<'a>(
     kind: Kind,
     splats: &Splats,
@@ -77,8 +80,9 @@ pub fn write<'a>(
         Kind::Sog => sog::write(splats, options)?,
         Kind::CompressedPly => compressed_ply::write(splats),
         Kind::Splat => splat::write(splats),
-        Kind::Lexi | Kind::Ksplat | Kind::Gltf => {
-            let expected = "ply, spz, sog, compressed.ply or splat";
+        Kind::Gltf => gltf::write(splats, options)?,
+        Kind::Lexi | Kind::Ksplat => {
+            let expected = "ply, spz, sog, compressed.ply, splat or glb";
             return Err(Error::parameter("format", kind.extension(), expected));
         }
     };

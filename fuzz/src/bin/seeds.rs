@@ -8,8 +8,10 @@ use std::collections::HashSet;
 use std::error::Error;
 use std::fmt::Write as _;
 use std::fs;
+use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
+use flate2::read::GzDecoder;
 use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::packed::fuzzing::{flat, layered};
 use lexisplat::packed::{PackOptions, Packer, RangeKind, ReachedRecord, TargetRecord};
@@ -17,6 +19,7 @@ use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress,
     lexi, ply,
 };
+use lexisplat_formats::{Kind, WriteOptions};
 use lexisplat_fuzz::container::FEED_SCRIPT;
 use lexisplat_render::{Camera, orbit};
 use lexisplat_sample::{SampleOptions, scene};
@@ -32,12 +35,27 @@ const CHUNK_ROWS: usize = 1024;
 /// Atoms of seeds, so that dictionaries are small.
 const ATOMS: usize = 4;
 
+/// First bytes of gzip.
+const GZIP: [u8; 2] = [0x1f, 0x8b];
+/// Members of a SOG as their reader asks for them.
+const MEMBERS: [&str; 8] = [
+    "meta.json",
+    "means_l.webp",
+    "means_u.webp",
+    "quats.webp",
+    "scales.webp",
+    "sh0.webp",
+    "shN_centroids.webp",
+    "shN_labels.webp",
+];
+
 fn main() -> Done {
     let root = PathBuf::from(std::env::args_os().nth(1).ok_or("name the folder to write to")?);
     plys(&root)?;
     exact(&root)?;
     packed(&root)?;
     cameras(&root)?;
+    formats(&root)?;
     made(&root)
 }
 
@@ -351,6 +369,75 @@ fn colmap(root: &Path) -> Done {
 fn joined(kind: u8, cameras: &[u8], images: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
     let length = u16::try_from(cameras.len())?.to_le_bytes();
     Ok([&[kind], &length[..], cameras, images].concat())
+}
+
+/// Files of other programs' formats: every one that is written, and the .ksplat of the tests.
+fn formats(root: &Path) -> Done {
+    for degree in degrees() {
+        let mut splats = sample(FEW, degree);
+        splats.meta.antialiased = degree == ShDegree::ONE;
+        for kind in Kind::WRITTEN {
+            for variant in 0..3 {
+                let mut options = WriteOptions::default();
+                options.spz_version = 2 + variant;
+                options.sog_palette = if variant == 0 { 0 } else { 1 << 16 };
+                let mut bytes = Vec::new();
+                lexisplat_formats::write(kind, &splats, &options, &mut bytes, &Silent)?;
+                let name = format!("{degree}-{variant}");
+                match kind {
+                    Kind::Spz => {
+                        save(root, "spz", &name, &[&[0], &bytes[..]].concat())?;
+                        if bytes.starts_with(&GZIP) {
+                            let mut plain = vec![1];
+                            GzDecoder::new(&bytes[..]).read_to_end(&mut plain)?;
+                            save(root, "spz", &format!("plain-{name}"), &plain)?;
+                        }
+                    }
+                    Kind::Sog => {
+                        save(root, "sog", &name, &[&[0], &bytes[..]].concat())?;
+                        save(root, "sog", &format!("pieces-{name}"), &pieces(&bytes)?)?;
+                    }
+                    Kind::CompressedPly => save(root, "compressed_ply", &name, &bytes)?,
+                    Kind::Splat => save(root, "splat", &name, &bytes)?,
+                    Kind::Gltf => save(root, "gltf", &name, &bytes)?,
+                    _ => {}
+                }
+            }
+        }
+    }
+    let fixtures = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/lexisplat-formats/tests/data");
+    for file in fs::read_dir(fixtures)? {
+        let path = file?.path();
+        let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        match path.extension().and_then(|extension| extension.to_str()) {
+            Some("ksplat") => save(root, "ksplat", &name, &fs::read(&path)?)?,
+            Some("glb" | "gltf") => save(root, "gltf", &name, &fs::read(&path)?)?,
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// The members of the zip archive `bytes`, which are stored, each after its length: `meta.json` first, then the others in
+/// the order in which they are asked for.
+fn pieces(bytes: &[u8]) -> Result<Vec<u8>, Box<dyn Error>> {
+    let mut found = vec![Vec::new(); MEMBERS.len()];
+    let mut rest = bytes;
+    while let [b'P', b'K', 3, 4, ..] = rest {
+        let size = u32::from_le_bytes(rest[18..22].try_into()?) as usize;
+        let name = usize::from(u16::from_le_bytes(rest[26..28].try_into()?));
+        let (head, content) = rest[30..].split_at(name);
+        let (content, after) = content.split_at(size);
+        let place = MEMBERS.iter().position(|member| member.as_bytes() == head).ok_or("an unknown member")?;
+        found[place] = content.to_vec();
+        rest = after;
+    }
+    let mut all = vec![1];
+    for content in found {
+        all.extend(u16::try_from(content.len())?.to_le_bytes());
+        all.extend(content);
+    }
+    Ok(all)
 }
 
 /// Scenes as bytes: what to do, how, degree, count, whether copies, then values.

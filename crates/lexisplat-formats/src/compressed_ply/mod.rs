@@ -63,6 +63,9 @@ pub(crate) fn is_likely(bytes: &[u8]) -> bool {
     Header::parse("", bytes, &Limits::default()).is_ok_and(is_packed)
 }
 
+/// Largest bound with which every value is finite: base colours are divided by [`C0`].
+const MOST_BOUND: f32 = f32::MAX / 8.0;
+
 /// The rows of an element.
 #[derive(Debug, Clone, Copy)]
 struct Element<'h, 'a> {
@@ -131,7 +134,7 @@ pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Re
         warnings: Vec::new(),
         facts: vec![("chunks", json!(chunk.count)), ("colour_bounds", json!(has_colours))],
         rows: Box::new(CompressedRows {
-            is_finite: floats.iter().all(|v| v.is_finite()),
+            is_finite: floats.iter().all(|v| v.abs() <= MOST_BOUND),
             bounds,
             vertices: vertex.bytes.as_chunks().0,
             sh: sh.map_or(&[], |sh| sh.bytes),
@@ -252,6 +255,22 @@ mod tests {
     use crate::kind::Kind;
     use crate::open::open;
     use crate::siblings::Siblings;
+
+    /// A chunk's bounds may be finite, and the colours between them not.
+    #[test]
+    fn bounds_that_overflow_are_refused() {
+        let (bytes, _) = write(&scene(&SampleOptions::new(3, 1)));
+        let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+        for (k, name) in [(3, "x"), (9, "scale_0"), (15, "f_dc_0")] {
+            let mut bytes = bytes.clone();
+            let mut value = |v: f32| bytes[end + 4 * k..][..4].copy_from_slice(&v.to_le_bytes());
+            value(f32::INFINITY);
+            let error = opened(&bytes).unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+            bytes[end + 4 * k..][..4].copy_from_slice(&f32::MAX.to_le_bytes());
+            assert_eq!(opened(&bytes).is_err(), name == "f_dc_0");
+        }
+    }
 
     fn opened(bytes: &[u8]) -> Result<Splats> {
         let opened = open("a.ply", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;

@@ -9,8 +9,7 @@ use lexisplat::{Error, FormatError, Result};
 
 /// Effort of deflate, 0 to 9 (`Z_DEFAULT_COMPRESSION` of the reference).
 const DEFLATE_LEVEL: u32 = 6;
-/// Effort of Zstandard's own library (`compressZstd` of the reference).
-#[cfg(feature = "zstd")]
+/// Effort of Zstandard (`compressZstd` of the reference).
 const ZSTD_LEVEL: i32 = 12;
 
 /// The bytes inside a gzip file.
@@ -73,7 +72,7 @@ pub(super) fn unzstd(name: &str, what: &str, bytes: &[u8], out: &mut [u8]) -> Re
     #[cfg(feature = "zstd")]
     let found = zstd::bulk::decompress_to_buffer(bytes, out).map_err(|error| damaged(error.to_string()))?;
     #[cfg(not(feature = "zstd"))]
-    let found = ruzstd::decoding::FrameDecoder::new()
+    let found = structured_zstd::decoding::FrameDecoder::new()
         .decode_all(bytes, out)
         .map_err(|error| damaged(error.to_string()))?;
     if found == out.len() {
@@ -89,5 +88,8 @@ pub(super) fn zstd(bytes: &[u8]) -> Result<Vec<u8>> {
     #[cfg(feature = "zstd")]
     return zstd::bulk::compress(bytes, ZSTD_LEVEL).map_err(|source| Error::Writer { source });
     #[cfg(not(feature = "zstd"))]
-    Ok(ruzstd::encoding::compress_to_vec(bytes, ruzstd::encoding::CompressionLevel::Fastest))
+    Ok(structured_zstd::encoding::compress_to_vec(
+        bytes,
+        structured_zstd::encoding::CompressionLevel::from_level(ZSTD_LEVEL),
+    ))
 }

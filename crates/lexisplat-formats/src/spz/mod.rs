@@ -44,7 +44,7 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 ///
 /// # Errors
 /// [`Error::Format`] for damage, [`Error::Limit`] for a file that asks for too much.
-pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Result<Described<'a>> {
+pub(crate) fn read(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Described<'static>> {
     let (header, streams, records) =
         if bytes.starts_with(&GZIP) { old(name, bytes, options)? } else { new(name, bytes, options)? };
     let extensions =
