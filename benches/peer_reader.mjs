@@ -58,7 +58,7 @@ async function reader(peer, file) {
     const theirs = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
     // Not optimised: nothing is sorted or left out.
     const readers = {
-        ".spz": () => theirs.SpzLoader.loadFromFileData(buffer, 1, 0, false, 2),
+        ".spz": () => theirs.SpzLoader.loadFromFileData(new Uint8Array(buffer), 1, 0, false, 2),
         ".splat": () => theirs.SplatLoader.loadFromFileData(buffer, 0, 0, false),
         ".ksplat": () => theirs.KSplatLoader.loadFromFileData(buffer),
         ".ply": () => theirs.PlyLoader.loadFromFileData(buffer, 0, 0, false, 2),
