@@ -17,6 +17,8 @@ use crate::write::Lost;
 const ROW: usize = 32;
 /// Stands for 0 in a byte of a rotation, and for 1 above it (`convert.py`: `rot * 128 + 128`).
 const ROTATION_ZERO: f32 = 128.0;
+/// Natural logarithm of 2^-150, half of the smallest f32 above 0: stands for a scale of 0, whose logarithm is not finite.
+const LEAST_SCALE: f32 = -103.972_08;
 /// Rows that [`is_likely`] looks at.
 const LOOKED_AT: usize = 64;
 /// Largest squared length of a rotation in bytes, of full length 128, that [`is_likely`] takes.
@@ -75,7 +77,7 @@ impl Rows for SplatRows<'_> {
         let logits = logits();
         for (i, row) in self.0[range].iter().enumerate() {
             out.positions[i] = floats(row, 0);
-            out.scales[i] = floats(row, 12).map(libm::logf);
+            out.scales[i] = floats(row, 12).map(|v| if v == 0.0 { LEAST_SCALE } else { libm::logf(v) });
             out.dc[i] = [24, 25, 26].map(|k| (f32::from(row[k]) / MOST - COLOUR_OFFSET) / C0);
             out.opacities[i] = logits[usize::from(row[27])];
             out.rotations[i] = [28, 29, 30, 31].map(|k| (f32::from(row[k]) - ROTATION_ZERO) / ROTATION_ZERO);
@@ -96,7 +98,10 @@ pub(crate) fn write(splats: &Splats) -> (Vec<u8>, Lost) {
     let mut bytes = Vec::with_capacity(ROW * splats.len());
     for i in 0..splats.len() {
         geometry.positions[i].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
-        geometry.scales[i].iter().for_each(|v| bytes.extend(libm::expf(*v).to_le_bytes()));
+        for scale in geometry.scales[i].map(libm::expf) {
+            lost.limited += u64::from(scale.is_infinite());
+            bytes.extend(scale.min(f32::MAX).to_le_bytes());
+        }
         for dc in geometry.dc[i] {
             let share = COLOUR_OFFSET + C0 * dc;
             lost.limited += u64::from(!(0.0..=1.0).contains(&share));
@@ -142,6 +147,21 @@ mod tests {
             assert!((28..ROW).all(|k| a[k].abs_diff(b[k]) <= 1));
         }
         assert_eq!(opened.source().len(), 300);
+    }
+
+    /// Scales of 0 come back; those that are larger than numbers go to the largest.
+    #[test]
+    fn scales_at_the_ends_are_numbers() {
+        let mut splats = scene(&SampleOptions::new(1, 1));
+        splats.geometry.scales[0] = [LEAST_SCALE, 89.0, -1.0];
+        let (bytes, lost) = write(&splats);
+        assert_eq!(floats(bytes.first_chunk().unwrap(), 12)[..2], [0.0, f32::MAX]);
+        assert_eq!(lost.limited, 1);
+        let opened = open("a", &bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent).unwrap();
+        let read = opened.source().whole().unwrap().into_owned();
+        assert_eq!(read.geometry.scales[0][0], LEAST_SCALE);
+        let (again, lost) = write(&read);
+        assert!(again == bytes && lost.limited == 1);
     }
 
     #[test]
