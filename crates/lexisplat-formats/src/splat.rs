@@ -17,8 +17,8 @@ use crate::write::Lost;
 const ROW: usize = 32;
 /// Stands for 0 in a byte of a rotation, and for 1 above it (`convert.py`: `rot * 128 + 128`).
 const ROTATION_ZERO: f32 = 128.0;
-/// Natural logarithm of 2^-150, half of the smallest f32 above 0: stands for a scale of 0, whose logarithm is not finite.
-const LEAST_SCALE: f32 = -103.972_08;
+/// Stands for a scale of 0, whose logarithm is not finite: below the logarithm of 2^-150, so its exponential rounds to 0.
+const LEAST_SCALE: f32 = -104.0;
 /// Rows that [`is_likely`] looks at.
 const LOOKED_AT: usize = 64;
 /// Largest squared length of a rotation in bytes, of full length 128, that [`is_likely`] takes.
