@@ -14,7 +14,7 @@ use super::buffers::Buffers;
 use super::document::{Document, Shape};
 use super::place::Place;
 use super::primitive::{Found, Source};
-use super::{attribute, rest_attributes};
+use super::{attribute, rest_attributes, warn};
 use crate::rows::{Rows, RowsMut};
 use crate::spz;
 
@@ -48,7 +48,7 @@ struct Packed {
 }
 
 enum Splats {
-    Plain(Accessors),
+    Plain(Box<Accessors>),
     Packed(Packed),
 }
 
@@ -115,7 +115,7 @@ impl<'a> Scene<'a> {
                 Source::Plain { geometry, rest, degree } => {
                     let accessors = self.accessors(name, document, found, (geometry, rest, *degree))?;
                     let len = accessors.position.count;
-                    (Splats::Plain(accessors), len, *degree)
+                    (Splats::Plain(Box::new(accessors)), len, *degree)
                 }
                 Source::Spz { view, count } => {
                     let packed = match packed.get(view) {
@@ -135,7 +135,7 @@ impl<'a> Scene<'a> {
                             "{}: its accessors have {count} elements, and its SPZ {}",
                             found.label, packed.len
                         );
-                        warnings.push(text);
+                        warn(warnings, text);
                     }
                     let (len, degree) = (packed.len, packed.degree);
                     (Splats::Packed(packed), len, degree)
@@ -199,7 +199,7 @@ fn unpack(
     warnings: &mut Vec<String>,
 ) -> Result<Packed> {
     let described = spz::read(&format!("{name}, {}", found.label), bytes, options)?;
-    warnings.extend(described.warnings);
+    described.warnings.into_iter().for_each(|text| warn(warnings, text));
     Ok(Packed {
         rows: Arc::from(described.rows),
         len: described.len,
