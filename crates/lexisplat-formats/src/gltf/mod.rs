@@ -6,6 +6,7 @@
 
 mod accessor;
 mod buffers;
+mod columns;
 mod document;
 mod glb;
 mod json;
