@@ -14,10 +14,12 @@ const MUTATIONS: usize = 2_000;
 
 fn files() -> Vec<(Kind, Vec<u8>)> {
     let splats = scene(&SampleOptions::new(GAUSSIANS, 1));
-    let kinds = Kind::WRITTEN.into_iter().filter(|&kind| kind != Kind::Ply);
-    let written = kinds.map(|kind| {
+    let kinds = Kind::WRITTEN.into_iter().filter(|&kind| kind != Kind::Ply).map(|kind| (kind, false));
+    let written = kinds.chain([(Kind::Gltf, true)]).map(|(kind, glb_spz)| {
+        let mut options = WriteOptions::default();
+        options.glb_spz = glb_spz;
         let mut bytes = Vec::new();
-        write(kind, &splats, &WriteOptions::default(), &mut bytes, &Silent).unwrap();
+        write(kind, &splats, &options, &mut bytes, &Silent).unwrap();
         (kind, bytes)
     });
     written.collect()

@@ -66,7 +66,7 @@ pub(crate) struct Convert {
     /// [default: 5,4, as SPZ's own library].
     #[arg(long, value_name = "N,N", value_parser = sh_bits, help_heading = FORMATS)]
     pub(crate) sh_bits: Option<[u8; 2]>,
-    /// Write the splats of a glb as an SPZ, as CesiumJS takes them, and not as floats. The extension of glTF for it is a
+    /// Write the splats of a glb as an SPZ, as Cesium takes them, and not as floats. The extension of glTF for it is a
     /// draft.
     #[arg(long, help_heading = FORMATS)]
     pub(crate) glb_spz: bool,

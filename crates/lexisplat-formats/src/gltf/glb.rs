@@ -75,7 +75,8 @@ impl<'a> Chunks<'a> {
                 }
             } else {
                 let kind = kind.escape_ascii();
-                chunks.warnings.push(format!("a chunk of type '{kind}' is not known, and left out"));
+                let text = format!("a chunk of type '{kind}' is not known, and left out");
+                super::warn(&mut chunks.warnings, text);
             }
         }
         if chunks.json.is_empty() {

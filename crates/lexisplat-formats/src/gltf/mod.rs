@@ -6,6 +6,7 @@
 
 mod accessor;
 mod buffers;
+mod columns;
 mod document;
 mod glb;
 mod json;
@@ -46,6 +47,8 @@ const REQUIRED: [&str; 6] = [
 ];
 /// Most splat primitives that a scene shows, each time that it shows them.
 const MOST_SHOWN: usize = 1 << 16;
+/// Most warnings about a file.
+const MOST_WARNINGS: usize = 32;
 
 /// Reads the glb or glTF in `bytes`, which messages call `name`.
 ///
@@ -99,4 +102,11 @@ fn rest_attributes(degree: ShDegree) -> impl Iterator<Item = String> {
 /// The names of the attributes of SH of degree `l` alone.
 fn of_degree(l: u8) -> impl Iterator<Item = String> {
     (0..=2 * l).map(move |n| attribute(&format!("SH_DEGREE_{l}_COEF_{n}")))
+}
+
+/// Adds a warning that is not there yet, up to [`MOST_WARNINGS`].
+fn warn(warnings: &mut Vec<String>, text: String) {
+    if warnings.len() < MOST_WARNINGS && !warnings.contains(&text) {
+        warnings.push(text);
+    }
 }

@@ -1,5 +1,8 @@
 //! Primitives that are splats, and what they say of themselves.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use lexisplat::sh::MAX_DEGREE;
 use lexisplat::{Error, Result, ShDegree};
 
@@ -7,7 +10,7 @@ use super::buffers::missing;
 use super::document::{Document, Primitive, Splatting};
 use super::nodes::Shown;
 use super::place::{GLTF, Place};
-use super::{MOST_SHOWN, attribute, of_degree, rest_attributes};
+use super::{MOST_SHOWN, attribute, of_degree, rest_attributes, warn};
 
 /// `mode` of points.
 const POINTS: u32 = 0;
@@ -64,24 +67,19 @@ pub(super) fn find(
     nodes: &[Shown],
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Found>> {
-    let (mut found, mut others, mut mirrored) = (Vec::new(), 0_usize, 0_usize);
+    let (mut found, mut others, mut mirrored) = (Vec::new(), 0, 0_usize);
+    // Many nodes may show one mesh.
+    let mut meshes = BTreeMap::new();
     for node in nodes {
-        let mesh = document.meshes.get(node.mesh).ok_or_else(|| missing(name, "mesh", node.mesh))?;
-        for (k, primitive) in mesh.primitives.iter().enumerate() {
-            let label = format!("primitive {k} of mesh {}", node.mesh);
-            let mut said = Vec::new();
-            let Some((source, changes)) = source(name, document, &label, primitive, &mut said)? else {
-                others += 1;
-                continue;
-            };
-            for text in said {
-                if !warnings.contains(&text) {
-                    warnings.push(text);
-                }
-            }
-            let place = Place::of(name, node.node, &node.matrix, changes)?;
+        let sources = match meshes.entry(node.mesh) {
+            Entry::Occupied(entry) => entry.into_mut(),
+            Entry::Vacant(entry) => entry.insert(sources(name, document, node.mesh, warnings)?),
+        };
+        others += sources.others;
+        for (label, source, changes) in &sources.splats {
+            let place = Place::of(name, node.node, &node.matrix, *changes)?;
             mirrored += usize::from(place.is_mirrored);
-            found.push(Found { label, source, place });
+            found.push(Found { label: label.clone(), source: source.clone(), place });
             if found.len() > MOST_SHOWN {
                 let (what, limit) = (format!("splat primitives in {name}"), MOST_SHOWN as u64);
                 return Err(Error::Limit { what, found: limit + 1, limit, name: None });
@@ -103,6 +101,28 @@ pub(super) fn find(
         ));
     }
     Ok(found)
+}
+
+/// The primitives of a mesh.
+struct Sources {
+    /// What messages call them, where their splats are, and the axes whose signs they have beside those of the glTF.
+    splats: Vec<(String, Source, [bool; 3])>,
+    /// Number of those that are not splats.
+    others: u64,
+}
+
+/// The primitives of mesh `index`.
+fn sources(name: &str, document: &Document<'_>, index: usize, warnings: &mut Vec<String>) -> Result<Sources> {
+    let mesh = document.meshes.get(index).ok_or_else(|| missing(name, "mesh", index))?;
+    let mut sources = Sources { splats: Vec::new(), others: 0 };
+    for (k, primitive) in mesh.primitives.iter().enumerate() {
+        let label = format!("primitive {k} of mesh {index}");
+        match source(name, document, &label, primitive, warnings)? {
+            None => sources.others += 1,
+            Some((source, changes)) => sources.splats.push((label, source, changes)),
+        }
+    }
+    Ok(sources)
 }
 
 /// Where the splats of `primitive` are, and the axes whose signs they have beside those of the glTF; none if it is not of
@@ -150,13 +170,13 @@ fn check_words(name: &str, label: &str, splatting: &Splatting, warnings: &mut Ve
         return Err(Error::malformed(name, text));
     }
     if is_draft(splatting) {
-        warnings.push("kernel and colorSpace are missing, as in drafts of the extension".to_owned());
+        warn(warnings, "kernel and colorSpace are missing, as in drafts of the extension".to_owned());
     } else if let Some(missing) = match (&splatting.kernel, &splatting.color_space) {
         (None, _) => Some("kernel"),
         (_, None) => Some("colorSpace"),
         _ => None,
     } {
-        warnings.push(format!("{missing} is missing"));
+        warn(warnings, format!("{missing} is missing"));
     }
     for (what, found, expected) in [
         ("colorSpace", &splatting.color_space, "srgb_rec709_display"),
@@ -164,7 +184,7 @@ fn check_words(name: &str, label: &str, splatting: &Splatting, warnings: &mut Ve
         ("sortingMethod", &splatting.sorting_method, "cameraDistance"),
     ] {
         if let Some(found) = found.as_deref().filter(|found| *found != expected) {
-            warnings.push(format!("{what} is '{}' and is taken as '{expected}'", shown(found)));
+            warn(warnings, format!("{what} is '{}' and is taken as '{expected}'", shown(found)));
         }
     }
     Ok(())
@@ -183,7 +203,7 @@ fn plain(name: &str, label: &str, primitive: &Primitive, warnings: &mut Vec<Stri
     let has = |l: u8| of_degree(l).any(|attribute| attributes.contains_key(&attribute));
     let most = (1..=MAX_DEGREE).rev().find(|&l| has(l)).unwrap_or(0);
     if most > EXTENSION_DEGREE {
-        warnings.push(format!("SH of degree {most} are read, and the extension ends at {EXTENSION_DEGREE}"));
+        warn(warnings, format!("SH of degree {most} are read, and the extension ends at {EXTENSION_DEGREE}"));
     }
     let degree = ShDegree::new(most)?;
     let rest = rest_attributes(degree).map(|attribute| accessor(&attribute)).collect::<Result<_>>()?;

@@ -6,37 +6,16 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lexisplat::ply::ReadOptions;
-use lexisplat::sh::CHANNELS;
 use lexisplat::{Error, Result, ShDegree};
 
-use super::accessor::{Accessor, Component};
 use super::buffers::Buffers;
-use super::document::{Document, Shape};
+use super::columns::Accessors;
+use super::document::Document;
 use super::place::Place;
 use super::primitive::{Found, Source};
-use super::{attribute, rest_attributes};
+use super::warn;
 use crate::rows::{Rows, RowsMut};
 use crate::spz;
-
-use Component::{F32, I8, I8Share, I16, I16Share, U8, U8Share, U16, U16Share};
-
-/// What the numbers of positions may be, with `KHR_mesh_quantization`.
-const POSITION: &[Component] = &[F32, I8, I8Share, U8, U8Share, I16, I16Share, U16, U16Share];
-const ROTATION: &[Component] = &[F32, I8Share, I16Share];
-const SCALE: &[Component] = &[F32, U8, U8Share, U16, U16Share];
-const OPACITY: &[Component] = &[F32, U8Share, U16Share];
-const HARMONICS: &[Component] = &[F32];
-
-/// The accessors of a primitive, all of as many elements.
-#[derive(Debug)]
-struct Accessors {
-    position: Accessor,
-    rotation: Accessor,
-    scale: Accessor,
-    opacity: Accessor,
-    dc: Accessor,
-    rest: Vec<Accessor>,
-}
 
 /// An SPZ of a bufferView.
 #[derive(Clone)]
@@ -48,7 +27,7 @@ struct Packed {
 }
 
 enum Splats {
-    Plain(Accessors),
+    Plain(Box<Accessors>),
     Packed(Packed),
 }
 
@@ -113,9 +92,10 @@ impl<'a> Scene<'a> {
         for found in found {
             let (splats, len, degree) = match &found.source {
                 Source::Plain { geometry, rest, degree } => {
-                    let accessors = self.accessors(name, document, found, (geometry, rest, *degree))?;
-                    let len = accessors.position.count;
-                    (Splats::Plain(accessors), len, *degree)
+                    let accessors =
+                        Accessors::check(name, document, &self.buffers, found, (geometry, rest, *degree))?;
+                    let len = accessors.len();
+                    (Splats::Plain(Box::new(accessors)), len, *degree)
                 }
                 Source::Spz { view, count } => {
                     let packed = match packed.get(view) {
@@ -135,7 +115,7 @@ impl<'a> Scene<'a> {
                             "{}: its accessors have {count} elements, and its SPZ {}",
                             found.label, packed.len
                         );
-                        warnings.push(text);
+                        warn(warnings, text);
                     }
                     let (len, degree) = (packed.len, packed.degree);
                     (Splats::Packed(packed), len, degree)
@@ -148,46 +128,6 @@ impl<'a> Scene<'a> {
         }
         Ok(())
     }
-
-    /// The accessors of a primitive that is not compressed.
-    fn accessors(
-        &self,
-        name: &str,
-        document: &Document<'_>,
-        found: &Found,
-        (geometry, rest, degree): (&[usize; 5], &[usize], ShDegree),
-    ) -> Result<Accessors> {
-        let check = |name_of: &str, index: usize, shape, components| {
-            Accessor::check(name, document, &self.buffers, (name_of, index), shape, components)
-        };
-        let [position, rotation, scale, opacity, dc] = *geometry;
-        let position = check("POSITION", position, Shape::Vec3, POSITION)?;
-        let same = |name_of: &str, accessor: Accessor| {
-            if accessor.count == position.count {
-                return Ok(accessor);
-            }
-            let text = format!(
-                "{}: {} elements of {name_of}, and {} of POSITION",
-                found.label, accessor.count, position.count
-            );
-            Err(Error::malformed(name, text))
-        };
-        let of = |word: &str, index: usize, shape, components| {
-            let name_of = attribute(word);
-            same(&name_of, check(&name_of, index, shape, components)?)
-        };
-        let sh = |(name_of, index): (String, &usize)| {
-            same(&name_of, check(&name_of, *index, Shape::Vec3, HARMONICS)?)
-        };
-        Ok(Accessors {
-            position,
-            rotation: of("ROTATION", rotation, Shape::Vec4, ROTATION)?,
-            scale: of("SCALE", scale, Shape::Vec3, SCALE)?,
-            opacity: of("OPACITY", opacity, Shape::Scalar, OPACITY)?,
-            dc: of("SH_DEGREE_0_COEF_0", dc, Shape::Vec3, HARMONICS)?,
-            rest: rest_attributes(degree).zip(rest).map(sh).collect::<Result<_>>()?,
-        })
-    }
 }
 
 /// The SPZ in `bytes`, which `found` has.
@@ -199,7 +139,7 @@ fn unpack(
     warnings: &mut Vec<String>,
 ) -> Result<Packed> {
     let described = spz::read(&format!("{name}, {}", found.label), bytes, options)?;
-    warnings.extend(described.warnings);
+    described.warnings.into_iter().for_each(|text| warn(warnings, text));
     Ok(Packed {
         rows: Arc::from(described.rows),
         len: described.len,
@@ -246,49 +186,4 @@ impl Packed {
             }
         }
     }
-}
-
-impl Accessors {
-    /// Decodes Gaussians `range` to SH of `degree`, which is no lower than that of the primitive.
-    fn fill(&self, buffers: &Buffers<'_>, range: Range<usize>, degree: ShDegree, out: RowsMut<'_>) {
-        let RowsMut { positions, dc, opacities, scales, rotations, sh_rest } = out;
-        self.position.read(buffers, range.clone(), |i, v| positions[i] = v);
-        self.rotation.read(buffers, range.clone(), |i, [x, y, z, w]| rotations[i] = [w, x, y, z]);
-        let half_step = self.scale.component.half_step();
-        self.scale.read(buffers, range.clone(), |i, v: [f32; 3]| {
-            scales[i] = v.map(|v| log_scale(v, half_step));
-        });
-        self.opacity.read(buffers, range.clone(), |i, [share]| opacities[i] = logit(share));
-        self.dc.read(buffers, range.clone(), |i, v| dc[i] = v);
-        if self.rest.len() < degree.rest_per_channel() {
-            sh_rest.fill(0.0);
-        }
-        let (all, per) = (degree.rest(), degree.rest_per_channel());
-        for (k, accessor) in self.rest.iter().enumerate() {
-            accessor.read(buffers, range.clone(), |i, colours: [f32; CHANNELS]| {
-                for (c, v) in colours.into_iter().enumerate() {
-                    sh_rest[i * all + c * per + k] = v;
-                }
-            });
-        }
-    }
-}
-
-/// The opacity before the sigmoid of `share`, 0 to 1. It is infinite for 0 and 1, and below and above.
-#[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
-pub(super) fn logit(share: f32) -> f32 {
-    if share <= 0.0 {
-        f32::NEG_INFINITY
-    } else if share >= 1.0 {
-        f32::INFINITY
-    } else {
-        let share = f64::from(share);
-        libm::log(share / (1.0 - share)) as f32
-    }
-}
-
-/// The logarithm of `scale`, and of half the smallest scale above 0 for 0, whose logarithm is not finite.
-#[expect(clippy::cast_possible_truncation, reason = "scenes are in single precision")]
-pub(super) fn log_scale(scale: f32, half_step: f64) -> f32 {
-    libm::log(if scale == 0.0 { half_step } else { scale.into() }) as f32
 }

@@ -5,11 +5,11 @@ use lexisplat::sh::{C0, CHANNELS, COLOUR_OFFSET};
 use lexisplat::{Error, Limits, Result, SURE_OPACITY, ShDegree, Splats};
 
 use super::accessor::Component;
+use super::columns::{log_scale, logit};
 use super::document::Shape;
 use super::glb::{BIN, CHUNK_HEADER, HEADER, JSON, MAGIC, VERSION};
 use super::json::{Attribute, Root};
 use super::place::GLTF;
-use super::scene::{log_scale, logit};
 use super::{attribute, rest_attributes};
 use crate::axes::Flip;
 use crate::opacity::to_byte;

@@ -35,10 +35,10 @@ fn what_cannot_be_read_is_named() {
     type Change = fn(&mut Builder);
     let cases: [(&str, Change); 22] = [
         ("accessor 3, KHR_gaussian_splatting:OPACITY, ends at byte", |b| {
-            b.json["accessors"][3]["count"] = json!(4)
+            b.json["accessors"][3]["count"] = json!(4);
         }),
         ("2 elements of KHR_gaussian_splatting:OPACITY, and 3", |b| {
-            b.json["accessors"][3]["count"] = json!(2)
+            b.json["accessors"][3]["count"] = json!(2);
         }),
         ("ends at byte 18446744073709551615", |b| b.json["accessors"][0]["count"] = json!(u64::MAX)),
         ("ends at byte 37", |b| b.accessor_of("POSITION")["byteOffset"] = json!(1)),
@@ -49,7 +49,7 @@ fn what_cannot_be_read_is_named() {
         ("accessor 99 does not exist", |b| b.first()["attributes"]["POSITION"] = json!(99)),
         ("mesh 5 does not exist", |b| b.json["nodes"][0]["mesh"] = json!(5)),
         ("has no bufferView", |b| {
-            drop(b.accessor_of("POSITION").as_object_mut().unwrap().remove("bufferView"))
+            drop(b.accessor_of("POSITION").as_object_mut().unwrap().remove("bufferView"));
         }),
         ("is sparse", |b| b.accessor_of("POSITION")["sparse"] = json!({"count": 1})),
         ("is not of type Vec3", |b| b.accessor_of("POSITION")["type"] = json!("VEC4")),
@@ -69,7 +69,7 @@ fn what_cannot_be_read_is_named() {
         ("only equal scales", |b| b.json["nodes"][0]["scale"] = json!([1, 2, 1])),
         ("only equal scales", |b| b.json["nodes"][0]["scale"] = json!([0, 0, 0])),
         ("shears", |b| {
-            b.json["nodes"][0]["matrix"] = json!([1, 0, 0, 0, 0.6, 0.8, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])
+            b.json["nodes"][0]["matrix"] = json!([1, 0, 0, 0, 0.6, 0.8, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
         }),
         ("requires the extension 'EXT_meshopt_compression'", |b| {
             b.json["extensionsRequired"] = json!(["EXT_meshopt_compression"]);

@@ -5,7 +5,7 @@ use lexisplat::{ShDegree, Splats};
 use serde_json::json;
 
 use super::super::place::GLTF;
-use super::super::write::write;
+use super::super::write::{unit, write};
 use super::build::Builder;
 use super::{most, opened, read, sample};
 use crate::axes::Flip;
@@ -75,7 +75,7 @@ fn shown(splats: &Splats, i: usize, direction: [f64; 3]) -> [f32; 3] {
 
 /// Twice the matrix of the ellipsoid of Gaussian `i`, along `direction`.
 fn spread(splats: &Splats, i: usize, direction: [f64; 3]) -> f64 {
-    let q = splats.geometry.rotations[i].map(f64::from);
+    let q = unit(splats.geometry.rotations[i]).map(f64::from);
     let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].map(|axis| turned(q, axis));
     let scales = splats.geometry.scales[i].map(|v| f64::from(v).exp());
     let dot = |a: [f64; 3]| (0..3).map(|k| a[k] * direction[k]).sum::<f64>();
@@ -175,6 +175,25 @@ fn drafts_of_compression_are_read_along_their_axes() {
         let draft = read_with(draft);
         for (a, b) in now.geometry.positions.iter().zip(&draft.geometry.positions) {
             assert_eq!(about_y.position(*a), *b);
+        }
+    }
+}
+
+/// A file of another program (tests/data/README.md). It turns the ellipsoids' own axes about z, by half, beside ours.
+#[test]
+fn a_file_of_splat_transform_holds_the_scene() {
+    let (found, warnings) = opened(include_bytes!("../../../tests/data/splat-transform.glb")).unwrap();
+    assert_eq!(warnings, [""; 0]);
+    let scene = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(8, 1));
+    let (a, b) = (&scene.geometry, &found.geometry);
+    assert!(most(a.positions.as_flattened(), b.positions.as_flattened()) < 1e-6);
+    assert!(a.dc == b.dc && most(&scene.sh_rest, &found.sh_rest) < 1e-6);
+    assert!(most(a.scales.as_flattened(), b.scales.as_flattened()) < 1e-6);
+    assert!(most(&a.opacities, &b.opacities) < 1e-5);
+    for i in 0..scene.len() {
+        for direction in [[1.0, 0.0, 0.0], [0.36, 0.48, 0.8], [-0.48, 0.64, -0.6]] {
+            let [before, after] = [spread(&scene, i, direction), spread(&found, i, direction)];
+            assert!((before / after - 1.0).abs() < 1e-5, "{i}: {before} {after}");
         }
     }
 }
