@@ -46,6 +46,7 @@ C0 = 0.28209479177387814  # SH function of degree 0
 DEGREE = {0: 0, 9: 1, 24: 2, 45: 3, 72: 4}  # of so many values of SH-rest
 PER = [0, 3, 8, 15, 24]  # SH-rest of one channel, by degree
 SURE = 100.0  # an opacity before the sigmoid that is 1 for every picture
+AXES = {"spz": [1, -1, -1], "glb": [-1, -1, 1]}  # signs of these formats' axes beside a trainer's PLY
 CHUNK = 256  # Gaussians of compressed.ply's chunks
 FLOAT = 2.0**-20  # relative step of values that are floats in the file; 8 units of the last place
 ALIKE = 50.0  # dB between pictures of two readings of one file
@@ -176,6 +177,8 @@ def quanta(kind, scene, facts):
         steps |= {"rotation": np.sqrt(2) / 255, "colour": spread(colour) / 255, "SH": spread(sh) / 255}
     elif kind == "splat":
         steps |= {"position": floats, "scale": FLOAT * 16, "rotation": 1 / 128, "colour": 1 / 255 / C0}
+    elif kind == "glb":
+        steps |= {"position": floats, "scale": FLOAT * 16, "rotation": FLOAT, "opacity": FLOAT, "colour": FLOAT * 16, "SH": FLOAT}
     elif kind == "ksplat":
         half, level = 2.0**-11, facts["compression_level"]
         steps |= {"position": 2.5 / 32767 if level else floats, "scale": half if level else FLOAT * 16}
@@ -187,15 +190,14 @@ def quanta(kind, scene, facts):
     return {name: np.maximum(step, FLOAT) for name, step in steps.items()}
 
 
-def differences(ours, theirs, steps, turned):
+def differences(ours, theirs, steps, sign):
     """The largest difference of every attribute in quanta, and the attributes that the peer rounds to 8 bits.
 
-    `turned`: the peer leaves the axes y and z of SPZ as they are.
+    `sign`: of the axes that the peer leaves as they are in the file.
     """
     if len(ours["x"]) != len(theirs["x"]):
         raise Failed(f"{len(ours['x'])} Gaussians, and {len(theirs['x'])}")
     largest = lambda difference, step: float(np.max(np.abs(difference) / step, initial=0))
-    sign = np.array([1, -1, -1]) if turned else np.ones(3)
     found, rounded = {}, set()
     found["position"] = largest(stack(ours, "x", "y", "z") - sign * stack(theirs, "x", "y", "z"), steps["position"])
     if "scale_0" in theirs:
@@ -211,18 +213,19 @@ def differences(ours, theirs, steps, turned):
         b = b * sign[[0, 0, 0, 1, 1, 2]] * sign[[0, 1, 2, 1, 2, 2]]
         trace = a[:, [0, 3, 5]].sum(axis=1, keepdims=True)
         found["scale"] = found["rotation"] = largest((a - b) / np.maximum(trace, 1e-30), 2 * steps["scale"])
-    found["opacity"] = largest(alpha(ours) - alpha(theirs), steps["opacity"])
     if "red" in theirs:
         shown = np.clip(255 * (numbered(ours, "f_dc", 3) * C0 + 0.5), 0, 255)
         found["colour"] = largest(shown - stack(theirs, "red", "green", "blue"), 1.0)
         rounded |= {"colour", "opacity"}
+        steps = dict(steps, opacity=1 / 255)
     else:
         found["colour"] = largest(numbered(ours, "f_dc", 3) - numbered(theirs, "f_dc", 3), steps["colour"])
+    found["opacity"] = largest(alpha(ours) - alpha(theirs), steps["opacity"])
     a, b = rest(ours), rest(theirs)
     per = min(a.shape[2], b.shape[2])
     if per:
         a, b, step = a[:, :, :per], b[:, :, :per], steps["SH"]
-        a = a * turns_of_sh()[:per] if turned else a
+        a = a * turns_of_sh(sign)[:per]
         if "cov_0" in theirs:
             # Bytes around 128.
             a, step, rounded = np.clip(a, -1, 127 / 128), max(step, 1 / 128), rounded | {"SH"}
@@ -230,12 +233,13 @@ def differences(ours, theirs, steps, turned):
     return found, rounded
 
 
-def turns_of_sh():
-    """The signs of SH functions, where y and z change theirs: of those that are odd in y and z together."""
+def turns_of_sh(sign):
+    """The signs of SH functions along axes that have these: function m of degree l is odd in y for m below 0, and so on."""
     signs = []
-    for degree in range(1, 4):
+    for degree in range(1, 5):
         for m in range(-degree, degree + 1):
-            signs.append(-1.0 if ((m < 0) + degree - abs(m)) % 2 else 1.0)
+            odd = [-m - 1 if m < 0 else m, m < 0, degree - abs(m)]
+            signs.append(np.prod([s if o % 2 else 1.0 for s, o in zip(sign, odd)]))
     return np.array(signs)
 
 
@@ -280,7 +284,7 @@ class Ours:
 
 class SplatTransform:
     name, reads = "splat-transform", ["spz", "sog", "compressed.ply", "splat", "ksplat"]
-    writes = [("spz", 3), ("spz", 4), ("compressed.ply", None), ("sog", None)]
+    writes = [("spz", 3), ("spz", 4), ("compressed.ply", None), ("sog", None), ("glb", None)]
 
     def __init__(self, npm):
         self.npm = npm
@@ -351,7 +355,7 @@ class Bench:
             self.peers.append(Niantic(args.spz, folder))
             versions += self.peers[-1].versions()
         if args.npm:
-            self.peers.append(ByNode(args.npm, "three", ["spz", "splat", "ksplat"], 4))
+            self.peers.append(ByNode(args.npm, "three", ["spz", "splat", "ksplat", "glb"], 4))
             self.peers.append(ByNode(args.npm, "gaussian-splats-3d", ["spz", "splat", "ksplat", "compressed.ply"], 2))
         print("Programs: " + "; ".join(versions) + ".")
         self.models = [args.folder / f"{name}.ply" for name in args.models]
@@ -388,8 +392,8 @@ class Bench:
                 self.ours.read(path, ours)
                 peer.read(path, theirs)
                 a, b = columns(ours), columns(theirs)
-                turned = kind == "spz" and isinstance(peer, ByNode)
-                found, of = differences(a, b, quanta(kind, a, facts), turned)
+                sign = AXES.get(kind, [1, 1, 1]) if isinstance(peer, ByNode) else [1, 1, 1]
+                found, of = differences(a, b, quanta(kind, a, facts), np.array(sign, float))
                 if pictures and "scale_0" in b and rest(a).shape == rest(b).shape:
                     write(b, theirs)
                     least, drawn = min(least, self.ours.alike(ours, theirs, "--orbit", ORBIT)["min"]), True
@@ -447,7 +451,7 @@ class Bench:
     def written(self):
         files = []
         for model in self.models:
-            for kind, version in [("spz", 2), ("spz", 3), ("spz", 4), ("sog", None), ("compressed.ply", None), ("splat", None)]:
+            for kind, version in [("spz", 2), ("spz", 3), ("spz", 4), ("sog", None), ("compressed.ply", None), ("splat", None), ("glb", None)]:
                 path = self.folder / f"{model.stem}-ours-{version or 0}.{kind}"
                 self.ours.write(model, path, version)
                 files.append((f"{kind}{f' v{version}' if version else ''}", path))
@@ -457,7 +461,7 @@ class Bench:
 
     def again(self):
         self.title("Read and written twice", "format", "files", "the second is the first", "bytes that differ")
-        for kind, version in [("spz", 2), ("spz", 3), ("spz", 4), ("compressed.ply", None), ("splat", None), ("sog", None)]:
+        for kind, version in [("spz", 2), ("spz", 3), ("spz", 4), ("compressed.ply", None), ("glb", None), ("splat", None), ("sog", None)]:
             same, count, differ = 0, 0, 0
             for source in self.models + [path for path in self.given() if kind != "sog"]:
                 first, second = (self.folder / f"{name}.{kind}" for name in ("first", "second"))
@@ -469,7 +473,7 @@ class Bench:
                 differ += abs(len(a) - len(b)) + int(np.count_nonzero(np.not_equal(*both)))
             label = f"{kind}{f' v{version}' if version else ''}"
             text = f"{same} of {count}"
-            asked = kind in ("spz", "compressed.ply")
+            asked = kind in ("spz", "compressed.ply", "glb")
             self.row(label, count, text if same == count or not asked else self.miss(f"{label}: {text} come back"), f"{differ:,}")
 
     def speed(self):

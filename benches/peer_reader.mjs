@@ -47,6 +47,18 @@ async function reader(peer, file) {
             return { count: table.numRows };
         };
     }
+    if (peer === "three" && kind === ".glb") {
+        const { GLTFLoader } = await load("three/examples/jsm/loaders/GLTFLoader.js");
+        const name = "GLTFGaussianSplatLoaderExtension";
+        const Extension = (await load(`three/examples/jsm/loaders/${name}.js`))[name];
+        return async () => {
+            const loader = new GLTFLoader().register((parser) => new Extension(parser));
+            const { scene } = await loader.parseAsync(buffer, "");
+            let geometry;
+            scene.traverse((node) => (geometry ??= node.splatGeometry));
+            return { count: geometry.attributes.position.count, geometry };
+        };
+    }
     if (peer === "three") {
         const name = { ".spz": "SPZLoader", ".splat": "SPLATLoader", ".ksplat": "KSPLATLoader", ".ply": "GaussianSplatPLYLoader" }[kind];
         const Loader = (await load(`three/examples/jsm/loaders/${name}.js`))[name];
@@ -56,16 +68,16 @@ async function reader(peer, file) {
         };
     }
     const theirs = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
-    // Not optimised: nothing is sorted or left out.
+    // Not optimised: nothing is sorted or left out. A .splat would be sorted all the same, so its parser is called alone.
     const readers = {
         ".spz": () => theirs.SpzLoader.loadFromFileData(new Uint8Array(buffer), 1, 0, false, 2),
-        ".splat": () => theirs.SplatLoader.loadFromFileData(buffer, 0, 0, false),
+        ".splat": () => theirs.SplatParser.parseStandardSplatToUncompressedSplatArray(buffer),
         ".ksplat": () => theirs.KSplatLoader.loadFromFileData(buffer),
         ".ply": () => theirs.PlyLoader.loadFromFileData(buffer, 0, 0, false, 2),
     }[kind];
     return async () => {
         const splats = await readers();
-        return { count: splats.getSplatCount(), splats };
+        return { count: splats.splatCount, splats };
     };
 }
 
@@ -89,7 +101,23 @@ async function dumpThree(geometry, out) {
     });
 }
 
+const SPLAT_NAMES = [
+    ...["x", "y", "z", "red", "green", "blue", "alpha"],
+    ...["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"],
+];
+
+function dumpArray(array, out) {
+    const at = array.constructor.OFFSET;
+    const fields = [at.X, at.Y, at.Z, at.FDC0, at.FDC1, at.FDC2, at.OPACITY];
+    const [scales, turns] = [[at.SCALE0, at.SCALE1, at.SCALE2], [at.ROTATION0, at.ROTATION1, at.ROTATION2, at.ROTATION3]];
+    writePly(out, SPLAT_NAMES, array.splatCount, (i, row) => {
+        const splat = array.getSplat(i);
+        row.set([...fields.map((k) => splat[k]), ...scales.map((k) => Math.log(splat[k])), ...turns.map((k) => splat[k])]);
+    });
+}
+
 async function dumpSplats(splats, out) {
+    if (splats.splats) return dumpArray(splats, out);
     const { Vector3, Quaternion, Vector4 } = await load("three/build/three.module.js");
     const degree = splats.getMinSphericalHarmonicsDegree();
     const per = REST[degree], count = splats.getSplatCount();
@@ -101,8 +129,7 @@ async function dumpSplats(splats, out) {
         const { minSphericalHarmonicsCoeff: low, maxSphericalHarmonicsCoeff: high } = splats;
         sh.forEach((byte, k) => (sh[k] = low + (byte / 255) * (high - low)));
     }
-    const tail = ["scale_0", "scale_1", "scale_2", "rot_0", "rot_1", "rot_2", "rot_3"];
-    const names = ["x", "y", "z", "red", "green", "blue", "alpha", ...tail, ...restNames(per)];
+    const names = [...SPLAT_NAMES, ...restNames(per)];
     writePly(out, names, count, (i, row) => {
         splats.getSplatCenter(i, centre);
         splats.getSplatScaleAndRotation(i, scale, turn);
