@@ -18,8 +18,11 @@ const bufferOf = (file) => {
     const bytes = fs.readFileSync(file);
     return bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength);
 };
-// gaussian-splats-3d waits with it between steps.
-globalThis.window = globalThis;
+async function gaussianSplats3d() {
+    // It waits with it between steps. Others would take this for a browser.
+    globalThis.window = globalThis;
+    return load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
+}
 // SH coefficients of one channel above degree 0, by degree.
 const REST = [0, 3, 8, 15];
 
@@ -67,7 +70,7 @@ async function reader(peer, file) {
             return { count: geometry.attributes.position.count, geometry };
         };
     }
-    const theirs = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
+    const theirs = await gaussianSplats3d();
     // Not optimised: nothing is sorted or left out. A .splat would be sorted all the same, so its parser is called alone.
     const readers = {
         ".spz": () => theirs.SpzLoader.loadFromFileData(new Uint8Array(buffer), 1, 0, false, 2),
@@ -164,7 +167,7 @@ if (task === "versions") {
     await (geometry ? dumpThree(geometry, out) : dumpSplats(splats, out));
 } else if (task === "ksplat") {
     const [file, out, level, degree] = words;
-    const { PlyParser, SplatBufferGenerator } = await load("@mkkellogg/gaussian-splats-3d/build/gaussian-splats-3d.module.js");
+    const { PlyParser, SplatBufferGenerator } = await gaussianSplats3d();
     const splats = PlyParser.parseToUncompressedSplatArray(bufferOf(file), Number(degree));
     const made = SplatBufferGenerator.getStandardGenerator(1, Number(level)).generateFromUncompressedSplatArray(splats);
     fs.writeFileSync(out, Buffer.from(made.bufferData));
