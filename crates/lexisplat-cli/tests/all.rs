@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod cli;
+mod convert;
 mod demo;
 mod determinism;
 mod eval;

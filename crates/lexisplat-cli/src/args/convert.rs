@@ -17,8 +17,8 @@ const FORMATS: &str = "Options of formats";
 /// Convert scenes between formats. Several scenes become one.
 ///
 /// Reads and writes PLY, .lexi, SPZ, SOG, compressed.ply, .splat and glb, and reads .ksplat and .gltf. What a file is, its
-/// content tells. What a format cannot
-/// hold is printed. A .lexi is made as by `lexisplat compress` without options, which reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
+/// content tells. What a format cannot hold is printed. A .lexi is made as by `lexisplat compress` without options, which
+/// reads all of these formats itself. docs/FORMATS.md tells each format's axes and precision.
 #[derive(Debug, Args)]
 pub(crate) struct Convert {
     /// One or more scenes, and the file to write last.

@@ -68,7 +68,7 @@ pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
         if let Some(Value::Object(psnr)) = &psnr {
             let value = |name: &str| psnr.get(name).and_then(Value::as_f64);
             let [mean, least] = ["mean", "min"].map(|name| format::decibels(value(name)));
-            writeln!(out, "PSNR  {mean} dB on average, {least} dB at worst, over {VIEWS} views")?;
+            writeln!(out, "PSNR  {mean} on average, {least} at worst, over {VIEWS} views")?;
         }
         Ok(out)
     })
