@@ -104,8 +104,9 @@ impl Sums {
         }
         let middle = ends.start.midpoint(ends.end - 1);
         let (mut found, mut best) = (f64::INFINITY, bounds[0]);
-        for start in bounds[0]..=bounds[1].min(middle) {
-            let squares = least[start] + self.squares(start, middle);
+        let last = bounds[1].min(middle);
+        for (start, before) in (bounds[0]..).zip(&least[bounds[0]..=last]) {
+            let squares = before + self.squares(start, middle);
             if squares < found {
                 (found, best) = (squares, start);
             }
