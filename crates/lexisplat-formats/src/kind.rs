@@ -140,8 +140,9 @@ struct Marks {
 fn of_json(bytes: &[u8]) -> Option<Kind> {
     let marks: Marks = serde_json::from_slice(bytes).ok()?;
     match (marks.asset, marks.means, marks.quats) {
+        // It has an `asset` too.
+        (_, Some(_), Some(_)) => Some(Kind::Sog),
         (Some(_), ..) => Some(Kind::Gltf),
-        (None, Some(_), Some(_)) => Some(Kind::Sog),
         _ => None,
     }
 }
@@ -152,7 +153,7 @@ mod tests {
 
     #[test]
     fn kinds_are_told_by_their_bytes() {
-        let cases: [(&str, &[u8], Option<Kind>); 14] = [
+        let cases: [(&str, &[u8], Option<Kind>); 15] = [
             ("a.spz", b"", None),
             ("a.spz", b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", Some(Kind::Ply)),
             (
@@ -168,6 +169,7 @@ mod tests {
             ("a", b"glTF\x02\0\0\0{\0\0\0", Some(Kind::Gltf)),
             ("a", b" {\"asset\":{}}", Some(Kind::Gltf)),
             ("a", b"{\"means\":{},\"quats\":{}}", Some(Kind::Sog)),
+            ("a", b"{\"asset\":{},\"means\":{},\"quats\":{}}", Some(Kind::Sog)),
             ("a", b"{\"other\":{}}", None),
             ("a.SPLAT", &[0; 32], Some(Kind::Splat)),
             ("a.ksplat", &[0; 7], Some(Kind::Ksplat)),
