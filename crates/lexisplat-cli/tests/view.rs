@@ -167,6 +167,25 @@ fn a_window_shows_what_render_draws() {
     }
 }
 
+/// Two files of other formats beside each other: both are shown as `render` draws them.
+#[test]
+fn files_of_other_formats_are_shown() {
+    let folder = Folder::new();
+    let draw = ["--orbit", "1", "--width", "160", "--quiet"];
+    for file in ["a.spz", "a.glb"] {
+        folder.run(&["convert", "scene.ply", file]);
+        folder.run(&[&["render", file, "-o", &format!("{file}-views")][..], &draw].concat());
+    }
+    let actions = "camera=0,mode=first,screenshot=first.png,report,quit";
+    let Some(told) = show(&folder, &["a.spz", "a.glb", "--width", "160"], actions) else { return };
+    let report: Value = serde_json::from_str(&told).unwrap();
+    assert_eq!(report["models"].as_array().unwrap().len(), 2, "{report}");
+    assert!(report["psnr"].as_f64().unwrap() > 20.0, "{report}");
+    let views = std::fs::read_dir(folder.path("a.spz-views")).unwrap().map(|entry| entry.unwrap().path());
+    let drawn = views.into_iter().find(|path| path.extension().is_some_and(|e| e == "png")).unwrap();
+    assert!(picture(&folder.path("first.png")).width() == picture(&drawn).width());
+}
+
 #[test]
 fn the_window_compresses_as_the_command_does() {
     let folder = Folder::new();
