@@ -49,7 +49,8 @@ fn check_sized(name: &str, data: &[u8], input: &[u8], siblings: &Siblings<'_>) {
     };
     let first = written(&splats);
     let options = ReadOptions::default();
-    let again = open("again", &first, Siblings::NONE, &options, true, &Silent).expect("what was written opens");
+    let again =
+        open("again", &first, Siblings::NONE, &options, true, &Silent).expect("what was written opens");
     assert_eq!(again.kind(), kind);
     let again = again.source().whole().expect("what was written can be read").into_owned();
     assert_eq!((again.len(), again.degree), (splats.len(), splats.degree));
