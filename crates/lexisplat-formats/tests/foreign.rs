@@ -61,7 +61,6 @@ const FILES: [Foreign; 5] = [
         // It cuts shares down to whole bytes.
         opacity: 1.01 / 255.0,
         sh: [0.1, 2.0],
-        ..SPZ
     },
 ];
 

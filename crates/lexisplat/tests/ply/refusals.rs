@@ -31,7 +31,7 @@ fn relatives_of_3dgs_are_named() {
     let cases = [
         (
             packed.into_bytes(),
-            "t.ply: this is a PlayCanvas compressed.ply, which is not supported; unpack it first",
+            "t.ply: this is a PlayCanvas compressed.ply, which is not supported; 'lexisplat convert' makes a PLY",
         ),
         (
             good().without(&["scale_2"]).bytes(),
