@@ -10,7 +10,7 @@ use lexisplat_testing::Random;
 /// Gaussians of the files: a few, so that headers are a large part.
 const GAUSSIANS: usize = 20;
 /// Damaged files of each format, beside all that are cut off.
-const MUTATIONS: usize = 2_000;
+const MUTATIONS: usize = 10_000;
 
 fn files() -> Vec<(Kind, Vec<u8>)> {
     let splats = scene(&SampleOptions::new(GAUSSIANS, 1));
