@@ -35,16 +35,7 @@ pub fn ply(
         assert_eq!(chunks.meta(), &splats.meta);
         assert_eq!((chunks.len(), chunks.degree()), (splats.len(), splats.degree));
         assert_eq!(chunks.has_normals() && !chunks.is_empty(), !splats.geometry.normals.is_empty());
-        let mut part = chunks.empty();
-        let (mut start, mut sizes) = (0, sizes(data, splats.len()));
-        while start < splats.len() {
-            let end = splats.len().min(start + sizes.next().unwrap_or(1));
-            chunks.read(start..end, &mut part).expect("all was looked at");
-            assert_eq!(part.len(), end - start);
-            part.validate().expect("arrays fit");
-            (start..end).enumerate().for_each(|(k, j)| same_splat(&part, k, splats, j));
-            start = end;
-        }
+        source(data, chunks, splats);
     });
 }
 

@@ -13,6 +13,7 @@ mod gltf;
 mod kind;
 mod ksplat;
 mod merge;
+mod numbers;
 mod opacity;
 mod open;
 mod rows;

@@ -2,6 +2,8 @@
 
 use lexisplat::{Error, FormatError, Result};
 
+use crate::numbers::u32_at;
+
 /// First bytes of a glb.
 pub(crate) const MAGIC: &[u8] = b"glTF";
 /// The version of the container.
@@ -20,11 +22,6 @@ pub(super) struct Chunks<'a> {
     pub(super) json: &'a [u8],
     pub(super) bin: Option<&'a [u8]>,
     pub(super) warnings: Vec<String>,
-}
-
-/// The number at byte `at`; 0 if it is not there.
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    bytes.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |chunk| u32::from_le_bytes(*chunk))
 }
 
 fn truncated(name: &str, what: &str, expected: usize, found: usize) -> Error {

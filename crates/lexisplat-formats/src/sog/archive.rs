@@ -10,6 +10,7 @@ use std::ops::Deref;
 use flate2::bufread::DeflateDecoder;
 use lexisplat::{Error, FormatError, Input, Limits, Result};
 
+use crate::numbers::{u16_at, u32_at};
 use crate::siblings::{Siblings, check_plain};
 
 /// First bytes of the header of a member, of its entry in the directory, and of the end of the directory.
@@ -52,15 +53,6 @@ pub(super) struct Archive<'a> {
     name: &'a str,
     bytes: &'a [u8],
     members: BTreeMap<&'a str, Member>,
-}
-
-/// The numbers at `at` in a record that is long enough.
-fn u16_at(record: &[u8], at: usize) -> u16 {
-    record.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |v| u16::from_le_bytes(*v))
-}
-
-fn u32_at(record: &[u8], at: usize) -> u32 {
-    record.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |v| u32::from_le_bytes(*v))
 }
 
 impl<'a> Archive<'a> {

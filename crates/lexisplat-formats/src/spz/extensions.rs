@@ -2,8 +2,8 @@
 
 use lexisplat::{Error, Result};
 
-use super::header::u32_at;
 use crate::axes::Flip;
+use crate::numbers::u32_at;
 
 /// Bytes of a record's type and length.
 const HEAD: usize = 8;

@@ -2,6 +2,8 @@
 
 use lexisplat::{Error, FormatError, Result, ShDegree};
 
+use crate::numbers::u32_at;
+
 /// First bytes of a header, in all versions.
 const MAGIC: &[u8; 4] = b"NGSP";
 /// Bytes of a header of versions 1 to 3, which is inside gzip (`LegacyPackedGaussiansHeader`).
@@ -38,11 +40,6 @@ pub(super) struct Header {
     pub(super) has_extensions: bool,
     /// Number of streams that are not empty, and where their table begins; only in version 4.
     pub(super) table: Option<(usize, usize)>,
-}
-
-/// The number at byte `at` of `bytes`; 0 if it is not there.
-pub(super) fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    bytes.get(at..).and_then(|rest| rest.first_chunk()).map_or(0, |chunk| u32::from_le_bytes(*chunk))
 }
 
 impl Header {
