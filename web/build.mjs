@@ -18,6 +18,8 @@ const modules = process.env.LEXISPLAT_NPM ?? join(web, 'node_modules');
 
 /** What a build asks of the engine; every browser with WebGPU has it, and Node since version 16. */
 const FEATURES = '-Ctarget-feature=+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals';
+/** The same for wasm-opt, and what wasm-bindgen uses. All its features at once make files that engines do not read yet. */
+const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to-int', 'sign-ext', 'mutable-globals', 'reference-types', 'multivalue'].map((f) => `--enable-${f}`);
 /** Most bytes of the decoder and its JavaScript after gzip -9. */
 const MOST_DECODER = 150_000;
 
@@ -46,7 +48,7 @@ function build(name) {
   const wasm = join(folder, `${name}_bg.wasm`);
   const optimiser = join(modules, 'binaryen/bin/wasm-opt');
   if (existsSync(optimiser)) {
-    run(process.execPath, [optimiser, wasm, '-o', wasm, optimise, '--all-features', '--strip-debug', '--strip-producers']);
+    run(process.execPath, [optimiser, wasm, '-o', wasm, optimise, ...ENABLED, '--strip-debug', '--strip-producers']);
   } else {
     console.warn(`${name}: not optimised further, because binaryen is not in ${modules}`);
   }

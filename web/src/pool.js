@@ -38,6 +38,7 @@ export class Pool {
       const { id, reply, error, fatal } = worker.on ? event : event.data;
       const { resolve, reject } = waiting.get(id) ?? {};
       waiting.delete(id);
+      if (waiting.size === 0) worker.unref?.();
       if (error !== undefined) reject?.(new Error(fatal ? `lexisplat: ${FAULT} (${error})` : error));
       else resolve?.(reply);
     });
@@ -49,6 +50,8 @@ export class Pool {
         new Promise((resolve, reject) => {
           const id = this.#next++;
           waiting.set(id, { resolve, reject });
+          // Node goes on while an answer is awaited, and ends although a scene was not closed.
+          worker.ref?.();
           worker.postMessage({ ...message, id }, transfer);
         }),
       stop: () => {
@@ -56,7 +59,6 @@ export class Pool {
         failAll(new Error('lexisplat: the scene was closed'));
       },
     };
-    worker.unref?.();
     await slot.ask({ type: 'module', module: env.module });
     return slot;
   }
