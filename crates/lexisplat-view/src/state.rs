@@ -347,6 +347,12 @@ mod tests {
     }
 
     #[test]
+    #[cfg(feature = "window")]
+    fn differences_start_as_those_of_a_montage() {
+        assert_eq!(GAIN, lexisplat_eval::montage::AMPLIFICATION);
+    }
+
+    #[test]
     fn numbers_stay_in_their_ranges() {
         let mut state = state(true);
         state.apply(&Command::Split(2.0));
