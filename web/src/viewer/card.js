@@ -1,6 +1,8 @@
 // What the panel says of one scene.
 
-import { bytes, count, make, say, time } from './dom.js';
+import { bytes, count, icon, make, say, time } from './dom.js';
+
+const CROSS = 'M6 6l8 8M14 6l-8 8';
 
 /**
  * Makes the card of a slot.
@@ -9,7 +11,7 @@ import { bytes, count, make, say, time } from './dom.js';
  */
 export function sceneCard(slot, on) {
     const name = make('h2', { class: 'name' });
-    const remove = make('button', { type: 'button', class: 'small' }, 'Remove');
+    const remove = make('button', { type: 'button', class: 'icon cross' }, icon(CROSS));
     remove.addEventListener('click', () => (load?.active ? on.cancel(slot) : on.remove(slot)));
     const size = make('p', { class: 'strong' });
     const about = make('p', {});
@@ -27,8 +29,8 @@ export function sceneCard(slot, on) {
         element.setAttribute('aria-label', ordinal);
         say(name, title ?? '');
         name.title = title ?? '';
-        say(remove, load?.active ? 'Cancel' : 'Remove');
-        remove.setAttribute('aria-label', `${load?.active ? 'Cancel' : 'Remove'} ${title}`);
+        remove.title = load?.active ? 'Cancel' : 'Remove';
+        remove.setAttribute('aria-label', `${remove.title} ${title}`);
         const ratio = slot === 1 && first && model && first.bytes > model.bytes ? `, ${(first.bytes / model.bytes).toFixed(1)} x smaller` : '';
         say(size, model ? `${bytes(model.bytes)}${ratio}` : '');
         say(about, model ? `${count(model.gaussians)} Gaussians, ${model.layout}` : '');

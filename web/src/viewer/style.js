@@ -128,6 +128,8 @@ button:disabled { opacity: 0.4; cursor: default; }
 .small { min-height: 24px; padding: 1px 7px; border-color: transparent; color: var(--quiet); font-size: 12px; }
 .icon { display: grid; place-items: center; width: 34px; height: 34px; padding: 0; border-color: transparent; }
 .icon svg { width: 20px; height: 20px; fill: none; stroke: currentColor; stroke-width: 1.5; stroke-linecap: round; stroke-linejoin: round; }
+.cross { width: 26px; height: 26px; min-height: 26px; margin: -3px -4px -3px 0; color: var(--quiet); }
+.cross svg { width: 16px; height: 16px; }
 .turn[aria-expanded='true'] svg { transform: rotate(180deg); }
 .choice { display: flex; flex: 1; padding: 2px; border-radius: 8px; background: var(--card); }
 .spread .choice { flex: 0 1 200px; }
@@ -149,7 +151,7 @@ input[type='color'] { width: 34px; height: 32px; padding: 2px; border: 1px solid
 @container (width < 640px) {
     .panel { inset: auto 0 0; width: auto; max-height: min(56%, 420px); border-width: 1px 0 0; border-radius: 14px 14px 0 0; flex-direction: column-reverse; }
     .bar { padding: 7px 10px calc(7px + env(safe-area-inset-bottom)); }
-    .icon { width: 40px; height: 40px; }
+    .bar .icon { width: 40px; height: 40px; }
     .main { min-height: 40px; padding: 4px 15px; }
     .body { padding: 12px 12px 4px; }
     .turn svg { transform: rotate(180deg); }

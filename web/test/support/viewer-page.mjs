@@ -76,6 +76,15 @@ export function calls(page, name) {
     return page.evaluate((name) => globalThis.viewers.at(-1).calls.filter((call) => call[0] === name), name);
 }
 
+/** What the newest stand-in reports as soon as it does not draw. */
+export function reportOf(page) {
+    return page.evaluate(async () => {
+        const viewer = globalThis.viewers.at(-1);
+        while (viewer.busy) await new Promise((go) => setTimeout(go));
+        return JSON.parse(viewer.report());
+    });
+}
+
 /** Waits until a scene of this name is whole, by what the panel says. */
 export function whole(page, name) {
     return page.locator('.card', { hasText: name }).filter({ hasText: 'Decoded in' }).waitFor();
