@@ -4,6 +4,7 @@ const PART = 100;
 
 export async function show(source, { slot, onForm, onPart, onProgress, signal, env, budget }) {
     if (!(slot === 0 || slot === 1) || !env.wasm || !(budget > 0)) throw new Error('a call without what it needs');
+    if (env.worker.startsWith('blob:')) await echo(env.worker);
     const answer = source instanceof Blob ? new Response(source) : await fetch(source, { signal });
     if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
     const total = source instanceof Blob ? source.size : Number(answer.headers.get('content-length')) || undefined;
@@ -30,4 +31,15 @@ export async function show(source, { slot, onForm, onPart, onProgress, signal, e
     if (!info) throw new Error('this is not a scene that can be read');
     if (parts < info.many) throw new Error('the connection was cut');
     return { info };
+}
+
+// The worker of the page of one file is asked whether it is there.
+function echo(address) {
+    return new Promise((done, failed) => {
+        // Chromium starts no module worker from a blob of a page from disk.
+        const worker = new Worker(address);
+        worker.onmessage = () => done(worker.terminate());
+        worker.onerror = () => failed(new Error('the worker did not start'));
+        worker.postMessage('there');
+    });
 }
