@@ -12,8 +12,8 @@ let loading;
 
 /** Says why this browser cannot draw, or nothing if it may. */
 export function obstacle() {
-    if (!globalThis.isSecureContext) return 'Browsers offer WebGPU to pages from https:// and localhost only.';
-    if (!navigator.gpu) return 'This browser has no WebGPU, which draws the scene. Current Chrome, Edge, Safari and Firefox have it.';
+  if (!globalThis.isSecureContext) return 'Browsers offer WebGPU to pages from https:// and localhost only.';
+  if (!navigator.gpu) return 'This browser has no WebGPU, which draws the scene. Current Chrome, Edge, Safari and Firefox have it.';
 }
 
 /**
@@ -22,15 +22,15 @@ export function obstacle() {
  * @returns {Promise<{Viewer: any, env: {wasm: WebAssembly.Module, worker: string, workers: number}}>}
  */
 export function load(place) {
-    loading ??= start(place).catch((error) => {
-        loading = undefined;
-        throw error;
-    });
-    return loading;
+  loading ??= start(place).catch((error) => {
+    loading = undefined;
+    throw error;
+  });
+  return loading;
 }
 
 async function start(place) {
-    const [glue, wasm] = await Promise.all([import('./viewer.js'), place.compile()]);
-    await glue.default({ module_or_path: wasm });
-    return { Viewer: glue.Viewer, env: { wasm, worker: place.worker, workers: place.workers } };
+  const [glue, wasm] = await Promise.all([import('../../wasm/viewer.js'), place.compile()]);
+  await glue.default({ module_or_path: wasm });
+  return { Viewer: glue.Viewer, env: { wasm, worker: place.worker, workers: place.workers } };
 }

@@ -5,12 +5,12 @@ const WORKERS = 2;
 
 /** @type {import('./engine.js').Place} */
 export const folder = {
-    compile: async () => {
-        const answer = await fetch(new URL('./viewer_bg.wasm', import.meta.url));
-        if (!answer.ok) throw new Error(`The viewer's program could not be loaded (${answer.status}).`);
-        // compileStreaming refuses what a server sends under another type than application/wasm.
-        return WebAssembly.compile(await answer.arrayBuffer());
-    },
-    worker: new URL('../worker.js', import.meta.url).href,
-    workers: WORKERS,
+  compile: async () => {
+    const answer = await fetch(new URL('../../wasm/viewer_bg.wasm', import.meta.url));
+    if (!answer.ok) throw new Error(`The viewer's program could not be loaded (${answer.status}).`);
+    // compileStreaming refuses what a server sends under another type than application/wasm.
+    return WebAssembly.compile(await answer.arrayBuffer());
+  },
+  worker: new URL('../worker.js', import.meta.url).href,
+  workers: WORKERS,
 };

@@ -5,17 +5,17 @@ const CSS = `
 :host([hidden]) { display: none; }
 :host(main) { position: fixed; inset: 0; }
 .app {
-    --behind: #17181b; --panel: rgb(28 29 33 / 0.9); --card: rgb(255 255 255 / 0.055); --line: rgb(255 255 255 / 0.13);
-    --text: #ececef; --quiet: #b3b4bd; --accent: #8ccdff; --on-accent: #0b1a26; --wrong: #ffb4a9; --wrong-panel: #3a1f1d;
-    position: absolute; inset: 0; overflow: hidden; container-type: size; background: var(--behind); color: var(--text);
-    font: 13px/1.45 system-ui, sans-serif; font-variant-numeric: tabular-nums; color-scheme: dark;
+  --behind: #17181b; --panel: rgb(28 29 33 / 0.9); --card: rgb(255 255 255 / 0.055); --line: rgb(255 255 255 / 0.13);
+  --text: #ececef; --quiet: #b3b4bd; --accent: #8ccdff; --on-accent: #0b1a26; --wrong: #ffb4a9; --wrong-panel: #3a1f1d;
+  position: absolute; inset: 0; overflow: hidden; container-type: size; background: var(--behind); color: var(--text);
+  font: 13px/1.45 system-ui, sans-serif; font-variant-numeric: tabular-nums; color-scheme: dark;
 }
 @media (prefers-color-scheme: light) {
-    .app {
-        --behind: #e9eaed; --panel: rgb(252 252 253 / 0.94); --card: rgb(0 0 0 / 0.04); --line: rgb(0 0 0 / 0.16);
-        --text: #1b1c20; --quiet: #565863; --accent: #0a5ea8; --on-accent: #ffffff; --wrong: #9a1f12; --wrong-panel: #fdecea;
-        color-scheme: light;
-    }
+  .app {
+    --behind: #e9eaed; --panel: rgb(252 252 253 / 0.94); --card: rgb(0 0 0 / 0.04); --line: rgb(0 0 0 / 0.16);
+    --text: #1b1c20; --quiet: #565863; --accent: #0a5ea8; --on-accent: #ffffff; --wrong: #9a1f12; --wrong-panel: #fdecea;
+    color-scheme: light;
+  }
 }
 *, *::before, *::after { box-sizing: border-box; }
 [hidden] { display: none !important; }
@@ -34,8 +34,8 @@ canvas:focus-visible { outline-offset: -3px; }
 
 .label, .middle, .wipe { position: absolute; }
 .label {
-    max-width: 44%; padding: 3px 9px; overflow: hidden; border-radius: 6px; background: rgb(12 12 14 / 0.68); color: #fff;
-    text-overflow: ellipsis; white-space: nowrap;
+  max-width: 44%; padding: 3px 9px; overflow: hidden; border-radius: 6px; background: rgb(12 12 14 / 0.68); color: #fff;
+  text-overflow: ellipsis; white-space: nowrap;
 }
 .label.left { top: 12px; left: 12px; }
 .label.right { top: 12px; right: 12px; }
@@ -45,17 +45,17 @@ canvas:focus-visible { outline-offset: -3px; }
 .middle { left: 50%; top: 0; bottom: 0; width: 2px; margin-left: -1px; background: #fff; box-shadow: 0 0 0 1px rgb(0 0 0 / 0.35); }
 .wipe { top: 0; bottom: 0; width: 28px; margin-left: -14px; pointer-events: auto; touch-action: none; cursor: ew-resize; }
 .wipe::before {
-    content: ''; position: absolute; left: 13px; top: 0; bottom: 0; width: 2px; background: #fff;
-    box-shadow: 0 0 0 1px rgb(0 0 0 / 0.35);
+  content: ''; position: absolute; left: 13px; top: 0; bottom: 0; width: 2px; background: #fff;
+  box-shadow: 0 0 0 1px rgb(0 0 0 / 0.35);
 }
 .wipe:focus-visible { outline: none; }
 .wipe:focus-visible .grip { outline: 2px solid var(--accent); outline-offset: 2px; }
 .grip {
-    position: absolute; left: 0; top: 50%; width: 28px; height: 28px; margin-top: -14px; border: 2px solid #fff;
-    border-radius: 50%; background: rgb(20 20 23 / 0.85); box-shadow: 0 1px 5px rgb(0 0 0 / 0.4);
+  position: absolute; left: 0; top: 50%; width: 28px; height: 28px; margin-top: -14px; border: 2px solid #fff;
+  border-radius: 50%; background: rgb(20 20 23 / 0.85); box-shadow: 0 1px 5px rgb(0 0 0 / 0.4);
 }
 .grip::before, .grip::after {
-    content: ''; position: absolute; top: 8px; width: 6px; height: 6px; border: solid #fff; border-width: 0 0 2px 2px;
+  content: ''; position: absolute; top: 8px; width: 6px; height: 6px; border: solid #fff; border-width: 0 0 2px 2px;
 }
 .grip::before { left: 5px; transform: rotate(45deg); }
 .grip::after { right: 5px; transform: rotate(225deg); }
@@ -64,8 +64,8 @@ canvas:focus-visible { outline-offset: -3px; }
 .instead > * { grid-area: 1 / 1; }
 .poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
 .notice {
-    display: grid; gap: 10px; justify-items: center; max-width: 25rem; padding: 22px 26px; border-radius: 12px;
-    background: var(--panel); text-align: center; pointer-events: auto; position: relative;
+  display: grid; gap: 10px; justify-items: center; max-width: 25rem; padding: 22px 26px; border-radius: 12px;
+  background: var(--panel); text-align: center; pointer-events: auto; position: relative;
 }
 .whole:not(.still) .notice { border: 1.5px dashed var(--line); }
 .notice h2 { font-size: 17px; font-weight: 600; }
@@ -74,14 +74,14 @@ canvas:focus-visible { outline-offset: -3px; }
 .begin { position: relative; pointer-events: auto; padding: 9px 20px; font-weight: 600; background: var(--panel); }
 .begin::before { content: ''; position: absolute; inset: -100vmax; }
 .over::after {
-    content: 'Drop to open'; position: absolute; inset: 10px; display: grid; place-items: center; border: 2px dashed var(--accent);
-    border-radius: 12px; background: rgb(0 0 0 / 0.45); color: #fff; font-size: 18px; pointer-events: none;
+  content: 'Drop to open'; position: absolute; inset: 10px; display: grid; place-items: center; border: 2px dashed var(--accent);
+  border-radius: 12px; background: rgb(0 0 0 / 0.45); color: #fff; font-size: 18px; pointer-events: none;
 }
 
 .panel {
-    position: absolute; top: 12px; right: 12px; display: flex; flex-direction: column; width: 288px; max-height: calc(100% - 24px);
-    border: 1px solid var(--line); border-radius: 12px; background: var(--panel); backdrop-filter: blur(14px);
-    box-shadow: 0 4px 22px rgb(0 0 0 / 0.22);
+  position: absolute; top: 12px; right: 12px; display: flex; flex-direction: column; width: 288px; max-height: calc(100% - 24px);
+  border: 1px solid var(--line); border-radius: 12px; background: var(--panel); backdrop-filter: blur(14px);
+  box-shadow: 0 4px 22px rgb(0 0 0 / 0.22);
 }
 .bar { display: flex; gap: 2px; align-items: center; padding: 7px; }
 .body { display: grid; gap: 13px; padding: 5px 12px 12px; overflow: auto; overscroll-behavior: contain; }
@@ -96,11 +96,11 @@ section { display: grid; gap: 6px; min-width: 0; }
 .card p { color: var(--quiet); }
 .card p.strong { color: var(--text); }
 .card .name {
-    flex: 1; min-width: 0; overflow: hidden; color: var(--text); font-size: 13px; text-overflow: ellipsis; white-space: nowrap;
+  flex: 1; min-width: 0; overflow: hidden; color: var(--text); font-size: 13px; text-overflow: ellipsis; white-space: nowrap;
 }
 .slot {
-    flex: none; width: 18px; border-radius: 4px; background: var(--line); font-size: 11px; font-weight: 600; line-height: 18px;
-    text-align: center;
+  flex: none; width: 18px; border-radius: 4px; background: var(--line); font-size: 11px; font-weight: 600; line-height: 18px;
+  text-align: center;
 }
 progress { width: 100%; height: 5px; margin: 5px 0 3px; border: 0; border-radius: 3px; background: var(--line); accent-color: var(--accent); overflow: hidden; }
 progress::-webkit-progress-bar { background: var(--line); }
@@ -118,8 +118,8 @@ th { width: 48%; padding-right: 8px; }
 td { color: var(--quiet); }
 
 button {
-    min-height: 32px; padding: 4px 10px; border: 1px solid var(--line); border-radius: 7px; background: transparent; color: inherit;
-    font: inherit; cursor: pointer; white-space: nowrap;
+  min-height: 32px; padding: 4px 10px; border: 1px solid var(--line); border-radius: 7px; background: transparent; color: inherit;
+  font: inherit; cursor: pointer; white-space: nowrap;
 }
 button:hover:not(:disabled) { background: var(--card); border-color: var(--quiet); }
 button:disabled { opacity: 0.4; cursor: default; }
@@ -140,8 +140,8 @@ input[type='color'] { width: 34px; height: 32px; padding: 2px; border: 1px solid
 
 .messages { position: absolute; left: 12px; bottom: 52px; display: grid; gap: 8px; width: min(430px, calc(100% - 330px)); }
 .message {
-    display: flex; gap: 8px; align-items: center; padding: 8px 8px 8px 13px; border: 1px solid var(--line); border-radius: 10px;
-    background: var(--panel); box-shadow: 0 3px 14px rgb(0 0 0 / 0.22); backdrop-filter: blur(14px);
+  display: flex; gap: 8px; align-items: center; padding: 8px 8px 8px 13px; border: 1px solid var(--line); border-radius: 10px;
+  background: var(--panel); box-shadow: 0 3px 14px rgb(0 0 0 / 0.22); backdrop-filter: blur(14px);
 }
 .message p { flex: 1; min-width: 0; overflow-wrap: anywhere; }
 .message input { flex: 1; min-width: 0; padding: 4px; border: 1px solid var(--line); border-radius: 5px; background: transparent; color: inherit; font: inherit; }
@@ -149,19 +149,19 @@ input[type='color'] { width: 34px; height: 32px; padding: 2px; border: 1px solid
 .message.wrong .small { color: inherit; }
 
 @container (width < 640px) {
-    .panel { inset: auto 0 0; width: auto; max-height: min(56%, 420px); border-width: 1px 0 0; border-radius: 14px 14px 0 0; flex-direction: column-reverse; }
-    .bar { padding: 7px 10px calc(7px + env(safe-area-inset-bottom)); }
-    .bar .icon { width: 40px; height: 40px; }
-    .main { min-height: 40px; padding: 4px 15px; }
-    .body { padding: 12px 12px 4px; }
-    .turn svg { transform: rotate(180deg); }
-    .turn[aria-expanded='true'] svg { transform: none; }
-    .messages { left: 8px; right: 8px; top: 48px; bottom: auto; width: auto; }
-    .view:has(~ .panel) .label { max-width: 44%; }
-    .view:has(~ .panel) .label.right { right: 12px; }
-    .view:has(~ .panel) .label.score { bottom: 68px; }
-    .cards:has(.card + .card:not([hidden])) { grid-template-columns: 1fr 1fr; }
-    .cards .strong + p { text-wrap: balance; }
+  .panel { inset: auto 0 0; width: auto; max-height: min(56%, 420px); border-width: 1px 0 0; border-radius: 14px 14px 0 0; flex-direction: column-reverse; }
+  .bar { padding: 7px 10px calc(7px + env(safe-area-inset-bottom)); }
+  .bar .icon { width: 40px; height: 40px; }
+  .main { min-height: 40px; padding: 4px 15px; }
+  .body { padding: 12px 12px 4px; }
+  .turn svg { transform: rotate(180deg); }
+  .turn[aria-expanded='true'] svg { transform: none; }
+  .messages { left: 8px; right: 8px; top: 48px; bottom: auto; width: auto; }
+  .view:has(~ .panel) .label { max-width: 44%; }
+  .view:has(~ .panel) .label.right { right: 12px; }
+  .view:has(~ .panel) .label.score { bottom: 68px; }
+  .cards:has(.card + .card:not([hidden])) { grid-template-columns: 1fr 1fr; }
+  .cards .strong + p { text-wrap: balance; }
 }
 @media (prefers-reduced-transparency: reduce) { .panel, .message { backdrop-filter: none; } }
 @media (prefers-reduced-motion: no-preference) { button, .turn svg { transition: background-color 120ms, transform 160ms; } }
@@ -172,9 +172,9 @@ let sheet;
 
 /** Gives a shadow root the look of the viewer. @param {ShadowRoot} root */
 export function adopt(root) {
-    if (!sheet) {
-        sheet = new CSSStyleSheet();
-        sheet.replaceSync(CSS);
-    }
-    if (!root.adoptedStyleSheets.includes(sheet)) root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
+  if (!sheet) {
+    sheet = new CSSStyleSheet();
+    sheet.replaceSync(CSS);
+  }
+  if (!root.adoptedStyleSheets.includes(sheet)) root.adoptedStyleSheets = [...root.adoptedStyleSheets, sheet];
 }
