@@ -34,7 +34,7 @@ const MARKERS = [
  * @param {Record<string, string>} [options.instead] files to take instead of others, for tests
  * @returns {Promise<string>} the HTML
  */
-export async function buildPage({ wasm = here('wasm/viewer_bg.wasm'), worker = here('src/viewer/worker.js'), instead = {} } = {}) {
+export async function buildPage({ wasm = here('wasm/viewer_bg.wasm'), worker = here('src/viewer-worker.js'), instead = {} } = {}) {
   const [page, program, main, decoder] = await Promise.all([
     readFile(here('src/viewer/page.html'), 'utf8'),
     readFile(wasm),

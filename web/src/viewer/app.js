@@ -72,7 +72,8 @@ export class App {
     });
     this.loads = new Loads(this.stage, {
       changed: (slot) => this.#changed(slot),
-      formed: (slot) => this.#formed(slot),
+      formed: () => this.#tell(() => {}).catch((error) => this.fail(error)),
+      begun: (slot) => this.#first(slot),
       loaded: (slot, load) => options.on('load', { slot, name: load.name, ...this.report?.models[slot] }),
       failed: (slot, message, error) => this.fail(message, error),
     });
@@ -212,10 +213,9 @@ export class App {
     this.#update(report);
   }
 
-  #formed(slot) {
+  #first(slot) {
     this.#arranged();
     this.#wanted.slots.delete(slot);
-    this.#tell(() => {}).catch((error) => this.fail(error));
   }
 
   // A new scene moves the camera and may change the mode, so that what is wanted is said after it.

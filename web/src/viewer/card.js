@@ -33,7 +33,9 @@ export function sceneCard(slot, on) {
     remove.setAttribute('aria-label', `${remove.title} ${title}`);
     const ratio = slot === 1 && first && model && first.bytes > model.bytes ? `, ${(first.bytes / model.bytes).toFixed(1)} x smaller` : '';
     say(size, model ? `${bytes(model.bytes)}${ratio}` : '');
-    say(about, model ? `${count(model.gaussians)} Gaussians, ${model.layout}` : '');
+    const { shown = model?.gaussians } = load?.info ?? {};
+    const less = shown < model?.gaussians ? `${count(shown)} of ` : '';
+    say(about, model ? `${less}${count(model.gaussians)} Gaussians, ${model.layout}` : '');
     const progress = load?.progress;
     bar.hidden = !load?.active;
     if (load?.active) {

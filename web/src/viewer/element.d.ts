@@ -23,15 +23,18 @@ export interface ViewerModel {
 export interface ViewerReport {
   device: string;
   mode: ViewMode;
-  camera: number;
+  /** Name of the camera. */
+  camera: string | null;
+  /** Number of the camera among `cameras`, from 0. */
+  index: number;
   cameras: number;
   /** Whether the view was moved away from the cameras. */
   free: boolean;
   /** Of the picture, in device pixels. */
   width: number;
   height: number;
-  /** Time of the last picture. */
-  milliseconds: number;
+  /** Time of the last picture; null before there is one. */
+  milliseconds: number | null;
   /** Gaussians drawn of each scene. */
   drawn: [number | null, number | null];
   /** Bytes on the GPU. */

@@ -1,10 +1,9 @@
 // Scenes on their way into the two slots of the viewer.
 
-import { show } from '../session.js';
 import { reason } from './dom.js';
 
-// Most bytes of files that are held at once while they are decoded.
-const BUDGET = 256 * 2 ** 20;
+// Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
+const BUDGET = 2 ** 30;
 
 /** What is known of a scene that is being loaded, or was.
  * @typedef {object} Load
@@ -12,6 +11,9 @@ const BUDGET = 256 * 2 ** 20;
  * @property {boolean} file whether it is a file, not an address
  * @property {boolean} active whether bytes still come
  * @property {boolean} shown whether the viewer has it
+ * @property {boolean} begun whether there is something to see of it
+ * @property {Promise<unknown>} [last] the last part on its way to the viewer; those before are done when it is
+ * @property {any} [info] what its header says
  * @property {{loaded: number, total?: number, decoded: number, gaussians: number, ms: number}} [progress]
  */
 
@@ -21,8 +23,9 @@ export class Loads {
   #stops = [undefined, undefined];
 
   /**
+   * `formed` is told that the viewer has a scene, `begun` that there is something to see of it.
    * @param {import('./stage.js').Stage} stage
-   * @param {{changed: (slot: number) => void, formed: (slot: number) => void, loaded: (slot: number, load: Load) => void,
+   * @param {{changed: (slot: number) => void, formed: (slot: number) => void, begun: (slot: number) => void, loaded: (slot: number, load: Load) => void,
    *     failed: (slot: number, message: string, error: unknown) => void}} on
    */
   constructor(stage, on) {
@@ -41,7 +44,7 @@ export class Loads {
     this.cancel(slot);
     const stop = new AbortController();
     const before = this.slots[slot]?.shown ? this.slots[slot] : undefined;
-    const load = { name: nameOf(source), file: source instanceof Blob, active: true, shown: false, progress: undefined };
+    const load = { name: nameOf(source), file: source instanceof Blob, active: true, shown: false, begun: false, progress: undefined };
     this.#stops[slot] = stop;
     this.slots[slot] = load;
     this.on.changed(slot);
@@ -54,19 +57,22 @@ export class Loads {
       });
     const pending = [];
     try {
+      const { show } = await import('../session.js');
       await show(source, {
         env,
         slot,
         signal: stop.signal,
         budget: BUDGET,
         onForm: (bytes, info) => {
+          load.info = info;
           const formed = act((viewer) => viewer.form(slot, bytes, JSON.stringify({ ...info, name: load.name })));
           pending.push(formed.then(() => stop.signal.aborted || this.#formed(slot, load)));
           return formed;
         },
         onPart: (index, bytes) => {
           const part = act((viewer) => viewer.part(slot, index, bytes));
-          pending.push(part);
+          if (!load.begun) pending.push(part.then(() => stop.signal.aborted || this.#begun(slot, load)));
+          load.last = part;
           return part;
         },
         onProgress: (progress) => {
@@ -74,19 +80,20 @@ export class Loads {
           if (!stop.signal.aborted) this.on.changed(slot);
         },
       });
-      await Promise.all(pending);
+      await Promise.all([...pending, load.last]);
       if (refusal) throw refusal;
       if (stop.signal.aborted) return false;
       load.active = false;
+      this.#begun(slot, load);
       this.on.loaded(slot, load);
       return true;
     } catch (error) {
-      await Promise.all(pending);
+      await Promise.all([...pending, load.last]);
       load.active = false;
       const replaced = this.slots[slot] !== load;
       if (!replaced && !load.shown) this.slots[slot] = before;
       const wrong = refusal ?? error;
-      if (refusal || !stop.signal.aborted) this.on.failed(slot, `${load.name}: ${reason(wrong)}${rest(load)}`, wrong);
+      if (refusal || !stop.signal.aborted) this.on.failed(slot, `${named(load.name, reason(wrong))}${rest(load)}`, wrong);
       return false;
     } finally {
       load.active = false;
@@ -107,12 +114,22 @@ export class Loads {
     this.on.changed(slot);
   }
 
+  #begun(slot, load) {
+    if (!load.begun) this.on.begun(slot);
+    load.begun = true;
+  }
+
   #formed(slot, load) {
     if (!load.shown) {
       load.shown = true;
       this.on.formed(slot);
     }
   }
+}
+
+// The decoder begins what it says with the name.
+function named(name, text) {
+  return text.startsWith(`${name}:`) ? text : `${name}: ${text}`;
 }
 
 function rest(load) {

@@ -124,7 +124,7 @@ export function makePanel(on) {
     const score = report.identical ? 'identical' : report.psnr === null ? '-' : `${report.psnr.toFixed(2)} dB`;
     say(psnr, score);
     for (const step of steps) step.disabled = report.cameras < 1;
-    say(camera, report.free || report.cameras < 1 ? 'free' : `${report.camera + 1} of ${report.cameras}`);
+    say(camera, report.free || report.cameras < 1 ? 'free' : `${report.index + 1} of ${report.cameras}`);
     degree.set(String(report.degree ?? 'all'));
     colour.value = hex(report.background);
     list(figures, rows(report));
@@ -154,7 +154,7 @@ function rows(report) {
   );
   return [
     ['Gaussians drawn', drawn],
-    ['Frame', time(report.milliseconds)],
+    ['Frame', report.milliseconds === null ? '' : time(report.milliseconds)],
     ['Picture', `${report.width} x ${report.height}`],
     ['GPU memory', bytes(report.resident_bytes)],
     ['of it geometry', geometry],

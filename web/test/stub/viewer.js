@@ -99,16 +99,17 @@ export class Viewer {
     [this.canvas.width, this.canvas.height] = [width, height];
   }
 
-  form(slot, bytes, info) {
+  async form(slot, bytes, info) {
     this.#called('form', slot, bytes.length, info);
     this.models[slot] = JSON.parse(info);
     this.parts[slot] = 0;
     if (slot === 1 && this.models[0]) this.view.mode = 'wipe';
-    if (slot === 0) [this.view.turn, this.view.at] = [[0, 0], [0, 0, 3]];
   }
 
-  part(slot, index, bytes) {
+  async part(slot, index, bytes) {
     this.#called('part', slot, index, bytes.length);
+    // A scene is looked at when it is known where it is.
+    if (slot === 0 && this.parts[slot] === 0) [this.view.turn, this.view.at] = [[0, 0], [0, 0, 3]];
     this.parts[slot]++;
   }
 
@@ -159,7 +160,7 @@ export class Viewer {
     const both = this.models.every(Boolean);
     const drawn = this.models.map((model) => model && model.gaussians);
     return JSON.stringify({
-      device: DEVICE, mode, camera: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
+      device: DEVICE, mode, camera: 'orbit 0', index: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
       milliseconds: globalThis.cost ?? 3.2, drawn, resident_bytes: 5e6, scene_bytes: this.models.map((model) => model && { geometry: 2e6, sh: 5e5 }),
       psnr: both ? 41.27 : null, identical: false, split, gain, degree, background, models: this.models,
     });
