@@ -239,6 +239,26 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     }
   });
 
+  test('says that a scene is on its way, and lets it be cancelled', async () => {
+    const slow = createServer((_, response) => {
+      response.writeHead(200, { 'content-length': 1000, 'access-control-allow-origin': '*' });
+      response.write('lexi');
+    });
+    await new Promise((done) => slow.listen(0, '127.0.0.1', done));
+    try {
+      await open(`?url=${encodeURIComponent(`http://localhost:${slow.address().port}/slow.lexi`)}`);
+      await page.getByText('Loading slow.lexi').waitFor();
+      await page.getByText('4 B of 1.0 kB').waitFor();
+      await page.getByRole('button', { name: 'Cancel slow.lexi' }).click();
+      await page.getByText('Open a scene').waitFor();
+      assert.equal(await page.locator('.message').count(), 0);
+      assert.equal(await page.locator('.card').filter({ visible: true }).count(), 0);
+    } finally {
+      slow.closeAllConnections();
+      slow.close();
+    }
+  });
+
   test('says that an address has nothing', async () => {
     await open('?url=/made/none.lexi');
     await message('none.lexi: the server answered 404.');
@@ -339,6 +359,7 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     assert.equal(await page.locator('.poster').getAttribute('src'), still);
     await drop(page, 'body', [file('one.lexi')]);
     assert.equal(await page.locator('canvas').isVisible(), false);
+    assert.equal(await page.locator('.panel').isVisible(), false, 'nothing can be done there');
   });
 
   test('without an adapter says the reason', async () => {

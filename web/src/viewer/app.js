@@ -256,8 +256,8 @@ export class App {
   // The notice is there until a scene is.
   #look() {
     const shown = Boolean(this.report?.models.some(Boolean));
-    const active = this.loads?.slots.some((load) => load?.active);
+    const load = this.loads?.slots.find((load) => load?.active);
     this.element.classList.toggle('shown', shown);
-    this.notice.update({ shown, active });
+    this.notice.update({ shown, load });
   }
 }

@@ -11,16 +11,23 @@ export function makeNotice({ poster, open }) {
   const title = make('h2', {});
   const text = make('p', {});
   const button = make('button', { type: 'button', class: 'main', onclick: () => open && open() }, 'Open files');
-  const card = make('div', { class: 'notice', role: 'status', hidden: true }, title, text, button);
+  const bar = make('progress', { 'aria-label': 'Loaded', max: 1 });
+  const card = make('div', { class: 'notice', role: 'status', hidden: true }, title, text, bar, button);
   const begin = make('button', { type: 'button', class: 'begin', hidden: true }, 'Show in 3D');
   const element = make('div', { class: 'instead' }, still, card, begin);
   let [waits, why] = [false, ''];
 
-  function draw({ shown, active }) {
+  function draw({ shown, load }) {
+    const loads = !why && (waits || Boolean(load));
     element.hidden = shown;
-    card.hidden = !why && (waits || active || !open);
-    button.hidden = !open || Boolean(why);
-    say(title, why ? 'The scene cannot be drawn here' : 'Open a scene');
+    card.hidden = !why && !loads && !open;
+    button.hidden = !open || Boolean(why) || loads;
+    bar.hidden = !loads;
+    const { loaded, total } = load?.progress ?? {};
+    if (total) bar.value = loaded / total;
+    else bar.removeAttribute('value');
+    text.hidden = loads;
+    say(title, why ? 'The scene cannot be drawn here' : loads ? `Loading ${load?.name ?? ''}` : 'Open a scene');
     say(text, why || 'Drop one or two files here, or choose them: .lexi, .ply, .spz, .sog, .splat, .ksplat or .glb. They stay on this device.');
   }
 
@@ -29,16 +36,17 @@ export function makeNotice({ poster, open }) {
     /** Says that a scene was asked for. */
     busy: () => {
       waits = true;
-      draw({ shown: false, active: true });
+      draw({ shown: false });
     },
     /** Says why nothing can be drawn. */
     cannot: (text) => {
       why = text;
-      draw({ shown: false, active: false });
+      draw({ shown: false });
     },
-    update: ({ shown, active }) => {
-      if (active || shown) waits = false;
-      draw({ shown, active });
+    /** Shows what there is to know: whether a scene is shown, and the load that may bring one. */
+    update: ({ shown, load }) => {
+      if (load || shown) waits = false;
+      draw({ shown, load });
     },
     /** Shows another still picture. */
     poster: (address) => {

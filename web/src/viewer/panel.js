@@ -159,6 +159,7 @@ function rows(report) {
     ['GPU memory', bytes(report.resident_bytes)],
     ['of it geometry', geometry],
     ['of it SH', sh],
+    ['most it ever was', report.most_bytes ? bytes(report.most_bytes) : ''],
     ['Drawn by', report.device],
   ].filter(([, value]) => value);
 }

@@ -31,6 +31,7 @@ canvas:focus, .whole canvas { touch-action: none; }
 canvas:active { cursor: grabbing; }
 canvas:focus-visible { outline-offset: -3px; }
 .app:not(.shown) canvas, .still canvas { visibility: hidden; }
+.still .panel { display: none; }
 
 .label, .middle, .wipe { position: absolute; }
 .label {
@@ -70,6 +71,8 @@ canvas:focus-visible { outline-offset: -3px; }
 .whole:not(.still) .notice { border: 1.5px dashed var(--line); }
 .notice h2 { font-size: 17px; font-weight: 600; }
 .notice p { color: var(--quiet); text-wrap: balance; }
+.notice progress { width: 12rem; max-width: 100%; }
+.notice h2 { max-width: 100%; overflow-wrap: anywhere; }
 .still .instead:has(.poster:not([hidden])) { place-items: end center; }
 .begin { position: relative; pointer-events: auto; padding: 9px 20px; font-weight: 600; background: var(--panel); }
 .begin::before { content: ''; position: absolute; inset: -100vmax; }

@@ -101,9 +101,17 @@ export class Viewer {
 
   async form(slot, bytes, info) {
     this.#called('form', slot, bytes.length, info);
+    const one = !this.models.every(Boolean);
     this.models[slot] = JSON.parse(info);
+    this.#possible(one);
     this.parts[slot] = 0;
-    if (slot === 1 && this.models[0]) this.view.mode = 'wipe';
+  }
+
+  // As the state of `lexisplat view`: a wipe when there are two, and only modes of scenes that are there.
+  #possible(one) {
+    const both = this.models.every(Boolean);
+    if (both && one) this.view.mode = 'wipe';
+    if (!both) this.view.mode = this.models[1] ? 'second' : 'first';
   }
 
   async part(slot, index, bytes) {
@@ -117,6 +125,7 @@ export class Viewer {
     this.#called('remove', slot);
     this.models[slot] = null;
     this.parts[slot] = 0;
+    this.#possible(false);
   }
 
   async draw(scale) {
