@@ -1,6 +1,6 @@
 // Makes the viewer's page of one file: HTML, style, program, worker and WebAssembly, for any server and from disk.
 //
-//   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html
+//   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html; gzipped if it ends so
 //
 // It needs esbuild, from the folder of node_modules that LEXISPLAT_NPM names or from the one beside this file. What is
 // replaced in the written file to give it a scene is said at the head of src/viewer/page.html.
@@ -112,6 +112,7 @@ if (process.argv[1] === fileURLToPath(import.meta.url)) {
   const { values } = parseArgs({ options: { out: { type: 'string', default: OUT } } });
   const html = await buildPage();
   await mkdir(dirname(values.out), { recursive: true });
-  await writeFile(values.out, html);
-  console.log(`${values.out}: ${html.length} bytes`);
+  const bytes = values.out.endsWith('.gz') ? gzipSync(html, { level: 9 }) : Buffer.from(html);
+  await writeFile(values.out, bytes);
+  console.log(`${values.out}: ${bytes.length} bytes`);
 }
