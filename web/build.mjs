@@ -24,7 +24,7 @@ const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to
 const MOST_DECODER = 150_000;
 
 /** The two builds: features of the crate, and the level of wasm-opt. */
-const BUILDS = { decoder: { features: [], optimise: '-O3' }, viewer: { features: ['viewer'], optimise: '-Os' } };
+const BUILDS = { decoder: { features: [], optimise: '-Os' }, viewer: { features: ['viewer'], optimise: '-Oz' } };
 
 function run(program, args, env = {}) {
   const { status, error } = spawnSync(program, args, { stdio: 'inherit', env: { ...process.env, ...env } });

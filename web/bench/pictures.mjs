@@ -12,7 +12,7 @@ import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
 import { open } from '../src/index.js';
-import { launch, serve } from '../test/support/chromium.mjs';
+import { launch, psnr, serve } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
 
 const web = dirname(dirname(fileURLToPath(import.meta.url)));
@@ -27,13 +27,6 @@ const { values, positionals } = parseArgs({
 const [program, ...scenes] = positionals;
 const views = Number(values.views);
 const width = Number(values.width);
-
-/** The PSNR of two pictures of 8 bits, red, green and blue. */
-export function psnr(a, b) {
-  let sum = 0;
-  for (let i = 0; i < a.length; i += 4) for (let c = 0; c < 3; c++) sum += (a[i + c] - b[i + c]) ** 2;
-  return sum === 0 ? Infinity : 10 * Math.log10(255 ** 2 / (sum / ((a.length / 4) * 3)));
-}
 
 async function positionsOf(scene) {
   const opened = await open(readFileSync(scene));
@@ -95,7 +88,7 @@ try {
     const found = [];
     for (const [i, expected] of pictures.entries()) {
       const drawn = await page.evaluate(([w, h, words]) => window.bench.picture(w, h, words), [expected.width, expected.height, `camera=${i}`]);
-      found.push(psnr(expected.data, Buffer.from(drawn.data, 'base64')));
+      found.push(psnr(expected, { ...drawn, data: Buffer.from(drawn.data, 'base64') }));
     }
     const { sh, geometry } = loaded.report.scene_bytes[0];
     const source = loaded.info.sourceGaussians;

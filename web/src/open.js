@@ -2,7 +2,7 @@
 
 import { Pool } from './pool.js';
 import { Scene } from './scene.js';
-import { sourceOf } from './source.js';
+import { after, feedOnce, sourceOf } from './source.js';
 
 /** Most bytes of a file that are held at once, unless options say otherwise. */
 export const MEMORY = 256 << 20;
@@ -24,7 +24,7 @@ export async function openWith(env, source, options) {
   const { signal } = settings;
   signal?.throwIfAborted();
   const workers = settings.workers ?? (typeof Worker === 'undefined' && typeof process === 'undefined' ? 0 : WORKERS);
-  const input = { source: sourceOf(source), feed: undefined, at: 0 };
+  const input = { source: sourceOf(source), feed: undefined };
   let pool;
   try {
     const start = await readStart(input.source, signal);
@@ -34,15 +34,8 @@ export async function openWith(env, source, options) {
     }
     const feed = new env.wasm.Feed(input.source.name, settings.memory, settings.shParts);
     input.feed = feed;
-    feed.feed(0, start.bytes);
-    input.at = start.bytes.length;
-    while (feed.header() === undefined) {
-      const [at] = feed.wants() ?? [];
-      const piece = at === undefined ? null : await input.source.read(at, signal);
-      if (!piece) throw new Error(`${input.source.name}: the file ends within its header`);
-      feed.feed(at, piece);
-      input.at = at + piece.length;
-    }
+    input.source = after(start.bytes, input.source);
+    while (feed.header() === undefined) await feedOnce(feed, input.source, signal);
     pool = await Pool.of(workers, env);
     const { name } = input.source;
     await pool.askAll({ type: 'start', name, start: feed.start(), shParts: settings.shParts });

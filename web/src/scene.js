@@ -1,6 +1,6 @@
 /** A scene that is open: its header, its dictionary, and its chunks as they are decoded. */
 
-import { Pool } from './pool.js';
+import { feedOnce } from './source.js';
 
 /** Most chunks that are decoded and not taken yet, besides those in work. */
 const AHEAD = 2;
@@ -61,14 +61,13 @@ export class Scene {
  * @param {object} input
  * @param {object} input.source where the bytes come from
  * @param {object} input.feed takes them
- * @param {number} input.at how many of the file's first bytes it has
  * @param {Pool} input.pool decodes
  */
-export async function* streamed({ source, feed, at, pool, options, as, refine, stats = {} }) {
+export async function* streamed({ source, feed, pool, options, as, refine, stats = {} }) {
   const { signal, onProgress } = options;
   const header = JSON.parse(feed.header());
   const total = header.bytes;
-  stats.loaded ??= at;
+  stats.loaded ??= 0;
   stats.decoded ??= 0;
   const ready = [];
   const inWork = new Set();
@@ -80,21 +79,19 @@ export async function* streamed({ source, feed, at, pool, options, as, refine, s
   const report = () => onProgress?.({ loaded: stats.loaded, total, decoded: stats.decoded, gaussians: header.gaussians });
   // Reads one piece. What the feed has no room for is read when chunks were decoded.
   const read = async () => {
-    let wanted = feed.wants();
-    if (!wanted && feed.ask_again()) wanted = feed.wants();
-    if (!wanted) {
+    const end = (await feedOnce(feed, source, signal)) ?? (feed.ask_again() ? await feedOnce(feed, source, signal) : undefined);
+    if (end === undefined) {
       isRead = true;
       return;
     }
-    const piece = await source.read(wanted[0], signal);
-    if (!piece) throw new Error(`${source.name}: the file ends after ${wanted[0]} bytes; ${total} were expected`);
-    feed.feed(wanted[0], piece);
-    stats.loaded = Math.max(stats.loaded, wanted[0] + piece.length);
+    stats.loaded = Math.max(stats.loaded, end);
     report();
   };
   const start = (chunk) => {
     const isFinal = !refine || feed.is_final(chunk);
     const job = feed.job(chunk, refine);
+    // There may be room for more bytes now.
+    isRead = false;
     const clock = performance.now();
     const work = pool.ask({ type: 'job', job, as }, [job.buffer]).then((arrays) => {
       stats.milliseconds = (stats.milliseconds ?? 0) + performance.now() - clock;

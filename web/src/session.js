@@ -4,7 +4,7 @@ import * as wasm from '../wasm/viewer.js';
 import { ALL_PARTS, MEMORY, readStart, readWhole } from './open.js';
 import { Pool } from './pool.js';
 import { streamed } from './scene.js';
-import { sourceOf } from './source.js';
+import { after, feedOnce, sourceOf } from './source.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
 /** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
@@ -58,22 +58,15 @@ async function layered({ input, start, open, options, stats, budget, onForm, onP
   const { name } = input;
   const feed = new wasm.Feed(name, options.memory, options.shParts);
   open.feed = feed;
-  feed.feed(0, start.bytes);
-  let at = start.bytes.length;
-  while (feed.header() === undefined) {
-    const [wanted] = feed.wants() ?? [];
-    const piece = wanted === undefined ? null : await input.read(wanted, options.signal);
-    if (!piece) throw new Error(`${name}: the file ends within its header`);
-    feed.feed(wanted, piece);
-    at = wanted + piece.length;
-  }
+  const source = after(start.bytes, input);
+  while (feed.header() === undefined) await feedOnce(feed, source, options.signal);
   const header = JSON.parse(feed.header());
   const shown = feed.give_up(Math.min(header.gaussians, mostGaussians(budget)));
   if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: ${budget} bytes of graphics memory are too few for it`);
   const info = { ...header, name, shown };
   await open.pool.askAll({ type: 'start', name, start: feed.start(), shParts: options.shParts });
   let isFormed = false;
-  for await (const chunk of streamed({ source: input, feed, at, pool: open.pool, options, as: 'gpu', refine: true, stats })) {
+  for await (const chunk of streamed({ source, feed, pool: open.pool, options, as: 'gpu', refine: true, stats })) {
     if (!isFormed) await onForm(chunk.form, info);
     isFormed = true;
     await onPart(chunk.index, chunk.part);

@@ -24,6 +24,33 @@ export function sourceOf(source) {
   throw new TypeError('lexisplat: a source is an address, a Blob, an ArrayBuffer or bytes');
 }
 
+/** `source`, whose first bytes were read already and are given again. */
+export function after(bytes, source) {
+  return {
+    name: source.name,
+    get size() {
+      return source.size;
+    },
+    read: async (at, signal) => (at < bytes.length ? bytes.subarray(at) : source.read(at, signal)),
+    close: () => source.close(),
+  };
+}
+
+/**
+ * Gives `feed` the bytes that it wants next, as far as they come at once.
+ * @returns {Promise<number | undefined>} the place in the file after them; undefined if it wants none
+ */
+export async function feedOnce(feed, source, signal) {
+  const wanted = feed.wants();
+  if (!wanted) return undefined;
+  const [from, to] = wanted;
+  const piece = await source.read(from, signal);
+  if (!piece) throw new Error(`${source.name}: the file ends after ${from} bytes, before it is whole`);
+  const taken = piece.subarray(0, to - from);
+  feed.feed(from, taken);
+  return from + taken.length;
+}
+
 class Memory {
   name = 'scene.lexi';
 
@@ -60,8 +87,9 @@ class Address {
   #address;
   #controller;
   #reader;
-  /** The place in the file of the next byte of the running request. */
+  /** The place in the file of the next byte of the running request, and the piece that came before it. */
   #at = 0;
+  #piece = new Uint8Array(0);
   #ranges = false;
 
   constructor(address) {
@@ -71,6 +99,9 @@ class Address {
   }
 
   async read(at, signal) {
+    const before = this.#at - this.#piece.length;
+    // What was not taken of the last piece is given again.
+    if (this.#reader && at >= before && at < this.#at) return this.#piece.subarray(at - before);
     const skipped = at - this.#at;
     if (!this.#reader || skipped < 0 || (skipped > WORTH_SKIPPING && this.#ranges)) await this.#request(at, signal);
     for (;;) {
@@ -78,6 +109,7 @@ class Address {
       if (!piece) return null;
       const start = this.#at;
       this.#at += piece.length;
+      this.#piece = piece;
       // What was asked for may begin within the piece, or after it.
       if (this.#at > at) return at > start ? piece.subarray(at - start) : piece;
     }
@@ -119,6 +151,7 @@ class Address {
     }
     // A server without ranges sends the file from its start.
     this.#at = response.status === 206 ? at : 0;
+    this.#piece = new Uint8Array(0);
     if (response.status === 200) {
       const length = Number(response.headers.get('content-length'));
       // The length of compressed content is not that of the file.

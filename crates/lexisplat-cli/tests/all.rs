@@ -10,6 +10,7 @@ mod eval;
 mod first;
 mod folder;
 mod gpu;
+mod html;
 #[cfg(target_os = "linux")]
 #[path = "interruption/main.rs"]
 mod interruption;

@@ -15,6 +15,9 @@ fn the_page_is_small_and_the_packed_file_leads() {
     assert!(page.len() <= MOST_BYTES, "{} bytes", page.len());
     assert_eq!(page.matches("data:image/jpeg").count(), 18, "three pictures of each of six views, once");
 
+    let viewer = std::fs::read_to_string(folder.path("lexisplat-demo/scene.html")).unwrap();
+    assert!(viewer.contains("<title>lexisplat demo</title>") && viewer.contains("data-name=\"scene.lexi\">"));
+
     let bytes = |file| std::fs::metadata(folder.path("lexisplat-demo").join(file)).unwrap().len() as f64;
     let ratio = |file| bytes("scene.ply") / bytes(file);
     let (packed, exact) = (ratio("scene.lexi"), ratio("scene-exact.lexi"));

@@ -15,15 +15,20 @@ use lexisplat_sweep::report::{CompressedFile, Picture, Report, jpeg, page};
 use serde_json::json;
 
 use super::compress::error_line;
+use super::html;
 use crate::args::{Common, Demo};
-use crate::files::{check_free, make_folder, new_output, note, tell, view_name, write_bytes, write_picture};
+use crate::files::{
+    check_free, input, make_folder, new_output, note, tell, view_name, write_bytes, write_picture, write_pieces,
+};
+use crate::page::{Page, Poster};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
 /// Views drawn and compared.
 const VIEWS: usize = 6;
-/// What the demo makes beside the pictures: the scene, the packed file, the exact file, the page.
-const FILES: [&str; 4] = ["scene.ply", "scene.lexi", "scene-exact.lexi", "report.html"];
+/// What the demo makes beside the pictures: the scene, the packed file, the exact file, the report, the packed file with a
+/// viewer.
+const FILES: [&str; 5] = ["scene.ply", "scene.lexi", "scene-exact.lexi", "report.html", "scene.html"];
 /// The pictures of a view.
 const PARTS: [&str; 3] = ["original", "compressed", "difference"];
 
@@ -41,7 +46,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
             note(text);
         }
     };
-    let [ply_path, packed_path, exact_path, page_path] = FILES.map(|name| folder.join(name));
+    let [ply_path, packed_path, exact_path, page_path, viewer_path] = FILES.map(|name| folder.join(name));
     let bars = Bars::new(common.quiet);
 
     say("1. making a scene: a still life of glossy and matt things, as a trainer would leave it");
@@ -76,7 +81,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     })?;
     let exact_scores = compared(&splats, &exact, &cameras, &bars, |_, _, _| Ok(()))?;
 
-    say("5. writing the report");
+    say("5. writing the report, and a page with a viewer and the packed scene in it");
     let page = page(&Report {
         title: "lexisplat demo",
         command: "lexisplat demo",
@@ -99,6 +104,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
         pictures: &pictures,
     });
     write_bytes(&page_path, page.as_bytes(), common.overwrite)?;
+    write_viewer(&viewer_path, &packed_path, &packed, common)?;
 
     let seconds = start.elapsed().as_secs_f64();
     let file = |name: &str, bytes: u64, scores: &Comparison| json!({ "file": name, "bytes": bytes, "psnr": scores.psnr, "ssim": scores.ssim });
@@ -128,7 +134,7 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
     };
     tell(common, json, || {
         Ok(format!(
-            "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser ({seconds:.0} s in all).\n",
+            "\n{:<17} {}, {} Gaussians\n{}{}{:<17} SH error {}\n\nOpen {} in a browser, and {} to look around ({seconds:.0} s in all).\n",
             FILES[0],
             format::bytes(ply_bytes),
             format::count(exact.len() as u64),
@@ -137,8 +143,23 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
             "",
             error_line(exact.record()),
             page_path.display(),
+            viewer_path.display(),
         ))
     })
+}
+
+/// Writes a page with a viewer and the file `packed_path`, which holds `packed`.
+fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common) -> Result<()> {
+    let (_, bytes) = input(packed_path, common)?;
+    let still = html::still(&Scene::from(packed))?;
+    let viewer = Page {
+        title: "lexisplat demo",
+        poster: Some(Poster { bytes: &still, kind: html::JPEG_TYPE }),
+        words: "",
+        scenes: vec![(FILES[1], &bytes)],
+    };
+    write_pieces(path, &viewer.pieces(), common.overwrite)?;
+    Ok(())
 }
 
 /// Compares `compressed` with `original`. `draw` gets the name and both pictures of each view.

@@ -25,6 +25,8 @@ const POSTER_WIDTH: u32 = 640;
 /// The first bytes of a PNG and of a JPEG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
+/// Media type of a JPEG.
+pub(super) const JPEG_TYPE: &str = "image/jpeg";
 
 pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
     let output = match args.files.first() {
@@ -106,21 +108,21 @@ fn poster(args: &Html, scene: Option<&SceneFile>, common: &Common) -> Result<Opt
         let (name, bytes) = input(path, common)?;
         let kind = match &*bytes {
             bytes if bytes.starts_with(PNG) => "image/png",
-            bytes if bytes.starts_with(JPEG) => "image/jpeg",
+            bytes if bytes.starts_with(JPEG) => JPEG_TYPE,
             _ => return Err(Error::malformed(&name, "a poster is a PNG or a JPEG").into()),
         };
         return Ok(Some((bytes.to_vec(), kind)));
     }
     match scene {
         Some(scene) if !args.no_poster && !scene.scene().is_empty() => {
-            Ok(Some((still(&scene.scene())?, "image/jpeg")))
+            Ok(Some((still(&scene.scene())?, JPEG_TYPE)))
         }
         _ => Ok(None),
     }
 }
 
-/// A picture of `scene` as the viewer shows it first.
-fn still(scene: &Scene<'_>) -> Result<Vec<u8>> {
+/// A picture of `scene` as the viewer shows it first, as a JPEG.
+pub(super) fn still(scene: &Scene<'_>) -> Result<Vec<u8>> {
     let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
     let camera = cameras.first().map(|camera: &Camera| camera.with_max_width(POSTER_WIDTH));
     let camera = camera.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
