@@ -82,6 +82,8 @@ async function answer(roots, requests, request, response, limit) {
     const path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);
     const range = request.headers.range;
     requests.push({ path, range });
+    // Browsers ask for it by themselves, and a 404 would be an error in the page's console.
+    if (path === '/favicon.ico') return void response.writeHead(204).end();
     const file = found(roots, path);
     const info = file && (await stat(file).catch(() => undefined));
     if (!info?.isFile()) return void response.writeHead(404).end();
