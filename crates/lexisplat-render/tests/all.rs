@@ -13,6 +13,8 @@ mod common;
 #[cfg(feature = "gpu")]
 mod gpu_broken;
 #[cfg(feature = "gpu")]
+mod gpu_parts;
+#[cfg(feature = "gpu")]
 mod gpu_pictures;
 #[cfg(feature = "gpu")]
 mod gpu_sensitivity;
@@ -24,6 +26,8 @@ mod naive;
 mod photos;
 mod sensitivity;
 mod sparse;
+#[cfg(feature = "gpu")]
+mod squared_error;
 mod twin;
 #[cfg(feature = "gpu")]
 mod twins;

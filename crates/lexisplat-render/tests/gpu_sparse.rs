@@ -105,13 +105,14 @@ fn codes_take_as_many_bytes_as_stated() {
     let escapes = codes.escapes().gaussians.len() as u64;
     let n = model.geometry().positions.len() as u64;
     let columns = 20 * n.div_ceil(16) + 4 * escapes;
-    // 15 coefficients of three channels fill twelve vectors of four floats.
-    let atoms = 12 * 16 * (90 + escapes);
+    // 15 coefficients of three channels are 45 floats, and fill twelve vectors of four.
+    let (exact, atoms) = (4 * 45 * escapes, 12 * 16 * 90);
     let scene = GpuScene::new(&gpu, &Scene::from(&model), ShPath::Sparse).unwrap();
-    assert_eq!(scene.bytes().sh, 12 * n + columns + 4 * words + atoms);
+    assert_eq!(scene.bytes().sh, 12 * n + columns + 4 * words + exact + atoms);
     // Position and size; shape, opacity and rotation.
     assert_eq!(scene.bytes().geometry, (16 + 32) * n);
     let dense = |path| GpuScene::new(&gpu, &Scene::from(&model), path).unwrap().bytes().sh;
     assert_eq!((dense(ShPath::DenseF32), dense(ShPath::DenseF16)), (48 * 4 * n, 48 * 2 * n));
-    assert_eq!(dense(ShPath::SparseTable) - scene.bytes().sh, 6 * 32 * 32 * 8 * 90);
+    // A table stands for the atoms.
+    assert_eq!(dense(ShPath::SparseTable) + atoms - scene.bytes().sh, 6 * 32 * 32 * 8 * 90);
 }

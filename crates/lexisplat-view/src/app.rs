@@ -30,11 +30,6 @@ const REST: Duration = Duration::from_millis(200);
 const MOVING_BUDGET: f64 = 80.0;
 /// Smallest scale of pictures during motion: a factor on each side.
 const LEAST_SCALE: f64 = 0.2;
-/// Longest step of a flight, in seconds, however long the last frame took.
-const LONGEST_STEP: f32 = 0.1;
-/// Speed of a flight in scene radii a second, and the factor on it while shift is held.
-const SPEED: f64 = 0.6;
-const FAST: f64 = 4.0;
 /// Messages that the panel keeps.
 const MESSAGES: usize = 5;
 
@@ -201,13 +196,11 @@ impl App {
     /// Moves to the first camera of the camera file, or of an orbit around the first model.
     pub(crate) fn reset_cameras(&mut self) {
         let Some(model) = self.models.iter().flatten().next() else { return };
-        let (centre, radius) = model.bulk;
         let (cameras, given) = match &self.given {
             Some(cameras) => (cameras.clone(), true),
             None => (model.orbit.clone(), false),
         };
-        let up = if given { SceneBounds::up_of(&cameras) } else { DVec3::NEG_Y };
-        let bounds = SceneBounds { centre: DVec3::from_array(centre), radius, up };
+        let bounds = SceneBounds::new(model.bulk, if given { &cameras } else { &[] });
         self.state.set_cameras(cameras, given, bounds);
     }
 
@@ -289,8 +282,8 @@ impl App {
     pub(crate) fn wanted_view(&self) -> Option<View> {
         let camera = self.state.camera(self.area.0, self.area.1)?;
         // Without motion both models are drawn, so that they can be compared and switched at once.
-        let needs = if self.is_moving() { self.state.arrangement.mode.needs() } else { [true; 2] };
-        Some(View { camera, options: self.state.options, models: self.open_ids(needs)? })
+        let needs = if self.is_moving() { self.state.arrangement().mode.needs() } else { [true; 2] };
+        Some(View { camera, options: self.state.options(), models: self.open_ids(needs)? })
     }
 
     /// Returns the ids of the open models of those that are needed; `None` if there are none.
@@ -344,17 +337,14 @@ impl App {
                     _ => None,
                 })
                 .collect();
-            let flight = keys::flight(|key| input.key_down(key), input.modifiers);
-            (pressed, flight, input.stable_dt.min(LONGEST_STEP), input.modifiers.shift)
+            let flight = keys::window::flight(|key| input.key_down(key), input.modifiers);
+            (pressed, flight, input.stable_dt, input.modifiers.shift)
         });
-        for command in pressed.into_iter().filter_map(keys::command) {
+        for command in pressed.into_iter().filter_map(keys::window::command) {
             self.handle(command);
         }
         if flight != DVec3::ZERO {
-            let speed = SPEED * if fast { FAST } else { 1.0 };
-            if let Some(controller) = self.state.free_camera() {
-                controller.fly(flight * speed * f64::from(seconds));
-            }
+            self.state.fly(flight, f64::from(seconds), fast);
             self.note_motion();
             context.request_repaint();
         }
@@ -395,7 +385,7 @@ impl eframe::App for App {
         self.process_events();
         self.keys(&context);
         self.dropped(&context);
-        if self.state.panel {
+        if self.state.panel() {
             for command in panel::show(self, ui) {
                 self.handle(command);
             }

@@ -3,6 +3,8 @@
 use glam::{DMat3, DVec3};
 use lexisplat_render::Camera;
 
+use crate::pose::Pose;
+
 /// Smallest angle between the view direction and the vertical, in radians.
 const POLE: f64 = 0.02;
 /// Smallest distance of the pivot, in scene radii. Moving nearer pushes the pivot ahead.
@@ -12,18 +14,27 @@ const SHORTEST: f64 = 0.2;
 
 /// The ball that holds most of a scene, and its upward direction.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SceneBounds {
-    pub(crate) centre: DVec3,
-    /// World units, above 0.
-    pub(crate) radius: f64,
-    /// Unit vector.
-    pub(crate) up: DVec3,
+pub struct SceneBounds {
+    /// Its middle, in world units.
+    pub centre: DVec3,
+    /// In world units, above 0.
+    pub radius: f64,
+    /// The scene's upward direction in the world, a unit vector.
+    pub up: DVec3,
 }
 
 impl SceneBounds {
+    /// Returns the bounds of a scene whose bulk, as [`lexisplat_render::bulk`] returns it, is the ball `(centre,
+    /// radius)`. Up is that of the `given` cameras; generated ones, which say nothing about it, are not given.
+    #[must_use]
+    pub fn new((centre, radius): ([f64; 3], f64), given: &[Camera]) -> Self {
+        Self { centre: DVec3::from_array(centre), radius, up: Self::up_of(given) }
+    }
+
     /// Returns the mean upward direction of `cameras`. Returns world -y, which is up in most scenes trained from
     /// COLMAP's cameras, if there are none or they do not agree.
-    pub(crate) fn up_of(cameras: &[Camera]) -> DVec3 {
+    #[must_use]
+    pub fn up_of(cameras: &[Camera]) -> DVec3 {
         let sum: DVec3 = cameras.iter().map(|c| -column(c, 1)).sum();
         let count = u32::try_from(cameras.len()).unwrap_or(u32::MAX);
         let mean = sum / f64::from(count.max(1));
@@ -33,7 +44,7 @@ impl SceneBounds {
 
 /// A camera that the user moves.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CameraController {
+pub struct CameraController {
     position: DVec3,
     /// The directions right, down and forward in the world, as columns.
     axes: DMat3,
@@ -46,7 +57,8 @@ pub(crate) struct CameraController {
 
 impl CameraController {
     /// Returns a controller with the view of `camera`. Its pivot is as far ahead as the scene's centre.
-    pub(crate) fn at(camera: &Camera, bounds: SceneBounds) -> Self {
+    #[must_use]
+    pub fn at(camera: &Camera, bounds: SceneBounds) -> Self {
         let position = DVec3::from_array(camera.position.map(f64::from));
         let axes = DMat3::from_cols(column(camera, 0), column(camera, 1), column(camera, 2));
         let ahead = (bounds.centre - position).dot(axes.z_axis);
@@ -60,7 +72,23 @@ impl CameraController {
         }
     }
 
-    fn pivot(&self) -> DVec3 {
+    /// Returns a controller that looks from `pose`, which should be one of [`Pose::new`].
+    #[must_use]
+    pub fn from_pose(pose: &Pose, bounds: SceneBounds) -> Self {
+        let axes = pose.axes();
+        let position = DVec3::from_array(pose.position);
+        Self { position, axes, distance: pose.distance, focal: pose.focal, bounds }
+    }
+
+    /// Returns the place of the camera.
+    #[must_use]
+    pub fn pose(&self) -> Pose {
+        Pose::of(self.position, self.axes, self.distance, self.focal)
+    }
+
+    /// Returns the point that the camera orbits, in world units.
+    #[must_use]
+    pub fn pivot(&self) -> DVec3 {
         self.position + self.axes.z_axis * self.distance
     }
 
@@ -83,14 +111,14 @@ impl CameraController {
     }
 
     /// Turns the scene around the pivot, as if it were dragged to the right and down. Angles are in radians.
-    pub(crate) fn orbit(&mut self, right: f64, down: f64) {
+    pub fn orbit(&mut self, right: f64, down: f64) {
         let pivot = self.pivot();
         self.look(right, down);
         self.position = pivot - self.axes.z_axis * self.distance;
     }
 
     /// Turns the view to the right and down around the camera's position. Angles are in radians.
-    pub(crate) fn look(&mut self, right: f64, down: f64) {
+    pub fn look(&mut self, right: f64, down: f64) {
         let down = self.clamped_pitch(down);
         self.turn(self.bounds.up, -right);
         self.turn(self.axes.y_axis.cross(self.axes.z_axis), -down);
@@ -98,26 +126,44 @@ impl CameraController {
 
     /// Moves the camera so that the pivot moves on the picture to the right and down. Lengths are in units of the
     /// picture's shorter side.
-    pub(crate) fn pan(&mut self, right: f64, down: f64) {
+    pub fn pan(&mut self, right: f64, down: f64) {
         let scale = self.distance / self.focal;
         self.position -= (self.axes.x_axis * right + self.axes.y_axis * down) * scale;
     }
 
     /// Multiplies the distance of the pivot by `factor` by moving towards it or away from it.
-    pub(crate) fn dolly(&mut self, factor: f64) {
+    pub fn dolly(&mut self, factor: f64) {
         let step = self.distance * (1.0 - factor);
         self.position += self.axes.z_axis * step;
         self.distance = (self.distance - step).max(NEAREST * self.bounds.radius);
     }
 
     /// Moves by `step` scene radii to the right, up and forward. Up is the scene's.
-    pub(crate) fn fly(&mut self, step: DVec3) {
+    pub fn fly(&mut self, step: DVec3) {
         let along = self.axes.x_axis * step.x + self.bounds.up * step.y + self.axes.z_axis * step.z;
         self.position += along * self.bounds.radius;
     }
 
-    /// Returns the camera for a picture of `width * height` pixels.
-    pub(crate) fn camera(&self, width: u32, height: u32) -> Camera {
+    /// Moves the camera sideways so that `point`, in world units, becomes the pivot. The direction of the view and
+    /// the camera's distance from the point stay. A point that is not finite changes nothing.
+    pub fn focus(&mut self, point: DVec3) {
+        if point.is_finite() {
+            self.distance = point.distance(self.position).max(NEAREST * self.bounds.radius);
+            self.position = point - self.axes.z_axis * self.distance;
+        }
+    }
+
+    /// Moves the camera so that the ball of [`SceneBounds`] touches the sides of a square picture. Its centre becomes
+    /// the pivot. The direction of the view stays.
+    pub fn frame(&mut self) {
+        // The sine of half the angle of view is 1/2 over the root of 1/4 and the squared focal length.
+        self.distance = self.bounds.radius * (1.0 + 4.0 * self.focal * self.focal).sqrt();
+        self.position = self.bounds.centre - self.axes.z_axis * self.distance;
+    }
+
+    /// Returns the camera for a picture of `width * height` pixels, named `free`.
+    #[must_use]
+    pub fn camera(&self, width: u32, height: u32) -> Camera {
         let focal = self.focal * f64::from(width.min(height));
         let rotation = self.axes.transpose().to_cols_array_2d();
         Camera::rounded("free".to_owned(), [width, height], [focal; 2], self.position.to_array(), rotation)
@@ -130,7 +176,8 @@ fn column(camera: &Camera, k: usize) -> DVec3 {
 }
 
 /// Returns the largest size with `aspect` (width over height) within `width * height` pixels.
-pub(crate) fn fitted(aspect: f64, width: u32, height: u32) -> (u32, u32) {
+#[must_use]
+pub fn fitted(aspect: f64, width: u32, height: u32) -> (u32, u32) {
     let whole = |v: f64, most: u32| {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within 1 and most")]
         let v = v.round().clamp(1.0, f64::from(most.max(1))) as u32;
@@ -238,6 +285,37 @@ mod tests {
         assert!(controller.distance > 0.01 && controller.position.z > 0.0);
         controller.dolly(2.0);
         assert!(controller.distance > 0.05);
+    }
+
+    #[test]
+    fn a_point_in_focus_is_in_the_middle_and_as_far_as_before() {
+        let mut controller = controller();
+        let point = DVec3::new(1.0, 0.5, -2.0);
+        let before = point.distance(controller.position);
+        controller.focus(point);
+        assert!(near(controller.pivot(), point.to_array()));
+        assert!((point.distance(controller.position) - before).abs() < 1e-12);
+        assert_eq!(controller.axes.z_axis, DVec3::Z);
+        let kept = controller;
+        controller.focus(DVec3::new(f64::NAN, 0.0, 0.0));
+        assert_eq!(controller, kept);
+        controller.focus(controller.position);
+        assert!(controller.distance > 0.0);
+    }
+
+    #[test]
+    fn the_whole_ball_is_framed() {
+        let mut controller = controller();
+        controller.orbit(0.7, 0.3);
+        controller.pan(3.0, 1.0);
+        let forward = controller.axes.z_axis;
+        controller.frame();
+        assert!(near(controller.pivot(), [0.0; 3]) && controller.axes.z_axis == forward);
+        // A line from the camera to a corner in the middle of a side touches the ball.
+        let side = controller.axes.x_axis * 0.5 + forward * controller.focal;
+        let to_centre = BOUNDS.centre - controller.position;
+        let apart = to_centre.cross(side.normalize()).length();
+        assert!((apart - BOUNDS.radius).abs() < 1e-9, "{apart}");
     }
 
     #[test]

@@ -1,27 +1,34 @@
-//! All commands of the viewer. Keys, buttons, dropped files and scripts give them.
+//! All commands of the viewer. Keys, buttons, dropped files, scripts and links give them.
 
 use std::path::PathBuf;
 
 use lexisplat::ShDegree;
 use lexisplat::packed::Preset;
 
+use crate::pose::Pose;
+
 /// The place of one of the two models.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub(crate) enum Slot {
+pub enum Slot {
+    /// The original, if there are two.
     First,
+    /// What is compared with it.
     Second,
 }
 
 impl Slot {
     /// Both, in order.
-    pub(crate) const BOTH: [Self; 2] = [Self::First, Self::Second];
+    pub const BOTH: [Self; 2] = [Self::First, Self::Second];
 
     /// Returns the index in arrays of two.
-    pub(crate) fn index(self) -> usize {
+    #[must_use]
+    pub fn index(self) -> usize {
         self as usize
     }
 
-    pub(crate) fn other(self) -> Self {
+    /// Returns the other one.
+    #[must_use]
+    pub fn other(self) -> Self {
         match self {
             Self::First => Self::Second,
             Self::Second => Self::First,
@@ -31,7 +38,7 @@ impl Slot {
 
 /// How the models are shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Mode {
+pub enum Mode {
     /// One of the models.
     One(Slot),
     /// Both models, the first on the left.
@@ -44,11 +51,12 @@ pub(crate) enum Mode {
 
 impl Mode {
     /// All modes, in the order of their keys.
-    pub(crate) const ALL: [Self; 5] =
+    pub const ALL: [Self; 5] =
         [Self::One(Slot::First), Self::One(Slot::Second), Self::SideBySide, Self::Wipe, Self::Difference];
 
     /// Returns the name in scripts and file names.
-    pub(crate) fn name(self) -> &'static str {
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::One(Slot::First) => "first",
             Self::One(Slot::Second) => "second",
@@ -59,7 +67,8 @@ impl Mode {
     }
 
     /// Returns the name on a button.
-    pub(crate) fn label(self) -> &'static str {
+    #[must_use]
+    pub fn label(self) -> &'static str {
         match self {
             Self::One(Slot::First) => "First",
             Self::One(Slot::Second) => "Second",
@@ -70,7 +79,8 @@ impl Mode {
     }
 
     /// Returns which models the mode needs a picture of.
-    pub(crate) fn needs(self) -> [bool; 2] {
+    #[must_use]
+    pub fn needs(self) -> [bool; 2] {
         match self {
             Self::One(slot) => [slot == Slot::First, slot == Slot::Second],
             _ => [true; 2],
@@ -80,7 +90,7 @@ impl Mode {
 
 /// The quality to compress to.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Quality {
+pub enum Quality {
     /// The packed layout with a preset.
     Preset(Preset),
     /// Exact geometry, with each Gaussian's SH error at most this L2 norm.
@@ -98,13 +108,17 @@ impl std::fmt::Display for Quality {
 
 /// A command.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Command {
+pub enum Command {
     /// Chooses the camera with this index, from 0.
     Camera(usize),
     /// Chooses the camera this many places after the current one; the first follows the last.
     StepCamera(isize),
+    /// Moves the free camera here.
+    View(Pose),
     /// Returns to the initial view.
     Reset,
+    /// Moves the free camera so that the whole scene is in the picture, in the direction that it looks.
+    Frame,
     /// Orbits to the right and down, in degrees.
     Orbit([f64; 2]),
     /// Sets the mode.
@@ -123,8 +137,13 @@ pub(crate) enum Command {
     Background([f32; 3]),
     /// Opens a file as one of the models.
     Open(PathBuf, Slot),
-    /// Opens dropped files; a single scene becomes the first model if `first`.
-    Drop { paths: Vec<PathBuf>, first: bool },
+    /// Opens dropped files.
+    Drop {
+        /// The files.
+        paths: Vec<PathBuf>,
+        /// Whether a single scene becomes the first model.
+        first: bool,
+    },
     /// Makes the second model by compressing the first.
     Compress(Quality),
     /// Exchanges the models.

@@ -33,8 +33,8 @@ impl App {
             Command::Screenshot(file) => self.screenshot(file)?,
             Command::Report => self.report()?,
             Command::Quit => self.quit = true,
-            Command::Camera(index) if index >= self.state.cameras.len() => {
-                let expected = format!("a camera from 0 to {}", self.state.cameras.len().saturating_sub(1));
+            Command::Camera(index) if index >= self.state.cameras().len() => {
+                let expected = format!("a camera from 0 to {}", self.state.cameras().len().saturating_sub(1));
                 return Err(lexisplat::Error::parameter("camera", index, expected).into());
             }
             command => self.state.apply(&command),
@@ -100,7 +100,7 @@ impl App {
     }
 
     fn screenshot(&mut self, file: Option<PathBuf>) -> Result<()> {
-        let arrangement = self.state.arrangement;
+        let arrangement = self.state.arrangement();
         let (width, height) = self.area;
         let camera = self.state.screenshot_camera(width, height, self.options.max_width);
         let (Some(camera), Some(models)) = (camera, self.open_ids(arrangement.mode.needs())) else {
@@ -113,7 +113,7 @@ impl App {
             Some(file) => file,
             None => free_name(Path::new(&self.picture_name(&camera.name)))?,
         };
-        let view = View { camera, options: self.state.options, models };
+        let view = View { camera, options: self.state.options(), models };
         self.render_thread.request(RenderRequest::Screenshot { view, arrangement, file })?;
         self.saving += 1;
         Ok(())
@@ -121,7 +121,7 @@ impl App {
 
     /// Returns a file name, without a folder, for the picture on screen.
     fn picture_name(&self, camera: &str) -> String {
-        let mode = self.state.arrangement.mode;
+        let mode = self.state.arrangement().mode;
         let shown = if mode == Mode::One(Slot::Second) { Slot::Second } else { Slot::First };
         let model = self.models[shown.index()].as_ref().map(|m| m.short_name()).unwrap_or_default();
         let model = Path::new(&model).file_stem().unwrap_or_default().to_string_lossy().into_owned();
@@ -156,7 +156,7 @@ impl App {
         let camera = frame.map(|frame| &frame.view.camera);
         let value = json!({
             "device": self.render_thread.name,
-            "mode": self.state.arrangement.mode.name(),
+            "mode": self.state.arrangement().mode.name(),
             "camera": camera.map(|c| &c.name),
             "width": camera.map(|c| c.width),
             "height": camera.map(|c| c.height),
@@ -165,6 +165,7 @@ impl App {
             "resident_bytes": frame.map(|frame| frame.resident_bytes),
             "psnr": if let Some(Score::Decibels(db)) = score { Some(db) } else { None },
             "identical": score.map(|score| score == Score::Identical),
+            "link": self.state.link(),
             "models": models,
         });
         // A reader that has closed the pipe is not an error.

@@ -13,25 +13,44 @@ const PIXEL: u32 = 4;
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Width, height and pixels row by row.
-pub(crate) type Rgb8Image = (u32, u32, Vec<[u8; 3]>);
+pub type Rgb8Image = (u32, u32, Vec<[u8; 3]>);
 
 /// Draws arrangements off screen with the shader of the window.
 #[derive(Debug)]
-pub(crate) struct Composer {
+pub struct Composer {
     pub(crate) presenter: Presenter,
     pub(crate) queue: wgpu::Queue,
 }
 
 impl Composer {
-    pub(crate) fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
+    /// Returns what draws on `device`, whose queue is `queue`.
+    #[must_use]
+    pub fn new(device: wgpu::Device, queue: wgpu::Queue) -> Self {
         Self { presenter: Presenter::new(device, FORMAT), queue }
     }
 
-    /// Draws `composition` at its own size.
+    /// Draws `composition` at its own size. Outside of a browser something must poll the device meanwhile.
     ///
     /// # Errors
-    /// [`Error::Device`] if a picture is missing, or too large for the device.
+    /// [`Error::Device`] if a picture is missing, or too large for the device; [`Error::Render`] if the device is lost.
+    pub async fn compose_async(&self, composition: &Composition) -> Result<Rgb8Image> {
+        let (target, size) = self.submit(composition)?;
+        Ok(image(size, &readback::read_async(&target, target.size()).await?))
+    }
+
+    /// The same, which blocks.
+    ///
+    /// # Errors
+    /// As [`Self::compose_async`].
+    #[cfg(feature = "window")]
     pub(crate) fn compose(&self, composition: &Composition) -> Result<Rgb8Image> {
+        let (target, size) = self.submit(composition)?;
+        Ok(image(size, &readback::read(&self.presenter.device, &target)?))
+    }
+
+    /// Starts drawing `composition`. Returns the buffer for its rows, each padded to [`ROW`] bytes, and its width and
+    /// height in pixels.
+    fn submit(&self, composition: &Composition) -> Result<(wgpu::Buffer, (u32, u32))> {
         let device = &self.presenter.device;
         let bound = self.presenter.bind(composition);
         let (Some(bound), Some((width, height))) = (bound, composition.size()) else {
@@ -53,7 +72,7 @@ impl Composer {
             view_formats: &[],
         });
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let row = (width * PIXEL).next_multiple_of(ROW);
+        let row = row_bytes(width);
         let target = readback::target(device, u64::from(row) * u64::from(height));
         let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
@@ -85,12 +104,21 @@ impl Composer {
             extent,
         );
         self.queue.submit([encoder.finish()]);
-        let bytes: Vec<u8> = readback::read(device, &target)?;
-        let pixels = bytes
-            .chunks_exact(row as usize)
-            .flat_map(|line| line[..(width * PIXEL) as usize].chunks_exact(PIXEL as usize))
-            .map(|pixel| [pixel[0], pixel[1], pixel[2]])
-            .collect();
-        Ok((width, height, pixels))
+        Ok((target, (width, height)))
     }
+}
+
+/// Returns the bytes of a row of `width` pixels in a buffer.
+fn row_bytes(width: u32) -> u32 {
+    (width * PIXEL).next_multiple_of(ROW)
+}
+
+/// Returns the picture of padded rows.
+fn image((width, height): (u32, u32), bytes: &[u8]) -> Rgb8Image {
+    let pixels = bytes
+        .chunks_exact(row_bytes(width) as usize)
+        .flat_map(|line| line[..(width * PIXEL) as usize].chunks_exact(PIXEL as usize))
+        .map(|pixel| [pixel[0], pixel[1], pixel[2]])
+        .collect();
+    (width, height, pixels)
 }

@@ -14,6 +14,7 @@ pub enum Error {
     #[error(transparent)]
     Render(#[from] lexisplat_render::Error),
     /// Pictures could not be compared, or no camera is left.
+    #[cfg(feature = "window")]
     #[error(transparent)]
     Eval(#[from] lexisplat_eval::Error),
     /// There is no display to open a window on.

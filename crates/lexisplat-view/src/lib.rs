@@ -1,72 +1,107 @@
-//! A window that shows one or two 3D Gaussian Splatting scenes.
+//! A viewer of one or two 3D Gaussian Splatting scenes: its commands and state, and a window for them.
 //!
-//! [`run`] opens the window and returns when it is closed. Keys, buttons, dropped files and scripts give commands
-//! to one state, which is independent of the window and tested without it. A thread of its own draws the pictures,
-//! so that the window responds however long a picture takes.
+//! The core knows no window. Keys, gestures, scripts and links give [`Command`]s to one [`State`], which says what is
+//! shown and from where. It is all that is left without the default feature `window`, and compiles for a browser too.
+//! With the feature `gpu`, [`Presenter`] shows one or two pictures on any surface of wgpu, and [`Composer`] saves them.
+//!
+//! With the feature `window`, [`run`] opens the window and returns when it is closed. Buttons and dropped files give
+//! commands as well. A thread of its own draws the pictures, so that the window responds however long a picture
+//! takes.
 //!
 //! | module | purpose |
 //! |---|---|
-//! | `command`, `keys`, `script` | all commands; their keys; their words in scripts |
+//! | `command`, [`keys`], [`script`] | all commands; their keys; their words in scripts |
 //! | `state` | what is shown and from where |
-//! | `camera_controller` | orbiting, panning and flying |
-//! | `models` | reading and compressing on threads of their own |
-//! | `scene_renderer`, `render_thread` | drawing by the GPU or the CPU; the thread that does it |
-//! | `present`, `compose` | one or two pictures on screen, or in memory |
-//! | `app`, `command_handlers`, `viewport`, `panel` | the window, its commands, its picture, its controls |
+//! | `camera_controller`, `gesture` | orbiting, panning and flying; what mouse, fingers and held keys do |
+//! | `pose`, `link` | the free camera's place as text; a link to the very view |
+//! | `picture`, `present`, `compose` | with `gpu`: one or two pictures on screen, or in memory |
+//! | `models` | with `window`: reading and compressing on threads of their own |
+//! | `scene_renderer`, `render_thread` | with `window`: drawing by the GPU or the CPU; the thread that does it |
+//! | `app`, `command_handlers`, `viewport`, `present_callback`, `panel` | the window, its commands, its picture, its controls |
+//!
+//! ```
+//! use lexisplat_render::Camera;
+//! use lexisplat_view::{Drag, SceneBounds, State, keys, script};
+//!
+//! let camera = Camera {
+//!     name: "front".into(),
+//!     width: 640,
+//!     height: 480,
+//!     fx: 500.0,
+//!     fy: 500.0,
+//!     position: [0.0, 0.0, -4.0],
+//!     rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+//!     split: None,
+//! };
+//! let mut state = State::new([0.0; 3]);
+//! state.set_open([true, false]);
+//! state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 1.0), &[]));
+//! for command in script::parse("orbit=30:10,degree=1")? {
+//!     state.apply(&command);
+//! }
+//! state.drag(Drag::Pan, 0.1, 0.0);
+//! if let Some(command) = keys::command_of_key("f") {
+//!     state.apply(&command);
+//! }
+//! let link = state.link();
+//! state.apply_link(&link)?;
+//! assert_eq!(state.link(), link);
+//! # Ok::<(), lexisplat::Error>(())
+//! ```
 
+#[cfg(feature = "window")]
 mod app;
 mod camera_controller;
 mod command;
+#[cfg(feature = "window")]
 mod command_handlers;
+#[cfg(feature = "gpu")]
 mod compose;
 mod error;
-mod keys;
+mod gesture;
+pub mod keys;
+mod link;
+#[cfg(feature = "window")]
 mod models;
+#[cfg(feature = "window")]
+mod options;
+#[cfg(feature = "window")]
 mod panel;
+#[cfg(feature = "gpu")]
+mod picture;
+mod pose;
+#[cfg(feature = "gpu")]
 mod present;
+#[cfg(feature = "window")]
+mod present_callback;
+#[cfg(feature = "window")]
 mod render_thread;
+#[cfg(feature = "window")]
 mod scene_renderer;
-mod script;
+pub mod script;
 mod state;
+#[cfg(feature = "window")]
 mod viewport;
+#[cfg(feature = "window")]
 mod window;
 
-use std::path::PathBuf;
-
-use lexisplat::Limits;
-use lexisplat::output::OutputGroup;
-use lexisplat_eval::SplitFilter;
-use lexisplat_render::Device;
-
+pub use camera_controller::{CameraController, SceneBounds, fitted};
+pub use command::{Command, Mode, Quality, Slot};
+#[cfg(feature = "gpu")]
+pub use compose::{Composer, Rgb8Image};
 pub use error::{Error, Result};
-pub use window::run;
-
+pub use gesture::Drag;
+/// Vectors of three numbers in double precision, as [`SceneBounds`] and [`keys::flight`] have them.
+pub use glam::DVec3;
+#[cfg(feature = "window")]
+pub use options::Options;
+#[cfg(feature = "gpu")]
+pub use picture::Picture;
+pub use pose::Pose;
+#[cfg(feature = "gpu")]
+pub use present::{Composition, Presenter};
 /// The words of a script and their meanings, for `--help`.
 pub use script::WORDS as SCRIPT_WORDS;
-
-/// What to show, and the initial settings.
-#[derive(Debug, Clone, Default)]
-pub struct Options {
-    /// One or two scenes: PLY or .lexi.
-    pub files: Vec<PathBuf>,
-    /// A file or folder of cameras. Without it the cameras are an orbit around the first scene.
-    pub cameras: Option<PathBuf>,
-    /// Which cameras of the file to take.
-    pub split: SplitFilter,
-    /// Number of views of the orbit; 0 counts as 1.
-    pub orbit: u16,
-    /// Largest width of a screenshot, in pixels; 0 counts as 1.
-    pub max_width: u32,
-    /// Colour behind the scenes, 0 to 1 in each channel.
-    pub background: [f32; 3],
-    /// The device that draws the scenes. The window itself always needs a graphics adapter, which may be software.
-    pub device: Device,
-    /// Whether a screenshot with a given name may replace a file.
-    pub overwrite: bool,
-    /// Limits on what files may make the program allocate, including files dropped on the window.
-    pub limits: Limits,
-    /// Commands to carry out at the start, as [`SCRIPT_WORDS`] describes; may be empty.
-    pub script: String,
-    /// The group of all pictures that are saved.
-    pub outputs: OutputGroup,
-}
+pub use state::{Arrangement, State};
+#[cfg(feature = "window")]
+pub use window::run;

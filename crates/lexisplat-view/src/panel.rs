@@ -11,7 +11,7 @@ use crate::command::{Command, Mode, Quality, Slot};
 use crate::keys;
 use crate::models::{Job, OpenModel};
 use crate::render_thread::{Frame, Score};
-use crate::scene_renderer::Picture;
+use crate::scene_renderer::DrawnPicture;
 
 /// Width of the panel, in points.
 const WIDTH: f32 = 304.0;
@@ -143,7 +143,7 @@ fn qualities(ui: &mut Ui, commands: &mut Vec<Command>) {
 }
 
 fn view(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
-    let arrangement = app.state.arrangement;
+    let arrangement = app.state.arrangement();
     let both = app.models.iter().all(Option::is_some);
     heading(ui, "VIEW");
     ui.horizontal(|ui| {
@@ -187,7 +187,7 @@ fn view(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
 }
 
 fn cameras(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
-    let (cameras, free) = (&app.state.cameras, app.state.is_free());
+    let (cameras, free) = (app.state.cameras(), app.state.is_free());
     heading(ui, if app.given.is_some() { "CAMERAS" } else { "ORBIT" });
     ui.horizontal(|ui| {
         ui.add_enabled_ui(!cameras.is_empty(), |ui| {
@@ -197,7 +197,7 @@ fn cameras(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
             if ui.button(">").on_hover_text("key ]").clicked() {
                 commands.push(Command::StepCamera(1));
             }
-            let mut index = app.state.index;
+            let mut index = app.state.index();
             let most = cameras.len().saturating_sub(1);
             if ui.add(DragValue::new(&mut index).range(0..=most)).changed() {
                 commands.push(Command::Camera(index));
@@ -208,7 +208,7 @@ fn cameras(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
             }
         });
     });
-    let name = match cameras.get(app.state.index) {
+    let name = match cameras.get(app.state.index()) {
         _ if free => "free".to_owned(),
         Some(camera) => format!("{}, {} x {}", camera.name, camera.width, camera.height),
         None => return,
@@ -222,7 +222,7 @@ fn cameras(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
 fn drawing(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
     heading(ui, "DRAWING");
     let most = app.models.iter().flatten().map(|m| m.degree()).max().unwrap_or(ShDegree::ZERO);
-    let mut degree = app.state.options.max_degree.map_or(most.get(), |d| d.get().min(most.get()));
+    let mut degree = app.state.options().max_degree.map_or(most.get(), |d| d.get().min(most.get()));
     if most > ShDegree::ZERO {
         let slider = Slider::new(&mut degree, 0..=most.get()).text("SH degree");
         if ui.add(slider).changed() {
@@ -231,12 +231,12 @@ fn drawing(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
         }
     }
     ui.horizontal(|ui| {
-        let mut colour = app.state.options.background;
+        let mut colour = app.state.options().background;
         if ui.color_edit_button_rgb(&mut colour).changed() {
             commands.push(Command::Background(colour));
         }
         for (name, colour) in [("black", [0.0; 3]), ("white", [1.0; 3])] {
-            if ui.selectable_label(app.state.options.background == colour, name).clicked() {
+            if ui.selectable_label(app.state.options().background == colour, name).clicked() {
                 commands.push(Command::Background(colour));
             }
         }
@@ -246,7 +246,7 @@ fn drawing(app: &App, ui: &mut Ui, commands: &mut Vec<Command>) {
 
 fn numbers(app: &App, frame: &Frame, ui: &mut Ui) {
     heading(ui, "NUMBERS");
-    let pictures: Vec<&Picture> = frame.pictures.iter().flatten().map(AsRef::as_ref).collect();
+    let pictures: Vec<&DrawnPicture> = frame.pictures.iter().flatten().map(AsRef::as_ref).collect();
     Grid::new("numbers").num_columns(3).spacing([12.0, 2.0]).show(ui, |ui| {
         let row = |ui: &mut Ui, name: &str, values: Vec<String>| {
             ui.label(RichText::new(name).color(QUIET));
@@ -265,7 +265,8 @@ fn numbers(app: &App, frame: &Frame, ui: &mut Ui) {
         let rate = 1e3 / frame.milliseconds.max(1e-3);
         row(ui, "frame", vec![milliseconds(frame.milliseconds), format!("{rate:.1} a second")]);
         let camera = &frame.view.camera;
-        let (width, height) = pictures.first().map_or((camera.width, camera.height), |p| (p.width, p.height));
+        let (width, height) =
+            pictures.first().map_or((camera.width, camera.height), |p| (p.picture.width, p.picture.height));
         row(ui, "picture", vec![format!("{width} x {height}")]);
         row(ui, "GPU memory", vec![format::bytes(frame.resident_bytes)]);
     });

@@ -1,12 +1,9 @@
-//! Drawing one or two pictures to the window or a texture, with one triangle and a shader.
+//! Drawing one or two pictures to a window, a canvas or a texture, with one triangle and a shader.
 
-use std::sync::Arc;
-
-use eframe::egui_wgpu::{CallbackResources, CallbackTrait};
 use wgpu::util::DeviceExt;
 
 use crate::command::{Mode, Slot};
-use crate::scene_renderer::Picture;
+use crate::picture::Picture;
 use crate::state::Arrangement;
 
 /// The uniform `Arrangement` of the shader.
@@ -23,17 +20,19 @@ struct Uniform {
 
 /// Pictures of one size, and their arrangement.
 #[derive(Debug, Clone)]
-pub(crate) struct Composition {
-    pub(crate) arrangement: Arrangement,
+pub struct Composition {
+    /// What is shown of which.
+    pub arrangement: Arrangement,
     /// The picture of each model.
-    pub(crate) pictures: [Option<Arc<Picture>>; 2],
+    pub pictures: [Option<Picture>; 2],
 }
 
 impl Composition {
     /// Returns the pictures on the left and on the right, which are the same if one model is shown. Returns `None`
     /// if the arrangement needs a picture that is missing.
-    pub(crate) fn sides(&self) -> Option<[&Picture; 2]> {
-        let [first, second] = [0, 1].map(|i| self.pictures[i].as_deref());
+    #[must_use]
+    pub fn sides(&self) -> Option<[&Picture; 2]> {
+        let [first, second] = [0, 1].map(|i| self.pictures[i].as_ref());
         match (self.arrangement.mode, first, second) {
             (Mode::One(Slot::First), Some(one), _) | (Mode::One(Slot::Second), _, Some(one)) => {
                 Some([one; 2])
@@ -44,8 +43,9 @@ impl Composition {
         }
     }
 
-    /// Returns the width and height of the arrangement in pixels.
-    pub(crate) fn size(&self) -> Option<(u32, u32)> {
+    /// Returns the width and height of the arrangement in pixels, or `None` if a picture is missing.
+    #[must_use]
+    pub fn size(&self) -> Option<(u32, u32)> {
         let [picture, _] = self.sides()?;
         Some((picture.width * self.arrangement.columns(), picture.height))
     }
@@ -53,14 +53,17 @@ impl Composition {
 
 /// The pipeline for one texture format.
 #[derive(Debug)]
-pub(crate) struct Presenter {
+pub struct Presenter {
     pub(crate) device: wgpu::Device,
     pipeline: wgpu::RenderPipeline,
     encodes: bool,
 }
 
 impl Presenter {
-    pub(crate) fn new(device: wgpu::Device, format: wgpu::TextureFormat) -> Self {
+    /// Returns what draws to targets of `format`. The pictures are sRGB already: a format that encodes what is
+    /// written to it as sRGB gets them decoded, and shows the same.
+    #[must_use]
+    pub fn new(device: wgpu::Device, format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::include_wgsl!("present.wgsl"));
         let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("present"),
@@ -86,8 +89,10 @@ impl Presenter {
         Self { device, pipeline, encodes: format.is_srgb() }
     }
 
-    /// Returns the bind group that shows `composition`, or `None` if a picture is missing.
-    pub(crate) fn bind(&self, composition: &Composition) -> Option<wgpu::BindGroup> {
+    /// Returns the bind group that shows `composition`, or `None` if a picture is missing. Both pictures must have
+    /// one size and be on the device of this.
+    #[must_use]
+    pub fn bind(&self, composition: &Composition) -> Option<wgpu::BindGroup> {
         let [left, right] = composition.sides()?;
         let uniform = Uniform {
             size: [left.width, left.height],
@@ -119,27 +124,9 @@ impl Presenter {
     }
 
     /// Draws a bind group of [`Self::bind`] over the whole viewport of `pass`.
-    pub(crate) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bound: &wgpu::BindGroup) {
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, bound: &wgpu::BindGroup) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, bound, &[]);
         pass.draw(0..3, 0..1);
-    }
-}
-
-/// Shows a composition inside egui.
-pub(crate) struct PresentCallback {
-    pub(crate) presenter: Arc<Presenter>,
-    /// The bind group of the composition.
-    pub(crate) bound: wgpu::BindGroup,
-}
-
-impl CallbackTrait for PresentCallback {
-    fn paint(
-        &self,
-        _: eframe::egui::PaintCallbackInfo,
-        pass: &mut wgpu::RenderPass<'static>,
-        _: &CallbackResources,
-    ) {
-        self.presenter.draw(pass, &self.bound);
     }
 }

@@ -17,7 +17,7 @@ use crate::compose::{Composer, Rgb8Image};
 use crate::error::{Error, Result};
 use crate::models::OpenModel;
 use crate::present::Composition;
-use crate::scene_renderer::{Picture, SceneRenderer};
+use crate::scene_renderer::{DrawnPicture, SceneRenderer};
 use crate::state::Arrangement;
 
 /// Shortest time between two comparisons of pictures during motion.
@@ -68,7 +68,7 @@ pub(crate) struct Frame {
     pub(crate) view: View,
     /// Factor on both sides of the pictures.
     pub(crate) scale: f64,
-    pub(crate) pictures: [Option<Arc<Picture>>; 2],
+    pub(crate) pictures: [Option<Arc<DrawnPicture>>; 2],
     /// Time to draw all pictures.
     pub(crate) milliseconds: f64,
     /// The second picture compared with the first, if both were drawn and a comparison was due.
@@ -207,7 +207,7 @@ impl RenderWorker {
         }
     }
 
-    fn draw_models(&mut self, view: &View, camera: &Camera) -> Result<[Option<Arc<Picture>>; 2]> {
+    fn draw_models(&mut self, view: &View, camera: &Camera) -> Result<[Option<Arc<DrawnPicture>>; 2]> {
         let mut pictures = [None, None];
         for slot in Slot::BOTH {
             if view.models[slot.index()].is_some() {
@@ -230,7 +230,7 @@ impl RenderWorker {
             score = Some(decibels.map_or(Score::Identical, Score::Decibels));
             self.last_comparison = Some(Instant::now());
         }
-        let buffers: u64 = pictures.iter().flatten().map(|p| p.pixels.size()).sum();
+        let buffers: u64 = pictures.iter().flatten().map(|p| p.picture.pixels.size()).sum();
         Ok(Frame {
             view,
             scale,
@@ -241,7 +241,7 @@ impl RenderWorker {
         })
     }
 
-    fn image(&self, picture: &Picture) -> Result<Image> {
+    fn image(&self, picture: &DrawnPicture) -> Result<Image> {
         picture.to_image(&self.composer.presenter.device, &self.composer.queue)
     }
 
@@ -252,6 +252,7 @@ impl RenderWorker {
             let image = self.image(picture)?;
             return Ok((image.width, image.height, image.to_8bit()));
         }
+        let pictures = pictures.map(|drawn| drawn.map(|drawn| drawn.picture.clone()));
         self.composer.compose(&Composition { arrangement, pictures })
     }
 }

@@ -4,21 +4,23 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use eframe::egui::Key;
 use lexisplat::{Error, Result, ShDegree};
 
 use crate::command::{Command, Mode, Quality, Slot};
 use crate::keys;
+use crate::pose::Pose;
 
 /// The words of a script and their meanings, for `--help`.
 pub const WORDS: &str = "\
 Words of a script, separated by commas. Each is carried out when the picture of the one before is complete:
   camera=N              choose camera N, from 0
+  view=POSE             move the free camera to a place of a link, as report prints it
   orbit=RIGHT:DOWN      orbit by degrees
+  frame                 look at the whole scene in the direction of the view
   mode=NAME             first, second, side, wipe or difference
   split=F               move the wipe's line to F: 0 is the left edge, 1 the right
   gain=F                multiply differences by F
-  degree=N              draw with SH up to degree N
+  degree=N              draw with SH up to degree N; all: with all
   background=R:G:B      colour behind the scene, each 0 to 1
   key=K                 press a key, such as ] or P
   open=FILE, open2=FILE open a file as the first or second model
@@ -31,29 +33,36 @@ Words of a script, separated by commas. Each is carried out when the picture of 
 An error ends the script and the program.";
 
 /// The commands still to be carried out.
-pub(crate) type Script = VecDeque<Command>;
+pub type Script = VecDeque<Command>;
 
 /// Parses the commands of `text`.
 ///
 /// # Errors
 /// [`Error::Parameter`] with the word that is not valid.
-pub(crate) fn parse(text: &str) -> Result<Script> {
-    text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(word).collect()
+pub fn parse(text: &str) -> Result<Script> {
+    text.split(',').map(str::trim).filter(|word| !word.is_empty()).map(|text| word("actions", text)).collect()
 }
 
-fn word(word: &str) -> Result<Command> {
-    let wrong = |expected: &str| Error::parameter("actions", word, expected);
+/// Parses one word. `parameter` is what the error says is wrong.
+pub(crate) fn word(parameter: &'static str, word: &str) -> Result<Command> {
+    let wrong = |expected: &str| Error::parameter(parameter, word, expected);
     let (name, value) = word.split_once('=').map_or((word, None), |(name, value)| (name, Some(value)));
     let file = || value.filter(|v| !v.is_empty()).map(PathBuf::from).ok_or_else(|| wrong("a file's name"));
     Ok(match name {
         "camera" => Command::Camera(number(value).ok_or_else(|| wrong("a camera's number, from 0"))?),
         "orbit" => Command::Orbit(numbers(value).ok_or_else(|| wrong("two numbers of degrees"))?),
+        "view" => {
+            let pose = value.and_then(Pose::parse);
+            Command::View(pose.ok_or_else(|| wrong("the nine numbers of a view, as a link has them"))?)
+        }
+        "frame" => Command::Frame,
         "mode" => {
             let found = Mode::ALL.into_iter().find(|mode| Some(mode.name()) == value);
             Command::Mode(found.ok_or_else(|| wrong("first, second, side, wipe or difference"))?)
         }
         "split" => Command::Split(number(value).ok_or_else(|| wrong("a number from 0 to 1"))?),
         "gain" => Command::Gain(number(value).ok_or_else(|| wrong("a number"))?),
+        "degree" if value == Some("all") => Command::Degree(None),
         "degree" => {
             let degree = number(value).and_then(|d: u8| ShDegree::new(d).ok());
             Command::Degree(Some(degree.ok_or_else(|| wrong("an SH degree"))?))
@@ -62,8 +71,8 @@ fn word(word: &str) -> Result<Command> {
             Command::Background(numbers(value).ok_or_else(|| wrong("three numbers from 0 to 1"))?)
         }
         "key" => {
-            let key = value.and_then(Key::from_name);
-            key.and_then(keys::command).ok_or_else(|| wrong("a key that has a command"))?
+            let command = value.and_then(keys::command_of_key);
+            command.ok_or_else(|| wrong("a key that has a command"))?
         }
         "open" => Command::Open(file()?, Slot::First),
         "open2" => Command::Open(file()?, Slot::Second),
@@ -121,6 +130,15 @@ mod tests {
             Command::Drop { paths: vec!["x.lexi".into()], first: false },
         ];
         assert_eq!(script, expected);
+        let script = parse("frame,view=1:2:-3:0:0:0:1:4:1.5:mirrored,degree=all").unwrap();
+        let pose = Pose {
+            position: [1.0, 2.0, -3.0],
+            rotation: [0.0, 0.0, 0.0, 1.0],
+            mirrored: true,
+            distance: 4.0,
+            focal: 1.5,
+        };
+        assert_eq!(script, [Command::Frame, Command::View(pose), Command::Degree(None)]);
         assert!(parse("").unwrap().is_empty());
     }
 
@@ -131,6 +149,7 @@ mod tests {
             "camera",
             "camera=-1",
             "camera=x",
+            "view=1:2:3",
             "mode=best",
             "split=",
             "degree=9",

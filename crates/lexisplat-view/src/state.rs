@@ -4,51 +4,58 @@ use lexisplat_render::{Camera, RenderOptions};
 
 use crate::camera_controller::{CameraController, SceneBounds, fitted};
 use crate::command::{Command, Mode, Slot};
+use crate::pose::Pose;
 
-/// Amplification of differences: the initial value, and the range.
-const GAIN: f32 = lexisplat_eval::montage::AMPLIFICATION;
-const GAINS: std::ops::RangeInclusive<f32> = 1.0..=100.0;
+/// Amplification of differences: the initial value, which is that of `lexisplat-eval`'s montages, and the range.
+const GAIN: f32 = 10.0;
+pub(crate) const GAINS: std::ops::RangeInclusive<f32> = 1.0..=100.0;
 
 /// How the models' pictures are arranged on screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Arrangement {
-    pub(crate) mode: Mode,
+pub struct Arrangement {
+    /// What is shown of which model.
+    pub mode: Mode,
     /// Position of the wipe's line: 0 is the left edge, 1 the right.
-    pub(crate) split: f32,
-    /// Factor on differences.
-    pub(crate) gain: f32,
+    pub split: f32,
+    /// Factor on differences, 1 to 100.
+    pub gain: f32,
 }
 
 impl Arrangement {
     /// Returns the number of pictures next to each other.
-    pub(crate) fn columns(&self) -> u32 {
+    #[must_use]
+    pub fn columns(&self) -> u32 {
         if self.mode == Mode::SideBySide { 2 } else { 1 }
     }
 }
 
 /// What is shown and from where.
 #[derive(Debug)]
-pub(crate) struct State {
+pub struct State {
     /// Cameras to step through.
-    pub(crate) cameras: Vec<Camera>,
+    cameras: Vec<Camera>,
     /// Whether the cameras come from a file. Else they are a generated orbit, whose picture size is arbitrary.
     given: bool,
     bounds: SceneBounds,
     /// Index of the camera chosen last.
-    pub(crate) index: usize,
+    index: usize,
     /// Whether one of the cameras was chosen since the last reset.
     visited: bool,
     /// The free camera, or `None` while one of the cameras is chosen.
     free_camera: Option<CameraController>,
-    pub(crate) arrangement: Arrangement,
-    pub(crate) options: RenderOptions,
+    arrangement: Arrangement,
+    options: RenderOptions,
     /// Which models are open.
     open: [bool; 2],
-    pub(crate) panel: bool,
+    /// Whether the panel is shown.
+    panel: bool,
 }
 
 impl State {
-    pub(crate) fn new(background: [f32; 3]) -> Self {
+    /// Returns a state without models and cameras. `background` is the colour behind the scenes, 0 to 1 in each
+    /// channel.
+    #[must_use]
+    pub fn new(background: [f32; 3]) -> Self {
         let bounds = SceneBounds { centre: glam::DVec3::ZERO, radius: 1.0, up: glam::DVec3::NEG_Y };
         Self {
             cameras: Vec::new(),
@@ -58,7 +65,7 @@ impl State {
             visited: false,
             free_camera: None,
             arrangement: Arrangement { mode: Mode::One(Slot::First), split: 0.5, gain: GAIN },
-            options: RenderOptions::default().with_background(background),
+            options: RenderOptions::default().with_background(clipped(background)),
             open: [false; 2],
             panel: true,
         }
@@ -66,7 +73,7 @@ impl State {
 
     /// Replaces the cameras and resets the view. With `given` cameras the view is that of the first. Else it is
     /// that of a free camera in its place, whose picture fills the window.
-    pub(crate) fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, bounds: SceneBounds) {
+    pub fn set_cameras(&mut self, cameras: Vec<Camera>, given: bool, bounds: SceneBounds) {
         self.cameras = cameras;
         self.given = given;
         self.bounds = bounds;
@@ -74,7 +81,7 @@ impl State {
     }
 
     /// Sets which models are open. The mode becomes a wipe when the second of them is opened.
-    pub(crate) fn set_open(&mut self, open: [bool; 2]) {
+    pub fn set_open(&mut self, open: [bool; 2]) {
         if open == [true; 2] && self.open != open {
             self.arrangement.mode = Mode::Wipe;
         }
@@ -100,14 +107,51 @@ impl State {
         };
     }
 
+    /// Returns the cameras to step through.
+    #[must_use]
+    pub fn cameras(&self) -> &[Camera] {
+        &self.cameras
+    }
+
+    /// Returns the index of the camera chosen last.
+    #[must_use]
+    pub fn index(&self) -> usize {
+        self.index
+    }
+
+    /// Returns how the pictures are arranged.
+    #[must_use]
+    pub fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
+    /// Returns how the models are drawn.
+    #[must_use]
+    pub fn options(&self) -> RenderOptions {
+        self.options
+    }
+
+    /// Returns whether the panel is shown.
+    #[must_use]
+    pub fn panel(&self) -> bool {
+        self.panel
+    }
+
+    /// Returns the free camera's place, if it is in use.
+    #[must_use]
+    pub fn pose(&self) -> Option<Pose> {
+        self.free_camera.as_ref().map(CameraController::pose)
+    }
+
     /// Returns whether the free camera is in use.
-    pub(crate) fn is_free(&self) -> bool {
+    #[must_use]
+    pub fn is_free(&self) -> bool {
         self.free_camera.is_some()
     }
 
     /// Returns the free camera, which starts at the present view if it was not in use. Returns `None` if there is no
     /// camera yet.
-    pub(crate) fn free_camera(&mut self) -> Option<&mut CameraController> {
+    pub fn free_camera(&mut self) -> Option<&mut CameraController> {
         if self.free_camera.is_none() {
             self.free_camera = Some(CameraController::at(self.cameras.get(self.index)?, self.bounds));
         }
@@ -115,7 +159,7 @@ impl State {
     }
 
     /// Carries out `command`. Commands that do not concern the state are ignored.
-    pub(crate) fn apply(&mut self, command: &Command) {
+    pub fn apply(&mut self, command: &Command) {
         let count = self.cameras.len();
         match *command {
             Command::Camera(index) if index < count => {
@@ -131,7 +175,15 @@ impl State {
                 self.visited = true;
                 self.free_camera = None;
             }
+            Command::View(pose) => {
+                self.free_camera = Some(CameraController::from_pose(&pose, self.bounds));
+            }
             Command::Reset => self.reset(),
+            Command::Frame => {
+                if let Some(controller) = self.free_camera() {
+                    controller.frame();
+                }
+            }
             Command::Orbit([right, down]) => {
                 if let Some(controller) = self.free_camera() {
                     controller.orbit(right.to_radians(), down.to_radians());
@@ -152,7 +204,7 @@ impl State {
             Command::ScaleGain(factor) => self.apply(&Command::Gain(self.arrangement.gain * factor)),
             Command::Degree(degree) => self.options.max_degree = degree,
             Command::Background(colour) => {
-                self.options.background = colour.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 });
+                self.options.background = clipped(colour);
             }
             Command::Panel => self.panel = !self.panel,
             _ => {}
@@ -161,7 +213,8 @@ impl State {
 
     /// Returns the camera for an area of `width * height` pixels in the present arrangement: the free camera fills
     /// it, the others keep their aspect within it. Returns `None` if there is no camera yet.
-    pub(crate) fn camera(&self, width: u32, height: u32) -> Option<Camera> {
+    #[must_use]
+    pub fn camera(&self, width: u32, height: u32) -> Option<Camera> {
         let width = (width / self.arrangement.columns()).clamp(1, lexisplat_render::MAX_SIDE);
         let height = height.clamp(1, lexisplat_render::MAX_SIDE);
         if let Some(controller) = &self.free_camera {
@@ -173,13 +226,20 @@ impl State {
         Some(camera.resized(width, height))
     }
 
-    /// Returns the camera of a screenshot: the chosen one at its own size, or the free one at its size on screen.
-    pub(crate) fn screenshot_camera(&self, width: u32, height: u32, max_width: u32) -> Option<Camera> {
+    /// Returns the camera of a screenshot: the chosen one at its own size, or the free one at its size on screen, at
+    /// most `max_width` pixels wide. Returns `None` if there is no camera yet.
+    #[must_use]
+    pub fn screenshot_camera(&self, width: u32, height: u32, max_width: u32) -> Option<Camera> {
         if self.free_camera.is_none() {
             return Some(self.cameras.get(self.index)?.with_max_width(max_width));
         }
         Some(self.camera(width, height)?.with_max_width(max_width))
     }
+}
+
+/// Returns `colour` within 0 to 1; what is not finite becomes 0.
+fn clipped(colour: [f32; 3]) -> [f32; 3] {
+    colour.map(|v| if v.is_finite() { v.clamp(0.0, 1.0) } else { 0.0 })
 }
 
 /// Returns `index + by` modulo `count`, which must not be 0.
@@ -284,6 +344,12 @@ mod tests {
         state.apply(&Command::Mode(Mode::Difference));
         state.set_open([false, true]);
         assert_eq!(state.arrangement.mode, Mode::One(Slot::Second));
+    }
+
+    #[test]
+    #[cfg(feature = "window")]
+    fn differences_start_as_those_of_a_montage() {
+        assert_eq!(GAIN, lexisplat_eval::montage::AMPLIFICATION);
     }
 
     #[test]

@@ -8,15 +8,11 @@ use egui::{Align2, Color32, CornerRadius, CursorIcon, FontId, Pos2, Rect, Sense,
 use crate::app::App;
 use crate::camera_controller::fitted;
 use crate::command::{Command, Mode, Slot};
-use crate::present::{Composition, PresentCallback};
+use crate::gesture::Drag;
+use crate::present::Composition;
+use crate::present_callback::PresentCallback;
 use crate::render_thread::Score;
 
-/// Angle of orbiting for a drag across the picture's shorter side, in radians.
-const ORBIT: f64 = std::f64::consts::PI;
-/// Angle of looking around for the same drag, in radians.
-const LOOK: f64 = 1.0;
-/// Factor on the distance of the pivot for one point of scrolling.
-const WHEEL: f64 = 0.998;
 /// Largest distance of the pointer from the wipe's line that it drags, in points.
 const GRIP: f32 = 8.0;
 /// Radius of the line's handle, in points.
@@ -66,8 +62,8 @@ impl App {
     /// Returns the arrangement chosen, or the one picture there is if the arrangement needs another.
     fn composition(&self) -> Option<Composition> {
         let frame = self.frame.as_ref()?;
-        let mut composition =
-            Composition { arrangement: self.state.arrangement, pictures: frame.pictures.clone() };
+        let pictures = frame.pictures.each_ref().map(|drawn| drawn.as_ref().map(|d| d.picture.clone()));
+        let mut composition = Composition { arrangement: self.state.arrangement(), pictures };
         if composition.sides().is_none() {
             let there = Slot::BOTH.into_iter().find(|slot| composition.pictures[slot.index()].is_some())?;
             composition.arrangement.mode = Mode::One(there);
@@ -95,7 +91,7 @@ impl App {
     }
 
     fn pointer(&mut self, ui: &egui::Ui, response: &egui::Response, place: Rect, mode: Mode) {
-        let line = place.left() + place.width() * self.state.arrangement.split;
+        let line = place.left() + place.width() * self.state.arrangement().split;
         let near_line = |at: Pos2| mode == Mode::Wipe && (at.x - line).abs() <= GRIP && place.contains(at);
         let (modifiers, origin) = ui.input(|i| (i.modifiers, i.pointer.press_origin()));
         if response.drag_started_by(egui::PointerButton::Primary) {
@@ -116,20 +112,17 @@ impl App {
             }
         } else if response.dragged() && by != Vec2::ZERO {
             let primary = response.dragged_by(egui::PointerButton::Primary);
-            if let Some(controller) = self.state.free_camera() {
-                match (primary, modifiers.shift, modifiers.ctrl) {
-                    (true, false, false) => controller.orbit(x * ORBIT, y * ORBIT),
-                    (true, false, true) => controller.look(x * -LOOK, y * -LOOK),
-                    _ => controller.pan(x, y),
-                }
-            }
+            let drag = match (primary, modifiers.shift, modifiers.ctrl) {
+                (true, false, false) => Drag::Orbit,
+                (true, false, true) => Drag::Look,
+                _ => Drag::Pan,
+            };
+            self.state.drag(drag, x, y);
             self.note_motion();
         }
         let wheel = ui.input(egui::InputState::smooth_scroll_delta).y;
         if response.hovered() && wheel != 0.0 {
-            if let Some(controller) = self.state.free_camera() {
-                controller.dolly(WHEEL.powf(f64::from(wheel)));
-            }
+            self.state.scroll(f64::from(wheel));
             self.note_motion();
         }
     }
@@ -140,7 +133,7 @@ impl App {
         match mode {
             Mode::One(slot) => label(painter, left, Align2::LEFT_TOP, &name(slot)),
             Mode::SideBySide | Mode::Wipe => {
-                let share = if mode == Mode::Wipe { self.state.arrangement.split } else { 0.5 };
+                let share = if mode == Mode::Wipe { self.state.arrangement().split } else { 0.5 };
                 let x = place.left() + place.width() * share;
                 let stroke = Stroke::new(1.5, Color32::WHITE);
                 painter.vline(x, place.y_range(), Stroke::new(3.5, Color32::from_black_alpha(90)));
@@ -153,7 +146,7 @@ impl App {
                 label(painter, right, Align2::RIGHT_TOP, &name(Slot::Second));
             }
             Mode::Difference => {
-                let text = format!("difference x {:.3}", self.state.arrangement.gain);
+                let text = format!("difference x {:.3}", self.state.arrangement().gain);
                 label(painter, left, Align2::LEFT_TOP, text.trim_end_matches('0').trim_end_matches('.'));
             }
         }

@@ -86,14 +86,14 @@ impl Gpu {
     pub(super) async fn upload<T: Pod>(&self, label: &str, words: &[T]) -> Result<Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(words);
         let buffer = self.checked(label, || self.storage(label, bytes.len() as u64)).await?;
-        self.write(&buffer, bytes).await?;
+        self.write(&buffer, 0, bytes).await?;
         Ok(buffer)
     }
 
-    /// Copies `bytes`, of whole words, to the start of `buffer`. Of large uploads the GPU reads each piece
+    /// Copies `bytes`, of whole words, to `buffer` from byte `first` on. Of large uploads the GPU reads each piece
     /// before the next is handed over, so that the copies that wgpu holds do not pile up.
-    pub(super) async fn write(&self, buffer: &Buffer, bytes: &[u8]) -> Result<()> {
-        for (piece, at) in bytes.chunks(UPLOAD_PIECE).zip((0_u64..).step_by(UPLOAD_PIECE)) {
+    pub(super) async fn write(&self, buffer: &Buffer, first: u64, bytes: &[u8]) -> Result<()> {
+        for (piece, at) in bytes.chunks(UPLOAD_PIECE).zip((first..).step_by(UPLOAD_PIECE)) {
             self.queue().write_buffer(&buffer.raw, at, piece);
             if bytes.len() > UPLOAD_PIECE {
                 self.queue().submit([]);

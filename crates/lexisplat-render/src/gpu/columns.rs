@@ -15,17 +15,11 @@ use super::constants::{COLUMN_GROUP, ESCAPED};
 /// The codes of a run of Gaussians.
 #[derive(Debug, Default)]
 pub(super) struct Columns {
-    /// Places and counts, then the numbers of the escaped Gaussians within the run.
+    /// Places and counts.
     pub(super) columns: Vec<u32>,
-    /// Where in `columns` the numbers of the escaped Gaussians begin.
-    pub(super) escapes_at: usize,
+    /// The numbers of the escaped Gaussians within the run.
+    pub(super) escaped: Vec<u32>,
     pub(super) nonzeros: Vec<u32>,
-}
-
-/// Returns the number of words that a group with these `counts` takes in `nonzeros`.
-pub(super) fn group_words(codes: &SparseCodes, counts: &[u8]) -> usize {
-    let total: usize = counts.iter().map(|&c| usize::from(c)).sum();
-    (total * codes.indices().width()).div_ceil(4) + (total * codes.values().width()).div_ceil(4)
 }
 
 /// Returns which of the escapes are of Gaussians in `range`.
@@ -66,14 +60,8 @@ impl Columns {
             }
             at += total;
         }
-        out.escapes_at = out.columns.len();
-        out.columns.extend(escapes);
+        out.escaped = escapes;
         out
-    }
-
-    /// Number of escaped Gaussians.
-    pub(super) fn escapes(&self) -> usize {
-        self.columns.len() - self.escapes_at
     }
 }
 

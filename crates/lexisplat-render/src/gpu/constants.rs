@@ -51,6 +51,8 @@ const CULL_SLACK: f32 = 1e-3;
 const REACH_SLACK: f32 = 1e-3;
 /// The same in pixels.
 const REACH_MARGIN: f32 = 0.05;
+/// Pixels that a lane compares.
+pub(super) const ERROR_PIXELS: u32 = 16;
 /// Rounds in one measurement of arithmetic.
 pub(super) const MULTIPLY_ADDS: u32 = 1024;
 /// Larger numbers count as overflown.
@@ -147,6 +149,7 @@ pub(super) fn declarations() -> String {
         ("NO_SLOT", u32::MAX),
         ("MAX_BASIS", basis),
         ("MULTIPLY_ADDS", MULTIPLY_ADDS),
+        ("ERROR_PIXELS", ERROR_PIXELS),
         ("COUNTER_FOUND", Counter::Found as u32),
         ("COUNTER_SLOTS", Counter::Slots as u32),
         ("COUNTER_SLOTS_AND_END", Counter::SlotsAndEnd as u32),
@@ -253,11 +256,11 @@ pub(super) fn atom_terms(per_channel: usize) -> String {
     for_each_coefficient(per_channel, load, |k, coefficient| format!("sum += b[{k}] * {coefficient};"))
 }
 
-/// Returns the statements of [`atom_terms`] for the atom whose floats begin at `atoms_here[at]`.
-pub(super) fn shared_atom_terms(per_channel: usize) -> String {
+/// Returns the statements of [`atom_terms`] for a row whose floats `load` reads.
+pub(super) fn float_terms(per_channel: usize, load: impl Fn(usize) -> String) -> String {
     let mut out = String::new();
     for k in 0..per_channel {
-        let [r, g, b] = [3 * k, 3 * k + 1, 3 * k + 2].map(|c| format!("atoms_here[at + {c}u]"));
+        let [r, g, b] = [3 * k, 3 * k + 1, 3 * k + 2].map(&load);
         let _ = writeln!(out, "sum += b[{k}] * vec3<f32>({r}, {g}, {b});");
     }
     out

@@ -13,18 +13,23 @@
 //! entries of each splat, all in fixed order. The processor carries the sums over to the world.
 //!
 //! Kernels ask for no more than WebGPU's defaults: 8 storage buffers, 256 lanes, and 16 KiB of workgroup memory.
-//! Only [`ShPath::SparseShared`] with a large dictionary needs more of that. Scenes larger than a binding are
-//! cut into chunks. Pictures whose lists are larger than a binding are cut into bands; bands look for their own
+//! Only [`ShPath::SparseShared`] with a large dictionary needs more of that. A scene is made of parts, each laid out by
+//! [`ScenePart`] and uploaded by itself; those larger than a binding are cut into chunks. Pictures whose lists are larger than a binding are cut into bands; bands look for their own
 //! Gaussians where the slots do not hold those of the whole view.
 //!
 //! Nothing blocks but the functions that have a twin ending in `_async`, and a browser does not have those.
 //! Outside of a browser the futures need something that polls the device, such as `Gpu::wait` on another thread.
 
 mod buffer;
+mod chunks;
 mod columns;
 mod constants;
 mod device;
+mod form;
 mod moments;
+mod part;
+mod part_check;
+mod part_layout;
 mod path;
 mod plan;
 mod radiance;
@@ -36,6 +41,7 @@ mod sensitivity;
 mod sh_data;
 mod shaders;
 mod speed;
+mod squared_error;
 #[cfg(test)]
 mod tests;
 mod timestamps;
@@ -47,6 +53,8 @@ pub use wgpu;
 #[cfg(not(target_family = "wasm"))]
 pub use device::adapters;
 pub use device::{AdapterSummary, Gpu, adapters_async, rank};
+pub use form::SceneForm;
+pub use part::ScenePart;
 pub use path::ShPath;
 pub use plan::DrawStage;
 pub use renderer::{Frame, FrameStats, GpuRenderer, StageTimes};

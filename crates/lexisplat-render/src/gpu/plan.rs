@@ -6,11 +6,12 @@ use std::sync::{Arc, Weak};
 use crate::error::Result;
 
 use super::buffer::Buffer;
+use super::chunks::ChunkBuffers;
 use super::constants::{Counter, DIGIT_BITS, Dispatch, MAX_GROUPS, SCAN_BLOCK};
 use super::device::Gpu;
 use super::scene::GpuScene;
 use super::shaders::{Kernels, all_from, bind};
-use super::uniforms::{Band, Pass, Scan};
+use super::uniforms::{Band, ChunkUniform, Pass, Scan};
 use super::work::{PIXEL, Work};
 
 use crate::conventions::TILE;
@@ -135,6 +136,51 @@ struct Sorting<'a> {
     identity: bool,
 }
 
+/// Bytes between the uniforms of neighbouring chunks (WebGPU's `minUniformBufferOffsetAlignment`).
+const UNIFORM_STRIDE: usize = 256;
+
+/// What kernels are told about the chunks of a scene. It belongs to the plan, so that a scene whose parts change
+/// often makes it only for the pictures that are drawn.
+struct Chunks<'a> {
+    all: Vec<&'a ChunkBuffers>,
+    /// A [`ChunkUniform`] every [`UNIFORM_STRIDE`] bytes.
+    uniforms: Buffer,
+    /// The first block of each chunk, and the end of the last.
+    blocks: Buffer,
+}
+
+impl<'a> Chunks<'a> {
+    fn new(gpu: &Gpu, scene: &'a GpuScene) -> Result<Self> {
+        let numbering = scene.numbering();
+        let mut bytes = vec![0; numbering.len() * UNIFORM_STRIDE];
+        for (out, uniform) in bytes.chunks_exact_mut(UNIFORM_STRIDE).zip(&numbering) {
+            let uniform = bytemuck::bytes_of(uniform);
+            out[..uniform.len()].copy_from_slice(uniform);
+        }
+        let usage = wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST;
+        let uniforms = gpu.buffer("chunks", bytes.len() as u64, usage)?;
+        gpu.queue().write_buffer(&uniforms.raw, 0, &bytes);
+        let ends = numbering.iter().map(|chunk| chunk.first_block + chunk.blocks);
+        let starts: Vec<u32> = std::iter::once(0).chain(ends).collect();
+        let blocks = gpu.storage("chunk blocks", size_of_val(starts.as_slice()) as u64)?;
+        gpu.queue().write_buffer(&blocks.raw, 0, bytemuck::cast_slice(&starts));
+        Ok(Self { all: scene.chunks().collect(), uniforms, blocks })
+    }
+
+    /// The chunks in order, each with the binding of its uniform.
+    fn each(&self) -> impl Iterator<Item = (&'a ChunkBuffers, wgpu::BindGroupEntry<'_>)> {
+        let entry = |offset| wgpu::BindGroupEntry {
+            binding: 1,
+            resource: wgpu::BindingResource::Buffer(wgpu::BufferBinding {
+                buffer: &self.uniforms.raw,
+                offset,
+                size: NonZeroU64::new(size_of::<ChunkUniform>() as u64),
+            }),
+        };
+        self.all.iter().copied().zip((0..).step_by(UNIFORM_STRIDE).map(entry))
+    }
+}
+
 struct Planner<'a> {
     gpu: &'a Gpu,
     kernels: &'a Kernels,
@@ -158,7 +204,7 @@ impl Plan {
         gpu.checked("bindings", || planner.plan(scene, shape)).await
     }
 
-    /// Whether its scene is still there.
+    /// Whether its scene is still there, with the same parts.
     pub(super) fn is_of_use(&self) -> bool {
         self.scene_lives.strong_count() > 0
     }
@@ -166,55 +212,61 @@ impl Plan {
 
 impl Planner<'_> {
     fn plan(mut self, scene: &GpuScene, shape: Shape) -> Result<Plan> {
+        let chunks = Chunks::new(self.gpu, scene)?;
         let mut by_depth = 0;
         for first in (0..shape.rows).step_by(shape.band_rows as usize) {
             let rows = shape.band_rows.min(shape.rows - first);
             if shape.bands_see {
-                by_depth = self.see(scene, shape, first, rows)?;
+                by_depth = self.see(scene, &chunks, shape, [first, rows])?;
             } else if first == 0 {
-                by_depth = self.see(scene, shape, 0, shape.rows)?;
+                by_depth = self.see(scene, &chunks, shape, [0, shape.rows])?;
             }
             self.band(shape, &self.work.slot_values[by_depth], first, rows)?;
         }
         let scene_lives = Arc::downgrade(&scene.lives);
+        self.uniforms.extend([chunks.uniforms, chunks.blocks]);
         Ok(Plan { shape, scene: scene.id, scene_lives, passes: self.passes, _uniforms: self.uniforms })
     }
 
-    /// Finds, projects, colours and orders the Gaussians that may be visible in some rows of tiles. Returns in
-    /// which of the two buffers the ordered slots are.
-    fn see(&mut self, scene: &GpuScene, shape: Shape, first: u32, rows: u32) -> Result<usize> {
+    /// Finds, projects, colours and orders the Gaussians that may be visible in some rows of tiles: the first row
+    /// and their number are given. Returns in which of the two buffers the ordered slots are.
+    fn see(
+        &mut self,
+        scene: &GpuScene,
+        chunks: &Chunks<'_>,
+        shape: Shape,
+        [first, rows]: [u32; 2],
+    ) -> Result<usize> {
         let (work, kernels) = (self.work, self.kernels);
         let tiles = rows * shape.columns;
         let band = self.gpu.uniform("rows in view", &Band { first, rows, tiles, padding: 0 })?;
-        for chunk in &scene.chunks {
-            let bound = [&work.frame, &chunk.uniform, &chunk.bodies, &work.masks, &work.starts, &band];
-            self.step(&kernels["cull"], all_from(0, bound), Size::Groups(chunk.blocks));
+        for (chunk, uniform) in chunks.each() {
+            let bound = all_from(2, [&chunk.bodies, &work.masks, &work.starts, &band]);
+            let bound = all_from(0, [&work.frame]).chain([uniform]).chain(bound);
+            self.step(&kernels["cull"], bound, Size::Groups(chunk.blocks()));
         }
         self.scan(&work.starts, Counter::Found, Some(scene.blocks() + 1), None)?;
         let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];
         self.step(&kernels["compact"], all_from(0, bound), Size::Groups(scene.blocks()));
-        let bound = [&work.frame, &work.starts, &scene.chunk_blocks, &work.counters, &work.dispatches];
+        let bound = [&work.frame, &work.starts, &chunks.blocks, &work.counters, &work.dispatches];
         self.step(&kernels["plan_slots"], all_from(0, bound), Size::Groups(1));
         self.end(DrawStage::Cull);
 
-        for (chunk, k) in scene.chunks.iter().zip(0..) {
-            let read = [&work.frame, &chunk.uniform, &work.starts, &work.gaussians];
-            let shape = [&chunk.bodies, &chunk.shapes];
+        for ((chunk, uniform), k) in chunks.each().zip(0..) {
+            let read = [&work.starts, &work.gaussians, &chunk.bodies, &chunk.shapes];
             let written = [&work.centres, &work.conics, &work.slot_keys[0], &work.rects];
-            let bound = all_from(0, read.into_iter().chain(shape).chain(written));
+            let bound = all_from(2, read.into_iter().chain(written));
+            let bound = all_from(0, [&work.frame]).chain([uniform]).chain(bound);
             self.step(&kernels["project"], bound, Size::chunk(k));
         }
         self.end(DrawStage::Project);
 
-        for (chunk, k) in scene.chunks.iter().zip(0..) {
-            let bound =
-                [&work.frame, &chunk.uniform, &work.starts, &work.gaussians, &chunk.bodies, &work.colours];
+        for ((chunk, uniform), k) in chunks.each().zip(0..) {
+            let bound = [&work.starts, &work.gaussians, &chunk.bodies, &work.colours];
+            let bound = all_from(2, bound.into_iter().chain(&chunk.sh).chain(&scene.atoms));
+            let bound = all_from(0, [&work.frame]).chain([uniform]).chain(bound);
             let table = scene.table.iter().flat_map(|table| table.bound());
-            self.step(
-                &scene.radiance,
-                all_from(0, bound.into_iter().chain(&chunk.sh)).chain(table),
-                Size::chunk(k),
-            );
+            self.step(&scene.radiance, bound.chain(table), Size::chunk(k));
         }
         self.end(DrawStage::Radiance);
 

@@ -278,7 +278,7 @@ impl GpuRenderer {
     /// Makes sure that the buffers are large enough for the scene and the picture, and for `wanted` slots and
     /// entries.
     async fn make_room(&mut self, scene: &GpuScene, shape: Shape, wanted: Option<[u32; 2]>) -> Result<()> {
-        let chunks = u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX);
+        let chunks = u32::try_from(scene.chunks().count()).unwrap_or(u32::MAX);
         let limit = |value: u32, most: u64| value.min(u32::try_from(most).unwrap_or(u32::MAX));
         let least = Capacity {
             blocks: scene.blocks(),
@@ -290,10 +290,12 @@ impl GpuRenderer {
         };
         let now = self.work.as_ref().map_or(least, |work| work.capacity);
         let [slots, entries] = wanted.unwrap_or([0, 0]);
+        // A scene to which parts are added makes new buffers only when it has doubled.
+        let grown = |now: u32, least: u32| if least > now { least.max(now.saturating_mul(2)) } else { now };
         let capacity = Capacity {
-            blocks: now.blocks.max(least.blocks),
-            chunks: now.chunks.max(least.chunks),
-            slots: now.slots.max(least.slots).max(slots),
+            blocks: grown(now.blocks, least.blocks),
+            chunks: grown(now.chunks, least.chunks),
+            slots: limit(grown(now.slots, least.slots), self.limits.slots).max(slots),
             entries: now.entries.max(least.entries).max(entries),
             tiles: now.tiles.max(least.tiles),
             pixels: now.pixels.max(least.pixels),
@@ -465,7 +467,7 @@ enum Missing {
 
 /// Returns the number of significant bits of depth keys: those of the farthest corner of the scene.
 fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
-    let Some(bounds) = scene.bounds else { return 1 };
+    let Some(bounds) = scene.bounds() else { return 1 };
     let farthest = (0..8)
         .map(|corner: usize| {
             let at = std::array::from_fn(|k| bounds[corner >> k & 1][k]);
@@ -508,7 +510,7 @@ fn frame_uniform(
         width: camera.width,
         height: camera.height,
         blocks: scene.blocks(),
-        chunks: u32::try_from(scene.chunks.len()).unwrap_or(u32::MAX),
+        chunks: u32::try_from(scene.chunks().count()).unwrap_or(u32::MAX),
         entries: capacity.entries,
         padding: 0,
     }

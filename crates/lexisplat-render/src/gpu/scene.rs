@@ -1,24 +1,31 @@
-//! A scene on the GPU.
+//! A scene on the GPU, made of parts that come and go.
 
-use std::ops::Range;
+use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
-use lexisplat::{Geometry, ShDegree};
+use lexisplat::ShDegree;
 
 use crate::error::{Error, Result};
-use crate::parallel::*;
 use crate::scene::Scene;
 
 use super::buffer::Buffer;
-use super::columns::Columns;
+use super::chunks::ChunkBuffers;
 use super::constants::GROUP;
 use super::device::Gpu;
+use super::form::SceneForm;
+use super::part::ScenePart;
+use super::part_layout::{ShKind, ShLayout};
 use super::path::ShPath;
 use super::radiance::radiance_pipeline;
 use super::radiance_table::RadianceTable;
-use super::sh_data::{ShData, atoms, body, dense_rows, shape};
+use super::sh_data::ShData;
 use super::uniforms::ChunkUniform;
+
+/// Most Gaussians of a part that a whole scene is uploaded in. The arrays of one part are in memory at once.
+const PART_GAUSSIANS: usize = 1 << 20;
+/// Most blocks of Gaussians of a scene. The numbers of their Gaussians fit in 32 bits.
+const MAX_BLOCKS: u32 = 1 << 24;
 
 /// Bytes of a scene on the GPU.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -29,37 +36,43 @@ pub struct SceneBytes {
     pub sh: u64,
 }
 
-/// A scene uploaded for one [`ShPath`]. The scene that it was made from may be dropped.
+/// A scene on the GPU for one [`ShPath`]. What it was made from may be dropped.
+///
+/// It is uploaded whole, or made empty and filled with parts. Its Gaussians have the order of the parts' indices. The
+/// picture is the same, bit for bit, however the Gaussians are divided into parts.
 #[derive(Debug)]
 pub struct GpuScene {
     pub(super) id: u64,
-    /// Plans hold weak references to this, and so know whether the scene still lives.
+    /// Plans hold weak references to this, and so know whether the parts that they draw are still those of the scene.
     pub(super) lives: Arc<()>,
-    pub(super) chunks: Vec<ChunkBuffers>,
-    pub(super) chunk_blocks: Buffer,
+    parts: BTreeMap<usize, Part>,
+    /// The dictionary, where kernels read it.
+    pub(super) atoms: Option<Buffer>,
     pub(super) radiance: wgpu::ComputePipeline,
     pub(super) table: Option<RadianceTable>,
-    /// The corners of a box around all positions that can be drawn; `None` if there are none.
-    pub(super) bounds: Option<[[f32; 3]; 2]>,
     gpu: Gpu,
     path: ShPath,
-    len: u32,
-    degree: ShDegree,
+    layout: ShLayout,
     pub(super) antialiased: bool,
-    bytes: SceneBytes,
-    /// Those of the bytes for SH that all Gaussians share: dictionary and table.
-    shared_bytes: u64,
+    len: u32,
+    blocks: u32,
 }
 
-/// The buffers of a part of the scene.
 #[derive(Debug)]
-pub(super) struct ChunkBuffers {
-    pub(super) blocks: u32,
-    pub(super) uniform: Buffer,
-    pub(super) bodies: Buffer,
-    pub(super) shapes: Buffer,
-    /// What the radiance kernel has from binding 6 on: dense rows; or base colours, columns, nonzeros and atoms.
-    pub(super) sh: Vec<Buffer>,
+struct Part {
+    chunks: Vec<ChunkBuffers>,
+    /// The corners of a box around all positions that can be drawn; `None` if there are none.
+    bounds: Option<[[f32; 3]; 2]>,
+}
+
+impl Part {
+    fn len(&self) -> u32 {
+        self.chunks.iter().map(|chunk| chunk.count).sum()
+    }
+
+    fn blocks(&self) -> u32 {
+        self.chunks.iter().map(ChunkBuffers::blocks).sum()
+    }
 }
 
 /// The number of the next scene. Numbers keep bindings made for one scene from being used for another.
@@ -83,114 +96,127 @@ impl GpuScene {
     /// 2^32 - 2; [`Error::Gpu`] if memory runs out.
     pub async fn new_async(gpu: &Gpu, scene: &Scene<'_>, path: ShPath) -> Result<Self> {
         scene.validate()?;
-        let len = u32::try_from(scene.len()).ok().filter(|&n| n < u32::MAX).ok_or_else(|| {
-            let (found, limit) = (scene.len() as u64, u64::from(u32::MAX) - 1);
-            Error::gpu_limit("Gaussians of a scene on the GPU", found, limit)
-        })?;
-        let sh = match scene {
-            _ if !path.is_sparse() => ShData::Dense { scene, half: path == ShPath::DenseF16 },
-            Scene::Sparse(model) => ShData::Codes(model),
-            Scene::Dense(_) => {
-                return Err(Error::parameter("path", path.name(), "a compressed scene for a sparse path"));
-            }
-        };
-        let table = match (path, &sh) {
-            (ShPath::SparseTable, ShData::Codes(model)) => {
-                Some(RadianceTable::new(gpu, model.dictionary()).await?)
-            }
-            _ => None,
-        };
-        let radiance = radiance_pipeline(gpu, &sh, path).await?;
-        let ranges = sh.chunks(scene.len(), gpu.max_binding())?;
-        // Numbers of Gaussians fit in 32 bits, as checked above.
-        let ends =
-            ranges.iter().map(|range| u32::try_from(range.end.div_ceil(GROUP as usize)).unwrap_or(u32::MAX));
-        let chunk_blocks: Vec<u32> = std::iter::once(0).chain(ends).collect();
-        let shared_bytes = table.as_ref().map_or(0, |table| table.bytes.size);
-        let mut this = Self {
-            id: NEXT_ID.fetch_add(1, Relaxed),
-            lives: Arc::default(),
-            chunks: Vec::new(),
-            chunk_blocks: gpu.upload("chunk blocks", &chunk_blocks).await?,
-            radiance,
-            bounds: None,
-            gpu: gpu.clone(),
-            path,
-            len,
-            degree: scene.degree(),
-            antialiased: scene.meta().antialiased,
-            bytes: SceneBytes { geometry: 0, sh: shared_bytes },
-            shared_bytes,
-            table,
-        };
+        check_size(scene.len() as u64, scene.len().div_ceil(GROUP as usize) as u64)?;
+        let data = ShData::new(scene, path)?;
+        let mut this = Self::empty(gpu, &SceneForm::of_data(&data, scene), path).await?;
         let mut nonzero = 0;
-        for range in ranges {
-            this.add(scene.geometry(), &sh, range.clone(), nonzero).await?;
-            if let ShData::Codes(model) = sh {
-                nonzero +=
-                    model.codes().counts()[range.clone()].iter().map(|&c| usize::from(c)).sum::<usize>();
+        for (first, index) in (0..scene.len()).step_by(PART_GAUSSIANS).zip(0..) {
+            let range = first..(first + PART_GAUSSIANS).min(scene.len());
+            this.put_async(index, &ScenePart::of(&data, scene, range.clone(), nonzero)?).await?;
+            if let ShData::Codes(model) = data {
+                nonzero += model.codes().counts()[range].iter().map(|&c| usize::from(c)).sum::<usize>();
             }
         }
         gpu.wait_async().await?;
         Ok(this)
     }
 
-    /// Uploads one chunk, whose codes begin at nonzero `nonzero`.
-    async fn add(
-        &mut self,
-        geometry: &Geometry,
-        data: &ShData<'_>,
-        range: Range<usize>,
-        nonzero: usize,
-    ) -> Result<()> {
-        let gpu = self.gpu.clone();
-        let bodies: Vec<[f32; 4]> =
-            range.clone().into_par_iter().map(|i| body(geometry, data.finite(i), i)).collect();
-        for body in bodies.iter().filter(|body| body[3] >= 0.0) {
-            let at = [body[0], body[1], body[2]];
-            let [low, high] = self.bounds.get_or_insert([at, at]);
-            for k in 0..3 {
-                low[k] = low[k].min(at[k]);
-                high[k] = high[k].max(at[k]);
+    /// Blocks on [`Self::of_parts_async`].
+    ///
+    /// # Errors
+    /// As [`Self::of_parts_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn of_parts(gpu: &Gpu, form: &SceneForm) -> Result<Self> {
+        gpu.block_on(Self::of_parts_async(gpu, form))
+    }
+
+    /// Makes a scene without Gaussians, to which [`Self::put_async`] adds parts of this `form`.
+    ///
+    /// # Errors
+    /// [`Error::GpuLimit`] for a dictionary larger than a binding; [`Error::Gpu`] if the device fails.
+    pub async fn of_parts_async(gpu: &Gpu, form: &SceneForm) -> Result<Self> {
+        Self::empty(gpu, form, form.path()).await
+    }
+
+    async fn empty(gpu: &Gpu, form: &SceneForm, path: ShPath) -> Result<Self> {
+        let codes = matches!(form.layout.kind, ShKind::Codes { .. });
+        let table = match path {
+            ShPath::SparseTable => Some(RadianceTable::new(gpu, &form.dictionary).await?),
+            _ => None,
+        };
+        let radiance = radiance_pipeline(gpu, form.layout, path).await?;
+        // Whoever looks radiance up in a table reads no atoms.
+        let atoms = match codes && table.is_none() {
+            true => {
+                let atoms = form.atoms();
+                let (size, limit) = (size_of_val(atoms.as_slice()) as u64, gpu.max_binding());
+                if size > limit {
+                    return Err(Error::gpu_limit("bytes of a dictionary on the GPU", size, limit));
+                }
+                Some(gpu.upload("atoms", &atoms).await?)
             }
+            false => None,
+        };
+        Ok(Self {
+            id: NEXT_ID.fetch_add(1, Relaxed),
+            lives: Arc::default(),
+            parts: BTreeMap::new(),
+            atoms,
+            radiance,
+            table,
+            gpu: gpu.clone(),
+            path,
+            layout: form.layout,
+            antialiased: form.antialiased,
+            len: 0,
+            blocks: 0,
+        })
+    }
+
+    /// Blocks on [`Self::put_async`].
+    ///
+    /// # Errors
+    /// As [`Self::put_async`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn put(&mut self, index: usize, part: &ScenePart<'_>) -> Result<()> {
+        self.gpu.clone().block_on(self.put_async(index, part))
+    }
+
+    /// Uploads `part` as number `index`, in place of the one that was there. The next picture has it. Until the
+    /// upload is done, the old one is kept.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if the part is not of the scene's form; [`Error::GpuLimit`] for more than 2^32 - 2
+    /// Gaussians or 2^24 blocks of 256 in all, where each part begins a block; [`Error::Gpu`] if memory runs out.
+    /// The scene is then as before.
+    pub async fn put_async(&mut self, index: usize, part: &ScenePart<'_>) -> Result<()> {
+        if part.outline.layout != self.layout {
+            let (found, expected) = (part.outline.layout, self.layout);
+            return Err(Error::parameter("part", format!("{found:?}"), format!("{expected:?}")));
         }
-        let shapes: Vec<[f32; 8]> = range.clone().into_par_iter().map(|i| shape(geometry, i)).collect();
-        let (bodies, shapes) = (gpu.upload("bodies", &bodies).await?, gpu.upload("shapes", &shapes).await?);
-        let mut escapes = [0, 0];
-        let sh = match data {
-            ShData::Dense { scene, half } => vec![dense_rows(&gpu, scene, range.clone(), *half).await?],
-            ShData::Codes(model) => {
-                let columns = Columns::new(model.codes(), range.clone(), nonzero);
-                escapes =
-                    [columns.escapes_at, columns.escapes()].map(|v| u32::try_from(v).unwrap_or(u32::MAX));
-                vec![
-                    gpu.upload("base colours", &geometry.dc[range.clone()]).await?,
-                    gpu.upload("columns", &columns.columns).await?,
-                    gpu.upload("nonzeros", &columns.nonzeros).await?,
-                    gpu.upload("atoms", &atoms(model, &range)).await?,
-                ]
-            }
-        };
-        // Numbers of Gaussians fit in 32 bits, as checked above.
-        let number = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
-        let first = number(range.start);
-        let blocks = number(range.len().div_ceil(GROUP as usize));
-        let uniform = ChunkUniform {
-            first,
-            count: number(range.len()),
-            first_block: first / GROUP,
-            blocks,
-            escapes_at: escapes[0],
-            escapes: escapes[1],
-            padding: [0; 2],
-        };
-        let uniform = gpu.checked("chunk", || gpu.uniform("chunk", &uniform)).await?;
-        // Where there are codes, the last buffer has the atoms.
-        self.shared_bytes += sh.get(3).map_or(0, Buffer::bytes);
-        self.bytes.geometry += bodies.bytes() + shapes.bytes();
-        self.bytes.sh += sh.iter().map(Buffer::bytes).sum::<u64>();
-        self.chunks.push(ChunkBuffers { blocks, uniform, bodies, shapes, sh });
+        let cuts = part.cuts(self.gpu.max_binding())?;
+        let (len, blocks) = self.parts.get(&index).map_or((0, 0), |old| (old.len(), old.blocks()));
+        let own: u64 = cuts.iter().map(|cut| cut.gaussians.len().div_ceil(GROUP as usize) as u64).sum();
+        check_size(u64::from(self.len - len) + u64::from(part.len()), u64::from(self.blocks - blocks) + own)?;
+        let mut chunks = Vec::with_capacity(cuts.len());
+        for cut in &cuts {
+            chunks.push(part.upload(&self.gpu, cut).await?);
+        }
+        self.parts.insert(index, Part { chunks, bounds: part.bounds() });
+        self.changed();
         Ok(())
+    }
+
+    /// Removes part `index`. Returns whether it was there.
+    pub fn remove(&mut self, index: usize) -> bool {
+        let removed = self.parts.remove(&index).is_some();
+        if removed {
+            self.changed();
+        }
+        removed
+    }
+
+    /// Removes all parts.
+    pub fn clear(&mut self) {
+        self.parts.clear();
+        self.changed();
+    }
+
+    /// Counts the Gaussians again. Plans for the parts as they were are of no more use.
+    fn changed(&mut self) {
+        self.lives = Arc::default();
+        self.len = self.parts.values().map(Part::len).sum();
+        self.blocks = self.parts.values().map(Part::blocks).sum();
     }
 
     /// Number of Gaussians.
@@ -205,10 +231,16 @@ impl GpuScene {
         self.len == 0
     }
 
+    /// Number of parts.
+    #[must_use]
+    pub fn parts(&self) -> usize {
+        self.parts.len()
+    }
+
     /// SH degree.
     #[must_use]
     pub fn degree(&self) -> ShDegree {
-        self.degree
+        self.layout.degree
     }
 
     /// How SH is held.
@@ -217,17 +249,36 @@ impl GpuScene {
         self.path
     }
 
+    /// Returns the corners of a box around all positions that can be drawn; `None` if there are none.
+    #[must_use]
+    pub fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+        self.parts.values().filter_map(|part| part.bounds).reduce(|[low, high], [least, most]| {
+            [std::array::from_fn(|k| low[k].min(least[k])), std::array::from_fn(|k| high[k].max(most[k]))]
+        })
+    }
+
     /// Bytes on the GPU.
     #[must_use]
     pub fn bytes(&self) -> SceneBytes {
-        self.bytes
+        let mut bytes = SceneBytes { geometry: 0, sh: self.shared_bytes() };
+        for chunk in self.chunks() {
+            bytes.geometry += chunk.bodies.bytes() + chunk.shapes.bytes();
+            bytes.sh += chunk.sh.iter().map(Buffer::bytes).sum::<u64>();
+        }
+        bytes
+    }
+
+    /// Those of the bytes for SH that all Gaussians share: dictionary or table.
+    fn shared_bytes(&self) -> u64 {
+        let table = self.table.as_ref().map_or(0, |table| table.bytes.size);
+        self.atoms.as_ref().map_or(0, Buffer::bytes) + table
     }
 
     /// Bytes that colouring one visible Gaussian moves on average: its slot, position, SH and colour. The
     /// dictionary or table is not counted, since caches hold it.
     #[must_use]
     pub fn shading_bytes(&self) -> f64 {
-        let own = self.bytes.sh.saturating_sub(self.shared_bytes) as f64 / f64::from(self.len.max(1));
+        let own = self.bytes().sh.saturating_sub(self.shared_bytes()) as f64 / f64::from(self.len.max(1));
         let (slot, body, colour) = (size_of::<u32>(), size_of::<[f32; 4]>(), size_of::<[f32; 3]>());
         own + (slot + body + colour) as f64
     }
@@ -246,7 +297,47 @@ impl GpuScene {
         &self.gpu
     }
 
+    /// Number of blocks. Every chunk begins one.
     pub(super) fn blocks(&self) -> u32 {
-        self.len.div_ceil(GROUP)
+        self.blocks
     }
+
+    /// The chunks of all parts, in order.
+    pub(super) fn chunks(&self) -> impl Iterator<Item = &ChunkBuffers> {
+        self.parts.values().flat_map(|part| &part.chunks)
+    }
+
+    /// What kernels are told about each chunk. The first Gaussian of a block has the block's number times
+    /// [`GROUP`]; no Gaussian has the numbers after the last one of a short block.
+    pub(super) fn numbering(&self) -> Vec<ChunkUniform> {
+        let mut first_block = 0;
+        let number = |chunk: &ChunkBuffers| {
+            let uniform = ChunkUniform {
+                first: first_block * GROUP,
+                count: chunk.count,
+                first_block,
+                blocks: chunk.blocks(),
+                escapes_at: chunk.escapes_at,
+                escapes: chunk.escapes,
+                exact_at: chunk.exact_at,
+                padding: 0,
+            };
+            first_block += chunk.blocks();
+            uniform
+        };
+        self.chunks().map(number).collect()
+    }
+}
+
+/// Refuses more Gaussians, or blocks of them, than kernels can number.
+fn check_size(len: u64, blocks: u64) -> Result<()> {
+    for (what, found, limit) in [
+        ("Gaussians of a scene on the GPU", len, u64::from(u32::MAX) - 1),
+        ("blocks of Gaussians of a scene on the GPU", blocks, u64::from(MAX_BLOCKS)),
+    ] {
+        if found > limit {
+            return Err(Error::gpu_limit(what, found, limit));
+        }
+    }
+    Ok(())
 }

@@ -12,6 +12,7 @@ use super::moments::{MAX_BYTES, MOMENTS_BYTES};
 use super::renderer::{CapacityLimits, GpuRenderer};
 use super::scene::GpuScene;
 use super::shaders::{self, MEASURING};
+use super::uniforms::ChunkUniform;
 use super::work::WORD;
 
 impl GpuRenderer {
@@ -53,6 +54,7 @@ impl GpuRenderer {
             return Err(Error::parameter("geometry", geometry.len(), expected));
         }
         let mut measuring = self.measuring().await?;
+        let places = places(scene);
         let mut total = Sensitivity::zeros(geometry.len());
         let mut sums = vec![Moments::default(); geometry.len()];
         progress.begin(Stage::Draw, cameras.len() as u64);
@@ -61,7 +63,7 @@ impl GpuRenderer {
             let frame = measuring.draw_async(scene, camera, &RenderOptions::default()).await?;
             let (gaussians, moments) = measuring.read_moments(frame.stats.visible).await?;
             for (gaussian, moments) in gaussians.into_iter().zip(moments) {
-                sums[gaussian as usize] = moments;
+                sums[place(&places, gaussian)] = moments;
             }
             let projection = Projection::new(camera, scene.antialiased);
             carry(&mut total, &projection, geometry, cameras.len(), &mut sums);
@@ -112,6 +114,23 @@ impl GpuRenderer {
         let gaussians = self.gpu.read(&moments.gaussians_back, sizes[0]).await?;
         Ok((gaussians, self.gpu.read(&moments.of_slots_back, sizes[1]).await?))
     }
+}
+
+/// Returns the number that kernels give the first Gaussian of each chunk, and its place in the scene.
+fn places(scene: &GpuScene) -> Vec<[u32; 2]> {
+    let mut place = 0;
+    let of_chunk = |chunk: ChunkUniform| {
+        let own = [chunk.first, place];
+        place += chunk.count;
+        own
+    };
+    scene.numbering().into_iter().map(of_chunk).collect()
+}
+
+/// Returns the place in the scene of the Gaussian that kernels call `number`.
+fn place(places: &[[u32; 2]], number: u32) -> usize {
+    let chunk = places.partition_point(|[first, _]| *first <= number).saturating_sub(1);
+    places.get(chunk).map_or(number, |[first, place]| number - first + place) as usize
 }
 
 #[cfg(test)]

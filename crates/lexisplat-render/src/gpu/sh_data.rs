@@ -1,19 +1,16 @@
-//! The arrays of a scene on the GPU, and how the scene is cut into chunks whose arrays fit in a binding.
+//! The arrays of a scene on the GPU, Gaussian by Gaussian.
 
-use std::ops::Range;
-
-use crate::conventions::ALPHA_MIN;
-use crate::error::{Error, Result};
-use crate::parallel::*;
-use crate::scene::Scene;
 use half::f16;
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Geometry, Model};
 
-use super::buffer::Buffer;
-use super::columns::{escapes_in, group_words};
-use super::constants::{COLUMN_GROUP, GROUP, vectors};
-use super::device::Gpu;
+use crate::conventions::ALPHA_MIN;
+use crate::error::{Error, Result};
+use crate::scene::Scene;
+
+use super::constants::vectors;
+use super::part_layout::{ShKind, ShLayout};
+use super::path::ShPath;
 
 /// Smaller log scales are raised to this: the exponential of a smaller one is not a normal number.
 const LEAST_SCALE: f32 = -87.0;
@@ -30,7 +27,34 @@ pub(super) enum ShData<'a> {
     Codes(&'a Model),
 }
 
-impl ShData<'_> {
+impl<'a> ShData<'a> {
+    /// The SH of `scene` for `path`. Refuses a sparse path of a dense scene.
+    pub(super) fn new(scene: &'a Scene<'a>, path: ShPath) -> Result<Self> {
+        match scene {
+            _ if !path.is_sparse() => Ok(Self::Dense { scene, half: path == ShPath::DenseF16 }),
+            Scene::Sparse(model) => Ok(Self::Codes(model)),
+            Scene::Dense(_) => {
+                Err(Error::parameter("path", path.name(), "a compressed scene for a sparse path"))
+            }
+        }
+    }
+
+    /// How it is laid out.
+    pub(super) fn layout(&self) -> ShLayout {
+        // Widths are at most 4, and atoms at most `lexisplat::MAX_ATOMS`.
+        let number = |v: usize| u32::try_from(v).unwrap_or(u32::MAX);
+        match self {
+            Self::Dense { scene, half } => {
+                ShLayout { degree: scene.degree(), kind: ShKind::Dense { half: *half } }
+            }
+            Self::Codes(model) => {
+                let (codes, atoms) = (model.codes(), number(model.dictionary().len()));
+                let (index, value) = (number(codes.indices().width()), number(codes.values().width()));
+                ShLayout { degree: model.degree(), kind: ShKind::Codes { index, value, atoms } }
+            }
+        }
+    }
+
     /// Whether the SH-rest of Gaussian `i` is finite. Codes always are.
     pub(super) fn finite(&self, i: usize) -> bool {
         match self {
@@ -39,66 +63,6 @@ impl ShData<'_> {
                 splats.sh_rest[i * dim..(i + 1) * dim].iter().all(|v| v.is_finite())
             }
             _ => true,
-        }
-    }
-
-    /// Cuts `len` Gaussians into runs. Each array of a run fits in `limit` bytes, and all runs but the last are
-    /// whole blocks.
-    pub(super) fn chunks(&self, len: usize, limit: u64) -> Result<Vec<Range<usize>>> {
-        let block = GROUP as usize;
-        let mut chunks = Vec::new();
-        let mut start = 0;
-        let mut used = self.fixed();
-        for first in (0..len).step_by(block) {
-            let range = first..(first + block).min(len);
-            let more = self.block_bytes(range);
-            let with = |used: [u64; 4]| -> [u64; 4] { std::array::from_fn(|k| used[k] + more[k]) };
-            let fits = |bytes: [u64; 4]| bytes.iter().all(|&bytes| bytes <= limit);
-            if first > start && !fits(with(used)) {
-                chunks.push(start..first);
-                start = first;
-                used = self.fixed();
-            }
-            used = with(used);
-            if !fits(used) {
-                let found = used.into_iter().max().unwrap_or(0);
-                return Err(Error::gpu_limit("bytes of 256 Gaussians on the GPU", found, limit));
-            }
-        }
-        if start < len {
-            chunks.push(start..len);
-        }
-        Ok(chunks)
-    }
-
-    /// Bytes that the arrays of every chunk have: of shapes, of rows or nonzeros, of atoms, and of columns.
-    fn fixed(&self) -> [u64; 4] {
-        match self {
-            Self::Dense { .. } => [0; 4],
-            Self::Codes(model) => [0, 0, (model.dictionary().len() * atom_bytes(model)) as u64, 0],
-        }
-    }
-
-    /// Bytes that a block of Gaussians adds to those arrays.
-    fn block_bytes(&self, range: Range<usize>) -> [u64; 4] {
-        let shapes = range.len() as u64 * size_of::<[f32; 8]>() as u64;
-        match self {
-            Self::Dense { scene, half } => {
-                let vector = if *half { size_of::<[f16; 4]>() } else { size_of::<[f32; 4]>() };
-                let row = vectors(scene.degree().coefficients()) * vector;
-                [shapes, (range.len() * row) as u64, 0, 0]
-            }
-            Self::Codes(model) => {
-                let codes = model.codes();
-                let words: usize = codes.counts()[range.clone()]
-                    .chunks(COLUMN_GROUP as usize)
-                    .map(|counts| group_words(codes, counts))
-                    .sum();
-                let escapes = escapes_in(model.codes(), &range).len();
-                let row = escapes * atom_bytes(model);
-                let columns = range.len() * size_of::<u32>();
-                [shapes, 4 * words as u64, row as u64, columns as u64]
-            }
         }
     }
 }
@@ -125,66 +89,39 @@ pub(super) fn shape(geometry: &Geometry, i: usize) -> [f32; 8] {
     [a, b, c, geometry.opacities[i].clamp(-MOST_LOGIT, MOST_LOGIT), w, x, y, z]
 }
 
-/// Uploads the dense rows of a run of Gaussians: coefficients in order, DC first, with the three channels side by
-/// side.
-pub(super) async fn dense_rows(
-    gpu: &Gpu,
-    scene: &Scene<'_>,
-    range: Range<usize>,
-    half: bool,
-) -> Result<Buffer> {
-    let per_channel = scene.degree().rest_per_channel();
+/// Writes the dense row of Gaussian `i` of `scene` to `out`, in 32 or 16 bits: coefficients in order, DC first, with
+/// the three channels side by side.
+pub(super) fn dense_row(scene: &Scene<'_>, i: usize, half: bool, out: &mut [u32]) {
     let dim = scene.degree().rest();
-    let row_len = 4 * vectors(per_channel + 1);
-    let mut rows = vec![0.0_f32; range.len() * row_len];
-    rows.par_chunks_mut(row_len).zip(range).for_each(|(row, i)| {
-        row[..CHANNELS].copy_from_slice(&scene.geometry().dc[i]);
-        let mut decoded;
-        let rest = match scene {
-            Scene::Dense(splats) => &splats.sh_rest[i * dim..(i + 1) * dim],
-            Scene::Sparse(model) => {
-                decoded = vec![0.0; dim];
-                model.codes().reconstruct(model.dictionary(), i, &mut decoded);
-                &decoded
-            }
-        };
-        interleave(rest, per_channel, &mut row[CHANNELS..]);
-    });
+    let decoded: Vec<f32>;
+    let rest = match scene {
+        Scene::Dense(splats) => &splats.sh_rest[i * dim..(i + 1) * dim],
+        Scene::Sparse(model) => {
+            let mut row = vec![0.0; dim];
+            model.codes().reconstruct(model.dictionary(), i, &mut row);
+            decoded = row;
+            &decoded
+        }
+    };
+    let mut row = vec![0; 4 * vectors(scene.degree().coefficients())];
+    row[..CHANNELS].copy_from_slice(&scene.geometry().dc[i].map(f32::to_bits));
+    exact_row(rest, &mut row[CHANNELS..CHANNELS + dim]);
     if half {
-        let bits: Vec<u16> = rows.par_iter().map(|&v| f16::from_f32(v).to_bits()).collect();
-        return gpu.upload("dense rows", &bits).await;
+        let bits = |word: u32| u32::from(f16::from_f32(f32::from_bits(word)).to_bits());
+        for (out, pair) in out.iter_mut().zip(row.chunks_exact(2)) {
+            *out = bits(pair[0]) | bits(pair[1]) << 16;
+        }
+    } else {
+        out.copy_from_slice(&row);
     }
-    gpu.upload("dense rows", &rows).await
 }
 
-/// Copies a channel-major row to `out`, with the channels of each coefficient side by side.
-fn interleave(row: &[f32], per_channel: usize, out: &mut [f32]) {
-    for (k, out) in out.chunks_exact_mut(CHANNELS).take(per_channel).enumerate() {
+/// Copies a channel-major row to `out`, which is as long, with the channels of each coefficient side by side.
+pub(super) fn exact_row(row: &[f32], out: &mut [u32]) {
+    let per_channel = row.len() / CHANNELS;
+    for (k, out) in out.chunks_exact_mut(CHANNELS).enumerate() {
         for (c, out) in out.iter_mut().enumerate() {
-            *out = row[c * per_channel + k];
+            *out = row[c * per_channel + k].to_bits();
         }
     }
-}
-
-/// Bytes of an atom or exact row as kernels read them.
-fn atom_bytes(model: &Model) -> usize {
-    vectors(model.dictionary().degree().rest_per_channel()) * size_of::<[f32; 4]>()
-}
-
-/// Returns the atoms, and the exact rows of the escaped Gaussians in `range`. Each is filled up to whole
-/// vectors.
-pub(super) fn atoms(model: &Model, range: &Range<usize>) -> Vec<f32> {
-    let dictionary = model.dictionary();
-    let (dim, per_channel) = (dictionary.dim(), dictionary.degree().rest_per_channel());
-    let escapes = escapes_in(model.codes(), range);
-    let rows = &model.codes().escapes().rows[escapes.start * dim..escapes.end * dim];
-    let row_len = 4 * vectors(per_channel);
-    let mut out = vec![0.0; (dictionary.len() + escapes.len()) * row_len];
-    if dim > 0 {
-        let all = dictionary.as_slice().chunks_exact(dim).chain(rows.chunks_exact(dim));
-        for (row, out) in all.zip(out.chunks_exact_mut(row_len)) {
-            interleave(row, per_channel, out);
-        }
-    }
-    out
 }

@@ -17,8 +17,8 @@ pub(super) type ModuleText = (&'static str, &'static [&'static str], &'static [&
 const FRAME: &str = include_str!("kernels/frame.wgsl");
 const TILE: &str = include_str!("kernels/tile.wgsl");
 
-/// All kernels that drawing needs but radiance, which depends on the scene.
-pub(super) const DRAWING: [ModuleText; 9] = [
+/// All kernels that drawing and comparing need but radiance, which depends on the scene.
+pub(super) const DRAWING: [ModuleText; 10] = [
     ("cull", &["cull"], &[FRAME, include_str!("kernels/cull.wgsl")]),
     ("compact", &["compact"], &[FRAME, include_str!("kernels/compact.wgsl")]),
     ("plan", &["plan_slots", "plan_entries"], &[FRAME, include_str!("kernels/plan.wgsl")]),
@@ -32,6 +32,7 @@ pub(super) const DRAWING: [ModuleText; 9] = [
     ),
     ("ranges", &["find_ranges"], &[FRAME, include_str!("kernels/ranges.wgsl")]),
     ("blend", &["blend"], &[FRAME, TILE, include_str!("kernels/blend.wgsl")]),
+    ("squared_error", &["squared_error"], &[FRAME, include_str!("kernels/squared_error.wgsl")]),
 ];
 
 /// Kernels that only measuring sensitivities needs.

@@ -38,7 +38,8 @@ pub(super) struct ChunkUniform {
     pub(super) blocks: u32,
     pub(super) escapes_at: u32,
     pub(super) escapes: u32,
-    pub(super) padding: [u32; 2],
+    pub(super) exact_at: u32,
+    pub(super) padding: u32,
 }
 
 /// Rows of tiles drawn at once.
@@ -68,4 +69,13 @@ pub(super) struct Pass {
     pub(super) length: u32,
     pub(super) blocks: u32,
     pub(super) identity: u32,
+}
+
+/// How many pixels of two pictures are compared, laid out as in `squared_error.wgsl`.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Extent {
+    pub(super) pixels: u32,
+    pub(super) first_sum: u32,
+    pub(super) padding: [u32; 2],
 }

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use lexisplat_render::{Camera, RenderOptions, render_measured};
 use wgpu::util::DeviceExt;
 
-use super::{Picture, SceneRenderer};
+use super::{DrawnPicture, SceneRenderer};
 use crate::command::Slot;
 use crate::error::{Error, Result};
 use crate::models::OpenModel;
+use crate::picture::Picture;
 
 /// The reference rasteriser on the CPU.
 pub(crate) struct CpuSceneRenderer {
@@ -32,7 +33,7 @@ impl SceneRenderer for CpuSceneRenderer {
         Ok(())
     }
 
-    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture> {
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<DrawnPicture> {
         let Some(model) = &self.models[slot.index()] else {
             return Err(Error::Device(format!("there is no {slot:?} model to draw")));
         };
@@ -50,10 +51,8 @@ impl SceneRenderer for CpuSceneRenderer {
             contents: bytes,
             usage: wgpu::BufferUsages::STORAGE,
         });
-        Ok(Picture {
-            pixels,
-            width: image.width,
-            height: image.height,
+        Ok(DrawnPicture {
+            picture: Picture { pixels, width: image.width, height: image.height },
             gaussians: drawn.gaussians,
             stage_times: drawn.stage_times,
             image: Some(image),

@@ -5,10 +5,11 @@ use std::sync::Arc;
 use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, RenderOptions};
 
-use super::{Picture, SceneRenderer};
+use super::{DrawnPicture, SceneRenderer};
 use crate::command::Slot;
 use crate::error::{Error, Result};
 use crate::models::OpenModel;
+use crate::picture::Picture;
 
 /// The rasteriser on the GPU. Compressed scenes stay sparse on it.
 pub(crate) struct GpuSceneRenderer {
@@ -42,28 +43,16 @@ impl SceneRenderer for GpuSceneRenderer {
         Ok(())
     }
 
-    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture> {
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<DrawnPicture> {
         let Some(scene) = &self.scenes[slot.index()] else {
             return Err(Error::Device(format!("there is no {slot:?} model to draw")));
         };
         let frame = self.renderer.draw(scene, camera, options)?;
-        // The renderer reuses its own buffer for the next picture.
-        let size = u64::from(frame.width) * u64::from(frame.height) * size_of::<[f32; 4]>() as u64;
-        let device = self.gpu.device();
-        let pixels = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("picture"),
-            size,
-            usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&frame.pixels, 0, &pixels, 0, size);
-        self.gpu.queue().submit([encoder.finish()]);
+        let (device, queue) = (self.gpu.device(), self.gpu.queue());
+        let picture = Picture::copied(device, queue, &frame.pixels, frame.width, frame.height);
         let stages = frame.stats.stages.iter().map(|(stage, time)| (stage.name(), *time));
-        Ok(Picture {
-            pixels,
-            width: frame.width,
-            height: frame.height,
+        Ok(DrawnPicture {
+            picture,
             gaussians: frame.stats.visible as usize,
             stage_times: stages.collect(),
             image: None,

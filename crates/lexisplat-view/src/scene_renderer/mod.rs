@@ -5,12 +5,12 @@ mod gpu;
 
 use std::sync::Arc;
 
-use lexisplat_render::gpu::readback;
 use lexisplat_render::{Camera, Image, RenderOptions};
 
 use crate::command::Slot;
 use crate::error::Result;
 use crate::models::OpenModel;
+use crate::picture::Picture;
 
 pub(crate) use cpu::CpuSceneRenderer;
 pub(crate) use gpu::GpuSceneRenderer;
@@ -30,7 +30,7 @@ pub(crate) trait SceneRenderer: Send {
     ///
     /// # Errors
     /// If there is no such model, the camera is not valid, or the device fails.
-    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<Picture>;
+    fn draw(&mut self, slot: Slot, camera: &Camera, options: &RenderOptions) -> Result<DrawnPicture>;
 
     /// Returns the bytes of models and work buffers on the device, without the pictures returned.
     fn resident_bytes(&self) -> u64;
@@ -38,11 +38,8 @@ pub(crate) trait SceneRenderer: Send {
 
 /// A picture on the device, and statistics of drawing it.
 #[derive(Debug)]
-pub(crate) struct Picture {
-    /// Red, green, blue and 1 as f32 for each of `width * height` pixels, row by row; not clamped.
-    pub(crate) pixels: wgpu::Buffer,
-    pub(crate) width: u32,
-    pub(crate) height: u32,
+pub(crate) struct DrawnPicture {
+    pub(crate) picture: Picture,
     /// Number of Gaussians that may touch the picture.
     pub(crate) gaussians: usize,
     /// Milliseconds of each stage.
@@ -51,18 +48,15 @@ pub(crate) struct Picture {
     pub(crate) image: Option<Image>,
 }
 
-impl Picture {
+impl DrawnPicture {
     /// Returns the picture in memory.
     ///
     /// # Errors
     /// If the device fails.
     pub(crate) fn to_image(&self, device: &wgpu::Device, queue: &wgpu::Queue) -> Result<Image> {
-        if let Some(image) = &self.image {
-            return Ok(image.clone());
+        match &self.image {
+            Some(image) => Ok(image.clone()),
+            None => self.picture.to_image(device, queue),
         }
-        let pixels: Vec<[f32; 4]> = readback::read_buffer(device, queue, &self.pixels)?;
-        let count = self.width as usize * self.height as usize;
-        let pixels = pixels.into_iter().take(count).map(|[r, g, b, _]| [r, g, b]).collect();
-        Ok(Image { width: self.width, height: self.height, pixels })
     }
 }

@@ -112,6 +112,11 @@ impl Decoder {
         }
     }
 
+    /// The chunks of the next layer around chunk `c` that change what is made of it while they are missing.
+    pub(crate) fn around(&self, c: usize) -> Range<usize> {
+        self.index().map_or(0..0, |index| index.around(c))
+    }
+
     /// The Gaussians of each chunk.
     pub(crate) fn spans(&self) -> &[Range<usize>] {
         &self.spans

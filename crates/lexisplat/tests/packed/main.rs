@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 mod convergence;
+mod elsewhere;
 mod feed;
 mod odd;
 mod order;

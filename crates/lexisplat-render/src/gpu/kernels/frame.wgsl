@@ -42,8 +42,9 @@ struct Chunk {
     // Where in `columns` the numbers of its escaped Gaussians begin, and how many there are.
     escapes_at: u32,
     escapes: u32,
-    padding_a: u32,
-    padding_b: u32,
+    // Where in `nonzeros` their exact rows begin.
+    exact_at: u32,
+    padding: u32,
 }
 
 // Rows of tiles drawn at once, laid out as `gpu::uniforms::Band`.

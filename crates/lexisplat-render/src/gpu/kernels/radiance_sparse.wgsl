@@ -3,9 +3,10 @@
 // For every COLUMN_GROUP Gaussians, the word at which their nonzeros begin, and a byte for each Gaussian: its
 // number of nonzeros, or ESCAPED if it is stored exactly. The numbers of the escaped Gaussians follow.
 @group(0) @binding(7) var<storage, read> columns: array<u32>;
-// For every COLUMN_GROUP Gaussians, their atom numbers, then their values.
+// For every COLUMN_GROUP Gaussians, their atom numbers, then their values. The exact rows of the escaped Gaussians
+// follow, of DIM floats each.
 @group(0) @binding(8) var<storage, read> nonzeros: array<u32>;
-// The atoms, then the exact rows, of ATOM_VECTORS each: coefficients in order, with red, green and blue side by
+// The atoms, of ATOM_VECTORS each. In atoms and rows coefficients are in order, with red, green and blue side by
 // side.
 @group(0) @binding(9) var<storage, read> atoms: array<vec4<f32>>;
 
@@ -83,10 +84,17 @@ fn base_colour(i: u32) -> vec3<f32> {
     return vec3<f32>(base_colours[3u * i], base_colours[3u * i + 1u], base_colours[3u * i + 2u]);
 }
 
-// The dot products of the three channels of the atom or row at `at` with the basis.
+// The dot products of the three channels of the atom at `at` with the basis.
 fn seen(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
     var sum = vec3<f32>(0.0);
     // ATOM_TERMS
+    return sum;
+}
+
+// The same of the exact row at `at`.
+fn seen_exact(at: u32, b: array<f32, MAX_BASIS>) -> vec3<f32> {
+    var sum = vec3<f32>(0.0);
+    // EXACT_TERMS
     return sum;
 }
 
@@ -105,7 +113,7 @@ fn colour_slot(slot: u32) {
         rest += value_at(column, k) * atom_seen(atom_number(column, k), looked);
     }
     if column.escaped {
-        rest = seen((ATOMS + escape_of(i)) * ATOM_VECTORS, rest_basis(d));
+        rest = seen_exact(chunk.exact_at + escape_of(i) * DIM, rest_basis(d));
     }
     write_colour(slot, base_colour(i), rest);
 }

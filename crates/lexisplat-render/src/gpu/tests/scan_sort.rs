@@ -42,7 +42,7 @@ impl Bench {
     }
 
     fn fill(&self, buffer: &Buffer, words: &[u32]) {
-        self.gpu.block_on(self.gpu.write(buffer, bytemuck::cast_slice(words))).unwrap();
+        self.gpu.block_on(self.gpu.write(buffer, 0, bytemuck::cast_slice(words))).unwrap();
     }
 
     fn run(&self, steps: &[Step]) {
@@ -70,7 +70,7 @@ impl Bench {
         let work = &self.work;
         self.fill(&work.starts, &[count]);
         let frame = FrameUniform { slots: work.capacity.slots, ..FrameUniform::default() };
-        self.gpu.block_on(self.gpu.write(&work.frame, bytemuck::bytes_of(&frame))).unwrap();
+        self.gpu.block_on(self.gpu.write(&work.frame, 0, bytemuck::bytes_of(&frame))).unwrap();
         let bound = [&work.frame, &work.starts, &work.masks, &work.counters, &work.dispatches];
         planner.step(&self.kernels["plan_slots"], all_from(0, bound), Size::Groups(1));
     }
@@ -103,7 +103,7 @@ fn more_blocks_than_one_dimension_has_get_slots() {
     bench.fill(&bench.work.masks, &masks);
     bench.fill(&bench.work.starts, &starts);
     let frame = FrameUniform { blocks, slots: blocks, ..FrameUniform::default() };
-    gpu.block_on(gpu.write(&bench.work.frame, bytemuck::bytes_of(&frame))).unwrap();
+    gpu.block_on(gpu.write(&bench.work.frame, 0, bytemuck::bytes_of(&frame))).unwrap();
     let mut planner = bench.planner();
     let work = &bench.work;
     let bound = [&work.frame, &work.masks, &work.starts, &work.gaussians];

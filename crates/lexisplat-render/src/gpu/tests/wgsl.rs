@@ -74,7 +74,7 @@ fn every_radiance_is_portable() {
     for degree in (0..=4).map(|d| ShDegree::new(d).unwrap()) {
         let splats = made::scene(1, 2, degree, false);
         for (scene, half) in [(Scene::from(&splats), false), (Scene::from(&splats), true)] {
-            let text = radiance_text(&ShData::Dense { scene: &scene, half }, ShPath::DenseF32);
+            let text = radiance_text(ShData::Dense { scene: &scene, half }.layout(), ShPath::DenseF32);
             assert_eq!(check(&format!("dense, half {half}, {degree}"), &text, MOST_SHARED), ["radiance"]);
         }
         // At degree 0 atoms are empty; at the others 257 need two bytes a number.
@@ -82,7 +82,7 @@ fn every_radiance_is_portable() {
             let atoms = if degree == ShDegree::ZERO { 0 } else { atoms };
             let model = made::model(degree, atoms, half);
             for path in ShPath::ALL.into_iter().filter(|path| path.is_sparse()) {
-                let text = radiance_text(&ShData::Codes(&model), path);
+                let text = radiance_text(ShData::Codes(&model).layout(), path);
                 let own = size_of_val(model.dictionary().as_slice()).max(4).next_multiple_of(16) as u32;
                 let most = if path == ShPath::SparseShared { own } else { MOST_SHARED };
                 let name = format!("{}, {degree}, {atoms} atoms, half {half}", path.name());

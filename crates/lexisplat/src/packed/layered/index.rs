@@ -141,6 +141,22 @@ impl Index {
         alone
     }
 
+    /// The chunks of the next layer with cells of chunk `c` or next to them; none if the layer has no interim changes.
+    pub(in crate::packed) fn around(&self, c: usize) -> std::ops::Range<usize> {
+        let Some(chunk) = self.chunks.get(c).filter(|chunk| self.layer(chunk.layer).interim) else {
+            return 0..0;
+        };
+        let end = self.chunks.get(c + 1).filter(|after| after.layer == chunk.layer);
+        let end = end.map_or(u64::MAX, |after| after.cell);
+        let first = self.chunks.partition_point(|other| other.layer <= chunk.layer);
+        let last = self.chunks.partition_point(|other| other.layer <= chunk.layer + 1);
+        let next = self.chunks.get(first..last).unwrap_or_default();
+        // The chunk before the first one that begins beyond the cell may reach it.
+        let from = next.partition_point(|other| other.cell < chunk.cell).saturating_sub(1);
+        let to = next.partition_point(|other| other.cell <= end);
+        first + from..first + to.max(from)
+    }
+
     /// Whether the ranges lie chunk by chunk in the order of their kinds.
     fn is_sorted(&self) -> bool {
         self.order.is_sorted_by_key(|place| (place.chunk, place.kind))

@@ -1,5 +1,6 @@
 //! Reading a packed file from bytes as they come.
 
+mod elsewhere;
 mod ranges;
 mod run;
 
@@ -269,6 +270,12 @@ impl LexiFeed {
     #[must_use]
     pub fn head(&self) -> Option<&PackedHead> {
         self.ranges.as_ref().map(|ranges| &ranges.head)
+    }
+
+    /// The dictionary, once the start of the file came.
+    #[must_use]
+    pub fn dictionary(&self) -> Option<&Dictionary> {
+        self.ranges.as_ref().map(|ranges| ranges.decoder.dictionary())
     }
 
     /// The layers, chunks and ranges of the file, once its start came.

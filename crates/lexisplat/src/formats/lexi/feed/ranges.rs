@@ -198,6 +198,35 @@ impl Ranges {
         }
     }
 
+    /// Where the whole ranges of chunk `c` that are held are in the file, and their bytes.
+    pub(super) fn whole(&self, c: usize) -> impl Iterator<Item = (u64, &[u8])> {
+        let ranges = self.of_chunk.get(c).map(Vec::as_slice).unwrap_or_default();
+        ranges.iter().filter_map(|&r| match self.states.get(r)? {
+            State::Whole(run) => Some((self.range(r).start, run.whole()?)),
+            _ => None,
+        })
+    }
+
+    fn base(&self, c: usize) -> Option<usize> {
+        let is_base = |&&r: &&usize| self.outline.ranges.get(r).is_some_and(|r| r.kind == RangeKind::Base);
+        self.of_chunk.get(c)?.iter().find(is_base).copied()
+    }
+
+    /// Whether the base of chunk `c` came.
+    pub(super) fn base_came(&self, c: usize) -> bool {
+        let state = self.base(c).and_then(|r| self.states.get(r));
+        matches!(state, Some(State::Whole(_) | State::Gone))
+    }
+
+    /// Takes the base of chunk `c` for one that came and is not held.
+    pub(super) fn note_base(&mut self, c: usize) {
+        if let Some(state) = self.base(c).and_then(|r| self.states.get_mut(r))
+            && matches!(state, State::Unwanted | State::Missing)
+        {
+            *state = State::Gone;
+        }
+    }
+
     fn state_at(&self, start: u64) -> Option<&State> {
         let start = self.data_start.checked_add(start)?;
         let r = self.outline.ranges.partition_point(|range| range.bytes.end <= start);

@@ -1,0 +1,35 @@
+//! What the window shows at first.
+
+use std::path::PathBuf;
+
+use lexisplat::Limits;
+use lexisplat::output::OutputGroup;
+use lexisplat_eval::SplitFilter;
+use lexisplat_render::Device;
+
+/// What to show, and the initial settings.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// One or two scenes: PLY or .lexi.
+    pub files: Vec<PathBuf>,
+    /// A file or folder of cameras. Without it the cameras are an orbit around the first scene.
+    pub cameras: Option<PathBuf>,
+    /// Which cameras of the file to take.
+    pub split: SplitFilter,
+    /// Number of views of the orbit; 0 counts as 1.
+    pub orbit: u16,
+    /// Largest width of a screenshot, in pixels; 0 counts as 1.
+    pub max_width: u32,
+    /// Colour behind the scenes, 0 to 1 in each channel.
+    pub background: [f32; 3],
+    /// The device that draws the scenes. The window itself always needs a graphics adapter, which may be software.
+    pub device: Device,
+    /// Whether a screenshot with a given name may replace a file.
+    pub overwrite: bool,
+    /// Limits on what files may make the program allocate, including files dropped on the window.
+    pub limits: Limits,
+    /// Commands to carry out at the start, as [`SCRIPT_WORDS`](crate::SCRIPT_WORDS) describes; may be empty.
+    pub script: String,
+    /// The group of all pictures that are saved.
+    pub outputs: OutputGroup,
+}

@@ -1,0 +1,131 @@
+/** Reads the start of a file and tells how the rest is decoded. */
+
+import { Pool } from './pool.js';
+import { Scene } from './scene.js';
+import { sourceOf } from './source.js';
+
+/** Most bytes of a file that are held at once, unless options say otherwise. */
+export const MEMORY = 256 << 20;
+/** Workers, unless options say otherwise. */
+const WORKERS = 2;
+/** Parts of SH-rest, unless options say otherwise: all. */
+export const ALL_PARTS = 0xffffffff;
+/** Most bytes of the JSON header of a file. */
+const MOST_HEADER = 4 << 20;
+/** The version of files that are decoded in part. */
+const LAYERED = '3';
+
+/**
+ * @param {object} env where WebAssembly and workers come from
+ * @returns {Promise<Scene>}
+ */
+export async function openWith(env, source, options) {
+  const settings = { memory: MEMORY, shParts: ALL_PARTS, ...options };
+  const { signal } = settings;
+  signal?.throwIfAborted();
+  const workers = settings.workers ?? (typeof Worker === 'undefined' && typeof process === 'undefined' ? 0 : WORKERS);
+  const input = { source: sourceOf(source), feed: undefined, at: 0 };
+  let pool;
+  try {
+    const start = await readStart(input.source, signal);
+    if (start.version !== LAYERED) {
+      pool = await Pool.of(Math.min(workers, 1), env);
+      return await wholeScene({ input, env, settings, pool, start });
+    }
+    const feed = new env.wasm.Feed(input.source.name, settings.memory, settings.shParts);
+    input.feed = feed;
+    feed.feed(0, start.bytes);
+    input.at = start.bytes.length;
+    while (feed.header() === undefined) {
+      const [at] = feed.wants() ?? [];
+      const piece = at === undefined ? null : await input.source.read(at, signal);
+      if (!piece) throw new Error(`${input.source.name}: the file ends within its header`);
+      feed.feed(at, piece);
+      input.at = at + piece.length;
+    }
+    pool = await Pool.of(workers, env);
+    const { name } = input.source;
+    await pool.askAll({ type: 'start', name, start: feed.start(), shParts: settings.shParts });
+    const header = JSON.parse(feed.header());
+    const dictionary = { atoms: header.atoms, rest: restOf(header.degree), values: feed.dictionary() };
+    return new Scene({ input, env, options: settings, header, dictionary, pool });
+  } catch (error) {
+    input.source.close();
+    input.feed?.free();
+    pool?.close();
+    throw error;
+  }
+}
+
+/** Values of SH-rest at a degree. */
+export function restOf(degree) {
+  return 3 * ((degree + 1) ** 2 - 1);
+}
+
+/** The first bytes of a file, and its version if it is a .lexi. */
+export async function readStart(source, signal) {
+  let bytes = new Uint8Array(0);
+  const reach = async (length) => {
+    while (bytes.length < length) {
+      const piece = await source.read(bytes.length, signal);
+      if (!piece) return false;
+      const longer = new Uint8Array(bytes.length + piece.length);
+      longer.set(bytes);
+      longer.set(piece, bytes.length);
+      bytes = longer;
+    }
+    return true;
+  };
+  const LENGTH = 8;
+  // A .lexi begins with the length of a JSON object and the object.
+  if (!(await reach(LENGTH + 1)) || bytes[LENGTH] !== 0x7b) return { bytes, version: undefined };
+  const view = new DataView(bytes.buffer);
+  const length = view.getUint32(0, true);
+  if (view.getUint32(4, true) > 0 || length > MOST_HEADER || !(await reach(LENGTH + length))) return { bytes, version: undefined };
+  try {
+    const header = JSON.parse(new TextDecoder().decode(bytes.subarray(LENGTH, LENGTH + length)));
+    return { bytes, version: header.__metadata__?.version };
+  } catch {
+    return { bytes, version: undefined };
+  }
+}
+
+/** The rest of a file after its first bytes. */
+export async function readWhole(source, first, { memory, signal, onProgress }) {
+  const pieces = [first];
+  let length = first.length;
+  const most = Math.max(memory, MEMORY);
+  for (;;) {
+    if (length > most) throw new Error(`${source.name}: more than ${most} bytes: too many for a file that is decoded whole`);
+    const piece = await source.read(length, signal);
+    if (!piece) break;
+    pieces.push(piece);
+    length += piece.length;
+    onProgress?.({ loaded: length, total: source.size, decoded: 0, gaussians: 0 });
+  }
+  const bytes = new Uint8Array(length);
+  let at = 0;
+  for (const piece of pieces) {
+    bytes.set(piece, at);
+    at += piece.length;
+  }
+  return bytes;
+}
+
+/** A scene of a file that is decoded whole: an exact layout, or version 2. */
+async function wholeScene({ input, env, settings, pool, start }) {
+  const { source } = input;
+  if (start.version === undefined) throw new Error(`${source.name}: this is not a .lexi file`);
+  const bytes = await readWhole(source, start.bytes, settings);
+  // The header is known only once the file is decoded; what it is decoded to is chosen later, so bytes are kept until then.
+  const ask = (as, transfer) => pool.ask({ type: 'whole', name: source.name, bytes: transfer ? bytes : bytes.slice(), as }, transfer ? [bytes.buffer] : []);
+  const { header, dictionary } = await ask('none', false);
+  const scene = { atoms: header.atoms, rest: restOf(header.degree), values: dictionary };
+  const whole = async (as) => {
+    settings.signal?.throwIfAborted();
+    const { chunk } = await ask(as, true);
+    settings.onProgress?.({ loaded: header.bytes, total: header.bytes, decoded: chunk.count, gaussians: chunk.count });
+    return { index: 0, layer: 0, complete: true, ...chunk };
+  };
+  return new Scene({ input, env, options: settings, header: { version: Number(start.version), ...header }, dictionary: scene, whole, pool });
+}

@@ -1,0 +1,106 @@
+/** Workers that answer messages, each one at a time. */
+
+const isNode = typeof process !== 'undefined' && Boolean(process.versions?.node) && typeof Worker === 'undefined';
+
+/** What was told when the WebAssembly of a worker failed, which happens when memory runs out. */
+const FAULT = 'the decoder failed, perhaps for lack of memory';
+
+export class Pool {
+  #workers = [];
+  #next = 1;
+
+  /**
+   * @param {number} count how many workers; 0 for none
+   * @param {{module: WebAssembly.Module, worker: () => Promise<Worker>, handler: () => (message: object) => {reply: object}}} env
+   */
+  static async of(count, env) {
+    const pool = new Pool();
+    if (count === 0) {
+      const handle = env.handler();
+      // A turn of the event loop lets the page breathe between two chunks.
+      const ask = async (message) => (await turn(), handle(message).reply);
+      pool.#workers.push({ ask, busy: 0, stop() {} });
+      return pool;
+    }
+    pool.#workers = await Promise.all(Array.from({ length: count }, () => pool.#start(env)));
+    return pool;
+  }
+
+  async #start(env) {
+    const worker = await env.worker();
+    const waiting = new Map();
+    const listen = (name, take) => (worker.on ? worker.on(name, take) : worker.addEventListener(name, take));
+    const failAll = (error) => {
+      waiting.forEach(({ reject }) => reject(error));
+      waiting.clear();
+    };
+    listen('message', (event) => {
+      const { id, reply, error, fatal } = worker.on ? event : event.data;
+      const { resolve, reject } = waiting.get(id) ?? {};
+      waiting.delete(id);
+      if (waiting.size === 0) worker.unref?.();
+      if (error !== undefined) reject?.(new Error(fatal ? `lexisplat: ${FAULT} (${error})` : error));
+      else resolve?.(reply);
+    });
+    listen('error', (event) => failAll(new Error(`lexisplat: a worker failed: ${event.message ?? event}`)));
+    const slot = {
+      busy: 0,
+      failed: false,
+      ask: (message, transfer = []) =>
+        new Promise((resolve, reject) => {
+          const id = this.#next++;
+          waiting.set(id, { resolve, reject });
+          // Node goes on while an answer is awaited, and ends although a scene was not closed.
+          worker.ref?.();
+          worker.postMessage({ ...message, id }, transfer);
+        }),
+      stop: () => {
+        worker.terminate();
+        failAll(new Error('lexisplat: the scene was closed'));
+      },
+    };
+    await slot.ask({ type: 'module', module: env.module });
+    return slot;
+  }
+
+  /** How many messages can be answered at the same time. */
+  get size() {
+    return this.#workers.length;
+  }
+
+  /** How many workers have nothing to do. */
+  get idle() {
+    return this.#workers.filter((worker) => worker.busy === 0).length;
+  }
+
+  /** Asks the worker that has least to do. */
+  async ask(message, transfer) {
+    const worker = this.#workers.reduce((a, b) => (b.busy < a.busy ? b : a));
+    worker.busy++;
+    try {
+      return await worker.ask(message, transfer);
+    } finally {
+      worker.busy--;
+    }
+  }
+
+  /** Asks all workers the same. */
+  askAll(message) {
+    return Promise.all(this.#workers.map((worker) => worker.ask(message)));
+  }
+
+  close() {
+    this.#workers.forEach((worker) => worker.stop());
+  }
+}
+
+function turn() {
+  return new Promise((resolve) => setTimeout(resolve));
+}
+
+/** Starts the module worker at `url` in a browser or in Node. */
+export async function startWorker(url) {
+  if (!isNode) return new Worker(url, { type: 'module', name: 'lexisplat' });
+  const { Worker: NodeWorker } = await import('node:worker_threads');
+  return new NodeWorker(url);
+}

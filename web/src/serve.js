@@ -1,0 +1,28 @@
+/** The side of a worker: takes messages one after another and answers each. */
+
+/**
+ * @param {(module: WebAssembly.Module) => object} start gives the exports of the WebAssembly
+ * @param {(exports: object) => (message: object) => {reply: object, transfer: ArrayBuffer[]}} handlerOf
+ */
+export async function serve(start, handlerOf) {
+  const port = globalThis.postMessage ? globalThis : (await import('node:worker_threads')).parentPort;
+  let handle;
+  const take = (message) => {
+    const { id } = message;
+    try {
+      if (message.type === 'module') {
+        handle = handlerOf(start(message.module));
+        port.postMessage({ id });
+        return;
+      }
+      const { reply, transfer } = handle(message);
+      port.postMessage({ id, reply }, transfer);
+    } catch (error) {
+      // After a fault of the WebAssembly itself its memory is not to be trusted.
+      const fatal = error instanceof WebAssembly.RuntimeError;
+      port.postMessage({ id, error: String(error?.message ?? error), fatal });
+    }
+  };
+  if (port.on) port.on('message', take);
+  else port.onmessage = ({ data }) => take(data);
+}
