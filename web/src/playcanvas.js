@@ -29,7 +29,8 @@ export class LexiParser {
     /**
      * @param {{load: string, original: string}} url
      * @param {(error: unknown, resource?: LexiResource | null) => void} callback gets null if the asset was unloaded
-     * @param {import('playcanvas').Asset} asset fires `progress` with bytes there and bytes in all
+     * @param {import('playcanvas').Asset} asset fires `progress` with bytes there and bytes in all;
+     *     its data may say `reorder: false`, as that of a PLY
      */
     async load(url, callback, asset) {
         const prepareCenters = this.app.scene?.gsplatCentersEnabled !== false;
@@ -41,7 +42,8 @@ export class LexiParser {
             scene = await open(await sourceOf(url, asset), { ...this.options, signal: unloaded.signal, onProgress });
             const chunk = await scene.all({ as: 'codes' });
             if (unloaded.signal.aborted) return callback(null, null);
-            callback(null, new LexiResource(this.app.graphicsDevice, scene.header, scene.dictionary, chunk, { prepareCenters }));
+            const choices = { prepareCenters, reorder: asset?.data?.reorder };
+            callback(null, new LexiResource(this.app.graphicsDevice, scene.header, scene.dictionary, chunk, choices));
         } catch (error) {
             if (unloaded.signal.aborted) callback(null, null);
             else callback(error);

@@ -21,6 +21,8 @@ const folder = mkdtempSync(join(tmpdir(), 'lexisplat-three-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with three and playwright-core';
 let browser;
 let server;
+// Opening a page costs seconds without a GPU, so tests share one for each backend.
+const viewers = {};
 
 // Writes the PLY of a golden scene and gives the scene.
 async function decompressed(name) {
@@ -31,7 +33,8 @@ async function decompressed(name) {
   return { header: scene.header, chunk };
 }
 
-const shown = (query = '') => openViewer(browser, `${server.url}/test/support/three.html${query}`);
+const shown = (backend = 'WebGPU') =>
+  (viewers[backend] ??= openViewer(browser, `${server.url}/test/support/three.html?${backend.toLowerCase()}`));
 
 before(async () => {
   if (skip) return;
@@ -49,7 +52,7 @@ after(async () => {
 for (const backend of ['WebGPU', 'WebGL2']) {
   test(`${backend}: pictures are alike`, { skip }, async () => {
     const { chunk } = await decompressed('packed3_layers');
-    const viewer = await shown(backend === 'WebGL2' ? '?webgl2' : '');
+    const viewer = await shown(backend);
     assert.equal(await viewer.call('backend'), backend);
     const views = orbit(chunk.positions, 2, SIZE);
     await viewer.call('own', '/ply/packed3_layers.ply');
@@ -65,7 +68,6 @@ for (const backend of ['WebGPU', 'WebGL2']) {
     }
     assert.ok(psnr(...theirs) < ALIKE, 'pictures of two views differ');
     assert.deepEqual(viewer.faults, []);
-    await viewer.page.close();
   });
 }
 
@@ -87,7 +89,6 @@ test('a PLY that the Rust program wrote gives the same Gaussians', { skip }, asy
   });
   assert.equal(ours.length, 300);
   assert.deepEqual(ours, theirs);
-  await viewer.page.close();
 });
 
 for (const name of ['degree0', 'degree1_u16_escapes', 'paper', 'f16', 'degree4']) {
@@ -101,7 +102,6 @@ for (const name of ['degree0', 'degree1_u16_escapes', 'paper', 'f16', 'degree4']
       return [arrays(ours), arrays(await new GaussianSplatPLYLoader().loadAsync(`/ply/${name}.ply`))];
     }, name);
     assert.deepEqual(ours, theirs);
-    await viewer.page.close();
   });
 }
 
@@ -129,7 +129,6 @@ test('geometries come while a file loads, and the last is that of a file loaded 
   assert.ok(stages.every((stage, i) => i === 0 || stage.gaussians > stages[i - 1].gaussians), 'each has more Gaussians');
   assert.ok(same);
   assert.deepEqual(bytes.at(-1), [80632, 80632]);
-  await viewer.page.close();
 });
 
 test('bytes and blobs are parsed; what is no .lexi, or ended, is told', { skip }, async () => {
@@ -160,7 +159,6 @@ test('bytes and blobs are parsed; what is no .lexi, or ended, is told', { skip }
   assert.match(told.ended, /AbortError/);
   assert.equal(told.again, 300);
   assert.deepEqual(told.items, ['/golden/packed3.ply', '/golden/packed3_layers.lexi', 'none.lexi']);
-  await viewer.page.close();
 });
 
 test('the example draws', { skip }, async () => {

@@ -3,7 +3,9 @@
 import { FloatPacking } from 'playcanvas';
 import { ATOMS_PER_ROW, ESCAPE, ESCAPE_WORDS, OFFSET_BITS } from './shaders.js';
 
-const half = FloatPacking.float2Half;
+// The largest half float. Infinity times 0 would be no number, and colours are cut off far before.
+const MOST = 65504;
+const half = (value) => FloatPacking.float2Half(Math.max(-MOST, Math.min(MOST, value)));
 const CHANNELS = 3;
 // Channels of a texel of the dictionary; textures of three channels are padded by drivers.
 const TEXEL = 4;
@@ -31,31 +33,37 @@ export function atomTexels({ atoms, rest, values }, kept) {
  * @param {import('../index.js').Chunk} chunk as 'codes'
  * @param {import('../index.js').Scene['dictionary']} dictionary
  * @param {number} kept coefficients of a channel that are drawn
+ * @param {Uint32Array} order the Gaussian of each word
  * @returns {{words: Uint32Array, nonzeros: Uint32Array}} a word a Gaussian: where its nonzeros begin, and from OFFSET_BITS
  *     on how many; nonzeros: the atom, and from bit 16 on the value as a half float
  * @throws {RangeError} if nonzeros are more than a word can say
  */
-export function codeWords({ count, codes }, dictionary, kept) {
+export function codeWords({ count, codes }, dictionary, kept, order) {
     const { counts, indices, values, escapes } = codes;
     const halves = values instanceof Uint16Array;
     const rest = dictionary.rest;
     const escaped = new Map();
     escapes.gaussians.forEach((gaussian, i) => escaped.set(gaussian, escapes.rows.subarray(rest * i, rest * (i + 1))));
+    const begins = new Uint32Array(count);
     for (let i = 0, at = 0; i < count; at += counts[i++]) {
+        begins[i] = at;
         if (counts[i] >= ESCAPE && !escaped.has(i)) escaped.set(i, row(dictionary, indices, values, at, counts[i], halves));
     }
     const nonzeros = new Uint32Array(indices.length + ESCAPE_WORDS * kept * escaped.size);
     if (nonzeros.length > 2 ** OFFSET_BITS) throw new RangeError(`${nonzeros.length} nonzeros are more than PlayCanvas can be given`);
 
     const words = new Uint32Array(count);
-    let [from, to] = [0, 0];
-    for (let i = 0; i < count; i++) {
+    let to = 0;
+    order.forEach((i, place) => {
         const exact = escaped.get(i);
-        words[i] = ((exact ? ESCAPE : counts[i]) * 2 ** OFFSET_BITS + to) >>> 0;
+        words[place] = ((exact ? ESCAPE : counts[i]) * 2 ** OFFSET_BITS + to) >>> 0;
         if (exact) to = writeRow(exact, kept, nonzeros, to);
-        else for (let n = from; n < from + counts[i]; n++) nonzeros[to++] = indices[n] | ((halves ? values[n] : half(values[n])) << 16);
-        from += counts[i];
-    }
+        else {
+            for (let n = begins[i]; n < begins[i] + counts[i]; n++) {
+                nonzeros[to++] = indices[n] | ((halves ? values[n] : half(values[n])) << 16);
+            }
+        }
+    });
     return { words, nonzeros: nonzeros.subarray(0, to) };
 }
 

@@ -2,6 +2,7 @@
 
 import {
     FloatPacking,
+    GSplatData,
     GSplatFormat,
     GSplatResourceBase,
     PIXELFORMAT_R32U,
@@ -29,19 +30,21 @@ export class LexiResource extends GSplatResourceBase {
      * @param {import('../index.js').Scene['header']} header
      * @param {import('../index.js').Scene['dictionary']} dictionary
      * @param {import('../index.js').Chunk} chunk all of the scene, as 'codes'
-     * @param {{prepareCenters?: boolean}} [options] prepareCenters: false where the engine sorts on the GPU
+     * @param {{prepareCenters?: boolean, reorder?: boolean}} [options] prepareCenters: false where the engine sorts on the
+     *     GPU; reorder: false leaves Gaussians in the order of the file, layer by layer
      */
-    constructor(device, header, dictionary, chunk, options) {
+    constructor(device, header, dictionary, chunk, options = {}) {
         const degree = Math.min(header.degree, MOST_DEGREE);
-        super(device, dataOf(chunk, degree), options);
+        const order = orderOf(chunk, options.reorder ?? true);
+        super(device, dataOf(chunk, degree, order), options);
         const count = chunk.count;
-        const { placed, shape, color } = geometryTexels(chunk);
+        const { placed, shape, color } = geometryTexels(chunk, order);
         const formats = [this.#texture('lexiPlaced', PIXELFORMAT_RGBA32U, count, placed)];
         formats.push(this.#texture('lexiShape', PIXELFORMAT_RGBA16F, count, shape));
         formats.push(this.#texture('lexiColor', PIXELFORMAT_RGBA16F, count, color));
         if (degree > 0) {
             const kept = (degree + 1) ** 2 - 1;
-            const { words, nonzeros } = codeWords(chunk, dictionary, kept);
+            const { words, nonzeros } = codeWords(chunk, dictionary, kept, order);
             const atoms = atomTexels(dictionary, kept);
             formats.push(this.#texture('lexiCode', PIXELFORMAT_R32U, count, words));
             formats.push(this.#texture('lexiNonzeros', PIXELFORMAT_R32U, Math.max(1, nonzeros.length), nonzeros));
@@ -79,8 +82,21 @@ export class LexiResource extends GSplatResourceBase {
     }
 }
 
+// The Gaussian of each texel. Neighbours are beside each other, as the engine puts those of a PLY: textures are read faster,
+// and Gaussians that its sort cannot tell apart are drawn in the same order.
+function orderOf({ count, positions }, reorder) {
+    if (!reorder || count === 0) return Uint32Array.from({ length: count }, (_, i) => i);
+    const column = (name, k) => ({ name, type: 'float', byteSize: 4, storage: Float32Array.from({ length: count }, (_, i) => positions[3 * i + k]) });
+    return new GSplatData([{ name: 'vertex', count, properties: ['x', 'y', 'z'].map(column) }]).calcMortonOrder();
+}
+
 // What GSplatResourceBase asks of a scene's data.
-function dataOf({ count, positions, scales }, shBands) {
+function dataOf({ count, positions, scales }, shBands, order) {
+    const getCenters = () => {
+        const centers = new Float32Array(3 * count);
+        order.forEach((i, place) => centers.set(positions.subarray(3 * i, 3 * i + 3), 3 * place));
+        return centers;
+    };
     const calcAabb = (box) => {
         const [least, most] = [[Infinity, Infinity, Infinity], [-Infinity, -Infinity, -Infinity]];
         for (let i = 0; i < count; i++) {
@@ -97,28 +113,29 @@ function dataOf({ count, positions, scales }, shBands) {
             box.halfExtents.set(...least.map((low, k) => (most[k] - low) / 2));
         }
     };
-    return { numSplats: count, shBands, getCenters: () => positions, calcAabb };
+    return { numSplats: count, shBands, getCenters, calcAabb };
 }
 
 // Positions are whole floats; turns, sizes and colours are half floats, as in the engine's own resource of a PLY.
-function geometryTexels({ count, positions, scales, rotations, opacities, dc }) {
+function geometryTexels({ count, positions, scales, rotations, opacities, dc }, order) {
     const placed = new Uint32Array(4 * count);
     const places = new Float32Array(placed.buffer);
     const shape = new Uint16Array(4 * count);
     const color = new Uint16Array(4 * count);
-    for (let i = 0; i < count; i++) {
+    order.forEach((i, place) => {
         const [w, x, y, z] = unit(rotations, 4 * i);
+        const to = 4 * place;
         for (let k = 0; k < 3; k++) {
-            places[4 * i + k] = positions[3 * i + k];
-            shape[4 * i + k] = half(Math.exp(scales[3 * i + k]));
-            color[4 * i + k] = half(0.5 + SH_C0 * dc[3 * i + k]);
+            places[to + k] = positions[3 * i + k];
+            shape[to + k] = half(Math.exp(scales[3 * i + k]));
+            color[to + k] = half(0.5 + SH_C0 * dc[3 * i + k]);
         }
         // w is what is missing from the length 1, so it must not be negative.
         const sign = w < 0 ? -1 : 1;
-        placed[4 * i + 3] = half(sign * x) | (half(sign * y) << 16);
-        shape[4 * i + 3] = half(sign * z);
-        color[4 * i + 3] = half(1 / (1 + Math.exp(-opacities[i])));
-    }
+        placed[to + 3] = half(sign * x) | (half(sign * y) << 16);
+        shape[to + 3] = half(sign * z);
+        color[to + 3] = half(1 / (1 + Math.exp(-opacities[i])));
+    });
     return { placed, shape, color };
 }
 
