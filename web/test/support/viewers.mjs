@@ -22,24 +22,24 @@ export const serveViewers = (files) => serve({ '/': web, '/node_modules': npm, '
  *     far; call: a function of its `viewer`; picture: of a view, as the page shows it
  */
 export async function openViewer(browser, address) {
-    const page = await browser.newPage({ viewport: { width: 640, height: 640 } });
-    page.setDefaultTimeout(PATIENCE);
-    const faults = [];
-    page.on('pageerror', (error) => faults.push(String(error)));
-    page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
-    await page.goto(address);
-    await page.waitForFunction(() => window.viewer);
-    const call = (name, argument) => page.evaluate(([name, argument]) => window.viewer[name](argument), [name, argument]);
-    const picture = async (view) => {
-        await call('draw', view);
-        return shot(page, 'canvas');
-    };
-    return { page, faults, call, picture };
+  const page = await browser.newPage({ viewport: { width: 640, height: 640 } });
+  page.setDefaultTimeout(PATIENCE);
+  const faults = [];
+  page.on('pageerror', (error) => faults.push(String(error)));
+  page.on('console', (message) => message.type() === 'error' && faults.push(message.text()));
+  await page.goto(address);
+  await page.waitForFunction(() => window.viewer);
+  const call = (name, argument) => page.evaluate(([name, argument]) => window.viewer[name](argument), [name, argument]);
+  const picture = async (view) => {
+    await call('draw', view);
+    return shot(page, 'canvas');
+  };
+  return { page, faults, call, picture };
 }
 
 /** The share of a picture's pixels that are not nearly black, so that a test knows that something was drawn. */
 export function lit({ width, height, data }) {
-    let sum = 0;
-    for (let i = 0; i < data.length; i += 4) if (Math.max(data[i], data[i + 1], data[i + 2]) > 16) sum++;
-    return sum / (width * height);
+  let sum = 0;
+  for (let i = 0; i < data.length; i += 4) if (Math.max(data[i], data[i + 1], data[i + 2]) > 16) sum++;
+  return sum / (width * height);
 }

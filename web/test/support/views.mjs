@@ -16,24 +16,24 @@ const cross = (a, b) => [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a
  * @param {number} size of a picture's sides, pixels
  */
 export function orbit(positions, count, size) {
-    const gaussians = positions.length / 3;
-    const column = (k) => Float32Array.from({ length: gaussians }, (_, i) => positions[3 * i + k]).sort();
-    const middle = [0, 1, 2].map((k) => column(k)[Math.floor(gaussians / 2)]);
-    const distances = Float32Array.from({ length: gaussians }, (_, i) =>
-        Math.hypot(...minus([...positions.subarray(3 * i, 3 * i + 3)], middle)),
-    ).sort();
-    const away = AWAY * distances[Math.floor(WITHIN * (gaussians - 1))];
-    const focal = size / 2 / Math.tan(ANGLE / 2);
-    return Array.from({ length: count }, (_, n) => {
-        const turn = (2 * Math.PI * n) / count + 0.3;
-        // y points down.
-        const position = [middle[0] + away * Math.cos(turn), middle[1] - 0.3 * away, middle[2] + away * Math.sin(turn)];
-        const forward = unit(minus(middle, position));
-        const right = unit(cross([0, 1, 0], forward));
-        const down = cross(forward, right);
-        const rotation = [0, 1, 2].map((k) => [right[k], down[k], forward[k]]);
-        return { width: size, height: size, fx: focal, fy: focal, position, rotation };
-    });
+  const gaussians = positions.length / 3;
+  const column = (k) => Float32Array.from({ length: gaussians }, (_, i) => positions[3 * i + k]).sort();
+  const middle = [0, 1, 2].map((k) => column(k)[Math.floor(gaussians / 2)]);
+  const distances = Float32Array.from({ length: gaussians }, (_, i) =>
+    Math.hypot(...minus([...positions.subarray(3 * i, 3 * i + 3)], middle)),
+  ).sort();
+  const away = AWAY * distances[Math.floor(WITHIN * (gaussians - 1))];
+  const focal = size / 2 / Math.tan(ANGLE / 2);
+  return Array.from({ length: count }, (_, n) => {
+    const turn = (2 * Math.PI * n) / count + 0.3;
+    // y points down.
+    const position = [middle[0] + away * Math.cos(turn), middle[1] - 0.3 * away, middle[2] + away * Math.sin(turn)];
+    const forward = unit(minus(middle, position));
+    const right = unit(cross([0, 1, 0], forward));
+    const down = cross(forward, right);
+    const rotation = [0, 1, 2].map((k) => [right[k], down[k], forward[k]]);
+    return { width: size, height: size, fx: focal, fy: focal, position, rotation };
+  });
 }
 
 /**
@@ -42,6 +42,6 @@ export function orbit(positions, count, size) {
  * @param {number} width pixels
  */
 export function scaled(view, width) {
-    const by = width / view.width;
-    return { ...view, width, height: Math.round(view.height * by), fx: view.fx * by, fy: view.fy * by };
+  const by = width / view.width;
+  return { ...view, width, height: Math.round(view.height * by), fx: view.fx * by, fy: view.fy * by };
 }
