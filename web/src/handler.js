@@ -4,9 +4,10 @@ import { rowsOf } from './rows.js';
 
 /**
  * @param {object} wasm the exports of the decoder's WebAssembly
+ * @param {(chunk: object) => object} [gpu] the arrays of a chunk `as: 'gpu'`
  * @returns {(message: object) => {reply: object, transfer: ArrayBuffer[]}}
  */
-export function handlerOf(wasm) {
+export function handlerOf(wasm, gpu) {
   let decoder;
   const answers = {
     start({ name, start, shParts }) {
@@ -15,7 +16,7 @@ export function handlerOf(wasm) {
       return {};
     },
     job({ job, as }) {
-      return arraysOf(decoder.decode(job), as);
+      return arraysOf(decoder.decode(job), as, gpu);
     },
     whole({ name, bytes, as }) {
       const whole = new wasm.Whole(name, bytes);
@@ -23,7 +24,7 @@ export function handlerOf(wasm) {
         const header = JSON.parse(whole.header());
         const chunk = whole.chunk();
         const dictionary = chunk.dictionary();
-        return { header, dictionary, chunk: arraysOf(chunk, as) };
+        return { header, dictionary, chunk: arraysOf(chunk, as, gpu) };
       } finally {
         whole.free();
       }
@@ -38,8 +39,9 @@ export function handlerOf(wasm) {
 }
 
 /** The arrays of a decoded chunk, which is freed. */
-function arraysOf(chunk, as) {
+function arraysOf(chunk, as, gpu) {
   try {
+    if (as === 'gpu') return { first: chunk.first, count: chunk.count, ...gpu(chunk) };
     const arrays = {
       first: chunk.first,
       count: chunk.count,

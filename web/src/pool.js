@@ -18,7 +18,7 @@ export class Pool {
     if (count === 0) {
       const handle = env.handler();
       // A turn of the event loop lets the page breathe between two chunks.
-      const ask = async (message) => (await turn(), handle(message).reply);
+      const ask = async (message, _, onPart) => (await turn(), handle(message, onPart).reply);
       pool.#workers.push({ ask, busy: 0, stop() {} });
       return pool;
     }
@@ -35,8 +35,18 @@ export class Pool {
       waiting.clear();
     };
     listen('message', (event) => {
-      const { id, reply, error, fatal } = worker.on ? event : event.data;
-      const { resolve, reject } = waiting.get(id) ?? {};
+      const { id, reply, part, error, fatal } = worker.on ? event : event.data;
+      const { resolve, reject, onPart } = waiting.get(id) ?? {};
+      if (part !== undefined) {
+        try {
+          onPart?.(part);
+        } catch (refusal) {
+          // What a worker goes on to send is not taken.
+          waiting.delete(id);
+          reject?.(refusal);
+        }
+        return;
+      }
       waiting.delete(id);
       if (waiting.size === 0) worker.unref?.();
       if (error !== undefined) reject?.(new Error(fatal ? `lexisplat: ${FAULT} (${error})` : error));
@@ -46,10 +56,10 @@ export class Pool {
     const slot = {
       busy: 0,
       failed: false,
-      ask: (message, transfer = []) =>
+      ask: (message, transfer = [], onPart) =>
         new Promise((resolve, reject) => {
           const id = this.#next++;
-          waiting.set(id, { resolve, reject });
+          waiting.set(id, { resolve, reject, onPart });
           // Node goes on while an answer is awaited, and ends although a scene was not closed.
           worker.ref?.();
           worker.postMessage({ ...message, id }, transfer);
@@ -73,12 +83,12 @@ export class Pool {
     return this.#workers.filter((worker) => worker.busy === 0).length;
   }
 
-  /** Asks the worker that has least to do. */
-  async ask(message, transfer) {
+  /** Asks the worker that has least to do. `onPart` takes what it sends before its answer. */
+  async ask(message, transfer, onPart) {
     const worker = this.#workers.reduce((a, b) => (b.busy < a.busy ? b : a));
     worker.busy++;
     try {
-      return await worker.ask(message, transfer);
+      return await worker.ask(message, transfer, onPart);
     } finally {
       worker.busy--;
     }

@@ -2,7 +2,7 @@
 
 /**
  * @param {(module: WebAssembly.Module) => object} start gives the exports of the WebAssembly
- * @param {(exports: object) => (message: object) => {reply: object, transfer: ArrayBuffer[]}} handlerOf
+ * @param {(exports: object) => (message: object, emit: (part: object, transfer: ArrayBuffer[]) => void) => {reply: object, transfer: ArrayBuffer[]}} handlerOf
  */
 export async function serve(start, handlerOf) {
   const port = globalThis.postMessage ? globalThis : (await import('node:worker_threads')).parentPort;
@@ -15,7 +15,7 @@ export async function serve(start, handlerOf) {
         port.postMessage({ id });
         return;
       }
-      const { reply, transfer } = handle(message);
+      const { reply, transfer } = handle(message, (part, buffers) => port.postMessage({ id, part }, buffers));
       port.postMessage({ id, reply }, transfer);
     } catch (error) {
       // After a fault of the WebAssembly itself its memory is not to be trusted.

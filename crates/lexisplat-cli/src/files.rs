@@ -1,5 +1,6 @@
 //! Files in and out: scenes by content, `-` for pipes, outputs that are never half written.
 
+use std::borrow::Cow;
 use std::ffi::OsStr;
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
@@ -249,6 +250,21 @@ pub(crate) fn write_output<T, E: Into<anyhow::Error>>(
     })?;
     out.flush().map_err(|e| Error::io(STANDARD_OUTPUT, e))?;
     Ok(done)
+}
+
+/// Writes `pieces` one after another to `path` or standard output. Returns how many bytes they have.
+pub(crate) fn write_pieces(path: &Path, pieces: &[Cow<'_, str>], overwrite: bool) -> Result<u64> {
+    let bytes = pieces.iter().map(|piece| piece.len() as u64).sum();
+    if is_pipe(path) {
+        let mut out = BufWriter::new(std::io::stdout().lock());
+        let written = pieces.iter().try_for_each(|piece| out.write_all(piece.as_bytes()));
+        written.and_then(|()| out.flush()).map_err(|e| Error::io(STANDARD_OUTPUT, e))?;
+        return Ok(bytes);
+    }
+    lexisplat::output::write_whole(new_output(path, overwrite), |writer| {
+        pieces.iter().try_for_each(|piece| writer.write_all(piece.as_bytes())).map_err(|e| Error::io(path, e))
+    })?;
+    Ok(bytes)
 }
 
 /// Tells what was done, as JSON or as text on standard output, or not at all.

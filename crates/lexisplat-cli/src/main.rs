@@ -5,6 +5,7 @@ mod commands;
 mod device;
 mod exit;
 mod files;
+mod page;
 mod progress;
 mod stop;
 mod terminal;

@@ -20,19 +20,11 @@ mod sequential {
     impl<I: IntoIterator> IntoParallelIterator for I {}
 
     pub(crate) trait ParallelSlice<T> {
-        /// Only code for GPUs goes through single values.
-        #[cfg(feature = "gpu")]
-        fn par_iter(&self) -> slice::Iter<'_, T>;
         fn par_chunks(&self, len: usize) -> slice::Chunks<'_, T>;
         fn par_chunks_mut(&mut self, len: usize) -> slice::ChunksMut<'_, T>;
     }
 
     impl<T> ParallelSlice<T> for [T] {
-        #[cfg(feature = "gpu")]
-        fn par_iter(&self) -> slice::Iter<'_, T> {
-            self.iter()
-        }
-
         fn par_chunks(&self, len: usize) -> slice::Chunks<'_, T> {
             self.chunks(len)
         }

@@ -72,7 +72,7 @@ impl CameraController {
         }
     }
 
-    /// Returns a controller that looks from `pose`, which should be one of [`Pose::new`].
+    /// Returns a controller that looks from `pose`, whose rotation need not be of length 1.
     #[must_use]
     pub fn from_pose(pose: &Pose, bounds: SceneBounds) -> Self {
         let axes = pose.axes();

@@ -2,9 +2,9 @@
 //!
 //! The core knows no window. Keys, gestures, scripts and links give [`Command`]s to one [`State`], which says what is
 //! shown and from where. It is all that is left without the default feature `window`, and compiles for a browser too.
-//! With the feature `gpu`, [`Presenter`] shows one or two pictures on any surface of wgpu, and [`Composer`] saves them.
+//! With the feature `gpu`, `Presenter` shows one or two pictures on any surface of wgpu, and `Composer` saves them.
 //!
-//! With the feature `window`, [`run`] opens the window and returns when it is closed. Buttons and dropped files give
+//! With the feature `window`, `run` opens the window and returns when it is closed. Buttons and dropped files give
 //! commands as well. A thread of its own draws the pictures, so that the window responds however long a picture
 //! takes.
 //!

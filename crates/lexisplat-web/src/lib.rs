@@ -10,17 +10,33 @@
 //! | [`Decoder`], in each worker | decodes chunks, which it gets as [jobs](Feed::job) |
 //! | [`Whole`], in a worker | decodes files that cannot be decoded in part |
 //!
+//!
+//! With `viewer` there are also
+//!
+//! | where | what |
+//! |---|---|
+//! | `open_scene`, in a worker | reads a scene of any format and gives its parts as the GPU holds them |
+//! | `Viewer`, on the main thread | draws one or two scenes of such parts by WebGPU |
+//!
 //! No function panics, whatever bytes it is given. Errors become JavaScript's `Error` with the library's message.
 
 mod chunk;
 mod decoder;
 mod feed;
 mod job;
+#[cfg(feature = "viewer")]
+mod parts;
+#[cfg(all(feature = "viewer", target_family = "wasm"))]
+mod viewer;
 mod whole;
 
 pub use chunk::Chunk;
 pub use decoder::Decoder;
 pub use feed::Feed;
+#[cfg(feature = "viewer")]
+pub use parts::open_scene;
+#[cfg(all(feature = "viewer", target_family = "wasm"))]
+pub use viewer::Viewer;
 pub use whole::Whole;
 
 use lexisplat::Limits;

@@ -4,6 +4,7 @@ mod compress;
 mod convert;
 mod draw;
 mod eval;
+mod html;
 mod limits;
 mod part;
 mod values;
@@ -21,6 +22,7 @@ pub(crate) use self::convert::Convert;
 pub(crate) use self::draw::View;
 pub(crate) use self::draw::{Bench, Compare, Render};
 pub(crate) use self::eval::{Eval, Measures, Sweep};
+pub(crate) use self::html::Html;
 pub(crate) use self::part::Part;
 use self::values::whole;
 pub(crate) use self::views::Views;
@@ -82,6 +84,7 @@ pub(crate) enum Command {
     Compare(Compare),
     Eval(Eval),
     Sweep(Box<Sweep>),
+    Html(Html),
     #[cfg(feature = "view")]
     View(View),
     Devices(Devices),

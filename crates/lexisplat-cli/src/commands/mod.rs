@@ -10,6 +10,7 @@ mod decompress;
 mod demo;
 mod devices;
 mod eval;
+mod html;
 mod info;
 mod render;
 mod scores;
@@ -54,6 +55,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         Command::Compare(args) => compare::run(&args, &common),
         Command::Eval(args) => eval::run(&args, &common),
         Command::Sweep(args) => sweep::run(&args, &common),
+        Command::Html(args) => html::run(&args, &common),
         #[cfg(feature = "view")]
         Command::View(args) => view::run(&args, &common),
         Command::Bench(args) => bench::run(&args, &common),

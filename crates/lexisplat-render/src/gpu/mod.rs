@@ -30,6 +30,7 @@ mod moments;
 mod part;
 mod part_check;
 mod part_layout;
+mod part_sample;
 mod path;
 mod plan;
 mod radiance;

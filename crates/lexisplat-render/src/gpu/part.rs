@@ -178,7 +178,7 @@ impl<'a> ScenePart<'a> {
             let [x, y, z, largest] =
                 std::array::from_fn(|k| f32::from_bits(word(&body[4 * k..]).unwrap_or(u32::MAX)));
             // One that is never drawn may lie anywhere.
-            if !(largest >= 0.0) {
+            if largest.is_nan() || largest < 0.0 {
                 continue;
             }
             let at = [x, y, z];

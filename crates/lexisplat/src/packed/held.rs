@@ -9,7 +9,7 @@ pub(crate) enum Data<'d> {
     Ranges(&'d dyn Held),
 }
 
-/// Ranges of packed data that are there. They are told apart by where they start in the data.
+/// Ranges of packed data that are there, whose checksums hold. They are told apart by where they start in the data.
 pub(crate) trait Held: Sync {
     /// The bytes of the range, if they are held.
     fn bytes(&self, start: u64) -> Option<&[u8]>;
@@ -36,6 +36,11 @@ impl<'d> Data<'d> {
             Self::First(data) => start.saturating_add(length.into()) <= data.len() as u64,
             Self::Ranges(held) => held.came(start),
         }
+    }
+
+    /// Whether the checksums of ranges are known to hold.
+    pub(super) fn is_verified(self) -> bool {
+        matches!(self, Self::Ranges(_))
     }
 
     /// The first part, if this is one.

@@ -49,8 +49,10 @@ impl ShDegree {
     pub const ZERO: Self = Self(0);
     /// The first view-dependent degree.
     pub const ONE: Self = Self(1);
+    pub(crate) const TWO: Self = Self(2);
     /// What INRIA's trainer writes.
     pub const THREE: Self = Self(3);
+    pub(crate) const FOUR: Self = Self(4);
 
     /// The degree, if it is at most [`MAX_DEGREE`].
     ///

@@ -1,6 +1,7 @@
 //! Averages of the Gaussians that a lane decoded last.
 
-use super::symbols::{LANES, Lanes};
+use super::shifts::{power, right};
+use super::symbols::{LANES, Lanes, each};
 use crate::packed::parameters::TARGETS;
 
 /// Gaussians that are remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
@@ -29,7 +30,8 @@ impl Around {
     }
 
     /// Averages of the features of the neighbours of `cell`, weighted by about the inverse squared distance.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn average(&self, cell: &[Lanes; 3]) -> [Lanes; AVERAGED] {
         let mut total = [0_i32; LANES];
         let mut sums = [[0_i32; LANES]; AVERAGED];
@@ -44,17 +46,17 @@ impl Around {
                 }
             }
         }
-        let (mut bits, mut inverse) = ([0; LANES], [0_i32; LANES]);
+        let (mut bits, mut half, mut inverse) = ([0; LANES], [0_i32; LANES], [0_i32; LANES]);
         for l in 0..LANES {
-            let total = total[l].max(1).cast_unsigned();
-            bits[l] = u32::BITS - total.leading_zeros();
-            inverse[l] = ((1_u32 << 31) / (total << (16 - bits[l].min(16)))).cast_signed();
+            let total = total[l].max(1);
+            bits[l] = length(total);
+            half[l] = power(bits[l] - 1).cast_signed();
+            inverse[l] = inverted(total);
         }
         for sum in &mut sums {
-            for l in 0..LANES {
-                let scaled = sum[l].wrapping_add(1 << (bits[l] - 1)) >> bits[l];
-                sum[l] = scaled.wrapping_mul(inverse[l]) >> 15;
-            }
+            let rounded = each(|l| sum[l].wrapping_add(half[l]));
+            let scaled = right(&rounded, &bits);
+            *sum = each(|l| scaled[l].wrapping_mul(inverse[l]) >> 15);
         }
         sums
     }
@@ -75,11 +77,28 @@ fn weights(a: &[Lanes; 3], b: &[Lanes; 3]) -> Lanes {
         let far = |k: usize| a[k][l].abs_diff(b[k][l]).min(FARTHEST);
         let (x, y, z) = (far(0), far(1), far(2));
         let squares = 4 * (x * x + y * y + z * z) + 1;
-        // The exponent of a number below 2^24 as an f32 is its bit length, exactly. Vector registers count no bits.
-        let length = ((squares.cast_signed() as f32).to_bits() >> 23) - 126;
-        weight[l] = 1 << (WEIGHT_BITS - length.min(WEIGHT_BITS));
+        weight[l] = power(WEIGHT_BITS - length(squares.cast_signed()).min(WEIGHT_BITS)).cast_signed();
     }
     weight
+}
+
+/// Bits of a positive number below 2^24.
+#[inline(always)]
+fn length(number: i32) -> u32 {
+    // It is the exponent of the number as an f32, exactly. Vector registers count no bits.
+    ((number as f32).to_bits() >> 23) - 126
+}
+
+/// 2^31 over a positive number below 2^16 after that is shifted up to 16 bits, rounded down.
+#[inline(always)]
+fn inverted(number: i32) -> i32 {
+    // The mantissa of an f32, with its leading one, holds the shifted number.
+    let shifted = (((number as f32).to_bits() & 0x007f_ffff) | 0x0080_0000) >> 8;
+    // Vector registers divide floats alone. Adding 2^23 rounds to a whole number, which is this quotient or one more.
+    const WHOLE: f32 = 8_388_608.0;
+    let near = (2_147_483_648.0 / (shifted.cast_signed() as f32) + WHOLE).to_bits() - WHOLE.to_bits();
+    let rest = (1_u32 << 31).wrapping_sub(near * shifted).cast_signed();
+    near.cast_signed() + (rest >> 31)
 }
 
 #[cfg(test)]
@@ -146,6 +165,25 @@ mod tests {
                 around.push(cell, std::array::from_fn(features));
             }
         }
+    }
+
+    #[test]
+    fn inverses_are_quotients() {
+        for number in 1..1_u32 << 16 {
+            let bits = u32::BITS - number.leading_zeros();
+            let quotient = (1_u32 << 31) / (number << (16 - bits));
+            assert_eq!(
+                (length(number.cast_signed()), inverted(number.cast_signed())),
+                (bits, quotient.cast_signed())
+            );
+        }
+    }
+
+    /// The heaviest neighbours are in the same cell.
+    #[test]
+    fn weights_sum_up_to_less_than_2_to_the_16() {
+        let cell = [[5; LANES]; 3];
+        assert!(weights(&cell, &cell)[0] * i32::try_from(WINDOW).unwrap() < 1 << 16);
     }
 
     /// In damaged files features are any numbers and cells any of 21 bits.

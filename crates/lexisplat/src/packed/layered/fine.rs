@@ -1,5 +1,6 @@
 //! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
 
+use super::shifts::power;
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each};
 use super::walk::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
@@ -14,7 +15,8 @@ const CLASS_WIDTH: u32 = 2;
 const FINENESS_WIDTH: u32 = 3;
 
 /// Codes the refinement of a group from `level` missing levels to one less. Returns `None` for impossible values.
-#[inline(always)]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) -> Option<()> {
     let mut beyond = false;
     let finer = factor(level - 1);
@@ -51,7 +53,7 @@ pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: 
             wanted[l] >> dropped(full[l], level - 1) & ((1 << count[l]) - 1)
         });
         for l in 0..LANES {
-            group.rotation[k][l] = group.rotation[k][l] << count[l] | low[l];
+            group.rotation[k][l] = group.rotation[k][l].wrapping_mul(power(count[l])) | low[l];
         }
     }
     (!beyond).then_some(())

@@ -27,7 +27,8 @@ fn kind(change: usize) -> usize {
 }
 
 /// Codes the changes of a group. `wanted` are those that the encoder codes.
-#[inline(always)]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn interim<S: Symbols>(s: &mut S, set: u32, group: &mut Group, wanted: &[Lanes; CHANGES]) {
     let (shape, colour) = (&group.shape, &group.colour);
     let class = |l: usize, classes: &Lanes<u32>| (classes[l] / CLASS_WIDTH).min(CLASSES - 1);

@@ -5,7 +5,9 @@
 //! taken away again. So a Gaussian shows its best colour whether or not its SH-rest is there.
 
 use super::bytes::shortened;
+use super::halves::doubled;
 use super::symbols::{LANES, Lanes};
+use super::unpack::Nonzero;
 use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
 use crate::scene::splats::Splats;
 use crate::sparse::dictionary::Dictionary;
@@ -80,40 +82,106 @@ impl MeanView {
         parts.concat()
     }
 
-    /// [`Self::weights`] of the positions of all lanes.
+    /// Makes `out` [`Self::weights`] of the positions of all lanes, as far as the degree has coefficients.
+    // WebAssembly has few registers, and is slower where it keeps values of several such functions in them.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(super) fn lanes(&self, degree: ShDegree, positions: &[Lanes<f32>; 3], out: &mut [Lanes<f32>; MOST]) {
+        // Where the degree is a constant, all lanes are computed at once.
+        match degree.rest_per_channel() {
+            ..=3 => self.lanes_of::<3>(ShDegree::ONE, positions, out),
+            4..=8 => self.lanes_of::<8>(ShDegree::TWO, positions, out),
+            9..=15 => self.lanes_of::<15>(ShDegree::THREE, positions, out),
+            _ => self.lanes_of::<24>(ShDegree::FOUR, positions, out),
+        }
+    }
+
+    /// [`Self::lanes`] of a degree with `PER_CHANNEL` coefficients a channel.
     #[inline(always)]
-    pub(super) fn lanes(&self, degree: ShDegree, positions: &[Lanes<f32>; 3]) -> [Lanes<f32>; MOST] {
-        let mut out = [[0.0; LANES]; MOST];
-        for l in 0..LANES {
-            let weights = self.weights(degree, [positions[0][l], positions[1][l], positions[2][l]]);
-            for (out, weight) in out.iter_mut().zip(weights) {
-                out[l] = weight;
+    fn lanes_of<const PER_CHANNEL: usize>(
+        &self,
+        degree: ShDegree,
+        positions: &[Lanes<f32>; 3],
+        out: &mut [Lanes<f32>; MOST],
+    ) {
+        let mut sums = [[0.0; LANES]; PER_CHANNEL];
+        let softening = self.softening * self.softening;
+        for point in &self.points {
+            for l in 0..LANES {
+                let (x, y, z) =
+                    (positions[0][l] - point[0], positions[1][l] - point[1], positions[2][l] - point[2]);
+                let scale = 1.0 / (x * x + y * y + z * z + softening).sqrt();
+                let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
+                for k in 0..PER_CHANNEL {
+                    sums[k][l] += basis[k];
+                }
             }
         }
-        out
-    }
-}
-
-/// What a code adds to a base colour by these weights, of which there are as many as a channel has coefficients.
-#[inline(always)]
-pub(in crate::packed) fn seen(
-    dictionary: &Dictionary,
-    code: impl Iterator<Item = (u16, f32)>,
-    weights: &[f32],
-) -> [f32; CHANNELS] {
-    let mut sums = [0.0; CHANNELS];
-    for (atom, value) in code {
-        let start = usize::from(atom) * dictionary.dim();
-        let row = dictionary.as_slice().get(start..start + dictionary.dim()).unwrap_or_default();
-        for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(weights.len().max(1))) {
-            let dot = channel.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
-            *sum += value * dot;
+        let share = 1.0 / (C0 * self.points.len().max(1) as f32);
+        for (out, sums) in out.iter_mut().zip(&sums) {
+            for l in 0..LANES {
+                out[l] = sums[l] * share;
+            }
         }
     }
-    sums
 }
 
-/// [`seen`] of an exact row.
+/// The atoms of a dictionary with the values of all channels beside each other, to be weighed at once.
+#[derive(Debug, Clone, Default)]
+pub(in crate::packed) struct SeenAtoms {
+    per_channel: usize,
+    /// Of each atom its coefficients, and of these the channels and a zero.
+    rows: Vec<[f32; CHANNELS + 1]>,
+}
+
+impl SeenAtoms {
+    /// Nothing if there are no points of view.
+    pub(in crate::packed) fn new(view: &MeanView, dictionary: &Dictionary) -> Self {
+        let per_channel = dictionary.degree().rest_per_channel();
+        if view.points.is_empty() || per_channel == 0 {
+            return Self::default();
+        }
+        let row = |atom: &[f32]| -> Vec<[f32; CHANNELS + 1]> {
+            let channel = |c: usize, k: usize| atom.get(c * per_channel + k).copied().unwrap_or(0.0);
+            (0..per_channel)
+                .map(|k| std::array::from_fn(|c| if c < CHANNELS { channel(c, k) } else { 0.0 }))
+                .collect()
+        };
+        let rows = dictionary.as_slice().chunks_exact(dictionary.dim()).flat_map(row).collect();
+        Self { per_channel, rows }
+    }
+
+    /// What a code adds to a base colour by the weights of lane `l`. The last number means nothing.
+    ///
+    /// It is called and not inlined: where the last number is known to be unused, three are computed one by one.
+    #[inline(never)]
+    pub(super) fn seen(
+        &self,
+        code: &[Nonzero],
+        weights: &[Lanes<f32>; MOST],
+        l: usize,
+    ) -> [f32; CHANNELS + 1] {
+        let l = l % LANES;
+        let mut sums = [0.0; CHANNELS + 1];
+        for nonzero in code {
+            let start = usize::from(nonzero.atom) * self.per_channel;
+            let row = self.rows.get(start..start + self.per_channel).unwrap_or_default();
+            let mut dots = [0.0; CHANNELS + 1];
+            for (channels, weights) in row.iter().zip(weights) {
+                for c in 0..CHANNELS + 1 {
+                    dots[c] += channels[c] * weights[l];
+                }
+            }
+            let value = doubled(nonzero.value);
+            for c in 0..CHANNELS + 1 {
+                sums[c] += value * dots[c];
+            }
+        }
+        sums
+    }
+}
+
+/// What a row adds to a base colour by these weights, of which there are as many as a channel has coefficients.
 #[inline(always)]
 pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNELS] {
     let mut sums = [0.0; CHANNELS];

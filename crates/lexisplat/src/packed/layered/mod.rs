@@ -20,6 +20,7 @@ mod decoder;
 mod fine;
 #[cfg(feature = "fuzzing")]
 pub mod fuzzing;
+mod halves;
 mod head;
 mod index;
 mod interim;
@@ -30,6 +31,7 @@ mod range;
 mod rest;
 #[cfg(any(test, feature = "fuzzing"))]
 mod script;
+mod shifts;
 mod steering;
 mod streams;
 mod symbols;

@@ -1,6 +1,7 @@
 //! The entropy decoder of a range.
 
 use super::range::{LEAST, MOST_BITS, length_bytes};
+use super::shifts::{power, right_unsigned};
 use super::streams::{CONTEXTS, Slot, Stream};
 use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
@@ -125,19 +126,19 @@ impl<'a> Player<'a> {
     }
 
     /// The next `count` raw bits of each lane, at most 16. Lanes that are not in use have none.
-    #[inline(always)]
+    #[inline(never)]
     fn take_bits(&mut self, count: &Lanes<u32>) -> Lanes<u32> {
-        let out = each(|l| self.states[l] & ((1 << count[l]) - 1));
-        self.states = each(|l| self.states[l] >> count[l]);
-        self.refill();
-        out
+        let simd = self.simd;
+        simd.run(TakeBits { player: self, count })
     }
 
-    /// Takes words into the states of all lanes that have room for one.
+    /// Adds raw bits that are taken next.
+    #[cold]
     #[inline(never)]
-    fn refill(&mut self) {
-        let simd = self.simd;
-        simd.run(Refill { player: self });
+    fn count_raw(&mut self, slot: Slot, count: &Lanes<u32>, set: u32) {
+        let Some(bit_counts) = &mut self.bit_counts else { return };
+        let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
+        bit_counts.0[slot.stream as usize] += taken.sum::<f64>();
     }
 }
 
@@ -172,48 +173,86 @@ impl<const PRECISION: u32> Take<'_, '_, PRECISION> {
             let low = self.player.states[FIRST + l] & ((1 << PRECISION) - 1);
             entries[l] = self.tables.entry(self.context[FIRST + l], low);
         }
-        let mut states = [0; HALF];
-        for l in 0..HALF {
-            states[l] = after::<PRECISION>(self.player.states[FIRST + l], entries[l]);
-            out[FIRST + l] = symbol(entries[l]);
-        }
-        self.player.put::<FIRST>(&states);
+        let words = self.player.next_words::<FIRST>();
+        let (states, next) = self.player.half_mut::<FIRST>();
+        let symbols = advance::<PRECISION>(states, next, &entries, &words);
+        out[FIRST..FIRST + HALF].copy_from_slice(&symbols);
     }
 }
 
-/// The work of [`Player::refill`].
-struct Refill<'p, 'l> {
+/// The work of [`Player::take_bits`].
+struct TakeBits<'p, 'l> {
     player: &'p mut Player<'l>,
+    count: &'p Lanes<u32>,
 }
 
-impl pulp::NullaryFnOnce for Refill<'_, '_> {
-    type Output = ();
+impl pulp::NullaryFnOnce for TakeBits<'_, '_> {
+    type Output = Lanes<u32>;
 
     #[inline(always)]
-    fn call(self) {
-        self.player.refill_half::<0>();
-        self.player.refill_half::<HALF>();
+    fn call(self) -> Lanes<u32> {
+        let Self { player, count } = self;
+        let states = player.states;
+        let out = each(|l| states[l] & (power(count[l]) - 1));
+        player.states = right_unsigned(&states, count);
+        player.refill_half::<0>();
+        player.refill_half::<HALF>();
+        out
     }
 }
 
 impl Player<'_> {
+    /// Takes words into the states of half of the lanes that have room for one.
     #[inline(always)]
     fn refill_half<const FIRST: usize>(&mut self) {
-        let states = self.states.as_chunks().0[FIRST / HALF];
-        self.put::<FIRST>(&states);
+        let words = self.next_words::<FIRST>();
+        let (states, next) = self.half_mut::<FIRST>();
+        refill(states, next, &words);
     }
 
-    /// Sets the states of half of the lanes, and takes words into those that have room for one.
+    /// The next word of each lane of a half.
     #[inline(always)]
-    fn put<const FIRST: usize>(&mut self, states: &[u32; HALF]) {
+    fn next_words<const FIRST: usize>(&self) -> [u32; HALF] {
         let mut words = [0; HALF];
         for l in 0..HALF {
             words[l] = word(self.words, self.next[FIRST + l]);
         }
-        for l in 0..HALF {
-            let lane = FIRST + l;
-            (self.states[lane], self.next[lane]) = refilled(states[l], self.next[lane], words[l]);
-        }
+        words
+    }
+
+    /// The states of a half of the lanes, and the numbers of their next words.
+    #[inline(always)]
+    fn half_mut<const FIRST: usize>(&mut self) -> (&mut [u32; HALF], &mut [u32; HALF]) {
+        let (states, next) = (self.states.as_chunks_mut().0, self.next.as_chunks_mut().0);
+        (&mut states[FIRST / HALF], &mut next[FIRST / HALF])
+    }
+}
+
+/// Takes symbols from states, and words into those that have room for one. Returns the symbols.
+// Inlined between look-ups of single numbers, WebAssembly would not get vectors.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn advance<const PRECISION: u32>(
+    states: &mut [u32; HALF],
+    next: &mut [u32; HALF],
+    entries: &[Entry; HALF],
+    words: &[u32; HALF],
+) -> [u32; HALF] {
+    let mut out = [0; HALF];
+    for l in 0..HALF {
+        let state = after::<PRECISION>(states[l], entries[l]);
+        (states[l], next[l]) = refilled(state, next[l], words[l]);
+        out[l] = symbol(entries[l]);
+    }
+    out
+}
+
+/// Takes words into states that have room for one.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn refill(states: &mut [u32; HALF], next: &mut [u32; HALF], words: &[u32; HALF]) {
+    for l in 0..HALF {
+        (states[l], next[l]) = refilled(states[l], next[l], words[l]);
     }
 }
 
@@ -261,9 +300,8 @@ impl Symbols for Player<'_> {
 
     #[inline(always)]
     fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
-        if let Some(bit_counts) = &mut self.bit_counts {
-            let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
-            bit_counts.0[slot.stream as usize] += taken.sum::<f64>();
+        if self.bit_counts.is_some() {
+            self.count_raw(slot, &count, set);
         }
         let count = each(|l| if has(set, l) { count[l] } else { 0 });
         let first = each(|l| count[l].min(MOST_BITS));

@@ -161,7 +161,8 @@ impl Rest {
 
     /// Codes one part of the nonzeros of the block. `targets` holds the Gaussians of each lane. Returns `None` for
     /// impossible values.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn part<S: Symbols>(
         &mut self,
         s: &mut S,
@@ -234,7 +235,8 @@ impl Rest {
     }
 
     /// Codes the numbers of nonzeros.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn counts<S: Symbols>(
         &mut self,
         s: &mut S,

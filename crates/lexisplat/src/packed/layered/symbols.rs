@@ -22,7 +22,7 @@ pub(super) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
 /// Whether `lane` is in `set`.
 #[inline(always)]
 pub(super) fn has(set: u32, lane: usize) -> bool {
-    (set >> lane) & 1 == 1
+    set & 1 << lane != 0
 }
 
 /// The encoder or the decoder of a range. The encoder records what the closures say of each lane, and returns it. The

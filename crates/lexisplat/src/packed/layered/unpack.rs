@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use half::f16;
-use half::slice::HalfFloatSliceExt;
 
 use super::chunk::{Form, LayerForm, Sink, Want, starts};
+use super::halves::halved;
 use super::interim::{KINDS, change};
-use super::mean_view::{MOST, MeanView, seen, seen_row};
+use super::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use super::rest::{BLOCK, Coded, Cursor, Rest};
 use super::steering::VALUE_BITS;
 use super::symbols::{LANES, Lanes, each, has};
@@ -49,6 +49,7 @@ pub(in crate::packed) struct Unpacker {
     pub(in crate::packed) mean_view: MeanView,
     pub(in crate::packed) lookup: Lookup,
     pub(in crate::packed) dictionary: Dictionary,
+    pub(in crate::packed) seen_atoms: SeenAtoms,
 }
 
 impl Unpacker {
@@ -106,8 +107,8 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
         let Self { with, layer, cell, alone, ranges, want, place, budget } = self;
         let n = place.counts.len();
         let starts = starts(n, super::chunk::lanes(n));
-        let blank = [[0.0; LANES]; MOST];
-        let weights = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
+        let blank = [[0.0; LANES]; 3];
+        let positions = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
         let mut out = Out {
             with,
             place,
@@ -116,7 +117,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             starts,
             nonzeros: Lanes::default(),
             escapes: Lanes::default(),
-            weights,
+            positions,
             budget,
             is_full: false,
         };
@@ -124,13 +125,11 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
             return Err(if out.is_full { Refusal::Full } else { Refusal::Damaged });
         };
         let total = out.nonzeros.iter().map(Vec::len).sum();
-        let (mut atoms, mut products) = (Vec::with_capacity(total), Vec::with_capacity(total));
+        let (mut atoms, mut values) = (Vec::with_capacity(total), Vec::with_capacity(total));
         for lane in &out.nonzeros {
             atoms.extend(lane.iter().map(|nonzero| nonzero.atom));
-            products.extend(lane.iter().map(|nonzero| nonzero.value));
+            values.extend(lane.iter().map(|nonzero| nonzero.value));
         }
-        let mut values = vec![f16::ZERO; total];
-        values.convert_from_f32_slice(&products);
         let [mut escapes, rest @ ..] = out.escapes;
         for lane in rest {
             escapes.gaussians.extend(lane.gaussians);
@@ -149,10 +148,9 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
 /// A nonzero of a code.
 #[derive(Debug, Clone, Copy)]
-struct Nonzero {
-    atom: u16,
-    /// To be rounded to half precision.
-    value: f32,
+pub(super) struct Nonzero {
+    pub(super) atom: u16,
+    pub(super) value: f16,
 }
 
 /// Where a decoded chunk goes.
@@ -168,15 +166,16 @@ struct Out<'j, 'p> {
     /// The nonzeros of each lane, by ascending atoms of each Gaussian.
     nonzeros: Lanes<Vec<Nonzero>>,
     escapes: Lanes<Escapes>,
-    /// The weights of [`MeanView`] of each Gaussian of the block, if there are points of view.
-    weights: Vec<[Lanes<f32>; MOST]>,
+    /// The position of each Gaussian of the block, if there are points of view.
+    positions: Vec<[Lanes<f32>; 3]>,
     budget: &'j MemoryBudget<'j>,
     /// Whether the budget was too small.
     is_full: bool,
 }
 
 impl Sink for Out<'_, '_> {
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn group(
         &mut self,
         number: usize,
@@ -192,8 +191,8 @@ impl Sink for Out<'_, '_> {
             |l: usize| has(set, l) && self.alone.iter().any(|cells| cells.contains(&group.number[l]));
         let alone = if self.alone.is_empty() { [false; LANES] } else { each(is_alone) };
         let drawn = Drawn::new(&self.with.frame, group, levels, &alone);
-        if let Some(weights) = self.weights.get_mut(in_block) {
-            *weights = self.with.mean_view.lanes(self.with.dictionary.degree(), &drawn.position);
+        if let Some(position) = self.positions.get_mut(in_block) {
+            *position = drawn.position;
         }
         for l in (0..LANES).filter(|&l| has(set, l)) {
             let i = self.starts[l] + number;
@@ -206,7 +205,8 @@ impl Sink for Out<'_, '_> {
         drawn.can_be(set).then_some(())
     }
 
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn rest(&mut self, number: usize, rest: &Rest) -> Option<()> {
         let form = &self.with.form.rest;
         let (codes, rows) = rest.sizes(form);
@@ -215,26 +215,39 @@ impl Sink for Out<'_, '_> {
             self.is_full = true;
             return None;
         }
-        let per_channel = self.with.dictionary.degree().rest_per_channel();
+        let degree = self.with.dictionary.degree();
+        let per_channel = degree.rest_per_channel().min(MOST);
         for l in 0..LANES {
-            let (nonzeros, escapes) = (&mut self.nonzeros[l], &mut self.escapes[l]);
-            nonzeros.reserve(rest.total(l));
-            let mut cursor = Cursor::default();
-            for k in (0..rest.len()).filter(|&k| has(rest.of(k).0, l)) {
+            self.nonzeros[l].reserve(rest.total(l));
+        }
+        let mut cursors = [Cursor::default(); LANES];
+        let mut weights = [[0.0; LANES]; MOST];
+        for k in 0..rest.len() {
+            let (set, colours) = rest.of(k);
+            let has_view = match self.positions.get(k) {
+                Some(position) => {
+                    self.with.mean_view.lanes(degree, position, &mut weights);
+                    true
+                }
+                None => false,
+            };
+            for l in (0..LANES).filter(|&l| has(set, l)) {
+                let nonzeros = &mut self.nonzeros[l];
                 let i = self.starts[l] + number + k;
-                let step = self.with.frame.value_steps[(rest.of(k).1[l] & u32::from(LAST_CLASS)) as usize];
+                let step = self.with.frame.value_steps[(colours[l] & u32::from(LAST_CLASS)) as usize];
                 let first = nonzeros.len();
                 let mut exact = None;
                 for part in 0..form.least.len() {
-                    match rest.coded(form, part, k, l, &mut cursor) {
+                    match rest.coded(form, part, k, l, &mut cursors[l]) {
                         Coded::Exact(row) => {
-                            escapes.gaussians.push(u32::try_from(i).ok()?);
-                            escapes.rows.extend_from_slice(row);
+                            self.escapes[l].gaussians.push(u32::try_from(i).ok()?);
+                            self.escapes[l].rows.extend_from_slice(row);
                             exact = Some(row);
                         }
+                        Coded::Code(_, 0) => {}
                         Coded::Code(from, count) => {
                             for (atom, value) in rest.nonzeros(part, from, count, l) {
-                                let added = Nonzero { atom, value: value as f32 * step };
+                                let added = Nonzero { atom, value: halved(value as f32 * step) };
                                 let mut at = nonzeros.len();
                                 nonzeros.push(added);
                                 // Codes are short, so that moving what follows is cheaper than sorting.
@@ -249,22 +262,19 @@ impl Sink for Out<'_, '_> {
                 }
                 let code = &nonzeros[first..];
                 *self.place.counts.get_mut(i)? = u8::try_from(code.len()).ok()?;
-                if let Some(weights) = self.weights.get(k) {
-                    let mut own = [0.0; MOST];
-                    for (own, weight) in own.iter_mut().zip(weights) {
-                        *own = weight[l];
+                if !has_view {
+                    continue;
+                }
+                let added = match exact {
+                    Some(row) => {
+                        let own: [f32; MOST] = std::array::from_fn(|k| weights[k][l]);
+                        let [r, g, b] = seen_row(row, &own[..per_channel]);
+                        [r, g, b, 0.0]
                     }
-                    let weights = &own[..per_channel.min(MOST)];
-                    let added = match exact {
-                        Some(row) => seen_row(row, weights),
-                        None => {
-                            let code = code.iter().map(|n| (n.atom, f16::from_f32(n.value).to_f32()));
-                            seen(&self.with.dictionary, code, weights)
-                        }
-                    };
-                    for (dc, added) in self.place.dc.get_mut(i)?.iter_mut().zip(added) {
-                        *dc -= added;
-                    }
+                    None => self.with.seen_atoms.seen(code, &weights, l),
+                };
+                for (dc, added) in self.place.dc.get_mut(i)?.iter_mut().zip(added) {
+                    *dc -= added;
                 }
             }
         }
@@ -284,7 +294,8 @@ pub(super) struct Drawn {
 }
 
 impl Drawn {
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn new(
         frame: &Frame,
         group: &Group,

@@ -66,7 +66,8 @@ fn ln(x: f64) -> f64 {
 }
 
 /// What trainers store of opacities: their logits, from logarithms as integer values.
-#[inline(always)]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
     each(|l| {
         let log = f64::from(log_opacity[l].min(MAX_LOG_OPACITY)) / f64::from(1_u32 << VALUE_BITS);
@@ -110,7 +111,9 @@ fn share(code: u32, bits: u32) -> f32 {
 pub(super) fn main_axis(s: f32, t: f32) -> [f32; 3] {
     let (s, t) = (s * 2.0 - 1.0, t * 2.0 - 1.0);
     let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
-    let z = (1.0 - x.abs() - y.abs()).max(0.0);
+    let z = 1.0 - x.abs() - y.abs();
+    // For `max` the compiler calls a function where NaN may differ from that of vector instructions.
+    let z = if z > 0.0 { z } else { 0.0 };
     let scale = 1.0 / (x * x + y * y + z * z).sqrt();
     [x * scale, y * scale, z * scale]
 }
@@ -124,7 +127,8 @@ pub(super) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
 }
 
 /// Rotations of their codes: two coordinates of the main axis and a turn, of `bits` bits each.
-#[inline(always)]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle: &Lanes<bool>) -> Turned {
     let mut out = Turned { axes: [[[0.0; LANES]; 3]; 3], quaternions: [[0.0; LANES]; 4] };
     for l in 0..LANES {
@@ -160,7 +164,8 @@ pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle:
 }
 
 /// Powers of two of logarithms in 512ths of an octave.
-#[inline(always)]
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn powers(logs: &Lanes) -> Lanes<f64> {
     each(|l| exp2(f64::from(logs[l]) / 512.0))
 }

@@ -88,7 +88,8 @@ impl<'a> Walk<'a> {
 
     /// Codes the base of the next Gaussian of each lane in `set` to `group`, which holds another or is new. Returns `None`
     /// for impossible values, which only damaged files hold. Decoders pass no targets.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn base<S: Symbols>(
         &mut self,
         s: &mut S,
@@ -178,7 +179,8 @@ impl<'a> Walk<'a> {
     }
 
     /// Codes rotations and positions.
-    #[inline(always)]
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn turns_and_moves<S: Symbols>(
         &self,
         s: &mut S,

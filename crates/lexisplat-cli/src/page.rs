@@ -1,0 +1,124 @@
+//! The page of `lexisplat html`: the built viewer with scenes put into it.
+
+use std::borrow::Cow;
+
+use base64::Engine;
+use base64::engine::general_purpose::STANDARD as BASE64;
+
+/// The viewer, built by `web/build-page.mjs`. Each of the texts below is in it once.
+const VIEWER: &str = include_str!("../assets/viewer.html");
+
+const TITLE: &str = "<title>lexisplat</title>";
+const POSTER: &str = "data-poster=\"\"";
+const WORDS: &str = "data-words=\"\"";
+const SCENES: [(&str, &str); 2] =
+    [("id=\"scene\"", " data-name=\"\"></script>"), ("id=\"scene2\"", " data-name=\"\"></script>")];
+
+/// A picture in a page.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Poster<'a> {
+    /// Bytes of a PNG or JPEG.
+    pub(crate) bytes: &'a [u8],
+    /// `image/png` or `image/jpeg`.
+    pub(crate) kind: &'static str,
+}
+
+/// What is put into the page.
+#[derive(Debug, Default)]
+pub(crate) struct Page<'a> {
+    pub(crate) title: &'a str,
+    pub(crate) poster: Option<Poster<'a>>,
+    /// Words of a script of the viewer.
+    pub(crate) words: &'a str,
+    /// Names and bytes of up to two scenes.
+    pub(crate) scenes: Vec<(&'a str, &'a [u8])>,
+}
+
+impl Page<'_> {
+    /// The page as HTML, in pieces that follow one another.
+    pub(crate) fn pieces(&self) -> Vec<Cow<'static, str>> {
+        let poster = self.poster.map(|poster| {
+            format!("data-poster=\"data:{};base64,{}\"", poster.kind, BASE64.encode(poster.bytes))
+        });
+        let mut edits = vec![
+            (TITLE.to_owned(), format!("<title>{}</title>", escaped(self.title))),
+            (POSTER.to_owned(), poster.unwrap_or_else(|| POSTER.to_owned())),
+            (WORDS.to_owned(), format!("data-words=\"{}\"", escaped(self.words))),
+        ];
+        for ((name, bytes), (id, rest)) in self.scenes.iter().zip(SCENES) {
+            let scene = BASE64.encode(bytes);
+            edits.push((
+                format!("{id}{rest}"),
+                format!("{id} data-name=\"{}\">{scene}</script>", escaped(name)),
+            ));
+        }
+        let mut placed: Vec<(usize, usize, String)> = edits
+            .into_iter()
+            .filter_map(|(text, by)| VIEWER.find(&text).map(|at| (at, at + text.len(), by)))
+            .collect();
+        placed.sort_unstable_by_key(|edit| edit.0);
+        let mut pieces = Vec::new();
+        let mut from = 0;
+        for (start, end, by) in placed {
+            pieces.push(Cow::Borrowed(VIEWER.get(from..start).unwrap_or_default()));
+            pieces.push(Cow::Owned(by));
+            from = end;
+        }
+        pieces.push(Cow::Borrowed(VIEWER.get(from..).unwrap_or_default()));
+        pieces
+    }
+}
+
+/// `text` where HTML expects text or the value of an attribute in double quotes.
+fn escaped(text: &str) -> String {
+    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            c => out.push(c),
+        }
+        out
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Most bytes of the viewer in the program.
+    const MOST: usize = 1 << 20;
+
+    #[test]
+    fn the_viewer_is_small_and_has_each_place_once() {
+        assert!(VIEWER.len() <= MOST, "{} bytes", VIEWER.len());
+        let scenes = SCENES.map(|(id, rest)| format!("{id}{rest}"));
+        for place in [TITLE, POSTER, WORDS].into_iter().chain(scenes.iter().map(String::as_str)) {
+            assert_eq!(VIEWER.matches(place).count(), 1, "{place}");
+        }
+    }
+
+    #[test]
+    fn what_is_put_in_is_there_and_the_rest_is_unchanged() {
+        let poster = Poster { bytes: b"\x89PNG", kind: "image/png" };
+        let page = Page {
+            title: "a <b> & \"c\"",
+            poster: Some(poster),
+            words: "mode=wipe",
+            scenes: vec![("a\".lexi", b"first"), ("b.lexi", b"second")],
+        };
+        let html = page.pieces().concat();
+        for text in [
+            "<title>a &lt;b&gt; &amp; &quot;c&quot;</title>",
+            "data-poster=\"data:image/png;base64,iVBORw==\"",
+            "data-words=\"mode=wipe\"",
+            "id=\"scene\" data-name=\"a&quot;.lexi\">Zmlyc3Q=</script>",
+            "id=\"scene2\" data-name=\"b.lexi\">c2Vjb25k</script>",
+        ] {
+            assert_eq!(html.matches(text).count(), 1, "{text}");
+        }
+        let empty = Page { title: "lexisplat", ..Page::default() };
+        assert_eq!(empty.pieces().concat(), VIEWER);
+    }
+}

@@ -1,0 +1,100 @@
+//! Where a scene is, as far as it came.
+
+use std::collections::BTreeMap;
+
+use lexisplat::Geometry;
+use lexisplat_render::gpu::ScenePart;
+use lexisplat_render::{Camera, bulk, orbit};
+use lexisplat_view::{DVec3, SceneBounds, Slot};
+
+/// Gaussians that are remembered of each part.
+const SAMPLE: usize = 2048;
+/// Views of the orbit that is stepped through, as in `lexisplat view`, and their size, which the canvas replaces.
+const ORBIT: usize = 24;
+const ORBIT_SIZE: (u32, u32) = (1280, 720);
+/// The bounds are found again when so many times as many Gaussians were sampled.
+const GROWTH: usize = 2;
+/// Gaussians count as seen at a place within this share of the picture's shorter side of it.
+const NEAR: f64 = 0.02;
+/// Opacity, after the sigmoid, of Gaussians that count as seen.
+const SOLID: f32 = 0.3;
+/// As many Gaussians in front of the point that is looked at are passed over, as a share of those near it.
+const PASSED: f64 = 0.1;
+
+/// A sample of the scene that is looked at.
+#[derive(Debug, Default)]
+pub(super) struct Bounds {
+    slot: Option<Slot>,
+    parts: BTreeMap<usize, Geometry>,
+    /// Gaussians of the sample when the bounds were last found.
+    found_at: usize,
+    /// The link to the view that was chosen last for the scene, while it was not changed.
+    pub(super) link: Option<String>,
+}
+
+impl Bounds {
+    /// Begins with the scene in `slot`.
+    pub(super) fn begin(&mut self, slot: Slot) {
+        *self = Self { slot: Some(slot), link: self.link.take(), ..Self::default() };
+    }
+
+    /// Takes a part of the scene in `slot`. Returns whether the bounds should be found again.
+    pub(super) fn add(&mut self, slot: Slot, index: usize, part: &ScenePart<'_>) -> bool {
+        if self.slot != Some(slot) || self.parts.contains_key(&index) {
+            return false;
+        }
+        self.parts.insert(index, part.sample((part.len() as usize / SAMPLE).max(1)));
+        let sampled: usize = self.parts.values().map(Geometry::len).sum();
+        if sampled >= GROWTH * self.found_at && sampled > 0 {
+            self.found_at = sampled;
+            return true;
+        }
+        false
+    }
+
+    fn geometry(&self) -> Geometry {
+        let mut all = Geometry::default();
+        for part in self.parts.values() {
+            all.positions.extend(&part.positions);
+            all.opacities.extend(&part.opacities);
+        }
+        all
+    }
+
+    /// The bounds of the scene that `cameras` look at.
+    pub(super) fn of_scene(&self, cameras: &[Camera]) -> SceneBounds {
+        SceneBounds::new(bulk(&self.geometry()), cameras)
+    }
+
+    /// Cameras around the scene, and its bounds.
+    pub(super) fn around(&self) -> (Vec<Camera>, SceneBounds) {
+        let geometry = self.geometry();
+        let cameras = orbit(&geometry, ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
+        (cameras, SceneBounds::new(bulk(&geometry), &[]))
+    }
+
+    /// The point of the scene that `camera` sees at a place, in shares of its picture.
+    pub(super) fn seen(&self, camera: &Camera, x: f64, y: f64) -> Option<DVec3> {
+        let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+        let place = [x * width - width / 2.0, y * height - height / 2.0];
+        let near = NEAR * width.min(height);
+        let mut seen: Vec<(f64, [f32; 3])> = Vec::new();
+        for part in self.parts.values() {
+            for (&at, &opacity) in part.positions.iter().zip(&part.opacities) {
+                let [right, down, depth] = camera.to_view(at).map(f64::from);
+                let off = [
+                    f64::from(camera.fx) * right / depth - place[0],
+                    f64::from(camera.fy) * down / depth - place[1],
+                ];
+                let solid = 1.0 / (1.0 + (-opacity).exp()) > SOLID;
+                if depth > 0.0 && solid && off[0].hypot(off[1]) < near {
+                    seen.push((depth, at));
+                }
+            }
+        }
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of points")]
+        let passed = (seen.len() as f64 * PASSED) as usize;
+        seen.get(passed).map(|(_, at)| DVec3::from_array(at.map(f64::from)))
+    }
+}

@@ -1,0 +1,309 @@
+//! The viewer on the main thread: the state and commands of `lexisplat view`, drawn by WebGPU on a canvas.
+
+mod bounds;
+mod screen;
+
+use js_sys::{Object, Reflect, Uint8Array};
+use lexisplat_render::gpu::{SceneForm, ScenePart};
+use lexisplat_render::read_cameras_bytes;
+use lexisplat_view::{Command, DVec3, Mode, Slot, State, keys, script};
+use serde_json::{Value, json};
+use wasm_bindgen::prelude::*;
+use web_sys::HtmlCanvasElement;
+
+use self::bounds::Bounds;
+use self::screen::{Drawn, Screen};
+use crate::thrown;
+
+/// Shows one or two scenes on a canvas. No method may be called before the promise of another one settles.
+#[wasm_bindgen]
+pub struct Viewer {
+    state: State,
+    screen: Screen,
+    bounds: Bounds,
+    /// What the page says of each scene, as it is given back by the report.
+    infos: [Option<Value>; 2],
+    /// Whether the cameras are of a file.
+    given: bool,
+    size: (u32, u32),
+    drawn: Option<Drawn>,
+}
+
+impl std::fmt::Debug for Viewer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Viewer").field("state", &self.state).field("size", &self.size).finish_non_exhaustive()
+    }
+}
+
+#[wasm_bindgen]
+impl Viewer {
+    /// Opens WebGPU for `canvas`. `options` is a JSON object; its `background` is a colour of three numbers from 0 to 1.
+    ///
+    /// # Errors
+    /// Why this browser cannot draw.
+    pub async fn create(canvas: HtmlCanvasElement, options: String) -> Result<Viewer, JsError> {
+        let options: Value = serde_json::from_str(&options).map_err(thrown)?;
+        let colour = |k: usize| options["background"][k].as_f64().unwrap_or(0.0);
+        #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+        let background = [0, 1, 2].map(|k| colour(k) as f32);
+        let size = (canvas.width().max(1), canvas.height().max(1));
+        Ok(Self {
+            state: State::new(background),
+            screen: Screen::open(canvas).await.map_err(thrown)?,
+            bounds: Bounds::default(),
+            infos: [None, None],
+            given: false,
+            size,
+            drawn: None,
+        })
+    }
+
+    /// Carries out the words of a script; see [`lexisplat_view::SCRIPT_WORDS`]. Those about files are refused.
+    ///
+    /// # Errors
+    /// The word that is wrong. Words before it are carried out only if all are right.
+    pub fn run(&mut self, words: &str) -> Result<(), JsError> {
+        let commands = script::parse(words).map_err(thrown)?;
+        let not_here = |command: &&Command| {
+            matches!(
+                command,
+                Command::Open(..) | Command::Drop { .. } | Command::Compress(_) | Command::Screenshot(_)
+                    | Command::Report | Command::Quit | Command::Swap
+            )
+        };
+        if let Some(command) = commands.iter().find(not_here) {
+            return Err(thrown(format!("{command:?} cannot be asked for in a page")));
+        }
+        commands.iter().for_each(|command| self.state.apply(command));
+        Ok(())
+    }
+
+    /// Carries out the command of the key that `KeyboardEvent.key` names. Returns whether it has one.
+    pub fn key(&mut self, key: &str) -> bool {
+        let Some(command) = keys::command_of_key(key) else { return false };
+        self.state.apply(&command);
+        true
+    }
+
+    /// Turns the scene around the pivot, in radians to the right and down.
+    pub fn orbit(&mut self, right: f64, down: f64) {
+        self.moved([right, down], |camera| camera.orbit(right, down));
+    }
+
+    /// Turns the view around the camera, in radians to the right and down.
+    pub fn look(&mut self, right: f64, down: f64) {
+        self.moved([right, down], |camera| camera.look(right, down));
+    }
+
+    /// Moves the scene along, in shares of the picture's shorter side.
+    pub fn pan(&mut self, right: f64, down: f64) {
+        self.moved([right, down], |camera| camera.pan(right, down));
+    }
+
+    /// Multiplies the distance of the pivot.
+    pub fn dolly(&mut self, factor: f64) {
+        if factor > 0.0 {
+            self.moved([factor, 0.0], |camera| camera.dolly(factor));
+        }
+    }
+
+    /// Flies, in radii of the scene.
+    pub fn fly(&mut self, right: f64, up: f64, forward: f64) {
+        self.moved([right + up, forward], |camera| camera.fly(DVec3::new(right, up, forward)));
+    }
+
+    /// Makes what is seen at a place the pivot, in shares of the canvas from its left and upper edge.
+    pub fn focus(&mut self, x: f64, y: f64) {
+        let Some(camera) = self.state.camera(self.size.0, self.size.1) else { return };
+        // Where two pictures lie side by side, a place is one of either.
+        let columns = f64::from(self.state.arrangement().columns());
+        if let Some(point) = self.bounds.seen(&camera, (x * columns).fract(), y) {
+            self.state.focus(point);
+        }
+    }
+
+    fn moved(&mut self, by: [f64; 2], change: impl FnOnce(&mut lexisplat_view::CameraController)) {
+        if let Some(camera) = self.state.free_camera().filter(|_| by.iter().all(|v| v.is_finite())) {
+            change(camera);
+        }
+    }
+
+    /// Sets the size of the canvas, in pixels of the device.
+    pub fn resize(&mut self, width: u32, height: u32) {
+        self.size = (width.max(1), height.max(1));
+        self.screen.resize(self.size);
+        self.drawn = None;
+    }
+
+    /// Takes the cameras of INRIA's `cameras.json`. They are what `[` and `]` step through.
+    ///
+    /// # Errors
+    /// What is wrong with the bytes.
+    pub fn cameras(&mut self, bytes: &[u8]) -> Result<(), JsError> {
+        let cameras = read_cameras_bytes("cameras.json", bytes).map_err(thrown)?;
+        self.given = true;
+        let bounds = self.bounds.of_scene(&cameras);
+        self.state.set_cameras(cameras, true, bounds);
+        Ok(())
+    }
+
+    /// Begins a scene in a slot, 0 or 1, in place of the one that was there. `info` is a JSON object that the report gives back.
+    ///
+    /// # Errors
+    /// [`Chunk.form`](crate::Chunk::form) did not give these bytes, or the GPU refuses.
+    pub async fn form(&mut self, slot: usize, bytes: Vec<u8>, info: String) -> Result<(), JsError> {
+        let slot = slot_of(slot)?;
+        let form = SceneForm::from_bytes(&bytes).map_err(thrown)?;
+        let info: Value = serde_json::from_str(&info).map_err(thrown)?;
+        self.screen.begin(slot, &form).await.map_err(thrown)?;
+        self.infos[slot.index()] = Some(info);
+        let was_open = self.infos.iter().flatten().count() > 1 || slot == Slot::Second;
+        self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
+        // A scene alone, or a new first one, is looked at from its own place.
+        if !was_open || slot == Slot::First {
+            self.bounds.begin(slot);
+        }
+        self.drawn = None;
+        Ok(())
+    }
+
+    /// Puts part `index` of the scene of a slot, in place of the one that was there.
+    ///
+    /// # Errors
+    /// [`Chunk.part`](crate::Chunk::part) did not give these bytes, or the GPU refuses.
+    pub async fn part(&mut self, slot: usize, index: usize, bytes: Vec<u8>) -> Result<(), JsError> {
+        let slot = slot_of(slot)?;
+        let part = ScenePart::from_bytes(&bytes).map_err(thrown)?;
+        self.screen.put(slot, index, &part).await.map_err(thrown)?;
+        if self.bounds.add(slot, index, &part) {
+            self.look_at_scene();
+        }
+        self.drawn = None;
+        Ok(())
+    }
+
+    /// Looks at the scene as far as it came, unless the view was changed.
+    fn look_at_scene(&mut self) {
+        if self.given {
+            return;
+        }
+        let before = self.state.link();
+        let is_untouched = self.bounds.link.as_ref().is_none_or(|link| link == &before);
+        let (cameras, bounds) = self.bounds.around();
+        self.state.set_cameras(cameras, false, bounds);
+        if is_untouched {
+            self.bounds.link = Some(self.state.link());
+        } else {
+            // What was a link a moment ago is one still.
+            let _ = self.state.apply_link(&before);
+        }
+    }
+
+    /// Removes the scene of a slot.
+    ///
+    /// # Errors
+    /// If there is no such slot.
+    pub fn remove(&mut self, slot: usize) -> Result<(), JsError> {
+        let slot = slot_of(slot)?;
+        self.screen.remove(slot);
+        self.infos[slot.index()] = None;
+        self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
+        self.drawn = None;
+        Ok(())
+    }
+
+    /// Draws and shows what changed since the last time, with both sides of pictures multiplied by `scale`, at most 1. Returns
+    /// whether there was anything to do.
+    ///
+    /// # Errors
+    /// What the GPU has against it.
+    pub async fn draw(&mut self, scale: f64) -> Result<bool, JsError> {
+        let Some(camera) = self.state.camera(self.size.0, self.size.1) else { return Ok(false) };
+        let view = screen::View {
+            // Coarse pictures are of a moving view, where only what is seen is drawn.
+            wanted: if scale < 1.0 { self.state.arrangement().mode.needs() } else { [true; 2] },
+            camera,
+            options: self.state.options(),
+            arrangement: self.state.arrangement(),
+            scale: scale.clamp(0.0, 1.0),
+        };
+        if self.drawn.as_ref().is_some_and(|drawn| drawn.shows(&view)) {
+            return Ok(false);
+        }
+        let before = self.drawn.take();
+        self.drawn = Some(self.screen.draw(view, before).await.map_err(thrown)?);
+        Ok(true)
+    }
+
+    /// What is shown and what it took, as JSON.
+    #[must_use]
+    pub fn report(&self) -> String {
+        let (arrangement, options) = (self.state.arrangement(), self.state.options());
+        let drawn = self.drawn.as_ref();
+        let camera = self.state.camera(self.size.0, self.size.1);
+        let scenes = self.screen.scene_bytes().map(|bytes| bytes.map(|b| json!({"geometry": b.geometry, "sh": b.sh})));
+        let value = json!({
+            "device": self.screen.device_name(),
+            "mode": arrangement.mode.name(),
+            "modes": Mode::ALL.map(Mode::name),
+            "camera": camera.map(|camera| camera.name),
+            "cameras": self.state.cameras().len(),
+            "index": self.state.index(),
+            "free": self.state.is_free(),
+            "width": self.size.0,
+            "height": self.size.1,
+            "milliseconds": drawn.map(|drawn| drawn.milliseconds),
+            "drawn": drawn.map_or([None; 2], |drawn| drawn.visible),
+            "gaussians": self.screen.gaussians(),
+            "resident_bytes": self.screen.resident_bytes(),
+            "most_bytes": self.screen.most_bytes(),
+            "scene_bytes": scenes,
+            "psnr": drawn.and_then(|drawn| drawn.psnr),
+            "identical": drawn.is_some_and(|drawn| drawn.identical),
+            "split": arrangement.split,
+            "gain": arrangement.gain,
+            "degree": options.max_degree.map(|degree| degree.get()),
+            "background": options.background,
+            "panel": self.state.panel(),
+            "models": self.infos,
+        });
+        value.to_string()
+    }
+
+    /// A link to the very view, for the fragment of an address.
+    #[must_use]
+    pub fn link(&self) -> String {
+        self.state.link()
+    }
+
+    /// Shows what a text of [`Self::link`] says.
+    ///
+    /// # Errors
+    /// The word that is wrong. Nothing is changed then.
+    pub fn set_link(&mut self, text: &str) -> Result<(), JsError> {
+        self.state.apply_link(text).map_err(thrown)
+    }
+
+    /// What is shown as `{width, height, data}`, with red, green, blue and opacity of each pixel, 8 bits each.
+    ///
+    /// # Errors
+    /// If nothing was drawn yet, or what the GPU has against it.
+    pub async fn picture(&mut self) -> Result<Object, JsError> {
+        let drawn = self.drawn.as_ref().ok_or_else(|| thrown("nothing is shown yet"))?;
+        let (width, height, pixels) = self.screen.picture(drawn).await.map_err(thrown)?;
+        let data: Vec<u8> = pixels.iter().flat_map(|&[r, g, b]| [r, g, b, u8::MAX]).collect();
+        let out = Object::new();
+        let set = |name: &str, value: JsValue| {
+            // An object that was just made takes every property.
+            let _ = Reflect::set(&out, &JsValue::from(name), &value);
+        };
+        set("width", width.into());
+        set("height", height.into());
+        set("data", Uint8Array::from(data.as_slice()).into());
+        Ok(out)
+    }
+}
+
+fn slot_of(slot: usize) -> Result<Slot, JsError> {
+    Slot::BOTH.get(slot).copied().ok_or_else(|| thrown(format!("slot is {slot}, expected 0 or 1")))
+}

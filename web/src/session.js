@@ -1,0 +1,118 @@
+/** Brings a scene of any format to the viewer: .lexi files coarse to fine while they come, others whole. */
+
+import * as wasm from '../wasm/viewer.js';
+import { ALL_PARTS, MEMORY, readStart, readWhole } from './open.js';
+import { Pool } from './pool.js';
+import { streamed } from './scene.js';
+import { sourceOf } from './source.js';
+import { viewerHandlerOf } from './viewer-handler.js';
+
+/** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
+const GEOMETRY = 16 + 32 + 12 + 2;
+/** Bytes of a nonzero, and how many a Gaussian has at most on average in files that were met. */
+const NONZERO = 3;
+const NONZEROS = 8;
+/** Bytes of a coefficient of dense SH, whose rows are filled up to four. */
+const COEFFICIENT = 4;
+/** Of the budget, the share that the scene may take. The rest is for what it is drawn with. */
+const SCENE_SHARE = 0.75;
+/** The version of files that are decoded in part. */
+const LAYERED = '3';
+
+/**
+ * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
+ * @param {object} options
+ * @param {{wasm: WebAssembly.Module, worker: string, workers: number}} options.env
+ * @param {(bytes: Uint8Array, info: object) => unknown} options.onForm takes what `Viewer.form` takes
+ * @param {(index: number, bytes: Uint8Array) => unknown} options.onPart takes what `Viewer.part` takes
+ * @param {(progress: object) => void} [options.onProgress]
+ * @param {AbortSignal} [options.signal]
+ * @param {number} options.budget most bytes on the GPU
+ * @returns {Promise<{info: object}>}
+ */
+export async function show(source, { env, onForm, onPart, onProgress, signal, budget = Infinity }) {
+  const input = sourceOf(source);
+  const stats = { milliseconds: 0 };
+  const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
+  const options = { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report };
+  const open = { pool: undefined, feed: undefined };
+  try {
+    signal?.throwIfAborted();
+    const start = await readStart(input, signal);
+    open.pool = await Pool.of(start.version === LAYERED ? env.workers : Math.min(env.workers, 1), {
+      module: env.wasm,
+      worker: async () => new Worker(env.worker, env.worker.startsWith('blob:') ? {} : { type: 'module' }),
+      handler: () => viewerHandlerOf(wasm),
+    });
+    const given = { input, start, open, options, stats, budget, onForm, onPart };
+    return { info: await (start.version === LAYERED ? layered(given) : whole(given)) };
+  } finally {
+    input.close();
+    open.feed?.free();
+    open.pool?.close();
+  }
+}
+
+/** Shows a packed file of version 3 while it comes. */
+async function layered({ input, start, open, options, stats, budget, onForm, onPart }) {
+  const { name } = input;
+  const feed = new wasm.Feed(name, options.memory, options.shParts);
+  open.feed = feed;
+  feed.feed(0, start.bytes);
+  let at = start.bytes.length;
+  while (feed.header() === undefined) {
+    const [wanted] = feed.wants() ?? [];
+    const piece = wanted === undefined ? null : await input.read(wanted, options.signal);
+    if (!piece) throw new Error(`${name}: the file ends within its header`);
+    feed.feed(wanted, piece);
+    at = wanted + piece.length;
+  }
+  const header = JSON.parse(feed.header());
+  const shown = feed.give_up(Math.min(header.gaussians, mostGaussians(budget)));
+  if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: ${budget} bytes of graphics memory are too few for it`);
+  const info = { ...header, name, shown };
+  await open.pool.askAll({ type: 'start', name, start: feed.start(), shParts: options.shParts });
+  let isFormed = false;
+  for await (const chunk of streamed({ source: input, feed, at, pool: open.pool, options, as: 'gpu', refine: true, stats })) {
+    if (!isFormed) await onForm(chunk.form, info);
+    isFormed = true;
+    await onPart(chunk.index, chunk.part);
+  }
+  return info;
+}
+
+function mostGaussians(budget) {
+  return Math.floor((budget * SCENE_SHARE) / (GEOMETRY + NONZERO * NONZEROS));
+}
+
+/** Shows a file that is read whole. */
+async function whole({ input, start, open, options, stats, budget, onForm, onPart }) {
+  const { name } = input;
+  const bytes = await readWhole(input, start.bytes, { ...options, memory: Infinity });
+  const loaded = bytes.length;
+  const clock = performance.now();
+  let info;
+  let decoded = 0;
+  let taken = Promise.resolve();
+  let refusal;
+  const take = (step) => (taken = taken.then(step).catch((error) => (refusal ??= error)));
+  await open.pool.ask({ type: 'scene', name, bytes }, [bytes.buffer], ({ form, head, index, part, count }) => {
+    options.signal?.throwIfAborted();
+    if (form) {
+      info = { ...head, name, shown: head.gaussians };
+      const needed = head.gaussians * (GEOMETRY + COEFFICIENT * 4 * Math.ceil((3 * (head.degree + 1) ** 2) / 4));
+      if (needed * SCENE_SHARE > budget) {
+        throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${budget} are allowed; a .lexi made of it takes less`);
+      }
+      take(() => onForm(form, info));
+    } else {
+      decoded += count;
+      take(() => onPart(index, part));
+    }
+    stats.milliseconds = performance.now() - clock;
+    options.onProgress({ loaded, total: loaded, decoded, gaussians: info.gaussians });
+  });
+  await taken;
+  if (refusal) throw refusal;
+  return info;
+}

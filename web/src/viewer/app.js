@@ -1,0 +1,263 @@
+// The viewer: a canvas with what lies over it, and the panel. The page and the custom element are made of it.
+
+import { load as loadEngine, obstacle } from './engine.js';
+import { make, reason } from './dom.js';
+import { Keys } from './keys.js';
+import { Loads } from './loads.js';
+import { makeMessages, makeOverlay } from './overlay.js';
+import { makeNotice } from './notice.js';
+import { makePanel } from './panel.js';
+import { listenToPointers } from './pointer.js';
+import { save } from './picture.js';
+import { Stage } from './stage.js';
+import { adopt } from './style.js';
+
+/** Ends of the names of files that are read. */
+export const EXTENSIONS = ['.lexi', '.ply', '.spz', '.sog', '.splat', '.ksplat', '.glb'];
+
+/**
+ * @typedef {object} Options
+ * @property {import('./engine.js').Place} place where the program's parts are
+ * @property {boolean} controls whether there is a panel
+ * @property {boolean} whole whether the viewer is all of its page, which then takes keys and the wheel from everywhere
+ * @property {string} [poster] address of a still picture, shown until the scene is
+ * @property {string} [label] what the scene is, for those who do not see it
+ * @property {() => void} [link] copies a link; leaves the button out if there is none
+ * @property {(name: string, detail?: any) => void} on is told of `load`, `progress`, `error` and `view` (a new picture)
+ */
+
+export class App {
+  /** What the viewer said after its last picture. */
+  report;
+  #stop = new AbortController();
+  #begun;
+  #wanted = { words: '', link: '', slots: new Set() };
+
+  /** @param {ShadowRoot} root @param {Options} options */
+  constructor(root, options) {
+    this.options = options;
+    this.root = root;
+    const { signal } = this.#stop;
+    const run = (words) => this.run(words).catch((error) => this.fail(error));
+    this.canvas = make('canvas', { tabIndex: 0, role: 'application' });
+    this.overlay = makeOverlay((split) => run(`split=${split}`));
+    this.messages = makeMessages();
+    this.notice = makeNotice({ poster: options.poster, open: options.controls && (() => this.choose()) });
+    this.files = make('input', { type: 'file', multiple: true, accept: EXTENSIONS.join(','), hidden: true });
+    this.files.addEventListener('change', () => {
+      this.take(this.files.files);
+      this.files.value = '';
+    });
+    this.panel = makePanel({
+      run,
+      open: () => this.choose(),
+      link: options.link,
+      picture: () => this.picture(),
+      full: document.fullscreenEnabled ? () => this.fullScreen() : undefined,
+      remove: (slot) => this.remove(slot),
+      cancel: (slot) => this.loads.cancel(slot),
+    });
+    this.label(options.label);
+    const view = make('div', { class: 'view' }, this.canvas, this.notice.element, this.overlay.element);
+    this.element = make('div', { class: options.whole ? 'app whole' : 'app' }, view, this.messages.element);
+    if (options.whole) this.element.prepend(make('h1', { class: 'unseen' }, 'Viewer of Gaussian splats'));
+    if (options.controls) this.element.append(this.panel.element, this.files);
+    adopt(root);
+    root.append(this.element);
+
+    this.stage = new Stage(this.canvas, {
+      drawn: (report, moving) => this.#update(report, moving),
+      failed: (error) => this.fail(error),
+      step: (now) => this.keys.fly(now, (change) => this.stage.act(change, true).catch(() => {})),
+    });
+    this.loads = new Loads(this.stage, {
+      changed: (slot) => this.#changed(slot),
+      formed: () => this.#tell(() => {}).catch((error) => this.fail(error)),
+      begun: (slot) => this.#first(slot),
+      loaded: (slot, load) => options.on('load', { slot, name: load.name, ...this.report?.models[slot] }),
+      failed: (slot, message, error) => this.fail(message, error),
+    });
+    const own = { p: () => this.picture(), h: () => this.panel.toggle() };
+    this.keys = new Keys(options.whole ? window : root, this.stage, { signal, own });
+    listenToPointers(this.stage, { signal, wheel: () => options.whole || root.activeElement === this.canvas });
+    // A wide panel leaves the picture room, a narrow one would not.
+    this.panel.show(this.element.clientWidth >= 640);
+    this.#look();
+  }
+
+  /** Loads the program and takes hold of the GPU. Resolves with whether this browser can draw; says why if not. */
+  start() {
+    this.#begun ??= this.#start();
+    return this.#begun;
+  }
+
+  /** Loads a scene into a slot. Resolves with whether all of it came. Never rejects. */
+  async open(source, slot = 0) {
+    this.#wanted.slots.add(slot);
+    this.notice.busy();
+    if (!(await this.start()) || this.#stop.signal.aborted) return false;
+    const { env } = await loadEngine(this.options.place);
+    return this.loads.open(source, slot, env);
+  }
+
+  /** Opens files: two as both scenes, one as the second if there is a first, and not `first`. */
+  async take(list, first = false) {
+    const files = [...list];
+    if (files.length === 0) return this.fail('That was no file.');
+    if (files.length > 2) this.messages.add(`${files.length} files were given. The first two are opened.`);
+    this.#wanted = { words: '', link: '', slots: new Set() };
+    const one = first || !this.#occupied(0) ? 0 : 1;
+    const opened = files.length === 1 ? [this.open(files[0], one)] : [this.open(files[0], 0), this.open(files[1], 1)];
+    await Promise.all(opened);
+  }
+
+  /** Empties a slot. */
+  remove(slot) {
+    this.loads.remove(slot);
+    return this.#tell((viewer) => viewer.remove(slot)).catch((error) => this.fail(error));
+  }
+
+  /** Carries out words of a script of `lexisplat view`. Rejects with the reason if one is wrong. */
+  run(words) {
+    return this.#tell((viewer) => viewer.run(words));
+  }
+
+  /** Arranges the view by words or a link, now and again as the scenes of the page come. */
+  arrange({ words = this.#wanted.words, link = this.#wanted.link }) {
+    this.#wanted = { ...this.#wanted, words, link };
+    if (this.report?.models.some(Boolean)) this.#arranged();
+  }
+
+  /** The link's text for what is shown. */
+  link() {
+    return this.stage.act((viewer) => viewer.link());
+  }
+
+  /** Saves what is shown as a PNG. */
+  async picture() {
+    try {
+      const picture = await this.stage.act((viewer) => viewer.picture());
+      const name = await save(picture, this.report?.models.find(Boolean)?.name);
+      this.messages.add(`${name} was saved`);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** Fills the screen, or returns from there. */
+  async fullScreen() {
+    const host = this.options.whole ? document.documentElement : this.root.host;
+    try {
+      if (document.fullscreenElement) await document.exitFullscreen();
+      else await host.requestFullscreen();
+    } catch {
+      this.fail('The browser does not allow full screen here.');
+    }
+  }
+
+  /** Lets people choose files. */
+  choose() {
+    this.files.click();
+  }
+
+  /** Says what is shown to those who do not see it. */
+  label(text) {
+    this.canvas.setAttribute('aria-label', text || 'The scene. Arrow keys orbit, W A S D Q E fly.');
+  }
+
+  /** Shows what went wrong, and tells the page. */
+  fail(message, error = message) {
+    if (this.#stop.signal.aborted || error?.name === 'AbortError') return;
+    this.messages.add(message, { wrong: true });
+    this.options.on('error', { message: reason(message) });
+    this.#look();
+  }
+
+  /** Stops everything and frees the GPU's memory. */
+  close() {
+    this.#stop.abort();
+    for (const slot of [0, 1]) this.loads.cancel(slot);
+    this.stage.close();
+    this.element.remove();
+  }
+
+  async #start() {
+    const { signal } = this.#stop;
+    const missing = obstacle();
+    if (missing) return this.#cannot(missing);
+    try {
+      const { Viewer } = await loadEngine(this.options.place);
+      if (signal.aborted) return false;
+      await this.stage.start(Viewer, {});
+      if (this.#wanted.words) await this.run(this.#wanted.words);
+    } catch (error) {
+      return this.#cannot(error);
+    }
+    return !signal.aborted;
+  }
+
+  #cannot(why) {
+    if (this.#stop.signal.aborted) return false;
+    this.element.classList.add('still');
+    this.notice.cannot(reason(why));
+    this.options.on('error', { message: reason(why) });
+    return false;
+  }
+
+  // Changes the viewer and shows what it says then, before it draws.
+  async #tell(change) {
+    const report = await this.stage.act((viewer) => {
+      change(viewer);
+      return JSON.parse(viewer.report());
+    });
+    this.#update(report);
+  }
+
+  #first(slot) {
+    this.#arranged();
+    this.#wanted.slots.delete(slot);
+  }
+
+  // A new scene moves the camera and may change the mode, so that what is wanted is said after it.
+  #arranged() {
+    const { words, link, slots } = this.#wanted;
+    if (words && slots.size > 0) this.#tell((viewer) => viewer.run(words)).catch((error) => this.fail(error));
+    if (link) {
+      this.#tell((viewer) => viewer.set_link(link)).catch((error) => {
+        this.#wanted.link = '';
+        this.fail(`The view of the link could not be shown: ${reason(error)}`, error);
+      });
+    }
+    if (slots.size <= 1) this.#wanted = { ...this.#wanted, words: '', link: '' };
+  }
+
+  #changed(slot) {
+    const load = this.loads.slots[slot];
+    this.panel.cards[slot].load(load);
+    if (load?.progress) this.options.on('progress', { slot, ...load.progress });
+    this.#look();
+  }
+
+  #update(report, moving = false) {
+    if (this.#stop.signal.aborted) return;
+    // Coarse pictures may have no PSNR; the last one stays rather than to flicker.
+    if (moving && !report.identical) report.psnr ??= this.report?.psnr ?? null;
+    this.report = report;
+    this.overlay.update(report);
+    this.panel.update(report);
+    this.#look();
+    this.options.on('view', report);
+  }
+
+  #occupied(slot) {
+    return Boolean(this.report?.models[slot] || this.loads.slots[slot]);
+  }
+
+  // The notice is there until a scene is.
+  #look() {
+    const shown = Boolean(this.report?.models.some(Boolean));
+    const active = this.loads?.slots.some((load) => load?.active);
+    this.element.classList.toggle('shown', shown);
+    this.notice.update({ shown, active });
+  }
+}

@@ -1,0 +1,70 @@
+// What the panel says of one scene.
+
+import { bytes, count, icon, make, say, time } from './dom.js';
+
+const CROSS = 'M6 6l8 8M14 6l-8 8';
+
+/**
+ * Makes the card of a slot.
+ * @param {0 | 1} slot
+ * @param {{remove: (slot: number) => void, cancel: (slot: number) => void}} on
+ */
+export function sceneCard(slot, on) {
+  const name = make('h2', { class: 'name' });
+  const remove = make('button', { type: 'button', class: 'icon cross' }, icon(CROSS));
+  remove.addEventListener('click', () => (load?.active ? on.cancel(slot) : on.remove(slot)));
+  const size = make('p', { class: 'strong' });
+  const about = make('p', {});
+  const decode = make('p', {});
+  const bar = make('progress', { 'aria-label': 'Loaded', max: 1 });
+  const head = make('div', { class: 'row' }, make('span', { class: 'slot', 'aria-hidden': 'true' }, String(slot + 1)), name, remove);
+  const element = make('section', { class: 'card', hidden: true }, head, size, about, bar, decode);
+  let [model, first, load] = [null, null, undefined];
+
+  function update() {
+    element.hidden = !model && !load;
+    if (element.hidden) return;
+    const title = load?.active || !model ? load?.name : model.name;
+    const ordinal = slot === 0 ? 'First scene' : 'Second scene';
+    element.setAttribute('aria-label', ordinal);
+    say(name, title ?? '');
+    name.title = title ?? '';
+    remove.title = load?.active ? 'Cancel' : 'Remove';
+    remove.setAttribute('aria-label', `${remove.title} ${title}`);
+    const ratio = slot === 1 && first && model && first.bytes > model.bytes ? `, ${(first.bytes / model.bytes).toFixed(1)} x smaller` : '';
+    say(size, model ? `${bytes(model.bytes)}${ratio}` : '');
+    const { shown = model?.gaussians } = load?.info ?? {};
+    const less = shown < model?.gaussians ? `${count(shown)} of ` : '';
+    say(about, model ? `${less}${count(model.gaussians)} Gaussians, ${model.layout}` : '');
+    const progress = load?.progress;
+    bar.hidden = !load?.active;
+    if (load?.active) {
+      if (progress?.total) bar.value = progress.loaded / progress.total;
+      else bar.removeAttribute('value');
+    }
+    say(decode, load ? came(load) : '');
+  }
+
+  return {
+    element,
+    /** Shows what the viewer has, beside what it has of the first slot. */
+    model(next, report) {
+      [model, first] = [next, report?.models[0]];
+      update();
+    },
+    /** Shows how far a load is. */
+    load(next) {
+      load = next;
+      update();
+    },
+  };
+}
+
+function came({ active, progress }) {
+  if (!progress) return active ? 'Waiting for the first bytes' : '';
+  const { loaded, total, decoded, gaussians, ms } = progress;
+  const whole = active && total ? `${bytes(loaded)} of ${bytes(total)}` : '';
+  const part = active && gaussians ? `${count(decoded)} of ${count(gaussians)} Gaussians` : '';
+  const took = active || !ms ? '' : `Decoded in ${time(ms)}`;
+  return [whole, part, took].filter(Boolean).join(', ');
+}

@@ -1,0 +1,16 @@
+// Where the program's parts are if they are files of one folder.
+
+// Workers that decode a scene. More leave no processor to the page on phones.
+const WORKERS = 2;
+
+/** @type {import('./engine.js').Place} */
+export const folder = {
+  compile: async () => {
+    const answer = await fetch(new URL('../../wasm/viewer_bg.wasm', import.meta.url));
+    if (!answer.ok) throw new Error(`The viewer's program could not be loaded (${answer.status}).`);
+    // compileStreaming refuses what a server sends under another type than application/wasm.
+    return WebAssembly.compile(await answer.arrayBuffer());
+  },
+  worker: new URL('../viewer-worker.js', import.meta.url).href,
+  workers: WORKERS,
+};

@@ -1,0 +1,41 @@
+// The page of one file: the program, its worker and the scene are text in it.
+
+import { startPage } from './page.js';
+
+// Workers that decode a scene, as in the folder.
+const WORKERS = 2;
+
+/** The bytes that an element has as base64. */
+function bytesOf(element) {
+  const text = element.textContent.trim();
+  if (Uint8Array.fromBase64) return Uint8Array.fromBase64(text);
+  const raw = atob(text);
+  const bytes = new Uint8Array(raw.length);
+  for (let at = 0; at < raw.length; at++) bytes[at] = raw.charCodeAt(at);
+  return bytes;
+}
+
+async function compile() {
+  const packed = new Blob([bytesOf(document.getElementById('program'))]).stream();
+  const bytes = await new Response(packed.pipeThrough(new DecompressionStream('gzip'))).arrayBuffer();
+  return WebAssembly.compile(bytes);
+}
+
+const code = new Blob([document.getElementById('worker').textContent], { type: 'text/javascript' });
+const place = { compile, worker: URL.createObjectURL(code), workers: WORKERS };
+
+const scenes = ['scene', 'scene2'].map((id) => {
+  const element = document.getElementById(id);
+  if (!element?.textContent.trim()) return undefined;
+  const name = element.dataset.name || 'scene.lexi';
+  try {
+    return new File([bytesOf(element)], name);
+  } catch {
+    // The viewer says of an empty file what is wrong with it.
+    return new File([], name);
+  } finally {
+    // The text may be larger than all else in the page.
+    element.textContent = '';
+  }
+});
+startPage(place, scenes);

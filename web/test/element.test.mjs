@@ -1,0 +1,188 @@
+// <lexi-viewer> in Chromium, with stand-ins for the WebAssembly and the session.
+
+import assert from 'node:assert/strict';
+import { writeFile } from 'node:fs/promises';
+import { join } from 'node:path';
+import { after, before, describe, it } from 'node:test';
+import { launch, npm } from './support/chromium.mjs';
+import { newPage, reportOf, scene, serveStub } from './support/viewer-page.mjs';
+
+const STILL = 'data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACwAAAAAAQABAAACAkQBADs=';
+// A strict page around the element: no inline styles, no inline scripts.
+const HOST = (body) => `<!doctype html><html lang="en"><title>host</title>
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src 'self' 'wasm-unsafe-eval'; connect-src 'self'; style-src 'self'; img-src data:">
+<link rel="icon" href="data:,"><script type="module" src="/src/viewer/element.js"></script><script src="/made/events.js"></script>
+${body}`;
+const EVENTS = `globalThis.heard = [];
+for (const name of ['load', 'progress', 'error']) {
+  document.addEventListener(name, (event) => event.target.localName === 'lexi-viewer' && heard.push([name, event.detail]), true);
+}`;
+
+describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
+  let browser;
+  let server;
+  let page;
+  before(async () => {
+    [browser, server] = await Promise.all([launch(), serveStub()]);
+    await writeFile(join(server.made, 'events.js'), EVENTS);
+  });
+  after(() => Promise.all([browser?.close(), server?.close()]));
+
+  const open = async (body, options) => {
+    await writeFile(join(server.made, 'host.html'), HOST(body));
+    page = await newPage(browser, options);
+    await page.goto(`${server.url}/made/host.html`);
+  };
+  const heard = (name) => page.evaluate((name) => globalThis.heard.filter(([heard]) => heard === name).map(([, detail]) => detail), name);
+  const loaded = (count = 1) => page.waitForFunction((count) => globalThis.heard.filter(([name]) => name === 'load').length === count, count);
+  const viewers = () => page.evaluate(() => (globalThis.viewers ?? []).map(({ freed }) => freed));
+  const test = (name, run) =>
+    it(name, async () => {
+      try {
+        await run();
+        assert.deepEqual(page.faults, []);
+      } finally {
+        await page?.context().close();
+      }
+    });
+
+  test('shows its scene and tells the page', async () => {
+    await open('<lexi-viewer src="/made/first.lexi" alt="A garden"></lexi-viewer>');
+    await loaded();
+    assert.deepEqual((await heard('load')).map(({ slot, name, gaussians }) => [slot, name, gaussians]), [[0, 'first.lexi', 12_345]]);
+    const progress = await heard('progress');
+    assert.equal(progress.at(-1).decoded, 12_345);
+    await page.getByLabel('A garden').waitFor();
+    assert.equal(await page.locator('.panel').count(), 0, 'no controls were asked for');
+    const box = await page.locator('lexi-viewer canvas').boundingBox();
+    assert.ok(box.width > 800 && box.height >= 128, 'it has a height without any style');
+  });
+
+  test('compares two scenes, and its mode follows the user', async () => {
+    await open('<lexi-viewer src="/made/first.lexi" src2="/made/second.lexi" mode="difference" controls></lexi-viewer>');
+    await loaded(2);
+    assert.equal((await reportOf(page)).mode, 'difference');
+    await page.getByRole('button', { name: 'Side' }).click();
+    await page.waitForFunction(() => document.querySelector('lexi-viewer').getAttribute('mode') === 'side');
+    await page.evaluate(() => (document.querySelector('lexi-viewer').mode = 'wipe'));
+    await page.waitForFunction(() => globalThis.viewers[0].view.mode === 'wipe');
+    assert.equal((await page.evaluate(() => document.querySelector('lexi-viewer').report)).psnr, 41.27);
+    await page.evaluate(() => document.querySelector('lexi-viewer').run('split=0.2,degree=1'));
+    assert.deepEqual([(await reportOf(page)).split, (await reportOf(page)).degree], [0.2, 1]);
+    assert.match(await page.evaluate(() => document.querySelector('lexi-viewer').run('dance').catch(String)), /dance/);
+  });
+
+  test('takes new addresses, reflects its properties, and says what failed', async () => {
+    await open('<lexi-viewer src="/made/first.lexi" controls></lexi-viewer>');
+    await loaded();
+    await page.evaluate(() => (document.querySelector('lexi-viewer').src = '/made/second.lexi'));
+    await loaded(2);
+    const reflected = await page.evaluate(() => {
+      const viewer = document.querySelector('lexi-viewer');
+      [viewer.src2, viewer.alt] = ['/made/none.lexi', 'A room'];
+      return [viewer.getAttribute('src'), viewer.getAttribute('src2'), viewer.getAttribute('alt'), viewer.controls];
+    });
+    assert.deepEqual(reflected, ['/made/second.lexi', '/made/none.lexi', 'A room', true]);
+    await page.locator('.message', { hasText: 'none.lexi: the server answered 404.' }).waitFor();
+    assert.deepEqual((await heard('error')).map(({ message }) => message), ['none.lexi: the server answered 404.']);
+    assert.equal((await reportOf(page)).models[0].name, 'second.lexi', 'what it had stays');
+    await page.evaluate(() => document.querySelector('lexi-viewer').removeAttribute('src'));
+    await page.waitForFunction(() => globalThis.viewers[0].models[0] === null);
+  });
+
+  test('begins when it is seen', async () => {
+    await open(`${'<br>'.repeat(300)}<lexi-viewer src="/made/first.lexi"></lexi-viewer>`);
+    await page.waitForFunction(() => customElements.get('lexi-viewer'));
+    await page.waitForTimeout(200);
+    assert.deepEqual(await viewers(), []);
+    await page.locator('lexi-viewer').scrollIntoViewIfNeeded();
+    await loaded();
+  });
+
+  test('with a poster begins when it is asked to', async () => {
+    await open(`<lexi-viewer src="/made/first.lexi" poster="${STILL}"></lexi-viewer>`);
+    await page.locator('.poster').waitFor();
+    await page.waitForTimeout(200);
+    assert.deepEqual(await viewers(), []);
+    await page.getByRole('button', { name: 'Show in 3D' }).click();
+    await loaded();
+    assert.equal(await page.locator('.poster').isVisible(), false);
+    assert.equal(await page.getByRole('button', { name: 'Show in 3D' }).isVisible(), false);
+  });
+
+  test('leaves the wheel and keys to the page until it has the focus', async () => {
+    await open('<lexi-viewer src="/made/first.lexi"></lexi-viewer><p id="rest">text</p>');
+    await loaded();
+    await page.evaluate(() => (document.getElementById('rest').style.height = '3000px'));
+    await page.mouse.move(300, 60);
+    await page.mouse.wheel(0, 20);
+    await page.keyboard.press('4');
+    await page.waitForFunction(() => scrollY > 0);
+    const steered = () => page.evaluate(() => globalThis.viewers[0].calls.filter(([name]) => ['dolly', 'key'].includes(name)).length);
+    assert.equal(await steered(), 0);
+    await page.evaluate(() => scrollTo(0, 0));
+    await page.mouse.click(300, 60);
+    await page.mouse.wheel(0, 20);
+    await page.keyboard.press('4');
+    await page.waitForFunction(() => globalThis.viewers[0].calls.filter(([name]) => ['dolly', 'key'].includes(name)).length === 2);
+    assert.equal(await page.evaluate(() => scrollY), 0);
+  });
+
+  test('frees what it has when it is removed, and begins again when it is put back', async () => {
+    await open('<lexi-viewer src="/made/first.lexi"></lexi-viewer><lexi-viewer src="/made/second.lexi"></lexi-viewer>');
+    await loaded(2);
+    await page.evaluate(() => {
+      globalThis.kept = document.querySelector('lexi-viewer');
+      kept.remove();
+    });
+    await page.waitForFunction(() => globalThis.viewers.filter(({ freed }) => freed).length === 1);
+    await page.keyboard.press('w');
+    await page.evaluate(() => document.body.append(globalThis.kept));
+    await loaded(3);
+    assert.deepEqual((await viewers()).sort(), [false, false, true]);
+  });
+
+  test('frees what it has when it is removed at once', async () => {
+    await open('<lexi-viewer></lexi-viewer>');
+    await page.evaluate(async (address) => {
+      for (let wait = 0; wait < 12; wait++) {
+        const viewer = document.createElement('lexi-viewer');
+        viewer.src = address;
+        document.body.append(viewer);
+        viewer.start();
+        await new Promise((go) => setTimeout(go, wait));
+        viewer.remove();
+      }
+    }, '/made/first.lexi');
+    await page.waitForFunction(() => globalThis.viewers.filter(({ freed }) => !freed).length <= 1);
+    assert.deepEqual(await heard('error'), []);
+  });
+
+  test('without WebGPU says so at once and shows its poster', async () => {
+    await writeFile(join(server.made, 'host.html'), HOST(`<lexi-viewer src="/made/first.lexi" poster="${STILL}"></lexi-viewer>`));
+    page = await newPage(browser);
+    await page.addInitScript(() => delete Navigator.prototype.gpu);
+    await page.goto(`${server.url}/made/host.html`);
+    await page.getByText('This browser has no WebGPU').waitFor();
+    assert.equal(await page.locator('.poster').isVisible(), true);
+    assert.equal((await heard('error')).length, 1);
+  });
+
+  test('opens a file by its function', async () => {
+    await open('<lexi-viewer></lexi-viewer>');
+    const whole = await page.evaluate((text) => document.querySelector('lexi-viewer').open(new File([text], 'own.lexi')), scene('own'));
+    assert.equal(whole, true);
+    assert.equal((await reportOf(page)).models[0].name, 'own.lexi');
+  });
+});
+
+describe('the module of <lexi-viewer>', () => {
+  it('can be loaded where there is no browser', async () => {
+    // The session comes with the package; the element asks for it only when a scene is opened.
+    const { LexiViewer } = await import('../src/viewer/element.js').catch((error) => {
+      if (/session\.js/.test(error.message)) return { LexiViewer: class {} };
+      throw error;
+    });
+    assert.equal(typeof LexiViewer, 'function');
+  });
+});
