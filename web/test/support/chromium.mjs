@@ -18,25 +18,25 @@ export const npm = process.env.LEXISPLAT_NPM && resolve(process.env.LEXISPLAT_NP
 const EXECUTABLE = process.env.CHROMIUM ?? '/usr/bin/chromium';
 // Without both SwiftShader flags compute works, but a canvas of WebGPU stays white.
 const FLAGS = [
-    '--enable-unsafe-webgpu',
-    '--enable-features=Vulkan',
-    '--use-vulkan=swiftshader',
-    '--use-angle=swiftshader',
-    '--no-sandbox',
-    '--no-first-run',
-    '--disable-background-networking',
-    '--disable-component-update',
-    '--disable-sync',
-    '--disable-quic',
+  '--enable-unsafe-webgpu',
+  '--enable-features=Vulkan',
+  '--use-vulkan=swiftshader',
+  '--use-angle=swiftshader',
+  '--no-sandbox',
+  '--no-first-run',
+  '--disable-background-networking',
+  '--disable-component-update',
+  '--disable-sync',
+  '--disable-quic',
 ];
 const TYPES = {
-    '.css': 'text/css',
-    '.html': 'text/html; charset=utf-8',
-    '.js': 'text/javascript',
-    '.json': 'application/json',
-    '.mjs': 'text/javascript',
-    '.png': 'image/png',
-    '.wasm': 'application/wasm',
+  '.css': 'text/css',
+  '.html': 'text/html; charset=utf-8',
+  '.js': 'text/javascript',
+  '.json': 'application/json',
+  '.mjs': 'text/javascript',
+  '.png': 'image/png',
+  '.wasm': 'application/wasm',
 };
 // Pieces of a body, so small that a held rate is even: bytes.
 const PIECE = 16 * 1024;
@@ -47,9 +47,9 @@ const PIECE = 16 * 1024;
  * @returns {Promise<import('playwright-core').Browser>}
  */
 export async function launch(more = []) {
-    if (!npm) throw new Error('LEXISPLAT_NPM names no folder of node_modules with playwright-core');
-    const { chromium } = createRequire(join(npm, 'x.js'))('playwright-core');
-    return chromium.launch({ executablePath: EXECUTABLE, args: [...FLAGS, ...more] });
+  if (!npm) throw new Error('LEXISPLAT_NPM names no folder of node_modules with playwright-core');
+  const { chromium } = createRequire(join(npm, 'x.js'))('playwright-core');
+  return chromium.launch({ executablePath: EXECUTABLE, args: [...FLAGS, ...more] });
 }
 
 /**
@@ -61,72 +61,72 @@ export async function launch(more = []) {
  *     slash at its end; requests lists what was asked for, in order
  */
 export async function serve(folders, { rate } = {}) {
-    const roots = Object.entries(typeof folders === 'string' ? { '/': folders } : folders)
-        .map(([path, folder]) => ({ path: path.replace(/\/*$/, ''), folder: resolve(folder) }))
-        .sort((a, b) => b.path.length - a.path.length);
-    const requests = [];
-    const link = { free: 0 };
-    const server = createServer((request, response) => {
-        answer(roots, requests, request, response, rate && { rate, link }).catch(() => response.destroy());
+  const roots = Object.entries(typeof folders === 'string' ? { '/': folders } : folders)
+    .map(([path, folder]) => ({ path: path.replace(/\/*$/, ''), folder: resolve(folder) }))
+    .sort((a, b) => b.path.length - a.path.length);
+  const requests = [];
+  const link = { free: 0 };
+  const server = createServer((request, response) => {
+    answer(roots, requests, request, response, rate && { rate, link }).catch(() => response.destroy());
+  });
+  await new Promise((done) => server.listen(0, '127.0.0.1', done));
+  const close = () =>
+    new Promise((done) => {
+      server.close(done);
+      server.closeAllConnections();
     });
-    await new Promise((done) => server.listen(0, '127.0.0.1', done));
-    const close = () =>
-        new Promise((done) => {
-            server.close(done);
-            server.closeAllConnections();
-        });
-    return { url: `http://localhost:${server.address().port}`, requests, close };
+  return { url: `http://localhost:${server.address().port}`, requests, close };
 }
 
 async function answer(roots, requests, request, response, limit) {
-    const path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);
-    const range = request.headers.range;
-    requests.push({ path, range });
-    // Browsers ask for it by themselves, and a 404 would be an error in the page's console.
-    if (path === '/favicon.ico') return void response.writeHead(204).end();
-    const file = found(roots, path);
-    const info = file && (await stat(file).catch(() => undefined));
-    if (!info?.isFile()) return void response.writeHead(404).end();
+  const path = decodeURIComponent(new URL(request.url, 'http://localhost').pathname);
+  const range = request.headers.range;
+  requests.push({ path, range });
+  // Browsers ask for it by themselves, and a 404 would be an error in the page's console.
+  if (path === '/favicon.ico') return void response.writeHead(204).end();
+  const file = found(roots, path);
+  const info = file && (await stat(file).catch(() => undefined));
+  if (!info?.isFile()) return void response.writeHead(404).end();
 
-    const headers = {
-        'content-type': TYPES[extname(file)] ?? 'application/octet-stream',
-        'accept-ranges': 'bytes',
-        'cache-control': 'no-store',
-    };
-    const span = range === undefined ? { start: 0, end: info.size - 1 } : spanOf(range, info.size);
-    if (!span) return void response.writeHead(416, { 'content-range': `bytes */${info.size}` }).end();
-    headers['content-length'] = Math.max(0, span.end - span.start + 1);
-    if (range !== undefined) headers['content-range'] = `bytes ${span.start}-${span.end}/${info.size}`;
-    response.writeHead(range === undefined ? 200 : 206, headers);
-    if (request.method === 'HEAD' || headers['content-length'] === 0) return void response.end();
-    const body = createReadStream(file, { ...span, highWaterMark: PIECE });
-    await pipeline(limit ? held(body, limit) : body, response);
+  const headers = {
+    'content-type': TYPES[extname(file)] ?? 'application/octet-stream',
+    'accept-ranges': 'bytes',
+    'cache-control': 'no-store',
+  };
+  const span = range === undefined ? { start: 0, end: info.size - 1 } : spanOf(range, info.size);
+  if (!span) return void response.writeHead(416, { 'content-range': `bytes */${info.size}` }).end();
+  headers['content-length'] = Math.max(0, span.end - span.start + 1);
+  if (range !== undefined) headers['content-range'] = `bytes ${span.start}-${span.end}/${info.size}`;
+  response.writeHead(range === undefined ? 200 : 206, headers);
+  if (request.method === 'HEAD' || headers['content-length'] === 0) return void response.end();
+  const body = createReadStream(file, { ...span, highWaterMark: PIECE });
+  await pipeline(limit ? held(body, limit) : body, response);
 }
 
 function found(roots, path) {
-    for (const root of roots) {
-        if (path === root.path) return root.folder;
-        if (!path.startsWith(`${root.path}/`)) continue;
-        const file = normalize(join(root.folder, path.slice(root.path.length), path.endsWith('/') ? 'index.html' : ''));
-        return file.startsWith(root.folder + sep) ? file : undefined;
-    }
+  for (const root of roots) {
+    if (path === root.path) return root.folder;
+    if (!path.startsWith(`${root.path}/`)) continue;
+    const file = normalize(join(root.folder, path.slice(root.path.length), path.endsWith('/') ? 'index.html' : ''));
+    return file.startsWith(root.folder + sep) ? file : undefined;
+  }
 }
 
 function spanOf(range, size) {
-    const [, first, last] = /^bytes=(\d*)-(\d*)$/.exec(range) ?? [];
-    if (first === undefined || (first === '' && last === '')) return undefined;
-    const start = first === '' ? Math.max(0, size - Number(last)) : Number(first);
-    const end = first === '' || last === '' ? size - 1 : Math.min(Number(last), size - 1);
-    return start <= end ? { start, end } : undefined;
+  const [, first, last] = /^bytes=(\d*)-(\d*)$/.exec(range) ?? [];
+  if (first === undefined || (first === '' && last === '')) return undefined;
+  const start = first === '' ? Math.max(0, size - Number(last)) : Number(first);
+  const end = first === '' || last === '' ? size - 1 : Math.min(Number(last), size - 1);
+  return start <= end ? { start, end } : undefined;
 }
 
 // All answers share one link: each piece takes its time on it, after the pieces before.
 async function* held(stream, { rate, link }) {
-    for await (const piece of stream) {
-        link.free = Math.max(link.free, performance.now()) + (1000 * piece.length) / rate;
-        await wait(link.free - performance.now());
-        yield piece;
-    }
+  for await (const piece of stream) {
+    link.free = Math.max(link.free, performance.now()) + (1000 * piece.length) / rate;
+    await wait(link.free - performance.now());
+    yield piece;
+  }
 }
 
 /**
@@ -136,7 +136,7 @@ async function* held(stream, { rate, link }) {
  * @returns {Promise<{width: number, height: number, data: Uint8Array}>} data: 4 bytes a pixel, red, green, blue, alpha
  */
 export async function shot(page, selector) {
-    return decodePng(await page.locator(selector).screenshot({ animations: 'disabled' }));
+  return decodePng(await page.locator(selector).screenshot({ animations: 'disabled' }));
 }
 
 /**
@@ -144,8 +144,8 @@ export async function shot(page, selector) {
  * @returns {number} PSNR in dB; Infinity where they are the same
  */
 export function psnr(a, b) {
-    if (a.width !== b.width || a.height !== b.height) throw new Error('the pictures are not of one size');
-    let sum = 0;
-    for (let i = 0; i < a.data.length; i++) if (i % 4 !== 3) sum += (a.data[i] - b.data[i]) ** 2;
-    return 10 * Math.log10((255 ** 2 * 3 * a.width * a.height) / sum);
+  if (a.width !== b.width || a.height !== b.height) throw new Error('the pictures are not of one size');
+  let sum = 0;
+  for (let i = 0; i < a.data.length; i++) if (i % 4 !== 3) sum += (a.data[i] - b.data[i]) ** 2;
+  return 10 * Math.log10((255 ** 2 * 3 * a.width * a.height) / sum);
 }
