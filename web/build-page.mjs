@@ -1,6 +1,6 @@
 // Makes the viewer's page of one file: HTML, style, program, worker and WebAssembly, for any server and from disk.
 //
-//   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html; gzipped if it ends so
+//   node build-page.mjs [--out FILE]        writes FILE, or ../crates/lexisplat-cli/assets/viewer.html.gz; gzipped if it ends so
 //
 // It needs esbuild, from the folder of node_modules that LEXISPLAT_NPM names or from the one beside this file. What is
 // replaced in the written file to give it a scene is said at the head of src/viewer/page.html.
@@ -14,7 +14,7 @@ import { parseArgs } from 'node:util';
 import { gzipSync } from 'node:zlib';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
-const OUT = here('../crates/lexisplat-cli/assets/viewer.html');
+const OUT = here('../crates/lexisplat-cli/assets/viewer.html.gz');
 // What browsers with WebGPU understand.
 const TARGET = 'es2022';
 // Each is in the page once, so that a scene can be put in by replacing text.

@@ -1,12 +1,16 @@
 //! The page of `lexisplat html`: the built viewer with scenes put into it.
 
 use std::borrow::Cow;
+use std::io::Read;
+use std::sync::OnceLock;
 
+use anyhow::{Context, Result};
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD as BASE64;
+use flate2::read::GzDecoder;
 
-/// The viewer, built by `web/build-page.mjs`. Each of the texts below is in it once.
-const VIEWER: &str = include_str!("../assets/viewer.html");
+/// The viewer, built by `web/build-page.mjs`, after gzip. Each of the texts below is in it once.
+const VIEWER: &[u8] = include_bytes!("../assets/viewer.html.gz");
 
 const TITLE: &str = "<title>lexisplat</title>";
 const POSTER: &str = "data-poster=\"\"";
@@ -36,7 +40,11 @@ pub(crate) struct Page<'a> {
 
 impl Page<'_> {
     /// The page as HTML, in pieces that follow one another.
-    pub(crate) fn pieces(&self) -> Vec<Cow<'static, str>> {
+    ///
+    /// # Errors
+    /// If the viewer in the program is damaged.
+    pub(crate) fn pieces(&self) -> Result<Vec<Cow<'static, str>>> {
+        let viewer = viewer()?;
         let poster = self.poster.map(|poster| {
             format!("data-poster=\"data:{};base64,{}\"", poster.kind, BASE64.encode(poster.bytes))
         });
@@ -54,19 +62,30 @@ impl Page<'_> {
         }
         let mut placed: Vec<(usize, usize, String)> = edits
             .into_iter()
-            .filter_map(|(text, by)| VIEWER.find(&text).map(|at| (at, at + text.len(), by)))
+            .filter_map(|(text, by)| viewer.find(&text).map(|at| (at, at + text.len(), by)))
             .collect();
         placed.sort_unstable_by_key(|edit| edit.0);
         let mut pieces = Vec::new();
         let mut from = 0;
         for (start, end, by) in placed {
-            pieces.push(Cow::Borrowed(VIEWER.get(from..start).unwrap_or_default()));
+            pieces.push(Cow::Borrowed(viewer.get(from..start).unwrap_or_default()));
             pieces.push(Cow::Owned(by));
             from = end;
         }
-        pieces.push(Cow::Borrowed(VIEWER.get(from..).unwrap_or_default()));
-        pieces
+        pieces.push(Cow::Borrowed(viewer.get(from..).unwrap_or_default()));
+        Ok(pieces)
     }
+}
+
+/// The viewer's page.
+fn viewer() -> Result<&'static str> {
+    static PAGE: OnceLock<String> = OnceLock::new();
+    if let Some(page) = PAGE.get() {
+        return Ok(page);
+    }
+    let mut page = String::new();
+    GzDecoder::new(VIEWER).read_to_string(&mut page).context("the viewer in this program is damaged")?;
+    Ok(PAGE.get_or_init(|| page))
 }
 
 /// `text` where HTML expects text or the value of an attribute in double quotes.
@@ -88,14 +107,15 @@ mod tests {
     use super::*;
 
     /// Most bytes of the viewer in the program.
-    const MOST: usize = 1 << 20;
+    const MOST: usize = 1_000_000;
 
     #[test]
     fn the_viewer_is_small_and_has_each_place_once() {
         assert!(VIEWER.len() <= MOST, "{} bytes", VIEWER.len());
         let scenes = SCENES.map(|(id, rest)| format!("{id}{rest}"));
+        let viewer = viewer().unwrap();
         for place in [TITLE, POSTER, WORDS].into_iter().chain(scenes.iter().map(String::as_str)) {
-            assert_eq!(VIEWER.matches(place).count(), 1, "{place}");
+            assert_eq!(viewer.matches(place).count(), 1, "{place}");
         }
     }
 
@@ -108,7 +128,7 @@ mod tests {
             words: "mode=wipe",
             scenes: vec![("a\".lexi", b"first"), ("b.lexi", b"second")],
         };
-        let html = page.pieces().concat();
+        let html = page.pieces().unwrap().concat();
         for text in [
             "<title>a &lt;b&gt; &amp; &quot;c&quot;</title>",
             "data-poster=\"data:image/png;base64,iVBORw==\"",
@@ -119,6 +139,6 @@ mod tests {
             assert_eq!(html.matches(text).count(), 1, "{text}");
         }
         let empty = Page { title: "lexisplat", ..Page::default() };
-        assert_eq!(empty.pieces().concat(), VIEWER);
+        assert_eq!(empty.pieces().unwrap().concat(), viewer().unwrap());
     }
 }

@@ -158,7 +158,7 @@ fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common
         words: "",
         scenes: vec![(FILES[1], &bytes)],
     };
-    write_pieces(path, &viewer.pieces(), common.overwrite)?;
+    write_pieces(path, &viewer.pieces()?, common.overwrite)?;
     Ok(())
 }
 

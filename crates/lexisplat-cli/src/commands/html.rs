@@ -64,7 +64,7 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
         words: &args.actions,
         scenes: names.iter().map(String::as_str).zip(files.iter().map(|(_, bytes)| &**bytes)).collect(),
     };
-    let pieces = page.pieces();
+    let pieces = page.pieces()?;
     let bytes = write_pieces(&output, &pieces, common.overwrite)?;
     if is_pipe(&output) {
         return Ok(());
