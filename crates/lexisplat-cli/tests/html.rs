@@ -24,7 +24,10 @@ fn a_page_holds_the_scene_and_a_picture_of_it() {
     let page = std::fs::read_to_string(folder.path("scene.html")).unwrap();
     assert_eq!(report["bytes"], page.len());
     assert!(page.contains("<title>scene</title>"), "the scene's name");
-    assert_eq!(held(&page, "id=\"scene\" data-name=\"scene.lexi\">"), std::fs::read(folder.path("scene.lexi")).unwrap());
+    assert_eq!(
+        held(&page, "id=\"scene\" data-name=\"scene.lexi\">"),
+        std::fs::read(folder.path("scene.lexi")).unwrap()
+    );
     let poster = held(&page, "data-poster=\"data:image/jpeg;base64,");
     let poster = image::load_from_memory(&poster).unwrap();
     assert_eq!(poster.width(), 640);
@@ -40,10 +43,18 @@ fn two_scenes_are_compared_and_options_are_kept() {
     let args = ["html", "scene.ply", "scene.lexi", "-o", "both.html", "--title", "a & b", "--no-poster"];
     folder.run(&[&args[..], &["--actions", "mode=wipe,split=0.25"]].concat());
     let page = std::fs::read_to_string(folder.path("both.html")).unwrap();
-    assert!(page.contains("<title>a &amp; b</title>") && page.contains("data-words=\"mode=wipe,split=0.25\""));
+    assert!(
+        page.contains("<title>a &amp; b</title>") && page.contains("data-words=\"mode=wipe,split=0.25\"")
+    );
     assert!(page.contains("data-poster=\"\""));
-    assert_eq!(held(&page, "id=\"scene\" data-name=\"scene.ply\">"), std::fs::read(folder.path("scene.ply")).unwrap());
-    assert_eq!(held(&page, "id=\"scene2\" data-name=\"scene.lexi\">"), std::fs::read(folder.path("scene.lexi")).unwrap());
+    assert_eq!(
+        held(&page, "id=\"scene\" data-name=\"scene.ply\">"),
+        std::fs::read(folder.path("scene.ply")).unwrap()
+    );
+    assert_eq!(
+        held(&page, "id=\"scene2\" data-name=\"scene.lexi\">"),
+        std::fs::read(folder.path("scene.lexi")).unwrap()
+    );
 }
 
 #[test]

@@ -68,9 +68,11 @@ impl Feed {
     pub fn header(&self) -> Option<String> {
         let (head, outline) = (self.feed.head()?, self.feed.outline()?);
         let end = outline.ranges.iter().map(|range| range.bytes.end).max().unwrap_or(0);
-        let reached = head.reached.as_ref().map(|reached| json!({
-            "meanPsnr": reached.mean_psnr, "minPsnr": reached.min_psnr, "views": reached.views,
-        }));
+        let reached = head.reached.as_ref().map(|reached| {
+            json!({
+                "meanPsnr": reached.mean_psnr, "minPsnr": reached.min_psnr, "views": reached.views,
+            })
+        });
         let header = json!({
             "version": PACKED_VERSION,
             "layout": "packed",
@@ -192,7 +194,9 @@ impl Feed {
         let chunks = self.feed.outline().map(|outline| outline.chunks.clone()).unwrap_or_default();
         let mut kept = 0;
         for (c, chunk) in chunks.iter().enumerate() {
-            let (Some(done), Some(given_up)) = (self.done.get_mut(c), self.given_up.get_mut(c)) else { break };
+            let (Some(done), Some(given_up)) = (self.done.get_mut(c), self.given_up.get_mut(c)) else {
+                break;
+            };
             if chunk.first + chunk.gaussians > gaussians && *done == Done::Nothing {
                 self.feed.forget(c);
                 (*done, *given_up) = (Done::Final, true);

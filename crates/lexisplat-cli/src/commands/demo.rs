@@ -18,7 +18,8 @@ use super::compress::error_line;
 use super::html;
 use crate::args::{Common, Demo};
 use crate::files::{
-    check_free, input, make_folder, new_output, note, tell, view_name, write_bytes, write_picture, write_pieces,
+    check_free, input, make_folder, new_output, note, tell, view_name, write_bytes, write_picture,
+    write_pieces,
 };
 use crate::page::{Page, Poster};
 use crate::progress::Bars;

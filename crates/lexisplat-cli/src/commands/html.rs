@@ -78,7 +78,11 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
         "poster_bytes": poster.as_ref().map(|(bytes, _)| bytes.len()),
     });
     tell(common, json, || {
-        Ok(format!("wrote {name}: {}, of it scenes of {}\n", format::bytes(bytes), format::bytes(scene_bytes)))
+        Ok(format!(
+            "wrote {name}: {}, of it scenes of {}\n",
+            format::bytes(bytes),
+            format::bytes(scene_bytes)
+        ))
     })
 }
 
@@ -103,7 +107,11 @@ fn scene_name(path: &Path) -> String {
 }
 
 /// The bytes and the media type of the still picture.
-fn poster(args: &Html, scene: Option<&SceneFile>, common: &Common) -> Result<Option<(Vec<u8>, &'static str)>> {
+fn poster(
+    args: &Html,
+    scene: Option<&SceneFile>,
+    common: &Common,
+) -> Result<Option<(Vec<u8>, &'static str)>> {
     if let Some(path) = &args.poster {
         let (name, bytes) = input(path, common)?;
         let kind = match &*bytes {
