@@ -1,5 +1,5 @@
 /**
- * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [viewer]`, both without arguments.
+ * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [files] [viewer]`, all without arguments.
  *
  * It needs the Rust toolchain with the target wasm32-unknown-unknown. With the npm package `binaryen` in node_modules, or in
  * the folder that LEXISPLAT_NPM names, the result is optimised further.
@@ -23,8 +23,15 @@ const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to
 /** Most bytes of the decoder and its JavaScript after gzip -9. */
 const MOST_DECODER = 150_000;
 
-/** The two builds: features of the crate, and the level of wasm-opt. */
-const BUILDS = { decoder: { features: [], optimise: '-Os' }, viewer: { features: ['viewer'], optimise: '-Oz' } };
+/**
+ * The builds, their features of the crate, and what wasm-opt does: `decoder` decodes packed files of version 3, `files` all
+ * other .lexi files, and `viewer` is what the viewer is made of.
+ */
+const BUILDS = {
+  decoder: { features: ['feed'], optimise: ['-O3', '-Oz'] },
+  files: { features: ['files'], optimise: ['-Oz'] },
+  viewer: { features: ['viewer'], optimise: ['-Oz'] },
+};
 
 function run(program, args, env = {}) {
   const { status, error } = spawnSync(program, args, { stdio: 'inherit', env: { ...process.env, ...env } });
@@ -38,7 +45,7 @@ function build(name) {
   const { features, optimise } = BUILDS[name];
   const cargo = ['build', '--locked', '--profile', 'wasm', '--target', 'wasm32-unknown-unknown', '-p', 'lexisplat-web', '--lib'];
   cargo.push('--manifest-path', join(root, 'Cargo.toml'), '--target-dir', target, '--no-default-features');
-  if (features.length > 0) cargo.push('--features', features.join(','));
+  cargo.push('--features', features.join(','));
   run('cargo', cargo, { RUSTFLAGS: FEATURES });
   const built = join(target, 'wasm32-unknown-unknown/wasm/lexisplat_web.wasm');
   const folder = join(web, 'wasm');
@@ -48,7 +55,7 @@ function build(name) {
   const wasm = join(folder, `${name}_bg.wasm`);
   const optimiser = join(modules, 'binaryen/bin/wasm-opt');
   if (existsSync(optimiser)) {
-    run(process.execPath, [optimiser, wasm, '-o', wasm, optimise, ...ENABLED, '--strip-debug', '--strip-producers']);
+    run(process.execPath, [optimiser, wasm, '-o', wasm, ...optimise, ...ENABLED, '--strip-debug', '--strip-producers']);
   } else {
     console.warn(`${name}: not optimised further, because binaryen is not in ${modules}`);
   }

@@ -4,14 +4,14 @@ use std::ops::Range;
 
 use super::FeedOptions;
 use super::run::Run;
-use crate::packed::{Decoder, Held, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::packed::{Held, LayeredChunks, Outline, PackedHead, RangeKind, RangeOutline};
 use crate::support::error::{Error, FormatError, Result};
 
 /// What a file is decoded with, and its ranges.
 #[derive(Debug)]
 pub(super) struct Ranges {
     pub(super) head: PackedHead,
-    pub(super) decoder: Decoder,
+    pub(super) decoder: LayeredChunks,
     pub(super) outline: Outline,
     /// Where the data start in the file.
     data_start: u64,
@@ -40,7 +40,7 @@ enum State {
 impl Ranges {
     pub(super) fn new(
         head: PackedHead,
-        decoder: Decoder,
+        decoder: LayeredChunks,
         outline: Outline,
         data_start: u64,
         options: &FeedOptions,
