@@ -185,7 +185,9 @@ impl Feed {
         let chunks = self.feed.outline().map(|outline| outline.chunks.clone()).unwrap_or_default();
         let mut kept = 0;
         for (c, chunk) in chunks.iter().enumerate() {
-            let (Some(done), Some(given_up)) = (self.done.get_mut(c), self.given_up.get_mut(c)) else { break };
+            let (Some(done), Some(given_up)) = (self.done.get_mut(c), self.given_up.get_mut(c)) else {
+                break;
+            };
             if chunk.first + chunk.gaussians > gaussians && *done == Done::Nothing {
                 self.feed.forget(c);
                 (*done, *given_up) = (Done::Final, true);

@@ -1,8 +1,8 @@
 //! Parts of scenes as the GPU holds them, made in workers.
 
 use js_sys::{Function, Uint8Array};
-use lexisplat::ply::ReadOptions;
 use lexisplat::Silent;
+use lexisplat::ply::ReadOptions;
 use lexisplat_formats::{Opened, Siblings};
 use lexisplat_render::Scene;
 use lexisplat_render::gpu::{SceneForm, ScenePart};
@@ -42,7 +42,8 @@ impl Chunk {
 pub fn open_scene(name: &str, bytes: &[u8], on_form: &Function, on_part: &Function) -> Result<(), JsValue> {
     let options = ReadOptions::default().with_limits(limits());
     let refused = |error: lexisplat::Error| JsValue::from(thrown(error));
-    let opened = lexisplat_formats::open(name, bytes, Siblings::NONE, &options, false, &Silent).map_err(refused)?;
+    let opened =
+        lexisplat_formats::open(name, bytes, Siblings::NONE, &options, false, &Silent).map_err(refused)?;
     let source = opened.source();
     let head = json!({
         "layout": layout(&opened),
@@ -59,7 +60,9 @@ pub fn open_scene(name: &str, bytes: &[u8], on_form: &Function, on_part: &Functi
     };
     let give_part = |index: usize, scene: &Scene<'_>| -> Result<(), JsValue> {
         let number = |n: usize| JsValue::from(u32::try_from(n).unwrap_or(u32::MAX));
-        on_part.call3(&JsValue::NULL, &number(index), &bytes_of(scene)?.into(), &number(scene.len())).map(drop)
+        on_part
+            .call3(&JsValue::NULL, &number(index), &bytes_of(scene)?.into(), &number(scene.len()))
+            .map(drop)
     };
     if let Opened::Lexi(reader) = &opened {
         // Codes stay codes.

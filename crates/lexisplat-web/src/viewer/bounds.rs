@@ -93,7 +93,11 @@ impl Bounds {
             }
         }
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "below the number of points")]
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "below the number of points"
+        )]
         let passed = (seen.len() as f64 * PASSED) as usize;
         seen.get(passed).map(|(_, at)| DVec3::from_array(at.map(f64::from)))
     }

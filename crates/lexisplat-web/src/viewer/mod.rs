@@ -67,8 +67,13 @@ impl Viewer {
         let not_here = |command: &&Command| {
             matches!(
                 command,
-                Command::Open(..) | Command::Drop { .. } | Command::Compress(_) | Command::Screenshot(_)
-                    | Command::Report | Command::Quit | Command::Swap
+                Command::Open(..)
+                    | Command::Drop { .. }
+                    | Command::Compress(_)
+                    | Command::Screenshot(_)
+                    | Command::Report
+                    | Command::Quit
+                    | Command::Swap
             )
         };
         if let Some(command) = commands.iter().find(not_here) {
@@ -241,7 +246,8 @@ impl Viewer {
         let (arrangement, options) = (self.state.arrangement(), self.state.options());
         let drawn = self.drawn.as_ref();
         let camera = self.state.camera(self.size.0, self.size.1);
-        let scenes = self.screen.scene_bytes().map(|bytes| bytes.map(|b| json!({"geometry": b.geometry, "sh": b.sh})));
+        let scenes =
+            self.screen.scene_bytes().map(|bytes| bytes.map(|b| json!({"geometry": b.geometry, "sh": b.sh})));
         let value = json!({
             "device": self.screen.device_name(),
             "mode": arrangement.mode.name(),

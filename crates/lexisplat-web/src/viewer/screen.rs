@@ -69,7 +69,8 @@ impl Screen {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::BROWSER_WEBGPU;
         let instance = wgpu::Instance::new(descriptor);
-        let surface = instance.create_surface(wgpu::SurfaceTarget::Canvas(canvas)).map_err(|e| e.to_string())?;
+        let surface =
+            instance.create_surface(wgpu::SurfaceTarget::Canvas(canvas)).map_err(|e| e.to_string())?;
         let adapter = instance
             .request_adapter(&wgpu::RequestAdapterOptions {
                 power_preference: wgpu::PowerPreference::HighPerformance,
@@ -83,7 +84,8 @@ impl Screen {
         let gpu = Gpu::from_device(&adapter, device, queue);
         let capabilities = surface.get_capabilities(&adapter);
         // Pictures are sRGB already.
-        let format = capabilities.formats.iter().find(|format| !format.is_srgb()).or(capabilities.formats.first());
+        let format =
+            capabilities.formats.iter().find(|format| !format.is_srgb()).or(capabilities.formats.first());
         let format = *format.ok_or_else(|| "the canvas has no format that can be drawn to".to_owned())?;
         let configuration = surface
             .get_default_config(&adapter, width, height)
@@ -138,7 +140,8 @@ impl Screen {
         let (mut pictures, mut visible) = ([None, None], [None; 2]);
         for slot in Slot::BOTH.map(Slot::index) {
             let Some(scene) = self.scenes[slot].as_ref().filter(|_| view.wanted[slot]) else { continue };
-            let frame = self.renderer.draw_async(scene, &camera, &view.options).await.map_err(|e| e.to_string())?;
+            let frame =
+                self.renderer.draw_async(scene, &camera, &view.options).await.map_err(|e| e.to_string())?;
             let (device, queue) = (self.gpu.device(), self.gpu.queue());
             pictures[slot] = Some(Picture::copied(device, queue, &frame.pixels, frame.width, frame.height));
             visible[slot] = Some(frame.stats.visible);
@@ -161,13 +164,16 @@ impl Screen {
         let texture = match self.surface.get_current_texture() {
             CurrentSurfaceTexture::Success(texture) | CurrentSurfaceTexture::Suboptimal(texture) => texture,
             // The canvas is not seen, or will be drawn to again when it has its size.
-            CurrentSurfaceTexture::Timeout | CurrentSurfaceTexture::Occluded | CurrentSurfaceTexture::Outdated => {
+            CurrentSurfaceTexture::Timeout
+            | CurrentSurfaceTexture::Occluded
+            | CurrentSurfaceTexture::Outdated => {
                 return Ok(());
             }
             _ => return Err("the canvas was lost".to_owned()),
         };
         let target = texture.texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let mut encoder = self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let mut encoder =
+            self.gpu.device().create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let [r, g, b] = drawn.view.options.background.map(f64::from);
             let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -196,7 +202,10 @@ impl Screen {
     fn place(&self, drawn: &Drawn) -> [f32; 4] {
         let (width, height) = (self.configuration.width, self.configuration.height);
         let camera = &drawn.view.camera;
-        let own = (camera.width.saturating_mul(drawn.view.arrangement.columns()).min(width), camera.height.min(height));
+        let own = (
+            camera.width.saturating_mul(drawn.view.arrangement.columns()).min(width),
+            camera.height.min(height),
+        );
         let offset = [(width - own.0) / 2, (height - own.1) / 2];
         #[expect(clippy::cast_precision_loss, reason = "sides are far below 2^24")]
         let place = [offset[0] as f32, offset[1] as f32, own.0 as f32, own.1 as f32];
@@ -206,7 +215,8 @@ impl Screen {
     /// What is shown, in memory.
     pub(super) async fn picture(&mut self, drawn: &Drawn) -> Result<Rgb8Image> {
         let gpu = &self.gpu;
-        let composer = self.composer.get_or_insert_with(|| Composer::new(gpu.device().clone(), gpu.queue().clone()));
+        let composer =
+            self.composer.get_or_insert_with(|| Composer::new(gpu.device().clone(), gpu.queue().clone()));
         composer.compose_async(&composition(drawn)).await.map_err(|e| e.to_string())
     }
 

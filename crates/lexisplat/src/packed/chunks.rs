@@ -100,8 +100,9 @@ impl LayeredChunks {
         budget: &MemoryBudget<'_>,
     ) -> Result<(Geometry, SparseCodes)> {
         let span = self.spans.get(c).cloned().unwrap_or_default();
-        let (geometry, codes, _) =
-            decoded(&self.file, self.dictionary(), span, &mut |place| self.piece(data, c, 0, place, budget, false))?;
+        let (geometry, codes, _) = decoded(&self.file, self.dictionary(), span, &mut |place| {
+            self.piece(data, c, 0, place, budget, false)
+        })?;
         Ok((geometry, codes))
     }
 

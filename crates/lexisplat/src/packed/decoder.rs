@@ -43,7 +43,8 @@ impl Decoder {
     /// of which nothing is there are left out. `None` for version 2.
     pub(crate) fn of_prefix(head: &PackedHead, data: &[u8], whole: u64) -> Result<Option<Self>> {
         let Coding::Layered(bytes) = &head.coding else { return Ok(None) };
-        LayeredChunks::of_prefix(head, bytes, data.len() as u64, whole).map(|chunks| Some(Self::Layered(chunks)))
+        LayeredChunks::of_prefix(head, bytes, data.len() as u64, whole)
+            .map(|chunks| Some(Self::Layered(chunks)))
     }
 
     fn layered(&self) -> Option<&LayeredChunks> {

@@ -8,6 +8,7 @@ use super::header::{Header, TensorInfo};
 use super::json::{self, Json};
 use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
+use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::parallel::map_chunks;
@@ -71,7 +72,7 @@ impl<'a> Checked<'a> {
             let text = format!("truncated or too long: {there} bytes do not match the header");
             return Err(Error::malformed(file, text));
         }
-        let header_checksum = crc32fast::hash(text);
+        let header_checksum = crc32::hash(text);
         let data_start = text.len();
         let checked = Self { file, bytes: shared, data_start, header, file_bytes };
         let format = |problem| Error::format(&checked.file, problem);
@@ -100,7 +101,7 @@ impl<'a> Checked<'a> {
         let (stored, expected) = match version {
             PACKED_VERSION if checked.has(tensor::HEAD) => {
                 let (sum, head) = checked.sealed_head()?;
-                let mut crc = crc32fast::Hasher::new_with_initial_len(header_checksum, data_start as u64);
+                let mut crc = crc32::Hasher::new_with_initial_len(header_checksum, data_start as u64);
                 crc.update(head);
                 (vec![sum], crc.finalize())
             }
@@ -137,7 +138,7 @@ impl<'a> Checked<'a> {
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
-            self.view(name).map(|t| format!("{:08x}", crc32fast::hash(t.data)))
+            self.view(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
         });
         for (name, sum) in names.iter().zip(found) {
             let expected = sums
@@ -191,9 +192,7 @@ impl<'a> Checked<'a> {
 
     /// The metadata entry `key`.
     pub(super) fn text(&self, key: &str) -> Result<&str> {
-        self.header
-            .text(key)
-            .ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
+        self.header.text(key).ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
     }
 
     /// The metadata entry `key` as a number, or as `true` or `false`.
@@ -229,7 +228,8 @@ impl<'a> Checked<'a> {
     /// What `take` makes of the JSON in the metadata entry `key`, if it is what was to be there.
     pub(super) fn json<T>(&self, key: &str, take: impl FnOnce(&Json) -> Option<T>) -> Result<T> {
         let parsed = Json::parse(self.text(key)?.as_bytes());
-        let taken = parsed.and_then(|json| take(&json).ok_or_else(|| "a member is not what it should be".to_owned()));
+        let taken =
+            parsed.and_then(|json| take(&json).ok_or_else(|| "a member is not what it should be".to_owned()));
         taken.map_err(|error| self.malformed(format!("metadata '{key}': {error}")))
     }
 

@@ -90,7 +90,8 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     ];
     for (key, value) in sizes {
         if !value.is_finite() || value < 0.0 {
-            return Err(checked.malformed(format!("metadata '{key}' is {value}, not a finite size")));
+            let text = checked.text(key)?;
+            return Err(checked.malformed(format!("metadata '{key}' is {text}, not a finite size")));
         }
     }
     Ok(record)
@@ -124,8 +125,7 @@ pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     check_extra_names(checked)?;
     let mut out = Vec::new();
-    let names =
-        if checked.is_layered() { checked.names_by_place() } else { checked.names().collect() };
+    let names = if checked.is_layered() { checked.names_by_place() } else { checked.names().collect() };
     for full in names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         if !checked.is_whole() {

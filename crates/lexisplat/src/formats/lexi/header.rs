@@ -3,6 +3,7 @@
 use safetensors::Dtype;
 
 use super::json::Json;
+use crate::support::order::order;
 
 /// The member of the header that is no tensor.
 const METADATA: &str = "__metadata__";
@@ -110,9 +111,9 @@ impl Header {
 
     /// All tensors in the order in which they lie.
     pub(super) fn by_place(&self) -> Vec<&(String, TensorInfo)> {
-        let mut tensors: Vec<_> = self.tensors.iter().collect();
-        tensors.sort_unstable_by(|a, b| (a.1.data_offsets, &a.0).cmp(&(b.1.data_offsets, &b.0)));
-        tensors
+        let start = |k: usize| self.tensors.get(k).map(|tensor| tensor.1.data_offsets);
+        let places = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
+        places.into_iter().filter_map(|k| self.tensors.get(k)).collect()
     }
 
     /// The metadata entry `key`.

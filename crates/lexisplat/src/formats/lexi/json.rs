@@ -3,12 +3,15 @@
 //! Text that is no JSON is refused, and so are objects that name a member twice: one parser would take the first and another
 //! the last.
 
+use crate::support::order::order;
+
 /// Most arrays and objects within one another, as serde_json has it.
 const MOST_DEPTH: usize = 127;
 
 /// A value.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) enum Json {
+    #[default]
     Null,
     Bool(bool),
     /// A number as it is written.
@@ -218,7 +221,8 @@ impl Parser<'_> {
             members.push((name, self.value(depth)?));
             goes_on = self.goes_on(b'}')?;
         }
-        members.sort_unstable_by(|a, b| a.0.cmp(&b.0));
+        let places = order(members.len(), &mut |a, b| members[a].0.cmp(&members[b].0));
+        let members: Vec<_> = places.into_iter().map(|k| std::mem::take(&mut members[k])).collect();
         match members.array_windows().find(|[a, b]| a.0 == b.0) {
             Some([twice, _]) => Err(format!("member '{}' is there twice", twice.0.escape_debug())),
             None => Ok(Json::Object(members)),

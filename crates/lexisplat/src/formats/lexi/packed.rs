@@ -8,9 +8,7 @@ use super::checked::Checked;
 use super::fields::{check_extra_names, column, degree, extras, meta, record};
 use super::json::Json;
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{
-    CHUNK, Coding, Flat, Packed, PackedHead, ReachedRecord, TargetRecord, layered_atoms,
-};
+use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead, ReachedRecord, TargetRecord, layered_atoms};
 use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
