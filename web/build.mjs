@@ -6,7 +6,7 @@
  */
 
 import { spawnSync } from 'node:child_process';
-import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -20,6 +20,8 @@ const modules = process.env.LEXISPLAT_NPM ?? join(web, 'node_modules');
 const FEATURES = '-Ctarget-feature=+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals';
 /** The same for wasm-opt, and what wasm-bindgen uses. All its features at once make files that engines do not read yet. */
 const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to-int', 'sign-ext', 'mutable-globals', 'reference-types', 'multivalue'].map((f) => `--enable-${f}`);
+/** Comments of the JavaScript that wasm-bindgen writes: each starts and ends a line. */
+const COMMENTS = /^ *\/\*\*[^]*?\*\/\n/gm;
 /** Most bytes of the decoder and its JavaScript after gzip -9. */
 const MOST_DECODER = 150_000;
 
@@ -59,7 +61,10 @@ function build(name) {
   } else {
     console.warn(`${name}: not optimised further, because binaryen is not in ${modules}`);
   }
-  report(name, wasm, join(folder, `${name}.js`));
+  const script = join(folder, `${name}.js`);
+  // The same comments are in the types.
+  writeFileSync(script, readFileSync(script, 'utf8').replace(COMMENTS, ''));
+  report(name, wasm, script);
 }
 
 function report(name, ...files) {

@@ -198,8 +198,12 @@ impl<'a> Checked<'a> {
     /// The metadata entry `key` as a number, or as `true` or `false`.
     pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T> {
         let text = self.text(key)?;
-        let parsed = text.parse().ok().filter(|_| json::is_number(text) || matches!(text, "true" | "false"));
-        parsed.ok_or_else(|| self.malformed(format!("metadata '{key}' is '{text}'")))
+        text.parse().ok().filter(|_| is_value(text)).ok_or_else(|| self.wrong_value(key, text))
+    }
+
+    #[cold]
+    fn wrong_value(&self, key: &str, text: &str) -> Error {
+        self.malformed(format!("metadata '{key}' is '{text}'"))
     }
 
     /// The metadata entry `key`, if it is there.
@@ -313,6 +317,11 @@ impl<'a> Checked<'a> {
         let data = data.ok_or_else(|| self.malformed(format!("tensor '{name}' is too short")))?;
         Ok(bytemuck::allocation::pod_collect_to_vec(data))
     }
+}
+
+/// Whether `text` is a number as JSON writes it, or `true` or `false`.
+fn is_value(text: &str) -> bool {
+    json::is_number(text) || matches!(text, "true" | "false")
 }
 
 /// Where the header of a file ends that begins with `bytes`, by its length.

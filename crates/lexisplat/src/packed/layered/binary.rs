@@ -19,7 +19,8 @@ const HALF: u16 = 1 << (PRECISION - 1);
 pub(super) struct Odds {
     /// By how much the probability is above a half.
     above: i16,
-    seen: u8,
+    /// It counts to 255. As wide as the other one it leaves no gap, so that many odds are cleared at once.
+    seen: u16,
 }
 
 impl Odds {
@@ -29,7 +30,7 @@ impl Odds {
 
     fn learn(&mut self, bit: bool) {
         let rate = RATES[usize::from(self.seen).min(RATES.len() - 1)];
-        self.seen = self.seen.saturating_add(1);
+        self.seen = (self.seen + 1).min(u8::MAX.into());
         let zero = self.zero();
         let zero = if bit { zero - (zero >> rate) } else { zero + (((1 << PRECISION) - zero) >> rate) };
         self.above = zero.clamp(LEAST, (1 << PRECISION) - LEAST).wrapping_sub(HALF).cast_signed();

@@ -276,6 +276,7 @@ pub(in crate::packed) struct Played {
 struct Sums(Lanes<crc32::Hasher>);
 
 impl Sums {
+    #[inline(never)]
     fn add(&mut self, l: usize, numbers: &[i32]) {
         for number in numbers {
             self.0[l].update(&number.to_le_bytes());

@@ -76,6 +76,7 @@ impl Hasher {
         Self { sum, bytes }
     }
 
+    #[inline(never)]
     pub(crate) fn update(&mut self, bytes: &[u8]) {
         let tables = TABLES.get_or_init(tables);
         let (slices, rest) = bytes.as_chunks::<SLICE>();
