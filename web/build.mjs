@@ -1,12 +1,12 @@
 /**
- * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [viewer]`, both without arguments.
+ * Builds the WebAssembly of the npm package: `node build.mjs [decoder] [files] [viewer]`, all without arguments.
  *
  * It needs the Rust toolchain with the target wasm32-unknown-unknown. With the npm package `binaryen` in node_modules, or in
  * the folder that LEXISPLAT_NPM names, the result is optimised further.
  */
 
 import { spawnSync } from 'node:child_process';
-import { existsSync, mkdirSync, readFileSync, statSync } from 'node:fs';
+import { existsSync, mkdirSync, readFileSync, statSync, writeFileSync } from 'node:fs';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { gzipSync } from 'node:zlib';
@@ -20,11 +20,20 @@ const modules = process.env.LEXISPLAT_NPM ?? join(web, 'node_modules');
 const FEATURES = '-Ctarget-feature=+simd128,+bulk-memory,+nontrapping-fptoint,+sign-ext,+mutable-globals';
 /** The same for wasm-opt, and what wasm-bindgen uses. All its features at once make files that engines do not read yet. */
 const ENABLED = ['simd', 'bulk-memory', 'bulk-memory-opt', 'nontrapping-float-to-int', 'sign-ext', 'mutable-globals', 'reference-types', 'multivalue'].map((f) => `--enable-${f}`);
+/** Comments of the JavaScript that wasm-bindgen writes: each starts and ends a line. */
+const COMMENTS = /^ *\/\*\*[^]*?\*\/\n/gm;
 /** Most bytes of the decoder and its JavaScript after gzip -9. */
 const MOST_DECODER = 150_000;
 
-/** The two builds: features of the crate, and the level of wasm-opt. */
-const BUILDS = { decoder: { features: [], optimise: '-Os' }, viewer: { features: ['viewer'], optimise: '-Oz' } };
+/**
+ * The builds, their features of the crate, and what wasm-opt does: `decoder` decodes packed files of version 3, `files` all
+ * other .lexi files, and `viewer` is what the viewer is made of.
+ */
+const BUILDS = {
+  decoder: { features: ['feed'], optimise: ['-O3', '-Oz'] },
+  files: { features: ['files'], optimise: ['-Oz'] },
+  viewer: { features: ['viewer'], optimise: ['-Oz'] },
+};
 
 function run(program, args, env = {}) {
   const { status, error } = spawnSync(program, args, { stdio: 'inherit', env: { ...process.env, ...env } });
@@ -38,7 +47,7 @@ function build(name) {
   const { features, optimise } = BUILDS[name];
   const cargo = ['build', '--locked', '--profile', 'wasm', '--target', 'wasm32-unknown-unknown', '-p', 'lexisplat-web', '--lib'];
   cargo.push('--manifest-path', join(root, 'Cargo.toml'), '--target-dir', target, '--no-default-features');
-  if (features.length > 0) cargo.push('--features', features.join(','));
+  cargo.push('--features', features.join(','));
   run('cargo', cargo, { RUSTFLAGS: FEATURES });
   const built = join(target, 'wasm32-unknown-unknown/wasm/lexisplat_web.wasm');
   const folder = join(web, 'wasm');
@@ -48,11 +57,14 @@ function build(name) {
   const wasm = join(folder, `${name}_bg.wasm`);
   const optimiser = join(modules, 'binaryen/bin/wasm-opt');
   if (existsSync(optimiser)) {
-    run(process.execPath, [optimiser, wasm, '-o', wasm, optimise, ...ENABLED, '--strip-debug', '--strip-producers']);
+    run(process.execPath, [optimiser, wasm, '-o', wasm, ...optimise, ...ENABLED, '--strip-debug', '--strip-producers']);
   } else {
     console.warn(`${name}: not optimised further, because binaryen is not in ${modules}`);
   }
-  report(name, wasm, join(folder, `${name}.js`));
+  const script = join(folder, `${name}.js`);
+  // The same comments are in the types.
+  writeFileSync(script, readFileSync(script, 'utf8').replace(COMMENTS, ''));
+  report(name, wasm, script);
 }
 
 function report(name, ...files) {

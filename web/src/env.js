@@ -4,22 +4,41 @@ import * as wasm from '../wasm/decoder.js';
 import { handlerOf } from './handler.js';
 import { startWorker } from './pool.js';
 
-let compiled;
+/** What was compiled, by its address. */
+const compiled = new Map();
 
 /** The environment of the npm package: files beside this one. */
 export async function environment() {
-  compiled ??= compile(new URL('../wasm/decoder_bg.wasm', import.meta.url));
-  const module = await compiled.catch((error) => {
-    compiled = undefined;
-    throw error;
-  });
+  const module = await compiledAt(new URL('../wasm/decoder_bg.wasm', import.meta.url));
   wasm.initSync({ module });
   return {
     wasm,
     module,
     handler: () => handlerOf(wasm),
     worker: () => startWorker(new URL('./worker.js', import.meta.url)),
+    files,
   };
+}
+
+/** The same for files that are decoded whole. It is loaded when there is one. */
+async function files() {
+  const module = await compiledAt(new URL('../wasm/files_bg.wasm', import.meta.url));
+  const wasm = await import('../wasm/files.js');
+  wasm.initSync({ module });
+  return {
+    module,
+    handler: () => handlerOf(wasm),
+    worker: () => startWorker(new URL('./files-worker.js', import.meta.url)),
+  };
+}
+
+/** The module at `url`, compiled once. */
+async function compiledAt(url) {
+  if (!compiled.has(url.href)) compiled.set(url.href, compile(url));
+  return compiled.get(url.href).catch((error) => {
+    compiled.delete(url.href);
+    throw error;
+  });
 }
 
 async function compile(url) {

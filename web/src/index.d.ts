@@ -45,8 +45,6 @@ export interface Header {
   layers: number;
   /** Bytes after which the whole scene can be drawn, coarsely; of packed files. */
   firstLayerEnd?: number;
-  /** What views showed of the file, in decibels, if it was judged. */
-  reached?: { meanPsnr: number; minPsnr: number; views: number } | null;
 }
 
 /** The atoms that codes name. */

@@ -29,7 +29,8 @@ export async function openWith(env, source, options) {
   try {
     const start = await readStart(input.source, signal);
     if (start.version !== LAYERED) {
-      pool = await Pool.of(Math.min(workers, 1), env);
+      if (start.version === undefined) throw new Error(`${input.source.name}: this is not a .lexi file`);
+      pool = await Pool.of(Math.min(workers, 1), await env.files());
       return await wholeScene({ input, env, settings, pool, start });
     }
     const feed = new env.wasm.Feed(input.source.name, settings.memory, settings.shParts);
@@ -108,7 +109,6 @@ export async function readWhole(source, first, { memory, signal, onProgress }) {
 /** A scene of a file that is decoded whole: an exact layout, or version 2. */
 async function wholeScene({ input, env, settings, pool, start }) {
   const { source } = input;
-  if (start.version === undefined) throw new Error(`${source.name}: this is not a .lexi file`);
   const bytes = await readWhole(source, start.bytes, settings);
   // The header is known only once the file is decoded; what it is decoded to is chosen later, so bytes are kept until then.
   const ask = (as, transfer) => pool.ask({ type: 'whole', name: source.name, bytes: transfer ? bytes : bytes.slice(), as }, transfer ? [bytes.buffer] : []);

@@ -1,10 +1,9 @@
 //! The reader of a packed file on the main thread: it takes bytes, and says what is worth decoding.
 
-use lexisplat::lexi::{FeedOptions, LexiFeed, PACKED_VERSION};
-use serde_json::json;
+use lexisplat::lexi::{FeedOptions, Layout, LexiFeed, PACKED_VERSION};
 use wasm_bindgen::prelude::*;
 
-use crate::{job, limits, thrown};
+use crate::{header, job, limits, thrown};
 
 /// What was decoded of a chunk.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -68,26 +67,18 @@ impl Feed {
     pub fn header(&self) -> Option<String> {
         let (head, outline) = (self.feed.head()?, self.feed.outline()?);
         let end = outline.ranges.iter().map(|range| range.bytes.end).max().unwrap_or(0);
-        let reached = head.reached.as_ref().map(|reached| {
-            json!({
-                "meanPsnr": reached.mean_psnr, "minPsnr": reached.min_psnr, "views": reached.views,
-            })
-        });
-        let header = json!({
-            "version": PACKED_VERSION,
-            "layout": "packed",
-            "gaussians": head.gaussians,
-            "sourceGaussians": head.gaussians as u64 + head.removed,
-            "degree": head.degree.get(),
-            "bytes": end,
-            "atoms": head.atoms,
-            "antialiased": head.meta.antialiased,
-            "chunks": outline.chunks.len(),
-            "layers": outline.layers.len(),
-            "firstLayerEnd": outline.first_layer_end(),
-            "reached": reached,
-        });
-        Some(header.to_string())
+        let fields = [
+            ("version", PACKED_VERSION),
+            ("gaussians", head.gaussians as u64),
+            ("sourceGaussians", head.gaussians as u64 + head.removed),
+            ("degree", head.degree.get() as u64),
+            ("bytes", end),
+            ("atoms", head.atoms as u64),
+            ("chunks", outline.chunks.len() as u64),
+            ("layers", outline.layers.len() as u64),
+            ("firstLayerEnd", outline.first_layer_end()),
+        ];
+        Some(header::json(Layout::Packed, head.meta.antialiased, &fields))
     }
 
     /// The bytes at the start of the file, which a [`Decoder`](crate::Decoder) takes, once they came.

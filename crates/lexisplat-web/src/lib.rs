@@ -4,12 +4,13 @@
 //! The npm package `lexisplat` (`web/` in the repository) is what people use. Its JavaScript fetches bytes and owns the
 //! workers. What is here does the rest:
 //!
-//! | where | what |
-//! |---|---|
-//! | [`Feed`], on the main thread | takes the bytes of a file as they come, and says which chunk is worth decoding next |
-//! | [`Decoder`], in each worker | decodes chunks, which it gets as [jobs](Feed::job) |
-//! | [`Whole`], in a worker | decodes files that cannot be decoded in part |
+//! | feature | where | what |
+//! |---|---|---|
+//! | `feed` | [`Feed`], on the main thread | takes the bytes of a file as they come, and says which chunk is worth decoding next |
+//! | `feed` | [`Decoder`], in each worker | decodes chunks, which it gets as [jobs](Feed::job) |
+//! | `files` | [`Whole`], in a worker | decodes files that cannot be decoded in part |
 //!
+//! Pages load what they need: the npm package has one WebAssembly module of `feed` and one of `files`.
 //!
 //! With `viewer` there are also
 //!
@@ -21,22 +22,30 @@
 //! No function panics, whatever bytes it is given. Errors become JavaScript's `Error` with the library's message.
 
 mod chunk;
+#[cfg(feature = "feed")]
 mod decoder;
+#[cfg(feature = "feed")]
 mod feed;
+mod header;
+#[cfg(feature = "feed")]
 mod job;
 #[cfg(feature = "viewer")]
 mod parts;
 #[cfg(all(feature = "viewer", target_family = "wasm"))]
 mod viewer;
+#[cfg(feature = "files")]
 mod whole;
 
 pub use chunk::Chunk;
+#[cfg(feature = "feed")]
 pub use decoder::Decoder;
+#[cfg(feature = "feed")]
 pub use feed::Feed;
 #[cfg(feature = "viewer")]
 pub use parts::open_scene;
 #[cfg(all(feature = "viewer", target_family = "wasm"))]
 pub use viewer::Viewer;
+#[cfg(feature = "files")]
 pub use whole::Whole;
 
 use lexisplat::Limits;

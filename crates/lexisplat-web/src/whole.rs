@@ -1,11 +1,10 @@
 //! Files that are decoded whole: .lexi files of exact layouts, and packed ones of version 2.
 
 use lexisplat::{Model, lexi};
-use serde_json::json;
 use wasm_bindgen::prelude::*;
 
 use crate::chunk::Chunk;
-use crate::{limits, thrown};
+use crate::{header, limits, thrown};
 
 /// A decoded file of one chunk.
 #[wasm_bindgen]
@@ -24,21 +23,19 @@ impl Whole {
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, bytes: &[u8]) -> Result<Self, JsError> {
         let reader = lexi::LexiReader::open(name, bytes, &limits()).map_err(thrown)?;
-        let (layout, packed) = (reader.layout().to_string(), reader.packed_head());
-        let removed = packed.map_or(0, |head| head.removed);
+        let removed = reader.packed_head().map_or(0, |head| head.removed);
         let model = reader.model().map_err(thrown)?;
-        let header = json!({
-            "layout": layout,
-            "gaussians": model.len(),
-            "sourceGaussians": model.len() as u64 + removed,
-            "degree": model.degree().get(),
-            "bytes": bytes.len(),
-            "atoms": model.dictionary().len(),
-            "antialiased": model.meta().antialiased,
-            "chunks": 1,
-            "layers": 1,
-        });
-        Ok(Self { header: header.to_string(), model: Some(model) })
+        let fields = [
+            ("gaussians", model.len() as u64),
+            ("sourceGaussians", model.len() as u64 + removed),
+            ("degree", model.degree().get() as u64),
+            ("bytes", bytes.len() as u64),
+            ("atoms", model.dictionary().len() as u64),
+            ("chunks", 1),
+            ("layers", 1),
+        ];
+        let header = header::json(reader.layout(), model.meta().antialiased, &fields);
+        Ok(Self { header, model: Some(model) })
     }
 
     /// What the file says of itself, as JSON.

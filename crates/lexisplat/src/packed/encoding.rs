@@ -13,6 +13,7 @@ use super::stream::BitCounts;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
 use crate::sparse::tally::{CompressReport, Tally};
+use crate::support::crc32;
 use crate::support::error::{Error, Result};
 use crate::support::limits::Limits;
 use crate::support::spill::{Spill, SpillTo, Woven};
@@ -161,7 +162,7 @@ impl Encoding {
             for (bytes, integers) in &ranges {
                 let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
                 let length = u32::try_from(bytes.len()).map_err(too_long)?;
-                let checksum = crc32fast::hash(bytes);
+                let checksum = crc32::hash(bytes);
                 chunk.ranges.push(Range { start: at, length, checksum, integers: *integers });
                 at += u64::from(length);
                 spill.push(bytes)?;

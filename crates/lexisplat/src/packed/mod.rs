@@ -12,6 +12,7 @@ mod appearance;
 mod atoms;
 mod bits;
 mod canonical;
+mod chunks;
 mod codebook;
 mod coder;
 mod decoder;
@@ -41,8 +42,9 @@ mod stream;
 mod unpack;
 
 pub(crate) use canonical::{Bounds, Grid, MortonKey};
+pub(crate) use chunks::LayeredChunks;
 pub(crate) use decoder::Decoder;
-pub(crate) use held::{Data, Held};
+pub(crate) use held::{Data, Held, Wish};
 pub(crate) use layered::layered_atoms;
 pub(crate) use pack::{check, expected_step};
 pub(crate) use parts::{Part, PartPacker, Whole};

@@ -6,6 +6,7 @@ use half::slice::HalfFloatSliceExt;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::pursuit::ValueType;
 use crate::support::error::{Error, Result};
+use crate::support::maths::name_of;
 
 /// Gaussians between two stored offsets. To find a column, fewer than this many counts are added up.
 const GAUSSIANS_PER_CHECKPOINT: usize = 64;
@@ -298,7 +299,7 @@ impl SparseCodes {
         if !values.are_finite()
             && let Some(k) = (0..values.len()).find(|&k| !values.get(k).is_finite())
         {
-            return Err(Error::parameter("codes.values", values.get(k), "finite values"));
+            return Err(Error::parameter("codes.values", name_of(values.get(k)), "finite values"));
         }
         let mut checkpoints = Vec::with_capacity(counts.len().div_ceil(GAUSSIANS_PER_CHECKPOINT));
         let mut offset = 0_u64;

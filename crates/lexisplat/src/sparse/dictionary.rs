@@ -34,13 +34,29 @@ impl Dictionary {
             let expected = format!("1 to {MAX_ATOMS} atoms of {dim} values");
             return Err(Error::parameter("atoms", format!("{} values", atoms.len()), expected));
         }
-        for (j, atom) in atoms.chunks_exact(dim).enumerate() {
-            let norm = atom.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
-            if norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE {
-                return Err(Error::parameter("atoms", format!("norm {norm} of atom {j}"), "a unit norm"));
+        let dictionary = Self { degree, atoms };
+        match dictionary.odd_norm() {
+            Some((j, norm)) => {
+                Err(Error::parameter("atoms", format!("norm {norm} of atom {j}"), "a unit norm"))
             }
+            None => Ok(dictionary),
         }
-        Ok(Self { degree, atoms })
+    }
+
+    /// The same for atoms that were decoded, whose decoder says itself what is wrong.
+    pub(crate) fn decoded(degree: ShDegree, atoms: Vec<f32>) -> Option<Self> {
+        let dictionary = Self { degree, atoms };
+        let (dim, len) = (dictionary.dim(), dictionary.len());
+        let fits = (1..=MAX_ATOMS).contains(&len) && len * dim == dictionary.atoms.len();
+        (fits && dictionary.odd_norm().is_none()).then_some(dictionary)
+    }
+
+    /// The number and the norm of the first atom whose norm is not 1.
+    fn odd_norm(&self) -> Option<(usize, f64)> {
+        let norm = |atom: &[f32]| atom.iter().map(|&v| f64::from(v) * f64::from(v)).sum::<f64>().sqrt();
+        let norms = self.atoms.chunks_exact(self.dim().max(1)).map(norm).enumerate();
+        let is_odd = |norm: f64| norm.is_nan() || (norm - 1.0).abs() > NORM_TOLERANCE;
+        norms.into_iter().find(|&(_, norm)| is_odd(norm))
     }
 
     /// The dictionary of a scene without view dependence.

@@ -156,6 +156,15 @@ pub(crate) fn axis_of_square([s, t]: [f32; 2]) -> Vec3 {
     normalised([x, y, (1.0 - x.abs() - y.abs()).max(0.0)])
 }
 
+/// What a number is called that is not finite. Where only such numbers are told, nothing that writes others is needed.
+pub(crate) fn name_of(not_finite: f32) -> &'static str {
+    match not_finite {
+        f32::INFINITY => "inf",
+        f32::NEG_INFINITY => "-inf",
+        _ => "NaN",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

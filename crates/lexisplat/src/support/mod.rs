@@ -1,11 +1,13 @@
 //! What all other modules use: errors, limits, input and output, threads, vector instructions.
 
 pub(crate) mod builder;
+pub(crate) mod crc32;
 pub(crate) mod error;
 pub(crate) mod input;
 pub(crate) mod limits;
 pub(crate) mod maths;
 pub(crate) mod memory_budget;
+pub(crate) mod order;
 pub mod output;
 pub(crate) mod parallel;
 pub(crate) mod progress;

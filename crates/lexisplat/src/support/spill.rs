@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::SpooledTempFile;
 
+use crate::support::crc32;
 use crate::support::error::{Error, Result};
 
 /// Bytes of the write buffer, and of what is copied at a time.
@@ -59,7 +60,7 @@ impl Temporary {
 pub(crate) struct Spill {
     file: BufWriter<SpooledTempFile>,
     name: PathBuf,
-    checksum: crc32fast::Hasher,
+    checksum: crc32::Hasher,
 }
 
 impl Spill {
@@ -67,7 +68,7 @@ impl Spill {
     pub(crate) fn new(to: SpillTo<'_>) -> Result<Self> {
         let Temporary { file, name } = Temporary::new(to)?;
         let file = BufWriter::with_capacity(BUFFER, file);
-        Ok(Self { file, name, checksum: crc32fast::Hasher::new() })
+        Ok(Self { file, name, checksum: crc32::Hasher::new() })
     }
 
     /// Appends `values` as they lie in memory.

@@ -1,14 +1,14 @@
 //! A safetensors file whose checksums hold, and its tensors.
 
-use std::collections::BTreeMap;
 use std::ops::Range;
 
-use safetensors::tensor::{Metadata, SafeTensorError, TensorInfo};
-use safetensors::{Dtype, SafeTensors};
+use safetensors::Dtype;
 
-use super::json;
+use super::header::{Header, TensorInfo};
+use super::json::{self, Json};
 use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, key, tensor};
 use crate::formats::kind::FileKind;
+use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::parallel::map_chunks;
@@ -23,12 +23,7 @@ pub(super) struct Checked<'a> {
     bytes: FileBytes<'a>,
     /// Where the data of tensors start.
     data_start: usize,
-    tensors: Metadata,
-    /// Names of all tensors, sorted.
-    pub(super) names: Vec<String>,
-    /// The same in the order in which the tensors lie.
-    pub(super) by_place: Vec<String>,
-    metadata: BTreeMap<String, String>,
+    header: Header,
     /// Length of the file by its header.
     pub(super) file_bytes: u64,
 }
@@ -46,7 +41,7 @@ impl std::fmt::Debug for Checked<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Checked")
             .field("file", &self.file)
-            .field("names", &self.names)
+            .field("header", &self.header)
             .finish_non_exhaustive()
     }
 }
@@ -68,21 +63,18 @@ impl<'a> Checked<'a> {
             Error::format(file.as_str(), FormatError::Truncated { what, expected, found })
         };
         let end = header_end(&file, bytes, limits)?;
-        let header = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
-        let header = header.ok_or_else(|| truncated("the header", end))?;
-        json::check(&header[LENGTH_BYTES..])
-            .map_err(|e| Error::malformed(file.as_str(), format!("the header: {e}")))?;
-        let tensors = tensors(&file, bytes, header, extent)?;
-        let file_bytes = end.saturating_add(tensors.data_len() as u64);
-        let header_checksum = crc32fast::hash(header);
-        let data_start = header.len();
-        let metadata: BTreeMap<String, String> =
-            tensors.metadata().iter().flatten().map(|(k, v)| (k.clone(), v.clone())).collect();
-        let by_place = tensors.offset_keys();
-        let mut names = by_place.clone();
-        names.sort_unstable();
-        let checked =
-            Self { file, bytes: shared, data_start, tensors, names, by_place, metadata, file_bytes };
+        let text = usize::try_from(end).ok().and_then(|end| bytes.get(..end));
+        let text = text.ok_or_else(|| truncated("the header", end))?;
+        let header = read_header(&file, text)?;
+        let file_bytes = end.saturating_add(header.data_bytes() as u64);
+        let there = bytes.len() as u64;
+        if there > file_bytes || (extent == Extent::Whole && there < file_bytes) {
+            let text = format!("truncated or too long: {there} bytes do not match the header");
+            return Err(Error::malformed(file, text));
+        }
+        let header_checksum = crc32::hash(text);
+        let data_start = text.len();
+        let checked = Self { file, bytes: shared, data_start, header, file_bytes };
         let format = |problem| Error::format(&checked.file, problem);
         let malformed = |text: String| checked.malformed(text);
 
@@ -109,7 +101,7 @@ impl<'a> Checked<'a> {
         let (stored, expected) = match version {
             PACKED_VERSION if checked.has(tensor::HEAD) => {
                 let (sum, head) = checked.sealed_head()?;
-                let mut crc = crc32fast::Hasher::new_with_initial_len(header_checksum, data_start as u64);
+                let mut crc = crc32::Hasher::new_with_initial_len(header_checksum, data_start as u64);
                 crc.update(head);
                 (vec![sum], crc.finalize())
             }
@@ -128,14 +120,16 @@ impl<'a> Checked<'a> {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
         };
-        let sums: BTreeMap<String, String> = match layered && !self.has_text(key::CHECKSUMS) {
-            true => BTreeMap::new(),
-            false => self.json(key::CHECKSUMS)?,
+        let sums = match layered && !self.has_text(key::CHECKSUMS) {
+            true => Json::Object(Vec::new()),
+            false => self.json(key::CHECKSUMS, |sums| {
+                sums.members()?.iter().all(|(_, sum)| sum.text().is_some()).then(|| sums.clone())
+            })?,
         };
-        let summed = |name: &&String| !elsewhere.contains(&name.as_str());
-        let mut names: Vec<&String> = self.names.iter().filter(summed).collect();
-        if let Some(name) = sums.keys().find(|name| names.binary_search(name).is_err()) {
-            let why = match elsewhere.contains(&name.as_str()) {
+        let mut names: Vec<&str> = self.names().filter(|name| !elsewhere.contains(name)).collect();
+        let mut summed = sums.members().unwrap_or_default().iter().map(|(name, _)| name.as_str());
+        if let Some(name) = summed.find(|name| names.binary_search(name).is_err()) {
+            let why = match elsewhere.contains(&name) {
                 true => "whose checksum is elsewhere",
                 false => "which is no tensor",
             };
@@ -144,13 +138,14 @@ impl<'a> Checked<'a> {
         names.retain(|name| self.is_there(name));
         let found = map_chunks(names.len(), 1, |range| {
             let name = names[range.start];
-            self.view(name).map(|t| format!("{:08x}", crc32fast::hash(t.data)))
+            self.view(name).map(|t| format!("{:08x}", crc32::hash(t.data)))
         });
         for (name, sum) in names.iter().zip(found) {
             let expected = sums
-                .get(*name)
+                .get(name)
+                .and_then(Json::text)
                 .ok_or_else(|| self.malformed(format!("metadata 'checksums' lacks tensor '{name}'")))?;
-            if sum.ok().as_ref() != Some(expected) {
+            if sum.ok().as_deref() != Some(expected) {
                 return Err(Error::format(&self.file, FormatError::Checksum { part: (*name).to_owned() }));
             }
         }
@@ -178,36 +173,37 @@ impl<'a> Checked<'a> {
 
     /// Whether all bytes of the tensor `name` are there.
     fn is_there(&self, name: &str) -> bool {
-        self.tensors
+        self.header
             .info(name)
             .is_some_and(|tensor| tensor.data_offsets.1 <= self.bytes().len() - self.data_start)
     }
 
     /// Where the tensor `name` starts in the file, its length, and the first of its bytes, as many as are there.
     pub(super) fn first_of(&self, name: &str) -> Option<(u64, u64, &[u8])> {
-        let (start, end) = self.tensors.info(name)?.data_offsets;
+        let (start, end) = self.header.info(name)?.data_offsets;
         let place = |offset: usize| self.data_start.saturating_add(offset);
         let there = |offset: usize| place(offset).min(self.bytes().len());
         Some((place(start) as u64, (end - start) as u64, self.bytes().get(there(start)..there(end))?))
     }
 
     pub(super) fn has(&self, name: &str) -> bool {
-        self.tensors.info(name).is_some()
+        self.header.info(name).is_some()
     }
 
     /// The metadata entry `key`.
     pub(super) fn text(&self, key: &str) -> Result<&str> {
-        self.metadata
-            .get(key)
-            .map(String::as_str)
-            .ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
+        self.header.text(key).ok_or_else(|| self.malformed(format!("metadata '{key}' is missing")))
     }
 
     /// The metadata entry `key` as a number, or as `true` or `false`.
     pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T> {
         let text = self.text(key)?;
-        let parsed = text.parse().ok().filter(|_| json::is_number(text) || matches!(text, "true" | "false"));
-        parsed.ok_or_else(|| self.malformed(format!("metadata '{key}' is '{text}'")))
+        text.parse().ok().filter(|_| is_value(text)).ok_or_else(|| self.wrong_value(key, text))
+    }
+
+    #[cold]
+    fn wrong_value(&self, key: &str, text: &str) -> Error {
+        self.malformed(format!("metadata '{key}' is '{text}'"))
     }
 
     /// The metadata entry `key`, if it is there.
@@ -230,15 +226,25 @@ impl<'a> Checked<'a> {
 
     /// Whether there is a metadata entry `key`.
     pub(super) fn has_text(&self, key: &str) -> bool {
-        self.metadata.contains_key(key)
+        self.header.text(key).is_some()
     }
 
-    /// The JSON in the metadata entry `key`.
-    pub(super) fn json<T: serde::de::DeserializeOwned>(&self, key: &str) -> Result<T> {
-        let text = self.text(key)?;
-        let parsed = json::check(text.as_bytes())
-            .and_then(|()| serde_json::from_str(text).map_err(|error| error.to_string()));
-        parsed.map_err(|error| self.malformed(format!("metadata '{key}': {error}")))
+    /// What `take` makes of the JSON in the metadata entry `key`, if it is what was to be there.
+    pub(super) fn json<T>(&self, key: &str, take: impl FnOnce(&Json) -> Option<T>) -> Result<T> {
+        let parsed = Json::parse(self.text(key)?.as_bytes());
+        let taken =
+            parsed.and_then(|json| take(&json).ok_or_else(|| "a member is not what it should be".to_owned()));
+        taken.map_err(|error| self.malformed(format!("metadata '{key}': {error}")))
+    }
+
+    /// Names of all tensors, sorted.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.header.names()
+    }
+
+    /// The same in the order in which the tensors lie.
+    pub(super) fn names_by_place(&self) -> Vec<&str> {
+        self.header.by_place().into_iter().map(|(name, _)| name.as_str()).collect()
     }
 
     /// All bytes of the file.
@@ -249,7 +255,7 @@ impl<'a> Checked<'a> {
     pub(super) fn view(&self, name: &str) -> Result<View<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
         let TensorInfo { dtype, shape, data_offsets: (start, end) } =
-            self.tensors.info(name).ok_or_else(missing)?;
+            self.header.info(name).ok_or_else(missing)?;
         let (start, end) = (self.data_start.saturating_add(*start), self.data_start.saturating_add(*end));
         let data = self.bytes().get(start..end).ok_or_else(|| {
             let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
@@ -271,7 +277,7 @@ impl<'a> Checked<'a> {
         let summed = !self.is_layered();
         let ignored =
             |name: &str| (summed && name == tensor::HEADER_CHECKSUM) || name.starts_with(IGNORED_PREFIX);
-        match self.names.iter().find(|name| !ignored(name) && !known(name)) {
+        match self.names().find(|name| !ignored(name) && !known(name)) {
             Some(name) => Err(self.malformed(format!("tensor '{name}' is not known {whose}"))),
             None => Ok(()),
         }
@@ -313,6 +319,11 @@ impl<'a> Checked<'a> {
     }
 }
 
+/// Whether `text` is a number as JSON writes it, or `true` or `false`.
+fn is_value(text: &str) -> bool {
+    json::is_number(text) || matches!(text, "true" | "false")
+}
+
 /// Where the header of a file ends that begins with `bytes`, by its length.
 pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u64> {
     let length = bytes.first_chunk::<LENGTH_BYTES>().ok_or_else(|| {
@@ -327,35 +338,14 @@ pub(super) fn header_end(file: &str, bytes: &[u8], limits: &Limits) -> Result<u6
 /// Where the tensors end that are needed before any data, in a file whose header ends at `header_end`.
 pub(super) fn start_end(file: &str, bytes: &[u8], header_end: u64) -> Result<u64> {
     let header = usize::try_from(header_end).ok().and_then(|end| bytes.get(..end)).unwrap_or_default();
-    json::check(header.get(LENGTH_BYTES..).unwrap_or_default())
-        .map_err(|e| Error::malformed(file, format!("the header: {e}")))?;
-    let tensors = tensors(file, header, header, Extent::First)?;
-    let end = |name| tensors.info(name).map_or(0, |tensor| tensor.data_offsets.1 as u64);
+    let header = read_header(file, header)?;
+    let end = |name| header.info(name).map_or(0, |tensor| tensor.data_offsets.1 as u64);
     Ok(header_end.saturating_add(end(tensor::HEADER_CHECKSUM).max(end(tensor::HEAD))))
 }
 
-/// The tensors that a header lists, without holes between them. `bytes` are as long as they say, or shorter if they may be.
-fn tensors(file: &str, bytes: &[u8], header: &[u8], extent: Extent) -> Result<Metadata> {
-    let invalid = |error: &dyn std::fmt::Display| {
-        Error::malformed(file, format!("not a valid safetensors file: {error}"))
-    };
-    let mismatch = || {
-        let text = format!("truncated or too long: {} bytes do not match the header", bytes.len());
-        Error::malformed(file, text)
-    };
-    if extent == Extent::Whole {
-        return match SafeTensors::read_metadata(bytes) {
-            Ok((_, tensors)) => Ok(tensors),
-            Err(SafeTensorError::MetadataIncompleteBuffer) => Err(mismatch()),
-            Err(error) => Err(invalid(&error)),
-        };
-    }
-    let json = header.get(LENGTH_BYTES..).unwrap_or_default();
-    let tensors: Metadata = serde_json::from_slice(json).map_err(|error| invalid(&error))?;
-    if bytes.len() - header.len() > tensors.data_len() {
-        return Err(mismatch());
-    }
-    Ok(tensors)
+/// The header, which is `bytes` with its length before it.
+fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
+    Header::read(bytes.get(LENGTH_BYTES..).unwrap_or_default()).map_err(|e| Error::malformed(file, e))
 }
 
 /// One tensor of a file.

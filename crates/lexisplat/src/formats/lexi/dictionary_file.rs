@@ -44,6 +44,7 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
         let layout = fields::layout(&checked)?;
         if layout == Layout::Packed {
             let head = super::packed::head(&checked, limits)?;
+            super::packed::check_columns(&checked, head.gaussians)?;
             return Ok(Decoder::new(&head, super::packed::data(&checked)?)?.dictionary().clone());
         }
         refuse_unknown(&checked, layout, degree)?;

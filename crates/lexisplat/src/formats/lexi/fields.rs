@@ -44,7 +44,9 @@ pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
 pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
     let comments = match checked.is_layered() && !checked.has_text(key::COMMENTS) {
         true => Vec::new(),
-        false => checked.json(key::COMMENTS)?,
+        false => checked.json(key::COMMENTS, |comments| {
+            comments.items()?.iter().map(|comment| comment.text().map(str::to_owned)).collect()
+        })?,
     };
     Ok(SceneMeta { comments, antialiased: checked.number_or_default(key::ANTIALIASED)? })
 }
@@ -88,7 +90,8 @@ pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
     ];
     for (key, value) in sizes {
         if !value.is_finite() || value < 0.0 {
-            return Err(checked.malformed(format!("metadata '{key}' is {value}, not a finite size")));
+            let text = checked.text(key)?;
+            return Err(checked.malformed(format!("metadata '{key}' is {text}, not a finite size")));
         }
     }
     Ok(record)
@@ -104,17 +107,27 @@ fn wrong(checked: &Checked<'_>, name: &str, error: ColumnError) -> Error {
     checked.malformed(format!("tensor '{}': {error}", name.escape_debug()))
 }
 
+/// Refuses extras that are not named as a property of a PLY can be.
+pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
+    let names = || checked.names().filter_map(|name| name.strip_prefix(EXTRA_PREFIX));
+    match names().find(|name| !is_extra_name(name)) {
+        Some(name) => {
+            let name = format!("{EXTRA_PREFIX}{name}");
+            let text = format!("tensor '{}' is not named as a property can be", name.escape_debug());
+            Err(checked.malformed(text))
+        }
+        None => Ok(()),
+    }
+}
+
 /// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there. In
 /// version 3 they lie in the order of the source, in files of other versions by their sizes.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
+    check_extra_names(checked)?;
     let mut out = Vec::new();
-    let names = if checked.is_layered() { &checked.by_place } else { &checked.names };
+    let names = if checked.is_layered() { checked.names_by_place() } else { checked.names().collect() };
     for full in names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
-        if !is_extra_name(name) {
-            let text = format!("tensor '{}' is not named as a property can be", full.escape_debug());
-            return Err(checked.malformed(text));
-        }
         if !checked.is_whole() {
             continue;
         }

@@ -1,14 +1,233 @@
 //! JSON that means one thing only.
+//!
+//! Text that is no JSON is refused, and so are objects that name a member twice: one parser would take the first and another
+//! the last.
 
-use std::collections::HashSet;
-use std::fmt;
+use crate::support::order::order;
 
-use serde::de::{Deserialize, Deserializer, Error, MapAccess, SeqAccess, Visitor};
+/// Most arrays and objects within one another, as serde_json has it.
+const MOST_DEPTH: usize = 127;
 
-/// Refuses text that is no JSON, and objects that name a member twice: one parser would take the first and another the
-/// last. The message says which.
-pub(super) fn check(text: &[u8]) -> Result<(), String> {
-    serde_json::from_slice::<Unambiguous>(text).map(drop).map_err(|error| error.to_string())
+/// A value.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) enum Json {
+    #[default]
+    Null,
+    Bool(bool),
+    /// A number as it is written.
+    Number(String),
+    Text(String),
+    List(Vec<Json>),
+    /// The members, sorted by their names.
+    Object(Vec<(String, Json)>),
+}
+
+impl Json {
+    /// The value in `text`. The message says what is wrong with it.
+    pub(super) fn parse(text: &[u8]) -> Result<Self, String> {
+        let mut parser = Parser { text, at: 0 };
+        let value = parser.value(MOST_DEPTH)?;
+        match parser.next_token() {
+            None => Ok(value),
+            Some(_) => Err(parser.wrong("something after the end")),
+        }
+    }
+
+    /// The member `name` of an object, if there is one.
+    pub(super) fn get(&self, name: &str) -> Option<&Self> {
+        let members = self.members()?;
+        let place = members.binary_search_by(|member| member.0.as_str().cmp(name)).ok()?;
+        members.get(place).map(|member| &member.1)
+    }
+
+    /// The members of an object, sorted by their names.
+    pub(super) fn members(&self) -> Option<&[(String, Self)]> {
+        if let Self::Object(members) = self { Some(members) } else { None }
+    }
+
+    /// The items of a list.
+    pub(super) fn items(&self) -> Option<&[Self]> {
+        if let Self::List(items) = self { Some(items) } else { None }
+    }
+
+    pub(super) fn text(&self) -> Option<&str> {
+        if let Self::Text(text) = self { Some(text) } else { None }
+    }
+
+    pub(super) fn bool(&self) -> Option<bool> {
+        if let Self::Bool(value) = self { Some(*value) } else { None }
+    }
+
+    /// A number that is one of `T`.
+    pub(super) fn number<T: std::str::FromStr>(&self) -> Option<T> {
+        if let Self::Number(text) = self { text.parse().ok() } else { None }
+    }
+}
+
+/// Text that is read value by value.
+struct Parser<'t> {
+    text: &'t [u8],
+    /// The place of the next byte.
+    at: usize,
+}
+
+impl Parser<'_> {
+    fn wrong(&self, what: &str) -> String {
+        format!("{what} at byte {}", self.at)
+    }
+
+    fn peek(&self) -> Option<u8> {
+        self.text.get(self.at).copied()
+    }
+
+    /// The next byte after white space, which is not taken.
+    fn next_token(&mut self) -> Option<u8> {
+        while let Some(b' ' | b'\n' | b'\t' | b'\r') = self.peek() {
+            self.at += 1;
+        }
+        self.peek()
+    }
+
+    /// Takes the next byte.
+    fn take(&mut self) -> Result<u8, String> {
+        let byte = self.peek().ok_or_else(|| self.wrong("it ends early"))?;
+        self.at += 1;
+        Ok(byte)
+    }
+
+    /// A value with at most `depth` arrays and objects within one another.
+    fn value(&mut self, depth: usize) -> Result<Json, String> {
+        match self.next_token() {
+            Some(b'"') => self.string().map(Json::Text),
+            Some(b'-' | b'0'..=b'9') => self.number(),
+            Some(b'[' | b'{') if depth == 0 => Err(self.wrong("too much within one another")),
+            Some(b'[') => self.list(depth - 1),
+            Some(b'{') => self.object(depth - 1),
+            _ => self.word(),
+        }
+    }
+
+    fn word(&mut self) -> Result<Json, String> {
+        let words = [("null", Json::Null), ("true", Json::Bool(true)), ("false", Json::Bool(false))];
+        let rest = self.text.get(self.at..).unwrap_or_default();
+        for (word, value) in words {
+            if rest.starts_with(word.as_bytes()) {
+                self.at += word.len();
+                return Ok(value);
+            }
+        }
+        Err(self.wrong(if rest.is_empty() { "it ends early" } else { "no value" }))
+    }
+
+    fn number(&mut self) -> Result<Json, String> {
+        let mut text = String::new();
+        while let Some(byte @ (b'0'..=b'9' | b'+' | b'-' | b'.' | b'e' | b'E')) = self.peek() {
+            text.push(byte.into());
+            self.at += 1;
+        }
+        let is_finite = is_number(&text) && text.parse::<f64>().is_ok_and(f64::is_finite);
+        if is_finite { Ok(Json::Number(text)) } else { Err(self.wrong("no number")) }
+    }
+
+    fn string(&mut self) -> Result<String, String> {
+        self.at += 1;
+        let mut text = Vec::new();
+        loop {
+            match self.take()? {
+                b'"' => return String::from_utf8(text).map_err(|_| self.wrong("text that is not UTF-8")),
+                b'\\' => {
+                    let char = self.escaped()?;
+                    text.extend(char.encode_utf8(&mut [0; 4]).as_bytes());
+                }
+                0..0x20 => return Err(self.wrong("a control character")),
+                byte => text.push(byte),
+            }
+        }
+    }
+
+    /// The character that an escape stands for.
+    fn escaped(&mut self) -> Result<char, String> {
+        Ok(match self.take()? {
+            byte @ (b'"' | b'\\' | b'/') => byte.into(),
+            b'b' => '\u{8}',
+            b'f' => '\u{c}',
+            b'n' => '\n',
+            b'r' => '\r',
+            b't' => '\t',
+            b'u' => {
+                let mut code = self.hexadecimal()?;
+                // Two surrogates stand for one character.
+                if (0xd800..0xdc00).contains(&code) && self.take()? == b'\\' && self.take()? == b'u' {
+                    let low = self.hexadecimal()?;
+                    let bits = (code - 0xd800) << 10;
+                    code = if (0xdc00..0xe000).contains(&low) { 0x10000 + bits + low - 0xdc00 } else { code };
+                }
+                char::from_u32(code).ok_or_else(|| self.wrong("half a character"))?
+            }
+            _ => return Err(self.wrong("an unknown escape")),
+        })
+    }
+
+    /// Four hexadecimal digits.
+    fn hexadecimal(&mut self) -> Result<u32, String> {
+        let mut code = 0;
+        for _ in 0..4 {
+            let digit = char::from(self.take()?).to_digit(16);
+            code = code << 4 | digit.ok_or_else(|| self.wrong("no hexadecimal digit"))?;
+        }
+        Ok(code)
+    }
+
+    /// Takes `end`, or a comma before another item. Returns whether there is another.
+    fn goes_on(&mut self, end: u8) -> Result<bool, String> {
+        match self.next_token() {
+            Some(byte) if byte == end || byte == b',' => {
+                self.at += 1;
+                Ok(byte != end)
+            }
+            _ => Err(self.wrong("no comma and no end of a list or object")),
+        }
+    }
+
+    fn list(&mut self, depth: usize) -> Result<Json, String> {
+        self.at += 1;
+        let mut items = Vec::new();
+        if self.next_token() == Some(b']') {
+            self.at += 1;
+            return Ok(Json::List(items));
+        }
+        loop {
+            items.push(self.value(depth)?);
+            if !self.goes_on(b']')? {
+                return Ok(Json::List(items));
+            }
+        }
+    }
+
+    fn object(&mut self, depth: usize) -> Result<Json, String> {
+        self.at += 1;
+        let mut members: Vec<(String, Json)> = Vec::new();
+        let mut goes_on = self.next_token() != Some(b'}');
+        self.at += usize::from(!goes_on);
+        while goes_on {
+            if self.next_token() != Some(b'"') {
+                return Err(self.wrong("no name of a member"));
+            }
+            let name = self.string()?;
+            if self.next_token() != Some(b':') {
+                return Err(self.wrong("no colon"));
+            }
+            self.at += 1;
+            members.push((name, self.value(depth)?));
+            goes_on = self.goes_on(b'}')?;
+        }
+        let places = order(members.len(), &mut |a, b| members[a].0.cmp(&members[b].0));
+        let members: Vec<_> = places.into_iter().map(|k| std::mem::take(&mut members[k])).collect();
+        match members.array_windows().find(|[a, b]| a.0 == b.0) {
+            Some([twice, _]) => Err(format!("member '{}' is there twice", twice.0.escape_debug())),
+            None => Ok(Json::Object(members)),
+        }
+    }
 }
 
 /// Whether `text` is a number as JSON writes it: no plus sign, no leading zeros, digits on both sides of a point.
@@ -29,66 +248,6 @@ pub(super) fn is_number(text: &str) -> bool {
         && exponent.is_none_or(|e| digits(e.strip_prefix(['+', '-']).unwrap_or(e)))
 }
 
-/// Any JSON value in which no object names a member twice.
-struct Unambiguous;
-
-impl<'de> Deserialize<'de> for Unambiguous {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(Self)
-    }
-}
-
-impl<'de> Visitor<'de> for Unambiguous {
-    type Value = Self;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("JSON")
-    }
-
-    fn visit_bool<E>(self, _: bool) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_i64<E>(self, _: i64) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_u64<E>(self, _: u64) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_f64<E>(self, _: f64) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_str<E>(self, _: &str) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_unit<E>(self) -> Result<Self, E> {
-        Ok(self)
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut items: A) -> Result<Self, A::Error> {
-        while items.next_element::<Self>()?.is_some() {}
-        Ok(self)
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Self, A::Error> {
-        let mut names = HashSet::new();
-        while let Some(name) = members.next_key::<String>()? {
-            members.next_value::<Self>()?;
-            if let Some(twice) = names.replace(name) {
-                return Err(A::Error::custom(format_args!(
-                    "member '{}' is there twice",
-                    twice.escape_debug()
-                )));
-            }
-        }
-        Ok(self)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -96,14 +255,14 @@ mod tests {
     #[test]
     fn members_that_are_there_twice_are_refused() {
         for text in [r#"{"a":1,"b":{"a":[{"c":null},{"c":true}]},"c":-1.5e3,"d":"a"}  "#, "[]", "7"] {
-            assert_eq!(check(text.as_bytes()), Ok(()), "{text}");
+            assert!(Json::parse(text.as_bytes()).is_ok(), "{text}");
         }
         for text in [r#"{"a":1,"a":1}"#, r#"{"b":[{"a":{},"\u0061":2}]}"#] {
-            let error = check(text.as_bytes()).unwrap_err();
+            let error = Json::parse(text.as_bytes()).unwrap_err();
             assert!(error.contains("'a' is there twice"), "{error}");
         }
         for text in ["", "{", "{} {}", &"[".repeat(1000)] {
-            assert!(check(text.as_bytes()).is_err(), "{text}");
+            assert!(Json::parse(text.as_bytes()).is_err(), "{text}");
         }
     }
 

@@ -11,6 +11,7 @@ mod exact;
 mod extra_column;
 mod feed;
 mod fields;
+mod header;
 mod json;
 mod layout;
 mod packed;

@@ -5,9 +5,10 @@ use std::ops::Range;
 use safetensors::Dtype;
 
 use super::checked::Checked;
-use super::fields::{column, degree, extras, meta, record};
+use super::fields::{check_extra_names, column, degree, extras, meta, record};
+use super::json::Json;
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead, layered_atoms};
+use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead, ReachedRecord, TargetRecord, layered_atoms};
 use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
@@ -62,8 +63,8 @@ fn length(checked: &Checked<'_>, name: &str, dtype: Dtype) -> Result<[usize; 1]>
     }
 }
 
-/// Everything of a packed scene that is not as long as the scene. Everything is checked except what only
-/// decoding finds.
+/// Everything of a packed scene that is not as long as the scene. Everything is checked except the [columns](check_columns)
+/// and what only decoding finds.
 pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead> {
     let file_bytes = checked.bytes().len() as u64;
     let gaussians: u64 = checked.number(key::GAUSSIANS)?;
@@ -81,9 +82,6 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     };
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    if has_order(checked) && !is_permutation(checked, gaussians)? {
-        return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
-    }
     let others: &[&str] = match &coding {
         Coding::Flat(_) => &[tensor::HEAD],
         Coding::Layered(_) => &[tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES],
@@ -91,9 +89,9 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
     let known =
         |name: &str| name.starts_with(EXTRA_PREFIX) || (PACKED.contains(&name) && !others.contains(&name));
     checked.refuse_unknown(known, "for layout 'packed'")?;
-    let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE)).transpose()?;
-    let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED)).transpose()?;
-    extras(checked, gaussians, &(0..0))?;
+    let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE, target)).transpose()?;
+    let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED, reached)).transpose()?;
+    check_extra_names(checked)?;
     data(checked)?;
     Ok(PackedHead {
         file: checked.file.clone(),
@@ -113,6 +111,35 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         coding,
         limits: *limits,
     })
+}
+
+fn target(json: &Json) -> Option<TargetRecord> {
+    Some(TargetRecord {
+        target: json.get("target")?.text()?.to_owned(),
+        asked: json.get("asked")?.number()?,
+        mean_psnr: json.get("mean_psnr")?.number()?,
+        min_psnr: json.get("min_psnr")?.number()?,
+        views: json.get("views")?.number()?,
+        cameras: json.get("cameras")?.bool()?,
+    })
+}
+
+fn reached(json: &Json) -> Option<ReachedRecord> {
+    Some(ReachedRecord {
+        judged_psnr: json.get("judged_psnr")?.number()?,
+        mean_psnr: json.get("mean_psnr")?.number()?,
+        min_psnr: json.get("min_psnr")?.number()?,
+        views: json.get("views")?.number()?,
+        cameras: json.get("cameras")?.bool()?,
+    })
+}
+
+/// Refuses columns that are not of `n` Gaussians: the order of the source, and extras.
+pub(super) fn check_columns(checked: &Checked<'_>, n: usize) -> Result<()> {
+    if has_order(checked) && !is_permutation(checked, n)? {
+        return Err(checked.malformed("tensor 'packed.order' is not a permutation"));
+    }
+    extras(checked, n, &(0..0)).map(drop)
 }
 
 /// What the scene is decoded with, by the version of the file.

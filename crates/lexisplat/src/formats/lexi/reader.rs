@@ -10,7 +10,7 @@ use super::layout::Layout;
 use super::schema::{
     EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor,
 };
-use crate::packed::{Data, Decoder, Outline, Packed, PackedHead, StreamBits};
+use crate::packed::{Data, Decoder, Outline, Packed, PackedHead, StreamBits, Wish};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -115,6 +115,7 @@ impl<'a> LexiReader<'a> {
         let attribute_bytes = sizes(&checked)?;
         let (kind, extras) = if layout == Layout::Packed {
             let mut head = super::packed::head(&checked, limits)?;
+            super::packed::check_columns(&checked, head.gaussians)?;
             let data = super::packed::data(&checked)?;
             let (start, length) = super::packed::data_place(&checked);
             let first = if checked.is_whole() { None } else { Decoder::of_prefix(&head, data, length)? };
@@ -138,7 +139,7 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// [`Error::Parameter`] for a file that is not a packed one of version 3, whose nonzeros have no parts.
     pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
-        self.layered("sh_parts", parts)?.wish().sh_parts = parts;
+        self.wish("sh_parts", parts)?.sh_parts = parts;
         Ok(self)
     }
 
@@ -148,16 +149,17 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// [`Error::Parameter`] for a file that is not a packed one of version 3, which has none.
     pub fn with_integers_verified(mut self) -> Result<Self> {
-        self.layered("verify", true)?.wish().verify = true;
+        self.wish("verify", true)?.verify = true;
         Ok(self)
     }
 
-    /// The decoder of a packed file of version 3. `name` and `value` are what is asked of it.
-    fn layered(&mut self, name: &'static str, value: impl ToString) -> Result<&mut Decoder> {
-        match &mut self.kind {
-            Kind::Packed(packed) if packed.outline.is_some() => Ok(&mut packed.decoder),
-            _ => Err(Error::parameter(name, value, "only for packed .lexi files of version 3")),
-        }
+    /// What is made of chunks of a packed file of version 3. `name` and `value` are what is asked of it.
+    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut Wish> {
+        let wish = match &mut self.kind {
+            Kind::Packed(packed) => packed.decoder.wish(),
+            Kind::Exact(_) => None,
+        };
+        wish.ok_or_else(|| Error::parameter(name, value, "only for packed .lexi files of version 3"))
     }
 
     /// The layers, chunks and ranges of a packed file of version 3, of the whole file also if only a first part of it is
@@ -462,7 +464,7 @@ fn sizes(checked: &Checked<'_>) -> Result<Vec<(String, u64)>> {
         tensor::ESCAPED,
         tensor::ESCAPE_ROWS,
     ];
-    let extras = checked.names.iter().map(String::as_str).filter(|name| name.starts_with(EXTRA_PREFIX));
+    let extras = checked.names().filter(|name| name.starts_with(EXTRA_PREFIX));
     let geometry = GEOMETRY.into_iter().map(|(name, _)| name);
     let order = geometry.chain(PACKED).chain(extras).chain(LAST);
     let mut out = Vec::new();

@@ -6,6 +6,7 @@ use std::io::{self, Write};
 use safetensors::Dtype;
 
 use super::schema::{HEADER_ALIGNMENT, LENGTH_BYTES, key, tensor};
+use crate::support::crc32;
 use crate::support::spill::{Spilled, Woven};
 
 #[cfg(target_endian = "big")]
@@ -76,13 +77,13 @@ impl<'a> Source<'a> {
     }
 
     /// `crc` of its bytes too.
-    fn hashed(&self, mut crc: crc32fast::Hasher) -> crc32fast::Hasher {
+    fn hashed(&self, mut crc: crc32::Hasher) -> crc32::Hasher {
         match self {
             Self::Bytes(bytes) => crc.update(bytes),
             Self::Owned(bytes) => crc.update(bytes),
             Self::Woven(_) => {}
             // Nothing is hashed before what was spilled.
-            Self::Spilled(spilled) => crc = crc32fast::Hasher::new_with_initial(spilled.checksum),
+            Self::Spilled(spilled) => crc = crc32::Hasher::new_with_initial(spilled.checksum),
             Self::Words(make) => {
                 // Hashing cannot fail.
                 let _ = each_block(make(), |block| {
@@ -149,7 +150,7 @@ impl<'a> Draft<'a> {
         tensors.sort_by_key(|t| std::cmp::Reverse(t.dtype.bitsize()));
         let mut sums = BTreeMap::new();
         for tensor in tensors.iter().filter(|tensor| tensor.sum == Sum::Listed) {
-            let crc = tensor.source.hashed(crc32fast::Hasher::new());
+            let crc = tensor.source.hashed(crc32::Hasher::new());
             sums.insert(tensor.name.clone(), format!("{:08x}", crc.finalize()));
         }
         let sealed = tensors.iter().position(|tensor| tensor.sum == Sum::Sealed);
@@ -181,7 +182,7 @@ impl<'a> Draft<'a> {
         }
         let mut header = (text.len() as u64).to_le_bytes().to_vec();
         header.extend_from_slice(text.as_bytes());
-        let mut crc = crc32fast::Hasher::new();
+        let mut crc = crc32::Hasher::new();
         crc.update(&header);
         if let Some(tensor) = sealed.and_then(|sealed| tensors.get(sealed)) {
             crc = tensor.source.hashed(crc);

@@ -29,9 +29,9 @@ fn bad(file: &str, what: &str) -> Error {
 
 /// What all chunks of a file of version 2 are decoded with, and where they are.
 #[derive(Debug)]
-pub(in crate::packed) struct FlatDecoder {
+pub(crate) struct FlatDecoder {
     /// The file, as the caller named it.
-    file: String,
+    pub(in crate::packed) file: String,
     limits: Limits,
     pub(in crate::packed) dictionary: Dictionary,
     pub(in crate::packed) dictionary_bits: BitCounts,

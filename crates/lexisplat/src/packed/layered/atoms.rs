@@ -48,7 +48,7 @@ impl WholeAtoms {
     }
 
     /// Codes the numbers. The decoder gives none.
-    fn code<B: Bits>(&self, coder: &mut B, learned: usize) -> Self {
+    fn code(&self, coder: &mut dyn Bits, learned: usize) -> Self {
         let per_channel = self.degree.rest_per_channel();
         let mut odds = [[[SignedOdds::default(); SIZES]; CHANNELS]; DEGREES];
         let mut numbers: Vec<i32> = Vec::with_capacity(self.numbers.len());

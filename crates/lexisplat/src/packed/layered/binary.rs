@@ -11,29 +11,29 @@ const RATES: [u32; 6] = [1, 2, 3, 4, 4, 5];
 /// The range is kept above this.
 const LEAST_RANGE: u32 = 1 << 24;
 
-/// The probability that a bit is 0, and how many bits it has seen.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Odds {
-    zero: u16,
-    seen: u8,
-}
+/// Half of the unit of probabilities.
+const HALF: u16 = 1 << (PRECISION - 1);
 
-impl Default for Odds {
-    fn default() -> Self {
-        Self { zero: 1 << (PRECISION - 1), seen: 0 }
-    }
+/// The probability that a bit is 0, and how many bits it has seen.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Odds {
+    /// By how much the probability is above a half.
+    above: i16,
+    /// It counts to 255. As wide as the other one it leaves no gap, so that many odds are cleared at once.
+    seen: u16,
 }
 
 impl Odds {
+    fn zero(self) -> u16 {
+        HALF.wrapping_add_signed(self.above)
+    }
+
     fn learn(&mut self, bit: bool) {
         let rate = RATES[usize::from(self.seen).min(RATES.len() - 1)];
-        self.seen = self.seen.saturating_add(1);
-        let zero = if bit {
-            self.zero - (self.zero >> rate)
-        } else {
-            self.zero + (((1 << PRECISION) - self.zero) >> rate)
-        };
-        self.zero = zero.clamp(LEAST, (1 << PRECISION) - LEAST);
+        self.seen = (self.seen + 1).min(u8::MAX.into());
+        let zero = self.zero();
+        let zero = if bit { zero - (zero >> rate) } else { zero + (((1 << PRECISION) - zero) >> rate) };
+        self.above = zero.clamp(LEAST, (1 << PRECISION) - LEAST).wrapping_sub(HALF).cast_signed();
     }
 }
 
@@ -43,16 +43,14 @@ pub(super) trait Bits {
     fn split(&mut self, zero: u16, bit: bool) -> bool;
 
     fn bit(&mut self, odds: &mut Odds, bit: bool) -> bool {
-        let bit = self.split(odds.zero, bit);
+        let bit = self.split(odds.zero(), bit);
         odds.learn(bit);
         bit
     }
 
     /// `count` bits, highest first, of which 0 and 1 are as likely.
     fn even(&mut self, count: u32, value: u32) -> u32 {
-        (0..count)
-            .rev()
-            .fold(0, |all, k| all << 1 | u32::from(self.split(1 << (PRECISION - 1), value >> k & 1 == 1)))
+        (0..count).rev().fold(0, |all, k| all << 1 | u32::from(self.split(HALF, value >> k & 1 == 1)))
     }
 
     /// A number from 1 to less than 2^`odds.len()`: its length in bits one by one, and the bits after the leading one, of

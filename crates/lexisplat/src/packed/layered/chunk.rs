@@ -12,6 +12,7 @@ use super::target::Target;
 use super::unpack::{Drawn, Frame};
 use super::walk::{Group, Walk};
 use crate::packed::stream::BitCounts;
+use crate::support::crc32;
 
 /// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
 const LEAST_OF_LANE: usize = 1024;
@@ -272,9 +273,10 @@ pub(in crate::packed) struct Played {
 
 /// CRC-32 of the integers of a range, as i32, Gaussian by Gaussian.
 #[derive(Debug, Clone, Default)]
-struct Sums(Lanes<crc32fast::Hasher>);
+struct Sums(Lanes<crc32::Hasher>);
 
 impl Sums {
+    #[inline(never)]
     fn add(&mut self, l: usize, numbers: &[i32]) {
         for number in numbers {
             self.0[l].update(&number.to_le_bytes());

@@ -15,6 +15,7 @@ use crate::packed::scene::PackedHead;
 use crate::packed::stream::BitCounts;
 use crate::scene::sh::ShDegree;
 use crate::sparse::dictionary::Dictionary;
+use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::MemoryBudget;
@@ -138,7 +139,7 @@ impl LayeredDecoder {
                 _ => true,
             };
             let wanted = data.range(range.start, range.length).filter(|_| is_needed && is_wanted(k));
-            if wanted.is_some_and(|bytes| !data.is_verified() && crc32fast::hash(bytes) != range.checksum) {
+            if wanted.is_some_and(|bytes| !data.is_verified() && crc32::hash(bytes) != range.checksum) {
                 let part = format!("range {k} of chunk {c}");
                 return Err(Error::format(&self.file, FormatError::Checksum { part }));
             }
@@ -156,7 +157,7 @@ fn dictionary(head: &Head, degree: ShDegree) -> Option<(Dictionary, BitCounts)> 
     let atoms = WholeAtoms::read(&head.dictionary, degree, learned, head.with_axes)?;
     let mut bits = BitCounts::zeros(Stream::ALL.len());
     bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
-    Some((Dictionary::new(degree, atoms.rows()).ok()?, bits))
+    Some((Dictionary::decoded(degree, atoms.rows())?, bits))
 }
 
 #[cfg(test)]

@@ -74,9 +74,9 @@ pub(super) struct LevelOdds {
 impl Levels {
     /// Codes a table of probabilities of `precision` bits. The decoder gives an empty one. `None` for what no encoder
     /// writes.
-    pub(super) fn code<B: Bits>(
+    pub(super) fn code(
         &self,
-        bits: &mut B,
+        bits: &mut dyn Bits,
         odds: &mut LevelOdds,
         kind: Kind,
         precision: u32,

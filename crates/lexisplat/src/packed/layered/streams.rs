@@ -111,10 +111,7 @@ pub(super) struct Slot {
 impl Slot {
     /// All sets of contexts in the order of their tables.
     pub(super) fn all() -> impl Iterator<Item = Self> {
-        let [coded @ .., _] = &Stream::ALL;
-        let (geometry, others) = coded.split_at(OF_GEOMETRY);
-        let geometry = (0..BY_LEVELS).flat_map(|levels| geometry.iter().map(move |stream| stream.at(levels)));
-        geometry.chain(others.iter().map(|stream| stream.at(0)))
+        (0..SLOTS).map(|number| Self { stream: stream_of(number * CONTEXTS), number })
     }
 
     /// The stream of a context, counted over all.

@@ -169,7 +169,7 @@ impl Tables {
     }
 
     /// Codes map and tables. The decoder gives empty ones.
-    fn code<B: Bits>(&self, bits: &mut B) -> Option<Self> {
+    fn code(&self, bits: &mut dyn Bits) -> Option<Self> {
         let mut odds = TablesOdds::default();
         let mut all = Self { map: Vec::with_capacity(ALL_CONTEXTS), tables: Vec::with_capacity(SLOTS) };
         let mut before = false;

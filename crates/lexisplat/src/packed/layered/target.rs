@@ -73,7 +73,7 @@ impl Target {
         let cell = |x: f32, bits: u32| -> u32 {
             let size = (1_u32 << bits) as f32;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-            let cell = (x * size).floor().clamp(0.0, size - 1.0) as u32;
+            let cell = (x * size).floor().max(0.0).min(size - 1.0) as u32;
             cell
         };
         let middle = |code: u32, bits: u32| (code as f32 + 0.5) / (1_u32 << bits) as f32;

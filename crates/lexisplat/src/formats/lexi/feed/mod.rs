@@ -13,7 +13,7 @@ use super::fields::layout;
 use super::layout::Layout;
 use super::schema::{FORMAT, LENGTH_BYTES};
 use crate::formats::kind::FileKind;
-use crate::packed::{Data, Decoder, Outline, PackedHead};
+use crate::packed::{Coding, Data, LayeredChunks, Outline, PackedHead};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
 use crate::support::builder::builder_methods;
@@ -254,10 +254,11 @@ impl LexiFeed {
         let head = super::packed::head(&checked, &self.limits)?;
         let (data_start, data_bytes) = super::packed::data_place(&checked);
         let not_layered = || checked.malformed("the file is not of version 3");
-        let mut decoder = Decoder::of_ranges(&head, data_bytes)?.ok_or_else(not_layered)?;
-        decoder.wish().sh_parts = self.options.sh_parts;
-        decoder.wish().verify = self.options.verify_integers;
-        let outline = decoder.outline(data_start).ok_or_else(not_layered)?;
+        let Coding::Layered(bytes) = &head.coding else { return Err(not_layered()) };
+        let mut decoder = LayeredChunks::new(&head, bytes, data_bytes)?;
+        decoder.wish.sh_parts = self.options.sh_parts;
+        decoder.wish.verify = self.options.verify_integers;
+        let outline = decoder.outline(data_start);
         if let Some(range) = outline.ranges.iter().find(|range| range.bytes.is_empty()) {
             let text =
                 format!("packed chunk {} has a range without bytes: no encoder writes it", range.chunk);
@@ -314,7 +315,7 @@ impl LexiFeed {
         let bytes = self.start.len() as u64 + ranges.bytes_of(chunk);
         let budget = MemoryBudget::new(&self.limits, &self.file, bytes);
         budget.take(gaussians, GEOMETRY_BYTES + COUNT_BYTES)?;
-        let (geometry, codes, _) = ranges.decoder.chunk(Data::Ranges(ranges), chunk, &budget, false)?;
+        let (geometry, codes) = ranges.decoder.chunk(Data::Ranges(ranges), chunk, &budget)?;
         let (meta, record) = (ranges.head.meta.clone(), ranges.head.record.clone());
         let dictionary: Dictionary = ranges.decoder.dictionary().clone();
         Model::new(geometry, meta, dictionary, codes, record).map(Some)

@@ -4,14 +4,15 @@ use std::ops::Range;
 
 use super::FeedOptions;
 use super::run::Run;
-use crate::packed::{Decoder, Held, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::packed::{Held, LayeredChunks, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 
 /// What a file is decoded with, and its ranges.
 #[derive(Debug)]
 pub(super) struct Ranges {
     pub(super) head: PackedHead,
-    pub(super) decoder: Decoder,
+    pub(super) decoder: LayeredChunks,
     pub(super) outline: Outline,
     /// Where the data start in the file.
     data_start: u64,
@@ -40,7 +41,7 @@ enum State {
 impl Ranges {
     pub(super) fn new(
         head: PackedHead,
-        decoder: Decoder,
+        decoder: LayeredChunks,
         outline: Outline,
         data_start: u64,
         options: &FeedOptions,
@@ -121,7 +122,7 @@ impl Ranges {
             let State::Part(run) = state else { continue };
             run.put(at, bytes);
             let Some(whole) = run.whole() else { continue };
-            let sum = crc32fast::hash(whole);
+            let sum = crc32::hash(whole);
             let run = std::mem::replace(run, Run::new(0, 0));
             match self.outline.ranges.get(r).filter(|range| range.checksum != sum) {
                 None => *state = State::Whole(run),
@@ -264,8 +265,8 @@ fn is_near(outline: &Outline, c: usize, options: &FeedOptions) -> bool {
 /// The ranges in the order in which they are asked for: that of the file, or by the distances of chunks among those of the
 /// same kind in the same layer.
 fn order(outline: &Outline, options: &FeedOptions) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..outline.ranges.len()).collect();
-    let Some(point) = options.nearest else { return order };
+    let count = outline.ranges.len();
+    let Some(point) = options.nearest else { return (0..count).collect() };
     let squares = outline.chunks.iter().map(|chunk| {
         let [least, most] = chunk.bounds;
         let off = |k: usize| (least[k] - point[k]).max(point[k] - most[k]).max(0.0);
@@ -274,7 +275,7 @@ fn order(outline: &Outline, options: &FeedOptions) -> Vec<usize> {
     let squares: Vec<f32> = squares.collect();
     // Layers and kinds follow one another as they first do in the file.
     let mut phases: Vec<(usize, RangeKind)> = Vec::new();
-    let mut keys = Vec::with_capacity(order.len());
+    let mut keys = Vec::with_capacity(count);
     for range in &outline.ranges {
         let phase = (outline.chunks.get(range.chunk).map_or(0, |chunk| chunk.layer), range.kind);
         let known = phases.iter().position(|&known| known == phase);
@@ -284,9 +285,8 @@ fn order(outline: &Outline, options: &FeedOptions) -> Vec<usize> {
         });
         keys.push((known, squares.get(range.chunk).copied().unwrap_or(0.0)));
     }
-    order.sort_by(|&a, &b| match (keys.get(a), keys.get(b)) {
+    crate::support::order::order(count, &mut |a, b| match (keys.get(a), keys.get(b)) {
         (Some(a), Some(b)) => a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)),
         _ => a.cmp(&b),
-    });
-    order
+    })
 }

@@ -1,0 +1,16 @@
+//! What a file says of itself, for JavaScript.
+
+use std::fmt::Write;
+
+use lexisplat::lexi::Layout;
+
+/// A JSON object of whole numbers, the layout and whether the source was antialiased. No name needs an escape.
+pub(crate) fn json(layout: Layout, antialiased: bool, fields: &[(&str, u64)]) -> String {
+    let mut json = format!(r#"{{"layout":"{layout}","antialiased":{antialiased}"#);
+    for (name, value) in fields {
+        // Writing to a String does not fail.
+        let _ = write!(json, r#","{name}":{value}"#);
+    }
+    json.push('}');
+    json
+}

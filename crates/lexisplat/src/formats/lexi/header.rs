@@ -1,0 +1,135 @@
+//! The JSON header of a safetensors file: its metadata, and where its tensors are.
+
+use safetensors::Dtype;
+
+use super::json::Json;
+use crate::support::order::order;
+
+/// The member of the header that is no tensor.
+const METADATA: &str = "__metadata__";
+/// All types of values by their names.
+const DTYPES: [(&str, Dtype); 22] = [
+    ("BOOL", Dtype::BOOL),
+    ("F4", Dtype::F4),
+    ("F6_E2M3", Dtype::F6_E2M3),
+    ("F6_E3M2", Dtype::F6_E3M2),
+    ("U8", Dtype::U8),
+    ("I8", Dtype::I8),
+    ("F8_E5M2", Dtype::F8_E5M2),
+    ("F8_E4M3", Dtype::F8_E4M3),
+    ("F8_E8M0", Dtype::F8_E8M0),
+    ("F8_E4M3FNUZ", Dtype::F8_E4M3FNUZ),
+    ("F8_E5M2FNUZ", Dtype::F8_E5M2FNUZ),
+    ("I16", Dtype::I16),
+    ("U16", Dtype::U16),
+    ("F16", Dtype::F16),
+    ("BF16", Dtype::BF16),
+    ("I32", Dtype::I32),
+    ("U32", Dtype::U32),
+    ("F32", Dtype::F32),
+    ("C64", Dtype::C64),
+    ("F64", Dtype::F64),
+    ("I64", Dtype::I64),
+    ("U64", Dtype::U64),
+];
+
+/// A tensor of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct TensorInfo {
+    pub(super) dtype: Dtype,
+    pub(super) shape: Vec<usize>,
+    /// Where it starts and ends, counted from the end of the header.
+    pub(super) data_offsets: (usize, usize),
+}
+
+/// Tensors that lie one after another, and metadata.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Header {
+    /// Sorted by their names.
+    tensors: Vec<(String, TensorInfo)>,
+    /// Texts by their names.
+    metadata: Json,
+}
+
+impl Header {
+    /// Reads the JSON `text`. The message says what is wrong with it.
+    pub(super) fn read(text: &[u8]) -> Result<Self, String> {
+        let Json::Object(members) = Json::parse(text).map_err(|e| format!("the header: {e}"))? else {
+            return Err(invalid("the header is not an object"));
+        };
+        let mut header = Self { tensors: Vec::new(), metadata: Json::Object(Vec::new()) };
+        for (name, value) in members {
+            if name == METADATA {
+                let texts = value.members().is_some_and(|all| all.iter().all(|(_, v)| v.text().is_some()));
+                match value {
+                    Json::Null => {}
+                    Json::Object(_) if texts => header.metadata = value,
+                    _ => return Err(invalid("metadata that are not texts by their names")),
+                }
+            } else {
+                let tensor = tensor(&value)
+                    .ok_or_else(|| invalid(&format!("tensor '{}' is not described", name.escape_debug())))?;
+                header.tensors.push((name, tensor));
+            }
+        }
+        header.check()?;
+        Ok(header)
+    }
+
+    /// Refuses tensors that do not lie one after another, or do not have the length of their shape.
+    fn check(&self) -> Result<(), String> {
+        let mut last = 0;
+        for (name, tensor) in self.by_place() {
+            let (start, end) = tensor.data_offsets;
+            if start != last || end < start {
+                return Err(invalid(&format!("invalid offset for tensor `{name}`")));
+            }
+            last = end;
+            let values = tensor.shape.iter().copied().try_fold(1, usize::checked_mul);
+            let bits = values.and_then(|values| values.checked_mul(tensor.dtype.bitsize()));
+            if bits.is_none_or(|bits| bits % 8 != 0 || bits / 8 != end - start) {
+                return Err(invalid("invalid shape, data type, or offset for tensor"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes of all tensors.
+    pub(super) fn data_bytes(&self) -> usize {
+        self.tensors.iter().map(|(_, tensor)| tensor.data_offsets.1).max().unwrap_or(0)
+    }
+
+    pub(super) fn info(&self, name: &str) -> Option<&TensorInfo> {
+        let place = self.tensors.binary_search_by(|tensor| tensor.0.as_str().cmp(name)).ok()?;
+        self.tensors.get(place).map(|tensor| &tensor.1)
+    }
+
+    /// The names of all tensors, sorted.
+    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+        self.tensors.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// All tensors in the order in which they lie.
+    pub(super) fn by_place(&self) -> Vec<&(String, TensorInfo)> {
+        let start = |k: usize| self.tensors.get(k).map(|tensor| tensor.1.data_offsets);
+        let places = order(self.tensors.len(), &mut |a, b| start(a).cmp(&start(b)));
+        places.into_iter().filter_map(|k| self.tensors.get(k)).collect()
+    }
+
+    /// The metadata entry `key`.
+    pub(super) fn text(&self, key: &str) -> Option<&str> {
+        self.metadata.get(key)?.text()
+    }
+}
+
+fn invalid(what: &str) -> String {
+    format!("not a valid safetensors file: {what}")
+}
+
+fn tensor(value: &Json) -> Option<TensorInfo> {
+    let dtype = value.get("dtype")?.text()?;
+    let (_, dtype) = *DTYPES.iter().find(|(name, _)| *name == dtype)?;
+    let shape = value.get("shape")?.items()?.iter().map(Json::number).collect::<Option<_>>()?;
+    let [start, end] = value.get("data_offsets")?.items()? else { return None };
+    Some(TensorInfo { dtype, shape, data_offsets: (start.number()?, end.number()?) })
+}

@@ -1,0 +1,146 @@
+//! The chunks of a scene of version 3, each decoded without the others.
+
+use std::ops::Range;
+
+use super::held::{Data, Wish};
+use super::layered::{Index, LayeredDecoder};
+use super::outline::Outline;
+use super::place::{Piece, Place, indices, places};
+use super::scene::PackedHead;
+use super::stream::BitCounts;
+use crate::scene::splats::Geometry;
+use crate::sparse::codes::{SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+use crate::support::memory_budget::MemoryBudget;
+
+/// What all chunks of a scene of version 3 are decoded with, and where they are.
+#[derive(Debug)]
+pub(crate) struct LayeredChunks {
+    file: String,
+    /// The chunks that are there, and the Gaussians of each.
+    chunks: Vec<usize>,
+    spans: Vec<Range<usize>>,
+    /// What is made of chunks.
+    pub(crate) wish: Wish,
+    decoder: Box<LayeredDecoder>,
+}
+
+impl LayeredChunks {
+    /// Reads what all chunks need from the head of a scene, which is `bytes` in the file, for data of `whole` bytes of which
+    /// any ranges will be there.
+    pub(crate) fn new(head: &PackedHead, bytes: &[u8], whole: u64) -> Result<Self> {
+        Self::of_prefix(head, bytes, whole, whole)
+    }
+
+    /// The same for data of which only the first `there` bytes are there. Chunks whose base is not are left out.
+    pub(crate) fn of_prefix(head: &PackedHead, bytes: &[u8], there: u64, whole: u64) -> Result<Self> {
+        let decoder = LayeredDecoder::new(head, bytes)?;
+        if decoder.index().data_bytes() != whole {
+            let text = "packed ranges do not cover the data: no encoder writes it";
+            return Err(Error::malformed(&head.file, text));
+        }
+        let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);
+        for (c, chunk) in decoder.index().chunks.iter().enumerate() {
+            if chunk.ranges.first().is_some_and(|range| range.end() <= there) {
+                chunks.push(c);
+                spans.push(first..first + chunk.gaussians);
+                first += chunk.gaussians;
+            }
+        }
+        check(head, first)?;
+        let (file, wish) = (head.file.clone(), Wish::default());
+        Ok(Self { file, chunks, spans, wish, decoder: Box::new(decoder) })
+    }
+
+    /// Layers, chunks and ranges of a scene whose data start at `data_start` of the file.
+    pub(crate) fn outline(&self, data_start: u64) -> Outline {
+        Outline::new(self.index(), data_start)
+    }
+
+    /// The file, as the caller named it.
+    pub(super) fn file(&self) -> &str {
+        &self.file
+    }
+
+    /// Makes no interim changes but of scales from here on.
+    pub(super) fn grow_only(&mut self) {
+        self.decoder.grow_only();
+    }
+
+    pub(super) fn index(&self) -> &Index {
+        self.decoder.index()
+    }
+
+    /// The chunks of the next layer around chunk `c` that change what is made of it while they are missing.
+    pub(crate) fn around(&self, c: usize) -> Range<usize> {
+        self.index().around(c)
+    }
+
+    /// The Gaussians of each chunk.
+    pub(super) fn spans(&self) -> &[Range<usize>] {
+        &self.spans
+    }
+
+    pub(crate) fn dictionary(&self) -> &Dictionary {
+        self.decoder.dictionary()
+    }
+
+    /// Bits that the dictionary took.
+    pub(super) fn dictionary_bits(&self) -> &BitCounts {
+        &self.decoder.dictionary_bits
+    }
+
+    /// Decodes chunk `c` of those that are there without extras. Escapes are numbered from its start. `budget` already holds
+    /// everything except its codes.
+    pub(crate) fn chunk(
+        &self,
+        data: Data<'_>,
+        c: usize,
+        budget: &MemoryBudget<'_>,
+    ) -> Result<(Geometry, SparseCodes)> {
+        let span = self.spans.get(c).cloned().unwrap_or_default();
+        let (geometry, codes, _) = decoded(&self.file, self.dictionary(), span, &mut |place| {
+            self.piece(data, c, 0, place, budget, false)
+        })?;
+        Ok((geometry, codes))
+    }
+
+    /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
+    pub(super) fn piece(
+        &self,
+        data: Data<'_>,
+        c: usize,
+        first: usize,
+        place: &mut Place<'_>,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
+        let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
+        self.decoder.piece(data, c, first, self.wish, place, budget, count_bits)
+    }
+}
+
+/// Refuses more Gaussians or atoms than the limits of the reader allow.
+pub(super) fn check(head: &PackedHead, gaussians: usize) -> Result<()> {
+    head.limits.check_gaussians(&head.file, gaussians as u64)?;
+    head.limits.check_atoms(&head.file, head.atoms as u64)
+}
+
+/// What `piece` decodes, as geometry, codes and bits. `span` are the Gaussians of the chunk. Errors call the
+/// file `file`.
+pub(super) fn decoded(
+    file: &str,
+    dictionary: &Dictionary,
+    span: Range<usize>,
+    piece: &mut dyn FnMut(&mut Place<'_>) -> Result<Piece>,
+) -> Result<(Geometry, SparseCodes, BitCounts)> {
+    let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
+    let own = 0..span.len();
+    let mut place = places(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
+    let piece = piece(&mut place)?;
+    let (indices, values) = (indices(dictionary, piece.atoms), Values::F16(piece.values));
+    let codes = SparseCodes::part(dictionary, span.start, counts, indices, values, piece.escapes)
+        .map_err(|e| Error::malformed(file, e.to_string()))?;
+    Ok((g, codes, piece.bit_counts))
+}
