@@ -40,7 +40,7 @@ mod tests {
     #[test]
     fn orders_are_those_of_a_stable_sort() {
         let mut rng = SplitMix64::new(8);
-        for n in (0..40).chain([1000]) {
+        for n in (0..40_usize).chain([1000]) {
             let keys: Vec<usize> = (0..n).map(|_| rng.below(n.div_ceil(2))).collect();
             let mut sorted: Vec<usize> = (0..n).collect();
             sorted.sort_by_key(|&k| keys[k]);

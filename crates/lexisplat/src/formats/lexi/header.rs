@@ -133,3 +133,61 @@ fn tensor(value: &Json) -> Option<TensorInfo> {
     let [start, end] = value.get("data_offsets")?.items()? else { return None };
     Some(TensorInfo { dtype, shape, data_offsets: (start.number()?, end.number()?) })
 }
+
+#[cfg(test)]
+mod tests {
+    use safetensors::tensor::Metadata;
+
+    use super::*;
+    use crate::support::rng::SplitMix64;
+
+    #[test]
+    fn types_are_known_by_the_names_of_safetensors() {
+        for (name, dtype) in DTYPES {
+            assert_eq!(serde_json::to_string(&dtype).unwrap(), format!("\"{name}\""));
+        }
+    }
+
+    /// What bytes of a header are replaced with.
+    const BYTES: &[u8] = b"0123456789\"{}[],:-.xyzabU8F3216";
+
+    /// Takes the same headers as the safetensors crate, which takes members that are there twice.
+    #[test]
+    fn headers_are_read_as_by_safetensors() {
+        let text = br#"{"__metadata__":{"a":"b","c":""},"y":{"dtype":"F32","shape":[2,1],"data_offsets":[3,11]},
+            "x":{"dtype":"U8","shape":[3],"data_offsets":[0,3]},"z":{"dtype":"U8","shape":[0],"data_offsets":[11,11]}}"#;
+        let mut rng = SplitMix64::new(12);
+        let (mut taken, mut refused) = (0, 0);
+        for round in 0..20_000 {
+            let mut text = text.to_vec();
+            for _ in 0..rng.below(3).min(round) {
+                let at = rng.below(text.len());
+                text[at] = BYTES[rng.below(BYTES.len())];
+            }
+            let shown = String::from_utf8_lossy(&text);
+            let other: Result<Metadata, _> = serde_json::from_slice(&text);
+            match (Header::read(&text), other) {
+                (Ok(own), Ok(other)) => {
+                    let mut names: Vec<String> = own.names().map(str::to_owned).collect();
+                    let metadata = other.metadata().iter().flatten();
+                    assert!(metadata.clone().all(|(key, text)| own.text(key) == Some(text)), "{shown}");
+                    for name in &names {
+                        let (own, other) = (own.info(name).unwrap(), other.info(name).unwrap());
+                        let other = (other.dtype, &other.shape, other.data_offsets);
+                        assert_eq!((own.dtype, &own.shape, own.data_offsets), other, "{shown}");
+                    }
+                    let mut others = other.offset_keys();
+                    names.sort_unstable();
+                    others.sort_unstable();
+                    assert_eq!(names, others);
+                    assert_eq!(own.data_bytes(), other.data_len());
+                    taken += 1;
+                }
+                (Err(_), Err(_)) => refused += 1,
+                (Err(error), Ok(_)) => assert!(error.contains("is there twice"), "{shown}: {error}"),
+                (Ok(_), Err(error)) => panic!("{shown}: {error}"),
+            }
+        }
+        assert!(taken > 1000 && refused > 1000, "{taken} {refused}");
+    }
+}

@@ -279,4 +279,94 @@ mod tests {
             assert!(!is_number(text), "{text}");
         }
     }
+
+    /// The same value as serde_json has it.
+    fn of_serde(value: &serde_json::Value) -> Json {
+        use serde_json::Value;
+        match value {
+            Value::Null => Json::Null,
+            Value::Bool(value) => Json::Bool(*value),
+            Value::Number(number) => Json::Number(number.to_string()),
+            Value::String(text) => Json::Text(text.clone()),
+            Value::Array(items) => Json::List(items.iter().map(of_serde).collect()),
+            Value::Object(members) => {
+                Json::Object(members.iter().map(|(name, value)| (name.clone(), of_serde(value))).collect())
+            }
+        }
+    }
+
+    /// The value with its numbers as serde_json writes them.
+    fn rewritten(value: Json) -> Json {
+        match value {
+            Json::Number(text) => {
+                let number: serde_json::Number = serde_json::from_str(&text).unwrap();
+                Json::Number(number.to_string())
+            }
+            Json::List(items) => Json::List(items.into_iter().map(rewritten).collect()),
+            Json::Object(members) => {
+                Json::Object(members.into_iter().map(|(name, value)| (name, rewritten(value))).collect())
+            }
+            other => other,
+        }
+    }
+
+    /// Refuses and takes the same as serde_json, but for members that are there twice.
+    fn agrees(text: &[u8]) {
+        let shown = String::from_utf8_lossy(text);
+        match (Json::parse(text), serde_json::from_slice::<serde_json::Value>(text)) {
+            (Ok(own), Ok(other)) => assert_eq!(rewritten(own), of_serde(&other), "{shown}"),
+            (Err(error), Ok(_)) => assert!(error.contains("is there twice"), "{shown}: {error}"),
+            (Ok(_), Err(error)) => panic!("{shown}: {error}"),
+            (Err(_), Err(_)) => {}
+        }
+    }
+
+    #[test]
+    fn texts_are_read_as_by_serde_json() {
+        let texts: [&[u8]; 24] = [
+            b" { \"a\" : [ 1 , -0.5e-3 , true , null ] , \"b\" : { } }\n\t\r",
+            br#""\u0041\ud83d\ude00\\\/\b\f\n\r\t\"\u00e4""#,
+            br#""\ud83d""#,
+            br#""\ud83dx""#,
+            br#""\ud83d\u0041""#,
+            br#""\ude00""#,
+            br#""\u00g0""#,
+            br#""\x""#,
+            b"\"\x01\"",
+            b"\"\xff\"",
+            b"\"\xc3\xa4\"",
+            b"\"\xc3\\u00a4\"",
+            b"[1,]",
+            b"[,1]",
+            b"{\"a\":1,}",
+            b"{a:1}",
+            b"1e400",
+            b"-1e-400",
+            b"1.7976931348623157e308",
+            b"123456789012345678901234567890",
+            b"1-2",
+            b"nul",
+            b"truefalse",
+            b"\xef\xbb\xbf1",
+        ];
+        texts.into_iter().for_each(agrees);
+        for depth in [126, 127, 128] {
+            agrees(&[vec![b'['; depth], vec![b']'; depth]].concat());
+            agrees(&[b"{\"a\":".repeat(depth), vec![b'1'], vec![b'}'; depth]].concat());
+        }
+        const BYTES: &[u8] = b"\"\\u{}[]:,0-.eEd8x \x00\xff";
+        let mut rng = crate::support::rng::SplitMix64::new(9);
+        for _ in 0..20_000 {
+            let mut text = texts[rng.below(2)].to_vec();
+            for _ in 0..=rng.below(3) {
+                let at = rng.below(text.len());
+                match rng.below(3) {
+                    0 => text[at] = BYTES[rng.below(BYTES.len())],
+                    1 => drop(text.remove(at)),
+                    _ => text.insert(at, BYTES[rng.below(BYTES.len())]),
+                }
+            }
+            agrees(&text);
+        }
+    }
 }

@@ -126,7 +126,7 @@ mod tests {
         // The check value of CRC-32.
         assert_eq!(hash(b"123456789"), 0xcbf4_3926);
         let mut rng = SplitMix64::new(4);
-        let bytes: Vec<u8> = (0..5000).map(|_| rng.next() as u8).collect();
+        let bytes: Vec<u8> = (0..5000).map(|_| rng.next().to_le_bytes()[0]).collect();
         for length in (0..70).chain([1000, 4999, 5000]) {
             assert_eq!(hash(&bytes[..length]), crc32fast::hash(&bytes[..length]), "{length}");
         }
