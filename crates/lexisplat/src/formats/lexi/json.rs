@@ -5,7 +5,7 @@
 
 use crate::support::order::order;
 
-/// Most arrays and objects within one another, as serde_json has it.
+/// Most arrays and objects within one another, as `serde_json` has it.
 const MOST_DEPTH: usize = 127;
 
 /// A value.
@@ -280,7 +280,7 @@ mod tests {
         }
     }
 
-    /// The same value as serde_json has it.
+    /// The same value as `serde_json` has it.
     fn of_serde(value: &serde_json::Value) -> Json {
         use serde_json::Value;
         match value {
@@ -295,7 +295,7 @@ mod tests {
         }
     }
 
-    /// The value with its numbers as serde_json writes them.
+    /// The value with its numbers as `serde_json` writes them.
     fn rewritten(value: Json) -> Json {
         match value {
             Json::Number(text) => {
@@ -310,7 +310,7 @@ mod tests {
         }
     }
 
-    /// Refuses and takes the same as serde_json, but for members that are there twice.
+    /// Refuses and takes the same as `serde_json`, but for members that are there twice.
     fn agrees(text: &[u8]) {
         let shown = String::from_utf8_lossy(text);
         match (Json::parse(text), serde_json::from_slice::<serde_json::Value>(text)) {
