@@ -67,8 +67,8 @@ fn a_page_without_a_scene_is_a_viewer_and_what_is_no_scene_is_refused() {
     folder.fail(&["html", "no.lexi"], 4);
     folder.fail(&["html", "scene.lexi", "no.lexi", "-o", "b.html"], 4);
     folder.fail(&["html", "scene.lexi", "--poster", "scene.ply", "-o", "b.html"], 4);
-    folder.fail(&["html", "scene.lexi", "-o", "b.lexi"], 2);
+    folder.fail(&["html", "scene.lexi", "-o", "b.lexi"], 5);
     assert!(!folder.path("b.html").exists());
     #[cfg(feature = "view")]
-    folder.fail(&["html", "scene.lexi", "--actions", "dance", "-o", "b.html"], 2);
+    folder.fail(&["html", "scene.lexi", "--actions", "dance", "-o", "b.html"], 5);
 }
