@@ -13,7 +13,7 @@ enum Done {
     Nothing,
     /// It was decoded when so many of its ranges were there and so many chunks around it missing.
     Coarse { ranges: usize, missing: usize },
-    /// As [`Self::Coarse`], and its bytes were dropped to make room. It is asked for again when nothing around it is missing.
+    /// Its bytes were dropped to make room. It is asked for again when nothing around it is missing.
     Dropped,
     /// All of it.
     Final,
@@ -151,32 +151,34 @@ impl Feed {
         job
     }
 
-    /// Makes room where [`Self::wants`] has none: drops the bytes of chunks that are whole but wait for others around them. They
-    /// are asked for again later. Returns whether there were any.
+    /// Makes room where [`Self::wants`] has none: drops the bytes of chunks that are whole but wait for others around them, or
+    /// if there are none, those of all chunks but the first that is not whole. They are asked for again later. Returns whether
+    /// there were any.
     pub fn relieve(&mut self) -> bool {
-        let mut any = false;
-        for (c, done) in self.done.iter_mut().enumerate() {
-            if matches!(done, Done::Coarse { .. }) && self.feed.is_chunk_complete(c) {
-                self.feed.forget(c);
-                (*done, any) = (Done::Dropped, true);
-            }
-        }
-        any
-    }
-
-    /// Asks again for the chunks that [`Self::relieve`] dropped, as far as those around them came. Returns whether there were
-    /// any.
-    pub fn ask_again(&mut self) -> bool {
-        let dropped: Vec<usize> = (0..self.done.len())
-            .filter(|&c| self.done.get(c) == Some(&Done::Dropped) && self.missing(c) == 0)
-            .collect();
-        for &c in &dropped {
-            self.feed.want(c);
+        let open = |c: &usize| !matches!(self.done.get(*c), Some(Done::Final | Done::Dropped));
+        let holding = (0..self.done.len()).filter(open).filter(|&c| self.feed.whole_ranges(c) > 0);
+        let (whole, unfinished): (Vec<usize>, Vec<usize>) =
+            holding.partition(|&c| self.feed.is_chunk_complete(c));
+        let dropped = if whole.is_empty() { unfinished.get(1..).unwrap_or_default() } else { &whole };
+        for &c in dropped {
+            self.feed.forget(c);
             if let Some(done) = self.done.get_mut(c) {
-                *done = Done::Coarse { ranges: 0, missing: 0 };
+                *done = Done::Dropped;
             }
         }
         !dropped.is_empty()
+    }
+
+    /// Asks again for the first of the chunks that [`Self::relieve`] dropped around which all came. Returns whether there was
+    /// one.
+    pub fn ask_again(&mut self) -> bool {
+        let is_next = |&c: &usize| self.done.get(c) == Some(&Done::Dropped) && self.missing(c) == 0;
+        let Some(c) = (0..self.done.len()).find(is_next) else { return false };
+        self.feed.want(c);
+        if let Some(done) = self.done.get_mut(c) {
+            *done = Done::Coarse { ranges: 0, missing: 0 };
+        }
+        true
     }
 
     /// Asks for no chunk that ends beyond the first `gaussians` Gaussians of the file, unless it was decoded. Chunks of the layer

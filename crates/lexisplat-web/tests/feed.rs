@@ -32,7 +32,7 @@ fn place(at: f64) -> usize {
 fn give(feed: &mut Feed, file: &[u8], piece: usize) -> bool {
     let Some(wanted) = feed.wants() else { return false };
     let (from, to) = (place(wanted[0]), place(wanted[1]));
-    assert!(feed.feed(wanted[0], &file[from..to.min(from + piece)]).is_ok());
+    assert!(feed.feed(wanted[0], &file[from..to.min(from.saturating_add(piece))]).is_ok());
     true
 }
 
