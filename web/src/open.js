@@ -13,7 +13,7 @@ export const ALL_PARTS = 0xffffffff;
 /** Most bytes of the JSON header of a file. */
 const MOST_HEADER = 4 << 20;
 /** The version of files that are decoded in part. */
-const LAYERED = '3';
+export const LAYERED = '3';
 
 /**
  * @param {object} env where WebAssembly and workers come from
@@ -31,24 +31,36 @@ export async function openWith(env, source, options) {
     if (start.version !== LAYERED) {
       if (start.version === undefined) throw new Error(`${input.source.name}: this is not a .lexi file`);
       pool = await Pool.of(Math.min(workers, 1), await env.files());
-      return await wholeScene({ input, env, settings, pool, start });
+      return await wholeScene({ input, settings, pool, start });
     }
-    const feed = new env.wasm.Feed(input.source.name, settings.memory, settings.shParts);
-    input.feed = feed;
-    input.source = after(start.bytes, input.source);
-    while (feed.header() === undefined) await feedOnce(feed, input.source, signal);
+    const header = await startFeed(input, env.wasm, start, settings);
     pool = await Pool.of(workers, env);
-    const { name } = input.source;
-    await pool.askAll({ type: 'start', name, start: feed.start(), shParts: settings.shParts });
-    const header = JSON.parse(feed.header());
-    const dictionary = { atoms: header.atoms, rest: restOf(header.degree), values: feed.dictionary() };
-    return new Scene({ input, env, options: settings, header, dictionary, pool });
+    await startDecoders(pool, input, settings);
+    const dictionary = { atoms: header.atoms, rest: restOf(header.degree), values: input.feed.dictionary() };
+    return new Scene({ input, options: settings, header, dictionary, pool });
   } catch (error) {
     input.source.close();
     input.feed?.free();
     pool?.close();
     throw error;
   }
+}
+
+/**
+ * Gives `input` a feed, which has what `start` is of its source and as much more as its header takes.
+ * @returns {Promise<object>} the header
+ */
+export async function startFeed(input, wasm, start, { memory, shParts, signal }) {
+  const feed = new wasm.Feed(input.source.name, memory, shParts);
+  input.feed = feed;
+  input.source = after(start.bytes, input.source);
+  while (feed.header() === undefined) await feedOnce(feed, input.source, signal);
+  return JSON.parse(feed.header());
+}
+
+/** Tells all workers the start of the file that they decode chunks of. */
+export async function startDecoders(pool, { source: { name }, feed }, { shParts }) {
+  await pool.askAll({ type: 'start', name, start: feed.start(), shParts });
 }
 
 /** Values of SH-rest at a degree. */
@@ -107,7 +119,7 @@ export async function readWhole(source, first, { memory, signal, onProgress }) {
 }
 
 /** A scene of a file that is decoded whole: an exact layout, or version 2. */
-async function wholeScene({ input, env, settings, pool, start }) {
+async function wholeScene({ input, settings, pool, start }) {
   const { source } = input;
   const bytes = await readWhole(source, start.bytes, settings);
   // The header is known only once the file is decoded; what it is decoded to is chosen later, so bytes are kept until then.
@@ -120,5 +132,5 @@ async function wholeScene({ input, env, settings, pool, start }) {
     settings.onProgress?.({ loaded: header.bytes, total: header.bytes, decoded: chunk.count, gaussians: chunk.count });
     return { index: 0, layer: 0, complete: true, ...chunk };
   };
-  return new Scene({ input, env, options: settings, header: { version: Number(start.version), ...header }, dictionary: scene, whole, pool });
+  return new Scene({ input, options: settings, header: { version: Number(start.version), ...header }, dictionary: scene, whole, pool });
 }

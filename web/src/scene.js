@@ -12,17 +12,15 @@ export class Scene {
   header;
   dictionary;
   #input;
-  #env;
   #options;
   #pool;
   #whole;
   #used = false;
 
-  constructor({ input, env, options, header, dictionary, whole, pool }) {
+  constructor({ input, options, header, dictionary, whole, pool }) {
     this.header = header;
     this.dictionary = dictionary;
     this.#input = input;
-    this.#env = env;
     this.#options = options;
     this.#whole = whole;
     this.#pool = pool;

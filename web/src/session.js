@@ -1,10 +1,10 @@
 /** Brings a scene of any format to the viewer: .lexi files coarse to fine while they come, others whole. */
 
 import * as wasm from '../wasm/viewer.js';
-import { ALL_PARTS, MEMORY, readStart, readWhole } from './open.js';
+import { ALL_PARTS, LAYERED, MEMORY, readStart, readWhole, startDecoders, startFeed } from './open.js';
 import { Pool } from './pool.js';
 import { streamed } from './scene.js';
-import { after, feedOnce, sourceOf } from './source.js';
+import { sourceOf } from './source.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
 /** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
@@ -16,8 +16,6 @@ const NONZEROS = 8;
 const COEFFICIENT = 4;
 /** Of the budget, the share that the scene may take. The rest is for what it is drawn with. */
 const SCENE_SHARE = 0.75;
-/** The version of files that are decoded in part. */
-const LAYERED = '3';
 
 /**
  * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
@@ -31,42 +29,38 @@ const LAYERED = '3';
  * @returns {Promise<{info: object}>}
  */
 export async function show(source, { env, onForm, onPart, onProgress, signal, budget = Infinity }) {
-  const input = sourceOf(source);
+  const input = { source: sourceOf(source), feed: undefined };
+  let pool;
   const stats = { milliseconds: 0 };
   const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
   const options = { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report };
-  const open = { pool: undefined, feed: undefined };
   try {
     signal?.throwIfAborted();
-    const start = await readStart(input, signal);
-    open.pool = await Pool.of(start.version === LAYERED ? env.workers : Math.min(env.workers, 1), {
+    const start = await readStart(input.source, signal);
+    pool = await Pool.of(start.version === LAYERED ? env.workers : Math.min(env.workers, 1), {
       module: env.wasm,
       worker: async () => new Worker(env.worker, env.worker.startsWith('blob:') ? {} : { type: 'module' }),
       handler: () => viewerHandlerOf(wasm),
     });
-    const given = { input, start, open, options, stats, budget, onForm, onPart };
+    const given = { input, start, pool, options, stats, budget, onForm, onPart };
     return { info: await (start.version === LAYERED ? layered(given) : whole(given)) };
   } finally {
-    input.close();
-    open.feed?.free();
-    open.pool?.close();
+    input.source.close();
+    input.feed?.free();
+    pool?.close();
   }
 }
 
 /** Shows a packed file of version 3 while it comes. */
-async function layered({ input, start, open, options, stats, budget, onForm, onPart }) {
-  const { name } = input;
-  const feed = new wasm.Feed(name, options.memory, options.shParts);
-  open.feed = feed;
-  const source = after(start.bytes, input);
-  while (feed.header() === undefined) await feedOnce(feed, source, options.signal);
-  const header = JSON.parse(feed.header());
-  const shown = feed.give_up(Math.min(header.gaussians, mostGaussians(budget)));
+async function layered({ input, start, pool, options, stats, budget, onForm, onPart }) {
+  const header = await startFeed(input, wasm, start, options);
+  const { name } = input.source;
+  const shown = input.feed.give_up(Math.min(header.gaussians, mostGaussians(budget)));
   if (shown === 0 && header.gaussians > 0) throw new Error(`${name}: ${budget} bytes of graphics memory are too few for it`);
   const info = { ...header, name, shown };
-  await open.pool.askAll({ type: 'start', name, start: feed.start(), shParts: options.shParts });
+  await startDecoders(pool, input, options);
   let isFormed = false;
-  for await (const chunk of streamed({ source, feed, pool: open.pool, options, as: 'gpu', refine: true, stats })) {
+  for await (const chunk of streamed({ ...input, pool, options, as: 'gpu', refine: true, stats })) {
     if (!isFormed) await onForm(chunk.form, info);
     isFormed = true;
     await onPart(chunk.index, chunk.part);
@@ -79,9 +73,9 @@ function mostGaussians(budget) {
 }
 
 /** Shows a file that is read whole. */
-async function whole({ input, start, open, options, stats, budget, onForm, onPart }) {
-  const { name } = input;
-  const bytes = await readWhole(input, start.bytes, { ...options, memory: Infinity });
+async function whole({ input: { source }, start, pool, options, stats, budget, onForm, onPart }) {
+  const { name } = source;
+  const bytes = await readWhole(source, start.bytes, { ...options, memory: Infinity });
   const loaded = bytes.length;
   const clock = performance.now();
   let info;
@@ -89,7 +83,7 @@ async function whole({ input, start, open, options, stats, budget, onForm, onPar
   let taken = Promise.resolve();
   let refusal;
   const take = (step) => (taken = taken.then(step).catch((error) => (refusal ??= error)));
-  await open.pool.ask({ type: 'scene', name, bytes }, [bytes.buffer], ({ form, head, index, part, count }) => {
+  await pool.ask({ type: 'scene', name, bytes }, [bytes.buffer], ({ form, head, index, part, count }) => {
     options.signal?.throwIfAborted();
     if (form) {
       info = { ...head, name, shown: head.gaussians };

@@ -5,7 +5,7 @@ import { writeFile } from 'node:fs/promises';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { launch, npm } from './support/chromium.mjs';
-import { newPage, reportOf, scene, serveStub } from './support/viewer-page.mjs';
+import { faultless, newPage, reportOf, scene, serveStub } from './support/viewer-page.mjs';
 
 const STILL = 'data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACwAAAAAAQABAAACAkQBADs=';
 // A strict page around the element: no inline styles, no inline scripts.
@@ -36,15 +36,7 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
   const heard = (name) => page.evaluate((name) => globalThis.heard.filter(([heard]) => heard === name).map(([, detail]) => detail), name);
   const loaded = (count = 1) => page.waitForFunction((count) => globalThis.heard.filter(([name]) => name === 'load').length === count, count);
   const viewers = () => page.evaluate(() => (globalThis.viewers ?? []).map(({ freed }) => freed));
-  const test = (name, run) =>
-    it(name, async () => {
-      try {
-        await run();
-        assert.deepEqual(page.faults, []);
-      } finally {
-        await page?.context().close();
-      }
-    });
+  const test = faultless(() => page);
 
   test('shows its scene and tells the page', async () => {
     await open('<lexi-viewer src="/made/first.lexi" alt="A garden"></lexi-viewer>');

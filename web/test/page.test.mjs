@@ -4,10 +4,10 @@ import assert from 'node:assert/strict';
 import { readFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { join } from 'node:path';
-import { after, before, describe, it } from 'node:test';
+import { after, before, describe } from 'node:test';
 import { launch, npm } from './support/chromium.mjs';
 import { decodePng } from './support/png.mjs';
-import { calls, drop, newPage, reportOf, scene, serveStub, whole } from './support/viewer-page.mjs';
+import { calls, drop, faultless, newPage, reportOf, scene, serveStub, whole } from './support/viewer-page.mjs';
 
 // Longer than the rest after which a picture is drawn in full, in milliseconds.
 const REST = 300;
@@ -31,15 +31,7 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
   const report = () => reportOf(page);
   const rest = () => page.waitForTimeout(REST);
   const message = (text) => page.locator('.message', { hasText: text }).waitFor();
-  const test = (name, run) =>
-    it(name, async () => {
-      try {
-        await run();
-        assert.deepEqual(page.faults, []);
-      } finally {
-        await page?.context().close();
-      }
-    });
+  const test = faultless(() => page);
 
   test('opens dropped files, the second beside the first, and says its figures', async () => {
     await open();

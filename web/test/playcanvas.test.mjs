@@ -5,11 +5,10 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { fileURLToPath } from 'node:url';
 import { open } from '../src/index.js';
 import { launch, npm, psnr, shot } from './support/chromium.mjs';
 import { plyOf } from './support/ply.mjs';
-import { lit, openViewer, serveViewers } from './support/viewers.mjs';
+import { dense, golden, lit, openViewer, serveViewers } from './support/viewers.mjs';
 import { orbit } from './support/views.mjs';
 
 // What the issue asks for, dB.
@@ -20,20 +19,12 @@ const SIZE = 256;
 const HALVES = 2 ** -8;
 // The largest half float.
 const MOST = 65504;
-const golden = fileURLToPath(new URL('../../crates/lexisplat/tests/golden', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'lexisplat-playcanvas-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with playcanvas and playwright-core';
 let browser;
 let server;
 // Opening a page costs seconds without a GPU, so tests share one for each backend.
 const viewers = {};
-
-async function dense(name) {
-  const scene = await open(readFileSync(join(golden, `${name}.lexi`)), { workers: 0 });
-  const chunk = await scene.all({ as: 'dense' });
-  scene.close();
-  return { header: scene.header, chunk };
-}
 
 const shown = (backend = 'webgl2') =>
   (viewers[backend] ??= openViewer(browser, `${server.url}/test/support/playcanvas.html?${backend}`));

@@ -8,7 +8,7 @@ import { after, before, describe, it } from 'node:test';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import { buildPage } from '../build-page.mjs';
 import { launch, npm } from './support/chromium.mjs';
-import { drop, newPage, reportOf, scene, whole } from './support/viewer-page.mjs';
+import { drop, faultless, newPage, reportOf, scene, whole } from './support/viewer-page.mjs';
 
 const here = (path) => fileURLToPath(new URL(path, import.meta.url));
 const STILL = 'data:image/gif;base64,R0lGODlhAQABAIAAAP///wAAACwAAAAAAQABAAACAkQBADs=';
@@ -52,15 +52,7 @@ describe('the page of one file', { skip: !npm && 'LEXISPLAT_NPM is not set' }, (
     `id="${id}" data-name=""></script>`,
     `id="${id}" data-name="${name}">${Buffer.from(text).toString('base64')}</script>`,
   ];
-  const test = (name, run) =>
-    it(name, async () => {
-      try {
-        await run();
-        assert.deepEqual(page.faults, []);
-      } finally {
-        await page?.context().close();
-      }
-    });
+  const test = faultless(() => page);
 
   test('shows the scene that it carries, with nothing from anywhere', async () => {
     await open([carried('scene', 'garden.lexi'), ['<title>lexisplat</title>', '<title>A garden</title>']]);

@@ -1,22 +1,19 @@
 // three.js from npm, in Chromium, draws a .lexi by our loader as it draws the same scene as a PLY by its own.
 
 import assert from 'node:assert/strict';
-import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
+import { mkdtempSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { fileURLToPath } from 'node:url';
-import { open } from '../src/index.js';
 import { launch, npm, psnr, shot } from './support/chromium.mjs';
 import { plyOf } from './support/ply.mjs';
-import { lit, openViewer, serveViewers } from './support/viewers.mjs';
+import { dense, golden, lit, openViewer, serveViewers } from './support/viewers.mjs';
 import { orbit } from './support/views.mjs';
 
 // What the issue asks for, dB.
 const ALIKE = 45;
 // Pixels.
 const SIZE = 256;
-const golden = fileURLToPath(new URL('../../crates/lexisplat/tests/golden', import.meta.url));
 const folder = mkdtempSync(join(tmpdir(), 'lexisplat-three-'));
 const skip = npm ? false : 'LEXISPLAT_NPM names no folder with three and playwright-core';
 let browser;
@@ -26,11 +23,9 @@ const viewers = {};
 
 // Writes the PLY of a golden scene and gives the scene.
 async function decompressed(name) {
-  const scene = await open(readFileSync(join(golden, `${name}.lexi`)), { workers: 0 });
-  const chunk = await scene.all({ as: 'dense' });
-  scene.close();
-  writeFileSync(join(folder, `${name}.ply`), plyOf(scene.header.degree, chunk));
-  return { header: scene.header, chunk };
+  const decoded = await dense(name);
+  writeFileSync(join(folder, `${name}.ply`), plyOf(decoded.header.degree, decoded.chunk));
+  return decoded;
 }
 
 const shown = (backend = 'WebGPU') =>

@@ -6,11 +6,11 @@ import { mkdtemp, readFile, rm, writeFile } from 'node:fs/promises';
 import { createServer } from 'node:http';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
-import { after, before, describe, it } from 'node:test';
+import { after, before, describe } from 'node:test';
 import { fileURLToPath, pathToFileURL } from 'node:url';
 import { buildPage } from '../build-page.mjs';
 import { launch, npm, psnr, serve, shot } from './support/chromium.mjs';
-import { newPage, web, whole } from './support/viewer-page.mjs';
+import { faultless, newPage, web, whole } from './support/viewer-page.mjs';
 
 const wasm = join(web, 'wasm/viewer_bg.wasm');
 const golden = fileURLToPath(new URL('../../crates/lexisplat/tests/golden', import.meta.url));
@@ -65,15 +65,7 @@ describe('the viewer with WebGPU', { skip: missing }, () => {
       last = next;
     }
   };
-  const test = (name, run) =>
-    it(name, { timeout: PATIENCE }, async () => {
-      try {
-        await run();
-        assert.deepEqual(page.faults, []);
-      } finally {
-        await page?.context().close();
-      }
-    });
+  const test = faultless(() => page, { timeout: PATIENCE });
 
   test('the page draws files of two formats, compares them, and goes on after a wrong one', async () => {
     await open(pageOf(''));

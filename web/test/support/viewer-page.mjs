@@ -1,8 +1,10 @@
 // What tests of the viewer's page and element share: a browser, and the sources served with the stand-ins of test/stub.
 
+import assert from 'node:assert/strict';
 import { mkdtemp, rm, writeFile } from 'node:fs/promises';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
+import { it } from 'node:test';
 import { fileURLToPath } from 'node:url';
 import { serve } from './chromium.mjs';
 
@@ -54,6 +56,23 @@ export async function newPage(browser, options = {}) {
     if (/Content Security Policy|Content-Security-Policy/.test(message.text())) page.faults.push(message.text());
   });
   return page;
+}
+
+/**
+ * Gives a function that defines tests, which fail if the page that `opened` gives had faults, and closes the page.
+ * @param {() => import('playwright-core').Page | undefined} opened
+ * @param {object} [options] of every test
+ */
+export function faultless(opened, options = {}) {
+  return (name, run) =>
+    it(name, options, async () => {
+      try {
+        await run();
+        assert.deepEqual(opened().faults, []);
+      } finally {
+        await opened()?.context().close();
+      }
+    });
 }
 
 /** Drops files on what `selector` finds. @param {{name: string, text: string}[]} files */

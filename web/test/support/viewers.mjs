@@ -1,11 +1,25 @@
 // Pages of three.js and PlayCanvas that show a file by our loader or a PLY by their own.
 
+import { readFileSync } from 'node:fs';
+import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
+import { open } from '../../src/index.js';
 import { npm, serve, shot } from './chromium.mjs';
 
 const web = fileURLToPath(new URL('../..', import.meta.url));
 // Milliseconds; drawing without a GPU takes long.
 const PATIENCE = 120_000;
+
+/** The folder of the golden files. */
+export const golden = fileURLToPath(new URL('../../../crates/lexisplat/tests/golden', import.meta.url));
+
+/** The header of a golden file and all of it, with dense SH. */
+export async function dense(name) {
+  const scene = await open(readFileSync(join(golden, `${name}.lexi`)), { workers: 0 });
+  const chunk = await scene.all({ as: 'dense' });
+  scene.close();
+  return { header: scene.header, chunk };
+}
 
 /**
  * Serves the package, those of LEXISPLAT_NPM as it would find them, and further files.
