@@ -88,7 +88,7 @@ async function whole({ input: { source }, start, pool, options, stats, budget, o
     if (form) {
       info = { ...head, name, shown: head.gaussians };
       const needed = head.gaussians * (GEOMETRY + COEFFICIENT * 4 * Math.ceil((3 * (head.degree + 1) ** 2) / 4));
-      if (needed * SCENE_SHARE > budget) {
+      if (needed > budget * SCENE_SHARE) {
         throw new Error(`${name}: it takes ${needed} bytes of graphics memory as it is, and ${budget} are allowed; a .lexi made of it takes less`);
       }
       take(() => onForm(form, info));

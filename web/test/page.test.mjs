@@ -172,8 +172,8 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     await page.mouse.down();
     for (let x = 0; x < 10; x++) await page.mouse.move(300 + 5 * x, 300);
     await page.mouse.up();
-    await rest();
-    await rest();
+    assert.equal(await page.locator('canvas').getAttribute('aria-busy'), 'true');
+    await page.locator('canvas[aria-busy=false]').waitFor();
     const moved = (await draws()).slice(still);
     assert.ok(moved.some((scale) => scale < 1), `${moved}`);
     assert.equal(moved.at(-1), 1, 'at rest it is drawn in full');

@@ -99,13 +99,6 @@ impl Feed {
         self.feed.outline().and_then(|outline| outline.chunks.get(chunk)).map_or(0, |chunk| chunk.layer)
     }
 
-    /// Bytes of the file that are held.
-    #[must_use]
-    #[expect(clippy::cast_precision_loss, reason = "far below 2^53")]
-    pub fn held(&self) -> f64 {
-        self.feed.held_bytes() as f64
-    }
-
     /// Whether every chunk was given as a job as fine as it can be.
     #[must_use]
     pub fn is_done(&self) -> bool {

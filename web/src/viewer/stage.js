@@ -9,7 +9,10 @@ const COARSEST = 0.25;
 // Most pixels along a side that every device of WebGPU can draw (maxTextureDimension2D of its default limits).
 const LARGEST = 8192;
 
-/** Draws by a `Viewer` on a canvas. A viewer is asked nothing while it draws, since its calls may not overlap. */
+/**
+ * Draws by a `Viewer` on a canvas. A viewer is asked nothing while it draws, since its calls may not overlap.
+ * The canvas is `aria-busy` until it shows the last picture of what was asked for, in full.
+ */
 export class Stage {
   #viewer;
   #drawing = false;
@@ -64,6 +67,12 @@ export class Stage {
   request() {
     if (this.#drawing) this.#again = true;
     else this.#scheduled ||= requestAnimationFrame((now) => this.#frame(now));
+    this.#tell();
+  }
+
+  #tell() {
+    const busy = this.#drawing || this.#again || this.#scheduled !== 0 || this.#resting !== 0 || this.#queue.length > 0;
+    if (this.canvas.ariaBusy !== String(busy)) this.canvas.ariaBusy = String(busy);
   }
 
   /** Frees the viewer. */
@@ -105,6 +114,7 @@ export class Stage {
       this.#drawing = false;
       if (this.#again) this.request();
       this.#proceed();
+      this.#tell();
     }
   }
 
@@ -120,17 +130,24 @@ export class Stage {
     if (flies) this.#moved = performance.now();
     const moving = performance.now() - this.#moved < REST;
     this.#again = flies;
+    clearTimeout(this.#resting);
+    this.#resting = moving ? setTimeout(() => this.#rest(), REST + 1 - (performance.now() - this.#moved)) : 0;
     try {
       const draw = async () => (await viewer.draw(moving ? this.#scale : 1)) && JSON.parse(viewer.report());
       const report = await this.#hold(draw());
       if (this.#closed) return;
       if (report) this.#measured(report, moving);
     } catch (error) {
+      clearTimeout(this.#resting);
+      this.#resting = 0;
+      this.#tell();
       if (!this.#closed) this.on.failed(error);
-      return;
     }
-    clearTimeout(this.#resting);
-    if (moving) this.#resting = setTimeout(() => this.request(), REST + 1 - (performance.now() - this.#moved));
+  }
+
+  #rest() {
+    this.#resting = 0;
+    this.request();
   }
 
   // The time of a picture grows with its pixels, the square of its scale.

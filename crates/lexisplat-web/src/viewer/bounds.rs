@@ -12,7 +12,7 @@ const SAMPLE: usize = 2048;
 /// Views of the orbit that is stepped through, as in `lexisplat view`, and their size, which the canvas replaces.
 const ORBIT: usize = 24;
 const ORBIT_SIZE: (u32, u32) = (1280, 720);
-/// The bounds are found again when so many times as many Gaussians were sampled.
+/// The bounds are found again when so many times as many Gaussians were sampled, and when all came.
 const GROWTH: usize = 2;
 /// Gaussians count as seen at a place within this share of the picture's shorter side of it.
 const NEAR: f64 = 0.02;
@@ -26,6 +26,9 @@ const PASSED: f64 = 0.1;
 pub(super) struct Bounds {
     slot: Option<Slot>,
     parts: BTreeMap<usize, Geometry>,
+    /// Gaussians that the scene will have, and that came.
+    wanted: u64,
+    came: u64,
     /// Gaussians of the sample when the bounds were last found.
     found_at: usize,
     /// The link to the view that was chosen last for the scene, while it was not changed.
@@ -33,9 +36,9 @@ pub(super) struct Bounds {
 }
 
 impl Bounds {
-    /// Begins with the scene in `slot`.
-    pub(super) fn begin(&mut self, slot: Slot) {
-        *self = Self { slot: Some(slot), link: self.link.take(), ..Self::default() };
+    /// Begins with the scene in `slot`, which will have `wanted` Gaussians.
+    pub(super) fn begin(&mut self, slot: Slot, wanted: u64) {
+        *self = Self { slot: Some(slot), wanted, link: self.link.take(), ..Self::default() };
     }
 
     /// Takes a part of the scene in `slot`. Returns whether the bounds should be found again.
@@ -44,8 +47,11 @@ impl Bounds {
             return false;
         }
         self.parts.insert(index, part.sample((part.len() as usize / SAMPLE).max(1)));
+        self.came += u64::from(part.len());
         let sampled: usize = self.parts.values().map(Geometry::len).sum();
-        if sampled >= GROWTH * self.found_at && sampled > 0 {
+        // The view of a whole scene does not depend on the order in which its parts came.
+        let is_whole = self.came == self.wanted;
+        if sampled > 0 && (is_whole || sampled >= GROWTH * self.found_at) {
             self.found_at = sampled;
             return true;
         }

@@ -152,7 +152,8 @@ impl Viewer {
         Ok(())
     }
 
-    /// Begins a scene in a slot, 0 or 1, in place of the one that was there. `info` is a JSON object that the report gives back.
+    /// Begins a scene in a slot, 0 or 1, in place of the one that was there. `info` is a JSON object that the report gives back;
+    /// its `shown` is the number of Gaussians that will come.
     ///
     /// # Errors
     /// [`Chunk.form`](crate::Chunk::form) did not give these bytes, or the GPU refuses.
@@ -161,12 +162,13 @@ impl Viewer {
         let form = SceneForm::from_bytes(&bytes).map_err(thrown)?;
         let info: Value = serde_json::from_str(&info).map_err(thrown)?;
         self.screen.begin(slot, &form).await.map_err(thrown)?;
+        let wanted = info["shown"].as_u64().unwrap_or(0);
         self.infos[slot.index()] = Some(info);
         let was_open = self.infos.iter().flatten().count() > 1 || slot == Slot::Second;
         self.state.set_open([0, 1].map(|k| self.infos[k].is_some()));
         // A scene alone, or a new first one, is looked at from its own place.
         if !was_open || slot == Slot::First {
-            self.bounds.begin(slot);
+            self.bounds.begin(slot, wanted);
         }
         self.drawn = None;
         Ok(())
