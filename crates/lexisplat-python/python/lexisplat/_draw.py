@@ -1,0 +1,133 @@
+"""Pictures, and comparisons by pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from typing import Any, overload
+
+from . import _native
+from ._cameras import Camera, as_tuples, native
+from ._compress import Cameras, _cameras
+from ._device import quiet
+from ._progress import Progress, reporter
+from ._scene import Scene
+from ._splats import FloatArray, Splats
+
+Colour = Sequence[float]
+
+
+@overload
+def render(
+    scene: Splats | Scene,
+    camera: Camera,
+    *,
+    background: Colour = ...,
+    max_degree: int | None = ...,
+    device: str = ...,
+    progress: Progress = ...,
+) -> FloatArray: ...
+@overload
+def render(
+    scene: Splats | Scene,
+    camera: Sequence[Camera] | str | os.PathLike[str],
+    *,
+    background: Colour = ...,
+    max_degree: int | None = ...,
+    device: str = ...,
+    progress: Progress = ...,
+) -> list[FloatArray]: ...
+def render(
+    scene: Splats | Scene,
+    camera: Camera | Cameras,
+    *,
+    background: Colour = (0.0, 0.0, 0.0),
+    max_degree: int | None = None,
+    device: str = "auto",
+    progress: Progress = None,
+) -> FloatArray | list[FloatArray]:
+    """Draws a scene by the rules of the 3DGS authors' rasteriser; a :class:`Scene` straight from its sparse codes.
+
+    Parameters
+    ----------
+    scene : Splats or Scene
+        What is drawn.
+    camera : Camera, sequence of Camera, or path
+        Where it is drawn from.
+    background : three floats
+        Colour behind the scene, 0 to 1.
+    max_degree : int, optional
+        Highest SH degree that is drawn.
+    device : {"auto", "cpu", "gpu"} or a number as text
+        ``"cpu"`` gives the same bits on every machine; ``"auto"`` takes a GPU if there is one.
+    progress : callable or bool, optional
+        As :func:`load`.
+
+    Returns
+    -------
+    (height, width, 3) of float32, or a list of them
+        0 is black and 1 is white; values are not clipped.
+
+    Raises
+    ------
+    ParameterError, GpuError
+    """
+    alone = isinstance(camera, Camera)
+    views: Any = [camera] if isinstance(camera, Camera) else _cameras(camera)
+    r, g, b = (float(value) for value in background)
+    with quiet(device):
+        pictures = _native.render(
+            native(scene),
+            as_tuples(views),
+            background=(r, g, b),
+            max_degree=max_degree,
+            device_name=device,
+            progress=reporter(progress),
+        )
+    return pictures[0] if alone else pictures
+
+
+def compare(
+    a: Splats | Scene,
+    b: Splats | Scene,
+    cameras: Cameras | None = None,
+    *,
+    count: int = 8,
+    background: Colour = (0.0, 0.0, 0.0),
+    eight_bit: bool = False,
+    device: str = "auto",
+    progress: Progress = None,
+) -> dict[str, Any]:
+    """Scores pictures of ``b`` against those of ``a``, view by view.
+
+    Parameters
+    ----------
+    a, b : Splats or Scene
+        The original, and what is compared with it.
+    cameras : sequence of Camera, or path, optional
+        Where both are drawn from. Otherwise ``count`` views of ``a`` like photographs are looked for.
+    background : three floats
+        Colour behind the scenes.
+    eight_bit : bool
+        Whether pictures are rounded to 8 bits first.
+
+    Returns
+    -------
+    dict
+        ``identical``; ``psnr`` and ``ssim`` with ``mean``, ``min`` and ``max`` over views (``psnr`` over those that
+        differ); ``views``, a dict each.
+    """
+    r, g, b_ = (float(value) for value in background)
+    with quiet(device):
+        told = _native.compare(
+            native(a),
+            native(b),
+            None if cameras is None else as_tuples(_cameras(cameras)),
+            count=count,
+            background=(r, g, b_),
+            eight_bit=eight_bit,
+            device_name=device,
+            progress=reporter(progress),
+        )
+    return dict(json.loads(told))

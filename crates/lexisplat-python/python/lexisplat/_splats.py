@@ -1,0 +1,216 @@
+"""A trained scene as arrays."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._errors import ParameterError
+
+FloatArray = npt.NDArray[np.float32]
+#: ``log``: scales are logarithms and opacities logits, as trainers store them. ``linear``: both are activated.
+Space = Literal["log", "linear"]
+
+#: Opacities of exactly 0 and 1 become logits of this size: in float32 the sigmoid of it is 1 (``SURE_OPACITY``).
+_SURE_OPACITY = 100.0
+#: Least standard deviation of linear scales, whose logarithm is stored: the smallest normal float32.
+_LEAST_SCALE = float(np.finfo(np.float32).tiny)
+_NAMES = ("means", "scales", "quats", "opacities", "sh0", "shN")
+
+
+@dataclass(eq=False)
+class Splats:
+    """A scene of N Gaussians with dense spherical harmonics (SH), by gsplat's names and shapes.
+
+    Values are as trainers store them, before any activation. All arrays are float32; other types are converted, and
+    torch tensors on the CPU are taken without a copy where that is possible. Arrays may be changed and replaced.
+
+    Parameters
+    ----------
+    means : (N, 3)
+        Centres, in world units.
+    scales : (N, 3)
+        Natural logarithms of the standard deviations along the three axes, in world units.
+    quats : (N, 4)
+        Quaternions (w, x, y, z), not necessarily of unit length.
+    opacities : (N,)
+        Opacities before the sigmoid.
+    sh0 : (N, 1, 3)
+        SH coefficient 0 of red, green and blue. The base colour is ``0.5 + 0.28209479 * sh0``.
+    shN : (N, K, 3)
+        The other SH coefficients; K is 0, 3, 8, 15 or 24 at degree 0 to 4. What :func:`load` gives is a view with
+        strides, because files hold the channels apart; :meth:`to_dict` makes contiguous copies.
+    normals : (N, 3), optional
+        Normals, which no renderer uses.
+    extras : dict of (N,) arrays
+        Per-Gaussian properties that 3DGS does not define, under their own names.
+    comments : list of str
+        Comment lines of the file.
+    antialiased : bool
+        Whether the scene was trained with the anti-aliased (Mip-Splatting) dilation, and is drawn with it.
+    """
+
+    means: FloatArray
+    scales: FloatArray
+    quats: FloatArray
+    opacities: FloatArray
+    sh0: FloatArray
+    shN: FloatArray
+    normals: FloatArray | None = None
+    extras: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
+    comments: list[str] = field(default_factory=list)
+    antialiased: bool = False
+
+    def __post_init__(self) -> None:
+        self._checked()
+
+    def _checked(self) -> Splats:
+        """Brings every array to its type and shape, without a copy of those that have both."""
+        self.means = _rows("means", self.means, 3)
+        count = len(self.means)
+        self.scales = _rows("scales", self.scales, 3, count)
+        self.quats = _rows("quats", self.quats, 4, count)
+        opacities = _floats(self.opacities)
+        if opacities.shape == (count, 1):
+            opacities = opacities.reshape(count)
+        self.opacities = _contiguous(_shaped("opacities", opacities, (count,)))
+        sh0 = _floats(self.sh0)
+        self.sh0 = _contiguous(_shaped("sh0", sh0.reshape(count, 1, 3) if sh0.shape == (count, 3) else sh0, (count, 1, 3)))
+        shN = _floats(self.shN)
+        if shN.ndim != 3 or shN.shape[0] != count or shN.shape[1] not in (0, 3, 8, 15, 24) or shN.shape[2] != 3:
+            raise _wrong_shape("shN", shN.shape, f"({count}, K, 3) with K of 0, 3, 8, 15 or 24")
+        self.shN = shN
+        if self.normals is not None:
+            self.normals = _rows("normals", self.normals, 3, count)
+        self.extras = {name: _contiguous(_shaped(name, np.asarray(v), (count,))) for name, v in self.extras.items()}
+        return self
+
+    def __len__(self) -> int:
+        return len(self.means)
+
+    def __repr__(self) -> str:
+        return f"Splats({len(self):,} Gaussians, SH degree {self.degree})"
+
+    @property
+    def degree(self) -> int:
+        """SH degree, 0 to 4."""
+        coefficients: int = self.shN.shape[1]
+        return math.isqrt(coefficients + 1) - 1
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        arrays = [getattr(self, name) for name in _NAMES] + [*self.extras.values()]
+        return sum(a.nbytes for a in arrays) + (0 if self.normals is None else self.normals.nbytes)
+
+    def __getitem__(self, which: Any) -> Splats:
+        """The Gaussians that a slice, a mask or an array of numbers names."""
+        if isinstance(which, (int, np.integer)):
+            which = slice(which, None if which == -1 else which + 1)
+        arrays = {name: getattr(self, name)[which] for name in _NAMES}
+        extras = {name: values[which] for name, values in self.extras.items()}
+        normals = None if self.normals is None else self.normals[which]
+        return Splats(
+            **arrays, normals=normals, extras=extras, comments=[*self.comments], antialiased=self.antialiased
+        )
+
+    def to_dict(self, space: Space = "log", *, contiguous: bool = True) -> dict[str, FloatArray]:
+        """The six arrays by gsplat's names.
+
+        Parameters
+        ----------
+        space : {"log", "linear"}
+            ``"linear"`` gives standard deviations and opacities from 0 to 1, as gsplat's ``rasterization`` takes them.
+        contiguous : bool
+            Whether ``shN`` is copied if it has strides. The other arrays are not copied in ``"log"`` space.
+        """
+        arrays: dict[str, FloatArray] = {name: getattr(self, name) for name in _NAMES}
+        if contiguous and not self.shN.flags.c_contiguous:
+            arrays["shN"] = _native.contiguous(self.shN)
+        if _space(space) == "linear":
+            arrays["scales"] = np.exp(self.scales)
+            arrays["opacities"] = np.float32(1) / (np.float32(1) + np.exp(-self.opacities))
+        return arrays
+
+    def to_torch(self, space: Space = "log", *, contiguous: bool = True) -> dict[str, Any]:
+        """:meth:`to_dict` as torch tensors on the CPU that share the memory of the arrays."""
+        import torch  # type: ignore[import-not-found, unused-ignore]
+
+        return {name: torch.from_dlpack(a) for name, a in self.to_dict(space, contiguous=contiguous).items()}
+
+    @classmethod
+    def from_dict(cls, arrays: Mapping[str, Any], space: Space = "log") -> Splats:
+        """A scene of arrays or torch tensors by gsplat's names.
+
+        Parameters
+        ----------
+        arrays : mapping
+            ``means``, ``scales``, ``quats``, ``opacities`` and ``sh0``, and ``shN`` if there is view-dependent colour.
+            Other keys are ignored.
+        space : {"log", "linear"}
+            What ``scales`` and ``opacities`` are. gsplat's trainers keep ``"log"``.
+        """
+        missing = [name for name in _NAMES[:-1] if name not in arrays]
+        if missing:
+            raise ParameterError(f"arrays = {sorted(map(str, arrays))}: {', '.join(missing)} missing")
+        means, scales, quats, opacities, sh0 = (_floats(arrays[name]) for name in _NAMES[:-1])
+        shN = _floats(arrays["shN"]) if "shN" in arrays else np.zeros((len(means), 0, 3), np.float32)
+        if _space(space) == "linear":
+            if scales.size and not scales.min() >= 0:
+                raise ParameterError(f"scales = {scales.min()}: standard deviations of 0 or more in linear space")
+            if opacities.size and not (opacities.min() >= 0 and opacities.max() <= 1):
+                raise ParameterError("opacities: 0 to 1 in linear space")
+            scales = np.log(np.maximum(scales, np.float32(_LEAST_SCALE)))
+            with np.errstate(divide="ignore"):
+                linear = opacities.astype(np.float64)
+                logits = np.log(linear) - np.log1p(-linear)
+            opacities = np.clip(logits, -_SURE_OPACITY, _SURE_OPACITY).astype(np.float32)
+        return cls(means, scales, quats, opacities, sh0, shN)
+
+
+def of_native(arrays: dict[str, Any]) -> Splats:
+    """The scene of arrays that the native part made."""
+    return Splats(**arrays)
+
+
+def _space(space: str) -> str:
+    if space not in ("log", "linear"):
+        raise ParameterError(f"space = {space!r}: 'log' or 'linear'")
+    return space
+
+
+def _floats(values: Any) -> FloatArray:
+    """``values`` as float32, sharing memory if they have that type."""
+    if hasattr(values, "detach"):
+        values = values.detach().cpu()
+    if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__"):
+        values = np.from_dlpack(values)
+    return np.asarray(values, np.float32)
+
+
+def _contiguous(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    return np.ascontiguousarray(values)
+
+
+def _rows(name: str, values: Any, width: int, count: int | None = None) -> FloatArray:
+    array = _floats(values)
+    expected = (len(array) if count is None and array.ndim else count or 0, width)
+    return _contiguous(_shaped(name, array, expected))
+
+
+def _shaped(name: str, array: npt.NDArray[Any], expected: Sequence[int]) -> npt.NDArray[Any]:
+    if array.shape != tuple(expected):
+        raise _wrong_shape(name, array.shape, str(tuple(expected)))
+    return array
+
+
+def _wrong_shape(name: str, found: Sequence[int], expected: str) -> ParameterError:
+    error = ParameterError(f"{name} = an array of shape {tuple(found)}: expected {expected}")
+    error.name = name
+    return error

@@ -1,0 +1,200 @@
+//! Scenes as NumPy arrays. What leaves is moved into arrays without a copy; what comes in is copied once.
+
+use lexisplat::sh::CHANNELS;
+use lexisplat::{Extra, ExtraValues, Geometry, SURE_OPACITY, SceneMeta, ShDegree, Splats};
+use numpy::ndarray::ArrayView3;
+use numpy::{
+    Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
+    PyReadonlyArray3, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use rayon::prelude::*;
+
+use crate::errors::parameter;
+
+/// Gaussians whose SH one task turns from one order to the other.
+const PER_TASK: usize = 4096;
+
+/// `splats` as a dictionary of arrays by the names of Python's `Splats`. SH-rest is a view with strides of the
+/// channel-major array that it is here.
+pub(crate) fn to_python<'py>(py: Python<'py>, splats: Splats) -> PyResult<Bound<'py, PyDict>> {
+    let Splats { geometry, degree, sh_rest, meta } = splats;
+    let (n, each) = (geometry.len(), degree.rest_per_channel());
+    let out = PyDict::new(py);
+    out.set_item("means", matrix(py, geometry.positions)?)?;
+    out.set_item("scales", matrix(py, geometry.scales)?)?;
+    out.set_item("quats", matrix(py, geometry.rotations)?)?;
+    out.set_item("opacities", PyArray1::from_vec(py, geometry.opacities))?;
+    out.set_item("sh0", matrix(py, geometry.dc)?.reshape([n, 1, CHANNELS])?)?;
+    let rest = PyArray1::from_vec(py, sh_rest).reshape([n, CHANNELS, each])?;
+    out.set_item("shN", rest.permute(Some([0_usize, 2, 1]))?)?;
+    let normals = match geometry.normals.is_empty() {
+        true => None,
+        false => Some(matrix(py, geometry.normals)?),
+    };
+    out.set_item("normals", normals)?;
+    let extras = PyDict::new(py);
+    for extra in geometry.extras {
+        extras.set_item(extra.name, extra_to_python(py, extra.values)?)?;
+    }
+    out.set_item("extras", extras)?;
+    out.set_item("comments", meta.comments)?;
+    out.set_item("antialiased", meta.antialiased)?;
+    Ok(out)
+}
+
+fn matrix<const N: usize>(py: Python<'_>, rows: Vec<[f32; N]>) -> PyResult<Bound<'_, PyArray2<f32>>> {
+    let n = rows.len();
+    PyArray1::from_vec(py, rows.into_flattened()).reshape([n, N])
+}
+
+macro_rules! extras {
+    ($($variant:ident($type:ty))*) => {
+        fn extra_to_python(py: Python<'_>, values: ExtraValues) -> PyResult<Bound<'_, PyAny>> {
+            Ok(match values {
+                $(ExtraValues::$variant(values) => PyArray1::from_vec(py, values).into_any(),)*
+                _ => return Err(parameter(py, "extras", "another type", "numbers of 8 to 64 bits")),
+            })
+        }
+
+        fn extra_from_python(name: &str, values: &Bound<'_, PyAny>) -> PyResult<ExtraValues> {
+            $(if let Ok(values) = values.extract::<PyReadonlyArray1<'_, $type>>() {
+                return Ok(values.as_array().to_vec().into());
+            })*
+            let expected = "an array of one dimension of int8 to int32, uint8 to uint32, float32 or float64";
+            Err(parameter(values.py(), "extras", name, expected))
+        }
+    };
+}
+extras! { I8(i8) U8(u8) I16(i16) U16(u16) I32(i32) U32(u32) F32(f32) F64(f64) }
+
+/// The scene that the attributes of Python's `Splats` hold.
+pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
+    let py = splats.py();
+    let positions = rows::<3>(splats, "means")?;
+    let (n, sh0) = (positions.len(), array::<PyReadonlyArray3<'_, f32>>(splats, "sh0")?);
+    if sh0.shape() != [n, 1, CHANNELS] {
+        return Err(shape(py, "sh0", sh0.shape(), &format!("({n}, 1, {CHANNELS})")));
+    }
+    let (dc, _) = slice(py, "sh0", sh0.as_slice())?.as_chunks();
+    let opacities = array::<PyReadonlyArray1<'_, f32>>(splats, "opacities")?;
+    let opacities = slice(py, "opacities", opacities.as_slice())?.iter().map(|&v| sure(v)).collect();
+    let normals = match splats.getattr("normals")?.is_none() {
+        true => Vec::new(),
+        false => rows::<3>(splats, "normals")?,
+    };
+    let mut extras = Vec::new();
+    for (name, values) in splats.getattr("extras")?.cast::<PyDict>()? {
+        let name: String = name.extract()?;
+        let values = extra_from_python(&name, &values)?;
+        extras.push(Extra { name, values });
+    }
+    let (degree, sh_rest) = sh_rest(splats, n)?;
+    let splats = Splats {
+        geometry: Geometry {
+            positions,
+            normals,
+            dc: dc.to_vec(),
+            opacities,
+            scales: rows::<3>(splats, "scales")?,
+            rotations: rows::<4>(splats, "quats")?,
+            extras,
+        },
+        degree,
+        sh_rest,
+        meta: SceneMeta {
+            comments: splats.getattr("comments")?.extract()?,
+            antialiased: splats.getattr("antialiased")?.extract()?,
+        },
+    };
+    splats.validate().map_err(|error| crate::errors::raise(py, &error.into()))?;
+    Ok(splats)
+}
+
+/// Infinite opacities as readers of files take them.
+fn sure(opacity: f32) -> f32 {
+    if opacity.is_infinite() { SURE_OPACITY.copysign(opacity) } else { opacity }
+}
+
+fn array<'a, T: for<'p> FromPyObject<'p, 'a>>(splats: &Bound<'a, PyAny>, name: &'static str) -> PyResult<T> {
+    let value = splats.getattr(name)?;
+    let kind = value.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string());
+    let wrong =
+        |_| parameter(splats.py(), name, kind, "an array of float32 of the shape that Splats documents");
+    value.extract().map_err(|error: T::Error| wrong(error))
+}
+
+fn slice<'a, E>(py: Python<'_>, name: &'static str, slice: Result<&'a [f32], E>) -> PyResult<&'a [f32]> {
+    slice.map_err(|_| parameter(py, name, "strided", "a contiguous array"))
+}
+
+fn shape(py: Python<'_>, name: &'static str, found: &[usize], expected: &str) -> PyErr {
+    parameter(py, name, format!("{found:?}"), format!("an array of shape {expected}"))
+}
+
+/// The rows of an attribute that has `N` columns.
+fn rows<const N: usize>(splats: &Bound<'_, PyAny>, name: &'static str) -> PyResult<Vec<[f32; N]>> {
+    let py = splats.py();
+    let values = array::<PyReadonlyArray2<'_, f32>>(splats, name)?;
+    if values.shape()[1] != N {
+        return Err(shape(py, name, values.shape(), &format!("(N, {N})")));
+    }
+    Ok(slice(py, name, values.as_slice())?.as_chunks().0.to_vec())
+}
+
+/// The degree, and SH-rest with the channels apart.
+fn sh_rest(splats: &Bound<'_, PyAny>, n: usize) -> PyResult<(ShDegree, Vec<f32>)> {
+    let py = splats.py();
+    let values = array::<PyReadonlyArray3<'_, f32>>(splats, "shN")?;
+    let view = values.as_array();
+    let degree = (0..=4).filter_map(|degree| ShDegree::new(degree).ok());
+    let degree = degree.into_iter().find(|degree| degree.rest_per_channel() == view.shape()[1]);
+    match degree {
+        Some(degree) if view.shape()[0] == n && view.shape()[2] == CHANNELS => {
+            Ok((degree, py.detach(|| channel_major(view))))
+        }
+        _ => Err(shape(py, "shN", view.shape(), &format!("({n}, K, 3) with K of 0, 3, 8, 15 or 24"))),
+    }
+}
+
+/// Copies an array of (Gaussians, coefficients, channels) to one of (Gaussians, channels, coefficients).
+fn channel_major(values: ArrayView3<'_, f32>) -> Vec<f32> {
+    let turned = values.permuted_axes([0, 2, 1]);
+    if let Some(all) = turned.as_slice() {
+        return all.to_vec();
+    }
+    transposed(turned)
+}
+
+/// The values of `from` in the order of its axes, whatever its strides are.
+fn transposed(from: ArrayView3<'_, f32>) -> Vec<f32> {
+    let (n, each) = (from.shape()[0], from.shape()[1] * from.shape()[2]);
+    let mut out = vec![0.0; n * each];
+    if each > 0 {
+        out.par_chunks_mut(PER_TASK * each).enumerate().for_each(|(task, out)| {
+            for (i, row) in out.chunks_exact_mut(each).enumerate() {
+                let from = from.index_axis(numpy::ndarray::Axis(0), task * PER_TASK + i);
+                row.iter_mut().zip(from.iter()).for_each(|(to, from)| *to = *from);
+            }
+        });
+    }
+    out
+}
+
+/// A contiguous copy of `values`, an array of three dimensions with any strides.
+#[pyfunction]
+pub(crate) fn contiguous<'py>(
+    py: Python<'py>,
+    values: PyReadonlyArray3<'py, f32>,
+) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    let view = values.as_array();
+    let shape = [view.shape()[0], view.shape()[1], view.shape()[2]];
+    let copy = py.detach(|| transposed(view));
+    PyArray1::from_vec(py, copy).reshape(shape)
+}
+
+/// An array of one dimension of a copy of `values`.
+pub(crate) fn vector<'py, T: Element + Copy>(py: Python<'py>, values: &[T]) -> Bound<'py, PyArray1<T>> {
+    PyArray1::from_slice(py, values)
+}

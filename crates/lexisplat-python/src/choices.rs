@@ -1,0 +1,279 @@
+//! Compression, with its choices by name.
+
+use std::sync::Arc;
+
+use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::{
+    CompressOptions, DEFAULT_TOLERANCE, Dictionary, Layout, Limits, Pursuit, ShDegree, SplatSource, Splats,
+    lexi,
+};
+use lexisplat_eval::{Compression, Error, Packing, Quality, SceneKind, Target};
+use lexisplat_formats::{Opened, Siblings, open, scene_path};
+use lexisplat_render::Device;
+use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::from_python;
+use crate::bytes::{Bytes, Given};
+use crate::cameras::{CameraTuple, cameras};
+use crate::draw::device;
+use crate::errors::{Result, parameter, raise};
+use crate::files::{json, read_options};
+use crate::scene::Scene;
+use crate::work::{Watch, without_gil};
+
+/// The choices, as Python names them. What is `None` is as the library's default.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Choices {
+    preset: Option<String>,
+    psnr: Option<f64>,
+    min_psnr: Option<f64>,
+    size: Option<u64>,
+    ratio: Option<f64>,
+    tol: Option<f64>,
+    max_nonzeros: Option<u8>,
+    atoms: Option<usize>,
+    pursuit: Option<String>,
+    layout: Option<String>,
+    sample: Option<usize>,
+    seed: u64,
+    cameras: Option<Vec<CameraTuple>>,
+    scene: Option<String>,
+    keep_order: bool,
+    keep_all: bool,
+    max_gaussians: Option<usize>,
+    guess: bool,
+    memory: Option<u64>,
+    device: String,
+}
+
+/// A name and whether the choice of that name was made.
+type Named = (&'static str, bool);
+
+impl Choices {
+    /// Choices that only layouts with exact geometry have.
+    fn exact_only(&self, has_dictionary: bool) -> [Named; 4] {
+        [
+            ("max_nonzeros", self.max_nonzeros.is_some()),
+            ("pursuit", self.pursuit.is_some()),
+            ("dictionary", has_dictionary),
+            ("sample", self.sample.is_some()),
+        ]
+    }
+
+    /// The targets, of which at most one is chosen.
+    fn goals(&self) -> [Named; 5] {
+        [
+            ("preset", self.preset.is_some()),
+            ("psnr", self.psnr.is_some()),
+            ("min_psnr", self.min_psnr.is_some()),
+            ("size", self.size.is_some()),
+            ("ratio", self.ratio.is_some()),
+        ]
+    }
+
+    /// Choices other than targets that only packed files have.
+    fn packed_only(&self) -> [Named; 6] {
+        [
+            ("guess", self.guess),
+            ("cameras", self.cameras.is_some()),
+            ("scene", self.scene.is_some()),
+            ("keep_order", self.keep_order),
+            ("keep_all", self.keep_all),
+            ("max_gaussians", self.max_gaussians.is_some()),
+        ]
+    }
+
+    /// Refuses choices that do not go together.
+    fn check(&self, has_dictionary: bool) -> Result<()> {
+        let refuse = |a: &[Named], b: &[Named]| {
+            let made = |choices: &[Named]| choices.iter().find(|choice| choice.1).map(|choice| choice.0);
+            match (made(a), made(b)) {
+                (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
+                _ => Ok(()),
+            }
+        };
+        let goals = self.goals();
+        (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
+        let [_, psnr, min_psnr, size, ratio] = goals;
+        let [guess, cameras, scene, keep_order, keep_all, max_gaussians] = self.packed_only();
+        refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, scene, max_gaussians])?;
+        refuse(&[cameras], &[scene])?;
+        refuse(&[max_gaussians], &[keep_all, keep_order, ("tol", self.tol.is_some())])?;
+        refuse(&[("dictionary", has_dictionary)], &[("atoms", self.atoms.is_some())])
+    }
+
+    /// The layout that is chosen, or the one that the other choices need, as in the program.
+    fn chosen_layout(&self, has_dictionary: bool) -> Result<Layout> {
+        let first = |choices: &[Named]| choices.iter().find(|choice| choice.1).map(|choice| choice.0);
+        let exact = first(&self.exact_only(has_dictionary));
+        let packed = first(&self.goals()).or(first(&self.packed_only()));
+        let layout = match &self.layout {
+            Some(name) => name.parse()?,
+            None if exact.is_none() && (packed.is_some() || self.tol.is_none()) => Layout::Packed,
+            None => Layout::F16,
+        };
+        let (wrong, other) = match layout {
+            Layout::Packed => (exact, "f16, f32 or paper"),
+            _ => (packed, "packed"),
+        };
+        match wrong {
+            None => Ok(layout),
+            Some(choice) => {
+                Err(Error::parameter("layout", layout, format!("{other}, which {choice} is for")))
+            }
+        }
+    }
+
+    /// The library's compression of these choices.
+    fn compression(self, device: Device, dictionary: Option<Dictionary>) -> Result<Compression> {
+        self.check(dictionary.is_some())?;
+        let layout = self.chosen_layout(dictionary.is_some())?;
+        if layout != Layout::Packed {
+            return Ok(Compression::Exact(self.exact(layout, dictionary)?, layout.codes()));
+        }
+        let options = PackOptions::default()
+            .with_tolerance(self.tol)
+            .with_atoms(self.atoms)
+            .with_keep_order(self.keep_order)
+            .with_keep_all(self.keep_all)
+            .with_seed(self.seed);
+        let preset = self.preset.map_or(Ok(Preset::default()), |name| name.parse())?;
+        if self.guess {
+            return Ok(Compression::Heuristic(preset, options));
+        }
+        let targets = [
+            self.psnr.map(Target::MeanPsnr),
+            self.min_psnr.map(Target::MinPsnr),
+            self.size.map(Target::Size),
+            self.ratio.map(Target::Ratio),
+        ];
+        let quality = targets.into_iter().flatten().next().map_or(Quality::Preset(preset), Quality::Target);
+        let mut packing = Packing::new(quality)
+            .with_options(options)
+            .with_gpu(device.open_gpu()?)
+            .with_scene_kind(self.scene.as_deref().map_or(Ok(SceneKind::Auto), scene_kind)?)
+            .with_max_gaussians(self.max_gaussians);
+        if let Some(bytes) = self.memory {
+            packing = packing.with_memory(bytes);
+        }
+        if let Some(views) = self.cameras {
+            packing = packing.with_cameras(cameras(views));
+        }
+        Ok(packing.into())
+    }
+
+    fn exact(self, layout: Layout, dictionary: Option<Dictionary>) -> Result<CompressOptions> {
+        let mut options = CompressOptions::default();
+        options.tolerance = self.tol.or_else(|| self.max_nonzeros.is_none().then_some(DEFAULT_TOLERANCE));
+        options.max_nonzeros = self.max_nonzeros;
+        options.atoms = self.atoms;
+        options.pursuit = self.pursuit.map_or(Ok(options.pursuit), |name| name.parse::<Pursuit>())?;
+        options.values = layout.values();
+        options.sample = self.sample.unwrap_or(options.sample);
+        options.seed = self.seed;
+        options.dictionary = dictionary;
+        Ok(options)
+    }
+}
+
+/// Where generated views are taken from.
+fn scene_kind(name: &str) -> Result<SceneKind> {
+    match name {
+        "auto" => Ok(SceneKind::Auto),
+        "object" => Ok(SceneKind::Object),
+        "room" => Ok(SceneKind::Room),
+        _ => Err(Error::parameter("scene", name, "auto, object or room")),
+    }
+}
+
+/// A dictionary: an array of (atoms, coefficients), a file, or its bytes.
+fn dictionary_of(given: &Bound<'_, PyAny>) -> PyResult<Option<Dictionary>> {
+    let py = given.py();
+    let fail = |error: lexisplat::Error| raise(py, &error.into());
+    if given.is_none() {
+        return Ok(None);
+    }
+    if let Ok(file) = given.extract::<Given>() {
+        let (name, limits) = (file.name(), Limits::default());
+        let bytes = file.bytes(&limits).map_err(|error| raise(py, &error))?;
+        return lexi::read_dictionary_bytes(&name, bytes.as_ref(), &limits).map(Some).map_err(fail);
+    }
+    let atoms: PyReadonlyArray2<'_, f32> = given.extract()?;
+    let dim = atoms.shape()[1];
+    let degree = (1..=4).filter_map(|degree| ShDegree::new(degree).ok()).find(|degree| degree.rest() == dim);
+    let Some(degree) = degree else {
+        return Err(parameter(
+            py,
+            "dictionary",
+            format!("{:?}", atoms.shape()),
+            "rows of 9, 24, 45 or 72 values",
+        ));
+    };
+    let atoms = atoms.as_array().iter().copied().collect();
+    Dictionary::new(degree, atoms).map(Some).map_err(fail)
+}
+
+/// What is compressed.
+enum Source {
+    Splats(Box<Splats>),
+    File(Given),
+}
+
+/// Compresses arrays or a file by `choices`. The result is in memory.
+#[pyfunction]
+#[pyo3(signature = (source, choices, *, dictionary, name, drop_invalid, drop_extras, limit, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn compress(
+    py: Python<'_>,
+    source: &Bound<'_, PyAny>,
+    choices: Choices,
+    dictionary: &Bound<'_, PyAny>,
+    name: &str,
+    drop_invalid: bool,
+    drop_extras: bool,
+    limit: Option<&Bound<'_, PyDict>>,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Scene> {
+    let dictionary = dictionary_of(dictionary)?;
+    let device = device(py, &choices.device)?;
+    let options = read_options(py, drop_invalid, drop_extras, limit)?;
+    let source = match source.extract::<Given>() {
+        Ok(file) => Source::File(file),
+        Err(_) => Source::Splats(Box::new(from_python(source)?)),
+    };
+    let (bytes, report) = without_gil(py, progress, move |watch| {
+        let compression = choices.compression(device, dictionary)?;
+        match source {
+            Source::Splats(splats) => run(&compression, &*splats, watch),
+            Source::File(given) => {
+                let (path, name) = match &given {
+                    Given::Path(path) => (Some(scene_path(path).into_owned()), given.name()),
+                    Given::Memory(_) => (None, given.name()),
+                };
+                let siblings = path.as_deref().map_or(Siblings::NONE, Siblings::of);
+                let bytes = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
+                let bytes = bytes.as_ref();
+                let whole = compression.holds_whole(bytes.len() as u64);
+                match open(&name, bytes, siblings, &options, whole, watch)? {
+                    Opened::Lexi(_) => Err(Error::format(&name, "it is compressed already")),
+                    opened => run(&compression, opened.source(), watch),
+                }
+            }
+        }
+    })?;
+    let report = json(py, &report)?;
+    Ok(Scene::new(name.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report)))
+}
+
+fn run(
+    compression: &Compression,
+    source: &dyn SplatSource,
+    watch: &Watch,
+) -> Result<(Vec<u8>, lexisplat_eval::CompressionReport)> {
+    let mut file = Vec::new();
+    let report = compression.run(source, &mut file, watch)?;
+    Ok((file, report))
+}

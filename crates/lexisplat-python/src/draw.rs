@@ -1,0 +1,143 @@
+//! Pictures of scenes, and comparisons of two.
+
+use std::borrow::Cow;
+use std::sync::Arc;
+
+use lexisplat::{Model, ShDegree, Splats};
+use lexisplat::{Progress as _, Stage};
+use lexisplat_eval::compression::judging_views;
+use lexisplat_eval::{Comparison, DEFAULT_MAX_WIDTH, DrawOptions, compare as compare_scenes};
+use lexisplat_render::{Device, Image, RenderOptions, Renderer, Scene as Drawable};
+use numpy::{PyArray1, PyArray3, PyArrayMethods};
+use pyo3::prelude::*;
+
+use crate::arrays::from_python;
+use crate::cameras::{CameraTuple, cameras};
+use crate::errors::{Result, raise};
+use crate::files::json;
+use crate::scene::{Held, Scene};
+use crate::work::without_gil;
+
+/// A scene that Python gave, which may still have to be decoded.
+pub(crate) enum Subject {
+    Dense(Box<Splats>),
+    Held(Arc<Held>),
+}
+
+/// A scene that can be drawn.
+pub(crate) enum Resolved {
+    Dense(Box<Splats>),
+    Sparse(Arc<Model>),
+}
+
+impl Subject {
+    /// The scene that `given` is: a compressed one, or one with the attributes of `Splats`.
+    pub(crate) fn of(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        match given.cast::<Scene>() {
+            Ok(scene) => Ok(Self::Held(Arc::clone(&scene.get().held))),
+            Err(_) => Ok(Self::Dense(Box::new(from_python(given)?))),
+        }
+    }
+
+    pub(crate) fn resolved(self) -> Result<Resolved> {
+        Ok(match self {
+            Self::Dense(splats) => Resolved::Dense(splats),
+            Self::Held(held) => Resolved::Sparse(held.model()?),
+        })
+    }
+}
+
+impl Resolved {
+    pub(crate) fn scene(&self) -> Drawable<'_> {
+        match self {
+            Self::Dense(splats) => Drawable::from(&**splats),
+            Self::Sparse(model) => Drawable::from(&**model),
+        }
+    }
+
+    /// The scene with dense SH.
+    pub(crate) fn dense(&self) -> Cow<'_, Splats> {
+        match self {
+            Self::Dense(splats) => Cow::Borrowed(splats),
+            Self::Sparse(model) => Cow::Owned(Model::clone(model).into_splats()),
+        }
+    }
+}
+
+/// The device that `text` names.
+pub(crate) fn device(py: Python<'_>, text: &str) -> PyResult<Device> {
+    text.parse().map_err(|error: lexisplat_render::Error| raise(py, &error.into()))
+}
+
+/// Draws the scene as each camera sees it: arrays of (height, width, 3).
+#[pyfunction]
+#[pyo3(signature = (scene, views, *, background, max_degree, device_name, progress))]
+pub(crate) fn render<'py>(
+    py: Python<'py>,
+    scene: &Bound<'py, PyAny>,
+    views: Vec<CameraTuple>,
+    background: [f32; 3],
+    max_degree: Option<u8>,
+    device_name: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Vec<Bound<'py, PyArray3<f32>>>> {
+    let (subject, views, device) = (Subject::of(scene)?, cameras(views), device(py, device_name)?);
+    let degree = max_degree.map(ShDegree::new).transpose().map_err(|error| raise(py, &error.into()))?;
+    let images = without_gil(py, progress, move |watch| {
+        let resolved = subject.resolved()?;
+        let mut renderer = Renderer::open(device)?;
+        let prepared = renderer.prepare(resolved.scene())?;
+        let options = RenderOptions::default().with_background(background).with_max_degree(degree);
+        watch.begin(Stage::Draw, views.len() as u64);
+        let mut images = Vec::with_capacity(views.len());
+        for camera in &views {
+            watch.check()?;
+            images.push(renderer.render(&prepared, camera, &options)?);
+            watch.advance(1);
+        }
+        watch.end();
+        Ok(images)
+    })?;
+    images.into_iter().map(|image| picture(py, image)).collect()
+}
+
+fn picture(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
+    let shape = [image.height as usize, image.width as usize, 3];
+    PyArray1::from_vec(py, image.pixels.into_flattened()).reshape(shape)
+}
+
+/// Scores scene `b` against `a` view by view, as JSON. Without views some like photographs are looked for.
+#[pyfunction]
+#[pyo3(signature = (a, b, views, *, count, background, eight_bit, device_name, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn compare<'py>(
+    py: Python<'py>,
+    a: &Bound<'py, PyAny>,
+    b: &Bound<'py, PyAny>,
+    views: Option<Vec<CameraTuple>>,
+    count: usize,
+    background: [f32; 3],
+    eight_bit: bool,
+    device_name: &str,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<String> {
+    let (a, b, device) = (Subject::of(a)?, Subject::of(b)?, device(py, device_name)?);
+    let views = views.map(cameras);
+    let found: Comparison = without_gil(py, progress, move |watch| {
+        let (a, b) = (a.resolved()?, b.resolved()?);
+        let mut renderer = Renderer::open(device)?;
+        let views = match views {
+            Some(views) => views,
+            None => {
+                let found = judging_views(&mut renderer, &a.dense(), count, watch)?;
+                found.iter().map(|camera| camera.with_max_width(DEFAULT_MAX_WIDTH)).collect()
+            }
+        };
+        let options = DrawOptions::new(background, eight_bit);
+        let (a, b) = (a.scene(), b.scene());
+        compare_scenes(&mut renderer, &a, &b, &views, &options, watch, |_, _, _| {
+            Ok::<(), lexisplat_eval::Error>(())
+        })
+    })?;
+    json(py, &found)
+}

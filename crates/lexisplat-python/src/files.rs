@@ -1,0 +1,114 @@
+//! Reads and writes scenes of any format.
+
+use std::path::PathBuf;
+
+use lexisplat::output::{Existing, Output};
+use lexisplat::ply::ReadOptions;
+use lexisplat_eval::{Compression, Loaded, Packing, SceneFile};
+use lexisplat_formats::{Kind, Siblings, WriteOptions, write};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{from_python, to_python};
+use crate::bytes::{Given, limits};
+use crate::errors::{parameter, raise};
+use crate::work::without_gil;
+
+/// Reads the scene in a file or in bytes. Returns its arrays, its warnings, and the name of its format.
+#[pyfunction]
+#[pyo3(signature = (source, *, name, drop_invalid, drop_extras, limit, progress))]
+pub(crate) fn load<'py>(
+    py: Python<'py>,
+    source: Given,
+    name: Option<String>,
+    drop_invalid: bool,
+    drop_extras: bool,
+    limit: Option<&Bound<'py, PyDict>>,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyDict>, Vec<String>, &'static str)> {
+    let options = read_options(py, drop_invalid, drop_extras, limit)?;
+    let name = name.unwrap_or_else(|| source.name());
+    let file = without_gil(py, progress, move |_| match source {
+        Given::Path(path) => Ok(SceneFile::read(&path, &options)?),
+        source => {
+            let bytes = source.bytes(&options.limits)?;
+            Ok(SceneFile::read_files(&name, bytes.as_ref(), Siblings::NONE, &options)?)
+        }
+    })?;
+    let (warnings, kind) = (file.warnings().to_vec(), file.kind().extension());
+    let splats = match file.loaded {
+        Loaded::Ply(read) => read.splats,
+        Loaded::Other(read) => read.splats,
+        Loaded::Lexi(model, _) => py.detach(|| model.into_splats()),
+    };
+    Ok((to_python(py, splats)?, warnings, kind))
+}
+
+/// How scenes are read.
+pub(crate) fn read_options(
+    py: Python<'_>,
+    drop_invalid: bool,
+    drop_extras: bool,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<ReadOptions> {
+    Ok(ReadOptions::default()
+        .with_drop_invalid(drop_invalid)
+        .with_drop_extras(drop_extras)
+        .with_limits(limits(py, limit)?))
+}
+
+/// Writes a scene in the format that `format` or the extension of `path` names. Returns what the file lacks, as JSON.
+#[pyfunction]
+#[pyo3(signature = (path, splats, *, format, spz_version, sh_bits, sog_palette, glb_spz, overwrite, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn save(
+    py: Python<'_>,
+    path: PathBuf,
+    splats: &Bound<'_, PyAny>,
+    format: Option<&str>,
+    spz_version: u8,
+    sh_bits: [u8; 2],
+    sog_palette: u32,
+    glb_spz: bool,
+    overwrite: bool,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<String> {
+    let kind = match format {
+        Some(name) => Kind::of_extension(&format!(".{name}")),
+        None => Kind::of_extension(&path.display().to_string()),
+    };
+    let writable = |kind: &Kind| *kind == Kind::Lexi || Kind::WRITTEN.contains(kind);
+    let Some(kind) = kind.filter(writable) else {
+        let expected =
+            "ply, lexi, spz, sog, compressed.ply, splat or glb, named by the extension or by format";
+        return Err(parameter(py, "format", format.unwrap_or(&path.display().to_string()), expected));
+    };
+    let splats = from_python(splats)?;
+    let mut options = WriteOptions::default();
+    (options.spz_version, options.sh_bits) = (spz_version, sh_bits);
+    (options.sog_palette, options.glb_spz) = (sog_palette, glb_spz);
+    let lost = without_gil(py, progress, move |watch| {
+        let output = output(&path, overwrite);
+        output.check()?;
+        match kind {
+            Kind::Lexi => {
+                Compression::from(Packing::default()).run(&splats, output, watch)?;
+                Ok(None)
+            }
+            kind => Ok(Some(write(kind, &splats, &options, output, watch)?.1)),
+        }
+    })?;
+    json(py, &lost)
+}
+
+/// Where a file is written that appears when it is whole.
+pub(crate) fn output(path: &std::path::Path, overwrite: bool) -> Output<'_> {
+    Output::new(path, if overwrite { Existing::Replace } else { Existing::Refuse })
+}
+
+/// `value` as JSON, which Python reads.
+pub(crate) fn json(py: Python<'_>, value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(|error| {
+        raise(py, &lexisplat_eval::Error::parameter("report", error, "a report that can be told as JSON"))
+    })
+}

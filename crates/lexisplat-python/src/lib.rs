@@ -1,0 +1,46 @@
+//! The native part of the Python package lexisplat: arrays in, arrays out.
+//!
+//! Everything here is private to the package. Its Python modules check and document arguments, and turn what comes from
+//! here into the classes that users see. Long work runs on a thread of its own without the GIL ([`work`]), so that
+//! Ctrl-C and progress reports reach Python.
+
+mod arrays;
+mod bytes;
+mod cameras;
+mod choices;
+mod chunks;
+mod draw;
+mod errors;
+mod files;
+mod metrics;
+mod scene;
+mod work;
+
+use pyo3::prelude::*;
+
+/// The native part of the package.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::arrays::contiguous;
+    #[pymodule_export]
+    use crate::cameras::{orbit, photographs, read_cameras};
+    #[pymodule_export]
+    use crate::choices::compress;
+    #[pymodule_export]
+    use crate::chunks::Chunks;
+    #[pymodule_export]
+    use crate::draw::{compare, render};
+    #[pymodule_export]
+    use crate::files::{load, save};
+    #[pymodule_export]
+    use crate::metrics::score;
+    #[pymodule_export]
+    use crate::scene::{Scene, open_scene};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}

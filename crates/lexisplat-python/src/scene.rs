@@ -1,0 +1,236 @@
+//! A .lexi file that is held as it is, and decoded when that is needed.
+
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use lexisplat::lexi::LexiReader;
+use lexisplat::{Indices, Limits, Model, SplatSource as _, Values, stream};
+use lexisplat_eval::compression::{RecordReport, part_bytes};
+use numpy::{PyArray1, PyArray2, PyArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use serde_json::json;
+
+use crate::arrays::{to_python, vector};
+use crate::bytes::{Bytes, Given, limits};
+use crate::chunks::Chunks;
+use crate::errors::Result;
+use crate::files::{json, output};
+use crate::work::without_gil;
+
+/// The bytes of a .lexi file, and its model once something needed it.
+#[derive(Debug)]
+pub(crate) struct Held {
+    pub(crate) name: String,
+    pub(crate) bytes: Bytes,
+    pub(crate) limits: Limits,
+    model: Mutex<Option<Arc<Model>>>,
+}
+
+impl Held {
+    pub(crate) fn reader(&self) -> Result<LexiReader<'static>> {
+        Ok(LexiReader::open(self.name.as_str(), self.bytes.clone(), &self.limits)?)
+    }
+
+    /// The decoded file, which is kept.
+    pub(crate) fn model(&self) -> Result<Arc<Model>> {
+        let mut kept = self.model.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*kept {
+            Some(model) => Ok(Arc::clone(model)),
+            None => {
+                let model = Arc::new(self.reader()?.model()?);
+                Ok(Arc::clone(kept.insert(model)))
+            }
+        }
+    }
+}
+
+/// A compressed scene.
+#[pyclass(frozen, subclass, module = "lexisplat._native")]
+#[derive(Debug)]
+pub(crate) struct Scene {
+    pub(crate) held: Arc<Held>,
+    /// The report of the compression, if it was made here, as JSON.
+    report: Option<String>,
+}
+
+impl Scene {
+    pub(crate) fn new(name: String, bytes: Bytes, limits: Limits, report: Option<String>) -> Self {
+        Self { held: Arc::new(Held { name, bytes, limits, model: Mutex::default() }), report }
+    }
+
+    fn with_reader<T>(&self, py: Python<'_>, get: impl FnOnce(&LexiReader<'_>) -> T) -> PyResult<T> {
+        match self.held.reader() {
+            Ok(reader) => Ok(get(&reader)),
+            Err(error) => Err(crate::errors::raise(py, &error)),
+        }
+    }
+}
+
+/// Opens a .lexi file, or its bytes. Its header is checked, and nothing is decoded.
+#[pyfunction]
+#[pyo3(signature = (source, *, name, limit))]
+pub(crate) fn open_scene(
+    py: Python<'_>,
+    source: Given,
+    name: Option<String>,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Scene> {
+    let limits = limits(py, limit)?;
+    let name = name.unwrap_or_else(|| source.name());
+    without_gil(py, None, move |_| {
+        let scene = Scene::new(name, source.bytes(&limits)?, limits, None);
+        scene.held.reader()?;
+        Ok(scene)
+    })
+}
+
+#[pymethods]
+impl Scene {
+    fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
+        self.with_reader(py, |reader| reader.len())
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        &self.held.name
+    }
+
+    /// Size of the file in bytes.
+    #[getter]
+    fn nbytes(&self) -> usize {
+        self.held.bytes.as_ref().len()
+    }
+
+    #[getter]
+    fn degree(&self, py: Python<'_>) -> PyResult<u8> {
+        self.with_reader(py, |reader| reader.degree().get())
+    }
+
+    #[getter]
+    fn layout(&self, py: Python<'_>) -> PyResult<&'static str> {
+        self.with_reader(py, |reader| reader.layout().name())
+    }
+
+    /// The report of the compression as JSON, or `None` of a file that was opened.
+    #[getter]
+    fn report_json(&self) -> Option<&str> {
+        self.report.as_deref()
+    }
+
+    /// The atoms: an array of (atoms, coefficients).
+    fn dictionary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let dictionary = self.with_reader(py, |reader| reader.dictionary().clone())?;
+        PyArray1::from_slice(py, dictionary.as_slice()).reshape([dictionary.len(), dictionary.dim()])
+    }
+
+    /// Facts about the file, all of which is decoded for them, as JSON.
+    #[pyo3(signature = (*, progress))]
+    fn info_json(&self, py: Python<'_>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+        let held = &self.held;
+        let facts = without_gil(py, progress, |_| {
+            let reader = held.reader()?;
+            let survey = stream::survey(&reader, &std::env::temp_dir())?;
+            let head = reader.packed_head();
+            let parts = part_bytes(reader.attribute_bytes(), &survey.stream_bits);
+            Ok(json!({
+                "gaussians": reader.len(),
+                "sh_degree": reader.degree().get(),
+                "layout": reader.layout().name(),
+                "version": reader.version(),
+                "file_bytes": held.bytes.as_ref().len(),
+                "attribute_bytes": parts.into_iter().collect::<std::collections::BTreeMap<_, _>>(),
+                "resident_sh_bytes": survey.resident_sh_bytes,
+                "dense_sh_bytes": reader.len() * reader.degree().rest() * size_of::<f32>(),
+                "atoms": reader.dictionary().len(),
+                "nonzeros": survey.nonzeros,
+                "nonzero_histogram": survey.nonzero_histogram,
+                "escapes": survey.escapes,
+                "record": RecordReport::from(reader.record()),
+                "promise": head.and_then(|head| head.target.as_ref()),
+                "reached": head.and_then(|head| head.reached),
+                "removed": head.map_or(0, |head| head.removed),
+                "device": head.map(|head| head.device.as_deref().unwrap_or("cpu")),
+                "order_kept": reader.order_kept(),
+                "antialiased": reader.meta().antialiased,
+                "comments": reader.meta().comments,
+                "extras": reader.empty().geometry.extras.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
+            }))
+        })?;
+        json(py, &facts)
+    }
+
+    /// The dense scene as arrays.
+    #[pyo3(signature = (*, progress))]
+    fn decode<'py>(
+        &self,
+        py: Python<'py>,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let held = &self.held;
+        let splats = without_gil(py, progress, |_| Ok(held.reader()?.model()?.into_splats()))?;
+        to_python(py, splats)
+    }
+
+    /// The sparse codes: starts, atoms, values, numbers of Gaussians that are stored exactly, and their rows.
+    #[expect(clippy::type_complexity, reason = "five arrays")]
+    fn codes<'py>(
+        &self,
+        py: Python<'py>,
+    ) -> PyResult<(
+        Bound<'py, PyArray1<i64>>,
+        Bound<'py, PyArray1<i32>>,
+        Bound<'py, PyArray1<f32>>,
+        Bound<'py, PyArray1<u32>>,
+        Bound<'py, PyArray2<f32>>,
+    )> {
+        let held = &self.held;
+        let model = without_gil(py, None, |_| held.model())?;
+        let codes = model.codes();
+        let mut starts = Vec::with_capacity(codes.len() + 1);
+        let mut at = 0;
+        starts.push(at);
+        for &count in codes.counts() {
+            at += i64::from(count);
+            starts.push(at);
+        }
+        let atoms: Vec<i32> = match codes.indices() {
+            Indices::U8(atoms) => atoms.iter().map(|&atom| atom.into()).collect(),
+            Indices::U16(atoms) => atoms.iter().map(|&atom| atom.into()).collect(),
+        };
+        let values: Vec<f32> = match codes.values() {
+            Values::F32(values) => values.clone(),
+            Values::F16(values) => values.iter().map(|value| value.to_f32()).collect(),
+        };
+        let (escapes, dim) = (codes.escapes(), model.dictionary().dim());
+        let rows = vector(py, &escapes.rows).reshape([escapes.gaussians.len(), dim])?;
+        Ok((
+            PyArray1::from_vec(py, starts),
+            PyArray1::from_vec(py, atoms),
+            PyArray1::from_vec(py, values),
+            vector(py, &escapes.gaussians),
+            rows,
+        ))
+    }
+
+    /// Decodes part after part.
+    fn chunks(&self) -> Chunks {
+        Chunks::start(Arc::clone(&self.held))
+    }
+
+    /// Writes the file. It appears when it is whole.
+    #[pyo3(signature = (path, *, overwrite))]
+    fn save(&self, py: Python<'_>, path: PathBuf, overwrite: bool) -> PyResult<()> {
+        let held = &self.held;
+        without_gil(py, None, |watch| {
+            let sink = lexisplat::Sink::from(output(&path, overwrite));
+            sink.write_bytes(held.bytes.as_ref(), watch)?;
+            Ok(())
+        })
+    }
+
+    /// A copy of the file's bytes.
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, self.held.bytes.as_ref())
+    }
+}

@@ -1,0 +1,199 @@
+"""Compression, and what is done with the result."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+import lexisplat as lx
+import numpy as np
+import pytest
+from conftest import make, of_inria
+
+
+@pytest.mark.parametrize(
+    ("arguments", "options"),
+    [
+        (["--preset", "small", "--keep-order"], {"preset": "small", "keep_order": True}),
+        (["--psnr", "30", "--max-gaussians", "900"], {"psnr": 30, "max_gaussians": 900}),
+        (["--ratio", "12", "--atoms", "40", "--seed", "7"], {"ratio": 12, "atoms": 40, "seed": 7}),
+        (["--guess"], {"guess": True}),
+        (["--tol", "0.05"], {"tol": 0.05}),
+        (["--layout", "paper", "--pursuit", "omp"], {"layout": "paper", "pursuit": "omp"}),
+        (["--max-nnz", "3"], {"max_nonzeros": 3}),
+        (["--scene", "object"], {"views": "object"}),
+    ],
+)
+def test_the_bytes_are_those_of_the_program(
+    arguments: list[str], options: dict[str, Any], views: list[lx.Camera], program: str, tmp_path: Path
+) -> None:
+    path, made = tmp_path / "scene.ply", tmp_path / "by-program.lexi"
+    lx.save(path, make(1000))
+    if {"preset", "psnr", "ratio"} & set(options):
+        file = tmp_path / "cameras.json"
+        file.write_text(json.dumps([of_inria(view) for view in views]))
+        arguments, options = [*arguments, "--cameras", str(file)], {**options, "cameras": file}
+    subprocess.run([program, "compress", path, "-o", made, "--quiet", *arguments], check=True)
+    by_program = made.read_bytes()
+    assert lx.compress(path, **options).to_bytes() == by_program
+    if "ratio" not in options:
+        assert lx.compress(lx.load(path), **options).to_bytes() == by_program
+
+
+def test_a_scene_tells_of_itself(packed: lx.Scene, splats: lx.Splats) -> None:
+    assert packed.degree == 3 and packed.layout == "packed" and 0 < len(packed) <= len(splats)
+    assert packed.nbytes == len(packed.to_bytes()) < splats.nbytes / 8
+    report, opened = packed.report, lx.open(packed.to_bytes(), name="a")
+    assert report is not None and report["file_bytes"] == packed.nbytes and opened.report is None
+    for scene in (packed, opened):
+        assert sum(scene.nbytes_by_part.values()) == pytest.approx(packed.nbytes)
+        assert scene.nbytes_by_part["position"] > 0
+    info = opened.info
+    assert info["gaussians"] == len(packed) and info["reached"]["judged_psnr"] > 36 and info["version"] == 3
+    assert "bytes" in repr(packed)
+
+
+def test_codes_rebuild_the_dense_scene_within_the_tolerance(splats: lx.Splats) -> None:
+    scene = lx.compress(splats, tol=0.03)
+    codes, atoms = scene.codes(), scene.dictionary
+    np.testing.assert_allclose(np.linalg.norm(atoms, axis=1), 1, atol=1e-5)
+    rows = np.repeat(np.arange(len(scene)), np.diff(codes.indptr))
+    built = np.zeros((len(scene), 45))
+    np.add.at(built, rows, codes.values[:, None].astype(np.float64) * atoms[codes.indices])
+    built[codes.escapes] = codes.escape_rows
+    decoded, original = (s.shN.transpose(0, 2, 1).reshape(-1, 45) for s in (scene.decode(), splats))
+    np.testing.assert_allclose(built, decoded, atol=1e-5)
+    errors = np.linalg.norm(decoded.astype(np.float64) - original, axis=1)
+    assert errors.max() <= 0.03 and errors.max() == pytest.approx(scene.info["record"]["max_residual"], rel=1e-6)
+    np.testing.assert_array_equal(scene.decode().means, splats.means)
+    pytest.importorskip("scipy")
+    assert codes.to_scipy(len(atoms)).shape == (len(splats), 90)
+
+
+def test_a_given_dictionary_is_used(splats: lx.Splats, tmp_path: Path) -> None:
+    first = lx.compress(splats, tol=0.1)
+    path = tmp_path / "first.lexi"
+    first.save(path)
+    for dictionary in (first.dictionary, path, path.read_bytes()):
+        scene = lx.compress(splats, tol=0.1, dictionary=dictionary)
+        np.testing.assert_array_equal(scene.dictionary, first.dictionary)
+    with pytest.raises(lx.ParameterError, match="dictionary"):
+        lx.compress(splats, tol=0.1, dictionary=np.eye(44, dtype=np.float32))
+
+
+def test_chunks_are_the_scene(tmp_path: Path) -> None:
+    splats = make(70_000, degree=1)
+    scene = lx.compress(splats, guess=True)
+    at, parts = 0, []
+    for start, part in scene.chunks():
+        assert start == at
+        at += len(part)
+        parts.append(part.means)
+    assert len(parts) > 1
+    np.testing.assert_array_equal(np.concatenate(parts), scene.decode().means)
+    # An iterator that is left early ends its thread.
+    threads = threading.active_count()
+    next(scene.chunks())
+    assert threading.active_count() == threads
+
+
+def test_the_order_is_kept_if_asked(splats: lx.Splats, views: list[lx.Camera]) -> None:
+    scene = lx.compress(splats, cameras=views, keep_order=True)
+    assert scene.info["order_kept"] and len(scene) == len(splats)
+    np.testing.assert_allclose(scene.decode().means, splats.means, atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"psnr": 40, "size": 1000}, "size = given: not together with psnr"),
+        ({"guess": True, "psnr": 40}, "psnr = given: not together with guess"),
+        ({"views": "room", "cameras": []}, "scene = given: not together with cameras"),
+        ({"layout": "packed", "max_nonzeros": 3}, "layout = packed: f16, f32 or paper, which max_nonzeros is for"),
+        ({"layout": "f32", "psnr": 40}, "layout = f32: packed, which psnr is for"),
+        ({"preset": "tiny"}, "preset = tiny: one of small"),
+        ({"psnr": -1}, "psnr = -1"),
+        ({"psnr": float("nan")}, "psnr = NaN"),
+        ({"tol": 0}, "tolerance = 0"),
+        ({"atoms": 5000}, "atoms = 5000: 1 to 1024"),
+        ({"device": "tpu"}, "device = tpu"),
+        ({"cameras": []}, "cameras"),
+        ({"size": 10}, "size"),
+    ],
+)
+def test_choices_that_cannot_be_met_are_named(splats: lx.Splats, options: dict[str, Any], text: str) -> None:
+    with pytest.raises(lx.ParameterError) as refused:
+        lx.compress(splats, **options)
+    assert text in str(refused.value)
+
+
+def test_what_is_compressed_is_not_compressed_again(packed: lx.Scene) -> None:
+    with pytest.raises(lx.FormatError, match="compressed already"):
+        lx.compress(packed.to_bytes())
+
+
+def test_values_that_are_not_finite_are_refused(splats: lx.Splats) -> None:
+    wrong = splats[:]
+    wrong.shN = wrong.shN.copy()
+    wrong.shN[3, 2, 1] = np.inf
+    with pytest.raises(lx.ParameterError, match="finite"):
+        lx.compress(wrong, guess=True)
+
+
+def test_progress_is_told_stage_by_stage(splats: lx.Splats, views: list[lx.Camera]) -> None:
+    told: list[tuple[str, int, int]] = []
+    lx.compress(splats, cameras=views, progress=lambda *report: told.append(report))
+    stages = [stage for stage, done, _ in told if done == 0]
+    assert {"draw", "code", "write"} <= set(stages)
+    for stage in set(stages):
+        assert any(done == total for name, done, total in told if name == stage), stage
+
+
+def test_a_callback_that_raises_ends_the_work(splats: lx.Splats) -> None:
+    def refuse(stage: str, done: int, total: int) -> None:
+        raise RuntimeError("enough")
+
+    with pytest.raises(RuntimeError, match="enough"):
+        lx.compress(splats, progress=refuse)
+
+
+def test_tqdm_shows_progress(splats: lx.Splats, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("tqdm")
+    lx.compress(splats, guess=True, progress=True)
+    assert "code" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_ctrl_c_ends_the_work() -> None:
+    splats = make(60_000)
+    timer = threading.Timer(0.5, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    begin = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        lx.compress(splats, psnr=50)
+    # It would take far longer than the wait for the next check.
+    assert time.monotonic() - begin < 30
+
+
+def test_other_threads_run_meanwhile(splats: lx.Splats) -> None:
+    done = threading.Event()
+    counted = 0
+
+    def count() -> None:
+        nonlocal counted
+        while not done.is_set():
+            counted += 1
+            time.sleep(0.001)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    lx.compress(splats)
+    done.set()
+    thread.join()
+    assert counted > 20

@@ -1,0 +1,108 @@
+"""Files of every format, and what is said of wrong ones."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import lexisplat as lx
+import numpy as np
+import pytest
+from conftest import make
+
+
+@pytest.mark.parametrize("extension", ["ply", "spz", "sog", "compressed.ply", "splat", "glb"])
+def test_every_format_is_written_and_read(extension: str, splats: lx.Splats, tmp_path: Path) -> None:
+    path = tmp_path / f"scene.{extension}"
+    lost = lx.save(path, splats)
+    read = lx.load(path)
+    assert len(read) == len(splats)
+    assert read.degree == (0 if extension == "splat" else 3)
+    assert lost["sh_degree"] == ([3, 0] if extension == "splat" else None)
+    # Formats may change the order: the scene as a whole is where it was.
+    np.testing.assert_allclose(read.means.mean(0), splats.means.mean(0), atol=1e-2)
+    if extension != "sog":
+        again = lx.load(path.read_bytes(), name="again")
+        np.testing.assert_array_equal(read.means, again.means)
+
+
+def test_golden_files_are_read(golden: Path) -> None:
+    for path in sorted(golden.glob("*.lexi")):
+        scene = lx.open(path) if "dictionary" not in path.name else None
+        if scene is not None:
+            assert len(scene.decode()) == len(scene) == len(lx.load(path)), path.name
+
+
+def test_lexi_is_a_format_too(splats: lx.Splats, packed: lx.Scene, tmp_path: Path) -> None:
+    assert lx.save(tmp_path / "a.lexi", packed) == {}
+    assert (tmp_path / "a.lexi").read_bytes() == packed.to_bytes()
+    assert len(lx.load(tmp_path / "a.lexi")) == len(packed)
+    lx.save(tmp_path / "a.ply", packed)
+    np.testing.assert_array_equal(lx.load(tmp_path / "a.ply").means, packed.decode().means)
+
+
+def test_options_of_formats(splats: lx.Splats, tmp_path: Path) -> None:
+    sizes = []
+    for bits in [(5, 4), (8, 8)]:
+        lx.save(tmp_path / "a.spz", splats, sh_bits=bits)
+        sizes.append((tmp_path / "a.spz").stat().st_size)
+    assert sizes[0] < sizes[1]
+    lx.save(tmp_path / "a", splats, format="spz", spz_version=2)
+    assert (tmp_path / "a").read_bytes()[:2] == b"\x1f\x8b"
+    with pytest.raises(lx.ParameterError, match="spz_version|version"):
+        lx.save(tmp_path / "a.spz", splats, spz_version=9)
+    with pytest.raises(lx.ParameterError, match="format"):
+        lx.save(tmp_path / "a.ksplat", splats)
+    with pytest.raises(lx.ParameterError, match="format"):
+        lx.save(tmp_path / "a.txt", splats)
+
+
+def test_files_appear_whole_and_are_kept_if_asked(splats: lx.Splats, tmp_path: Path) -> None:
+    path = tmp_path / "a.ply"
+    path.write_bytes(b"mine")
+    with pytest.raises(FileExistsError) as refused:
+        lx.save(path, splats, overwrite=False)
+    assert isinstance(refused.value, lx.IoError) and refused.value.filename == str(path)
+    assert path.read_bytes() == b"mine"
+    with pytest.raises(lx.ParameterError):
+        lx.save(path, splats[:0], format="glb")
+    assert path.read_bytes() == b"mine" and os.listdir(tmp_path) == ["a.ply"]
+    lx.save(path, splats)
+    assert len(lx.load(path)) == len(splats)
+
+
+def test_missing_and_wrong_files_are_told_apart(tmp_path: Path, packed: lx.Scene) -> None:
+    with pytest.raises(FileNotFoundError) as missing:
+        lx.load(tmp_path / "none.ply")
+    assert missing.value.errno == 2 and missing.value.filename.endswith("none.ply")
+    assert isinstance(missing.value, lx.Error) and type(missing.value).__name__ == "IoError"
+    with pytest.raises(lx.FormatError) as wrong:
+        lx.load(b"not a scene", name="mine")
+    assert wrong.value.file == "mine" and isinstance(wrong.value, ValueError)
+    with pytest.raises(lx.FormatError, match="truncated"):
+        lx.open(packed.to_bytes()[:-1])
+    damaged = bytearray(packed.to_bytes())
+    damaged[-5] ^= 1
+    with pytest.raises(lx.FormatError, match="checksum"):
+        lx.load(bytes(damaged))
+    with pytest.raises(IsADirectoryError if os.name == "posix" else OSError):
+        lx.load(tmp_path)
+
+
+def test_limits_are_kept(ply: Path, packed: lx.Scene) -> None:
+    with pytest.raises(lx.LimitError, match="1000"):
+        lx.load(ply, limit={"gaussians": 1000})
+    with pytest.raises(lx.LimitError):
+        lx.open(packed.to_bytes(), limit={"atoms": 1})
+    with pytest.raises(lx.ParameterError, match="limit = splats"):
+        lx.load(ply, limit={"splats": 1})
+
+
+def test_invalid_gaussians_are_refused_or_left_out(tmp_path: Path) -> None:
+    splats = make(100)
+    splats.means[7, 1] = np.nan
+    lx.save(tmp_path / "a.ply", splats)
+    with pytest.raises(lx.FormatError, match="number 7"):
+        lx.load(tmp_path / "a.ply")
+    with pytest.warns(lx.LexisplatWarning):
+        assert len(lx.load(tmp_path / "a.ply", drop_invalid=True)) == 99
