@@ -12,6 +12,7 @@ mod chunks;
 mod draw;
 mod errors;
 mod files;
+mod learn;
 mod metrics;
 mod scene;
 mod work;
@@ -33,6 +34,8 @@ mod _native {
     use crate::draw::{compare, render};
     #[pymodule_export]
     use crate::files::{load, save};
+    #[pymodule_export]
+    use crate::learn::{Statistics, encode_rows, learn_rows};
     #[pymodule_export]
     use crate::metrics::score;
     #[pymodule_export]

@@ -1,0 +1,189 @@
+//! Dictionaries of rows of any length.
+
+use lexisplat::learn::{DEFAULT_MOMENTUM, LearnOptions, Statistics as Sums, learn_atoms};
+use lexisplat::pursuit::{Coder, StopRule, ValueType, encode_rows as encode_all};
+use lexisplat::{Atoms, Pursuit};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+use crate::errors::{Result, parameter, raise};
+use crate::work::without_gil;
+
+/// Row starts, atoms, values, the error of each row, and the numbers of rows that are not within the tolerance.
+type Codes<'py> = (
+    Bound<'py, PyArray1<i64>>,
+    Bound<'py, PyArray1<i32>>,
+    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<i64>>,
+);
+
+/// How rows are coded, as Python names it: `tol`, `max_nonzeros`, `pursuit`.
+#[derive(FromPyObject)]
+pub(crate) struct Rule(Option<f64>, Option<usize>, String);
+
+impl Rule {
+    fn stop(&self) -> Result<StopRule> {
+        Ok(StopRule::new(self.0, self.1)?)
+    }
+
+    fn pursuit(&self) -> Result<Pursuit> {
+        Ok(self.2.parse()?)
+    }
+
+    fn coder(&self, atoms: &Atoms) -> Result<Coder> {
+        Ok(Coder::over(atoms, self.pursuit()?, self.stop()?, ValueType::F32))
+    }
+}
+
+/// A copy of the values of `rows`, and the length of a row. Other threads may change an array while the GIL is not held.
+fn copied(rows: &PyReadonlyArray2<'_, f32>) -> (usize, Vec<f32>) {
+    let dim = rows.shape()[1];
+    let values = match rows.as_slice() {
+        Ok(values) => values.to_vec(),
+        Err(_) => rows.as_array().iter().copied().collect(),
+    };
+    (dim, values)
+}
+
+fn atoms_of(components: &PyReadonlyArray2<'_, f32>) -> PyResult<Atoms> {
+    let (dim, values) = copied(components);
+    Atoms::new(dim, values).map_err(|error| raise(components.py(), &error.into()))
+}
+
+fn to_array<'py>(py: Python<'py>, atoms: &Atoms) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    PyArray1::from_slice(py, atoms.as_slice()).reshape([atoms.len(), atoms.dim()])
+}
+
+/// Learns atoms. Returns them, the rounds, the rows learned from, and the mean nonzeros of rows that were held out.
+#[pyfunction]
+#[pyo3(signature = (rows, *, atoms, rule, seed, sample, progress))]
+pub(crate) fn learn_rows<'py>(
+    py: Python<'py>,
+    rows: PyReadonlyArray2<'py, f32>,
+    atoms: Option<usize>,
+    rule: Rule,
+    seed: u64,
+    sample: usize,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<(Bound<'py, PyArray2<f32>>, usize, usize, f64)> {
+    let (dim, rows) = copied(&rows);
+    let learned = without_gil(py, progress, move |watch| {
+        let options = LearnOptions::new(rule.stop()?)
+            .with_atoms(atoms)
+            .with_pursuit(rule.pursuit()?)
+            .with_seed(seed)
+            .with_sample(sample)
+            .with_momentum(DEFAULT_MOMENTUM);
+        Ok(learn_atoms(dim, &rows, &options, watch)?)
+    })?;
+    Ok((to_array(py, &learned.atoms)?, learned.rounds, learned.sample, learned.held_out_nonzeros))
+}
+
+/// Codes rows over atoms, as arrays of a CSR matrix.
+#[pyfunction]
+#[pyo3(signature = (components, rows, *, rule, progress))]
+pub(crate) fn encode_rows<'py>(
+    py: Python<'py>,
+    components: PyReadonlyArray2<'py, f32>,
+    rows: PyReadonlyArray2<'py, f32>,
+    rule: Rule,
+    progress: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Codes<'py>> {
+    let atoms = atoms_of(&components)?;
+    let (dim, rows) = copied(&rows);
+    check_length(py, &atoms, dim)?;
+    let codes = without_gil(py, progress, move |watch| Ok(encode_all(&rule.coder(&atoms)?, &rows, watch)?))?;
+    Ok((
+        PyArray1::from_vec(py, numbers(py, codes.starts)?),
+        PyArray1::from_vec(py, codes.atoms.into_iter().map(i32::from).collect()),
+        PyArray1::from_vec(py, codes.values),
+        PyArray1::from_vec(py, codes.errors),
+        PyArray1::from_vec(py, numbers(py, codes.escapes)?),
+    ))
+}
+
+fn numbers(py: Python<'_>, counts: Vec<usize>) -> PyResult<Vec<i64>> {
+    let converted = counts.into_iter().map(i64::try_from).collect::<std::result::Result<_, _>>();
+    converted.map_err(|_| parameter(py, "rows", "too many", "fewer than 2^63 nonzeros"))
+}
+
+fn check_length(py: Python<'_>, atoms: &Atoms, dim: usize) -> PyResult<()> {
+    if atoms.dim() == dim {
+        return Ok(());
+    }
+    Err(parameter(py, "rows", format!("{dim} values each"), format!("{}, as the atoms have", atoms.dim())))
+}
+
+/// Sums over coded rows, from which atoms are refitted.
+#[pyclass(frozen, module = "lexisplat._native")]
+#[derive(Debug)]
+pub(crate) struct Statistics(Sums);
+
+#[pymethods]
+impl Statistics {
+    /// Codes rows and sums what learning needs of them.
+    #[staticmethod]
+    #[pyo3(signature = (components, rows, *, rule, progress))]
+    fn of<'py>(
+        py: Python<'py>,
+        components: PyReadonlyArray2<'py, f32>,
+        rows: PyReadonlyArray2<'py, f32>,
+        rule: Rule,
+        progress: Option<&Bound<'py, PyAny>>,
+    ) -> PyResult<Self> {
+        let atoms = atoms_of(&components)?;
+        let (dim, rows) = copied(&rows);
+        check_length(py, &atoms, dim)?;
+        without_gil(py, progress, move |watch| Ok(Self(Sums::of(&rule.coder(&atoms)?, &rows, watch)?)))
+    }
+
+    /// The sums of both.
+    fn plus(&self, py: Python<'_>, other: &Self) -> PyResult<Self> {
+        let mut sum = self.0.clone();
+        sum.add(&other.0).map_err(|error| raise(py, &error.into()))?;
+        Ok(Self(sum))
+    }
+
+    /// All sums times a factor from 0 to 1.
+    fn scaled(&self, py: Python<'_>, factor: f64) -> PyResult<Self> {
+        self.0.clone().scaled(factor).map(Self).map_err(|error| raise(py, &error.into()))
+    }
+
+    /// Atoms that fit the sums better than `components`.
+    fn update<'py>(
+        &self,
+        py: Python<'py>,
+        components: PyReadonlyArray2<'py, f32>,
+    ) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        let atoms = atoms_of(&components)?;
+        let sums = &self.0;
+        let updated = without_gil(py, None, move |_| Ok(sums.update(&atoms)?))?;
+        to_array(py, &updated)
+    }
+
+    #[getter]
+    fn rows(&self) -> f64 {
+        self.0.rows()
+    }
+
+    #[getter]
+    fn nonzeros(&self) -> f64 {
+        self.0.nonzeros()
+    }
+
+    #[getter]
+    fn squared_error(&self) -> f64 {
+        self.0.squared_error()
+    }
+
+    fn to_bytes<'py>(&self, py: Python<'py>) -> Bound<'py, PyBytes> {
+        PyBytes::new(py, &self.0.to_bytes())
+    }
+
+    #[staticmethod]
+    fn from_bytes(py: Python<'_>, bytes: &[u8]) -> PyResult<Self> {
+        Sums::from_bytes(bytes).map(Self).map_err(|error| raise(py, &error.into()))
+    }
+}
