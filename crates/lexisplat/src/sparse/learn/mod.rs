@@ -9,6 +9,7 @@ mod atom_replacement;
 mod axes;
 mod learner;
 mod sample;
+mod statistics;
 #[cfg(test)]
 mod tests;
 mod training;
@@ -25,6 +26,7 @@ use crate::support::progress::Progress;
 pub(crate) use atom_replacement::{take_first, unit_axis};
 pub(crate) use axes::principal_axes;
 pub(crate) use sample::Fetch;
+pub use statistics::{ROWS_PER_BLOCK, Statistics};
 use training::Beyond;
 pub(crate) use update::ksvd_atom;
 
