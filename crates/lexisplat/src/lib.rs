@@ -66,6 +66,7 @@ pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;
 pub use scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
 pub use scene::{sh, stats};
+pub use sparse::atoms::{Atoms, MAX_DIM};
 pub use sparse::codes::{CodedRest, Column, Escapes, Indices, SparseCodes, Values, reconstruct};
 pub use sparse::compress::{CompressOptions, DEFAULT_TOLERANCE, compress};
 pub use sparse::dictionary::Dictionary;

@@ -411,10 +411,5 @@ impl SparseCodes {
 /// This order and rounding are part of the promise: the encoder verifies exactly these values.
 #[inline]
 pub fn reconstruct(dictionary: &Dictionary, code: impl Iterator<Item = (usize, f32)>, out: &mut [f32]) {
-    out.fill(0.0);
-    for (atom, value) in code {
-        for (o, a) in out.iter_mut().zip(dictionary.atom(atom)) {
-            *o += value * a;
-        }
-    }
+    dictionary.atoms().reconstruct(code, out);
 }

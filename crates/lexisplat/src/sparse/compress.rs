@@ -159,7 +159,7 @@ impl Encoder {
         progress: &dyn Progress,
     ) -> Result<(Self, Option<Learned>)> {
         let degree = source.empty().degree;
-        let stop = StopRule::new(options.tolerance, options.max_nonzeros)?;
+        let stop = StopRule::new(options.tolerance, options.max_nonzeros.map(usize::from))?;
         let (dictionary, learned) = match &options.dictionary {
             Some(given) if given.degree() != degree => {
                 let expected = format!("a dictionary of the scene's SH degree {degree}");

@@ -44,7 +44,7 @@ pub enum Stage {
     Look,
     /// Draws views, in views.
     Draw,
-    /// Codes Gaussians, in Gaussians.
+    /// Codes Gaussians, in Gaussians, or rows of any kind, in rows.
     Code,
     /// Writes a file, in bytes.
     Write,

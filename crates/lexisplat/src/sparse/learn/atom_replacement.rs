@@ -6,7 +6,7 @@ use super::LearnOptions;
 use super::axes::principal_axes;
 use super::training::Training;
 use super::update::{dot, normalised};
-use crate::sparse::dictionary::Dictionary;
+use crate::sparse::atoms::Atoms;
 use crate::support::rng::SplitMix64;
 
 /// Two atoms whose |cos| is above this count as one (KSVD-Box, `muthresh`).
@@ -110,12 +110,12 @@ pub(super) fn replace_useless(atoms: &mut [f32], velocity: &mut [f32], training:
 }
 
 /// Returns the atoms most used first, each with its largest entry positive.
-pub(super) fn canonical(dictionary: &Dictionary, usage: &[usize]) -> Vec<f32> {
-    let mut order: Vec<usize> = (0..dictionary.len()).collect();
+pub(super) fn canonical(atoms: &Atoms, usage: &[usize]) -> Vec<f32> {
+    let mut order: Vec<usize> = (0..atoms.len()).collect();
     order.sort_by_key(|&j| Reverse(usage[j]));
-    let mut out = Vec::with_capacity(dictionary.as_slice().len());
+    let mut out = Vec::with_capacity(atoms.as_slice().len());
     for j in order {
-        let atom = dictionary.atom(j);
+        let atom = atoms.atom(j);
         let larger = |largest: f32, &x: &f32| if x.abs() > largest.abs() { x } else { largest };
         let largest = atom.iter().fold(0.0, larger);
         let sign = if largest < 0.0 { -1.0 } else { 1.0 };

@@ -1,9 +1,14 @@
 //! The principal axes of a sample.
 
+use crate::scene::sh::MAX_REST;
+
 /// Most vectors that the axes are computed from.
 const MAX_VECTORS: usize = 16_384;
 /// Passes over all pairs of coordinates. Convergence is quadratic, so few are needed.
 const SWEEPS: usize = 12;
+/// Largest correlation of two coordinates of which neither is rotated, in vectors longer than SH-rest. The passes that
+/// would only correct the rounding of earlier ones then cost next to nothing.
+const UNCORRELATED: f64 = 1e-9;
 
 /// Returns the eigenvectors of the second moments of `sample` (about zero, not the mean), largest eigenvalue first. An
 /// empty sample has none.
@@ -25,10 +30,11 @@ pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     }
     let mut axes: Vec<Vec<f64>> =
         (0..dim).map(|i| (0..dim).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
+    let uncorrelated = if dim > MAX_REST { UNCORRELATED } else { 0.0 };
     for _ in 0..SWEEPS {
         for p in 0..dim {
             for q in p + 1..dim {
-                rotate(&mut moments, &mut axes, p, q);
+                rotate(&mut moments, &mut axes, [p, q], uncorrelated);
             }
         }
     }
@@ -37,9 +43,12 @@ pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
     order.into_iter().map(|i| axes[i].clone()).collect()
 }
 
-/// Rotates coordinates `p < q` so that their mixed moment becomes zero.
-fn rotate(moments: &mut [Vec<f64>], axes: &mut [Vec<f64>], p: usize, q: usize) {
+/// Rotates coordinates `p < q` so that their mixed moment becomes zero, unless their correlation is below `uncorrelated`.
+fn rotate(moments: &mut [Vec<f64>], axes: &mut [Vec<f64>], [p, q]: [usize; 2], uncorrelated: f64) {
     let off = moments[p][q];
+    if off.abs() < uncorrelated * (moments[p][p] * moments[q][q]).sqrt() {
+        return;
+    }
     let theta = (moments[q][q] - moments[p][p]) / (2.0 * off);
     let tangent = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
     // The moments are zero, or already diagonal up to rounding.

@@ -1,7 +1,16 @@
 //! The coded sample: which vectors use which atom, and the residual of each vector.
 
-use crate::sparse::pursuit::{Coder, Encoded};
+use crate::sparse::pursuit::{Coder, Encoded, ROWS_PER_TASK};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
+
+/// What becomes of a vector that no code brings within the tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Beyond {
+    /// It is stored exactly. Atoms are not learned from it, and it costs as much as a code of full length.
+    Exact,
+    /// It keeps the code that comes nearest to it. Atoms are learned from that.
+    Nearest,
+}
 
 /// Codes and residuals of a set of vectors.
 #[derive(Debug, Default)]
@@ -27,16 +36,20 @@ pub(super) struct Use {
 }
 
 impl Training {
-    /// Codes all `vectors`. A vector that cannot be coded has no entries, and its residual is 0.
-    pub(super) fn code(coder: &Coder, vectors: &[f32], dim: usize) -> Self {
-        let parts = map_chunks(vectors.len() / dim, GAUSSIANS_PER_TASK, |range| {
+    /// Codes all `vectors`. A vector that is stored exactly has no entries, and its residual is 0.
+    pub(super) fn code(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Self {
+        let dim = coder.dim();
+        let parts = map_chunks(vectors.len() / dim, ROWS_PER_TASK, |range| {
             let mut part = Self { dim, ..Self::default() };
             coder.encode(&vectors[range.start * dim..range.end * dim], |visit| {
-                if visit.outcome == Encoded::Escape {
+                let (code, _) = visit.nearest();
+                if visit.outcome == Encoded::Escape && beyond == Beyond::Exact {
                     part.residuals.resize(part.residuals.len() + dim, 0.0);
+                } else if code.is_empty() {
+                    part.residuals.extend_from_slice(visit.signal);
                 } else {
-                    part.atoms.extend(visit.code.iter().map(|&(atom, _)| atom));
-                    part.values.extend(visit.code.iter().map(|&(_, value)| value));
+                    part.atoms.extend(code.iter().map(|&(atom, _)| atom));
+                    part.values.extend(code.iter().map(|&(_, value)| value));
                     part.residuals
                         .extend(visit.signal.iter().zip(visit.reconstruction()).map(|(x, y)| x - y));
                 }
@@ -83,27 +96,39 @@ impl Training {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Cost {
     pub(super) nonzeros: f64,
+    /// What vectors cost that stay beyond the tolerance, on top of their nonzeros and in the same unit. It grows with
+    /// their errors.
+    pub(super) beyond: f64,
     pub(super) squared_error: f64,
 }
 
 /// Mean cost of coding `vectors`.
-pub(super) fn cost(coder: &Coder, vectors: &[f32], dim: usize) -> Cost {
+pub(super) fn cost(coder: &Coder, vectors: &[f32], beyond: Beyond) -> Cost {
+    let dim = coder.dim();
     let count = vectors.len() / dim;
     let parts = map_chunks(count, GAUSSIANS_PER_TASK, |range| {
-        let (mut nonzeros, mut squared_error) = (0_usize, 0.0);
+        let (mut nonzeros, mut squared_error, mut left) = (0_usize, 0.0, 0.0);
         coder.encode(&vectors[range.start * dim..range.end * dim], |visit| match visit.outcome {
             Encoded::Code { error } => {
                 nonzeros += visit.code.len();
                 squared_error += error * error;
             }
             // The vector is stored exactly, which costs as much as a code with all atoms.
-            Encoded::Escape => nonzeros += dim,
+            Encoded::Escape if beyond == Beyond::Exact => nonzeros += dim,
+            // At the tolerance this is as much as a code of full length, and more the further from it.
+            Encoded::Escape => {
+                let (code, error) = visit.nearest();
+                nonzeros += code.len();
+                squared_error += error * error;
+                left += dim as f64 * coder.tolerance().map_or(0.0, |tolerance| error / tolerance);
+            }
         });
-        (nonzeros, squared_error)
+        (nonzeros, squared_error, left)
     });
     let scale = 1.0 / count.max(1) as f64;
     Cost {
         nonzeros: parts.iter().map(|p| p.0).sum::<usize>() as f64 * scale,
         squared_error: parts.iter().map(|p| p.1).sum::<f64>() * scale,
+        beyond: parts.iter().map(|p| p.2).sum::<f64>() * scale,
     }
 }

@@ -1,8 +1,7 @@
 //! Moves the atoms: approximate K-SVD, and momentum over rounds.
 
 use super::training::Training;
-use crate::scene::sh::MAX_REST;
-use crate::sparse::dictionary::Dictionary;
+use crate::sparse::atoms::Atoms;
 
 /// Users whose residuals are summed in f32 before the sum goes on in f64.
 const PARTIAL: usize = 64;
@@ -12,7 +11,7 @@ const PARTS: usize = 8;
 const MIN_NORM: f64 = 1e-12;
 
 /// Scales `vector` to unit norm, unless its norm is not finite or not above `min_norm`.
-fn normalised_over(vector: &[f64], min_norm: f64) -> Option<Vec<f32>> {
+pub(super) fn normalised_over(vector: &[f64], min_norm: f64) -> Option<Vec<f32>> {
     let norm = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
     #[expect(clippy::cast_possible_truncation, reason = "atoms are f32")]
     (norm.is_finite() && norm > min_norm).then(|| vector.iter().map(|x| (x / norm) as f32).collect())
@@ -37,15 +36,16 @@ pub(crate) fn ksvd_atom(mut sum: Vec<f64>, energy: f64, atom: &[f32], min_norm: 
 /// Step j replaces atom `d` with users `i`, values `g_i` and residuals `r_i` by the normalised
 /// `sum_i g_i (r_i + g_i d)`, then each `g_i` by the projection of `r_i + g_i d` on it. Later atoms see
 /// the new residuals. Returns the new atoms; `training` is changed to match.
-pub(super) fn refit(dictionary: &Dictionary, training: &mut Training) -> Vec<f32> {
-    let dim = dictionary.dim();
-    let uses = training.uses(dictionary.len());
-    let mut atoms = dictionary.as_slice().to_vec();
+pub(super) fn refit(old: &Atoms, training: &mut Training) -> Vec<f32> {
+    let dim = old.dim();
+    let uses = training.uses(old.len());
+    let mut atoms = old.as_slice().to_vec();
+    let mut partial = vec![0.0_f32; dim];
     for (uses, atom) in uses.iter().zip(atoms.chunks_exact_mut(dim)) {
         let mut sum = vec![0.0_f64; dim];
         let mut energy = 0.0_f64;
         for group in uses.chunks(PARTIAL) {
-            let mut partial = [0.0_f32; MAX_REST];
+            partial.fill(0.0);
             for u in group {
                 let value = training.values[u.entry];
                 energy += f64::from(value) * f64::from(value);
@@ -77,7 +77,7 @@ pub(super) fn refit(dictionary: &Dictionary, training: &mut Training) -> Vec<f32
 
 /// Adds momentum to each of `atoms`. Its step from `old` plus `momentum` times its velocity becomes both its new
 /// velocity and the step that it takes.
-pub(super) fn accelerate(old: &Dictionary, atoms: &mut [f32], velocity: &mut [f32], momentum: f32) {
+pub(super) fn accelerate(old: &Atoms, atoms: &mut [f32], velocity: &mut [f32], momentum: f32) {
     let dim = old.dim();
     let moving = atoms.chunks_exact_mut(dim).zip(velocity.chunks_exact_mut(dim));
     for ((atom, velocity), old) in moving.zip(old.as_slice().chunks_exact(dim)) {
@@ -109,8 +109,10 @@ pub(super) fn dot(a: &[f32], b: &[f32]) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::training::Beyond;
     use super::*;
     use crate::scene::sh::ShDegree;
+    use crate::sparse::dictionary::Dictionary;
     use crate::sparse::model::Pursuit;
     use crate::sparse::pursuit::{Coder, StopRule, ValueType};
     use crate::support::rng::SplitMix64;
@@ -135,10 +137,10 @@ mod tests {
         let dictionary = Dictionary::new(degree, atoms).unwrap();
         let stop = StopRule::new(None, Some(4)).unwrap();
         let coder = Coder::new(&dictionary, Pursuit::Omp, stop, ValueType::F32);
-        let mut training = Training::code(&coder, &vectors, dim);
+        let mut training = Training::code(&coder, &vectors, Beyond::Exact);
         let energy = |t: &Training| t.residuals.iter().map(|r| f64::from(r * r)).sum::<f64>();
         let before = energy(&training);
-        let new = refit(&dictionary, &mut training);
+        let new = refit(dictionary.atoms(), &mut training);
         assert!(energy(&training) < before * 0.999, "{} {before}", energy(&training));
         for vector in 0..training.len() {
             let mut expected = vectors[vector * dim..][..dim].to_vec();

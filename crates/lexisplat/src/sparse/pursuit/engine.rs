@@ -2,8 +2,9 @@
 
 use half::f16;
 
-use super::greedy::{ANY, Plan, Scratch};
+use super::greedy::{ANY, Plan, Scratch, squared_distance};
 use super::lanes::blocks_of;
+use crate::sparse::atoms::Atoms;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
 use crate::support::error::{Error, Result};
@@ -32,7 +33,7 @@ pub enum ValueType {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StopRule {
     tolerance: Option<f64>,
-    max_nonzeros: Option<u8>,
+    max_nonzeros: Option<usize>,
 }
 
 impl StopRule {
@@ -40,7 +41,7 @@ impl StopRule {
     ///
     /// # Errors
     /// [`Error::Parameter`] if both are missing, or if the tolerance is not finite or not above 0.
-    pub fn new(tolerance: Option<f64>, max_nonzeros: Option<u8>) -> Result<Self> {
+    pub fn new(tolerance: Option<f64>, max_nonzeros: Option<usize>) -> Result<Self> {
         if let Some(tol) = tolerance
             && (!tol.is_finite() || tol <= 0.0)
         {
@@ -82,7 +83,8 @@ pub enum Encoded {
 pub struct Visit<'a> {
     /// The vector.
     pub signal: &'a [f32],
-    /// Its (atom, value) pairs by ascending atom. Values are already rounded. An escape has no meaningful pairs.
+    /// Its (atom, value) pairs by ascending atom. Values are already rounded. An escape has those that the pursuit ended
+    /// with, of which [`Self::nearest`] tells whether they are of use.
     pub code: &'a [(u16, f32)],
     /// The outcome.
     pub outcome: Encoded,
@@ -94,6 +96,18 @@ impl Visit<'_> {
     #[must_use]
     pub fn reconstruction(&self) -> &[f32] {
         &self.reconstruction[..self.signal.len()]
+    }
+
+    /// The code that comes nearest to the vector, and the un-squared L2 norm of its error: that of [`Encoded::Code`],
+    /// or else the one that the pursuit ended with. The latter is empty if its error is not below the vector's norm.
+    #[must_use]
+    pub fn nearest(&self) -> (&[(u16, f32)], f64) {
+        if let Encoded::Code { error } = self.outcome {
+            return (self.code, error);
+        }
+        let norm = self.signal.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
+        let error = squared_distance(self.signal, self.reconstruction).sqrt();
+        if error < norm { (self.code, error) } else { (&[], norm) }
     }
 }
 
@@ -120,7 +134,7 @@ impl<F: FnMut(Visit<'_>), const BLOCKS: usize> pulp::NullaryFnOnce for Job<'_, F
     }
 }
 
-/// Codes vectors over one dictionary. Threads can share it, since each call has its own working memory.
+/// Codes vectors over one set of atoms. Threads can share it, since each call has its own working memory.
 #[derive(Debug)]
 pub struct Coder {
     plan: Plan,
@@ -133,7 +147,31 @@ impl Coder {
     /// Makes a coder over `dictionary`.
     #[must_use]
     pub fn new(dictionary: &Dictionary, pursuit: Pursuit, stop: StopRule, values: ValueType) -> Self {
-        Self { plan: Plan::new(dictionary), pursuit, stop, values }
+        Self::over(dictionary.atoms(), pursuit, stop, values)
+    }
+
+    /// Makes a coder over `atoms`.
+    #[must_use]
+    pub fn over(atoms: &Atoms, pursuit: Pursuit, stop: StopRule, values: ValueType) -> Self {
+        Self { plan: Plan::new(atoms), pursuit, stop, values }
+    }
+
+    /// Values of a vector.
+    #[must_use]
+    pub fn dim(&self) -> usize {
+        self.plan.dim
+    }
+
+    /// Number of atoms.
+    #[must_use]
+    pub fn atoms(&self) -> usize {
+        self.plan.atoms
+    }
+
+    /// The tolerance at which it stops, if any.
+    #[must_use]
+    pub fn tolerance(&self) -> Option<f64> {
+        self.stop.tolerance
     }
 
     /// Codes the vectors in `signals`, each as long as an atom, and passes each result to `sink`, in order. Uses the
@@ -173,7 +211,7 @@ impl Coder {
         if energy.is_nan() || energy > MAX_ENERGY {
             return Encoded::Escape;
         }
-        let cap = self.stop.max_nonzeros.map_or(self.plan.dim, usize::from);
+        let cap = self.stop.max_nonzeros.unwrap_or(self.plan.dim);
         let target = (promise * promise).max(energy * NOISE_FLOOR);
         self.plan.start::<BLOCKS>(s, signal, energy);
         loop {

@@ -2,7 +2,7 @@
 
 use super::lanes::{LANES, Lane, ZERO, accumulate, blocks_of, first_maximum, transposed};
 use crate::scene::sh::MAX_REST;
-use crate::sparse::dictionary::Dictionary;
+use crate::sparse::atoms::Atoms;
 use crate::sparse::model::Pursuit;
 
 /// An atom whose squared distance to the chosen span is below this counts as part of the span, because the f32
@@ -10,10 +10,12 @@ use crate::sparse::model::Pursuit;
 const MIN_SPAN_DISTANCE: f32 = 1e-5;
 /// Stands for any number of lanes, where a constant number makes loops faster.
 pub(super) const ANY: usize = 0;
+/// Lanes of the longest atoms of a dictionary. The lanes of longer atoms are summed in groups of so many.
+const MOST_BLOCKS: usize = MAX_REST.div_ceil(LANES);
 /// A lane of ones.
 const ONES: Lane = Lane([1.0; LANES]);
 
-/// A dictionary prepared for pursuit: its transpose, its Gram matrix, and padded atoms.
+/// Atoms prepared for pursuit: their transpose, their Gram matrix, and padded atoms.
 #[derive(Debug)]
 pub(super) struct Plan {
     /// Lanes of one per-atom array.
@@ -21,6 +23,8 @@ pub(super) struct Plan {
     /// Lanes of one atom.
     atom_blocks: usize,
     pub(super) dim: usize,
+    /// Number of atoms.
+    pub(super) atoms: usize,
     /// `dim` rows of `blocks` lanes: entry (d, j) is coefficient d of atom j.
     transposed: Vec<Lane>,
     /// `atoms` rows of `blocks` lanes: inner products of atoms, 0 in the padding.
@@ -41,41 +45,49 @@ pub(super) struct Scratch {
     /// Column l: coordinates of the l-th chosen atom in the orthonormal basis, without its last one.
     triangle: Vec<f32>,
     /// Last coordinate of each chosen atom.
-    diagonal: [f32; MAX_REST],
+    diagonal: Vec<f32>,
     /// Coordinates of the signal in the orthonormal basis.
-    amplitudes: [f32; MAX_REST],
+    amplitudes: Vec<f32>,
     /// The atoms chosen so far, in order, and their number.
-    pub(super) chosen: [u16; MAX_REST],
+    pub(super) chosen: Vec<u16>,
     pub(super) len: usize,
     /// Squared norm of the residual, by the recurrence.
     pub(super) energy: f64,
-    work: [f32; MAX_REST],
+    work: Vec<f32>,
     /// The vector that [`Plan::error`] reconstructed last, padded with zeros.
-    pub(super) reconstruction: [f32; MAX_REST.next_multiple_of(LANES)],
+    pub(super) reconstruction: Vec<f32>,
 }
 
 impl Plan {
-    pub(super) fn new(dictionary: &Dictionary) -> Self {
-        let (dim, atoms) = (dictionary.dim(), dictionary.len());
-        let (blocks, atom_blocks) = (blocks_of(atoms), dim.div_ceil(LANES));
-        let mut gram = vec![ZERO; atoms * blocks];
-        let mut padded = vec![ZERO; atoms * atom_blocks];
-        for j in 0..atoms {
-            let atom = dictionary.atom(j);
+    pub(super) fn new(atoms: &Atoms) -> Self {
+        let (dim, count) = (atoms.dim(), atoms.len());
+        let (blocks, atom_blocks) = (blocks_of(count), dim.div_ceil(LANES));
+        let mut gram = vec![ZERO; count * blocks];
+        let mut padded = vec![ZERO; count * atom_blocks];
+        for j in 0..count {
+            let atom = atoms.atom(j);
             for (d, &value) in atom.iter().enumerate() {
                 padded[j * atom_blocks + d / LANES].0[d % LANES] = value;
             }
             // Products are summed in f64 and rounded once, unlike those of `packed::codebook`: that codec sums them in
             // f32, which costs it nothing, and its files depend on it.
-            for i in 0..atoms {
+            for i in 0..count {
                 let product: f64 =
-                    atom.iter().zip(dictionary.atom(i)).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
+                    atom.iter().zip(atoms.atom(i)).map(|(&a, &b)| f64::from(a) * f64::from(b)).sum();
                 #[expect(clippy::cast_possible_truncation, reason = "the Gram matrix is kept in f32")]
                 let product = product as f32;
                 gram[j * blocks + i / LANES].0[i % LANES] = product;
             }
         }
-        Self { blocks, atom_blocks, dim, transposed: transposed(dim, dictionary.as_slice()), gram, padded }
+        Self {
+            blocks,
+            atom_blocks,
+            dim,
+            atoms: count,
+            transposed: transposed(dim, atoms.as_slice()),
+            gram,
+            padded,
+        }
     }
 
     /// Lanes of one per-atom array, `BLOCKS` unless that is [`ANY`].
@@ -94,14 +106,14 @@ impl Plan {
             correlations: vec![ZERO; self.blocks],
             distances: vec![ZERO; self.blocks],
             directions: vec![ZERO; self.dim * self.blocks],
-            triangle: vec![0.0; MAX_REST * MAX_REST],
-            diagonal: [0.0; MAX_REST],
-            amplitudes: [0.0; MAX_REST],
-            chosen: [0; MAX_REST],
+            triangle: vec![0.0; self.dim * self.dim],
+            diagonal: vec![0.0; self.dim],
+            amplitudes: vec![0.0; self.dim],
+            chosen: vec![0; self.dim],
             len: 0,
             energy: 0.0,
-            work: [0.0; MAX_REST],
-            reconstruction: [0.0; MAX_REST.next_multiple_of(LANES)],
+            work: vec![0.0; self.dim],
+            reconstruction: vec![0.0; self.atom_blocks * LANES],
         }
     }
 
@@ -134,7 +146,7 @@ impl Plan {
         let (block, lane) = (best / LANES, best % LANES);
         let length = distances[block].0[lane].sqrt();
         let amplitude = correlations[block].0[lane] / length;
-        let column = &mut s.triangle[k * MAX_REST..k * MAX_REST + k];
+        let column = &mut s.triangle[k * self.dim..k * self.dim + k];
         let (previous, new) = s.directions.split_at_mut(k * blocks);
         for (coordinate, direction) in column.iter_mut().zip(previous.iter().skip(block).step_by(blocks)) {
             *coordinate = direction.0[lane];
@@ -156,7 +168,7 @@ impl Plan {
         }
         s.diagonal[k] = length;
         s.amplitudes[k] = amplitude;
-        #[expect(clippy::cast_possible_truncation, reason = "a dictionary has at most 1024 atoms")]
+        #[expect(clippy::cast_possible_truncation, reason = "there are at most 1024 atoms")]
         {
             s.chosen[k] = best as u16;
         }
@@ -175,7 +187,7 @@ impl Plan {
         code.resize(k, (0, 0.0));
         for l in (0..k).rev() {
             let value = right[l] / s.diagonal[l];
-            let column = &s.triangle[l * MAX_REST..l * MAX_REST + l];
+            let column = &s.triangle[l * self.dim..l * self.dim + l];
             for (r, &c) in right[..l].iter_mut().zip(column) {
                 *r -= c * value;
             }
@@ -191,26 +203,30 @@ impl Plan {
     #[inline(always)]
     pub(super) fn error(&self, s: &mut Scratch, signal: &[f32], code: &[(u16, f32)]) -> f64 {
         match self.atom_blocks {
-            1 => self.reconstruct::<1>(s, code),
-            2 => self.reconstruct::<2>(s, code),
-            3 => self.reconstruct::<3>(s, code),
-            _ => self.reconstruct::<{ MAX_REST.div_ceil(LANES) }>(s, code),
+            1 => self.reconstruct::<1>(s, code, 0),
+            2 => self.reconstruct::<2>(s, code, 0),
+            3 => self.reconstruct::<3>(s, code, 0),
+            _ => {
+                for first in (0..self.atom_blocks).step_by(MOST_BLOCKS) {
+                    self.reconstruct::<MOST_BLOCKS>(s, code, first);
+                }
+            }
         }
         squared_distance(signal, &s.reconstruction).sqrt()
     }
 
-    /// Computes the sums of [`crate::sparse::codes::reconstruct`], `BLOCKS` lanes at a time.
+    /// Computes the sums of [`crate::sparse::codes::reconstruct`] in up to `BLOCKS` lanes, from lane `first`.
     #[inline(always)]
-    fn reconstruct<const BLOCKS: usize>(&self, s: &mut Scratch, code: &[(u16, f32)]) {
+    fn reconstruct<const BLOCKS: usize>(&self, s: &mut Scratch, code: &[(u16, f32)], first: usize) {
         let mut sums = [ZERO; BLOCKS];
         let stride = self.atom_blocks;
         for &(atom, value) in code {
-            let atom = &self.padded[usize::from(atom) * stride..][..stride];
+            let atom = &self.padded[usize::from(atom) * stride..][first..stride];
             for (sum, lane) in sums.iter_mut().zip(atom) {
                 *sum = sum.zip(*lane, |s, a| s + value * a);
             }
         }
-        for (out, sum) in s.reconstruction.chunks_exact_mut(LANES).zip(&sums) {
+        for (out, sum) in s.reconstruction[first * LANES..].chunks_exact_mut(LANES).zip(&sums) {
             out.copy_from_slice(&sum.0);
         }
     }
@@ -218,7 +234,7 @@ impl Plan {
 
 /// Returns the sum of squared differences in f64, in eight fixed partial sums. `b` may be longer than `a`.
 #[inline(always)]
-fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
+pub(super) fn squared_distance(a: &[f32], b: &[f32]) -> f64 {
     const PARTS: usize = 8;
     let mut sums = [0.0_f64; PARTS];
     let b = &b[..a.len()];

@@ -1,4 +1,4 @@
-//! Sparse coding of SH-rest vectors: finds the few atoms that bring each vector within a tolerance.
+//! Sparse coding of vectors, SH-rest or any others: finds the few atoms that bring each within a tolerance.
 //!
 //! Two greedy rules share one engine. **OMP** chooses the atom most correlated with the residual (the paper). **OLS**
 //! chooses the atom that lowers the residual most after the coefficients of all chosen atoms are refitted. It needs
@@ -13,7 +13,12 @@
 mod engine;
 mod greedy;
 pub(crate) mod lanes;
+mod rows;
 #[cfg(test)]
 mod tests;
 
 pub use engine::{Coder, Encoded, StopRule, ValueType, Visit};
+pub use rows::{RowCodes, encode_rows};
+
+/// Rows that one task codes: few enough that even small sets of long rows occupy all threads.
+pub(crate) const ROWS_PER_TASK: usize = 256;

@@ -1,103 +1,30 @@
-//! Tests of the pursuit against a naive one in f64, which projects every candidate afresh in every step.
+//! Tests of the pursuit against a naive one in f64.
+
+mod lengths;
+mod oracle;
+mod rows;
 
 use crate::scene::sh::ShDegree;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
-use crate::sparse::pursuit::greedy::{ANY, Plan};
 use crate::sparse::pursuit::{Coder, Encoded, StopRule, ValueType};
 use crate::support::rng::SplitMix64;
 use crate::support::simd::Simd;
+use oracle::{basis_of, check_agreement, dot, off, random_atoms, random_rows, wide};
 use proptest::prelude::*;
 
-/// A candidate whose squared distance to the chosen span is below this may be refused by the engine.
-const NEAR_SPAN: f64 = 1e-4;
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
-}
-
-/// The part of `vector` outside the span of an orthonormal `basis`. It is projected twice because of rounding.
-fn off(basis: &[Vec<f64>], vector: &[f64]) -> Vec<f64> {
-    let mut left = vector.to_vec();
-    for _ in 0..2 {
-        for direction in basis {
-            let c = dot(direction, &left);
-            for (l, d) in left.iter_mut().zip(direction) {
-                *l -= c * d;
-            }
-        }
-    }
-    left
-}
-
-fn normalised(mut vector: Vec<f64>) -> Vec<f64> {
-    let norm = dot(&vector, &vector).sqrt();
-    vector.iter_mut().for_each(|x| *x /= norm);
-    vector
-}
-
-/// An orthonormal basis of the span of chosen atoms.
-fn basis_of(atoms: &[Vec<f64>], chosen: impl IntoIterator<Item = usize>) -> Vec<Vec<f64>> {
-    let mut basis = Vec::new();
-    for j in chosen {
-        basis.push(normalised(off(&basis, &atoms[j])));
-    }
-    basis
-}
-
-/// The score by which a pursuit whose chosen atoms span `basis` prefers each atom; `None` for atoms too close to the
-/// span.
-fn scores(pursuit: Pursuit, atoms: &[Vec<f64>], basis: &[Vec<f64>], residual: &[f64]) -> Vec<Option<f64>> {
-    atoms
-        .iter()
-        .map(|atom| {
-            let fresh = off(basis, atom);
-            let distance = dot(&fresh, &fresh);
-            let correlation = dot(atom, residual);
-            (distance > NEAR_SPAN).then(|| match pursuit {
-                Pursuit::Omp => correlation * correlation,
-                Pursuit::Ols => correlation * correlation / distance,
-            })
-        })
-        .collect()
-}
-
-/// Two atoms whose scores differ by at most this share of the best score are equally good in f32.
-const CLOSE: f64 = 1e-3;
-/// Squared rounding noise of f32 recurrences over at most 72 steps, as a share of the signal's energy.
-const NOISE: f64 = 1e-9;
-/// Largest error of f32 recurrences, as a share of the signal. The tolerance is checked in f64, not by them.
-const ROUNDING: f64 = 1e-3;
-
-#[expect(clippy::cast_possible_truncation, reason = "test data are small")]
-fn uniform(rng: &mut SplitMix64) -> f32 {
-    ((rng.next() >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0) as f32
-}
-
 fn random_dictionary(degree: ShDegree, atoms: usize, rng: &mut SplitMix64) -> Dictionary {
-    let mut values = Vec::new();
-    for _ in 0..atoms {
-        let atom: Vec<f32> = (0..degree.rest()).map(|_| uniform(rng)).collect();
-        let norm = atom.iter().map(|x| x * x).sum::<f32>().sqrt();
-        values.extend(atom.iter().map(|x| x / norm));
-    }
-    Dictionary::new(degree, values).unwrap()
+    Dictionary::of(degree, random_atoms(degree.rest(), atoms, rng)).unwrap()
 }
 
 fn random_signals(degree: ShDegree, count: usize, scale: f32, rng: &mut SplitMix64) -> Vec<f32> {
-    (0..count * degree.rest()).map(|_| scale * uniform(rng)).collect()
-}
-
-fn wide(values: &[f32]) -> Vec<f64> {
-    values.iter().map(|&x| f64::from(x)).collect()
+    random_rows(degree.rest(), count, scale, rng)
 }
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// At every step the engine takes the atom the oracle would take after the same choices, or one so
-    /// close to it that f32 cannot tell; and its least-squares solution is as good as the oracle's.
     #[test]
     fn engine_agrees_with_the_oracle(
         seed in any::<u64>(),
@@ -108,34 +35,9 @@ proptest! {
         let degree = ShDegree::new(degree).unwrap();
         let mut rng = SplitMix64::new(seed);
         let dictionary = random_dictionary(degree, atoms.max(degree.rest() * 3 / 2), &mut rng);
-        let all: Vec<Vec<f64>> = (0..dictionary.len()).map(|j| wide(dictionary.atom(j))).collect();
-        let plan = Plan::new(&dictionary);
-        let mut scratch = plan.scratch();
         for signal in random_signals(degree, 3, 0.2, &mut rng).chunks_exact(degree.rest()) {
-            let exact = wide(signal);
             for pursuit in [Pursuit::Omp, Pursuit::Ols] {
-                let mut basis = Vec::new();
-                let mut residual = exact.clone();
-                plan.start::<ANY>(&mut scratch, signal, dot(&exact, &exact));
-                while dot(&residual, &residual).sqrt() > tol {
-                    let scores = scores(pursuit, &all, &basis, &residual);
-                    let best = scores.iter().flatten().fold(0.0_f64, |a, &b| a.max(b));
-                    prop_assert!(plan.step::<ANY>(&mut scratch, pursuit) || best == 0.0);
-                    let taken = scratch.chosen[..scratch.len].last().copied().map(usize::from).unwrap();
-                    if let Some(score) = scores[taken] {
-                        let slack = CLOSE * best + NOISE * dot(&exact, &exact);
-                        prop_assert!(score >= best - slack, "{} {}", score, best);
-                    }
-                    basis.push(normalised(off(&basis, &all[taken])));
-                    residual = off(&basis, &exact);
-                    let energy = dot(&residual, &residual);
-                    prop_assert!((scratch.energy - energy).abs() <= ROUNDING * dot(&exact, &exact));
-                }
-                let mut code = Vec::new();
-                plan.solve(&mut scratch, &mut code);
-                let error = plan.error(&mut scratch, signal, &code);
-                let least = dot(&residual, &residual).sqrt();
-                prop_assert!(error <= least + ROUNDING * dot(&exact, &exact).sqrt(), "{} {}", error, least);
+                check_agreement(dictionary.atoms(), signal, pursuit, tol);
             }
         }
     }
