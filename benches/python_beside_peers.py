@@ -9,7 +9,7 @@ Sections:
   read    a PLY of a million Gaussians (bonsai-3dgs.ply, tiled by tile.py), in the page cache, to six contiguous float32
           arrays: median seconds of 7 rounds, in which every reader has its turn
   code    leica-brush.ply's SH over the same 90 atoms to the same tolerance: rows a second of one thread of each, and mean
-          nonzeros. scikit-learn's `sparse_encode` by OMP takes the squared norm as its tolerance, and so does SPAMS.
+          nonzeros. SPAMS' `omp`, which chooses as OLS does, and scikit-learn's `orthogonal_mp` take the squared norm
   learn   the same rows: a dictionary by each, then coded by our pursuit: seconds to learn and mean nonzeros
   memory  the largest resident memory of a process that reads the million, beside that of its arrays
 """
@@ -116,31 +116,28 @@ def rows_of(models):
     return np.ascontiguousarray(lexisplat.load(models / "leica-brush.ply").shN.transpose(0, 2, 1)).reshape(-1, 45)
 
 
-def coders(components):
+def coders(X, components):
     import spams
-    from sklearn.decomposition import SparseCoder
+    from sklearn.linear_model import orthogonal_mp
 
     import lexisplat
 
-    def ours(X, pursuit):
+    def ours(pursuit):
         learner = lexisplat.DictionaryLearner(ATOMS, TOLERANCE, pursuit=pursuit).fit(X[:2])
         learner.components_ = components
-        return learner.transform(X)
+        return lambda: learner.transform(X)
 
-    def sklearn(X):
-        # It stops at a squared norm. In float64, as it is at its best.
-        coder = SparseCoder(components.astype(np.float64), transform_algorithm="omp", transform_alpha=TOLERANCE**2)
-        return coder.transform(X.astype(np.float64))
-
-    def by_spams(X):
-        # It chooses as OLS does, and is fastest in float32.
-        return spams.omp(np.asfortranarray(X.T), np.asfortranarray(components.T), eps=TOLERANCE**2, numThreads=1).T
-
+    # Each has its input in the form that it takes without a conversion.
+    columns, atoms = np.asfortranarray(X.T), np.asfortranarray(components.T)
+    doubles, double_atoms = columns.astype(np.float64), atoms.astype(np.float64)
     return {
-        f"lexisplat {version('lexisplat')}, OLS": lambda X: ours(X, "ols"),
-        f"lexisplat {version('lexisplat')}, OMP": lambda X: ours(X, "omp"),
-        f"SPAMS {version('spams-bin')}": by_spams,
-        f"scikit-learn {version('scikit-learn')}, OMP": sklearn,
+        f"lexisplat {version('lexisplat')}, OLS": ours("ols"),
+        f"lexisplat {version('lexisplat')}, OMP": ours("omp"),
+        f"SPAMS {version('spams-bin')}": lambda: spams.omp(columns, atoms, eps=TOLERANCE**2, numThreads=1).T,
+        # SparseCoder takes no tolerance for OMP; what it calls does.
+        f"scikit-learn {version('scikit-learn')}, OMP": lambda: orthogonal_mp(
+            double_atoms, doubles, tol=TOLERANCE**2, precompute=True
+        ).T,
     }
 
 
@@ -151,11 +148,11 @@ def code(models, rounds):
     components = lexisplat.DictionaryLearner(ATOMS, TOLERANCE).fit(X).components_
     print(f"\n| coder, one thread | rows a second | times ours is faster | mean nonzeros | largest error |\n|---|---|---|---|---|")
     base = None
-    for name, coder in coders(components).items():
+    for name, coder in coders(X, components).items():
         taken = []
         for _ in range(1 if "scikit" in name else rounds):
             clock = time.perf_counter()
-            codes = coder(X)
+            codes = coder()
             taken.append(time.perf_counter() - clock)
         median = statistics.median(taken)
         base = base or median

@@ -3,8 +3,11 @@
 viser draws without view-dependent colour. `lexisplat html` makes a page that draws with it.
 """
 
+from __future__ import annotations
+
 import sys
 import time
+from typing import Any
 
 import lexisplat as lx
 import numpy as np
@@ -13,7 +16,7 @@ import viser
 C0 = 0.28209479177387814  # SH function of degree 0
 
 
-def covariances(splats):
+def covariances(splats: lx.Splats) -> Any:
     """(N, 3, 3): rotations and squared sizes."""
     w, x, y, z = (splats.quats / np.linalg.norm(splats.quats, axis=1, keepdims=True)).T
     rows = [
@@ -25,7 +28,7 @@ def covariances(splats):
     return axes @ axes.transpose(0, 2, 1)
 
 
-def main(path, port=8080):
+def main(path: str, port: int = 8080) -> viser.ViserServer:
     server = viser.ViserServer(port=port)
     splats = lx.load(path)
     server.scene.add_gaussian_splats(

@@ -46,7 +46,7 @@ impl Held {
 }
 
 /// A compressed scene.
-#[pyclass(frozen, subclass, module = "lexisplat._native")]
+#[pyclass(frozen, module = "lexisplat._native")]
 #[derive(Debug)]
 pub(crate) struct Scene {
     pub(crate) held: Arc<Held>,

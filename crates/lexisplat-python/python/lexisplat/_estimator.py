@@ -14,6 +14,8 @@ from ._errors import ParameterError
 class Estimator:
     """Parameters by name, as scikit-learn's estimators have them."""
 
+    n_features_in_: int
+
     def get_params(self, deep: bool = True) -> dict[str, Any]:
         """The parameters by name."""
         names = [name for name in inspect.signature(type(self)).parameters]

@@ -100,8 +100,7 @@ class Splats:
     @property
     def degree(self) -> int:
         """SH degree, 0 to 4."""
-        coefficients: int = self.shN.shape[1]
-        return math.isqrt(coefficients + 1) - 1
+        return int(math.isqrt(self.shN.shape[1] + 1)) - 1
 
     @property
     def nbytes(self) -> int:

@@ -18,10 +18,7 @@ from ._progress import Progress, reporter
 if TYPE_CHECKING:
     from typing_extensions import Self
 
-    class _Base:
-        """What scikit-learn's estimators have, as far as this module needs it."""
-
-        n_features_in_: int
+    from ._estimator import Estimator as _Base
 
     def _validated(learner: DictionaryLearner, X: Any, reset: bool) -> npt.NDArray[np.float32]: ...
 
@@ -42,6 +39,12 @@ else:
             @property
             def _n_features_out(self):
                 return len(self.components_)
+
+            def __sklearn_tags__(self):
+                tags = super().__sklearn_tags__()
+                # Rows are coded in float32, whatever they come as.
+                tags.transformer_tags.preserves_dtype = ["float32"]
+                return tags
 
         def _validated(learner, X, reset):
             return validate_data(learner, X, reset=reset, dtype=np.float32, order="C")
@@ -192,7 +195,7 @@ class DictionaryLearner(_Base):
         return self.tol, self.max_nonzeros, self.pursuit
 
     def __getstate__(self) -> dict[str, Any]:
-        state: dict[str, Any] = dict(super().__getstate__() or {})  # type: ignore[misc]
+        state = dict(super().__getstate__())
         sums = state.get("_statistics")
         if sums is not None:
             state["_statistics"] = sums.to_bytes()
