@@ -66,8 +66,11 @@ impl Kind {
         if bytes.starts_with(&[0x1f, 0x8b]) {
             return Some(Self::Spz);
         }
-        if bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{') {
-            return of_json(bytes).or(Self::of_extension(name).filter(|kind| *kind == Self::Gltf));
+        // Rows of a .splat may begin as JSON does.
+        let is_json = bytes.iter().find(|b| !b.is_ascii_whitespace()) == Some(&b'{');
+        let json = || of_json(bytes).or(Self::of_extension(name).filter(|kind| *kind == Self::Gltf));
+        if let Some(kind) = is_json.then(json).flatten() {
+            return Some(kind);
         }
         if ksplat::is_likely(bytes) {
             return Some(Self::Ksplat);

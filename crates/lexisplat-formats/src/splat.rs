@@ -164,6 +164,17 @@ mod tests {
         assert!(again == bytes && lost.limited == 1);
     }
 
+    /// A row whose first byte that is not white space is the brace that JSON begins with.
+    #[test]
+    fn a_row_that_begins_as_json_is_a_row() {
+        let mut splats = scene(&SampleOptions::new(1, 1));
+        splats.geometry.positions[0] = [f32::from_le_bytes(*b"\n\n{\n"); 3];
+        let (bytes, _) = write(&splats);
+        assert!(bytes.starts_with(b"\n\n{\n"));
+        let opened = open("a", &bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent).unwrap();
+        assert_eq!(opened.kind(), Kind::Splat);
+    }
+
     #[test]
     fn rows_that_are_not_whole_are_refused() {
         let (bytes, _) = write(&scene(&SampleOptions::new(3, 1)));
