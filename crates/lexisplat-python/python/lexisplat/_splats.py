@@ -105,8 +105,8 @@ class Splats:
     @property
     def nbytes(self) -> int:
         """Bytes of all arrays."""
-        arrays = [getattr(self, name) for name in _NAMES] + [*self.extras.values()]
-        return sum(a.nbytes for a in arrays) + (0 if self.normals is None else self.normals.nbytes)
+        arrays = [*self.to_dict(contiguous=False).values(), *self.extras.values()]
+        return sum(array.nbytes for array in arrays) + (0 if self.normals is None else self.normals.nbytes)
 
     def __getitem__(self, which: Any) -> Splats:
         """The Gaussians that a slice, a mask or an array of numbers names."""
