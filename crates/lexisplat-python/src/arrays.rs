@@ -1,6 +1,6 @@
 //! Scenes as NumPy arrays. What leaves is moved into arrays without a copy; what comes in is copied once.
 
-use lexisplat::sh::CHANNELS;
+use lexisplat::sh::{CHANNELS, MAX_REST};
 use lexisplat::{Extra, ExtraValues, Geometry, SURE_OPACITY, SceneMeta, ShDegree, Splats};
 use numpy::ndarray::ArrayView3;
 use numpy::{
@@ -16,10 +16,18 @@ use crate::errors::parameter;
 /// Gaussians whose SH one task turns from one order to the other.
 const PER_TASK: usize = 4096;
 
-/// `splats` as a dictionary of arrays by the names of Python's `Splats`. SH-rest is a view with strides of the
-/// channel-major array that it is here.
-pub(crate) fn to_python<'py>(py: Python<'py>, splats: Splats) -> PyResult<Bound<'py, PyDict>> {
-    let Splats { geometry, degree, sh_rest, meta } = splats;
+/// How SH-rest leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum ShOrder {
+    /// A view with strides of the array with the channels apart.
+    Strided,
+    /// Turned in place to (Gaussians, coefficients, channels).
+    Contiguous,
+}
+
+/// `splats` as a dictionary of arrays by the names of Python's `Splats`.
+pub(crate) fn to_python(py: Python<'_>, splats: Splats, order: ShOrder) -> PyResult<Bound<'_, PyDict>> {
+    let Splats { geometry, degree, mut sh_rest, meta } = splats;
     let (n, each) = (geometry.len(), degree.rest_per_channel());
     let out = PyDict::new(py);
     out.set_item("means", matrix(py, geometry.positions)?)?;
@@ -27,8 +35,13 @@ pub(crate) fn to_python<'py>(py: Python<'py>, splats: Splats) -> PyResult<Bound<
     out.set_item("quats", matrix(py, geometry.rotations)?)?;
     out.set_item("opacities", PyArray1::from_vec(py, geometry.opacities))?;
     out.set_item("sh0", matrix(py, geometry.dc)?.reshape([n, 1, CHANNELS])?)?;
-    let rest = PyArray1::from_vec(py, sh_rest).reshape([n, CHANNELS, each])?;
-    out.set_item("shN", rest.permute(Some([0_usize, 2, 1]))?)?;
+    if order == ShOrder::Contiguous {
+        py.detach(|| turn(&mut sh_rest, each));
+        out.set_item("shN", PyArray1::from_vec(py, sh_rest).reshape([n, each, CHANNELS])?)?;
+    } else {
+        let rest = PyArray1::from_vec(py, sh_rest).reshape([n, CHANNELS, each])?;
+        out.set_item("shN", rest.permute(Some([0_usize, 2, 1]))?)?;
+    }
     let normals = match geometry.normals.is_empty() {
         true => None,
         false => Some(matrix(py, geometry.normals)?),
@@ -42,6 +55,26 @@ pub(crate) fn to_python<'py>(py: Python<'py>, splats: Splats) -> PyResult<Bound<
     out.set_item("comments", meta.comments)?;
     out.set_item("antialiased", meta.antialiased)?;
     Ok(out)
+}
+
+/// Turns rows of (channels, `each` coefficients) to rows of (coefficients, channels).
+fn turn(rows: &mut [f32], each: usize) {
+    let length = CHANNELS * each;
+    if length == 0 {
+        return;
+    }
+    rows.par_chunks_mut(PER_TASK * length).for_each(|rows| {
+        let mut before = [0.0; MAX_REST];
+        for row in rows.chunks_exact_mut(length) {
+            let before = &mut before[..length];
+            before.copy_from_slice(row);
+            let (red, rest) = before.split_at(each);
+            let (green, blue) = rest.split_at(each);
+            for (to, ((r, g), b)) in row.chunks_exact_mut(CHANNELS).zip(red.iter().zip(green).zip(blue)) {
+                to.copy_from_slice(&[*r, *g, *b]);
+            }
+        }
+    });
 }
 
 fn matrix<const N: usize>(py: Python<'_>, rows: Vec<[f32; N]>) -> PyResult<Bound<'_, PyArray2<f32>>> {

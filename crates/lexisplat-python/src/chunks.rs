@@ -9,7 +9,7 @@ use lexisplat::{Error, Splats};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::to_python;
+use crate::arrays::{ShOrder, to_python};
 use crate::errors::{Result, raise};
 use crate::scene::Held;
 
@@ -56,7 +56,9 @@ impl Chunks {
         loop {
             let next = py.detach(|| self.0.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(POLL));
             match next {
-                Ok(Ok((start, splats))) => return Ok(Some((start, to_python(py, splats)?))),
+                Ok(Ok((start, splats))) => {
+                    return Ok(Some((start, to_python(py, splats, ShOrder::Strided)?)));
+                }
                 Ok(Err(error)) => return Err(raise(py, &error)),
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),
                 Err(RecvTimeoutError::Timeout) => py.check_signals()?,

@@ -9,18 +9,20 @@ use lexisplat_formats::{Kind, Siblings, WriteOptions, write};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::{from_python, to_python};
+use crate::arrays::{ShOrder, from_python, to_python};
 use crate::bytes::{Given, limits};
 use crate::errors::{parameter, raise};
 use crate::work::without_gil;
 
 /// Reads the scene in a file or in bytes. Returns its arrays, its warnings, and the name of its format.
 #[pyfunction]
-#[pyo3(signature = (source, *, name, drop_invalid, drop_extras, limit, progress))]
+#[pyo3(signature = (source, *, name, contiguous, drop_invalid, drop_extras, limit, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn load<'py>(
     py: Python<'py>,
     source: Given,
     name: Option<String>,
+    contiguous: bool,
     drop_invalid: bool,
     drop_extras: bool,
     limit: Option<&Bound<'py, PyDict>>,
@@ -41,7 +43,8 @@ pub(crate) fn load<'py>(
         Loaded::Other(read) => read.splats,
         Loaded::Lexi(model, _) => py.detach(|| model.into_splats()),
     };
-    Ok((to_python(py, splats)?, warnings, kind))
+    let order = if contiguous { ShOrder::Contiguous } else { ShOrder::Strided };
+    Ok((to_python(py, splats, order)?, warnings, kind))
 }
 
 /// How scenes are read.

@@ -11,7 +11,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use serde_json::json;
 
-use crate::arrays::{to_python, vector};
+use crate::arrays::{ShOrder, to_python, vector};
 use crate::bytes::{Bytes, Given, limits};
 use crate::chunks::Chunks;
 use crate::errors::Result;
@@ -169,7 +169,7 @@ impl Scene {
     ) -> PyResult<Bound<'py, PyDict>> {
         let held = &self.held;
         let splats = without_gil(py, progress, |_| Ok(held.reader()?.model()?.into_splats()))?;
-        to_python(py, splats)
+        to_python(py, splats, ShOrder::Strided)
     }
 
     /// The sparse codes: starts, atoms, values, numbers of Gaussians that are stored exactly, and their rows.

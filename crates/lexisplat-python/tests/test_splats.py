@@ -50,6 +50,15 @@ def test_what_is_loaded_is_not_copied(ply: Path) -> None:
     np.testing.assert_array_equal(contiguous["shN"], splats.shN)
 
 
+@pytest.mark.parametrize("degree", range(5))
+def test_sh_are_contiguous_if_asked(degree: int, tmp_path: Path) -> None:
+    lx.save(tmp_path / "a.ply", make(9000, degree))
+    strided, contiguous = lx.load(tmp_path / "a.ply"), lx.load(tmp_path / "a.ply", contiguous=True)
+    same(strided, contiguous)
+    assert contiguous.shN.flags.c_contiguous
+    assert np.shares_memory(contiguous.to_dict()["shN"], contiguous.shN) or degree == 0
+
+
 def test_any_strides_of_sh_are_taken(tmp_path: Path) -> None:
     splats = make(5000)
     odd = np.zeros((5000, 3, 40), np.float32)

@@ -23,6 +23,7 @@ def load(
     source: Source,
     *,
     name: str | None = None,
+    contiguous: bool = False,
     drop_invalid: bool = False,
     drop_extras: bool = False,
     limit: Mapping[str, int] | None = None,
@@ -38,6 +39,8 @@ def load(
         The file. A SOG may be a folder with ``meta.json``.
     name : str, optional
         What messages call the file, if it is not its path.
+    contiguous : bool
+        Whether ``shN`` is contiguous, which takes a pass over it in place. Otherwise it is a view with strides.
     drop_invalid : bool
         Whether Gaussians with NaN or infinite values are left out. Otherwise such a file is refused.
     drop_extras : bool
@@ -55,6 +58,7 @@ def load(
     arrays, told, _ = _native.load(
         source,
         name=name,
+        contiguous=contiguous,
         drop_invalid=drop_invalid,
         drop_extras=drop_extras,
         limit=None if limit is None else dict(limit),

@@ -49,6 +49,7 @@ def load(
     source: _Source,
     *,
     name: str | None,
+    contiguous: bool,
     drop_invalid: bool,
     drop_extras: bool,
     limit: dict[str, int] | None,

@@ -156,7 +156,8 @@ class DictionaryLearner(_Base):
 
     def transform(self, X: Any, *, progress: Progress = None) -> Any:
         """Codes rows: (n_samples, n_components). A row that no code brings within ``tol`` has the code that comes nearest."""
-        _is_fitted(self)
+        if not hasattr(self, "components_"):
+            _is_fitted(self)
         rows = _validated(self, X, False)
         starts, atoms, values, _, _ = _native.encode_rows(
             self.components_, rows, rule=self._rule(), progress=reporter(progress)
