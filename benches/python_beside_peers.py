@@ -192,12 +192,18 @@ def learn(models):
 
 
 MEASURE = """
-import resource, sys, lexisplat
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+import sys, lexisplat
+
+def peak():
+    # ru_maxrss begins with what the parent had.
+    with open("/proc/self/status") as status:
+        return next(int(line.split()[1]) for line in status if line.startswith("VmHWM:"))
+
+before = peak()
 splats = lexisplat.load(sys.argv[1])
-read = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+read = peak()
 lexisplat.save(sys.argv[2], splats)
-print(before, read, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, splats.nbytes // 1024)
+print(before, read, peak(), splats.nbytes // 1024)
 """
 
 
