@@ -1,7 +1,7 @@
 //! The native part of the Python package lexisplat: arrays in, arrays out.
 //!
 //! Everything here is private to the package. Its Python modules check and document arguments, and turn what comes from
-//! here into the classes that users see. Long work runs on a thread of its own without the GIL ([`work`]), so that
+//! here into the classes that users see. Long work runs on a thread of its own without the GIL (`work`), so that
 //! Ctrl-C and progress reports reach Python.
 
 mod arrays;
