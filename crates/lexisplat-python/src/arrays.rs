@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::errors::parameter;
+use crate::work::check_process;
 
 /// Gaussians whose SH one task turns from one order to the other.
 const PER_TASK: usize = 4096;
@@ -105,6 +106,7 @@ extras! { I8(i8) U8(u8) I16(i16) U16(u16) I32(i32) U32(u32) F32(f32) F64(f64) }
 /// The scene that the attributes of Python's `Splats` hold.
 pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
     let py = splats.py();
+    check_process()?;
     let positions = rows::<3>(splats, "means")?;
     let (n, sh0) = (positions.len(), array::<PyReadonlyArray3<'_, f32>>(splats, "sh0")?);
     if sh0.shape() != [n, 1, CHANNELS] {
@@ -185,7 +187,7 @@ fn sh_rest(splats: &Bound<'_, PyAny>, n: usize) -> PyResult<(ShDegree, Vec<f32>)
     let degree = degree.into_iter().find(|degree| degree.rest_per_channel() == view.shape()[1]);
     match degree {
         Some(degree) if view.shape()[0] == n && view.shape()[2] == CHANNELS => {
-            Ok((degree, py.detach(|| channel_major(view))))
+            Ok((degree, channel_major(view)))
         }
         _ => Err(shape(py, "shN", view.shape(), &format!("({n}, K, 3) with K of 0, 3, 8, 15 or 24"))),
     }
@@ -221,9 +223,11 @@ pub(crate) fn contiguous<'py>(
     py: Python<'py>,
     values: PyReadonlyArray3<'py, f32>,
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+    check_process()?;
     let view = values.as_array();
     let shape = [view.shape()[0], view.shape()[1], view.shape()[2]];
-    let copy = py.detach(|| transposed(view));
+    // With the GIL held, so that no other thread of Python changes the array meanwhile.
+    let copy = transposed(view);
     PyArray1::from_vec(py, copy).reshape(shape)
 }
 

@@ -3,11 +3,12 @@
 //! The work runs on a thread of its own. The thread that called waits, and every [`POLL`] it looks for signals and
 //! passes reports on, because Python handles signals on its main thread alone.
 
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use lexisplat::{Progress, Stage};
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
 use crate::errors::{Result, raise};
@@ -100,6 +101,21 @@ impl Progress for Watch {
     }
 }
 
+/// The process that first did work here; 0 before there was one.
+static PROCESS: AtomicU32 = AtomicU32::new(0);
+
+/// Refuses to work in a process that was forked from one that worked: threads of the pool do not survive a fork, and would
+/// be waited for without end.
+pub(crate) fn check_process() -> PyResult<()> {
+    let own = std::process::id();
+    match PROCESS.compare_exchange(0, own, Ordering::Relaxed, Ordering::Relaxed) {
+        Err(first) if first != own => Err(PyRuntimeError::new_err(
+            "lexisplat was used before this process was forked: start processes by spawn (multiprocessing.get_context(\"spawn\"))",
+        )),
+        _ => Ok(()),
+    }
+}
+
 /// Does `work` without the GIL. `progress` is called with the stage, units done and units in all, or is `None`. A signal
 /// handler or a `progress` that raises ends the work, and what it raised is raised.
 pub(crate) fn without_gil<T: Send>(
@@ -107,6 +123,7 @@ pub(crate) fn without_gil<T: Send>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watch) -> Result<T> + Send,
 ) -> PyResult<T> {
+    check_process()?;
     let watch = Watch::default();
     let mut failure = None;
     let outcome = std::thread::scope(|scope| {
@@ -116,7 +133,7 @@ pub(crate) fn without_gil<T: Send>(
         });
         loop {
             let is_over = py.detach(|| watch.wait());
-            let told = py.check_signals().and_then(|()| match progress {
+            let told = py.check_signals().and_then(|()| match progress.filter(|_| failure.is_none()) {
                 Some(call) => watch.reports().into_iter().try_for_each(|report| call.call1(report).map(drop)),
                 None => Ok(()),
             });

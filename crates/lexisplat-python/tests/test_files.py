@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import os
+import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import lexisplat as lx
@@ -106,3 +109,31 @@ def test_invalid_gaussians_are_refused_or_left_out(tmp_path: Path) -> None:
         lx.load(tmp_path / "a.ply")
     with pytest.warns(lx.LexisplatWarning):
         assert len(lx.load(tmp_path / "a.ply", drop_invalid=True)) == 99
+
+
+def test_errors_can_be_pickled(tmp_path: Path) -> None:
+    with pytest.raises(FileNotFoundError) as missing:
+        lx.load(tmp_path / "none.ply")
+    again = pickle.loads(pickle.dumps(missing.value))
+    assert type(again) is type(missing.value) and again.filename == missing.value.filename
+
+
+@pytest.mark.skipif(os.name != "posix", reason="fork")
+def test_a_forked_process_is_told_to_be_spawned(ply: Path) -> None:
+    script = """
+import os, sys, lexisplat as lx
+lx.load(sys.argv[1])
+child = os.fork()
+if child == 0:
+    try: lx.load(sys.argv[1])
+    except RuntimeError as error: os._exit(0 if "spawn" in str(error) else 1)
+    os._exit(2)
+assert os.waitpid(child, 0)[1] == 0
+"""
+    subprocess.run([sys.executable, "-W", "ignore", "-c", script, ply], check=True, timeout=60)
+
+
+def test_what_is_no_scene_is_named(splats: lx.Splats, tmp_path: Path) -> None:
+    for wrong in (lambda: lx.save(tmp_path / "a.ply", splats.to_dict()), lambda: lx.compress(splats.to_dict())):
+        with pytest.raises(TypeError, match="Splats.from_dict"):
+            wrong()

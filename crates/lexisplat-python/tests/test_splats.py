@@ -170,3 +170,20 @@ def test_gaussians_are_chosen_as_rows_of_arrays(splats: lx.Splats) -> None:
     np.testing.assert_array_equal(splats[[3, 1]].means, splats.means[[3, 1]])
     assert "3,000 Gaussians, SH degree 3" in repr(splats)
     assert splats.nbytes == 3000 * 59 * 4
+
+
+def test_a_scene_has_an_end(splats: lx.Splats) -> None:
+    with pytest.raises(IndexError):
+        splats[3000]
+    assert len(list(splats[:3])) == 3
+
+
+def test_strides_of_no_whole_floats_are_copied(tmp_path: Path) -> None:
+    splats = make(50)
+    records = np.zeros(50, [("x", "u1"), ("shN", "f4", (15, 3)), ("means", "f4", 3)])
+    records["shN"], records["means"] = splats.shN, splats.means
+    splats.shN, splats.means = records["shN"], records["means"]
+    lx.save(tmp_path / "a.ply", splats)
+    same(lx.load(tmp_path / "a.ply"), make(50))
+    picture = np.zeros(20, [("x", "u1"), ("rows", "f4", (30, 3))])["rows"]
+    assert lx.metrics.psnr(picture, picture.copy()) == float("inf")

@@ -121,8 +121,14 @@ def photographs(scene: Splats | Scene, count: int = 8, *, progress: Progress = N
 def native(scene: Splats | Scene) -> Any:
     """What the native part takes for a scene."""
     from ._scene import Scene
+    from ._splats import Splats
 
-    return scene._native if isinstance(scene, Scene) else scene._checked()
+    if isinstance(scene, Scene):
+        return scene._native
+    if isinstance(scene, Splats):
+        return scene._checked()
+    kind = type(scene).__name__
+    raise TypeError(f"{kind}: expected Splats or a Scene; Splats.from_dict takes a dict of arrays, lexisplat.load a path")
 
 
 def as_tuples(cameras: Iterable[Camera]) -> list[_native.CameraTuple]:

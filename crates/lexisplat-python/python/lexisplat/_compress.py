@@ -6,6 +6,8 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import Literal, Union
 
+import numpy as np
+
 from . import _native
 from ._cameras import Camera, as_tuples, cameras as read_cameras
 from ._device import quiet
@@ -19,6 +21,8 @@ Layout = Literal["packed", "f16", "f32", "paper"]
 #: Cameras, or the path of a file or folder that :func:`lexisplat.cameras` reads.
 Cameras = Union[Sequence[Camera], str, "os.PathLike[str]"]
 
+#: What names a file, or is one.
+_FILE = (str, bytes, os.PathLike)
 #: Memory that packing a whole scene may take before it is packed in parts, as the program's default (2 GiB).
 DEFAULT_MEMORY = 2 << 30
 
@@ -130,9 +134,9 @@ def compress(
     }
     with quiet(device):
         made = _native.compress(
-            scene._checked() if isinstance(scene, Splats) else scene,
+            scene if isinstance(scene, _FILE) else _splats(scene),
             choices,
-            dictionary=dictionary,
+            dictionary=dictionary if isinstance(dictionary, _FILE) else _atoms(dictionary),
             name="scene.lexi",
             drop_invalid=drop_invalid,
             drop_extras=drop_extras,
@@ -144,5 +148,18 @@ def compress(
     return result
 
 
+def _splats(scene: object) -> object:
+    if isinstance(scene, Splats):
+        return scene._checked()
+    kind = type(scene).__name__
+    raise TypeError(f"{kind}: expected Splats, a path or bytes; Splats.from_dict takes a dict of arrays")
+
+
+def _atoms(dictionary: object) -> object:
+    return None if dictionary is None else np.require(dictionary, np.float32, ["C", "A"])
+
+
 def _cameras(cameras: Cameras) -> Sequence[Camera]:
+    if isinstance(cameras, Camera):
+        return [cameras]
     return read_cameras(cameras) if isinstance(cameras, (str, os.PathLike)) else cameras

@@ -19,8 +19,10 @@ def quiet(device: str) -> Iterator[None]:
     if device == "cpu" or _FOLDER in os.environ:
         yield
         return
-    os.environ[_FOLDER] = os.path.abspath(os.path.join(os.sep, "nonexistent"))
+    nowhere = os.path.abspath(os.path.join(os.sep, "nonexistent"))
+    os.environ[_FOLDER] = nowhere
     try:
         yield
     finally:
-        os.environ.pop(_FOLDER, None)
+        if os.environ.get(_FOLDER) == nowhere:
+            del os.environ[_FOLDER]

@@ -62,7 +62,7 @@ def render(
     device : {"auto", "cpu", "gpu"} or a number as text
         ``"cpu"`` gives the same bits on every machine; ``"auto"`` takes a GPU if there is one.
     progress : callable or bool, optional
-        As :func:`load`.
+        As :func:`compress`.
 
     Returns
     -------

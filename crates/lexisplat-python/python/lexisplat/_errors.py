@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+from typing import Any
 
 
 class Error(Exception):
@@ -11,6 +12,9 @@ class Error(Exception):
 
 class IoError(Error, OSError):
     """The operating system refused to read or write a file. It has ``errno`` and ``filename``, as every ``OSError``."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return os_error, (self.errno, self.strerror, self.filename)
 
 
 class _NotFound(IoError, FileNotFoundError):

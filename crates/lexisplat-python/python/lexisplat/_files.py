@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, Union
 
 from . import _native
+from ._cameras import native
 from ._errors import LexisplatWarning
 from ._progress import Progress, reporter
 from ._scene import Scene
@@ -27,7 +28,6 @@ def load(
     drop_invalid: bool = False,
     drop_extras: bool = False,
     limit: Mapping[str, int] | None = None,
-    progress: Progress = None,
 ) -> Splats:
     """Reads a scene with dense SH from a file of any format: PLY, .lexi, SPZ, SOG, compressed.ply, .splat, .ksplat, glTF.
 
@@ -48,8 +48,6 @@ def load(
     limit : mapping of str to int, optional
         Limits on what the file may ask for: ``gaussians``, ``atoms``, ``nonzeros``, ``bytes``, ``expansion``,
         ``header_bytes``, ``properties``. Lower them for files of strangers.
-    progress : callable or bool, optional
-        Called as ``progress(stage, done, total)``; ``True`` shows bars by tqdm.
 
     Raises
     ------
@@ -62,7 +60,7 @@ def load(
         drop_invalid=drop_invalid,
         drop_extras=drop_extras,
         limit=None if limit is None else dict(limit),
-        progress=reporter(progress),
+        progress=None,
     )
     warn(told, source if name is None else name)
     return of_native(arrays)
@@ -103,7 +101,7 @@ def save(
     overwrite : bool
         Whether a file that exists is replaced. Otherwise it is refused.
     progress : callable or bool, optional
-        As :func:`load`.
+        As :func:`compress`.
 
     Returns
     -------
@@ -123,7 +121,7 @@ def save(
         scene = scene.decode()
     lost = _native.save(
         path,
-        scene._checked(),
+        native(scene),
         format=format,
         spz_version=spz_version,
         sh_bits=tuple(sh_bits),

@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._progress import Progress, reporter
 from ._splats import FloatArray, Splats, of_native
 
 if TYPE_CHECKING:
@@ -91,7 +90,8 @@ class Scene:
 
     @property
     def nbytes_by_part(self) -> dict[str, float]:
-        """Bytes of each part of the file by name; they add up to :attr:`nbytes`. Parts of packed files share bytes."""
+        """Bytes of each part of the file by name; they add up to :attr:`nbytes`. Parts of packed files share
+        bytes: ``rounding`` is what their estimates differ by from whole bytes, and may be negative."""
         report = self.report
         return dict((report or self.info)["attribute_bytes"])
 
@@ -104,14 +104,14 @@ class Scene:
         """The sparse codes, in the order of the file."""
         return Codes(*self._native.codes())
 
-    def decode(self, *, progress: Progress = None) -> Splats:
+    def decode(self) -> Splats:
         """The scene with dense SH. Its order is that of the source if the file holds it."""
-        return of_native(self._native.decode(progress=reporter(progress)))
+        return of_native(self._native.decode(progress=None))
 
     def chunks(self) -> Iterator[tuple[int, Splats]]:
         """Decodes part after part, in the order of the file: the number of the first Gaussian, and the part.
 
-        Two parts are in memory at most. A part has up to 65,536 Gaussians.
+        Three parts are in memory at most: the one at hand and two that are ahead. A part has up to 65,536 Gaussians.
         """
         for start, arrays in self._native.chunks():
             yield start, of_native(arrays)

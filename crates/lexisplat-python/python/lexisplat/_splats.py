@@ -85,7 +85,8 @@ class Splats:
         shN = _floats(self.shN)
         if shN.ndim != 3 or shN.shape[0] != count or shN.shape[1] not in (0, 3, 8, 15, 24) or shN.shape[2] != 3:
             raise _wrong_shape("shN", shN.shape, f"({count}, K, 3) with K of 0, 3, 8, 15 or 24")
-        self.shN = shN
+        # The native part reads arrays of floats with strides of whole floats.
+        self.shN = shN if _is_regular(shN) else shN.copy()
         if self.normals is not None:
             self.normals = _rows("normals", self.normals, 3, count)
         self.extras = {name: _contiguous(_shaped(name, np.asarray(v), (count,))) for name, v in self.extras.items()}
@@ -111,6 +112,8 @@ class Splats:
     def __getitem__(self, which: Any) -> Splats:
         """The Gaussians that a slice, a mask or an array of numbers names."""
         if isinstance(which, (int, np.integer)):
+            if not -len(self) <= which < len(self):
+                raise IndexError(f"Gaussian {which} of {len(self)}")
             which = slice(which, None if which == -1 else which + 1)
         arrays = {name: getattr(self, name)[which] for name in _NAMES}
         extras = {name: values[which] for name, values in self.extras.items()}
@@ -133,8 +136,9 @@ class Splats:
         if contiguous and not self.shN.flags.c_contiguous:
             arrays["shN"] = _native.contiguous(self.shN)
         if _space(space) == "linear":
-            arrays["scales"] = np.exp(self.scales)
-            arrays["opacities"] = np.float32(1) / (np.float32(1) + np.exp(-self.opacities))
+            with np.errstate(over="ignore"):
+                arrays["scales"] = np.exp(self.scales)
+                arrays["opacities"] = np.float32(1) / (np.float32(1) + np.exp(-self.opacities))
         return arrays
 
     def to_torch(self, space: Space = "log", *, contiguous: bool = True) -> dict[str, Any]:
@@ -194,7 +198,11 @@ def _floats(values: Any) -> FloatArray:
 
 
 def _contiguous(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    return np.ascontiguousarray(values)
+    return np.require(values, requirements=["C", "A"])
+
+
+def _is_regular(values: npt.NDArray[Any]) -> bool:
+    return values.flags.aligned and all(stride % values.itemsize == 0 for stride in values.strides)
 
 
 def _rows(name: str, values: Any, width: int, count: int | None = None) -> FloatArray:

@@ -26,14 +26,15 @@ if TYPE_CHECKING:
 
 else:
     try:
-        from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin
-        from sklearn.utils.validation import check_is_fitted as _is_fitted
-        from sklearn.utils.validation import validate_data
+        import sklearn  # noqa: F401
     except ImportError:
         from ._estimator import Estimator as _Base
         from ._estimator import is_fitted as _is_fitted
         from ._estimator import validated as _validated
     else:
+        from sklearn.base import BaseEstimator, ClassNamePrefixFeaturesOutMixin, TransformerMixin
+        from sklearn.utils.validation import check_is_fitted as _is_fitted
+        from sklearn.utils.validation import validate_data
 
         class _Base(ClassNamePrefixFeaturesOutMixin, TransformerMixin, BaseEstimator):
             @property
@@ -47,7 +48,7 @@ else:
                 return tags
 
         def _validated(learner, X, reset):
-            return validate_data(learner, X, reset=reset, dtype=np.float32, order="C")
+            return np.require(validate_data(learner, X, reset=reset, dtype=np.float32, order="C"), requirements=["A"])
 
 
 __all__ = ["DictionaryLearner"]
@@ -160,7 +161,7 @@ class DictionaryLearner(_Base):
             _is_fitted(self)
         rows = _validated(self, X, False)
         starts, atoms, values, _, _ = _native.encode_rows(
-            self.components_, rows, rule=self._rule(), progress=reporter(progress)
+            np.require(self.components_, np.float32, ["C", "A"]), rows, rule=self._rule(), progress=reporter(progress)
         )
         shape = (len(rows), len(self.components_))
         sparse = self.sparse_output

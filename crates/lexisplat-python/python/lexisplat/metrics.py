@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
+from ._errors import ParameterError
 
 __all__ = ["flip", "lpips", "psnr", "score", "ssim"]
 
@@ -22,7 +23,10 @@ def _picture(values: Any) -> Any:
     picture = np.asarray(values)
     if picture.dtype == np.uint8:
         return picture.astype(np.float32) / np.float32(255)
-    return picture.astype(np.float32, copy=False)
+    if picture.dtype.kind != "f" or picture.ndim != 3 or picture.shape[2] != 3:
+        found = f"an array of {picture.dtype} of shape {picture.shape}"
+        raise ParameterError(f"picture = {found}: (height, width, 3) of floats from 0 to 1, or uint8")
+    return np.require(picture, np.float32, ["C", "A"])
 
 
 def score(a: Any, b: Any, *, flip: bool = False, lpips: str | os.PathLike[str] | bytes | None = None) -> dict[str, float]:
