@@ -4,30 +4,12 @@ use super::{LearnOptions, LearnedAtoms, learn, learn_atoms};
 use crate::scene::sh::ShDegree;
 use crate::sparse::atoms::{Atoms, MAX_DIM};
 use crate::sparse::model::Pursuit;
+pub(super) use crate::sparse::pursuit::tests::oracle::{random_atoms, uniform};
 use crate::sparse::pursuit::{Coder, StopRule, ValueType, encode_rows};
 use crate::support::error::Error;
 use crate::support::limits::MAX_ATOMS;
 use crate::support::progress::{Progress, Silent};
 use crate::support::rng::SplitMix64;
-
-/// Number of different random values.
-const FINE: usize = 1 << 20;
-
-/// A random value from -1 to 1.
-#[expect(clippy::cast_possible_truncation, reason = "test values are f32")]
-pub(super) fn uniform(rng: &mut SplitMix64) -> f32 {
-    (rng.below(FINE) as f64 / FINE as f64 * 2.0 - 1.0) as f32
-}
-
-pub(super) fn random_atoms(dim: usize, atoms: usize, rng: &mut SplitMix64) -> Atoms {
-    let mut values = Vec::new();
-    for _ in 0..atoms {
-        let atom: Vec<f32> = (0..dim).map(|_| uniform(rng)).collect();
-        let norm = atom.iter().map(|x| x * x).sum::<f32>().sqrt();
-        values.extend(atom.iter().map(|x| x / norm));
-    }
-    Atoms::new(dim, values).unwrap()
-}
 
 /// Rows that are sums of `nonzeros` of `atoms`, and a little noise.
 pub(super) fn sparse_rows(atoms: &Atoms, nonzeros: usize, count: usize, rng: &mut SplitMix64) -> Vec<f32> {

@@ -15,7 +15,7 @@ mod greedy;
 pub(crate) mod lanes;
 mod rows;
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;
 
 pub use engine::{Coder, Encoded, StopRule, ValueType, Visit};
 pub use rows::{RowCodes, encode_rows};

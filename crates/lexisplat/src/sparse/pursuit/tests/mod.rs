@@ -1,7 +1,7 @@
 //! Tests of the pursuit against a naive one in f64.
 
 mod lengths;
-mod oracle;
+pub(in crate::sparse) mod oracle;
 mod rows;
 
 use crate::scene::sh::ShDegree;

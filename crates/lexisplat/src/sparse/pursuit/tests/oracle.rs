@@ -71,11 +71,11 @@ pub(super) const NOISE: f64 = 1e-9;
 pub(super) const ROUNDING: f64 = 1e-3;
 
 #[expect(clippy::cast_possible_truncation, reason = "test data are small")]
-pub(super) fn uniform(rng: &mut SplitMix64) -> f32 {
+pub(in crate::sparse) fn uniform(rng: &mut SplitMix64) -> f32 {
     ((rng.next() >> 11) as f64 / (1_u64 << 53) as f64 * 2.0 - 1.0) as f32
 }
 
-pub(super) fn random_atoms(dim: usize, atoms: usize, rng: &mut SplitMix64) -> Atoms {
+pub(in crate::sparse) fn random_atoms(dim: usize, atoms: usize, rng: &mut SplitMix64) -> Atoms {
     let mut values = Vec::new();
     for _ in 0..atoms {
         let atom: Vec<f32> = (0..dim).map(|_| uniform(rng)).collect();
