@@ -1,6 +1,6 @@
 //! Pictures of a scene that are scored.
 
-use lexisplat::{Progress, Stage};
+use lexisplat::{Progress, ShDegree, Stage};
 use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
@@ -13,13 +13,21 @@ pub struct DrawOptions {
     pub background: [f32; 3],
     /// Whether pictures are rounded to 8 bits, as when they are saved and read back.
     pub eight_bit: bool,
+    /// Highest SH degree to draw with; `None` draws all that a scene has.
+    pub max_degree: Option<ShDegree>,
 }
 
 impl DrawOptions {
     /// Options with the given background and rounding.
     #[must_use]
     pub fn new(background: [f32; 3], eight_bit: bool) -> Self {
-        Self { background, eight_bit }
+        Self { background, eight_bit, max_degree: None }
+    }
+
+    /// These options with another highest SH degree.
+    #[must_use]
+    pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {
+        Self { max_degree, ..self }
     }
 
     /// Draws a view of `scene`, which `renderer` prepared.
@@ -29,7 +37,8 @@ impl DrawOptions {
         scene: &Prepared<'_>,
         camera: &Camera,
     ) -> Result<Image> {
-        let drawing = RenderOptions::default().with_background(self.background);
+        let drawing =
+            RenderOptions::default().with_background(self.background).with_max_degree(self.max_degree);
         let image = renderer.render(scene, camera, &drawing)?;
         if !self.eight_bit {
             return Ok(image);

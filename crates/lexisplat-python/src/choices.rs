@@ -7,6 +7,7 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Dictionary, Layout, Limits, Pursuit, ShDegree, SplatSource, Splats,
     lexi,
 };
+use lexisplat_eval::compression::choose_layout;
 use lexisplat_eval::{Compression, Error, Packing, Quality, SceneKind, Target};
 use lexisplat_formats::{Opened, Siblings, open, scene_path};
 use lexisplat_render::Device;
@@ -49,8 +50,16 @@ pub(crate) struct Choices {
     device: String,
 }
 
+/// What messages call a file that was made here.
+const MADE: &str = "scene.lexi";
+
 /// A name and whether the choice of that name was made.
 type Named = (&'static str, bool);
+
+/// The name of the first choice that was made.
+fn made(choices: &[Named]) -> Option<&'static str> {
+    choices.iter().find(|choice| choice.1).map(|choice| choice.0)
+}
 
 impl Choices {
     /// Choices that only layouts with exact geometry have.
@@ -88,12 +97,9 @@ impl Choices {
 
     /// Refuses choices that do not go together.
     fn check(&self, has_dictionary: bool) -> Result<()> {
-        let refuse = |a: &[Named], b: &[Named]| {
-            let made = |choices: &[Named]| choices.iter().find(|choice| choice.1).map(|choice| choice.0);
-            match (made(a), made(b)) {
-                (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
-                _ => Ok(()),
-            }
+        let refuse = |a: &[Named], b: &[Named]| match (made(a), made(b)) {
+            (Some(a), Some(b)) => Err(Error::parameter(b, "given", format!("not together with {a}"))),
+            _ => Ok(()),
         };
         let goals = self.goals();
         (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
@@ -107,24 +113,9 @@ impl Choices {
 
     /// The layout that is chosen, or the one that the other choices need, as in the program.
     fn chosen_layout(&self, has_dictionary: bool) -> Result<Layout> {
-        let first = |choices: &[Named]| choices.iter().find(|choice| choice.1).map(|choice| choice.0);
-        let exact = first(&self.exact_only(has_dictionary));
-        let packed = first(&self.goals()).or(first(&self.packed_only()));
-        let layout = match &self.layout {
-            Some(name) => name.parse()?,
-            None if exact.is_none() && (packed.is_some() || self.tol.is_none()) => Layout::Packed,
-            None => Layout::F16,
-        };
-        let (wrong, other) = match layout {
-            Layout::Packed => (exact, "f16, f32 or paper"),
-            _ => (packed, "packed"),
-        };
-        match wrong {
-            None => Ok(layout),
-            Some(choice) => {
-                Err(Error::parameter("layout", layout, format!("{other}, which {choice} is for")))
-            }
-        }
+        let packed = made(&self.goals()).or(made(&self.packed_only()));
+        let asked = self.layout.as_deref().map(str::parse).transpose()?;
+        choose_layout(asked, self.tol.is_some(), made(&self.exact_only(has_dictionary)), packed)
     }
 
     /// The library's compression of these choices.
@@ -144,17 +135,12 @@ impl Choices {
         if self.guess {
             return Ok(Compression::Heuristic(preset, options));
         }
-        let targets = [
-            self.psnr.map(Target::MeanPsnr),
-            self.min_psnr.map(Target::MinPsnr),
-            self.size.map(Target::Size),
-            self.ratio.map(Target::Ratio),
-        ];
-        let quality = targets.into_iter().flatten().next().map_or(Quality::Preset(preset), Quality::Target);
+        let target = Target::chosen(self.psnr, self.min_psnr, self.size, self.ratio);
+        let quality = target.map_or(Quality::Preset(preset), Quality::Target);
         let mut packing = Packing::new(quality)
             .with_options(options)
             .with_gpu(device.open_gpu()?)
-            .with_scene_kind(self.scene.as_deref().map_or(Ok(SceneKind::Auto), scene_kind)?)
+            .with_scene_kind(self.scene.map_or(Ok(SceneKind::Auto), |name| name.parse())?)
             .with_max_gaussians(self.max_gaussians);
         if let Some(bytes) = self.memory {
             packing = packing.with_memory(bytes);
@@ -176,16 +162,6 @@ impl Choices {
         options.seed = self.seed;
         options.dictionary = dictionary;
         Ok(options)
-    }
-}
-
-/// Where generated views are taken from.
-fn scene_kind(name: &str) -> Result<SceneKind> {
-    match name {
-        "auto" => Ok(SceneKind::Auto),
-        "object" => Ok(SceneKind::Object),
-        "room" => Ok(SceneKind::Room),
-        _ => Err(Error::parameter("scene", name, "auto, object or room")),
     }
 }
 
@@ -224,14 +200,13 @@ enum Source {
 
 /// Compresses arrays or a file by `choices`. The result is in memory.
 #[pyfunction]
-#[pyo3(signature = (source, choices, *, dictionary, name, drop_invalid, drop_extras, limit, progress))]
+#[pyo3(signature = (source, choices, *, dictionary, drop_invalid, drop_extras, limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn compress(
     py: Python<'_>,
     source: &Bound<'_, PyAny>,
     choices: Choices,
     dictionary: &Bound<'_, PyAny>,
-    name: &str,
     drop_invalid: bool,
     drop_extras: bool,
     limit: Option<&Bound<'_, PyDict>>,
@@ -249,9 +224,10 @@ pub(crate) fn compress(
         match source {
             Source::Splats(splats) => run(&compression, &*splats, watch),
             Source::File(given) => {
-                let (path, name) = match &given {
-                    Given::Path(path) => (Some(scene_path(path).into_owned()), given.name()),
-                    Given::Memory(_) => (None, given.name()),
+                let name = given.name();
+                let path = match &given {
+                    Given::Path(path) => Some(scene_path(path).into_owned()),
+                    Given::Memory(_) => None,
                 };
                 let siblings = path.as_deref().map_or(Siblings::NONE, Siblings::of);
                 let bytes = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
@@ -265,7 +241,7 @@ pub(crate) fn compress(
         }
     })?;
     let report = json(py, &report)?;
-    Ok(Scene::new(name.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report)))
+    Ok(Scene::new(MADE.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report)))
 }
 
 fn run(

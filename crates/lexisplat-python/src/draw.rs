@@ -4,10 +4,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use lexisplat::{Model, ShDegree, Splats};
-use lexisplat::{Progress as _, Stage};
 use lexisplat_eval::compression::judging_views;
-use lexisplat_eval::{Comparison, DEFAULT_MAX_WIDTH, DrawOptions, compare as compare_scenes};
-use lexisplat_render::{Device, Image, RenderOptions, Renderer, Scene as Drawable};
+use lexisplat_eval::{Comparison, DEFAULT_MAX_WIDTH, DrawOptions, compare as compare_scenes, draw_views};
+use lexisplat_render::{Device, Image, Renderer, Scene as Drawable};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -85,18 +84,8 @@ pub(crate) fn render<'py>(
     let degree = max_degree.map(ShDegree::new).transpose().map_err(|error| raise(py, &error.into()))?;
     let images = without_gil(py, progress, move |watch| {
         let resolved = subject.resolved()?;
-        let mut renderer = Renderer::open(device)?;
-        let prepared = renderer.prepare(resolved.scene())?;
-        let options = RenderOptions::default().with_background(background).with_max_degree(degree);
-        watch.begin(Stage::Draw, views.len() as u64);
-        let mut images = Vec::with_capacity(views.len());
-        for camera in &views {
-            watch.check()?;
-            images.push(renderer.render(&prepared, camera, &options)?);
-            watch.advance(1);
-        }
-        watch.end();
-        Ok(images)
+        let options = DrawOptions::new(background, false).with_max_degree(degree);
+        draw_views(&mut Renderer::open(device)?, &resolved.scene(), &views, &options, watch)
     })?;
     images.into_iter().map(|image| picture(py, image)).collect()
 }

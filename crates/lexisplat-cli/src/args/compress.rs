@@ -6,6 +6,7 @@ use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
 use lexisplat_eval::SceneKind;
+use lexisplat_eval::compression::choose_layout;
 use lexisplat_render::Device;
 
 use super::part::Part;
@@ -155,21 +156,10 @@ impl Compress {
     ///
     /// # Errors
     /// A layout and an option that do not go together.
-    pub(crate) fn chosen_layout(&self) -> Result<Layout, lexisplat::Error> {
+    pub(crate) fn chosen_layout(&self) -> lexisplat_eval::Result<Layout> {
         let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
         let (exact, packed) = (given(&self.exact_only()), given(&self.packed_only()));
-        let layout = self.layout.unwrap_or(match (exact, packed, self.tol) {
-            (None, Some(_), _) | (None, None, None) => Layout::Packed,
-            _ => Layout::F16,
-        });
-        let wrong = if layout == Layout::Packed { exact } else { packed };
-        match wrong {
-            None => Ok(layout),
-            Some(option) => {
-                let other = if layout == Layout::Packed { "f16, f32 or paper" } else { "packed" };
-                Err(lexisplat::Error::parameter("layout", layout, format!("{other}, which {option} is for")))
-            }
-        }
+        choose_layout(self.layout, self.tol.is_some(), exact, packed)
     }
 }
 

@@ -24,11 +24,7 @@ pub(super) fn sh_path() -> impl TypedValueParser<Value = ShPath> {
 
 /// Returns the parser of the place of generated views.
 pub(super) fn scene_kind() -> impl TypedValueParser<Value = SceneKind> {
-    PossibleValuesParser::new(["auto", "object", "room"]).map(|name| match name.as_str() {
-        "object" => SceneKind::Object,
-        "room" => SceneKind::Room,
-        _ => SceneKind::Auto,
-    })
+    PossibleValuesParser::new(["auto", "object", "room"]).try_map(|name| name.parse::<SceneKind>())
 }
 
 /// Returns the parser of a split of cameras.

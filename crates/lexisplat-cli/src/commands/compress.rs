@@ -118,13 +118,7 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     if args.guess {
         return Ok(Compression::Heuristic(preset, options));
     }
-    let targets = [
-        args.psnr.map(Target::MeanPsnr),
-        args.min_psnr.map(Target::MinPsnr),
-        args.size.map(Target::Size),
-        args.ratio.map(Target::Ratio),
-    ];
-    let target = targets.into_iter().flatten().next();
+    let target = Target::chosen(args.psnr, args.min_psnr, args.size, args.ratio);
     let mut packing = Packing::new(target.map_or(Quality::Preset(preset), Quality::Target))
         .with_options(options)
         .with_gpu(open_gpu(args.device)?)

@@ -24,6 +24,7 @@ mod facts;
 mod fewer;
 mod found;
 mod judge;
+mod layout;
 mod only_cancels;
 mod packing;
 mod refit;
@@ -35,6 +36,7 @@ mod views;
 
 pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 pub use judge::{Judge, Score};
+pub use layout::choose_layout;
 pub use packing::{Compression, Packing, Quality};
 pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
 pub use target::Target;

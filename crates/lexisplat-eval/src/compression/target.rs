@@ -76,6 +76,18 @@ pub enum Target {
 }
 
 impl Target {
+    /// The target of the choices that programs give by name, of which a user makes at most one.
+    #[must_use]
+    pub fn chosen(
+        psnr: Option<f64>,
+        min_psnr: Option<f64>,
+        size: Option<u64>,
+        ratio: Option<f64>,
+    ) -> Option<Self> {
+        let psnr = psnr.map(Self::MeanPsnr).or(min_psnr.map(Self::MinPsnr));
+        psnr.or(size.map(Self::Size)).or(ratio.map(Self::Ratio))
+    }
+
     /// Name of the target in errors and, but for a ratio, in the file's record.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -8,6 +8,7 @@ mod split;
 mod tests;
 
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 
 use lexisplat::Geometry;
 use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orbit, read_views};
@@ -36,6 +37,19 @@ pub enum SceneKind {
     Object,
     /// From inside the scene ([`interior_views`]).
     Room,
+}
+
+impl FromStr for SceneKind {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text {
+            "auto" => Ok(Self::Auto),
+            "object" => Ok(Self::Object),
+            "room" => Ok(Self::Room),
+            _ => Err(Error::parameter("scene", text, "auto, object or room")),
+        }
+    }
 }
 
 /// The views that [`find_views`] returns.
