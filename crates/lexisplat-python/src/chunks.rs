@@ -3,7 +3,6 @@
 use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::Duration;
 
 use lexisplat::{Error, Splats};
 use pyo3::prelude::*;
@@ -12,11 +11,10 @@ use pyo3::types::PyDict;
 use crate::arrays::{ShOrder, to_python};
 use crate::errors::{Result, raise};
 use crate::scene::Held;
+use crate::work::POLL;
 
 /// Parts that wait to be taken, at most. With the one that is decoded they bound the memory.
 const WAITING: usize = 1;
-/// Time between two looks at signals.
-const POLL: Duration = Duration::from_millis(50);
 
 /// The first Gaussian's number, and the part.
 type Part = Result<(usize, Splats)>;

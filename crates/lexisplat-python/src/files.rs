@@ -14,10 +14,9 @@ use crate::bytes::{Given, limits};
 use crate::errors::{parameter, raise};
 use crate::work::without_gil;
 
-/// Reads the scene in a file or in bytes. Returns its arrays, its warnings, and the name of its format.
+/// Reads the scene in a file or in bytes. Returns its arrays and its warnings.
 #[pyfunction]
-#[pyo3(signature = (source, *, name, contiguous, drop_invalid, drop_extras, limit, progress))]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
+#[pyo3(signature = (source, *, name, contiguous, drop_invalid, drop_extras, limit))]
 pub(crate) fn load<'py>(
     py: Python<'py>,
     source: Given,
@@ -26,25 +25,24 @@ pub(crate) fn load<'py>(
     drop_invalid: bool,
     drop_extras: bool,
     limit: Option<&Bound<'py, PyDict>>,
-    progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Bound<'py, PyDict>, Vec<String>, &'static str)> {
+) -> PyResult<(Bound<'py, PyDict>, Vec<String>)> {
     let options = read_options(py, drop_invalid, drop_extras, limit)?;
     let name = name.unwrap_or_else(|| source.name());
-    let file = without_gil(py, progress, move |_| match source {
+    let file = without_gil(py, None, move |_| match source {
         Given::Path(path) => Ok(SceneFile::read(&path, &options)?),
         source => {
             let bytes = source.bytes(&options.limits)?;
             Ok(SceneFile::read_files(&name, bytes.as_ref(), Siblings::NONE, &options)?)
         }
     })?;
-    let (warnings, kind) = (file.warnings().to_vec(), file.kind().extension());
+    let warnings = file.warnings().to_vec();
     let splats = match file.loaded {
         Loaded::Ply(read) => read.splats,
         Loaded::Other(read) => read.splats,
         Loaded::Lexi(model, _) => py.detach(|| model.into_splats()),
     };
     let order = if contiguous { ShOrder::Contiguous } else { ShOrder::Strided };
-    Ok((to_python(py, splats, order)?, warnings, kind))
+    Ok((to_python(py, splats, order)?, warnings))
 }
 
 /// How scenes are read.

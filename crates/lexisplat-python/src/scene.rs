@@ -1,7 +1,7 @@
 //! A .lexi file that is held as it is, and decoded when that is needed.
 
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::{Indices, Limits, Model, SplatSource as _, Values, stream};
@@ -14,22 +14,28 @@ use serde_json::json;
 use crate::arrays::{ShOrder, to_python, vector};
 use crate::bytes::{Bytes, Given, limits};
 use crate::chunks::Chunks;
-use crate::errors::Result;
+use crate::errors::{Result, raise};
 use crate::files::{json, output};
-use crate::work::without_gil;
+use crate::work::{check_process, without_gil};
 
-/// The bytes of a .lexi file, and its model once something needed it.
+/// The bytes of a .lexi file, and its reader and its model once something needed them.
 #[derive(Debug)]
 pub(crate) struct Held {
-    pub(crate) name: String,
-    pub(crate) bytes: Bytes,
-    pub(crate) limits: Limits,
+    name: String,
+    bytes: Bytes,
+    limits: Limits,
+    reader: OnceLock<LexiReader<'static>>,
     model: Mutex<Option<Arc<Model>>>,
 }
 
 impl Held {
-    pub(crate) fn reader(&self) -> Result<LexiReader<'static>> {
-        Ok(LexiReader::open(self.name.as_str(), self.bytes.clone(), &self.limits)?)
+    /// The reader, which is kept: opening it decodes the dictionary and the tables.
+    pub(crate) fn reader(&self) -> Result<&LexiReader<'static>> {
+        if let Some(reader) = self.reader.get() {
+            return Ok(reader);
+        }
+        let reader = LexiReader::open(self.name.as_str(), self.bytes.clone(), &self.limits)?;
+        Ok(self.reader.get_or_init(|| reader))
     }
 
     /// The decoded file, which is kept.
@@ -56,14 +62,12 @@ pub(crate) struct Scene {
 
 impl Scene {
     pub(crate) fn new(name: String, bytes: Bytes, limits: Limits, report: Option<String>) -> Self {
-        Self { held: Arc::new(Held { name, bytes, limits, model: Mutex::default() }), report }
+        let (reader, model) = (OnceLock::new(), Mutex::default());
+        Self { held: Arc::new(Held { name, bytes, limits, reader, model }), report }
     }
 
-    fn with_reader<T>(&self, py: Python<'_>, get: impl FnOnce(&LexiReader<'_>) -> T) -> PyResult<T> {
-        match self.held.reader() {
-            Ok(reader) => Ok(get(&reader)),
-            Err(error) => Err(crate::errors::raise(py, &error)),
-        }
+    fn reader(&self, py: Python<'_>) -> PyResult<&LexiReader<'static>> {
+        self.held.reader().map_err(|error| raise(py, &error))
     }
 }
 
@@ -88,12 +92,7 @@ pub(crate) fn open_scene(
 #[pymethods]
 impl Scene {
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
-        self.with_reader(py, |reader| reader.len())
-    }
-
-    #[getter]
-    fn name(&self) -> &str {
-        &self.held.name
+        Ok(self.reader(py)?.len())
     }
 
     /// Size of the file in bytes.
@@ -104,12 +103,12 @@ impl Scene {
 
     #[getter]
     fn degree(&self, py: Python<'_>) -> PyResult<u8> {
-        self.with_reader(py, |reader| reader.degree().get())
+        Ok(self.reader(py)?.degree().get())
     }
 
     #[getter]
     fn layout(&self, py: Python<'_>) -> PyResult<&'static str> {
-        self.with_reader(py, |reader| reader.layout().name())
+        Ok(self.reader(py)?.layout().name())
     }
 
     /// The report of the compression as JSON, or `None` of a file that was opened.
@@ -120,17 +119,16 @@ impl Scene {
 
     /// The atoms: an array of (atoms, coefficients).
     fn dictionary<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
-        let dictionary = self.with_reader(py, |reader| reader.dictionary().clone())?;
+        let dictionary = self.reader(py)?.dictionary();
         PyArray1::from_slice(py, dictionary.as_slice()).reshape([dictionary.len(), dictionary.dim()])
     }
 
     /// Facts about the file, all of which is decoded for them, as JSON.
-    #[pyo3(signature = (*, progress))]
-    fn info_json(&self, py: Python<'_>, progress: Option<&Bound<'_, PyAny>>) -> PyResult<String> {
+    fn info_json(&self, py: Python<'_>) -> PyResult<String> {
         let held = &self.held;
-        let facts = without_gil(py, progress, |_| {
+        let facts = without_gil(py, None, |_| {
             let reader = held.reader()?;
-            let survey = stream::survey(&reader, &std::env::temp_dir())?;
+            let survey = stream::survey(reader, &std::env::temp_dir())?;
             let head = reader.packed_head();
             let parts = part_bytes(reader.attribute_bytes(), &survey.stream_bits);
             Ok(json!({
@@ -161,14 +159,9 @@ impl Scene {
     }
 
     /// The dense scene as arrays.
-    #[pyo3(signature = (*, progress))]
-    fn decode<'py>(
-        &self,
-        py: Python<'py>,
-        progress: Option<&Bound<'py, PyAny>>,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn decode<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let held = &self.held;
-        let splats = without_gil(py, progress, |_| Ok(held.reader()?.model()?.into_splats()))?;
+        let splats = without_gil(py, None, |_| Ok(held.reader()?.model()?.into_splats()))?;
         to_python(py, splats, ShOrder::Strided)
     }
 
@@ -214,8 +207,9 @@ impl Scene {
     }
 
     /// Decodes part after part.
-    fn chunks(&self) -> Chunks {
-        Chunks::start(Arc::clone(&self.held))
+    fn chunks(&self) -> PyResult<Chunks> {
+        check_process()?;
+        Ok(Chunks::start(Arc::clone(&self.held)))
     }
 
     /// Writes the file. It appears when it is whole.

@@ -14,7 +14,7 @@ use pyo3::prelude::*;
 use crate::errors::{Result, raise};
 
 /// Time between two looks at signals and reports: short for a person, long for the work.
-const POLL: Duration = Duration::from_millis(50);
+pub(crate) const POLL: Duration = Duration::from_millis(50);
 
 /// A report: the stage, units done, and units in all or 0 if that is not known.
 type Report = (&'static str, u64, u64);

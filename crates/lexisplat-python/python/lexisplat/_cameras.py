@@ -6,7 +6,7 @@ import os
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,10 +14,8 @@ import numpy.typing as npt
 from . import _native
 from ._errors import LexisplatWarning, ParameterError
 from ._progress import Progress, reporter
-
-if TYPE_CHECKING:
-    from ._scene import Scene
-    from ._splats import Splats
+from ._scene import Scene
+from ._splats import Splats, host
 
 #: A principal point farther than this from the centre, in pixels, is told, because it is not drawn.
 _CENTRE_SLACK = 0.5
@@ -61,7 +59,7 @@ class Camera:
     @classmethod
     def from_viewmat(cls, viewmat: Any, K: Any, width: int, height: int, name: str = "") -> Camera:
         """A camera as gsplat describes it: ``viewmat`` (4, 4) from world to camera, ``K`` (3, 3)."""
-        view, intrinsics = (np.asarray(_host(m), np.float64) for m in (viewmat, K))
+        view, intrinsics = (np.asarray(host(m), np.float64) for m in (viewmat, K))
         if view.shape != (4, 4) or intrinsics.shape != (3, 3):
             raise ParameterError("camera: expected a viewmat of shape (4, 4) and a K of shape (3, 3)")
         off = np.abs(intrinsics[:2, 2] - np.array([width, height]) / 2).max()
@@ -120,9 +118,6 @@ def photographs(scene: Splats | Scene, count: int = 8, *, progress: Progress = N
 
 def native(scene: Splats | Scene) -> Any:
     """What the native part takes for a scene."""
-    from ._scene import Scene
-    from ._splats import Splats
-
     if isinstance(scene, Scene):
         return scene._native
     if isinstance(scene, Splats):
@@ -142,6 +137,3 @@ def _of_tuple(camera: _native.CameraTuple) -> Camera:
     name, width, height, fx, fy, position, rotation, split = camera
     return Camera(width, height, fx, fy, np.array(position, np.float32), np.array(rotation, np.float32), name, split)
 
-
-def _host(values: Any) -> Any:
-    return values.detach().cpu() if hasattr(values, "detach") else values

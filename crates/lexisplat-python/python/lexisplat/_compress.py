@@ -123,7 +123,7 @@ def compress(
         "layout": layout,
         "sample": sample,
         "seed": seed,
-        "cameras": None if cameras is None else as_tuples(_cameras(cameras)),
+        "cameras": None if cameras is None else as_tuples(views_of(cameras)),
         "scene": views,
         "keep_order": keep_order,
         "keep_all": keep_all,
@@ -137,7 +137,6 @@ def compress(
             scene if isinstance(scene, _FILE) else _splats(scene),
             choices,
             dictionary=dictionary if isinstance(dictionary, _FILE) else _atoms(dictionary),
-            name="scene.lexi",
             drop_invalid=drop_invalid,
             drop_extras=drop_extras,
             limit=None if limit is None else dict(limit),
@@ -159,7 +158,8 @@ def _atoms(dictionary: object) -> object:
     return None if dictionary is None else np.require(dictionary, np.float32, ["C", "A"])
 
 
-def _cameras(cameras: Cameras) -> Sequence[Camera]:
+def views_of(cameras: Cameras | Camera) -> Sequence[Camera]:
+    """The cameras that ``cameras`` means."""
     if isinstance(cameras, Camera):
         return [cameras]
     return read_cameras(cameras) if isinstance(cameras, (str, os.PathLike)) else cameras

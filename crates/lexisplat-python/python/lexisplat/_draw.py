@@ -9,7 +9,7 @@ from typing import Any, overload
 
 from . import _native
 from ._cameras import Camera, as_tuples, native
-from ._compress import Cameras, _cameras
+from ._compress import Cameras, views_of
 from ._device import quiet
 from ._progress import Progress, reporter
 from ._scene import Scene
@@ -74,7 +74,7 @@ def render(
     ParameterError, GpuError
     """
     alone = isinstance(camera, Camera)
-    views: Any = [camera] if isinstance(camera, Camera) else _cameras(camera)
+    views = views_of(camera)
     r, g, b = (float(value) for value in background)
     with quiet(device):
         pictures = _native.render(
@@ -123,7 +123,7 @@ def compare(
         told = _native.compare(
             native(a),
             native(b),
-            None if cameras is None else as_tuples(_cameras(cameras)),
+            None if cameras is None else as_tuples(views_of(cameras)),
             count=count,
             background=(r, g, b_),
             eight_bit=eight_bit,

@@ -53,14 +53,13 @@ def load(
     ------
     IoError, FormatError, LimitError
     """
-    arrays, told, _ = _native.load(
+    arrays, told = _native.load(
         source,
         name=name,
         contiguous=contiguous,
         drop_invalid=drop_invalid,
         drop_extras=drop_extras,
         limit=None if limit is None else dict(limit),
-        progress=None,
     )
     warn(told, source if name is None else name)
     return of_native(arrays)

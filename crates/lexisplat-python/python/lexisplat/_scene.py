@@ -85,7 +85,7 @@ class Scene:
     def info(self) -> dict[str, Any]:
         """Facts about the file: errors, promises, bytes of each part, use of atoms. The whole file is decoded for them once."""
         if self._info is None:
-            self._info = dict(json.loads(self._native.info_json(progress=None)))
+            self._info = dict(json.loads(self._native.info_json()))
         return self._info
 
     @property
@@ -106,7 +106,7 @@ class Scene:
 
     def decode(self) -> Splats:
         """The scene with dense SH. Its order is that of the source if the file holds it."""
-        return of_native(self._native.decode(progress=None))
+        return of_native(self._native.decode())
 
     def chunks(self) -> Iterator[tuple[int, Splats]]:
         """Decodes part after part, in the order of the file: the number of the first Gaussian, and the part.

@@ -21,7 +21,8 @@ Space = Literal["log", "linear"]
 _SURE_OPACITY = 100.0
 #: Least standard deviation of linear scales, whose logarithm is stored: the smallest normal float32.
 _LEAST_SCALE = float(np.finfo(np.float32).tiny)
-_NAMES = ("means", "scales", "quats", "opacities", "sh0", "shN")
+#: The arrays by gsplat's names.
+NAMES = ("means", "scales", "quats", "opacities", "sh0", "shN")
 
 
 @dataclass(eq=False)
@@ -115,7 +116,7 @@ class Splats:
             if not -len(self) <= which < len(self):
                 raise IndexError(f"Gaussian {which} of {len(self)}")
             which = slice(which, None if which == -1 else which + 1)
-        arrays = {name: getattr(self, name)[which] for name in _NAMES}
+        arrays = {name: getattr(self, name)[which] for name in NAMES}
         extras = {name: values[which] for name, values in self.extras.items()}
         normals = None if self.normals is None else self.normals[which]
         return Splats(
@@ -132,7 +133,7 @@ class Splats:
         contiguous : bool
             Whether ``shN`` is copied if it has strides. The other arrays are not copied in ``"log"`` space.
         """
-        arrays: dict[str, FloatArray] = {name: getattr(self, name) for name in _NAMES}
+        arrays: dict[str, FloatArray] = {name: getattr(self, name) for name in NAMES}
         if contiguous and not self.shN.flags.c_contiguous:
             arrays["shN"] = _native.contiguous(self.shN)
         if _space(space) == "linear":
@@ -159,10 +160,10 @@ class Splats:
         space : {"log", "linear"}
             What ``scales`` and ``opacities`` are. gsplat's trainers keep ``"log"``.
         """
-        missing = [name for name in _NAMES[:-1] if name not in arrays]
+        missing = [name for name in NAMES[:-1] if name not in arrays]
         if missing:
             raise ParameterError(f"arrays = {sorted(map(str, arrays))}: {', '.join(missing)} missing")
-        means, scales, quats, opacities, sh0 = (_floats(arrays[name]) for name in _NAMES[:-1])
+        means, scales, quats, opacities, sh0 = (_floats(arrays[name]) for name in NAMES[:-1])
         shN = _floats(arrays["shN"]) if "shN" in arrays else np.zeros((len(means), 0, 3), np.float32)
         if _space(space) == "linear":
             if scales.size and not scales.min() >= 0:
@@ -188,10 +189,14 @@ def _space(space: str) -> str:
     return space
 
 
+def host(values: Any) -> Any:
+    """``values`` without gradients and in main memory, if they are a tensor."""
+    return values.detach().cpu() if hasattr(values, "detach") else values
+
+
 def _floats(values: Any) -> FloatArray:
     """``values`` as float32, sharing memory if they have that type."""
-    if hasattr(values, "detach"):
-        values = values.detach().cpu()
+    values = host(values)
     if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__"):
         values = np.from_dlpack(values)
     return np.asarray(values, np.float32)

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from ._compress import compress
+from ._errors import ParameterError
 from ._scene import open as open_scene
-from ._splats import Splats
+from ._splats import NAMES, Splats
 
 __all__ = ["LexiCompression"]
 
 _FILE = "scene.lexi"
 _META = "meta.json"
-_NAMES = ("means", "scales", "quats", "opacities", "sh0", "shN")
 
 
 class LexiCompression:
@@ -45,11 +45,9 @@ class LexiCompression:
             ``means``, ``scales`` (logarithms), ``quats``, ``opacities`` (logits), ``sh0``, ``shN``. Other keys are
             refused, because a .lexi has no place for them.
         """
-        other = sorted(set(splats) - set(_NAMES))
+        other = sorted(set(splats) - set(NAMES))
         if other:
-            from ._errors import ParameterError
-
-            raise ParameterError(f"splats = {', '.join(other)}: only {', '.join(_NAMES)} can be compressed")
+            raise ParameterError(f"splats = {', '.join(other)}: only {', '.join(NAMES)} can be compressed")
         folder = Path(compress_dir)
         folder.mkdir(parents=True, exist_ok=True)
         scene = compress(Splats.from_dict(splats), **self.options)

@@ -13,14 +13,13 @@ import numpy as np
 
 from . import _native
 from ._errors import ParameterError
+from ._splats import host
 
 __all__ = ["flip", "lpips", "psnr", "score", "ssim"]
 
 
 def _picture(values: Any) -> Any:
-    if hasattr(values, "detach"):
-        values = values.detach().cpu()
-    picture = np.asarray(values)
+    picture = np.asarray(host(values))
     if picture.dtype == np.uint8:
         return picture.astype(np.float32) / np.float32(255)
     if picture.dtype.kind != "f" or picture.ndim != 3 or picture.shape[2] != 3:
