@@ -61,6 +61,7 @@ pub use formats::kind::{FileKind, Unsupported};
 pub use formats::lexi::{CodeLayout, Layout};
 pub use formats::{lexi, ply};
 pub use scene::extra::{Extra, ExtraValues};
+pub use scene::joined::Joined;
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;

@@ -21,9 +21,12 @@ const EXACT: &str = "Options of the layouts f16, f32 and paper";
 #[derive(Debug, Args)]
 pub(crate) struct Compress {
     /// The scene: a PLY, best the trainer's own, or SPZ, SOG, compressed.ply, .splat, .ksplat or glTF;
-    /// `-` reads standard input.
-    pub(crate) input: PathBuf,
-    /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi].
+    /// `-` reads standard input. Several are the tiles of one scene, of the same SH degree and with the same properties,
+    /// and become one file.
+    #[arg(required = true, value_name = "INPUT")]
+    pub(crate) inputs: Vec<PathBuf>,
+    /// The compressed file; `-` writes to standard output [default: the input's name with extension .lexi, if there is one
+    /// input].
     #[arg(short, long)]
     pub(crate) output: Option<PathBuf>,
     /// Quality of the pictures, from the smallest files to the best pictures: about 35, 40, 45 and 54 dB of PSNR

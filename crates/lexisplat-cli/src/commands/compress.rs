@@ -1,15 +1,15 @@
 //! `lexisplat compress`.
 
 use std::fmt::{Display, Write as _};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context as _, Result};
 use lexisplat::packed::{PackOptions, Preset, ReachedRecord, TargetRecord};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{
-    CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Layout, Limits, Record, SplatSource,
-    lexi,
+    CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Joined, Layout, Limits, Record,
+    SplatSource, lexi,
 };
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
@@ -30,8 +30,12 @@ const FAR_BELOW: f64 = 3.0;
 
 pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let start = Instant::now();
-    let output = output_path(&args.input, args.output.as_deref(), "lexi", common)?;
-    let mut inputs = vec![args.input.as_path()];
+    let (first, others) = args.inputs.split_first().context("no input")?;
+    if args.output.is_none() && !others.is_empty() {
+        return Err(Error::parameter("--output", "missing", "the file that several inputs become").into());
+    }
+    let output = output_path(first, args.output.as_deref(), "lexi", common)?;
+    let mut inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.dictionary.as_deref());
     check_output(&output, &inputs, common.overwrite)?;
     if let Some(path) = &args.save_dictionary {
@@ -51,16 +55,29 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         );
     }
 
-    let (name, bytes) = input(&args.input, common)?;
+    let files = args.inputs.iter().map(|path| input(path, common)).collect::<Result<Vec<_>>>()?;
     let read = ReadOptions::default()
         .with_drop_invalid(args.drop_invalid)
         .with_drop_extras(args.drop_extras)
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
-    let whole = compression.holds_whole(bytes.len() as u64);
-    let opened = open(&name, &bytes, siblings(&name), &read, whole, &bars)?;
-    let source = source_to_compress(&name, &opened)?;
-    warn(&name, source.warnings());
+    let whole = compression.holds_whole(files.iter().map(|(_, bytes)| bytes.len() as u64).sum());
+    let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
+    let opened = opened.collect::<Result<Vec<_>, _>>()?;
+    let named = files.iter().zip(&opened);
+    let tiles = named.map(|((name, _), opened)| Ok((name.clone(), source_to_compress(name, opened)?)));
+    let tiles = tiles.collect::<Result<Vec<(String, &dyn SplatSource)>>>()?;
+    for (name, tile) in &tiles {
+        warn(name, tile.warnings());
+    }
+    let joined;
+    let (name, source) = match tiles.as_slice() {
+        [(name, tile)] => (name.clone(), *tile),
+        several => {
+            joined = Joined::new(several)?;
+            (output.display().to_string(), &joined as &dyn SplatSource)
+        }
+    };
     let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
         compression.run(source, sink, &bars).map_err(|error| match error {

@@ -83,8 +83,7 @@ fn in_parts(
         Some(renderer) => {
             measure = |part: &Splats| -> Result<Sensitivity> {
                 let clock = Stopwatch::start();
-                let views = PackingViews::of_part(part);
-                let sensitivity = views.sensitivity(renderer, part, &OnlyCancels(progress));
+                let sensitivity = look_at_part(renderer, part, progress);
                 look_seconds += clock.seconds();
                 sensitivity
             };
@@ -95,6 +94,17 @@ fn in_parts(
     let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
     let pack_seconds = clock.seconds() - look_seconds;
     Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
+}
+
+/// The sensitivity to a part of a scene, from views like photographs of it and from all around. With the latter alone files of
+/// the same size were 2.5 dB worse (docs/results/scale.md).
+pub(super) fn look_at_part(
+    renderer: &mut Renderer,
+    part: &Splats,
+    progress: &dyn Progress,
+) -> Result<Sensitivity> {
+    let progress = &OnlyCancels(progress);
+    PackingViews::found(renderer, part, progress)?.sensitivity(renderer, part, progress)
 }
 
 /// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md, "Layers").

@@ -1,5 +1,7 @@
 //! The canonical form of a scene: one of the 24 descriptions of each ellipsoid, in the order of cells.
 
+use serde::{Deserialize, Serialize};
+
 use super::morton;
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
@@ -35,7 +37,7 @@ pub(super) struct Canonical {
 }
 
 /// A Gaussian's place in a packed scene.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(crate) struct MortonKey {
     pub(crate) cell: u64,
     /// Its index in the scene.
@@ -49,7 +51,7 @@ impl MortonKey {
 }
 
 /// Smallest and largest coordinates; 0 if there are no positions.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Bounds {
     least: Vec3,
     most: Vec3,
@@ -75,7 +77,7 @@ impl Bounds {
 }
 
 /// The grid of cells.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Grid {
     pub(super) origin: Vec3,
     pub(super) cell: f32,

@@ -20,7 +20,7 @@ use crate::support::progress::Progress;
 use crate::support::rng::SplitMix64;
 
 /// Largest number of rows to learn a dictionary from.
-const SAMPLE: usize = 24_576;
+pub(super) const SAMPLE: usize = 24_576;
 /// Most rows that decide how finely atoms are rounded.
 const ATOM_BITS_SAMPLE: usize = 2048;
 /// Gaussians that pay for one more atom.
@@ -42,7 +42,7 @@ const TOLERANCE_SHARE: f32 = 0.995;
 /// promised tolerance.
 const MAX_ERROR: f64 = 65_504.0;
 /// Mixed into the seed of the sample.
-const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
+pub(super) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 
 /// Gaussians in the order of a packed file.
 #[derive(Debug, Clone, Copy)]
@@ -59,6 +59,11 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
+    /// Gaussians that show what they are.
+    pub(super) fn new(splats: &'a Splats, scene: &'a [MortonKey], classes: &'a [[u8; 2]]) -> Self {
+        Self { splats, scene, classes, appearances: None, changes: None }
+    }
+
     /// Gaussians `range`.
     pub(super) fn part(self, range: std::ops::Range<usize>) -> Self {
         Self {
@@ -79,7 +84,11 @@ impl<'a> View<'a> {
     }
 
     /// The rows of Gaussians `indices` in units of their value steps, and their colour classes.
-    fn scaled(self, indices: impl Iterator<Item = usize>, parameters: &Parameters) -> (Vec<f32>, Vec<u8>) {
+    pub(super) fn scaled(
+        self,
+        indices: impl Iterator<Item = usize>,
+        parameters: &Parameters,
+    ) -> (Vec<f32>, Vec<u8>) {
         let mut rows = Vec::new();
         let mut classes = Vec::new();
         for i in indices {
@@ -113,16 +122,7 @@ impl ChunkCoder {
         options: &PackOptions,
         progress: &dyn Progress,
     ) -> Result<(Self, WholeAtoms)> {
-        let mut stop = StopRule::Balanced;
-        #[expect(
-            clippy::cast_possible_truncation,
-            reason = "a step is f32, and so is a share of the tolerance"
-        )]
-        if let Some(tol) = options.tolerance {
-            let step = tol * VALUE_STEP_PER_TOLERANCE;
-            parameters.promised = step.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32;
-            stop = StopRule::Error((1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32 * TOLERANCE_SHARE);
-        }
+        let stop = promise(&mut parameters, options.tolerance);
         if Parameters::from_list(&parameters.to_list()).is_none() {
             return Err(too_large());
         }
@@ -170,9 +170,7 @@ impl ChunkCoder {
             };
             return choose(degree, &rows, &classes, pays, bits_of, progress);
         }
-        // More atoms take fewer bits than exact rows to keep a promised tolerance.
-        let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
-        let first = first_atoms(dim, options.atoms.unwrap_or_else(|| pays.max(fewest)), &rows);
+        let first = first_atoms(dim, atoms_to_learn(total, dim, options), &rows);
         let (learned, costs) = learn(dim, &rows, &classes, first, 0, self.stop, progress)?;
         let stride = view.len().div_ceil(ATOM_BITS_SAMPLE).max(1);
         let (rows, classes) = view.scaled((0..view.len()).step_by(stride), &self.parameters);
@@ -198,10 +196,31 @@ impl ChunkCoder {
                 count += 1.0;
             }
         }
-        let wanted = libm::log2(ATOM_STEPS_PER_VALUE * (1.0 + sum / count).sqrt());
+        Self::atom_bits(sum / count)
+    }
+
+    /// How finely atoms are rounded whose values have this mean square.
+    pub(super) fn atom_bits(square: f64) -> u32 {
+        let wanted = libm::log2(ATOM_STEPS_PER_VALUE * (1.0 + square).sqrt());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
         let bits = wanted.round().clamp(4.0, f64::from(MAX_ATOM_BITS)) as u32;
         bits
+    }
+
+    /// A coder that has learned these atoms, and what symbols cost.
+    pub(super) fn learned(
+        parameters: Parameters,
+        mean_view: MeanView,
+        atoms: &WholeAtoms,
+        costs: Option<Costs>,
+        stop: StopRule,
+        tolerance: Option<f64>,
+    ) -> Result<Self> {
+        let degree = atoms.degree();
+        let dim = degree.rest();
+        let dictionary = if dim > 0 { Dictionary::new(degree, atoms.rows())? } else { Dictionary::empty() };
+        let book = costs.map(|costs| Codebook::new(dim, atoms.rows(), costs));
+        Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
     }
 
     /// The codes of all of `view`; none for scenes without SH-rest.
@@ -263,6 +282,26 @@ impl ChunkCoder {
         }
         Ok((tally, targets))
     }
+}
+
+/// Sets the step of values that keeps a promised `tolerance`. Returns when a code is good enough.
+pub(super) fn promise(parameters: &mut Parameters, tolerance: Option<f64>) -> StopRule {
+    let Some(tol) = tolerance else { return StopRule::Balanced };
+    let step = tol * VALUE_STEP_PER_TOLERANCE;
+    #[expect(clippy::cast_possible_truncation, reason = "a step is f32, and so is a share of the tolerance")]
+    let (step, share) = (
+        step.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+        (1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32,
+    );
+    parameters.promised = step;
+    StopRule::Error(share * TOLERANCE_SHARE)
+}
+
+/// Number of atoms that a scene of `total` Gaussians learns, if it does not choose among several.
+pub(super) fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
+    // More atoms take fewer bits than exact rows to keep a promised tolerance.
+    let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
+    options.atoms.unwrap_or_else(|| (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED).max(fewest))
 }
 
 pub(super) fn too_large() -> Error {

@@ -1,10 +1,12 @@
 //! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
 
+use serde::{Deserialize, Serialize};
+
 use super::alone;
 use super::coder::ChunkCoder;
 use super::layered::{
-    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, Place, Range, Recorder, Stream, Tables,
-    WholeAtoms, lanes, stream_of,
+    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, LayerForm, Lookup, Place, Range, Recorder,
+    Stream, Tables, WholeAtoms, lanes, stream_of,
 };
 use super::layering::Layering;
 use super::pack::PackOptions;
@@ -20,8 +22,8 @@ use crate::support::spill::{Spill, SpillTo, Woven};
 use crate::support::stopwatch::Stopwatch;
 
 /// What is counted over chunks before any is coded.
-#[derive(Debug, Clone)]
-pub(super) struct Counts {
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Counts {
     tally: Tally,
     histograms: Vec<Histogram>,
     raw_bits: BitCounts,
@@ -59,15 +61,15 @@ impl Counts {
 }
 
 /// A chunk whose ranges are coded.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Written {
     pub(super) layer: usize,
-    gaussians: usize,
+    pub(super) gaussians: usize,
     cell: u64,
     bounds: [[f32; 3]; 2],
     energy: f64,
     /// The bytes of each range, and the checksum of its integers.
-    ranges: Vec<(Vec<u8>, u32)>,
+    pub(super) ranges: Vec<(Vec<u8>, u32)>,
 }
 
 impl Written {
@@ -82,6 +84,24 @@ impl Written {
             energy: chunk.energy,
             ranges: ranges.collect(),
         }
+    }
+}
+
+impl Written {
+    /// The same chunk coded with `tables`. Its ranges are coded with those of `lookup`. `None` if no encoder writes them.
+    pub(super) fn recoded(
+        &self,
+        form: &Form,
+        layer: LayerForm,
+        lookup: &Lookup,
+        tables: &Tables,
+    ) -> Option<Self> {
+        let own: Vec<&[u8]> = self.ranges.iter().map(|(bytes, _)| bytes.as_slice()).collect();
+        let symbols = form.transcribe(layer, self.gaussians, lookup, &own)?;
+        let lanes = lanes(self.gaussians);
+        let coded = symbols.iter().map(|range| range.finish(tables, lanes));
+        let ranges = coded.zip(&self.ranges).map(|(bytes, (_, sum))| (bytes, *sum)).collect();
+        Some(Self { ranges, ..self.clone() })
     }
 }
 
@@ -146,30 +166,26 @@ impl Encoding {
         to: SpillTo<'_>,
         code_chunks: &mut CodeChunks<'_>,
     ) -> Result<Finished> {
+        let tables = Tables::of(&self.counts)?;
+        let mut ranges = Ranges::new(to)?;
+        code_chunks(&tables, &mut |written| ranges.push(written))?;
+        self.assemble(gaussians, options, meta, &tables, ranges)
+    }
+
+    /// Makes the head of the file, when all chunks of the `gaussians` Gaussians are counted and coded with `tables`.
+    pub(super) fn assemble(
+        self,
+        gaussians: usize,
+        options: &PackOptions,
+        meta: SceneMeta,
+        tables: &Tables,
+        ranges: Ranges,
+    ) -> Result<Finished> {
         let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
-        let tables = Tables::new(&counts.histograms)
-            .ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))?;
-        let stream_bits = counts.bits(&tables).named(Stream::names());
+        let stream_bits = counts.bits(tables).named(Stream::names());
         let parts = head.rest.least.len();
         let forms = layering.forms(parts);
-        let mut spill = Spill::new(to)?;
-        // Where each range of each chunk starts in it.
-        let mut at = 0_u64;
-        let mut chunks = Vec::new();
-        code_chunks(&tables, &mut |written| {
-            let Written { layer, gaussians, cell, bounds, energy, ranges } = written;
-            let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
-            for (bytes, integers) in &ranges {
-                let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
-                let length = u32::try_from(bytes.len()).map_err(too_long)?;
-                let checksum = crc32::hash(bytes);
-                chunk.ranges.push(Range { start: at, length, checksum, integers: *integers });
-                at += u64::from(length);
-                spill.push(bytes)?;
-            }
-            chunks.push((chunk, energy));
-            Ok(())
-        })?;
+        let Ranges { spill, mut chunks, .. } = ranges;
         chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
         let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
         let order = layering.order(&chunks, &energies, parts);
@@ -202,5 +218,45 @@ impl Encoding {
             limits: Limits::default(),
         };
         Ok(Finished { head, data, report })
+    }
+}
+
+impl Tables {
+    /// The tables of what was counted.
+    pub(super) fn of(counts: &Counts) -> Result<Self> {
+        Self::new(&counts.histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))
+    }
+}
+
+/// The coded ranges of chunks, in the order in which they come.
+#[derive(Debug)]
+pub(super) struct Ranges {
+    spill: Spill,
+    /// Where the next range starts.
+    at: u64,
+    /// The chunks, with what pictures change by without each. Their ranges say where they start in the spill.
+    chunks: Vec<(Chunk, f64)>,
+}
+
+impl Ranges {
+    /// None yet.
+    pub(super) fn new(to: SpillTo<'_>) -> Result<Self> {
+        Ok(Self { spill: Spill::new(to)?, at: 0, chunks: Vec::new() })
+    }
+
+    /// Adds the next chunk of its layer.
+    pub(super) fn push(&mut self, written: Written) -> Result<()> {
+        let Written { layer, gaussians, cell, bounds, energy, ranges } = written;
+        let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
+        for (bytes, integers) in &ranges {
+            let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
+            let length = u32::try_from(bytes.len()).map_err(too_long)?;
+            let checksum = crc32::hash(bytes);
+            chunk.ranges.push(Range { start: self.at, length, checksum, integers: *integers });
+            self.at += u64::from(length);
+            self.spill.push(bytes)?;
+        }
+        self.chunks.push((chunk, energy));
+        Ok(())
     }
 }

@@ -1,8 +1,11 @@
 //! Steps and predictors fitted to a scene.
 
+use serde::{Deserialize, Serialize};
+
 use super::canonical::{Canonical, Grid, MortonKey, canonical};
 use super::layered::rounded_axes;
 use super::neighbours::{AVERAGES, Neighbours};
+use super::octaves::Histogram;
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::sh::C0;
@@ -40,9 +43,15 @@ const MOST_SLOPE: f64 = 7.9;
 /// Everything but the overall step.
 #[derive(Debug, Clone)]
 pub(super) struct Fit {
-    pub(super) parameters: Parameters,
+    pub(super) steps: Steps,
     /// Colour and shape class of each Gaussian before they are rounded.
     pub(super) classes: Vec<[f32; 2]>,
+}
+
+/// Steps and predictors of a scene, but for the overall step.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Steps {
+    pub(super) parameters: Parameters,
     /// How weights become classes of colour and of shape.
     kinds: [Classes; 2],
 }
@@ -58,10 +67,27 @@ impl Fit {
     ) -> Self {
         let weights: Vec<[f32; 2]> = scene.iter().map(|g| sensitivity.appearance(g.index())).collect();
         let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
-        let classes = classes_of(kinds, &weights);
-        let (dc_mean, dc_axes) = colour_axes(dc, scene);
-        let [scale_rows, rotation, position] = derivatives(geometry, sensitivity, scene);
-        let mut parameters = Parameters {
+        let mut derivatives = Derivatives::default();
+        derivatives.add(geometry, sensitivity, scene);
+        let mut steps = Steps::new(grid, kinds, colour_axes(dc, scene), &derivatives);
+        let classes = steps.classes_of(&weights);
+        let mut predictors = Predictors::default();
+        predictors.add(geometry, dc, scene, &classes, &steps.parameters);
+        predictors.solve(&mut steps.parameters);
+        Self { steps, classes }
+    }
+}
+
+impl Steps {
+    /// Steps without predictors.
+    pub(super) fn new(
+        grid: &Grid,
+        kinds: [Classes; 2],
+        (dc_mean, dc_axes): (Vec3, [Vec3; 3]),
+        derivatives: &Derivatives,
+    ) -> Self {
+        let [scale_rows, rotation, position] = derivatives.rows();
+        let parameters = Parameters {
             origin: grid.origin,
             cell: grid.cell,
             factors: [
@@ -79,14 +105,12 @@ impl Fit {
             dc_axes,
             ..Parameters::default()
         };
-        predictors(geometry, dc, scene, &classes, &mut parameters);
-        Self { parameters, classes, kinds }
+        Self { parameters, kinds }
     }
 
-    /// Colour and shape class, before they are rounded, of each Gaussian of another part of the scene. `weights` are its
-    /// sensitivities to colour and opacity.
+    /// Colour and shape class, before they are rounded, of Gaussians of these sensitivities to colour and opacity.
     pub(super) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
-        classes_of(self.kinds, weights)
+        weights.iter().map(|w| [self.kinds[0].of(w[0]), self.kinds[1].of(w[1])]).collect()
     }
 
     /// The parameters for an overall step: about the square root of the mean squared error of pictures
@@ -95,11 +119,6 @@ impl Fit {
         let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
         Parameters { base: self.kinds.map(|k| base(k.unit())), ..self.parameters.clone() }
     }
-}
-
-/// Colour and shape class of Gaussians of these sensitivities to colour and opacity.
-fn classes_of(kinds: [Classes; 2], weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
-    weights.iter().map(|w| [kinds[0].of(w[0]), kinds[1].of(w[1])]).collect()
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]
@@ -114,7 +133,7 @@ fn quantile(values: &[f64], share: f64) -> f64 {
 }
 
 /// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight).
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
 pub(super) struct Classes {
     /// Added to every weight.
     floor: f64,
@@ -129,6 +148,13 @@ impl Classes {
         let floor = (quantile(&weights, FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
         let logs: Vec<f64> = weights.iter().map(|w| 0.5 * libm::log2(w + floor)).collect();
         Self { floor, top: quantile(&logs, TOP_QUANTILE).round() }
+    }
+
+    /// The classes for a scene of which these are the weights.
+    pub(super) fn of_histogram(weights: &Histogram) -> Self {
+        let floor = (f64::from(weights.quantile(FLOOR_QUANTILE)) * WEIGHT_FLOOR).max(1e-30);
+        let top = 0.5 * libm::log2(f64::from(weights.quantile(TOP_QUANTILE)) + floor);
+        Self { floor, top: top.round() }
     }
 
     /// The class of a weight, before it is rounded.
@@ -156,46 +182,112 @@ fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
     let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
     let deviations: Vec<f32> =
         dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
-    let axes = crate::sparse::learn::principal_axes(3, &deviations);
-    let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    for (row, axis) in out.iter_mut().zip(&axes) {
-        *row = std::array::from_fn(|c| single(axis[c]));
-    }
-    (mean, rounded_axes(&out))
+    (mean, rounded_of(&crate::sparse::learn::principal_axes(3, &deviations)))
 }
 
-/// Fits the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of
-/// the opacity, as a linear function of 1 and the scales. The steps of scaling are constant.
-fn derivatives(geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKey]) -> [[[f64; 4]; 3]; 3] {
-    let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
-    let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
-    let mut equations = [[Equations::<4>::NONE; 3]; 3];
-    for placed in scene.iter().filter(|g| weights[g.index()] > least) {
-        let by_opacity = weights[placed.index()];
-        let g = canonical(geometry, placed.index());
-        let by_axis = by_axis(sensitivity, placed.index(), &g);
-        let scales = g.scales.map(f64::from);
-        for (kind, equations) in equations.iter_mut().enumerate() {
-            // Positions are measured in standard deviations for the floor.
-            let unit = if kind == POSITION { libm::exp(-2.0 * scales[0]) } else { 1.0 };
-            let features = match kind {
-                SCALE => [1.0, 0.0, 0.0, 0.0],
-                _ => [1.0, scales[0], scales[1], scales[2]],
-            };
-            for (by_axis, equations) in by_axis[kind].iter().zip(equations) {
-                let by_axis = f64::from(by_axis.max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
-                equations.add(features, -0.5 * libm::log2(by_axis / by_opacity));
+/// Axes as a file holds them.
+fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
+    let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for (row, axis) in out.iter_mut().zip(axes) {
+        *row = std::array::from_fn(|c| single(axis[c]));
+    }
+    rounded_axes(&out)
+}
+
+/// Sums of base colours and of their products.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct ColourMoments {
+    count: u64,
+    sums: [f64; 3],
+    products: [[f64; 3]; 3],
+}
+
+impl ColourMoments {
+    pub(super) fn add(&mut self, dc: &[Vec3]) {
+        self.count += dc.len() as u64;
+        for dc in dc.iter().map(|dc| dc.map(f64::from)) {
+            for i in 0..3 {
+                self.sums[i] += dc[i];
+                for j in 0..3 {
+                    self.products[i][j] += dc[i] * dc[j];
+                }
             }
         }
     }
-    let rows = |kind: usize, factor: f64| {
-        std::array::from_fn(|axis| {
-            let mut row = equations[kind][axis].solve_within(MOST_SLOPE);
-            row[0] += libm::log2(factor);
-            row
-        })
-    };
-    [rows(SCALE, SCALE_FACTOR), rows(ROTATION, ROTATION_FACTOR), rows(POSITION, POSITION_FACTOR)]
+
+    /// Adds the sums of other Gaussians.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        for i in 0..3 {
+            self.sums[i] += other.sums[i];
+            for j in 0..3 {
+                self.products[i][j] += other.products[i][j];
+            }
+        }
+    }
+
+    /// Mean base colour and its principal axes, strongest first.
+    pub(super) fn axes(&self) -> (Vec3, [Vec3; 3]) {
+        let n = self.count.max(1) as f64;
+        let mean = self.sums.map(|sum| sum / n);
+        let about = |i: usize, j: usize| self.products[i][j] - self.sums[i] * mean[j];
+        let moments = (0..3).map(|i| (0..3).map(|j| about(i, j)).collect()).collect();
+        (mean.map(single), rounded_of(&crate::sparse::learn::axes_of_moments(moments)))
+    }
+}
+
+/// What the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of the
+/// opacity, is as a linear function of 1 and the scales. The steps of scaling are constant.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Derivatives([[Equations<4>; 3]; 3]);
+
+impl Default for Derivatives {
+    fn default() -> Self {
+        Self([[Equations::NONE; 3]; 3])
+    }
+}
+
+impl Derivatives {
+    /// Adds the Gaussians of `scene`, but those of the smallest weights.
+    pub(super) fn add(&mut self, geometry: &Geometry, sensitivity: &Sensitivity, scene: &[MortonKey]) {
+        let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
+        let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
+        for placed in scene.iter().filter(|g| weights[g.index()] > least) {
+            let by_opacity = weights[placed.index()];
+            let g = canonical(geometry, placed.index());
+            let by_axis = by_axis(sensitivity, placed.index(), &g);
+            let scales = g.scales.map(f64::from);
+            for (kind, equations) in self.0.iter_mut().enumerate() {
+                // Positions are measured in standard deviations for the floor.
+                let unit = if kind == POSITION { libm::exp(-2.0 * scales[0]) } else { 1.0 };
+                let features = match kind {
+                    SCALE => [1.0, 0.0, 0.0, 0.0],
+                    _ => [1.0, scales[0], scales[1], scales[2]],
+                };
+                for (by_axis, equations) in by_axis[kind].iter().zip(equations) {
+                    let by_axis = f64::from(by_axis.max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
+                    equations.add(features, -0.5 * libm::log2(by_axis / by_opacity));
+                }
+            }
+        }
+    }
+
+    /// Adds the sums of other Gaussians.
+    pub(super) fn merge(&mut self, other: &Self) {
+        let own = self.0.as_flattened_mut().iter_mut();
+        own.zip(other.0.as_flattened()).for_each(|(sum, more)| sum.merge(more));
+    }
+
+    fn rows(&self) -> [[[f64; 4]; 3]; 3] {
+        let rows = |kind: usize, factor: f64| {
+            std::array::from_fn(|axis| {
+                let mut row = self.0[kind][axis].solve_within(MOST_SLOPE);
+                row[0] += libm::log2(factor);
+                row
+            })
+        };
+        [rows(SCALE, SCALE_FACTOR), rows(ROTATION, ROTATION_FACTOR), rows(POSITION, POSITION_FACTOR)]
+    }
 }
 
 /// Indices of the derivatives by an axis.
@@ -215,52 +307,101 @@ fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
     [g.order.map(|k| sensitivity.scale[i][k]), g.order.map(|k| sensitivity.rotation[i][k]), g.axes.map(along)]
 }
 
-/// Fits the predictions to the values of the scene before they are rounded.
-fn predictors(
-    geometry: &Geometry,
-    dc: &[Vec3],
-    scene: &[MortonKey],
-    classes: &[[f32; 2]],
-    parameters: &mut Parameters,
-) {
-    let values = |g: &Canonical, parameters: &Parameters| -> [f32; TARGETS] {
-        let dc = parameters.dc_coordinates(g.dc);
-        [g.scales[0], g.scales[1], g.scales[2], g.log_opacity, dc[0], dc[1], dc[2]]
-    };
-    let mut sums = [0.0_f64; TARGETS];
-    let mut equations = [Equations::<FEATURES>::NONE; TARGETS];
-    let mut neighbours = Neighbours::default();
-    for (placed, class) in scene.iter().zip(classes) {
-        let mut g = canonical(geometry, placed.index());
-        g.dc = dc[placed.index()];
-        let values = values(&g, parameters);
-        for (sum, value) in sums.iter_mut().zip(values) {
-            *sum += f64::from(value);
-        }
-        if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
-            for (t, equations) in equations.iter_mut().enumerate() {
-                let [colour, shape] = class.map(|class| f32::from(rounded(class)));
-                let known = |k: usize| if t > k { values[k] } else { 0.0 };
-                let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
-                equations.add(features.map(f64::from), f64::from(values[t]));
-            }
-        }
-        let mut pushed = [0.0; AVERAGES];
-        pushed[..TARGETS].copy_from_slice(&values);
-        neighbours.push(g.position, pushed);
+/// The predictions of the values of a scene before they are rounded.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct Predictors {
+    count: u64,
+    sums: [f64; TARGETS],
+    equations: [Equations<FEATURES>; TARGETS],
+}
+
+impl Default for Predictors {
+    fn default() -> Self {
+        Self { count: 0, sums: [0.0; TARGETS], equations: [Equations::NONE; TARGETS] }
     }
-    let n = scene.len().max(1) as f64;
-    parameters.means = sums.map(|sum| single(sum / n));
-    for (row, equations) in parameters.predictors.iter_mut().zip(&equations) {
-        *row = equations.solve().map(single);
+}
+
+impl Predictors {
+    /// Adds the Gaussians of `scene`, each beside those before it, with their classes before they are rounded.
+    pub(super) fn add(
+        &mut self,
+        geometry: &Geometry,
+        dc: &[Vec3],
+        scene: &[MortonKey],
+        classes: &[[f32; 2]],
+        parameters: &Parameters,
+    ) {
+        self.count += scene.len() as u64;
+        let mut neighbours = Neighbours::default();
+        for (placed, class) in scene.iter().zip(classes) {
+            let mut g = canonical(geometry, placed.index());
+            g.dc = dc[placed.index()];
+            let coordinates = parameters.dc_coordinates(g.dc);
+            let values: [f32; TARGETS] = [
+                g.scales[0],
+                g.scales[1],
+                g.scales[2],
+                g.log_opacity,
+                coordinates[0],
+                coordinates[1],
+                coordinates[2],
+            ];
+            for (sum, value) in self.sums.iter_mut().zip(values) {
+                *sum += f64::from(value);
+            }
+            if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
+                for (t, equations) in self.equations.iter_mut().enumerate() {
+                    let [colour, shape] = class.map(|class| f32::from(rounded(class)));
+                    let known = |k: usize| if t > k { values[k] } else { 0.0 };
+                    let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
+                    equations.add(features.map(f64::from), f64::from(values[t]));
+                }
+            }
+            let mut pushed = [0.0; AVERAGES];
+            pushed[..TARGETS].copy_from_slice(&values);
+            neighbours.push(g.position, pushed);
+        }
+    }
+
+    /// Adds the sums of other Gaussians.
+    pub(super) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
+        self.equations.iter_mut().zip(&other.equations).for_each(|(sum, more)| sum.merge(more));
+    }
+
+    /// Puts the predictions into `parameters`.
+    pub(super) fn solve(&self, parameters: &mut Parameters) {
+        let n = self.count.max(1) as f64;
+        parameters.means = self.sums.map(|sum| single(sum / n));
+        for (row, equations) in parameters.predictors.iter_mut().zip(&self.equations) {
+            *row = equations.solve().map(single);
+        }
     }
 }
 
 /// Least squares by normal equations.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 struct Equations<const N: usize> {
     matrix: [[f64; N]; N],
     right: [f64; N],
+}
+
+impl<const N: usize> Serialize for Equations<N> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (self.matrix.as_flattened(), self.right.as_slice()).serialize(serializer)
+    }
+}
+
+impl<'de, const N: usize> Deserialize<'de> for Equations<N> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (matrix, right) = <(Vec<f64>, Vec<f64>)>::deserialize(deserializer)?;
+        let (rows, rest) = matrix.as_chunks::<N>();
+        match (rows.try_into(), right.try_into(), rest) {
+            (Ok(matrix), Ok(right), []) => Ok(Self { matrix, right }),
+            _ => Err(serde::de::Error::custom("equations of another number of unknowns")),
+        }
+    }
 }
 
 impl<const N: usize> Equations<N> {
@@ -273,6 +414,12 @@ impl<const N: usize> Equations<N> {
             }
             self.right[i] += features[i] * value;
         }
+    }
+
+    /// Adds the sums of other equations.
+    fn merge(&mut self, other: &Self) {
+        let own = self.matrix.as_flattened_mut().iter_mut().chain(&mut self.right);
+        own.zip(other.matrix.as_flattened().iter().chain(&other.right)).for_each(|(sum, more)| *sum += more);
     }
 
     /// The coefficients, those but the first at most `most` in size. Features that hardly vary, or together, have large ones

@@ -3,6 +3,8 @@
 //! Views that nobody foresaw show what the measured ones did not. The limits here are shares of a Gaussian's own size,
 //! turn, opacity and colour, so that such a view is worse but not broken (docs/METHOD.md, "The floor").
 
+use serde::{Deserialize, Serialize};
+
 use super::canonical::{MortonKey, canonical};
 use super::fit::rounded;
 use super::parameters::{LAST_CLASS, Parameters, least_axis, rotation_steps};
@@ -30,7 +32,7 @@ const MOST_OCTAVES: f32 = 4.0;
 const EXACT: f32 = 1e-3;
 
 /// Parameters under which the classes of Gaussians can keep the limits.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Floor {
     pub(super) parameters: Parameters,
     /// What is added to a class of colour and of shape, because the steps of class 0 are others.
@@ -46,20 +48,38 @@ impl Floor {
 
     /// Changes the steps of class 0 of `parameters` so that they are within the limits of all of `scene`, and so that
     /// the steps of a class are the limits themselves.
-    pub(super) fn new(mut parameters: Parameters, geometry: &Geometry, scene: &[MortonKey]) -> Self {
+    pub(super) fn new(parameters: Parameters, geometry: &Geometry, scene: &[MortonKey]) -> Self {
+        let floor = Self::begin(parameters);
+        let over = floor.over(geometry, scene);
+        floor.within(over)
+    }
+
+    /// The limits of colours and of logarithms alone.
+    pub(super) fn begin(mut parameters: Parameters) -> Self {
         // If the limits were between two classes, all Gaussians at a limit would change their steps at once as the
         // overall step grows.
         let over = [colour_over(&parameters), logs_over(&parameters)].map(log2);
-        let mut added = over.map(|over| over - over.round().min(0.0));
+        let added = over.map(|over| over - over.round().min(0.0));
         rescale(&mut parameters, added);
+        Self { parameters, added, limited: true }
+    }
+
+    /// By how many classes the shape of `scene` asks for more than class 0, at least 0. Of several parts of a scene the largest
+    /// number counts.
+    pub(super) fn over(&self, geometry: &Geometry, scene: &[MortonKey]) -> f32 {
         let parts = map_chunks(scene.len(), GAUSSIANS_PER_TASK, |range| {
-            let coarsest = scene[range].iter().map(|&g| coarsest(&parameters, geometry, g)[1]);
+            let coarsest = scene[range].iter().map(|&g| coarsest(&self.parameters, geometry, g)[1]);
             coarsest.fold(0.0, f32::min)
         });
-        let shape = -parts.into_iter().fold(0.0, f32::min).max(-MOST_OCTAVES);
-        rescale(&mut parameters, [0.0, shape]);
-        added[1] += shape;
-        Self { parameters, added, limited: true }
+        -parts.into_iter().fold(0.0, f32::min)
+    }
+
+    /// The limits of a scene whose parts are [`Self::over`] by at most `over`.
+    pub(super) fn within(mut self, over: f32) -> Self {
+        let shape = over.min(MOST_OCTAVES);
+        rescale(&mut self.parameters, [0.0, shape]);
+        self.added[1] += shape;
+        self
     }
 
     /// The classes of Gaussians of the same steps as `classes`, or of smaller ones where the limits ask for it.

@@ -1,5 +1,7 @@
 //! The layers of a file: which Gaussians come first, and in which order the ranges of all chunks lie.
 
+use serde::{Deserialize, Serialize};
+
 use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Scenes of fewer Gaussians have one layer by default. Their files are small.
@@ -26,7 +28,7 @@ const LEVELS: [u8; LAYERS] = [2, 1];
 const LAYERS: usize = SHARES.len() + 1;
 
 /// The layers of a file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Layering {
     /// Factors of the probabilities of all layers but the last; none if there is one layer.
     factors: Vec<f64>,
@@ -38,22 +40,23 @@ pub(super) struct Layering {
 
 impl Layering {
     /// The layers of a scene of `gaussians` Gaussians, or one if these are fewer than `layers_from`. `energies` are the
-    /// changes of pictures without each of some of the Gaussians.
+    /// changes of pictures without each of some of the Gaussians, and for how many Gaussians each stands.
     pub(super) fn new(
         gaussians: usize,
         layers_from: usize,
-        energies: impl Iterator<Item = f32> + Clone,
+        energies: impl Iterator<Item = (f32, u64)>,
     ) -> Self {
         let mut factors = Vec::new();
         if gaussians >= layers_from.max(1) {
-            let powers: Vec<f64> = energies.map(power).collect();
+            let powers: Vec<(f64, f64)> =
+                energies.map(|(energy, count)| (power(energy), count as f64)).collect();
             // The probability that a Gaussian is in no layer so far.
             let mut left = vec![1.0; powers.len()];
             for share in SHARES {
                 let factor = factor(share, &powers, &left);
                 left.iter_mut()
                     .zip(&powers)
-                    .for_each(|(left, power)| *left *= 1.0 - (factor * power).min(1.0));
+                    .for_each(|(left, (power, _))| *left *= 1.0 - (factor * power).min(1.0));
                 factors.push(factor);
             }
         }
@@ -229,14 +232,17 @@ fn power(energy: f32) -> f64 {
     libm::pow(f64::from(energy).max(0.0), ENERGY_POWER)
 }
 
-/// The factor with which probabilities sum to `share` of all Gaussians, of which these shares are left.
-fn factor(share: f64, powers: &[f64], left: &[f64]) -> f64 {
-    let wanted = (share * powers.len() as f64).max(f64::MIN_POSITIVE);
+/// The factor with which probabilities sum to `share` of all Gaussians. `powers` are those of some, and how many Gaussians each
+/// stands for, of which these shares are left.
+fn factor(share: f64, powers: &[(f64, f64)], left: &[f64]) -> f64 {
+    let all: f64 = powers.iter().map(|p| p.1).sum();
+    let wanted = (share * all).max(f64::MIN_POSITIVE);
     let sum = |factor: f64| {
-        powers.iter().zip(left).map(|(power, left)| left * (factor * power).min(1.0)).sum::<f64>()
+        let of = |((power, count), left): (&(f64, f64), &f64)| left * (factor * power).min(1.0) * count;
+        powers.iter().zip(left).map(of).sum::<f64>()
     };
     // As if all probabilities were below 1; more where some are not.
-    let whole: f64 = powers.iter().zip(left).map(|(power, left)| left * power).sum();
+    let whole: f64 = powers.iter().zip(left).map(|((power, count), left)| left * power * count).sum();
     let mut factor = wanted / whole.max(f64::MIN_POSITIVE);
     for _ in 0..FACTOR_STEPS {
         let found = sum(factor) / wanted;

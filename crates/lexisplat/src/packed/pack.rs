@@ -2,6 +2,8 @@
 
 use std::borrow::Borrow;
 
+use serde::{Deserialize, Serialize};
+
 use super::canonical::{Grid, MortonKey};
 use super::fit::Fit;
 use super::floor::Floor;
@@ -32,7 +34,7 @@ const DB_PER_OCTAVE_2: f64 = 0.15;
 const MOST_DB: f64 = 100.0;
 
 /// How to pack.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct PackOptions {
     /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are then as exact as
@@ -177,7 +179,7 @@ impl<S: Borrow<Splats>> Packer<S> {
         if !step.is_finite() || step <= 0.0 {
             return Err(Error::parameter("step", step, "a finite number above 0"));
         }
-        let parameters = self.fit.with_step(step);
+        let parameters = self.fit.steps.with_step(step);
         let kept = self.weights.kept(step);
         let scene: Vec<MortonKey> = kept.iter().map(|&i| self.scene[i]).collect();
         let classes: Vec<[f32; 2]> = kept.iter().map(|&i| self.fit.classes[i]).collect();
@@ -196,7 +198,7 @@ impl<S: Borrow<Splats>> Packer<S> {
 }
 
 /// Share of the Gaussians whose base colours the unit of base colours is for. A few wild ones must not make all others coarse.
-const USUAL_DC: f64 = 0.999;
+pub(super) const USUAL_DC: f64 = 0.999;
 
 /// The largest coordinate of usual base colours.
 pub(super) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {

@@ -2,6 +2,8 @@
 
 use std::slice::from_mut;
 
+use serde::{Deserialize, Serialize};
+
 use crate::support::maths::{Vec3, exp, exp2};
 
 /// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
@@ -22,7 +24,7 @@ const MAX_ANGLE_STEP: f32 = 1.2;
 const MAX_POSITION_STEP: f32 = 2.0;
 
 /// Steps and predictors of a file.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Parameters {
     /// Corner of the grid, in world units.
     pub(super) origin: Vec3,

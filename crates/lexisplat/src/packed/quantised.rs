@@ -16,12 +16,18 @@ use super::reorder::gather;
 use super::scene::Packed;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::splats::Splats;
+use crate::sparse::model::Model;
 use crate::sparse::tally::{CompressReport, Tally};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
+
+/// Fits base colours and opacities of a part of a scene. Takes all Gaussians of the part, what a file has of them, and for
+/// each that the file has its sensitivities to the colour and to the logarithm of the opacity. Returns what fits, for each
+/// that the file has.
+pub type Refit<'a, E = Error> = dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Vec<Appearance>, E> + 'a;
 
 /// Gaussians that a file has, all in the same order.
 #[derive(Debug, Default)]
@@ -83,7 +89,7 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<Self> {
         let n = gaussians.scene.len();
-        let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| w[1]));
+        let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
         let view = View {
             splats,
             scene: &gaussians.scene,
@@ -192,6 +198,26 @@ impl<'a> Quantised<'a> {
         Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
     }
 
+    /// The layer and the symbols of each chunk with these appearances, or with the scene's own, and how often each symbol occurs.
+    pub(super) fn counted(
+        &self,
+        appearances: Option<&[Appearance]>,
+        progress: &dyn Progress,
+    ) -> Result<(Counts, Vec<(usize, CodedChunk)>)> {
+        let mut counts = Counts::of(Tally::new(self.encoding.coder.dictionary.dim()), []);
+        let mut chunks = Vec::with_capacity(self.chunks.len());
+        let all = self.each_chunk(self.view(appearances)?, progress, |layer, tally, coded| {
+            let counts = Counts::of(tally, coded.ranges.iter().map(|(range, _)| range));
+            (counts, (layer, coded))
+        });
+        for chunk in all {
+            let (own, chunk) = chunk?;
+            counts.add(&own);
+            chunks.push(chunk);
+        }
+        Ok((counts, chunks))
+    }
+
     /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
     pub(super) fn view<'v>(&'v self, appearances: Option<&'v [Appearance]>) -> Result<View<'v>> {
         let n = self.len();
@@ -243,11 +269,6 @@ impl<'a> Quantised<'a> {
             }
             with(*layer, tally, targets)
         })
-    }
-
-    /// The layers as they are after these Gaussians.
-    pub(super) fn layering(&self) -> &Layering {
-        &self.encoding.layering
     }
 
     /// Number of Gaussians of each layer.

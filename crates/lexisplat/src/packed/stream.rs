@@ -1,5 +1,7 @@
 //! The bits that streams of symbols take.
 
+use serde::{Deserialize, Serialize};
+
 /// Size of one stream.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -13,7 +15,7 @@ pub struct StreamBits {
 }
 
 /// Bits each stream took; empty if they were not counted.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct BitCounts(pub(super) Vec<f64>);
 
 impl BitCounts {

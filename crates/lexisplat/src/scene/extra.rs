@@ -1,10 +1,10 @@
 //! Per-Gaussian properties that 3DGS does not define, and the eight types that they may have.
 
 use safetensors::Dtype;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A per-Gaussian property that 3DGS does not define, kept under its own name and type.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Extra {
     /// Property name in the PLY.
     pub name: String,
@@ -15,14 +15,14 @@ pub struct Extra {
 macro_rules! scalar_types {
     ($($variant:ident($type:ty), $name:literal, $alias:literal;)*) => {
         /// Type of a scalar property.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum ScalarType {
             $(#[doc = concat!("`", $name, "` or `", $alias, "`.")] $variant,)*
         }
 
         /// Values of an [`Extra`] in the type the file gave them.
-        #[derive(Debug, Clone, PartialEq)]
+        #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[non_exhaustive]
         pub enum ExtraValues {
             $(#[doc = concat!("`", $name, "` or `", $alias, "`.")] $variant(Vec<$type>),)*
@@ -62,6 +62,11 @@ macro_rules! scalar_types {
             #[must_use]
             pub fn scalar_type(&self) -> ScalarType {
                 match self { $(Self::$variant(_) => ScalarType::$variant,)* }
+            }
+
+            /// No values of this type.
+            pub(crate) fn none(scalar: ScalarType) -> Self {
+                match scalar { $(ScalarType::$variant => Self::$variant(Vec::new()),)* }
             }
 
             /// Appends values of the same type.

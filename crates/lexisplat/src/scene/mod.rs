@@ -1,6 +1,7 @@
 //! Dense scenes: Gaussians, SH, sources to read them from, sensitivity of pictures, statistics.
 
 pub(crate) mod extra;
+pub(crate) mod joined;
 pub(crate) mod sensitivity;
 pub mod sh;
 pub(crate) mod source;

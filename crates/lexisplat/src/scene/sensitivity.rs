@@ -105,17 +105,6 @@ impl Sensitivity {
         filter(&mut self.removal_view, keep);
     }
 
-    /// Appends the sensitivity of further Gaussians.
-    pub(crate) fn append(&mut self, mut other: Self) {
-        self.colour.append(&mut other.colour);
-        self.opacity.append(&mut other.opacity);
-        self.position.append(&mut other.position);
-        self.scale.append(&mut other.scale);
-        self.rotation.append(&mut other.rotation);
-        self.removal.append(&mut other.removal);
-        self.removal_view.append(&mut other.removal_view);
-    }
-
     /// Scales the sensitivity to pictures of which only `share` show these Gaussians.
     pub(crate) fn share(&mut self, share: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();

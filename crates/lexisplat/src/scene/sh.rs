@@ -5,6 +5,8 @@
 //! in a PLY: all of red, then all of green, then all of blue (INRIA `gaussian_model.py`, `save_ply`,
 //! `transpose(1, 2).flatten`).
 
+use serde::{Deserialize, Serialize};
+
 use crate::support::error::{Error, Result};
 
 /// Colour channels.
@@ -41,8 +43,23 @@ pub const C4: [f32; 9] = [
 pub const COLOUR_OFFSET: f32 = 0.5;
 
 /// An SH degree, 0 to [`MAX_DEGREE`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(try_from = "u8", into = "u8")]
 pub struct ShDegree(u8);
+
+impl TryFrom<u8> for ShDegree {
+    type Error = Error;
+
+    fn try_from(degree: u8) -> Result<Self> {
+        Self::new(degree)
+    }
+}
+
+impl From<ShDegree> for u8 {
+    fn from(degree: ShDegree) -> Self {
+        degree.0
+    }
+}
 
 impl ShDegree {
     /// No view dependence.

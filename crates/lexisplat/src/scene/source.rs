@@ -37,6 +37,11 @@ pub trait SplatSource {
         (self.len() as u64).saturating_mul(self.row_bytes())
     }
 
+    /// The sources that it consists of, one after the other: the tiles of a scene. None if it is one itself.
+    fn parts(&self) -> &[&dyn SplatSource] {
+        &[]
+    }
+
     /// What is odd about the source, one sentence each.
     fn warnings(&self) -> &[String] {
         &[]

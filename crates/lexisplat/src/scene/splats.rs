@@ -1,5 +1,7 @@
 //! A trained scene as arrays, in the units of its PLY.
 
+use serde::{Deserialize, Serialize};
+
 use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, for_extra};
 use crate::scene::sh::ShDegree;
@@ -32,7 +34,7 @@ pub struct Geometry {
 }
 
 /// What the file of a scene says about it beside its Gaussians. It is kept from PLY to .lexi and back.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SceneMeta {
     /// `comment` lines of the source, without the keyword, in order.
     pub comments: Vec<String>,

@@ -1,5 +1,7 @@
 //! What coding counts, and the report that is made of it.
 
+use serde::{Deserialize, Serialize};
+
 use crate::packed::StreamBits;
 use crate::sparse::learn::Learned;
 use crate::sparse::model::Record;
@@ -34,7 +36,7 @@ impl CompressReport {
 }
 
 /// What is counted while coding.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(crate) struct Tally {
     /// Gaussians by number of nonzeros; escapes not among them.
     pub(crate) histogram: Vec<u64>,

@@ -5,11 +5,6 @@ use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 
-/// Sum of the squared weights that views measure. The heuristic scales its weights to a sum of 1, but squares sum
-/// to less where several Gaussians share a pixel or none covers it. Without this factor files came out 7 to 9 dB
-/// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
-pub(super) const SHOWN: f64 = 0.1;
-
 /// How the sensitivity to a part of a scene is found. A part holds about 262,144 Gaussians near each other.
 pub enum Importance<'a, E = Error> {
     /// From each Gaussian alone ([`Sensitivity::heuristic`]).
@@ -18,8 +13,8 @@ pub enum Importance<'a, E = Error> {
     Judge {
         /// Measures how pictures of a part depend on its values. It is called once for each part, in order.
         judge: &'a mut dyn FnMut(&Splats) -> Result<Sensitivity, E>,
-        /// Fits base colours and opacities to pictures of a part, if the options let them change. The parts are not those that
-        /// `judge` takes.
+        /// Fits base colours and opacities to pictures of a part, if the options let them change. The parts are those that `judge`
+        /// takes.
         refit: Option<&'a mut Refit<'a, E>>,
         /// Name of the GPU that draws, which the file records; `None` for the CPU renderer.
         device: Option<String>,
@@ -52,17 +47,11 @@ impl<'a, E> Importance<'a, E> {
         }
     }
 
-    /// The sensitivity to `part` of a scene of `gaussians` Gaussians, whose
-    /// [`heuristic_total`](crate::scene::sensitivity::heuristic_total) is `total`.
-    pub(super) fn of(&mut self, part: &Splats, gaussians: usize, total: f64) -> Result<Sensitivity, E> {
+    /// The sensitivity to `part` as if it were the whole scene, if something measures it.
+    pub(super) fn of(&mut self, part: &Splats) -> Result<Option<Sensitivity>, E> {
         match self {
-            Self::Heuristic => Ok(Sensitivity::heuristic_part(&part.geometry, total / SHOWN)),
-            Self::Judge { judge, .. } => {
-                let mut found = judge(part)?;
-                #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-                found.share((part.len() as f64 / gaussians.max(1) as f64) as f32);
-                Ok(found)
-            }
+            Self::Heuristic => Ok(None),
+            Self::Judge { judge, .. } => judge(part).map(Some),
         }
     }
 }

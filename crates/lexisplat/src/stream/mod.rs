@@ -39,7 +39,10 @@ mod survey;
 pub use compress::{Compressed, compress};
 pub use decompress::decompress;
 pub use importance::Importance;
+#[cfg(test)]
+pub(crate) use pack::run as pack_in_buckets;
 pub use pack::{PackedFile, pack};
+pub(crate) use rows::RowLayout;
 pub use source_order::in_source_order;
 pub use survey::{Survey, lint, survey};
 

@@ -1,25 +1,21 @@
-//! Layout packed: put in order first, then code chunk by chunk, then write.
+//! Layout packed: scenes of one bucket as a whole, others bucket by bucket.
 
 use super::importance::Importance;
-use super::order::{Judged, Ordered, Sizes};
+use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::{
-    CHUNK, PackOptions, PackedHead, PartPacker, Whole, changes_without, expected_step, is_worth_its_bits,
+use crate::packed::tiles::{
+    Assembly, BUCKET, Coded, Coding, Findings, Lesson, Looked, Plan, SHOWN, Sample, Steps, Tables,
 };
-use crate::scene::sensitivity::Sensitivity;
+use crate::packed::{PackOptions, PackedHead, Packer};
+use crate::scene::sensitivity::{Sensitivity, heuristic_total};
 use crate::scene::source::SplatSource;
-use crate::scene::splats::Splats;
-use crate::sparse::compress::AT_ONCE;
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
 use crate::support::sink::Sink;
-use crate::support::spill::SpillTo;
-
-/// Peak of anonymous memory is below 1.5 GiB with these, at SH degree 3.
-const SIZES: Sizes =
-    Sizes { at_once: AT_ONCE, bucket: 8 * CHUNK, looked_at: 1 << 20, sample: 1 << 19, run: 2048 };
+use crate::support::spill::{Spill, SpillTo, Spilled};
+use crate::support::stopwatch::Stopwatch;
 
 /// What [`pack`] did.
 #[derive(Debug, Clone)]
@@ -43,9 +39,11 @@ impl PackedFile {
 
 /// Packs the scene of `source` so that pictures are about `decibels` good, and writes it to `sink`.
 ///
-/// `importance` measures the sensitivity part by part; steps, predictors and dictionary are found from about
-/// half a million Gaussians. So the bytes are not those of [`Packer`](crate::packed::Packer), but they are the
-/// same on any number of threads.
+/// A scene of at most [`BUCKET`] Gaussians is packed as a whole, as by [`Packer`]. Others are packed
+/// [bucket by bucket](crate::packed::tiles): `importance` measures the sensitivity of each bucket, and steps, predictors and
+/// dictionary are found from sums over all of them. The bytes are the same on any number of threads, and those that other
+/// processes make of the same tiles: the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH
+/// degree 3.
 ///
 /// # Errors
 /// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
@@ -59,295 +57,185 @@ pub fn pack<'a, E: From<Error>>(
     sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    run(source, importance, options, decibels, sink.into(), SIZES, progress)
+    run(source, importance, options, decibels, sink.into(), BUCKET, progress)
 }
 
-fn run<E: From<Error>>(
+/// [`pack`] with buckets of about `bucket` Gaussians.
+pub(crate) fn run<E: From<Error>>(
+    source: &dyn SplatSource,
+    importance: Importance<'_, E>,
+    options: &PackOptions,
+    decibels: f64,
+    sink: Sink<'_>,
+    bucket: usize,
+    progress: &dyn Progress,
+) -> Result<PackedFile, E> {
+    Limits::check("Gaussians", source.len() as u64, MAX_GAUSSIANS)?;
+    options.check()?;
+    match source.len() <= bucket {
+        true => whole(source, importance, options, decibels, sink, progress),
+        false => in_buckets(source, importance, options, decibels, sink, bucket, progress),
+    }
+}
+
+fn whole<E: From<Error>>(
     source: &dyn SplatSource,
     mut importance: Importance<'_, E>,
     options: &PackOptions,
     decibels: f64,
     sink: Sink<'_>,
-    sizes: Sizes,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    let n = source.len();
-    Limits::check("Gaussians", n as u64, MAX_GAUSSIANS)?;
-    options.check()?;
-    let folder = sink.spill_folder()?;
-    let to = SpillTo::Folder(&folder);
-    let mut ordered = Ordered::new(source, sizes, options.seed, &folder, progress)?;
-    let step = expected_step(n, decibels);
-    let stays = |part: &Splats, found: &Sensitivity| -> Vec<bool> {
-        let changes = changes_without(&part.geometry, found, options.may_change());
-        changes.into_iter().map(|change| is_worth_its_bits(change, step)).collect()
-    };
-    let Judged { sample, sensitivity, rows } = ordered.judge(&mut importance, &stays, &folder, progress)?;
-    let whole = Whole { gaussians: n, kept: rows.kept, grid: ordered.grid, step };
-    let mut packer = PartPacker::new(whole, &sample, &sensitivity, options, to, progress)?;
-    drop((sample, sensitivity));
-    progress.begin(Stage::Code, rows.kept as u64);
-    ordered.each(rows, CHUNK, &mut |part| packer.push(part, importance.refit(), progress))?;
+    let splats = source.whole()?;
+    progress.begin(Stage::Look, splats.len() as u64);
+    let sensitivity = importance.of(&splats)?.unwrap_or_else(|| {
+        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+        Sensitivity::heuristic_part(&splats.geometry, total)
+    });
     progress.end();
-    let (head, spilled, report) = packer.finish(to, importance.device(), progress)?;
-    let writer = LexiWriter::spilled_packed(&head, spilled)?;
+    let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
+    let quantised = packer.quantise(packer.step_for(decibels), true, progress)?;
+    let device = importance.device().map(str::to_owned);
+    let refit = importance.refit().filter(|_| options.may_change() && !quantised.is_empty());
+    let mut appearances = None;
+    if let Some(refit) = refit {
+        let model = quantised.finish(None, None, progress)?.0.unpack()?;
+        appearances = Some(refit(&splats, &model, quantised.weights())?);
+    }
+    let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
+    let packed = packed.with_device(device);
+    let writer = LexiWriter::packed(&packed);
     let tensor_bytes = writer.attribute_bytes().to_vec();
     writer.write(sink, progress)?;
-    Ok(PackedFile { head, report, tensor_bytes })
+    Ok(PackedFile { head: packed.head().clone(), report, tensor_bytes })
+}
+
+fn in_buckets<E: From<Error>>(
+    source: &dyn SplatSource,
+    mut importance: Importance<'_, E>,
+    options: &PackOptions,
+    decibels: f64,
+    sink: Sink<'_>,
+    bucket: usize,
+    progress: &dyn Progress,
+) -> Result<PackedFile, E> {
+    let clock = Stopwatch::start();
+    let folder = sink.spill_folder()?;
+    let to = SpillTo::Folder(&folder);
+    let tiles = match source.parts() {
+        [] => vec![source],
+        parts => parts.to_vec(),
+    };
+    begin_reading(&tiles, progress);
+    let surveys = survey(&tiles, options.seed, progress)?;
+    let plan = Plan::with_bucket(&surveys, options, decibels, false, bucket)?;
+    drop(surveys);
+    let mut ordered = Ordered::new(&plan, &tiles, &folder, progress)?;
+    progress.end();
+
+    progress.begin(Stage::Look, plan.len() as u64);
+    let (mut statistics, mut all_looked) = (Vec::new(), Messages::new(to)?);
+    let mut samples = Vec::new();
+    for group in 0..plan.groups() {
+        let mut sample = Sample::new();
+        for number in plan.group(group) {
+            progress.check()?;
+            let bucket = ordered.bucket(number, false)?;
+            let (own, looked) = bucket.look(&plan, importance.of(bucket.splats())?)?;
+            sample.add(&plan, &bucket, &looked)?;
+            all_looked.push(&looked.to_bytes())?;
+            statistics.push(own);
+            progress.advance(bucket.splats().len() as u64);
+        }
+        samples.push(sample);
+    }
+    progress.end();
+    let before = clock.seconds();
+    let coding = learn(&plan, &Steps::new(&plan, &statistics)?, samples, progress)?;
+    drop(statistics);
+    let learn_seconds = clock.seconds() - before;
+
+    progress.begin(Stage::Code, coding.kept() as u64);
+    let (mut counts, mut all_coded) = (Vec::new(), Messages::new(to)?);
+    let mut all_looked = all_looked.finish()?;
+    for number in 0..plan.buckets() {
+        progress.check()?;
+        let bucket = ordered.bucket(number, true)?;
+        let looked = Looked::from_bytes(&all_looked.take()?)?;
+        let (own, coded) = coding.code(&plan, &bucket, &looked, importance.refit(), progress)?;
+        counts.push(own);
+        all_coded.push(&coded.to_bytes())?;
+    }
+    progress.end();
+    drop((ordered, all_looked));
+    let tables = Tables::new(&counts)?;
+    let mut assembly = Assembly::new(&plan, &coding, &tables, 0, sink)?;
+    let mut all_coded = all_coded.finish()?;
+    for _ in 0..plan.buckets() {
+        progress.check()?;
+        let coded = Coded::from_bytes(&all_coded.take()?)?;
+        assembly.push(coded.with_tables(&plan, &coding, &tables)?)?;
+    }
+    let device = importance.device().map(str::to_owned);
+    let mut done = assembly.finish(&counts, device, progress)?;
+    done.report.learn_seconds = learn_seconds;
+    done.report.code_seconds = clock.seconds() - before - learn_seconds;
+    Ok(done)
+}
+
+/// Everything that buckets are coded with, learned from the samples of all groups.
+fn learn(plan: &Plan, steps: &Steps, mut samples: Vec<Sample>, progress: &dyn Progress) -> Result<Coding> {
+    let groups: Vec<_> = samples.iter_mut().map(|sample| sample.statistics(plan, steps)).collect();
+    let Some(mut lesson) = Lesson::new(plan, steps, &groups)? else {
+        return Coding::new(plan, steps, &groups, None);
+    };
+    progress.begin(Stage::Learn, lesson.left() as u64);
+    loop {
+        progress.check()?;
+        let found: Vec<Findings> =
+            samples.iter_mut().map(|sample| sample.find(plan, steps, &lesson)).collect();
+        if lesson.is_over() {
+            progress.end();
+            return Coding::new(plan, steps, &groups, Some((&lesson, &found)));
+        }
+        lesson.advance(&found)?;
+        progress.advance(1);
+    }
+}
+
+/// Messages of one bucket after the other, in a temporary file.
+struct Messages {
+    spill: Spill,
+    lengths: Vec<usize>,
+}
+
+/// The same, to be read.
+struct Written {
+    spilled: Spilled,
+    lengths: std::vec::IntoIter<usize>,
+}
+
+impl Messages {
+    fn new(to: SpillTo<'_>) -> Result<Self> {
+        Ok(Self { spill: Spill::new(to)?, lengths: Vec::new() })
+    }
+
+    fn push(&mut self, message: &[u8]) -> Result<()> {
+        self.lengths.push(message.len());
+        self.spill.push(message)
+    }
+
+    fn finish(self) -> Result<Written> {
+        Ok(Written { spilled: self.spill.finish()?, lengths: self.lengths.into_iter() })
+    }
+}
+
+impl Written {
+    /// The next message; empty after the last.
+    fn take(&mut self) -> Result<Vec<u8>> {
+        self.spilled.take(self.lengths.next().unwrap_or(0))
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::packed::{Appearance, Packer};
-    use crate::scene::sensitivity::heuristic_total;
-    use crate::stream::importance::SHOWN;
-    use crate::{Extra, ExtraValues, Model, Silent, lexi, ply};
-
-    fn scene(count: usize) -> Splats {
-        let mut splats = crate::support::testing::scene(count, 4);
-        splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
-        let values = ExtraValues::U32((0..u32::try_from(count).unwrap()).collect());
-        splats.geometry.extras = vec![Extra { name: "number".into(), values }];
-        splats
-    }
-
-    fn options() -> PackOptions {
-        PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
-    }
-
-    fn streamed(splats: &Splats, importance: Importance<'_>, sizes: Sizes) -> Result<(Vec<u8>, PackedFile)> {
-        streamed_with(splats, importance, &options(), sizes)
-    }
-
-    fn streamed_with(
-        splats: &Splats,
-        importance: Importance<'_>,
-        options: &PackOptions,
-        sizes: Sizes,
-    ) -> Result<(Vec<u8>, PackedFile)> {
-        let mut bytes = Vec::new();
-        ply::write(&mut bytes, splats).unwrap();
-        let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
-        let folder = tempfile::tempdir().unwrap();
-        let output = folder.path().join("out.lexi");
-        let done = run(&chunks, importance, options, 38.0, Sink::from(&output), sizes, &Silent);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), usize::from(done.is_ok()));
-        done.map(|done| (std::fs::read(output).unwrap(), done))
-    }
-
-    /// Everything fits in one bucket and is of the sample: then nothing is left to differ.
-    #[test]
-    fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
-        for count in [CHUNK + 500, 700, 0] {
-            let splats = scene(count);
-            let all = Sizes { sample: count.max(1), looked_at: count.max(1), ..SIZES };
-            let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-            let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
-            let (found, done) = streamed(&splats, Importance::Heuristic, all).unwrap();
-            // A judge that says of each Gaussian what the guess says.
-            let mut judge = |part: &Splats| {
-                assert_eq!(part.len(), splats.len());
-                Ok(Sensitivity::heuristic_part(&part.geometry, total))
-            };
-            assert!(
-                streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, all)
-                    .unwrap()
-                    .0
-                    == found,
-                "{count}"
-            );
-            let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
-            let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
-            let mut expected = Vec::new();
-            LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
-            assert!(found == expected, "{count}");
-            assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
-            let bits = packed.stream_bits().unwrap();
-            for (a, b) in done.report.stream_bits.iter().zip(&bits) {
-                assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
-            }
-        }
-    }
-
-    /// Without every fifth Gaussian pictures stay as they are.
-    fn shown(part: &Splats, total: f64) -> Sensitivity {
-        let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
-        let mut sensitivity = Sensitivity::heuristic_part(&part.geometry, total);
-        sensitivity.removal.fill(0.5);
-        for (opacity, _) in sensitivity.opacity.iter_mut().zip(numbers).filter(|(_, n)| n.is_multiple_of(5)) {
-            *opacity = 1e-25;
-        }
-        sensitivity
-    }
-
-    #[test]
-    fn what_is_not_worth_its_bits_is_left_out() {
-        let options = PackOptions { keep_order: false, ..options() };
-        let splats = scene(CHUNK + 9000);
-        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-        let packer = Packer::new(&splats, &shown(&splats, total), &options).unwrap();
-        let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
-        let mut expected = Vec::new();
-        LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
-        let sizes = Sizes { sample: splats.len(), looked_at: splats.len(), ..SIZES };
-        let mut judge = |part: &Splats| Ok(shown(part, total));
-        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
-        let (found, done) = streamed_with(&splats, importance, &options, sizes).unwrap();
-        assert!(found == expected);
-        assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
-        // Chunks are filled from several buckets, and rows stay together.
-        let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
-        let mut judge = |part: &Splats| Ok(shown(part, total));
-        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
-        let (found, done) = streamed_with(&splats, importance, &options, small).unwrap();
-        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        let geometry = model.geometry();
-        assert_eq!((geometry.len(), done.head.gaussians), (model.len(), model.len()));
-        assert_eq!(done.head.removed, (splats.len() - model.len()) as u64);
-        let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
-        assert!(numbers.iter().all(|n| !n.is_multiple_of(5)));
-        for (position, &number) in geometry.positions.iter().zip(numbers) {
-            let original = splats.geometry.positions[number as usize];
-            assert!((0..3).all(|k| (position[k] - original[k]).abs() < 0.1), "{number}");
-        }
-    }
-
-    #[test]
-    fn appearances_are_fitted_part_by_part() {
-        let options = PackOptions { keep_order: false, ..options() };
-        let splats = scene(CHUNK + 9000);
-        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-        let others = |model: &Model| -> Vec<Appearance> {
-            let moved = |i| {
-                let Appearance { dc, log_opacity } = Appearance::of(model.geometry(), i);
-                Appearance { dc: dc.map(|v| v + 0.5), log_opacity: log_opacity - 0.3 }
-            };
-            (0..model.len()).map(moved).collect()
-        };
-        let sizes = Sizes { sample: splats.len(), looked_at: splats.len(), ..SIZES };
-        let fitted = |options: &PackOptions, sizes: Sizes| {
-            let mut judge = |part: &Splats| Ok(shown(part, total));
-            let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-                // The part has what the file leaves out, and the rest is in order.
-                assert!(part.len() > model.len() || options.keep_order);
-                assert_eq!(model.len(), weights.len());
-                Ok(others(model))
-            };
-            let importance = Importance::Judge { judge: &mut judge, refit: Some(&mut refit), device: None };
-            streamed_with(&splats, importance, options, sizes).unwrap().0
-        };
-        let sensitivity = shown(&splats, total);
-        let file = |options: &PackOptions, fitted: bool| {
-            let packer = Packer::new(&splats, &sensitivity, options).unwrap();
-            let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
-            let model = quantised.finish(None, None, &Silent).unwrap().0.unpack().unwrap();
-            let shown = fitted.then(|| others(&model));
-            let (packed, _) = quantised.finish(shown.as_deref(), None, &Silent).unwrap();
-            let mut bytes = Vec::new();
-            LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
-            bytes
-        };
-        assert!(fitted(&options, sizes) == file(&options, true));
-        let keeps = PackOptions { keep_order: true, ..options.clone() };
-        assert!(fitted(&keeps, sizes) == file(&keeps, false));
-        let model =
-            lexi::read_bytes("t", &fitted(&options, Sizes { bucket: 9000, ..sizes }), &Limits::default());
-        let model = model.unwrap();
-        let ExtraValues::U32(numbers) = &model.geometry().extras[0].values else { panic!("not u32") };
-        let moved = model.geometry().dc.iter().zip(numbers);
-        let moved = moved.map(|(dc, &number)| f64::from(dc[0] - splats.geometry.dc[number as usize][0]));
-        let mean = moved.sum::<f64>() / model.len() as f64;
-        assert!((0.45..0.55).contains(&mean), "{mean}");
-    }
-
-    #[test]
-    fn one_gaussian_stays() {
-        let options = PackOptions { keep_order: false, ..options() };
-        let splats = scene(9000);
-        let small = Sizes { at_once: 4096, bucket: 3000, looked_at: 3000, sample: 6000, run: 500 };
-        let mut judge = |part: &Splats| {
-            let mut none = Sensitivity::heuristic(&part.geometry);
-            none.removal.fill(0.5);
-            none.opacity.fill(0.0);
-            Ok(none)
-        };
-        let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
-        let (found, _) = streamed_with(&splats, importance, &options, small).unwrap();
-        assert_eq!(lexi::read_bytes("t", &found, &Limits::default()).unwrap().len(), 1);
-    }
-
-    #[test]
-    fn many_small_buckets_and_a_small_sample_make_a_file_that_is_as_good() {
-        let splats = scene(2 * CHUNK + 2000);
-        let small = Sizes { at_once: 4096, bucket: 9000, looked_at: 3000, sample: 20_000, run: 500 };
-        let (found, done) = streamed(&splats, Importance::Heuristic, small).unwrap();
-        let (whole, _) = streamed(&splats, Importance::Heuristic, SIZES).unwrap();
-        let ratio = found.len() as f64 / whole.len() as f64;
-        assert!((0.97..1.03).contains(&ratio), "{ratio}");
-        let other = Sizes { at_once: 10_000, bucket: 20_000, ..small };
-        assert!(
-            streamed(&splats, Importance::Heuristic, other).unwrap().0 == found,
-            "what is held at a time shows"
-        );
-        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        // The order was kept, so each Gaussian is where it was.
-        assert_eq!(model.geometry().extras, splats.geometry.extras);
-        let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
-        let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
-        assert_eq!(moved.count(), 0);
-        assert_eq!(done.head.gaussians, splats.len());
-        assert_eq!(
-            done.report.nonzero_histogram.iter().sum::<u64>() + done.report.escapes,
-            splats.len() as u64
-        );
-    }
-
-    #[test]
-    fn every_gaussian_is_judged_once_beside_its_neighbours() {
-        let splats = scene(12_000);
-        let small = Sizes { at_once: 4096, bucket: 3000, looked_at: 3000, sample: 6000, run: 500 };
-        let mut seen = Vec::new();
-        let mut parts = 0;
-        let mut judge = |part: &Splats| {
-            let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
-            seen.extend_from_slice(numbers);
-            parts += 1;
-            Ok(Sensitivity::heuristic(&part.geometry))
-        };
-        let (found, _) =
-            streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, small)
-                .unwrap();
-        assert_eq!(parts, 4);
-        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        assert_eq!(model.geometry().extras, splats.geometry.extras);
-        seen.sort_unstable();
-        assert!(seen.into_iter().eq(0..12_000));
-    }
-
-    #[test]
-    fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
-        let splats = scene(700);
-        let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
-            streamed(&splats, Importance::Judge { judge, refit: None, device: None }, SIZES)
-                .unwrap_err()
-                .to_string()
-        };
-        let error = refused(&mut |part| Ok(Sensitivity::zeros(part.len() - 1)));
-        assert!(error.contains("699") && error.contains("700"), "{error}");
-        let mut broken = Sensitivity::zeros(700);
-        broken.opacity[3] = f32::NAN;
-        assert!(refused(&mut |_| Ok(broken.clone())).contains("NaN"));
-        assert_eq!(refused(&mut |_| Err(Error::parameter("view", 7, "none"))), "view = 7: none");
-    }
-
-    #[test]
-    fn gaussians_in_one_place_do_not_make_one_bucket_of_all() {
-        let mut splats = scene(5000);
-        splats.geometry.positions.fill([1.0; 3]);
-        let small = Sizes { at_once: 1000, bucket: 700, looked_at: 1000, sample: 2000, run: 100 };
-        let (found, _) = streamed(&splats, Importance::Heuristic, small).unwrap();
-        let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
-        assert_eq!(model.geometry().extras, splats.geometry.extras);
-    }
-}
+mod tests;

@@ -9,7 +9,7 @@ const CHUNK_ROWS: usize = 1024;
 
 /// The layout of rows of scenes that are like a given one and have no normals: the values of each array one
 /// after the other, as they lie in memory.
-pub(super) struct RowLayout {
+pub(crate) struct RowLayout {
     like: Splats,
     /// Bytes of one Gaussian in each array.
     widths: Vec<usize>,
@@ -17,7 +17,7 @@ pub(super) struct RowLayout {
 
 impl RowLayout {
     /// The layout for scenes like `empty`, which has no Gaussians.
-    pub(super) fn new(empty: Splats) -> Self {
+    pub(crate) fn new(empty: Splats) -> Self {
         let float = size_of::<f32>();
         let mut widths: Vec<usize> =
             [3, 3, empty.degree.rest(), 1, 3, 4].iter().map(|values| values * float).collect();
@@ -26,12 +26,12 @@ impl RowLayout {
     }
 
     /// Bytes of a row.
-    pub(super) fn bytes(&self) -> usize {
+    pub(crate) fn bytes(&self) -> usize {
         self.widths.iter().sum()
     }
 
     /// Replaces `rows` by the rows of `splats`, which is left as it is.
-    pub(super) fn pack(&self, splats: &mut Splats, rows: &mut Vec<u8>) {
+    pub(crate) fn pack(&self, splats: &mut Splats, rows: &mut Vec<u8>) {
         rows.clear();
         rows.resize(splats.len() * self.bytes(), 0);
         let columns = columns(splats);
@@ -48,7 +48,7 @@ impl RowLayout {
     }
 
     /// The Gaussians of `rows`.
-    pub(super) fn unpack(&self, rows: &[u8]) -> Splats {
+    pub(crate) fn unpack(&self, rows: &[u8]) -> Splats {
         let n = rows.len() / self.bytes();
         let mut splats = self.like.clone();
         splats.sh_rest = vec![0.0; n * splats.degree.rest()];

@@ -1,5 +1,7 @@
 //! What symbols cost in bits, estimated from how often codes used them.
 
+use serde::{Deserialize, Serialize};
+
 use super::{COUNT_CLASSES, Codes};
 use crate::support::maths;
 
@@ -9,7 +11,7 @@ const VALUE_COSTS: usize = 64;
 const SMOOTHING: f64 = 0.25;
 
 /// What symbols cost, in bits.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(crate) struct Costs {
     /// Cost of an atom, by its number.
     pub(super) atoms: Vec<f32>,
@@ -68,7 +70,7 @@ impl Costs {
 }
 
 /// How often codes used each symbol.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub(super) struct Usage {
     pub(super) atoms: Vec<f64>,
     values: Vec<f64>,
@@ -76,6 +78,13 @@ pub(super) struct Usage {
 }
 
 impl Usage {
+    /// Adds the uses of other codes.
+    pub(super) fn merge(&mut self, other: &Self) {
+        let own = self.atoms.iter_mut().chain(&mut self.values).chain(self.counts.iter_mut().flatten());
+        let more = other.atoms.iter().chain(&other.values).chain(other.counts.iter().flatten());
+        own.zip(more).for_each(|(sum, more)| *sum += more);
+    }
+
     pub(super) fn of(codes: &Codes, classes: &[u8], atoms: usize, dim: usize) -> Self {
         let mut usage = Self {
             atoms: vec![0.0; atoms],

@@ -7,14 +7,14 @@ use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
 
 /// Rounds of coding and refitting.
-const ROUNDS: usize = 14;
+pub(super) const ROUNDS: usize = 14;
 /// An atom with fewer users is replaced. The exact codec replaces atoms with fewer than 4 users, and the less used of
 /// two similar atoms. Files depend on both rules.
-const MIN_USERS: f64 = 3.0;
+pub(super) const MIN_USERS: f64 = 3.0;
 /// In this many last rounds no atoms are replaced.
-const SETTLING: usize = 4;
+pub(super) const SETTLING: usize = 4;
 /// Shortest sum that gives an atom a new direction.
-const MIN_NORM: f64 = 0.0;
+pub(super) const MIN_NORM: f64 = 0.0;
 
 /// Learns unit-norm atoms from `rows`, beginning with the atoms `first`, of which the last `fixed` stay as they are. Returns
 /// the others most used first, without unused ones, and then the fixed ones, and the costs at which all were used.
@@ -64,16 +64,28 @@ pub(crate) fn learn(
     progress.end();
     let codes = book.encode(rows, classes, stop);
     let usage = Usage::of(&codes, classes, count, dim);
+    Ok(most_used_first(dim, &book.rows, learned, &usage, &book.costs))
+}
+
+/// The first `learned` of `atoms` most used first, without unused ones, and then the others; and the costs at this `usage`.
+/// `before` are those at which they were used.
+pub(super) fn most_used_first(
+    dim: usize,
+    atoms: &[f32],
+    learned: usize,
+    usage: &Usage,
+    before: &Costs,
+) -> (Vec<f32>, Costs) {
     let mut order: Vec<usize> = (0..learned).filter(|&j| usage.atoms[j] > 0.0).collect();
     order.sort_by(|&a, &b| usage.atoms[b].total_cmp(&usage.atoms[a]).then(a.cmp(&b)));
-    order.extend(learned..count);
+    order.extend(learned..atoms.len() / dim);
     if order.is_empty() {
         order.push(0);
     }
-    let kept = order.iter().flat_map(|&j| book.atom(j).to_vec()).collect();
-    let costs = Costs::of(&usage, &book.costs);
-    let atoms = order.iter().map(|&j| costs.atoms[j]).collect();
-    Ok((kept, Costs { atoms, ..costs }))
+    let kept = order.iter().flat_map(|&j| &atoms[j * dim..(j + 1) * dim]).copied().collect();
+    let costs = Costs::of(usage, before);
+    let of_kept = order.iter().map(|&j| costs.atoms[j]).collect();
+    (kept, Costs { atoms: of_kept, ..costs })
 }
 
 /// Moves `atom` to the unit vector that leaves the least error with the values of `users` as they are.
@@ -127,9 +139,14 @@ fn replace_unused(dim: usize, users: &[f64], atoms: &mut [f32], residuals: &[f32
 /// The exact codec draws dissimilar vectors at random and normalises in f64. Here `rows` are in random order already,
 /// similar ones are not skipped, and norms are f32. Files depend on both, so only the axes are shared.
 pub(crate) fn first_atoms(dim: usize, atoms: usize, rows: &[f32]) -> Vec<f32> {
+    first_atoms_of(dim, atoms, &principal_axes(dim, rows), rows)
+}
+
+/// [`first_atoms`] from principal axes and some rows.
+pub(super) fn first_atoms_of(dim: usize, atoms: usize, axes: &[Vec<f64>], rows: &[f32]) -> Vec<f32> {
     let mut out = Vec::with_capacity(atoms * dim);
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-    for axis in principal_axes(dim, rows).iter().take(atoms / 2) {
+    for axis in axes.iter().take(atoms / 2) {
         out.extend(axis.iter().map(|&x| x as f32));
     }
     let mut rows = rows.chunks_exact(dim);

@@ -11,6 +11,9 @@
 mod choice;
 mod costs;
 mod learn;
+mod lesson;
+
+use serde::{Deserialize, Serialize};
 
 use crate::sparse::pursuit::lanes::{LANES, Lane, ZERO, accumulate, blocks_of, first_maximum, transposed};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
@@ -19,6 +22,7 @@ use crate::support::simd::Simd;
 pub(super) use choice::{Choice, choose};
 pub(super) use costs::Costs;
 pub(super) use learn::{first_atoms, learn};
+pub(super) use lesson::{Findings, Lesson};
 
 /// Squared error, in squared steps, that one bit is worth. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit. Dead zones and short codes make a higher price pay.
@@ -78,7 +82,7 @@ struct Scratch {
 }
 
 /// When a code is good enough to end its pursuit.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub(super) enum StopRule {
     /// One more atom would cost more bits than its gain is worth.
     Balanced,

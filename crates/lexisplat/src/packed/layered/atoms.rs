@@ -2,6 +2,8 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
+use serde::{Deserialize, Serialize};
+
 use super::binary::{BitDecoder, BitEncoder, Bits, SignedOdds};
 use crate::scene::sh::{CHANNELS, ShDegree};
 
@@ -18,7 +20,7 @@ const SIZES: usize = 5;
 const MOST: i32 = (1 << 15) - 1;
 
 /// Atoms of whole numbers, and whether those that are the same in all files follow.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::packed) struct WholeAtoms {
     degree: ShDegree,
     /// Of each learned atom and each coefficient of a channel the numbers of the three [`COLOURS`].
@@ -83,6 +85,11 @@ impl WholeAtoms {
     /// Whether the atoms that are the same in all files follow.
     pub(super) fn with_axes(&self) -> bool {
         self.with_axes
+    }
+
+    /// SH degree of the atoms.
+    pub(in crate::packed) fn degree(&self) -> ShDegree {
+        self.degree
     }
 
     fn learned(&self) -> usize {

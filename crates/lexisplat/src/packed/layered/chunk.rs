@@ -32,7 +32,7 @@ pub(super) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
 }
 
 /// The sets of lanes that have a first, second, ... Gaussian.
-fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
+pub(super) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
     let whole = (1 << lanes) - 1;
     let last = (1 << (gaussians % lanes)) - 1;
     std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))

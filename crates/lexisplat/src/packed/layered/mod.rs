@@ -41,6 +41,7 @@ mod target;
 mod tests;
 #[cfg(test)]
 mod trace;
+mod transcribe;
 mod unpack;
 mod values;
 mod walk;
@@ -57,5 +58,5 @@ pub(super) use mean_view::{MeanView, seen_row};
 pub(super) use range::Recorder;
 pub(super) use rest::RestForm;
 pub(super) use streams::{Stream, stream_of};
-pub(super) use tables::{ALL_CONTEXTS, Histogram, Tables};
+pub(super) use tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
 pub(super) use target::Target;

@@ -82,11 +82,13 @@ impl Recorder {
     }
 
     /// All entries, lane by lane, to be [put back](Self::restore) later.
+    #[cfg(test)]
     pub(in crate::packed) fn entries(&self) -> &[Vec<u32>; LANES] {
         &self.lanes
     }
 
     /// A recorder with the entries of another.
+    #[cfg(test)]
     pub(in crate::packed) fn restore(entries: Vec<Vec<u32>>) -> Self {
         let mut lanes: [Vec<u32>; LANES] = Default::default();
         for (lane, entries) in lanes.iter_mut().zip(entries) {

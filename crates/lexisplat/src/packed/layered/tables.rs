@@ -1,5 +1,7 @@
 //! Tables of probabilities: made of counts, written, read, looked up.
 
+use serde::{Deserialize, Serialize};
+
 use super::binary::{BitDecoder, BitEncoder, Bits, Odds};
 use super::levels::{Kind, LevelOdds, Levels, MAX_SYMBOLS};
 use super::streams::{CONTEXTS, SLOTS, Slot};
@@ -15,7 +17,7 @@ const NONE: u8 = u8::MAX;
 pub(in crate::packed) const ALL_CONTEXTS: usize = SLOTS * CONTEXTS;
 
 /// How often each symbol occurs in one context.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(in crate::packed) struct Histogram {
     counts: Vec<u32>,
 }
@@ -34,7 +36,7 @@ impl Histogram {
             self.counts.resize(other.counts.len(), 0);
         }
         for (a, b) in self.counts.iter_mut().zip(&other.counts) {
-            *a += b;
+            *a = a.saturating_add(*b);
         }
     }
 

@@ -28,6 +28,12 @@ pub(crate) fn principal_axes(dim: usize, sample: &[f32]) -> Vec<Vec<f64>> {
             }
         }
     }
+    axes_of_moments(moments)
+}
+
+/// The principal axes of vectors of which these are the sums of products of coordinates, strongest first.
+pub(crate) fn axes_of_moments(mut moments: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
+    let dim = moments.len();
     let mut axes: Vec<Vec<f64>> =
         (0..dim).map(|i| (0..dim).map(|j| if i == j { 1.0 } else { 0.0 }).collect()).collect();
     let uncorrelated = if dim > MAX_REST { UNCORRELATED } else { 0.0 };

@@ -24,7 +24,7 @@ use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 pub(crate) use atom_replacement::{take_first, unit_axis};
-pub(crate) use axes::principal_axes;
+pub(crate) use axes::{axes_of_moments, principal_axes};
 pub(crate) use sample::Fetch;
 pub use statistics::{ROWS_PER_BLOCK, Statistics};
 use training::Beyond;

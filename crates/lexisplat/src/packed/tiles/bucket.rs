@@ -1,0 +1,146 @@
+//! The Gaussians of a bucket, in the order of the file.
+
+use std::ops::Range;
+
+use super::look::{LookStatistics, Looked, SHOWN};
+use super::plan::{Piece, Plan};
+use crate::packed::canonical::MortonKey;
+use crate::packed::pack::check;
+use crate::packed::reorder::gather;
+use crate::scene::extra::for_extra;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::source::SplatSource;
+use crate::scene::splats::Splats;
+use crate::stream::RowLayout;
+use crate::support::error::{Error, Result};
+use crate::support::progress::Progress;
+
+/// The Gaussians of a bucket, sorted along the Morton curve.
+#[derive(Debug, Clone)]
+pub struct Bucket {
+    pub(super) number: usize,
+    pub(super) splats: Splats,
+    /// Cell and number in the source of each.
+    pub(super) places: Vec<MortonKey>,
+}
+
+/// Collects the Gaussians of a bucket from blocks of tiles.
+#[derive(Debug)]
+pub struct BucketReader<'p> {
+    plan: &'p Plan,
+    bucket: Bucket,
+}
+
+impl<'p> BucketReader<'p> {
+    /// Collects those of bucket `number`.
+    #[must_use]
+    pub fn new(plan: &'p Plan, number: usize) -> Self {
+        Self { plan, bucket: Bucket { number, splats: plan.empty(), places: Vec::new() } }
+    }
+
+    /// Takes those of `rows` of tile `number` that are of the bucket. Rows come in any order.
+    ///
+    /// # Errors
+    /// As [`Plan::count`].
+    pub fn add(
+        &mut self,
+        number: usize,
+        tile: &dyn SplatSource,
+        rows: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let Bucket { number: wanted, splats, places } = &mut self.bucket;
+        let plan = self.plan;
+        plan.each(number, tile, rows, progress, &mut |part, keys| {
+            let keep: Vec<bool> = keys.iter().map(|key| plan.bucket_of(number, *key) == *wanted).collect();
+            places.extend(keys.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(key, _)| *key));
+            part.retain(&keep);
+            let mut own = tile.empty();
+            std::mem::swap(&mut own, part);
+            splats.append(own);
+            Ok(())
+        })
+    }
+
+    /// Takes a piece that [`Plan::scatter`] made for the bucket.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for other bytes.
+    pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
+        let Piece { places, rows } = Piece::from_bytes(bytes)?;
+        let layout = RowLayout::new(self.plan.empty());
+        if rows.len() != places.len() * layout.bytes() {
+            let expected = format!("{} rows of {} bytes", places.len(), layout.bytes());
+            return Err(Error::parameter("piece", rows.len(), expected));
+        }
+        self.bucket.splats.append(layout.unpack(&rows));
+        self.bucket.places.extend(places);
+        Ok(())
+    }
+
+    /// The bucket.
+    #[must_use]
+    pub fn finish(self) -> Bucket {
+        let Bucket { number, splats, places } = self.bucket;
+        Bucket::sorted(number, splats, places)
+    }
+}
+
+impl Bucket {
+    /// The Gaussians `splats` of bucket `number`, which are at these `places`.
+    fn sorted(number: usize, mut splats: Splats, mut places: Vec<MortonKey>) -> Self {
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_unstable_by_key(|&i| places[i]);
+        let order = || order.iter().copied();
+        let g = &mut splats.geometry;
+        gather(&mut places, order());
+        gather(&mut g.positions, order());
+        gather(&mut g.dc, order());
+        gather(&mut g.opacities, order());
+        gather(&mut g.scales, order());
+        gather(&mut g.rotations, order());
+        for extra in &mut g.extras {
+            for_extra!(&mut extra.values, v => gather(v, order()));
+        }
+        let dim = splats.degree.rest();
+        let mut rest = Vec::with_capacity(splats.sh_rest.len());
+        order().for_each(|i| rest.extend_from_slice(&splats.sh_rest[i * dim..(i + 1) * dim]));
+        splats.sh_rest = rest;
+        Self { number, splats, places }
+    }
+
+    /// The Gaussians of bucket `number` in order.
+    pub(crate) fn of_rows(number: usize, splats: Splats, places: Vec<MortonKey>) -> Self {
+        Self { number, splats, places }
+    }
+
+    /// Its number among all buckets.
+    #[must_use]
+    pub fn number(&self) -> usize {
+        self.number
+    }
+
+    /// Its Gaussians.
+    #[must_use]
+    pub fn splats(&self) -> &Splats {
+        &self.splats
+    }
+
+    /// Sums up what `sensitivity` says of the bucket's Gaussians, as if these were the whole scene. Without one it is guessed from
+    /// each Gaussian alone.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] for a sensitivity of another length or with values that are not finite.
+    pub fn look(&self, plan: &Plan, sensitivity: Option<Sensitivity>) -> Result<(LookStatistics, Looked)> {
+        let found = match sensitivity {
+            None => Sensitivity::heuristic_part(&self.splats.geometry, plan.heuristic_total / SHOWN),
+            Some(mut found) => {
+                #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+                found.share((self.splats.len() as f64 / plan.len().max(1) as f64) as f32);
+                found
+            }
+        };
+        check(&self.splats, &found)?;
+        Ok(LookStatistics::of(&self.splats, &found, plan))
+    }
+}

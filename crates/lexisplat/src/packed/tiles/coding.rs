@@ -1,0 +1,243 @@
+//! Coding of buckets, each on its own.
+
+use serde::{Deserialize, Serialize};
+
+use super::bucket::Bucket;
+use super::look::Looked;
+use super::message::messages;
+use super::plan::Plan;
+use super::sample::{Findings, Lesson, SampleStatistics};
+use super::steps::Steps;
+use crate::packed::canonical::MortonKey;
+use crate::packed::codebook::{self, Costs};
+use crate::packed::coder::{ChunkCoder, too_large};
+use crate::packed::encoding::{self, Encoding, Written};
+use crate::packed::floor::Floor;
+use crate::packed::layered::{self, Lookup, MeanView, WholeAtoms};
+use crate::packed::pack::USUAL_DC;
+use crate::packed::parameters::Parameters;
+use crate::packed::quantised::{Gaussians, Quantised, Refit};
+use crate::packed::reorder::gather;
+use crate::scene::extra::{Extra, for_extra};
+use crate::sparse::learn::unit_axis;
+use crate::support::error::{Error, Result};
+use crate::support::parallel::map_vec;
+use crate::support::progress::Progress;
+use crate::support::stopwatch::Stopwatch;
+
+/// Everything that buckets are coded with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Coding {
+    pub(super) steps: Steps,
+    floor: Floor,
+    most_dc: f64,
+    atoms: WholeAtoms,
+    /// What symbols cost; `None` without SH-rest.
+    costs: Option<Costs>,
+}
+
+/// The coded Gaussians of a bucket.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Coded {
+    pub(super) bucket: usize,
+    /// The tables it is coded with, its own ones.
+    tables: Vec<u8>,
+    chunks: Vec<Written>,
+    pub(super) layers: Vec<CodedLayer>,
+}
+
+/// What chunks do not hold of one layer.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct CodedLayer {
+    pub(super) gaussians: usize,
+    /// The place of each in the source of its file, if the order is kept.
+    pub(super) order: Option<Vec<u32>>,
+    pub(super) extras: Vec<Extra>,
+}
+
+/// How often each symbol occurs in a bucket.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Counts(pub(super) encoding::Counts);
+
+/// The tables that all buckets are coded with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Tables(pub(super) Vec<u8>);
+
+messages!(Coding => "coding", Coded => "coded bucket", Counts => "counts", Tables => "tables");
+
+impl Coding {
+    /// Everything that buckets are coded with. `groups` are the statistics of all, in order, and `learned` the lesson that is over and
+    /// what all groups found on its atoms, in order, if there is one.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if they are not those of all groups, and if values are so large that sums of them leave f32.
+    pub fn new(
+        plan: &Plan,
+        steps: &Steps,
+        groups: &[SampleStatistics],
+        learned: Option<(&Lesson, &[Findings])>,
+    ) -> Result<Self> {
+        let all = SampleStatistics::sum(plan, groups)?;
+        let degree = plan.like.degree;
+        let mut floor = steps.floor.clone().within(all.over);
+        all.predictors.solve(&mut floor.parameters);
+        if Parameters::from_list(&floor.parameters.to_list()).is_none() {
+            return Err(too_large());
+        }
+        let (atoms, costs) = match learned.filter(|_| degree.rest() > 0) {
+            None => {
+                let first: Vec<f32> = unit_axis(degree.rest(), 0).collect();
+                (WholeAtoms::new(degree, &first, 0, false), None)
+            }
+            Some((lesson, findings)) => {
+                let findings: Vec<codebook::Findings> = findings.iter().map(|f| f.0.clone()).collect();
+                let found = lesson.0.finish(&findings).filter(|_| lesson.is_over());
+                let wrong =
+                    || Error::parameter("findings", findings.len(), "those of all groups, at the end");
+                let (rows, costs, squares) = found.ok_or_else(wrong)?;
+                let bits = ChunkCoder::atom_bits(squares);
+                (WholeAtoms::new(degree, &rows, bits, false), Some(costs))
+            }
+        };
+        let most_dc = f64::from(all.dc.quantile(USUAL_DC));
+        Ok(Self { steps: steps.clone(), floor, most_dc, atoms, costs })
+    }
+
+    /// Number of Gaussians that are coded.
+    #[must_use]
+    pub fn kept(&self) -> usize {
+        self.steps.kept()
+    }
+
+    /// The encoder, before anything is coded.
+    pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
+        let clock = Stopwatch::start();
+        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let (floor, stop) = (&self.floor, self.steps.stop);
+        let parameters = floor.parameters.clone();
+        let coder = ChunkCoder::learned(
+            parameters,
+            mean_view,
+            &self.atoms,
+            self.costs.clone(),
+            stop,
+            plan.options.tolerance,
+        )?;
+        let layering = self.steps.layering.clone();
+        Ok(Encoding::new((coder, self.atoms.clone()), layering, self.most_dc, clock))
+    }
+
+    /// Codes the Gaussians of `bucket` that stay, with tables of its own. `refit` fits what they show, if that may change. Advances
+    /// `progress` by their number.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `looked` is of another bucket, and for values that no file holds; what `refit` returns;
+    /// [`Error::Cancelled`].
+    pub fn code<E: From<Error>>(
+        &self,
+        plan: &Plan,
+        bucket: &Bucket,
+        looked: &Looked,
+        refit: Option<&mut Refit<'_, E>>,
+        progress: &dyn Progress,
+    ) -> Result<(Counts, Coded), E> {
+        let splats = &bucket.splats;
+        let (weights, stays) = looked.of_each(splats.len(), self.steps.first_stays(bucket.number))?;
+        let kept = || (0..splats.len()).filter(|&i| stays[i]);
+        let places = (0..).zip(&bucket.places).zip(&stays).filter(|(_, stays)| **stays);
+        let scene: Vec<MortonKey> =
+            places.map(|((source, place), _)| MortonKey { source, ..*place }).collect();
+        let weights: Vec<[f32; 2]> = kept().map(|i| weights[i]).collect();
+        let free = self.steps.steps.classes_of(&weights);
+        let classes = self.floor.classes(&free, &splats.geometry, &scene);
+        let gaussians = Gaussians { scene, classes, weights };
+        let options = &plan.options;
+        let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
+        let mut appearances = None;
+        if let Some(refit) = refit.filter(|_| options.may_change() && !quantised.is_empty()) {
+            let model = quantised.finish(None, None, progress)?.0.unpack()?;
+            appearances = Some(refit(splats, &model, quantised.weights())?);
+        }
+        let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
+        let tables = layered::Tables::of(&counts)?;
+        let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));
+        let first = plan.first_of_file(bucket.number);
+        let mut start = 0;
+        let mut layers = Vec::new();
+        for gaussians in quantised.layer_counts() {
+            let sources = &quantised.sources()[start..start + gaussians];
+            start += gaussians;
+            let place = |g: &MortonKey| {
+                let place = u64::from(bucket.places[g.index()].source).saturating_sub(first);
+                u32::try_from(place).unwrap_or(u32::MAX)
+            };
+            let order = options.keep_order.then(|| sources.iter().map(place).collect());
+            let mut extras = splats.geometry.extras.clone();
+            for extra in &mut extras {
+                for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));
+            }
+            layers.push(CodedLayer { gaussians, order, extras });
+        }
+        Ok((Counts(counts), Coded { bucket: bucket.number, tables: tables.write(), chunks, layers }))
+    }
+}
+
+impl Tables {
+    /// The tables for all buckets. `counts` are those of all, in order.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are more symbols than a file holds.
+    pub fn new(counts: &[Counts]) -> Result<Self> {
+        let all =
+            Counts::sum(counts).ok_or_else(|| Error::parameter("counts", 0, "at least those of one"))?;
+        Ok(Self(layered::Tables::of(&all.0)?.write()))
+    }
+
+    pub(super) fn read(&self) -> Result<layered::Tables> {
+        layered::Tables::read(&self.0).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+    }
+}
+
+impl Counts {
+    /// The sum of all, one after the other; `None` if there are none.
+    pub(super) fn sum(all: &[Self]) -> Option<Self> {
+        let (first, rest) = all.split_first()?;
+        let mut sum = first.clone();
+        rest.iter().for_each(|more| sum.0.add(&more.0));
+        Some(sum)
+    }
+}
+
+impl Coded {
+    /// The same bucket, coded with the tables of all.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if it is not of this coding.
+    pub fn with_tables(self, plan: &Plan, coding: &Coding, tables: &Tables) -> Result<Self> {
+        let wrong = || Error::parameter("coded bucket", self.bucket, "a bucket of this scene");
+        let own = layered::Tables::read(&self.tables).ok_or_else(wrong)?;
+        let (lookup, common) = (Lookup::new(&own), tables.read()?);
+        let encoding = coding.encoding(plan)?;
+        let forms = encoding.layering.forms(encoding.head.rest.least.len());
+        let recoded = map_vec(self.chunks.iter().collect(), |chunk: &Written| {
+            let form = forms.get(chunk.layer).copied().unwrap_or_default();
+            chunk.recoded(&encoding.form, form, &lookup, &common)
+        });
+        let chunks = recoded.into_iter().collect::<Option<Vec<Written>>>().ok_or_else(wrong)?;
+        Ok(Self { tables: tables.0.clone(), chunks, ..self })
+    }
+
+    /// Takes its chunks out, if they are coded with `tables`.
+    pub(super) fn into_chunks(self, tables: &Tables) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
+        if self.tables != tables.0 {
+            return Err(Error::parameter("coded bucket", self.bucket, "one with the tables of the file"));
+        }
+        Ok((self.chunks, self.layers))
+    }
+
+    /// The bucket's number.
+    #[must_use]
+    pub fn bucket(&self) -> usize {
+        self.bucket
+    }
+}

@@ -1,0 +1,112 @@
+//! What a look at a bucket says of its Gaussians.
+
+use serde::{Deserialize, Serialize};
+
+use super::message::messages;
+use super::plan::Plan;
+use crate::packed::canonical::MortonKey;
+use crate::packed::fit::{ColourMoments, Derivatives};
+use crate::packed::layered::MeanView;
+use crate::packed::octaves::{Histogram, Pairs};
+use crate::packed::removal::{changes_without, is_worth_its_bits};
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::Splats;
+use crate::support::error::{Error, Result};
+
+/// Sum of the squared weights that views measure. The heuristic scales its weights to a sum of 1, but squares sum
+/// to less where several Gaussians share a pixel or none covers it. Without this factor files came out 7 to 9 dB
+/// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
+pub(crate) const SHOWN: f64 = 0.1;
+
+/// What is remembered of each Gaussian of a bucket: its weights, rounded to eighths of an octave, and whether it stays.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Looked {
+    pairs: Pairs,
+    /// One bit a Gaussian, the lowest first.
+    stays: Vec<u8>,
+}
+
+/// Sums over the Gaussians of a bucket.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct LookStatistics {
+    pub(super) gaussians: u64,
+    /// Number of those that stay.
+    pub(super) kept: u64,
+    /// Sensitivities to the colour and to the logarithm of the opacity.
+    pub(super) weights: [Histogram; 2],
+    /// Those to the opacity, of the Gaussians that stay.
+    pub(super) energies: Histogram,
+    pub(super) colours: ColourMoments,
+    pub(super) derivatives: Derivatives,
+}
+
+messages!(Looked => "looked", LookStatistics => "look statistics");
+
+impl LookStatistics {
+    pub(super) fn of(splats: &Splats, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
+        let n = splats.len();
+        let changes = changes_without(&splats.geometry, found, plan.options.may_change());
+        let stays: Vec<bool> = changes.into_iter().map(|c| is_worth_its_bits(c, plan.step)).collect();
+        let looked = Looked::new(&found.appearances(), &stays);
+        let mut out = Self {
+            gaussians: n as u64,
+            kept: stays.iter().filter(|&&stays| stays).count() as u64,
+            weights: Default::default(),
+            energies: Histogram::default(),
+            colours: ColourMoments::default(),
+            derivatives: Derivatives::default(),
+        };
+        for ([colour, opacity], stays) in looked.pairs.iter().zip(&stays) {
+            out.weights[0].add(colour);
+            out.weights[1].add(opacity);
+            if *stays {
+                out.energies.add(opacity);
+            }
+        }
+        out.colours.add(&MeanView::new(&plan.options.viewpoints).colours(splats));
+        let all = (0..).zip(0..n).map(|(source, _)| MortonKey { cell: 0, source });
+        out.derivatives.add(&splats.geometry, found, &all.collect::<Vec<_>>());
+        (out, looked)
+    }
+
+    /// Adds the sums of the next bucket.
+    pub(super) fn merge(&mut self, next: &Self) {
+        self.gaussians += next.gaussians;
+        self.kept += next.kept;
+        self.weights.iter_mut().zip(&next.weights).for_each(|(sum, more)| sum.merge(more));
+        self.energies.merge(&next.energies);
+        self.colours.merge(&next.colours);
+        self.derivatives.merge(&next.derivatives);
+    }
+
+    /// Number of Gaussians that stay.
+    #[must_use]
+    pub fn kept(&self) -> usize {
+        usize::try_from(self.kept).unwrap_or(usize::MAX)
+    }
+}
+
+impl Looked {
+    fn new(weights: &[[f32; 2]], stays: &[bool]) -> Self {
+        let mut bits = vec![0; stays.len().div_ceil(8)];
+        for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
+            bits[i / 8] |= 1_u8 << (i % 8);
+        }
+        Self { pairs: Pairs::of(weights), stays: bits }
+    }
+
+    /// The weights of each Gaussian, and whether it stays. The first does in any case if `first_stays`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if these are not `count` Gaussians.
+    pub(super) fn of_each(&self, count: usize, first_stays: bool) -> Result<(Vec<[f32; 2]>, Vec<bool>)> {
+        if self.pairs.len() != count || self.stays.len() != count.div_ceil(8) {
+            return Err(Error::parameter("looked", self.pairs.len(), format!("{count} Gaussians")));
+        }
+        let mut stays: Vec<bool> = (0..count).map(|i| self.stays[i / 8] >> (i % 8) & 1 == 1).collect();
+        if let Some(first) = stays.first_mut() {
+            *first |= first_stays;
+        }
+        Ok((self.pairs.iter().collect(), stays))
+    }
+}

@@ -1,0 +1,324 @@
+//! How a scene of tiles is divided into buckets.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use serde::{Deserialize, Serialize};
+
+use super::message::messages;
+use super::survey::{AT_ONCE, BLOCK, Like, Survey};
+use super::{BUCKET, message};
+use crate::packed::canonical::{Bounds, Grid, MortonKey};
+use crate::packed::pack::{PackOptions, expected_step};
+use crate::scene::extra::{Extra, ExtraValues};
+use crate::scene::source::SplatSource;
+use crate::scene::splats::{Geometry, Splats};
+use crate::stream::RowLayout;
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_GAUSSIANS};
+use crate::support::maths::Vec3;
+use crate::support::progress::Progress;
+
+/// Most groups of buckets whose samples are learned from. Every group sends a sum in every round.
+const GROUPS: usize = 2;
+
+/// What is settled of a scene before any of it is looked at.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Plan {
+    pub(super) options: PackOptions,
+    /// The overall step.
+    pub(super) step: f64,
+    /// Of each tile the number of Gaussians before it; then their number in all.
+    firsts: Vec<u64>,
+    pub(super) grid: Grid,
+    /// Sum of the expected weights of all Gaussians.
+    pub(super) heuristic_total: f64,
+    pub(super) like: Like,
+    /// Where buckets end but the last: of all tiles, or of each on its own.
+    ends: Vec<Vec<MortonKey>>,
+}
+messages!(Plan => "plan");
+
+impl Plan {
+    /// Plans a scene for pictures of about `decibels`. `tiles` has the name of each tile and the surveys of its blocks, in order.
+    /// With `one_each` every tile becomes a file of its own, with the steps, the dictionary and the tables of all.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for options out of range and no tiles, [`Error::Format`] that names a tile without Gaussians or with
+    /// another degree, other extras or another mark than the first, [`Error::Limit`] for too many Gaussians.
+    pub fn new(
+        tiles: &[(String, Vec<Survey>)],
+        options: &PackOptions,
+        decibels: f64,
+        one_each: bool,
+    ) -> Result<Self> {
+        Self::with_bucket(tiles, options, decibels, one_each, BUCKET)
+    }
+
+    /// The same with buckets of about `bucket` Gaussians.
+    pub(crate) fn with_bucket(
+        tiles: &[(String, Vec<Survey>)],
+        options: &PackOptions,
+        decibels: f64,
+        one_each: bool,
+        bucket: usize,
+    ) -> Result<Self> {
+        options.check()?;
+        let mut like: Option<Like> = None;
+        let mut firsts = vec![0_u64];
+        let mut bounds: Option<Bounds> = None;
+        let mut heuristic_total = 0.0;
+        let mut looked: Vec<(usize, Vec3, u64)> = Vec::new();
+        let mut total = 0_u64;
+        for (number, (name, blocks)) in tiles.iter().enumerate() {
+            let Some(first) = blocks.first() else {
+                return Err(Error::malformed(name, "the tile has no Gaussians"));
+            };
+            first.like.check(name, like.as_ref(), first.gaussians)?;
+            let like = like.get_or_insert_with(|| first.like.clone());
+            for comment in &first.like.meta.comments {
+                if !like.meta.comments.contains(comment) {
+                    like.meta.comments.push(comment.clone());
+                }
+            }
+            for block in blocks {
+                let own = block.positions.iter();
+                looked.extend(own.map(|&(row, position)| (number, position, total + u64::from(row))));
+                if let Some(own) = block.bounds {
+                    bounds.get_or_insert(own).add(own);
+                }
+                heuristic_total += block.heuristic_total;
+                total = total.saturating_add(block.gaussians);
+            }
+            firsts.push(total);
+        }
+        let Some(like) = like else { return Err(Error::parameter("tiles", 0, "at least one")) };
+        Limits::check("Gaussians", total, MAX_GAUSSIANS)?;
+        let gaussians = usize::try_from(total).unwrap_or(usize::MAX);
+        let positions: Vec<Vec3> = looked.iter().map(|l| l.1).collect();
+        let bounds = bounds.unwrap_or_else(|| Bounds::of(&[]));
+        let grid = Grid::fit_sample(&positions, bounds, gaussians);
+        drop(positions);
+        let mut keys: Vec<(usize, MortonKey)> = looked
+            .iter()
+            .map(|&(tile, position, row)| (if one_each { tile } else { 0 }, placed(&grid, position, row)))
+            .collect();
+        keys.sort_unstable();
+        let count = if one_each { tiles.len() } else { 1 };
+        let ends_of = |list: usize| -> Vec<MortonKey> {
+            let gaussians = if one_each { firsts[list + 1] - firsts[list] } else { total };
+            let from = keys.partition_point(|key| key.0 < list);
+            let own = &keys[from..keys.partition_point(|key| key.0 <= list)];
+            let parts = usize::try_from(gaussians).unwrap_or(usize::MAX).div_ceil(bucket);
+            (1..parts).filter_map(|k| own.get(k * own.len() / parts)).map(|key| key.1).collect()
+        };
+        let ends = (0..count).map(ends_of).collect();
+        let step = expected_step(gaussians, decibels);
+        Ok(Self { options: options.clone(), step, firsts, grid, heuristic_total, like, ends })
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        usize::try_from(self.firsts.last().copied().unwrap_or(0)).unwrap_or(usize::MAX)
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Number of tiles.
+    #[must_use]
+    pub fn tiles(&self) -> usize {
+        self.firsts.len() - 1
+    }
+
+    /// Whether every tile becomes a file of its own.
+    #[must_use]
+    pub fn is_one_each(&self) -> bool {
+        self.ends.len() > 1
+    }
+
+    /// Number of buckets.
+    #[must_use]
+    pub fn buckets(&self) -> usize {
+        self.ends.iter().map(|ends| ends.len() + 1).sum()
+    }
+
+    /// The buckets of each file, in order.
+    #[must_use]
+    pub fn files(&self) -> Vec<Range<usize>> {
+        let mut start = 0;
+        let of = |ends: &Vec<MortonKey>| {
+            let own = start..start + ends.len() + 1;
+            start = own.end;
+            own
+        };
+        self.ends.iter().map(of).collect()
+    }
+
+    /// Number of groups of buckets, each with a sample of its own.
+    #[must_use]
+    pub fn groups(&self) -> usize {
+        self.buckets().min(GROUPS)
+    }
+
+    /// The buckets of a group.
+    ///
+    /// # Panics
+    /// If there is no group `group`.
+    #[must_use]
+    pub fn group(&self, group: usize) -> Range<usize> {
+        let (groups, buckets) = (self.groups(), self.buckets());
+        assert!(group < groups, "{group} of {groups} groups");
+        group * buckets / groups..(group + 1) * buckets / groups
+    }
+
+    /// The blocks of a tile of `gaussians` Gaussians.
+    pub fn blocks(gaussians: usize) -> impl Iterator<Item = Range<usize>> {
+        (0..gaussians).step_by(BLOCK).map(move |start| start..gaussians.min(start + BLOCK))
+    }
+
+    /// How many of `rows` of a tile are of each bucket. Reports their bytes to `progress`.
+    ///
+    /// # Errors
+    /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile.
+    pub fn count(
+        &self,
+        number: usize,
+        tile: &dyn SplatSource,
+        rows: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<u64>> {
+        let mut counts = vec![0; self.buckets()];
+        self.each(number, tile, rows, progress, &mut |_, keys| {
+            keys.iter().for_each(|key| counts[self.bucket_of(number, *key)] += 1);
+            Ok(())
+        })?;
+        Ok(counts)
+    }
+
+    /// The rows of a tile that each bucket gets, in pieces: of which bucket, and bytes for [`BucketReader::add_piece`]. For tiles that
+    /// lie all over the scene, which every bucket would have to read otherwise.
+    ///
+    /// [`BucketReader::add_piece`]: super::BucketReader::add_piece
+    ///
+    /// # Errors
+    /// As [`Self::count`].
+    pub fn scatter(
+        &self,
+        number: usize,
+        tile: &dyn SplatSource,
+        rows: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Vec<(usize, Vec<u8>)>> {
+        let layout = RowLayout::new(self.empty());
+        let mut pieces: BTreeMap<usize, Piece> = BTreeMap::new();
+        let mut bytes = Vec::new();
+        self.each(number, tile, rows, progress, &mut |splats, keys| {
+            layout.pack(splats, &mut bytes);
+            for (key, row) in keys.iter().zip(bytes.chunks_exact(layout.bytes())) {
+                let piece = pieces.entry(self.bucket_of(number, *key)).or_default();
+                piece.places.push(*key);
+                piece.rows.extend_from_slice(row);
+            }
+            Ok(())
+        })?;
+        Ok(pieces.into_iter().map(|(bucket, piece)| (bucket, piece.to_bytes())).collect())
+    }
+
+    /// Hands `rows` of a tile to `take`, some at a time, with their places.
+    pub(crate) fn each(
+        &self,
+        number: usize,
+        tile: &dyn SplatSource,
+        rows: Range<usize>,
+        progress: &dyn Progress,
+        take: &mut dyn FnMut(&mut Splats, &[MortonKey]) -> Result<()>,
+    ) -> Result<()> {
+        let (first, end) = match self.firsts.get(number..number + 2) {
+            Some(&[first, end]) => (first, end),
+            _ => return Err(Error::parameter("tile", number, format!("below {}", self.tiles()))),
+        };
+        if tile.len() as u64 != end - first {
+            let expected = format!("{} Gaussians, as when it was surveyed", end - first);
+            return Err(Error::parameter("tile", format!("{} Gaussians", tile.len()), expected));
+        }
+        let mut part = tile.empty();
+        for start in rows.clone().step_by(AT_ONCE) {
+            progress.check()?;
+            let own = start..rows.end.min(start + AT_ONCE);
+            tile.read(own.clone(), &mut part)?;
+            part.geometry.normals = Vec::new();
+            let number = (first + start as u64)..;
+            let keys = number.zip(&part.geometry.positions);
+            let keys: Vec<MortonKey> = keys.map(|(row, &p)| placed(&self.grid, p, row)).collect();
+            take(&mut part, &keys)?;
+            progress.advance(own.len() as u64 * tile.row_bytes());
+        }
+        Ok(())
+    }
+
+    /// The bucket of a Gaussian of a tile.
+    pub(crate) fn bucket_of(&self, tile: usize, key: MortonKey) -> usize {
+        let list = if self.is_one_each() { tile } else { 0 };
+        let before: usize = self.ends[..list].iter().map(|ends| ends.len() + 1).sum();
+        before + self.ends[list].partition_point(|end| *end <= key)
+    }
+
+    /// The number of the first Gaussian of the file that a bucket is of.
+    pub(super) fn first_of_file(&self, bucket: usize) -> u64 {
+        let files = self.files();
+        let file = files.partition_point(|file| file.end <= bucket);
+        if self.is_one_each() { self.firsts.get(file).copied().unwrap_or(0) } else { 0 }
+    }
+
+    /// Number of Gaussians of the source of a file.
+    pub(super) fn gaussians_of_file(&self, file: usize) -> u64 {
+        match self.firsts.get(file..file + 2) {
+            Some(&[first, end]) if self.is_one_each() => end - first,
+            _ => self.firsts.last().copied().unwrap_or(0),
+        }
+    }
+
+    /// A scene without Gaussians that has everything that all tiles have in common.
+    #[must_use]
+    pub fn empty(&self) -> Splats {
+        let extra =
+            |(name, kind): &(String, _)| Extra { name: name.clone(), values: ExtraValues::none(*kind) };
+        let extras = self.like.extras.iter().map(extra).collect();
+        Splats {
+            geometry: Geometry { extras, ..Geometry::default() },
+            degree: self.like.degree,
+            sh_rest: Vec::new(),
+            meta: self.like.meta.clone(),
+        }
+    }
+}
+
+/// Rows of a bucket.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(super) struct Piece {
+    pub(super) places: Vec<MortonKey>,
+    pub(super) rows: Vec<u8>,
+}
+
+impl Piece {
+    /// What its bytes are called.
+    const KIND: &'static str = "piece";
+
+    fn to_bytes(&self) -> Vec<u8> {
+        message::to_bytes(Self::KIND, self)
+    }
+
+    pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self> {
+        message::from_bytes(Self::KIND, bytes)
+    }
+}
+
+fn placed(grid: &Grid, position: Vec3, row: u64) -> MortonKey {
+    // Scenes have at most 2^32 - 2 Gaussians.
+    MortonKey { cell: grid.cell(position), source: u32::try_from(row).unwrap_or(u32::MAX) }
+}

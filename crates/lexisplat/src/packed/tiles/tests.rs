@@ -1,0 +1,221 @@
+//! The steps as separate processes take them.
+
+use super::*;
+use crate::packed::PackOptions;
+use crate::scene::source::SplatSource;
+use crate::scene::splats::Splats;
+use crate::stream::{self, Importance};
+use crate::support::sink::Sink;
+use crate::{Error, Extra, ExtraValues, Limits, Result, ShDegree, Silent, lexi};
+
+/// Gaussians of a bucket of these tests.
+const SMALL: usize = 9000;
+
+fn scene(count: usize, seed: u64) -> Splats {
+    let mut splats = crate::support::testing::scene(count, seed).with_degree_cut(ShDegree::ONE);
+    let values = ExtraValues::U32((0..u32::try_from(count).unwrap()).collect());
+    splats.geometry.extras = vec![Extra { name: "number".into(), values }];
+    splats
+}
+
+fn options() -> PackOptions {
+    PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
+}
+
+fn surveys(tiles: &[Splats]) -> Vec<(String, Vec<Survey>)> {
+    let of = |(number, tile): (usize, &Splats)| {
+        let blocks = Plan::blocks(tile.len()).map(|rows| {
+            let survey = Survey::of(tile, rows, 0, &Silent).unwrap();
+            Survey::from_bytes(&survey.to_bytes()).unwrap()
+        });
+        (format!("{number}.ply"), blocks.collect())
+    };
+    tiles.iter().enumerate().map(of).collect()
+}
+
+/// The files that workers make of `tiles`, of which each step begins with bytes and takes buckets and groups last one first.
+fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
+    let plan = Plan::with_bucket(&surveys(tiles), &options(), 38.0, one_each, SMALL).unwrap();
+    let plan = Plan::from_bytes(&plan.to_bytes()).unwrap();
+    let bucket = |wanted: usize| {
+        let mut reader = BucketReader::new(&plan, wanted);
+        // The order of blocks makes no difference either.
+        for (number, tile) in tiles.iter().enumerate().rev() {
+            match number {
+                1 => {
+                    let pieces = plan.scatter(number, tile, 0..tile.len(), &Silent).unwrap();
+                    let own = pieces.iter().filter(|(bucket, _)| *bucket == wanted);
+                    own.for_each(|(_, piece)| reader.add_piece(piece).unwrap());
+                }
+                _ => reader.add(number, tile, 0..tile.len(), &Silent).unwrap(),
+            }
+        }
+        reader.finish()
+    };
+    let backwards = |count: usize| (0..count).rev();
+    let mut looks: Vec<(Vec<u8>, Vec<u8>)> = backwards(plan.buckets())
+        .map(|number| {
+            let (statistics, looked) = bucket(number).look(&plan, None).unwrap();
+            (statistics.to_bytes(), looked.to_bytes())
+        })
+        .collect();
+    looks.reverse();
+    let statistics: Vec<_> = looks.iter().map(|look| LookStatistics::from_bytes(&look.0).unwrap()).collect();
+    let looked = |number: usize| Looked::from_bytes(&looks[number].1).unwrap();
+    let steps = Steps::from_bytes(&Steps::new(&plan, &statistics).unwrap().to_bytes()).unwrap();
+    let sample = |group: usize| {
+        let mut sample = Sample::new();
+        for number in plan.group(group) {
+            sample.add(&plan, &bucket(number), &looked(number)).unwrap();
+        }
+        sample
+    };
+    let of_groups = |of: &dyn Fn(usize) -> Vec<u8>| -> Vec<Vec<u8>> {
+        let mut all: Vec<Vec<u8>> = backwards(plan.groups()).map(of).collect();
+        all.reverse();
+        all
+    };
+    let groups = of_groups(&|group| sample(group).statistics(&plan, &steps).to_bytes());
+    let groups: Vec<_> = groups.iter().map(|bytes| SampleStatistics::from_bytes(bytes).unwrap()).collect();
+    let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
+    let found = loop {
+        lesson = Lesson::from_bytes(&lesson.to_bytes()).unwrap();
+        // Every worker is a new one, which draws the sample again.
+        let found = of_groups(&|group| sample(group).find(&plan, &steps, &lesson).to_bytes());
+        let found: Vec<_> = found.iter().map(|bytes| Findings::from_bytes(bytes).unwrap()).collect();
+        if lesson.is_over() {
+            break found;
+        }
+        lesson.advance(&found).unwrap();
+    };
+    let coding = Coding::new(&plan, &steps, &groups, Some((&lesson, &found))).unwrap();
+    let coding = Coding::from_bytes(&coding.to_bytes()).unwrap();
+    let mut coded: Vec<(Vec<u8>, Vec<u8>)> = backwards(plan.buckets())
+        .map(|number| {
+            let none = None::<&mut crate::packed::Refit<'_>>;
+            let done = coding.code(&plan, &bucket(number), &looked(number), none, &Silent).unwrap();
+            (done.0.to_bytes(), done.1.to_bytes())
+        })
+        .collect();
+    coded.reverse();
+    let counts: Vec<_> = coded.iter().map(|coded| Counts::from_bytes(&coded.0).unwrap()).collect();
+    let tables = Tables::from_bytes(&Tables::new(&counts).unwrap().to_bytes()).unwrap();
+    let mut written: Vec<Vec<u8>> = backwards(plan.buckets())
+        .map(|number| {
+            let coded = Coded::from_bytes(&coded[number].1).unwrap();
+            coded.with_tables(&plan, &coding, &tables).unwrap().to_bytes()
+        })
+        .collect();
+    written.reverse();
+    let file = |(number, own): (usize, std::ops::Range<usize>)| {
+        let mut bytes = Vec::new();
+        let mut assembly = Assembly::new(&plan, &coding, &tables, number, &mut bytes).unwrap();
+        for bucket in own.clone() {
+            assembly.push(Coded::from_bytes(&written[bucket]).unwrap()).unwrap();
+        }
+        let done = assembly.finish(&counts[own], None, &Silent).unwrap();
+        assert_eq!(done.file_bytes(), bytes.len() as u64);
+        bytes
+    };
+    plan.files().into_iter().enumerate().map(file).collect()
+}
+
+/// `splats` in so many tiles of different lengths.
+fn cut(splats: &Splats, tiles: usize) -> Vec<Splats> {
+    let ends: Vec<usize> = (0..=tiles).map(|k| splats.len() * k * (k + 3) / (tiles * (tiles + 3))).collect();
+    let part = |pair: &[usize]| {
+        let mut part = splats.empty();
+        splats.read(pair[0]..pair[1], &mut part).unwrap();
+        part
+    };
+    ends.windows(2).map(part).collect()
+}
+
+fn in_one_process(tiles: &[Splats]) -> Vec<u8> {
+    let named: Vec<(String, &dyn SplatSource)> =
+        tiles.iter().enumerate().map(|(k, tile)| (format!("{k}.ply"), tile as &dyn SplatSource)).collect();
+    let joined = crate::Joined::new(&named).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.lexi");
+    let sink = Sink::from(&output);
+    let none = Importance::<Error>::Heuristic;
+    stream::pack_in_buckets(&joined, none, &options(), 38.0, sink, SMALL, &Silent).unwrap();
+    std::fs::read(output).unwrap()
+}
+
+#[test]
+fn workers_make_the_bytes_of_one_process() {
+    let splats = scene(30_000, 4);
+    for tiles in [1, 3] {
+        let tiles = cut(&splats, tiles);
+        let [file] = by_workers(&tiles, false).try_into().unwrap();
+        assert!(file == in_one_process(&tiles), "{} tiles", tiles.len());
+        let model = lexi::read_bytes("t", &file, &Limits::default()).unwrap();
+        assert_eq!(model.geometry().extras, splats.geometry.extras);
+    }
+}
+
+#[test]
+fn one_file_each_holds_its_tile() {
+    let tiles = cut(&scene(30_000, 4), 3);
+    for (file, tile) in by_workers(&tiles, true).iter().zip(&tiles) {
+        let model = lexi::read_bytes("t", file, &Limits::default()).unwrap();
+        assert_eq!(model.geometry().extras, tile.geometry.extras);
+        let pairs = model.geometry().positions.iter().zip(&tile.geometry.positions);
+        let far = pairs.filter(|(a, b)| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1));
+        assert_eq!(far.count(), 0);
+    }
+}
+
+#[test]
+fn tiles_that_do_not_go_together_are_named() {
+    let tiles = cut(&scene(2000, 4), 3);
+    let refused = |change: &dyn Fn(&mut Splats)| -> String {
+        let mut tiles = tiles.clone();
+        change(&mut tiles[1]);
+        let planned = Plan::new(&surveys(&tiles), &options(), 38.0, false);
+        let named: Vec<(String, &dyn SplatSource)> = tiles
+            .iter()
+            .enumerate()
+            .map(|(k, tile)| (format!("{k}.ply"), tile as &dyn SplatSource))
+            .collect();
+        assert!(matches!(crate::Joined::new(&named), Err(Error::Format { .. })));
+        planned.unwrap_err().to_string()
+    };
+    let text = refused(&|tile| *tile = tile.with_degree_cut(ShDegree::ZERO));
+    assert_eq!(text, "1.ply: the tile has SH degree 0, where the tiles before have degree 1");
+    assert_eq!(refused(&|tile| *tile = tile.empty()), "1.ply: the tile has no Gaussians");
+    assert!(refused(&|tile| tile.geometry.extras.clear()).contains("the extra properties none, where"));
+    assert!(refused(&|tile| tile.meta.antialiased = true).contains("antialiasing"));
+    assert!(Plan::new(&[], &options(), 38.0, false).is_err());
+}
+
+#[test]
+fn damaged_messages_and_those_of_other_scenes_are_refused() {
+    let tiles = cut(&scene(3000, 4), 2);
+    let plan = Plan::new(&surveys(&tiles), &options(), 38.0, false).unwrap();
+    let bytes = plan.to_bytes();
+    for end in (0..bytes.len()).step_by(7) {
+        assert!(Plan::from_bytes(&bytes[..end]).is_err(), "{end}");
+        let mut damaged = bytes.clone();
+        damaged[end] ^= 1 << (end % 8);
+        assert!(Plan::from_bytes(&damaged).is_err(), "{end}");
+    }
+    let error = Looked::from_bytes(&bytes).unwrap_err().to_string();
+    assert!(error.contains("plan of version"), "{error}");
+    let bucket = |tiles: &[Splats]| -> Result<Bucket> {
+        let mut reader = BucketReader::new(&plan, 0);
+        for (number, tile) in tiles.iter().enumerate() {
+            reader.add(number, tile, 0..tile.len(), &Silent)?;
+        }
+        Ok(reader.finish())
+    };
+    // A tile that changed since it was surveyed.
+    let error = bucket(&[tiles[0].clone(), tiles[0].clone()]).unwrap_err().to_string();
+    assert!(error.contains("as when it was surveyed"), "{error}");
+    let whole = bucket(&tiles).unwrap();
+    let (statistics, looked) = whole.look(&plan, None).unwrap();
+    let part = bucket(&tiles[..1]).unwrap();
+    assert!(Sample::new().add(&plan, &part, &looked).is_err());
+    assert!(Steps::new(&plan, &[statistics.clone(), statistics]).is_err());
+}

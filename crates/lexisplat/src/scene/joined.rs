@@ -1,0 +1,127 @@
+//! Several sources as one scene.
+
+use std::ops::Range;
+
+use crate::packed::tiles::Survey;
+use crate::scene::source::{SplatSource, check_range};
+use crate::scene::splats::Splats;
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_GAUSSIANS};
+
+/// A scene of several tiles, one after the other.
+pub struct Joined<'a> {
+    tiles: Vec<&'a dyn SplatSource>,
+    /// Of each tile the number of Gaussians before it; then their number in all.
+    firsts: Vec<usize>,
+    empty: Splats,
+    warnings: Vec<String>,
+}
+
+impl std::fmt::Debug for Joined<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Joined").field("firsts", &self.firsts).finish_non_exhaustive()
+    }
+}
+
+impl<'a> Joined<'a> {
+    /// Joins `tiles`, each with its name. Comments are those of all, without repetitions.
+    ///
+    /// # Errors
+    /// [`Error::Format`] that names a tile without Gaussians or with another degree, other extras or another mark than the first,
+    /// [`Error::Parameter`] for no tiles, [`Error::Limit`] for too many Gaussians.
+    pub fn new(tiles: &[(String, &'a dyn SplatSource)]) -> Result<Self> {
+        let mut firsts = vec![0_usize];
+        let mut empty: Option<Splats> = None;
+        let mut warnings = Vec::new();
+        for (name, tile) in tiles {
+            let own = tile.empty();
+            Survey::check_tile(name, empty.as_ref(), &own, tile.len())?;
+            let empty = empty.get_or_insert_with(|| own.clone());
+            for comment in own.meta.comments {
+                if !empty.meta.comments.contains(&comment) {
+                    empty.meta.comments.push(comment);
+                }
+            }
+            warnings.extend(tile.warnings().iter().map(|warning| format!("{name}: {warning}")));
+            firsts.push(firsts.last().copied().unwrap_or(0).saturating_add(tile.len()));
+        }
+        let empty = empty.ok_or_else(|| Error::parameter("tiles", 0, "at least one"))?;
+        Limits::check("Gaussians", firsts.last().copied().unwrap_or(0) as u64, MAX_GAUSSIANS)?;
+        Ok(Self { tiles: tiles.iter().map(|tile| tile.1).collect(), firsts, empty, warnings })
+    }
+}
+
+impl SplatSource for Joined<'_> {
+    fn len(&self) -> usize {
+        self.firsts.last().copied().unwrap_or(0)
+    }
+
+    fn empty(&self) -> Splats {
+        self.empty.clone()
+    }
+
+    fn has_normals(&self) -> bool {
+        self.tiles.iter().all(|tile| tile.has_normals())
+    }
+
+    fn row_bytes(&self) -> u64 {
+        self.tiles.iter().map(|tile| tile.row_bytes()).max().unwrap_or(0)
+    }
+
+    fn source_bytes(&self) -> u64 {
+        self.tiles.iter().map(|tile| tile.source_bytes()).sum()
+    }
+
+    fn parts(&self) -> &[&dyn SplatSource] {
+        &self.tiles
+    }
+
+    fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()> {
+        check_range(&range, self.len())?;
+        *part = self.empty();
+        for (tile, bounds) in self.tiles.iter().zip(self.firsts.windows(2)) {
+            let own = range.start.max(bounds[0])..range.end.min(bounds[1]);
+            if own.is_empty() {
+                continue;
+            }
+            let mut next = tile.empty();
+            tile.read(own.start - bounds[0]..own.end - bounds[0], &mut next)?;
+            if !self.has_normals() {
+                next.geometry.normals = Vec::new();
+            }
+            part.append(next);
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_reach_over_tiles() {
+        let whole = crate::support::testing::scene(100, 1);
+        let part = |range: Range<usize>| {
+            let mut part = whole.empty();
+            whole.read(range, &mut part).unwrap();
+            part
+        };
+        let tiles = [part(0..30), part(30..31), part(31..100)];
+        let named: Vec<(String, &dyn SplatSource)> =
+            tiles.iter().map(|tile| (String::new(), tile as &dyn SplatSource)).collect();
+        let joined = Joined::new(&named).unwrap();
+        assert_eq!((joined.len(), joined.parts().len()), (100, 3));
+        let mut found = joined.empty();
+        for range in [0..100, 29..32, 30..31, 5..5, 90..100] {
+            joined.read(range.clone(), &mut found).unwrap();
+            assert_eq!(found, part(range));
+        }
+        assert!(joined.read(99..101, &mut found).is_err());
+        assert!(Joined::new(&[]).is_err());
+    }
+}

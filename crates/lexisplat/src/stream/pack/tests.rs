@@ -1,0 +1,239 @@
+//! Packing of scenes that are read a part at a time, with buckets of any size.
+
+use super::*;
+use crate::packed::{Appearance, CHUNK};
+use crate::{Extra, ExtraValues, Model, Silent, Splats, lexi, ply};
+
+fn scene(count: usize) -> Splats {
+    let mut splats = crate::support::testing::scene(count, 4);
+    splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
+    let values = ExtraValues::U32((0..u32::try_from(count).unwrap()).collect());
+    splats.geometry.extras = vec![Extra { name: "number".into(), values }];
+    splats
+}
+
+fn options() -> PackOptions {
+    PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
+}
+
+fn streamed(splats: &Splats, importance: Importance<'_>, bucket: usize) -> Result<(Vec<u8>, PackedFile)> {
+    streamed_with(splats, importance, &options(), bucket)
+}
+
+fn streamed_with(
+    splats: &Splats,
+    importance: Importance<'_>,
+    options: &PackOptions,
+    bucket: usize,
+) -> Result<(Vec<u8>, PackedFile)> {
+    let mut bytes = Vec::new();
+    ply::write(&mut bytes, splats).unwrap();
+    let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let output = folder.path().join("out.lexi");
+    let done = run(&chunks, importance, options, 38.0, Sink::from(&output), bucket, &Silent);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), usize::from(done.is_ok()));
+    done.map(|done| (std::fs::read(output).unwrap(), done))
+}
+
+/// Everything fits in one bucket and is of the sample: then nothing is left to differ.
+#[test]
+fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
+    for count in [CHUNK + 500, 700, 0] {
+        let splats = scene(count);
+        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+        let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
+        let (found, done) = streamed(&splats, Importance::Heuristic, BUCKET).unwrap();
+        // A judge that says of each Gaussian what the guess says.
+        let mut judge = |part: &Splats| {
+            assert_eq!(part.len(), splats.len());
+            Ok(Sensitivity::heuristic_part(&part.geometry, total))
+        };
+        assert!(
+            streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, BUCKET)
+                .unwrap()
+                .0
+                == found,
+            "{count}"
+        );
+        let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
+        let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
+        let mut expected = Vec::new();
+        LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
+        assert!(found == expected, "{count}");
+        assert_eq!(done.tensor_bytes, LexiWriter::packed(&packed).attribute_bytes());
+        let bits = packed.stream_bits().unwrap();
+        for (a, b) in done.report.stream_bits.iter().zip(&bits) {
+            assert!((a.bits - b.bits).abs() <= 1e-9 * b.bits, "{a:?} {b:?}");
+        }
+    }
+}
+
+/// Without every fifth Gaussian pictures stay as they are.
+fn shown(part: &Splats, total: f64) -> Sensitivity {
+    let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
+    let mut sensitivity = Sensitivity::heuristic_part(&part.geometry, total);
+    sensitivity.removal.fill(0.5);
+    for (opacity, _) in sensitivity.opacity.iter_mut().zip(numbers).filter(|(_, n)| n.is_multiple_of(5)) {
+        *opacity = 1e-25;
+    }
+    sensitivity
+}
+
+#[test]
+fn what_is_not_worth_its_bits_is_left_out() {
+    let options = PackOptions { keep_order: false, ..options() };
+    let splats = scene(CHUNK + 9000);
+    let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+    let packer = Packer::new(&splats, &shown(&splats, total), &options).unwrap();
+    let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
+    let mut expected = Vec::new();
+    LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
+    let mut judge = |part: &Splats| Ok(shown(part, total));
+    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let (found, done) = streamed_with(&splats, importance, &options, BUCKET).unwrap();
+    assert!(found == expected);
+    assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
+    // Chunks are filled from several buckets, and rows stay together.
+    let small = 9000;
+    let mut judge = |part: &Splats| Ok(shown(part, total));
+    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let (found, done) = streamed_with(&splats, importance, &options, small).unwrap();
+    let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+    let geometry = model.geometry();
+    assert_eq!((geometry.len(), done.head.gaussians), (model.len(), model.len()));
+    assert_eq!(done.head.removed, (splats.len() - model.len()) as u64);
+    let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
+    assert!(numbers.iter().all(|n| !n.is_multiple_of(5)));
+    for (position, &number) in geometry.positions.iter().zip(numbers) {
+        let original = splats.geometry.positions[number as usize];
+        assert!((0..3).all(|k| (position[k] - original[k]).abs() < 0.1), "{number}");
+    }
+}
+
+#[test]
+fn appearances_are_fitted_part_by_part() {
+    let options = PackOptions { keep_order: false, ..options() };
+    let splats = scene(CHUNK + 9000);
+    let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+    let others = |model: &Model| -> Vec<Appearance> {
+        let moved = |i| {
+            let Appearance { dc, log_opacity } = Appearance::of(model.geometry(), i);
+            Appearance { dc: dc.map(|v| v + 0.5), log_opacity: log_opacity - 0.3 }
+        };
+        (0..model.len()).map(moved).collect()
+    };
+    let fitted = |options: &PackOptions, bucket: usize| {
+        let mut judge = |part: &Splats| Ok(shown(part, total));
+        let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+            // The part has what the file leaves out, and the rest is in order.
+            assert!(part.len() > model.len() || options.keep_order);
+            assert_eq!(model.len(), weights.len());
+            Ok(others(model))
+        };
+        let importance = Importance::Judge { judge: &mut judge, refit: Some(&mut refit), device: None };
+        streamed_with(&splats, importance, options, bucket).unwrap().0
+    };
+    let sensitivity = shown(&splats, total);
+    let file = |options: &PackOptions, fitted: bool| {
+        let packer = Packer::new(&splats, &sensitivity, options).unwrap();
+        let quantised = packer.quantise(packer.step_for(38.0), true, &Silent).unwrap();
+        let model = quantised.finish(None, None, &Silent).unwrap().0.unpack().unwrap();
+        let shown = fitted.then(|| others(&model));
+        let (packed, _) = quantised.finish(shown.as_deref(), None, &Silent).unwrap();
+        let mut bytes = Vec::new();
+        LexiWriter::packed(&packed).write(&mut bytes, &Silent).unwrap();
+        bytes
+    };
+    assert!(fitted(&options, BUCKET) == file(&options, true));
+    let keeps = PackOptions { keep_order: true, ..options.clone() };
+    assert!(fitted(&keeps, BUCKET) == file(&keeps, false));
+    let model = lexi::read_bytes("t", &fitted(&options, 9000), &Limits::default());
+    let model = model.unwrap();
+    let ExtraValues::U32(numbers) = &model.geometry().extras[0].values else { panic!("not u32") };
+    let moved = model.geometry().dc.iter().zip(numbers);
+    let moved = moved.map(|(dc, &number)| f64::from(dc[0] - splats.geometry.dc[number as usize][0]));
+    let mean = moved.sum::<f64>() / model.len() as f64;
+    assert!((0.45..0.55).contains(&mean), "{mean}");
+}
+
+#[test]
+fn one_gaussian_stays() {
+    let options = PackOptions { keep_order: false, ..options() };
+    let splats = scene(9000);
+    let small = 3000;
+    let mut judge = |part: &Splats| {
+        let mut none = Sensitivity::heuristic(&part.geometry);
+        none.removal.fill(0.5);
+        none.opacity.fill(0.0);
+        Ok(none)
+    };
+    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let (found, _) = streamed_with(&splats, importance, &options, small).unwrap();
+    assert_eq!(lexi::read_bytes("t", &found, &Limits::default()).unwrap().len(), 1);
+}
+
+#[test]
+fn buckets_make_a_file_that_is_as_good() {
+    let splats = scene(4 * CHUNK + 2000);
+    let small = CHUNK;
+    let (found, done) = streamed(&splats, Importance::Heuristic, small).unwrap();
+    let (whole, _) = streamed(&splats, Importance::Heuristic, BUCKET).unwrap();
+    let ratio = found.len() as f64 / whole.len() as f64;
+    assert!((0.97..1.03).contains(&ratio), "{ratio}");
+    let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+    // The order was kept, so each Gaussian is where it was.
+    assert_eq!(model.geometry().extras, splats.geometry.extras);
+    let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
+    let moved = model.geometry().positions.iter().zip(&splats.geometry.positions).filter(|&p| far(p));
+    assert_eq!(moved.count(), 0);
+    assert_eq!(done.head.gaussians, splats.len());
+    assert_eq!(done.report.nonzero_histogram.iter().sum::<u64>() + done.report.escapes, splats.len() as u64);
+}
+
+#[test]
+fn every_gaussian_is_judged_once_beside_its_neighbours() {
+    let splats = scene(12_000);
+    let small = 3000;
+    let mut seen = Vec::new();
+    let mut parts = 0;
+    let mut judge = |part: &Splats| {
+        let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
+        seen.extend_from_slice(numbers);
+        parts += 1;
+        Ok(Sensitivity::heuristic(&part.geometry))
+    };
+    let (found, _) =
+        streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, small).unwrap();
+    assert_eq!(parts, 4);
+    let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+    assert_eq!(model.geometry().extras, splats.geometry.extras);
+    seen.sort_unstable();
+    assert!(seen.into_iter().eq(0..12_000));
+}
+
+#[test]
+fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
+    let splats = scene(700);
+    let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
+        streamed(&splats, Importance::Judge { judge, refit: None, device: None }, BUCKET)
+            .unwrap_err()
+            .to_string()
+    };
+    let error = refused(&mut |part| Ok(Sensitivity::zeros(part.len() - 1)));
+    assert!(error.contains("699") && error.contains("700"), "{error}");
+    let mut broken = Sensitivity::zeros(700);
+    broken.opacity[3] = f32::NAN;
+    assert!(refused(&mut |_| Ok(broken.clone())).contains("NaN"));
+    assert_eq!(refused(&mut |_| Err(Error::parameter("view", 7, "none"))), "view = 7: none");
+}
+
+#[test]
+fn gaussians_in_one_place_do_not_make_one_bucket_of_all() {
+    let mut splats = scene(5000);
+    splats.geometry.positions.fill([1.0; 3]);
+    let small = 700;
+    let (found, _) = streamed(&splats, Importance::Heuristic, small).unwrap();
+    let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
+    assert_eq!(model.geometry().extras, splats.geometry.extras);
+}
