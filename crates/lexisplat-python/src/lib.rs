@@ -15,6 +15,7 @@ mod files;
 mod learn;
 mod metrics;
 mod scene;
+mod tiles;
 mod work;
 
 use pyo3::prelude::*;
@@ -40,10 +41,18 @@ mod _native {
     use crate::metrics::score;
     #[pymodule_export]
     use crate::scene::{Scene, open_scene};
+    #[pymodule_export]
+    use crate::tiles::{
+        TileSample, tile_advance, tile_assemble, tile_check, tile_code, tile_coding, tile_count, tile_finish,
+        tile_lesson, tile_look, tile_open, tile_plan, tile_scatter, tile_steps, tile_survey, tile_tables,
+        tile_whole,
+    };
     use pyo3::prelude::*;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        module.add("__version__", env!("CARGO_PKG_VERSION"))
+        module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+        module.add("TILE_BLOCK", lexisplat::packed::tiles::BLOCK)?;
+        module.add("TILE_BUCKET", lexisplat::packed::tiles::BUCKET)
     }
 }

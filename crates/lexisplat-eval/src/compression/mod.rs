@@ -32,6 +32,7 @@ mod report;
 mod run;
 mod solve;
 mod target;
+pub mod tiles;
 mod views;
 
 pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};

@@ -62,7 +62,7 @@ impl Compression {
 }
 
 /// Packs part by part. `renderer` measures the parts. Without one the heuristic does.
-fn in_parts(
+pub(super) fn in_parts(
     options: &PackOptions,
     preset: Preset,
     mut renderer: Option<Renderer>,

@@ -135,19 +135,18 @@ fn in_buckets<E: From<Error>>(
 
     progress.begin(Stage::Look, plan.len() as u64);
     let (mut statistics, mut all_looked) = (Vec::new(), Messages::new(to)?);
-    let mut samples = Vec::new();
-    for group in 0..plan.groups() {
-        let mut sample = Sample::new();
-        for number in plan.group(group) {
-            progress.check()?;
-            let bucket = ordered.bucket(number, false)?;
-            let (own, looked) = bucket.look(&plan, importance.of(bucket.splats())?)?;
+    let groups: Vec<Vec<usize>> = (0..plan.groups()).map(|group| plan.group(group)).collect();
+    let mut samples: Vec<Sample> = groups.iter().map(|_| Sample::new()).collect();
+    for number in 0..plan.buckets() {
+        progress.check()?;
+        let bucket = ordered.bucket(number, false)?;
+        let (own, looked) = bucket.look(&plan, importance.of(bucket.splats())?)?;
+        for (sample, _) in samples.iter_mut().zip(&groups).filter(|(_, group)| group.contains(&number)) {
             sample.add(&plan, &bucket, &looked)?;
-            all_looked.push(&looked.to_bytes())?;
-            statistics.push(own);
-            progress.advance(bucket.splats().len() as u64);
         }
-        samples.push(sample);
+        all_looked.push(&looked.to_bytes())?;
+        statistics.push(own);
+        progress.advance(bucket.splats().len() as u64);
     }
     progress.end();
     let before = clock.seconds();
@@ -169,7 +168,7 @@ fn in_buckets<E: From<Error>>(
     progress.end();
     drop((ordered, all_looked));
     let tables = Tables::new(&counts)?;
-    let mut assembly = Assembly::new(&plan, &coding, &tables, 0, sink)?;
+    let mut assembly = Assembly::new(&plan, &coding, &tables, 0, &folder)?;
     let mut all_coded = all_coded.finish()?;
     for _ in 0..plan.buckets() {
         progress.check()?;
@@ -177,7 +176,7 @@ fn in_buckets<E: From<Error>>(
         assembly.push(coded.with_tables(&plan, &coding, &tables)?)?;
     }
     let device = importance.device().map(str::to_owned);
-    let mut done = assembly.finish(&counts, device, progress)?;
+    let mut done = assembly.finish(&counts, device, sink, progress)?;
     done.report.learn_seconds = learn_seconds;
     done.report.code_seconds = clock.seconds() - before - learn_seconds;
     Ok(done)

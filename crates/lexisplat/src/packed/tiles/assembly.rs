@@ -1,5 +1,7 @@
 //! Makes a file of coded buckets.
 
+use std::path::Path;
+
 use super::coding::{Coded, Coding, Counts, Tables};
 use super::plan::Plan;
 use crate::formats::lexi::LexiWriter;
@@ -16,13 +18,12 @@ use crate::support::spill::{Spill, SpillTo, Spilled};
 
 /// A file that is being made of coded buckets.
 #[derive(Debug)]
-pub struct Assembly<'a, 's> {
+pub struct Assembly<'a> {
     plan: &'a Plan,
     coding: &'a Coding,
     tables: &'a Tables,
     /// Number of the file.
     file: usize,
-    sink: Sink<'s>,
     /// The bucket that comes next.
     next: usize,
     ranges: Ranges,
@@ -37,8 +38,8 @@ struct Layer {
     extras: SpilledExtras,
 }
 
-impl<'a, 's> Assembly<'a, 's> {
-    /// Begins file `file` of [`Plan::files`]. Its buckets lie in temporary files beside the output until it is written.
+impl<'a> Assembly<'a> {
+    /// Begins file `file` of [`Plan::files`]. Its buckets lie in temporary files in `folder` until it is written.
     ///
     /// # Errors
     /// [`Error::Parameter`] if there is no such file, [`Error::Io`] for temporary files.
@@ -47,15 +48,13 @@ impl<'a, 's> Assembly<'a, 's> {
         coding: &'a Coding,
         tables: &'a Tables,
         file: usize,
-        sink: impl Into<Sink<'s>>,
+        folder: impl AsRef<Path>,
     ) -> Result<Self> {
-        let sink = sink.into();
         let files = plan.files();
         let own = files
             .get(file)
             .ok_or_else(|| Error::parameter("file", file, format!("below {}", files.len())))?;
-        let folder = sink.spill_folder()?;
-        let to = SpillTo::Folder(&folder);
+        let to = SpillTo::Folder(folder.as_ref());
         let layer = |_| {
             Ok(Layer {
                 gaussians: 0,
@@ -64,7 +63,7 @@ impl<'a, 's> Assembly<'a, 's> {
             })
         };
         let layers = (0..coding.steps.layering.layers()).map(layer).collect::<Result<_>>()?;
-        Ok(Self { plan, coding, tables, file, sink, next: own.start, ranges: Ranges::new(to)?, layers })
+        Ok(Self { plan, coding, tables, file, next: own.start, ranges: Ranges::new(to)?, layers })
     }
 
     /// Adds the next bucket.
@@ -88,18 +87,19 @@ impl<'a, 's> Assembly<'a, 's> {
         Ok(())
     }
 
-    /// Writes the file, when all buckets are there. `counts` are those of its buckets, in order. `device` is the GPU that looked at
+    /// Writes the file to `sink`, when all buckets are there. `counts` are those of its buckets, in order. `device` is the GPU that looked at
     /// them, if one did.
     ///
     /// # Errors
     /// [`Error::Parameter`] if buckets are missing, [`Error::Io`], [`Error::Writer`] and [`Error::Cancelled`].
-    pub fn finish(
+    pub fn finish<'s>(
         self,
         counts: &[Counts],
         device: Option<String>,
+        sink: impl Into<Sink<'s>>,
         progress: &dyn Progress,
     ) -> Result<PackedFile> {
-        let Self { plan, coding, tables, file, sink, next, ranges, layers } = self;
+        let Self { plan, coding, tables, file, next, ranges, layers } = self;
         let own = plan.files()[file].clone();
         let all = Counts::sum(counts).filter(|_| next == own.end && counts.len() == own.len());
         let missing = || Error::parameter("buckets", counts.len(), format!("all {} of the file", own.len()));
@@ -118,7 +118,7 @@ impl<'a, 's> Assembly<'a, 's> {
         }
         let orders = orders.into_iter().collect::<Result<Vec<_>>>()?;
         let order = (!orders.is_empty()).then_some(orders);
-        write(head, SpilledPacked { data, order, extras: by_column(extras) }, report, sink, progress)
+        write(head, SpilledPacked { data, order, extras: by_column(extras) }, report, sink.into(), progress)
     }
 }
 

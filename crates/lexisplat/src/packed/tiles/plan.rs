@@ -19,8 +19,10 @@ use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
 
-/// Most groups of buckets whose samples are learned from. Every group sends a sum in every round.
+/// Most groups of buckets whose samples are learned from. Every group sends a sum in every round, and rounds take a second in all.
 const GROUPS: usize = 2;
+/// Most buckets that are sampled, evenly spread, so that drawing samples takes as long in any scene.
+const SAMPLED: usize = 32;
 
 /// What is settled of a scene before any of it is looked at.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -165,15 +167,17 @@ impl Plan {
         self.buckets().min(GROUPS)
     }
 
-    /// The buckets of a group.
-    ///
-    /// # Panics
-    /// If there is no group `group`.
+    /// The buckets of a group: of all buckets some, evenly spread. None if there is no such group.
     #[must_use]
-    pub fn group(&self, group: usize) -> Range<usize> {
-        let (groups, buckets) = (self.groups(), self.buckets());
-        assert!(group < groups, "{group} of {groups} groups");
-        group * buckets / groups..(group + 1) * buckets / groups
+    pub fn group(&self, group: usize) -> Vec<usize> {
+        let (groups, sampled, buckets) = (self.groups(), self.sampled(), self.buckets());
+        let own = group * sampled / groups.max(1)..(group + 1) * sampled / groups.max(1);
+        own.filter(|_| group < groups).map(|k| k * buckets / sampled).collect()
+    }
+
+    /// Number of buckets that are sampled.
+    pub(super) fn sampled(&self) -> usize {
+        self.buckets().min(SAMPLED)
     }
 
     /// The blocks of a tile of `gaussians` Gaussians.

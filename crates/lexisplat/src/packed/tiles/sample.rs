@@ -80,7 +80,9 @@ impl Sample {
         let n = bucket.splats.len();
         let (weights, stays) = looked.of_each(n, false)?;
         // Of so many runs one is taken, in the next bucket the next.
-        let every = plan.len().div_ceil(FITTED).max(1);
+        let share = plan.sampled() as f64 / plan.buckets().max(1) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+        let every = ((plan.len() as f64 * share / FITTED as f64).ceil() as usize).max(1);
         let is_taken = |i: usize| (i / RUN + bucket.number).is_multiple_of(every);
         let keep: Vec<bool> = (0..n).map(is_taken).collect();
         let mut splats = bucket.splats.clone();
@@ -150,8 +152,9 @@ impl Sample {
                 let free = steps.steps.classes_of(&weights);
                 let classes = steps.floor.classes(&free, &part.splats.geometry, &scene);
                 let view = View::new(&part.splats, &scene, &classes);
-                let share = steps.kept.get(part.bucket).copied().unwrap_or(0) as f64;
-                let share = share / steps.kept().max(1) as f64;
+                let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
+                let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
+                let share = kept(part.bucket) / sampled.map(kept).sum::<f64>().max(1.0);
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
                 let wanted = (SAMPLE as f64 * share).round() as usize;
                 let seed = plan.options.seed ^ SAMPLE_STREAM ^ part.bucket as u64;

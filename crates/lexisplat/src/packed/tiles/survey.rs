@@ -130,6 +130,15 @@ impl Survey {
         Ok(survey)
     }
 
+    /// Refuses the tile `name` that this block is of, if it has no Gaussians or does not go together with the tile that `before` is
+    /// of.
+    ///
+    /// # Errors
+    /// [`Error::Format`] that names the tile.
+    pub fn check(&self, name: &str, before: Option<&Self>) -> Result<()> {
+        self.like.check(name, before.map(|before| &before.like), self.gaussians)
+    }
+
     /// Refuses a tile that has no Gaussians or does not go together with those before, which are like `before`.
     pub(crate) fn check_tile(
         name: &str,

@@ -109,11 +109,12 @@ fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
     written.reverse();
     let file = |(number, own): (usize, std::ops::Range<usize>)| {
         let mut bytes = Vec::new();
-        let mut assembly = Assembly::new(&plan, &coding, &tables, number, &mut bytes).unwrap();
+        let folder = std::env::temp_dir();
+        let mut assembly = Assembly::new(&plan, &coding, &tables, number, folder).unwrap();
         for bucket in own.clone() {
             assembly.push(Coded::from_bytes(&written[bucket]).unwrap()).unwrap();
         }
-        let done = assembly.finish(&counts[own], None, &Silent).unwrap();
+        let done = assembly.finish(&counts[own], None, &mut bytes, &Silent).unwrap();
         assert_eq!(done.file_bytes(), bytes.len() as u64);
         bytes
     };

@@ -1,0 +1,73 @@
+//! The steps of [`lexisplat::packed::tiles`] that draw.
+
+use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
+use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::stream::PackedFile;
+use lexisplat::{Model, Progress, Sink, SplatSource, Splats};
+use lexisplat_render::Renderer;
+
+use super::refit::appearances_of_part;
+use super::report::{CompressionReport, SensitivitySource};
+use super::run::{in_parts, look_at_part};
+use crate::error::Result;
+
+/// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.
+///
+/// # Errors
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not fit.
+pub fn look(
+    plan: &Plan,
+    bucket: &Bucket,
+    renderer: Option<&mut Renderer>,
+    progress: &dyn Progress,
+) -> Result<(LookStatistics, Looked)> {
+    let found = match renderer {
+        // There is nothing to look at.
+        Some(renderer) if !bucket.splats().is_empty() => {
+            Some(look_at_part(renderer, bucket.splats(), progress)?)
+        }
+        _ => None,
+    };
+    Ok(bucket.look(plan, found)?)
+}
+
+/// Codes a bucket. What it shows is fitted to pictures if it was looked at and not `guessed`.
+///
+/// # Errors
+/// As [`Coding::code`], and errors of drawing.
+pub fn code(
+    plan: &Plan,
+    coding: &Coding,
+    bucket: &Bucket,
+    looked: &Looked,
+    guessed: bool,
+    progress: &dyn Progress,
+) -> Result<(Counts, Coded)> {
+    let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+        appearances_of_part(part, model, weights, progress)
+    };
+    coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
+}
+
+/// Packs a scene in one process as several would do it: bucket by bucket, or as a whole if it is one bucket.
+///
+/// # Errors
+/// As [`lexisplat::stream::pack`], and errors of drawing.
+pub fn pack(
+    options: &PackOptions,
+    preset: Preset,
+    renderer: Option<Renderer>,
+    source: &dyn SplatSource,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
+) -> Result<CompressionReport> {
+    in_parts(options, preset, renderer, source, sink, progress)
+}
+
+/// The report of a file that was assembled of buckets, which were looked at or `guessed`.
+#[must_use]
+pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
+    let origin = if guessed { SensitivitySource::Heuristic } else { SensitivitySource::Views };
+    let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
+    CompressionReport { in_parts: true, ..report }
+}

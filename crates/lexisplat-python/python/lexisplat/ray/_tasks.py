@@ -1,0 +1,137 @@
+"""What Ray runs: each step of the library as a task, and a sample as an actor. What they take and give are bytes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple, Union
+
+import ray
+
+from .. import _native
+from .._device import quiet
+from ._tiles import loaded
+
+#: A range of rows.
+Rows = tuple[int, int]
+#: Of a bucket: numbers of tiles, the tiles, and the rows to look in.
+Reads = list[tuple[int, Any, list[Rows]]]
+#: The same, or references to pieces that were scattered.
+Pieces = Union[Reads, list[Any]]
+#: Rows that are told apart by the buckets that get some of them.
+COUNTED = 4096
+
+
+class Context:
+    """What all tasks of a scene take beside their own arguments."""
+
+    def __init__(self, choices: dict[str, Any], limit: dict[str, int] | None, threads: int) -> None:
+        self.choices, self.limit, self.threads = choices, limit, threads
+
+    def begin(self) -> None:
+        """Limits the threads of this process, which begin with the first work that it does."""
+        os.environ.setdefault("RAYON_NUM_THREADS", str(self.threads))
+
+
+def _here(given: Any) -> Any:
+    """A tile as the native part reads it."""
+    return loaded(ray.get(given) if isinstance(given, ray.ObjectRef) else given)
+
+
+def _pieces(pieces: Pieces) -> Any:
+    if pieces and isinstance(pieces[0], ray.ObjectRef):
+        return [piece for piece in ray.get(list(pieces)) if piece is not None]
+    return [(number, _here(given), rows) for number, given, rows in pieces]
+
+
+def open_tile(context: Context, given: Any) -> tuple[int, int, list[str]]:
+    """Number of Gaussians, bytes and warnings of a tile."""
+    context.begin()
+    return _native.tile_open(_here(given), context.choices, context.limit)
+
+
+def survey(context: Context, given: Any, rows: Rows) -> bytes:
+    context.begin()
+    return _native.tile_survey(_here(given), rows, context.choices, context.limit)
+
+
+def count(context: Context, plan: bytes, number: int, given: Any, rows: Rows) -> list[tuple[int, list[Rows]]]:
+    context.begin()
+    return _native.tile_count(plan, number, _here(given), rows, COUNTED, context.choices, context.limit)
+
+
+def scatter(context: Context, plan: bytes, number: int, given: Any, rows: Rows, buckets: int) -> Any:
+    context.begin()
+    found = dict(_native.tile_scatter(plan, number, _here(given), rows, context.choices, context.limit))
+    pieces = [found.get(bucket) for bucket in range(buckets)]
+    return pieces[0] if buckets == 1 else pieces
+
+
+def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[tuple[bytes, int, str | None], bytes]:
+    """Statistics, the length of what is remembered, and the GPU that looked; what is remembered."""
+    context.begin()
+    with quiet(context.choices["device"]):
+        statistics, looked, gpu = _native.tile_look(plan, bucket, _pieces(pieces), context.choices, context.limit)
+    return (statistics, len(looked), gpu), looked
+
+
+class Draw(NamedTuple):
+    """What a sample is drawn from: references to the context and the plan, and of each bucket its pieces and a reference to what is
+    remembered of it."""
+
+    context: Any
+    plan: Any
+    buckets: Sequence[int]
+    pieces: Sequence[Pieces]
+    looked: Sequence[Any]
+
+
+class Group:
+    """The sample of a group of buckets, which stays in this process. One that Ray starts again draws it again."""
+
+    def __init__(self) -> None:
+        self._sample: _native.TileSample | None = None
+
+    def _drawn(self, draw: Draw) -> _native.TileSample:
+        if self._sample is None:
+            context, plan = ray.get([draw.context, draw.plan])
+            context.begin()
+            sample = _native.TileSample(plan)
+            for bucket, own, ref in zip(draw.buckets, draw.pieces, draw.looked):
+                sample.add(bucket, _pieces(own), ray.get(ref), context.choices, context.limit)
+            self._sample = sample
+        return self._sample
+
+    def statistics(self, draw: Draw, steps: bytes) -> bytes:
+        return self._drawn(draw).statistics(steps)
+
+    def find(self, draw: Draw, steps: bytes, lesson: bytes) -> bytes:
+        return self._drawn(draw).find(steps, lesson)
+
+
+def code(
+    context: Context, plan: bytes, coding: bytes, bucket: int, pieces: Pieces, looked: bytes
+) -> tuple[tuple[bytes, int], bytes]:
+    """Counts, and the length of the coded bucket; the coded bucket."""
+    context.begin()
+    choices, limit = context.choices, context.limit
+    counts, coded = _native.tile_code(plan, coding, bucket, _pieces(pieces), looked, choices, limit)
+    return (counts, len(coded)), coded
+
+
+def finish(context: Context, plan: bytes, coding: bytes, tables: bytes, coded: bytes) -> bytes:
+    context.begin()
+    return _native.tile_finish(plan, coding, tables, coded)
+
+
+def whole(context: Context, tiles: Sequence[tuple[str, Any]]) -> tuple[bytes, str]:
+    context.begin()
+    given = [(name, _here(tile)) for name, tile in tiles]
+    with quiet(context.choices["device"]):
+        return _native.tile_whole(given, context.choices, context.limit)
+
+
+def blocks(gaussians: int) -> Iterator[Rows]:
+    """The blocks of rows of a tile. One without Gaussians has an empty one."""
+    size = _native.TILE_BLOCK
+    return ((start, min(gaussians, start + size)) for start in range(0, max(gaussians, 1), size))

@@ -1,0 +1,89 @@
+"""Hands tasks to Ray, waits for them, counts what passes, and tells of progress."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import ray
+from ray.exceptions import RayTaskError
+
+from .._errors import Error
+from .._progress import ProgressCallback
+from ._tasks import Context
+
+#: Times that Ray runs a task again whose worker was lost. A scene is not given up for a machine that restarts.
+RETRIES = 10
+
+
+class Work:
+    """The tasks of one scene."""
+
+    def __init__(self, context: Context, progress: ProgressCallback | None) -> None:
+        self.context = ray.put(context)
+        self._threads = context.threads
+        self._progress = progress
+        self._pending: set[Any] = set()
+        self._remotes: dict[Callable[..., Any], Any] = {}
+        #: Bytes that passed between processes: statistics and what all tasks take, what is remembered of each Gaussian, scattered
+        #: rows, and coded buckets.
+        self.traffic = {"statistics": 0, "state": 0, "scattered": 0, "results": 0}
+
+    def shared(self, message: bytes) -> Any:
+        """A reference to bytes that several tasks take."""
+        self.traffic["statistics"] += len(message)
+        return ray.put(message)
+
+    def start(self, task: Callable[..., Any], *arguments: Any, returns: int = 1) -> Any:
+        """Starts a task. Returns references to what it gives."""
+        # Ray sends a function to all workers each time one is made of it.
+        if task not in self._remotes:
+            self._remotes[task] = ray.remote(num_cpus=self._threads, max_retries=RETRIES)(task)
+        refs = self._remotes[task].options(num_returns=returns).remote(self.context, *arguments)
+        self._pending.update(refs if returns > 1 else [refs])
+        return refs
+
+    def actors(self, kind: type, count: int) -> list[Any]:
+        """Starts actors. They take no processors of their own, since all others are idle while they work."""
+        remote = ray.remote(num_cpus=0, max_restarts=-1, max_task_retries=-1)(kind)
+        return [remote.remote() for _ in range(count)]
+
+    def results(self, stage: str, refs: Sequence[Any], weights: Sequence[int] | None = None) -> list[Any]:
+        """What all of ``refs`` give, in order. The first failure ends the wait."""
+        weights = [1] * len(refs) if weights is None else weights
+        total, done = sum(weights), 0
+        self.tell(stage, 0, total)
+        by_ref = dict(zip(refs, weights))
+        left = list(refs)
+        while left:
+            ready, left = ray.wait(left, num_returns=1)
+            # Raises what the task raised.
+            self.get(ready[0])
+            done += by_ref[ready[0]]
+            self.tell(stage, done, total)
+        return [self.get(ref) for ref in refs]
+
+    def get(self, ref: Any) -> Any:
+        """What ``ref`` gives. What a task raised is raised as if it had been done here."""
+        try:
+            result = ray.get(ref)
+        except RayTaskError as error:
+            cause = error.cause
+            if isinstance(cause, (Error, ImportError, TypeError, MemoryError, KeyboardInterrupt)):
+                raise cause from None
+            raise
+        self._pending.discard(ref)
+        return result
+
+    def tell(self, stage: str, done: int, total: int) -> None:
+        if self._progress is not None:
+            self._progress(stage, done, total)
+
+    def cancel(self) -> None:
+        """Cancels what was started and not waited for."""
+        for ref in self._pending:
+            try:
+                ray.cancel(ref)
+            except (ValueError, TypeError, ray.exceptions.RayError):
+                continue
+        self._pending.clear()

@@ -1,0 +1,555 @@
+//! The steps of packing a scene in tiles, each on bytes of the one before. `lexisplat.ray` runs them in tasks.
+
+use std::path::{Path, PathBuf};
+
+use lexisplat::packed::tiles::{
+    Assembly, Bucket, BucketReader, Coded, Coding, Counts, Findings, Lesson, LookStatistics, Looked, Plan,
+    Sample, SampleStatistics, Steps, Survey, Tables,
+};
+use lexisplat::packed::{PackOptions, Preset};
+use lexisplat::ply::ReadOptions;
+use lexisplat::{Joined, Silent, SplatSource, Splats};
+use lexisplat_eval::Error;
+use lexisplat_eval::compression::tiles;
+use lexisplat_formats::{Opened, Siblings, open, scene_path};
+use lexisplat_render::{Device, Renderer};
+use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::arrays::from_python;
+use crate::bytes::{Bytes, Given};
+use crate::draw::device;
+use crate::errors::{Result, raise};
+use crate::files::{json, output, read_options};
+use crate::work::without_gil;
+
+/// A tile: a file, or arrays that Ray holds.
+enum Tile {
+    File(String, Bytes, PathBuf),
+    Splats(Box<Splats>),
+}
+
+impl Tile {
+    fn of(given: &Bound<'_, PyAny>, options: &ReadOptions) -> PyResult<Self> {
+        let Ok(path) = given.extract::<PathBuf>() else {
+            return Ok(Self::Splats(Box::new(from_python(given)?)));
+        };
+        let name = path.display().to_string();
+        let scene = scene_path(&path).into_owned();
+        let bytes = Given::Path(scene.clone()).bytes(&options.limits).map_err(|e| raise(given.py(), &e))?;
+        Ok(Self::File(name, bytes, scene))
+    }
+
+    /// Does `work` with it.
+    fn with<T>(
+        &self,
+        options: &ReadOptions,
+        work: &mut dyn FnMut(&dyn SplatSource) -> Result<T>,
+    ) -> Result<T> {
+        match self {
+            Self::Splats(splats) => work(&**splats),
+            Self::File(name, bytes, scene) => {
+                match open(name, bytes.as_ref(), Siblings::of(scene), options, false, &Silent)? {
+                    Opened::Lexi(_) => Err(Error::format(name, "it is compressed already")),
+                    opened => work(opened.source()),
+                }
+            }
+        }
+    }
+}
+
+/// How tiles are read, and what is done with them, as Python names it.
+#[derive(FromPyObject)]
+#[pyo3(from_item_all)]
+pub(crate) struct Choices {
+    preset: Option<String>,
+    tol: Option<f64>,
+    atoms: Option<usize>,
+    seed: u64,
+    keep_order: bool,
+    keep_all: bool,
+    guess: bool,
+    device: String,
+    drop_invalid: bool,
+    drop_extras: bool,
+}
+
+impl Choices {
+    fn reading(&self, py: Python<'_>, limit: Option<&Bound<'_, PyDict>>) -> PyResult<ReadOptions> {
+        read_options(py, self.drop_invalid, self.drop_extras, limit)
+    }
+
+    fn options(&self) -> PackOptions {
+        PackOptions::default()
+            .with_tolerance(self.tol)
+            .with_atoms(self.atoms)
+            .with_keep_order(self.keep_order)
+            .with_keep_all(self.keep_all)
+            .with_seed(self.seed)
+    }
+
+    fn preset(&self) -> Result<Preset> {
+        Ok(self.preset.as_deref().map_or(Ok(Preset::default()), str::parse)?)
+    }
+
+    /// What draws, unless it is guessed.
+    fn renderer(&self, device: Device) -> Result<Option<Renderer>> {
+        Ok(match self.guess {
+            true => None,
+            false => Some(Renderer::open(device)?),
+        })
+    }
+}
+
+/// Runs of rows: the first of each, and the one after its last.
+type Runs = Vec<(usize, usize)>;
+
+/// Of a bucket: tiles by number, with their rows; or pieces that were scattered.
+#[derive(FromPyObject)]
+pub(crate) enum Pieces<'py> {
+    Rows(Vec<(usize, Bound<'py, PyAny>, Runs)>),
+    Scattered(Vec<PyBackedBytes>),
+}
+
+/// What a bucket is read from.
+enum From {
+    Rows(Vec<(usize, Tile, Runs)>),
+    Scattered(Vec<PyBackedBytes>),
+}
+
+impl From {
+    fn of(pieces: Pieces<'_>, options: &ReadOptions) -> PyResult<Self> {
+        Ok(match pieces {
+            Pieces::Scattered(pieces) => Self::Scattered(pieces),
+            Pieces::Rows(tiles) => {
+                let of = |(number, tile, rows): (usize, Bound<'_, PyAny>, _)| {
+                    Ok((number, Tile::of(&tile, options)?, rows))
+                };
+                Self::Rows(tiles.into_iter().map(of).collect::<PyResult<_>>()?)
+            }
+        })
+    }
+
+    fn bucket(&self, plan: &Plan, number: usize, options: &ReadOptions) -> Result<Bucket> {
+        let mut reader = BucketReader::new(plan, number);
+        match self {
+            Self::Scattered(pieces) => pieces.iter().try_for_each(|piece| reader.add_piece(piece))?,
+            Self::Rows(tiles) => {
+                for (number, tile, rows) in tiles {
+                    tile.with(options, &mut |source| {
+                        let add = |&(start, stop): &(usize, usize)| {
+                            reader.add(*number, source, start..stop, &Silent)
+                        };
+                        Ok(rows.iter().try_for_each(add)?)
+                    })?;
+                }
+            }
+        }
+        Ok(reader.finish())
+    }
+}
+
+/// Bytes for Python.
+fn made(py: Python<'_>, bytes: Vec<u8>) -> Py<PyBytes> {
+    PyBytes::new(py, &bytes).unbind()
+}
+
+/// Reads all of `messages`.
+fn all<T>(messages: &[PyBackedBytes], read: impl Fn(&[u8]) -> lexisplat::Result<T>) -> Result<Vec<T>> {
+    Ok(messages.iter().map(|message| read(message)).collect::<lexisplat::Result<_>>()?)
+}
+
+/// Number of Gaussians of a tile, and its warnings.
+#[pyfunction]
+#[pyo3(signature = (tile, choices, limit))]
+pub(crate) fn tile_open(
+    py: Python<'_>,
+    tile: &Bound<'_, PyAny>,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(usize, u64, Vec<String>)> {
+    let options = choices.reading(py, limit)?;
+    let tile = Tile::of(tile, &options)?;
+    without_gil(py, None, move |_| {
+        tile.with(&options, &mut |source| {
+            Ok((source.len(), source.source_bytes(), source.warnings().to_vec()))
+        })
+    })
+}
+
+/// What is known of rows of a tile.
+#[pyfunction]
+#[pyo3(signature = (tile, rows, choices, limit))]
+pub(crate) fn tile_survey(
+    py: Python<'_>,
+    tile: &Bound<'_, PyAny>,
+    rows: (usize, usize),
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Py<PyBytes>> {
+    let options = choices.reading(py, limit)?;
+    let tile = Tile::of(tile, &options)?;
+    let seed = choices.seed;
+    let bytes = without_gil(py, None, move |watch| {
+        let survey =
+            |source: &dyn SplatSource| Ok(Survey::of(source, rows.0..rows.1, seed, watch)?.to_bytes());
+        tile.with(&options, &mut { survey })
+    })?;
+    Ok(made(py, bytes))
+}
+
+/// Refuses a tile that does not go together with the first one, by surveys of a block of each.
+#[pyfunction]
+pub(crate) fn tile_check(
+    py: Python<'_>,
+    name: String,
+    own: PyBackedBytes,
+    first: Option<PyBackedBytes>,
+) -> PyResult<()> {
+    let read = |bytes: &PyBackedBytes| Survey::from_bytes(bytes);
+    let check = || {
+        let own = read(&own)?;
+        own.check(&name, first.as_ref().map(read).transpose()?.as_ref())
+    };
+    check().map_err(|error| raise(py, &error.into()))
+}
+
+/// The plan of a scene, with its numbers of Gaussians, buckets and groups and the buckets of each group and of each file.
+#[pyfunction]
+#[pyo3(signature = (surveys, choices, one_each))]
+#[expect(clippy::type_complexity, reason = "what Python unpacks")]
+pub(crate) fn tile_plan(
+    py: Python<'_>,
+    surveys: Vec<(String, Vec<PyBackedBytes>)>,
+    choices: Choices,
+    one_each: bool,
+) -> PyResult<(Py<PyBytes>, usize, Vec<Vec<usize>>, Vec<(usize, usize)>)> {
+    let (bytes, gaussians, groups, files) = without_gil(py, None, move |_| {
+        let read =
+            |(name, blocks): (String, Vec<PyBackedBytes>)| Ok((name, all(&blocks, Survey::from_bytes)?));
+        let surveys = surveys.into_iter().map(read).collect::<Result<Vec<_>>>()?;
+        let plan = Plan::new(&surveys, &choices.options(), choices.preset()?.decibels(), one_each)?;
+        let groups = (0..plan.groups()).map(|group| plan.group(group)).collect();
+        let files = plan.files().into_iter().map(|file| (file.start, file.end)).collect();
+        Ok((plan.to_bytes(), plan.len(), groups, files))
+    })?;
+    Ok((made(py, bytes), gaussians, groups, files))
+}
+
+/// Of each bucket the runs of rows, of `chunk` each, that it gets some of.
+#[pyfunction]
+#[pyo3(signature = (plan, number, tile, rows, chunk, choices, limit))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn tile_count(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    number: usize,
+    tile: &Bound<'_, PyAny>,
+    rows: (usize, usize),
+    chunk: usize,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<(usize, Runs)>> {
+    let options = choices.reading(py, limit)?;
+    let tile = Tile::of(tile, &options)?;
+    without_gil(py, None, move |watch| {
+        let plan = Plan::from_bytes(&plan)?;
+        let mut runs = vec![Runs::new(); plan.buckets()];
+        tile.with(&options, &mut |source| {
+            for start in (rows.0..rows.1).step_by(chunk.max(1)) {
+                let own = start..rows.1.min(start + chunk.max(1));
+                let counts = plan.count(number, source, own.clone(), watch)?;
+                for (runs, _) in runs.iter_mut().zip(counts).filter(|(_, count)| *count > 0) {
+                    match runs.last_mut() {
+                        Some(last) if last.1 == own.start => last.1 = own.end,
+                        _ => runs.push((own.start, own.end)),
+                    }
+                }
+            }
+            Ok(())
+        })?;
+        Ok(runs.into_iter().enumerate().filter(|(_, runs)| !runs.is_empty()).collect())
+    })
+}
+
+/// The rows of a tile in pieces, by bucket.
+#[pyfunction]
+#[pyo3(signature = (plan, number, tile, rows, choices, limit))]
+pub(crate) fn tile_scatter(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    number: usize,
+    tile: &Bound<'_, PyAny>,
+    rows: (usize, usize),
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<Vec<(usize, Py<PyBytes>)>> {
+    let options = choices.reading(py, limit)?;
+    let tile = Tile::of(tile, &options)?;
+    let pieces = without_gil(py, None, move |watch| {
+        let plan = Plan::from_bytes(&plan)?;
+        tile.with(&options, &mut |source| Ok(plan.scatter(number, source, rows.0..rows.1, watch)?))
+    })?;
+    Ok(pieces.into_iter().map(|(bucket, piece)| (bucket, made(py, piece))).collect())
+}
+
+/// What a look at a bucket says, what is remembered of its Gaussians, and the GPU that looked.
+#[pyfunction]
+#[pyo3(signature = (plan, bucket, pieces, choices, limit))]
+pub(crate) fn tile_look(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    bucket: usize,
+    pieces: Pieces<'_>,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Py<PyBytes>, Py<PyBytes>, Option<String>)> {
+    let options = choices.reading(py, limit)?;
+    let (from, device) = (From::of(pieces, &options)?, device(py, &choices.device)?);
+    let (statistics, looked, gpu) = without_gil(py, None, move |watch| {
+        let plan = Plan::from_bytes(&plan)?;
+        let bucket = from.bucket(&plan, bucket, &options)?;
+        let mut renderer = choices.renderer(device)?;
+        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), watch)?;
+        let gpu = renderer.filter(Renderer::is_gpu).map(|renderer| renderer.name().to_owned());
+        Ok((statistics.to_bytes(), looked.to_bytes(), gpu))
+    })?;
+    Ok((made(py, statistics), made(py, looked), gpu))
+}
+
+/// The steps of a scene.
+#[pyfunction]
+pub(crate) fn tile_steps(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    buckets: Vec<PyBackedBytes>,
+) -> PyResult<Py<PyBytes>> {
+    let bytes = without_gil(py, None, move |_| {
+        let statistics = all(&buckets, LookStatistics::from_bytes)?;
+        Ok(Steps::new(&Plan::from_bytes(&plan)?, &statistics)?.to_bytes())
+    })?;
+    Ok(made(py, bytes))
+}
+
+/// The sample of a group of buckets, which stays in the process where it was drawn.
+#[pyclass(module = "lexisplat._native")]
+pub(crate) struct TileSample {
+    plan: Plan,
+    sample: Sample,
+}
+
+#[pymethods]
+impl TileSample {
+    #[new]
+    fn new(py: Python<'_>, plan: PyBackedBytes) -> PyResult<Self> {
+        let plan = Plan::from_bytes(&plan).map_err(|error| raise(py, &error.into()))?;
+        Ok(Self { plan, sample: Sample::new() })
+    }
+
+    /// Adds the next bucket of the group.
+    #[pyo3(signature = (bucket, pieces, looked, choices, limit))]
+    fn add(
+        &mut self,
+        py: Python<'_>,
+        bucket: usize,
+        pieces: Pieces<'_>,
+        looked: PyBackedBytes,
+        choices: Choices,
+        limit: Option<&Bound<'_, PyDict>>,
+    ) -> PyResult<()> {
+        let options = choices.reading(py, limit)?;
+        let from = From::of(pieces, &options)?;
+        without_gil(py, None, |_| {
+            let bucket = from.bucket(&self.plan, bucket, &options)?;
+            Ok(self.sample.add(&self.plan, &bucket, &Looked::from_bytes(&looked)?)?)
+        })
+    }
+
+    /// Sums over the sample.
+    fn statistics(&mut self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
+        let bytes = without_gil(py, None, |_| {
+            Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?).to_bytes())
+        })?;
+        Ok(made(py, bytes))
+    }
+
+    /// What the sample says of the atoms of a round.
+    fn find(&mut self, py: Python<'_>, steps: PyBackedBytes, lesson: PyBackedBytes) -> PyResult<Py<PyBytes>> {
+        let bytes = without_gil(py, None, |_| {
+            let (steps, lesson) = (Steps::from_bytes(&steps)?, Lesson::from_bytes(&lesson)?);
+            Ok(self.sample.find(&self.plan, &steps, &lesson).to_bytes())
+        })?;
+        Ok(made(py, bytes))
+    }
+}
+
+/// The first atoms and the number of rounds to come, if there is anything to learn.
+#[pyfunction]
+pub(crate) fn tile_lesson(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    steps: PyBackedBytes,
+    groups: Vec<PyBackedBytes>,
+) -> PyResult<Option<(Py<PyBytes>, usize)>> {
+    let lesson = without_gil(py, None, move |_| {
+        let groups = all(&groups, SampleStatistics::from_bytes)?;
+        let lesson = Lesson::new(&Plan::from_bytes(&plan)?, &Steps::from_bytes(&steps)?, &groups)?;
+        Ok(lesson.map(|lesson| (lesson.to_bytes(), lesson.left())))
+    })?;
+    Ok(lesson.map(|(bytes, left)| (made(py, bytes), left)))
+}
+
+/// Better atoms, and the number of rounds to come.
+#[pyfunction]
+pub(crate) fn tile_advance(
+    py: Python<'_>,
+    lesson: PyBackedBytes,
+    groups: Vec<PyBackedBytes>,
+) -> PyResult<(Py<PyBytes>, usize)> {
+    let (bytes, left) = without_gil(py, None, move |_| {
+        let mut lesson = Lesson::from_bytes(&lesson)?;
+        lesson.advance(&all(&groups, Findings::from_bytes)?)?;
+        Ok((lesson.to_bytes(), lesson.left()))
+    })?;
+    Ok((made(py, bytes), left))
+}
+
+/// Everything that buckets are coded with, and the number of Gaussians that are coded. `learned` is the lesson that is over and
+/// what all groups found on its atoms.
+#[pyfunction]
+pub(crate) fn tile_coding(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    steps: PyBackedBytes,
+    groups: Vec<PyBackedBytes>,
+    learned: Option<(PyBackedBytes, Vec<PyBackedBytes>)>,
+) -> PyResult<(Py<PyBytes>, usize)> {
+    let (bytes, kept) = without_gil(py, None, move |_| {
+        let (plan, steps) = (Plan::from_bytes(&plan)?, Steps::from_bytes(&steps)?);
+        let groups = all(&groups, SampleStatistics::from_bytes)?;
+        let learned = match learned {
+            None => None,
+            Some((lesson, found)) => Some((Lesson::from_bytes(&lesson)?, all(&found, Findings::from_bytes)?)),
+        };
+        let learned = learned.as_ref().map(|(lesson, found)| (lesson, found.as_slice()));
+        let coding = Coding::new(&plan, &steps, &groups, learned)?;
+        Ok((coding.to_bytes(), coding.kept()))
+    })?;
+    Ok((made(py, bytes), kept))
+}
+
+/// How often each symbol occurs in a bucket, and the bucket, coded with tables of its own.
+#[pyfunction]
+#[pyo3(signature = (plan, coding, bucket, pieces, looked, choices, limit))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn tile_code(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    coding: PyBackedBytes,
+    bucket: usize,
+    pieces: Pieces<'_>,
+    looked: PyBackedBytes,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Py<PyBytes>, Py<PyBytes>)> {
+    let options = choices.reading(py, limit)?;
+    let from = From::of(pieces, &options)?;
+    let (counts, coded) = without_gil(py, None, move |watch| {
+        let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
+        let (bucket, looked) = (from.bucket(&plan, bucket, &options)?, Looked::from_bytes(&looked)?);
+        let (counts, coded) = tiles::code(&plan, &coding, &bucket, &looked, choices.guess, watch)?;
+        Ok((counts.to_bytes(), coded.to_bytes()))
+    })?;
+    Ok((made(py, counts), made(py, coded)))
+}
+
+/// The tables that all buckets are coded with.
+#[pyfunction]
+pub(crate) fn tile_tables(py: Python<'_>, counts: Vec<PyBackedBytes>) -> PyResult<Py<PyBytes>> {
+    let bytes =
+        without_gil(py, None, move |_| Ok(Tables::new(&all(&counts, Counts::from_bytes)?)?.to_bytes()))?;
+    Ok(made(py, bytes))
+}
+
+/// A bucket coded with the tables of all.
+#[pyfunction]
+pub(crate) fn tile_finish(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    coding: PyBackedBytes,
+    tables: PyBackedBytes,
+    coded: PyBackedBytes,
+) -> PyResult<Py<PyBytes>> {
+    let bytes = without_gil(py, None, move |_| {
+        let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
+        let tables = Tables::from_bytes(&tables)?;
+        Ok(Coded::from_bytes(&coded)?.with_tables(&plan, &coding, &tables)?.to_bytes())
+    })?;
+    Ok(made(py, bytes))
+}
+
+/// Writes file `file` of the coded buckets that `next` gives one after the other. Returns the report as JSON.
+#[pyfunction]
+#[pyo3(signature = (plan, coding, tables, file, next, counts, path, *, overwrite, guess, gpu))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
+pub(crate) fn tile_assemble(
+    py: Python<'_>,
+    plan: PyBackedBytes,
+    coding: PyBackedBytes,
+    tables: PyBackedBytes,
+    file: usize,
+    next: &Bound<'_, PyAny>,
+    counts: Vec<PyBackedBytes>,
+    path: PathBuf,
+    overwrite: bool,
+    guess: bool,
+    gpu: Option<String>,
+) -> PyResult<String> {
+    let fail = |error: lexisplat::Error| raise(py, &error.into());
+    let plan = Plan::from_bytes(&plan).map_err(fail)?;
+    let coding = Coding::from_bytes(&coding).map_err(fail)?;
+    let tables = Tables::from_bytes(&tables).map_err(fail)?;
+    let counts = all(&counts, Counts::from_bytes).map_err(|error| raise(py, &error))?;
+    output(&path, overwrite).check().map_err(fail)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let mut assembly = Assembly::new(&plan, &coding, &tables, file, folder).map_err(fail)?;
+    for bucket in next.try_iter()? {
+        let bucket: PyBackedBytes = bucket?.extract()?;
+        py.detach(|| assembly.push(Coded::from_bytes(&bucket)?)).map_err(fail)?;
+    }
+    let done = without_gil(py, None, move |watch| {
+        Ok(assembly.finish(&counts, gpu, output(&path, overwrite), watch)?)
+    })?;
+    json(py, &tiles::report(&done, guess))
+}
+
+/// Packs all tiles in this process. Returns the file and its report as JSON.
+#[pyfunction]
+#[pyo3(signature = (given, choices, limit))]
+pub(crate) fn tile_whole(
+    py: Python<'_>,
+    given: Vec<(String, Bound<'_, PyAny>)>,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<(Py<PyBytes>, String)> {
+    let options = choices.reading(py, limit)?;
+    let device = device(py, &choices.device)?;
+    let read = |(name, tile): (String, Bound<'_, PyAny>)| Ok((name, Tile::of(&tile, &options)?));
+    let given = given.into_iter().map(read).collect::<PyResult<Vec<_>>>()?;
+    let (bytes, report) = without_gil(py, None, move |watch| {
+        let mut scenes = Vec::new();
+        for (name, tile) in &given {
+            scenes.push((name.clone(), tile.with(&options, &mut |source| Ok(source.whole()?.into_owned()))?));
+        }
+        let named: Vec<(String, &dyn SplatSource)> =
+            scenes.iter().map(|(name, scene)| (name.clone(), scene as &dyn SplatSource)).collect();
+        let joined = Joined::new(&named)?;
+        let mut file = Vec::new();
+        let renderer = choices.renderer(device)?;
+        let (options, preset) = (choices.options(), choices.preset()?);
+        let report = tiles::pack(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
+        Ok((file, report))
+    })?;
+    Ok((made(py, bytes), json(py, &report)?))
+}
