@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use crate::folder::{Folder, lexisplat};
 use assert_cmd::Command;
-use lexisplat::ply;
+use lexisplat::{ShDegree, ply};
 use lexisplat::simd::Simd;
 use lexisplat_sample::{SampleOptions, scene};
 
@@ -16,11 +16,13 @@ const VARIABLE: &str = "LEXISPLAT_SIMD";
 const THREADS: [&str; 3] = ["1", "2", "7"];
 /// Gaussians of the larger scene: three units of work of the exact layouts, so that threads share them.
 const MANY: usize = 5000;
+/// Gaussians of a scene that is packed in parts: more than of the largest that is packed as a whole.
+const LARGE: usize = 270_000;
 /// Gaussians of the scene whose pictures are drawn again and again.
 const FEW: usize = 300;
 
-/// What is run, in this order, in a folder with `many.ply`, `few.ply` and a few small cameras.
-const COMMANDS: [&str; 12] = [
+/// What is run, in this order, in a folder with `many.ply`, `large.ply`, `few.ply` and a few small cameras.
+const COMMANDS: [&str; 13] = [
     "compress many.ply -o f16.lexi --tol 0.08 --sample 1000 --atoms 40 --save-dictionary dictionary.lexi",
     "compress many.ply -o f32.lexi --layout f32 --tol 0.1 --pursuit omp --dictionary dictionary.lexi",
     "compress many.ply -o paper.lexi --layout paper --max-nnz 6 --dictionary dictionary.lexi",
@@ -28,7 +30,8 @@ const COMMANDS: [&str; 12] = [
     "compress few.ply -o aimed.lexi --psnr 33 --cameras cameras.json",
     "compress few.ply -o sized.lexi --size 9kB --keep-all --cameras cameras.json",
     "compress few.ply -o promised.lexi --layout packed --tol 0.1 --cameras cameras.json",
-    "compress many.ply -o parts.lexi --preset balanced --memory 1MB",
+    "compress many.ply -o little.lexi --preset balanced --memory 1MB",
+    "compress large.ply -o parts.lexi --guess",
     "decompress f16.lexi -o f16.ply",
     "decompress preset.lexi -o preset.ply",
     "render few.ply -o dense --orbit 2 --width 96 --device cpu",
@@ -39,6 +42,8 @@ const COMMANDS: [&str; 12] = [
 fn made(simd: &str, threads: &str) -> BTreeMap<String, Vec<u8>> {
     let folder = Folder(tempfile::tempdir().unwrap());
     ply::write(&folder.path("many.ply"), &scene(&SampleOptions::new(MANY, 1))).unwrap();
+    let large = scene(&SampleOptions::new(LARGE, 3)).with_degree_cut(ShDegree::ONE);
+    ply::write(&folder.path("large.ply"), &large).unwrap();
     let few = scene(&SampleOptions::new(FEW, 2));
     ply::write(&folder.path("few.ply"), &few).unwrap();
     let cameras = lexisplat_render::orbit(&few.geometry, 4, 160, 120).into_iter().map(|camera| {
@@ -77,8 +82,8 @@ fn threads_and_vector_instructions_do_not_show_in_any_file() {
         (0..THREADS.len()).map(|k| (sets[k.min(sets.len() - 1)], THREADS[k])).collect();
     assert!(sets.iter().all(|set| runs.iter().any(|run| run.0 == *set)), "{sets:?} are not all run");
     let first = made(runs[0].0, runs[0].1);
-    // 8 compressed scenes, 2 decompressed, a dictionary, 2 given scenes with cameras, 4 pictures.
-    assert_eq!(first.len(), 8 + 2 + 1 + 3 + 4, "{:?}", first.keys());
+    // 9 compressed scenes, 2 decompressed, a dictionary, 3 given scenes with cameras, 4 pictures.
+    assert_eq!(first.len(), 9 + 2 + 1 + 4 + 4, "{:?}", first.keys());
     for (simd, threads) in &runs[1..] {
         let again = made(simd, threads);
         assert!(again.keys().eq(first.keys()), "{simd}, {threads} threads");

@@ -4,7 +4,7 @@ use std::process::{Command, Output, Stdio};
 
 use lexisplat_testing::{Need, missing};
 
-use super::runs::{JOBS, OLD, OUTPUT, PROGRAM, ready, said};
+use super::runs::{IN_PARTS, JOBS, OLD, OUTPUT, PROGRAM, in_parts, ready, said};
 use crate::folder::Folder;
 
 /// Mounts a disk of `$SIZE` on `disk`, puts an output there, runs the command, and shows what is left.
@@ -72,7 +72,8 @@ fn a_full_disk_is_said_and_nothing_is_left_on_it() {
 #[test]
 fn temporary_files_without_room_are_named_with_their_folder() {
     let folder = ready();
-    for job in [&["compress", "scene.ply", "--layout", "f16", "-o", "-"][..], JOBS[2]] {
+    in_parts(&folder);
+    for job in [&["compress", "scene.ply", "--layout", "f16", "-o", "-"][..], &IN_PARTS] {
         let mut arguments = onto_disk(job);
         arguments.push("--overwrite");
         let Some((ended, error, left)) = on_a_disk(&folder, "size=8k", None, &arguments) else { return };

@@ -4,6 +4,9 @@ use std::os::unix::process::ExitStatusExt;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
+use lexisplat::{ShDegree, ply};
+use lexisplat_sample::{SampleOptions, scene};
+
 use crate::folder::Folder;
 
 /// What the scene is coded or decoded to.
@@ -12,13 +15,25 @@ pub(crate) const OUTPUT: &str = "made";
 pub(crate) const OLD: &[u8] = b"what was there before";
 /// A program that does not come so far hangs.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(120);
-/// Every way to write a scene: exact, packed, packed in parts, and back.
+/// Every way to write a small scene: exact, packed, packed as if it were larger than memory, and back. [`IN_PARTS`] writes a large
+/// one.
 pub(crate) const JOBS: [&[&str]; 4] = [
     &["compress", "scene.ply", "--layout", "f16", "-o", OUTPUT],
     &["compress", "scene.ply", "--cameras", "cameras.json", "-o", OUTPUT],
     &["compress", "scene.ply", "--memory", "100kB", "-o", OUTPUT],
     &["decompress", "kept.lexi", "-o", OUTPUT],
 ];
+
+/// A scene that is packed in parts, which [`in_parts`] adds.
+pub(crate) const IN_PARTS: [&str; 5] = ["compress", "large.ply", "--guess", "-o", OUTPUT];
+/// Gaussians of that scene: more than of the largest that is packed as a whole.
+const LARGE: usize = 270_000;
+
+/// Adds a scene to `folder` that is packed in parts.
+pub(crate) fn in_parts(folder: &Folder) {
+    let splats = scene(&SampleOptions::new(LARGE, 3)).with_degree_cut(ShDegree::ZERO);
+    ply::write(&folder.path("large.ply"), &splats).unwrap();
+}
 
 pub(crate) const PROGRAM: &str = env!("CARGO_BIN_EXE_lexisplat");
 

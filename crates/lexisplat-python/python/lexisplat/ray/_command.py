@@ -9,10 +9,27 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from .._errors import Error, LexisplatWarning, ParameterError
+from .._errors import (
+    Error,
+    FormatError,
+    GpuError,
+    IoError,
+    LexisplatWarning,
+    LimitError,
+    ParameterError,
+)
 
-#: Exit statuses, as those of the program: an input or an option is at fault, reading or writing failed, and Ctrl-C.
-USAGE, FAILED, INTERRUPTED = 2, 1, 130
+#: Exit statuses as those of the program, by the exception; those of options that do not exist are argparse's, 2.
+STATUSES: list[tuple[type[BaseException], int]] = [
+    (FileExistsError, 7),
+    (IoError, 3),
+    (FormatError, 4),
+    (ParameterError, 5),
+    (LimitError, 6),
+    (GpuError, 8),
+    (KeyboardInterrupt, 130),
+    (Exception, 1),
+]
 
 
 def parser() -> argparse.ArgumentParser:
@@ -50,15 +67,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     try:
         report = _run(given)
-    except KeyboardInterrupt:
-        print("lexisplat-ray: interrupted", file=sys.stderr)
-        return INTERRUPTED
-    except ParameterError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return USAGE
-    except (Error, ImportError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        return FAILED
+    except (Error, ImportError, KeyboardInterrupt) as error:
+        print(f"error: {error or 'interrupted'}", file=sys.stderr)
+        return next(status for kind, status in STATUSES if isinstance(error, kind))
     print(json.dumps(report, indent=2) if given.json else _text(report))
     return 0
 

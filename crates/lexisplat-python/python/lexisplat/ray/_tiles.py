@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import glob
 import os
 from collections.abc import Iterable, Sequence
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Union
 
 import numpy as np
 
-from .._errors import ParameterError
+from .._errors import ParameterError, os_error
 from .._splats import Splats
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def outputs(tiles: Sequence[Tile], out: str | os.PathLike[str], one_each: bool, 
         if path in [tile.given for tile in tiles if isinstance(tile.given, str)]:
             raise _parameter("out", path, "another file than the tiles")
         if os.path.exists(path) and not overwrite:
-            raise _parameter("out", path, "a file that is not there yet, or overwrite=True")
+            raise os_error(errno.EEXIST, "it is there already, and overwrite=True was not given", path)
     folder = out if one_each else os.path.dirname(out)
     if one_each:
         os.makedirs(folder, exist_ok=True)
@@ -110,6 +111,6 @@ def _refuse_twice(wanted: Iterable[str], names: Sequence[str]) -> None:
 
 
 def _parameter(name: str, value: object, expected: str) -> ParameterError:
-    error = ParameterError(f"{name} = {value}: expected {expected}")
+    error = ParameterError(f"{name} = {value}: {expected}")
     error.name, error.value = name, str(value)
     return error

@@ -3,7 +3,7 @@
 //! A round codes all rows with the atoms as they are. Each place sums up, for each atom, the residuals of its users times their
 //! values. The sums of all places, added in a fixed order, move the atoms. All atoms move at once, while those of
 //! [`learn`](super::learn) move one after the other and see the residuals that the ones before left: that needs the residuals
-//! themselves. Files of either way are equally large (docs/METHOD.md, "Tiles").
+//! themselves. Files of either way are equally large (docs/METHOD.md, "Scenes larger than memory").
 
 use serde::{Deserialize, Serialize};
 
