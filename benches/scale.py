@@ -161,6 +161,7 @@ def memory(folder: Path, scratch: Path) -> None:
     thread.join()
     count = report["gaussians"] + report["removed"]
     sizes = ", ".join(f"{kind} {size / 2**20:.2f} GiB" for kind, size in sorted(most.items()))
+    print(report["stages"])
     print(f"{count:,} Gaussians in {report['clock']:.1f} s, {report['file_bytes']:,} bytes; most of a worker: {sizes}; traffic {report['traffic']}")
 
 

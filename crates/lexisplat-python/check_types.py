@@ -7,7 +7,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 #: Modules that examples need and the gate does not install.
-MISSING = ["torch", "viser", "gsplat", "scipy.*", "sklearn.*", "matplotlib.*", "nbclient.*", "nbformat.*", "pytest.*"]
+MISSING = ["torch", "viser", "gsplat", "ray.*", "scipy.*", "sklearn.*", "matplotlib.*", "nbclient.*", "nbformat.*", "pytest.*"]
 #: Names that only the stub has, aliases of `Literal`, which stubtest takes for functions, and what scikit-learn makes.
 ALLOWED = [
     r"lexisplat\._native\.CameraTuple",
@@ -15,6 +15,7 @@ ALLOWED = [
     r"lexisplat\._native\.\w+\.__new__",
     r"lexisplat\._\w+\.(Format|Layout|Preset|Space)",
     r"lexisplat\.learn\._\w+",
+    r"lexisplat\.ray\._\w+\.ray",
     r"lexisplat\.learn\.DictionaryLearner\.set_\w+",
 ]
 

@@ -83,7 +83,8 @@ def compress(
     Returns
     -------
     dict
-        The program's report, with ``"skipped"``, ``"traffic"`` (bytes that passed between processes) and ``"seconds"``. With
+        The program's report, with ``"skipped"``, ``"traffic"`` (bytes that passed between processes), ``"seconds"`` and
+        ``"stages"`` (seconds of each). With
         ``one_each`` the reports are under ``"files"``.
 
     Raises
@@ -118,7 +119,9 @@ def compress(
         report = scene.compressed(wanted, overwrite)
     finally:
         work.cancel()
+    work.end_stage()
     report["skipped"] = scene.skipped
+    report["stages"] = {stage: round(seconds, 3) for stage, seconds in work.stages.items()}
     report["traffic"] = dict(work.traffic)
     report["seconds"] = time.monotonic() - started
     return report
@@ -224,6 +227,7 @@ class _Scene:
         del codes
         reports = []
         for number, (path, (start, stop)) in enumerate(zip(wanted, files)):
+            os.makedirs(os.path.dirname(path), exist_ok=True)
             text = _native.tile_assemble(
                 plan,
                 coding,

@@ -66,8 +66,7 @@ def loaded(given: Any) -> Any:
     missing = [name for name in COLUMNS if name not in given]
     if missing:
         raise _parameter("tiles", sorted(given), f"a dataset with the columns {', '.join(COLUMNS)}")
-    columns = {name: _dense(given[name]) for name in COLUMNS}
-    return Splats(**columns)._checked()
+    return Splats.from_dict({name: _dense(given[name]) for name in COLUMNS})._checked()
 
 
 def _dense(column: Any) -> np.ndarray[Any, Any]:
@@ -94,10 +93,7 @@ def outputs(tiles: Sequence[Tile], out: str | os.PathLike[str], one_each: bool, 
             raise _parameter("out", path, "another file than the tiles")
         if os.path.exists(path) and not overwrite:
             raise os_error(errno.EEXIST, "it is there already, and overwrite=True was not given", path)
-    folder = out if one_each else os.path.dirname(out)
-    if one_each:
-        os.makedirs(folder, exist_ok=True)
-    elif not os.path.isdir(folder):
+    if not one_each and not os.path.isdir(os.path.dirname(out)):
         raise _parameter("out", out, "a file in a folder that is there")
     return wanted
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -28,6 +29,9 @@ class Work:
         #: Bytes that passed between processes: statistics and what all tasks take, what is remembered of each Gaussian, scattered
         #: rows, and coded buckets.
         self.traffic = {"statistics": 0, "state": 0, "scattered": 0, "results": 0}
+        #: Seconds of each stage, from the first word of it to the first of the next.
+        self.stages: dict[str, float] = {}
+        self._stage, self._since = "open", time.monotonic()
 
     def shared(self, message: bytes) -> Any:
         """A reference to bytes that several tasks take."""
@@ -76,8 +80,17 @@ class Work:
         return result
 
     def tell(self, stage: str, done: int, total: int) -> None:
+        if stage != self._stage:
+            self.end_stage()
+            self._stage = stage
         if self._progress is not None:
             self._progress(stage, done, total)
+
+    def end_stage(self) -> None:
+        """Ends the stage, and its seconds."""
+        now = time.monotonic()
+        self.stages[self._stage] = self.stages.get(self._stage, 0.0) + now - self._since
+        self._since = now
 
     def cancel(self) -> None:
         """Cancels what was started and not waited for."""
