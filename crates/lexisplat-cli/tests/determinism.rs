@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 
 use crate::folder::{Folder, lexisplat};
 use assert_cmd::Command;
-use lexisplat::{ShDegree, ply};
 use lexisplat::simd::Simd;
+use lexisplat::{ShDegree, ply};
 use lexisplat_sample::{SampleOptions, scene};
 
 /// The environment variable that chooses vector instructions.

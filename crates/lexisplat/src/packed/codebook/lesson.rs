@@ -156,3 +156,115 @@ impl Findings {
         Some(out)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::packed::codebook::{first_atoms, learn};
+    use crate::support::rng::SplitMix64;
+
+    const DIM: usize = 9;
+    const ATOMS: usize = 20;
+
+    /// Rows of few of some hidden atoms, with noise, and their classes.
+    fn rows(count: usize, seed: u64) -> (Vec<f32>, Vec<u8>) {
+        let mut random = SplitMix64::new(seed);
+        let mut unit = move || (random.next() >> 40) as f32 / (1_u64 << 24) as f32 - 0.5;
+        let mut hidden = SplitMix64::new(99);
+        let hidden: Vec<f32> =
+            (0..ATOMS * DIM).map(|_| (hidden.next() % 2001) as f32 / 1000.0 - 1.0).collect();
+        let mut rows = Vec::new();
+        for i in 0..count {
+            let mut row = [0.0; DIM];
+            for k in [i % ATOMS, (i / 3) % ATOMS] {
+                let value = 40.0 * unit();
+                row.iter_mut().zip(&hidden[k * DIM..]).for_each(|(r, a)| *r += value * a);
+            }
+            row.iter_mut().for_each(|r| *r += unit());
+            rows.extend(row);
+        }
+        (rows, (0..count).map(|i| (i % 5) as u8).collect())
+    }
+
+    fn begun(rows: &[f32]) -> Lesson {
+        let mut moments = vec![vec![0.0; DIM]; DIM];
+        for row in rows.chunks_exact(DIM) {
+            for i in 0..DIM {
+                (0..DIM).for_each(|j| moments[i][j] += f64::from(row[i]) * f64::from(row[j]));
+            }
+        }
+        Lesson::new(ATOMS, moments, rows, StopRule::Balanced)
+    }
+
+    #[test]
+    fn findings_are_sums_over_rows() {
+        let (rows, classes) = rows(600, 1);
+        let lesson = begun(&rows);
+        let found = lesson.find(&rows, &classes);
+        let book = Codebook::new(DIM, lesson.atoms.clone(), lesson.costs.clone());
+        let codes = book.encode(&rows, &classes, lesson.stop);
+        let (mut sums, mut weights) = (vec![0.0_f64; ATOMS * DIM], [0.0_f64; ATOMS]);
+        for i in 0..classes.len() {
+            let mut residual: Vec<f64> = rows[i * DIM..(i + 1) * DIM].iter().map(|&x| x.into()).collect();
+            for &(atom, value) in codes.row(i) {
+                let atom = &lesson.atoms[usize::from(atom) * DIM..][..DIM];
+                residual.iter_mut().zip(atom).for_each(|(r, a)| *r -= f64::from(value) * f64::from(*a));
+            }
+            for &(atom, value) in codes.row(i) {
+                let own = &mut sums[usize::from(atom) * DIM..][..DIM];
+                own.iter_mut().zip(&residual).for_each(|(sum, r)| *sum += f64::from(value) * r);
+                weights[usize::from(atom)] += f64::from(value).powi(2);
+            }
+        }
+        assert_eq!(found.weights, weights);
+        for (found, expected) in found.sums.iter().zip(&sums) {
+            assert!(
+                (f64::from(*found) - expected).abs() < 1e-3 * (1.0 + expected.abs()),
+                "{found} {expected}"
+            );
+        }
+        let half = classes.len() / 2;
+        let parts = [
+            lesson.find(&rows[..half * DIM], &classes[..half]),
+            lesson.find(&rows[half * DIM..], &classes[half..]),
+        ];
+        let sum = Findings::sum(&parts).unwrap();
+        assert_eq!(
+            (sum.weights, sum.usage.atoms, sum.squares),
+            (found.weights, found.usage.atoms, found.squares)
+        );
+        for (a, b) in sum.sums.iter().zip(&found.sums) {
+            assert!((a - b).abs() <= 1e-4 * (1.0 + a.abs()), "{a} {b}");
+        }
+        assert_eq!(sum.farthest[..OFFERED], found.farthest[..]);
+    }
+
+    #[test]
+    fn atoms_from_sums_are_as_good_as_from_residuals() {
+        let (rows, classes) = rows(3000, 2);
+        let cost = |atoms: Vec<f32>, costs: Costs| {
+            let (error, bits) = Codebook::new(DIM, atoms, costs).spent(&rows, &classes);
+            error + f64::from(super::super::PRICE) * bits
+        };
+        let mut lesson = begun(&rows);
+        let before = cost(lesson.atoms.clone(), lesson.costs.clone());
+        let places = [0..1000, 1000..1100, 1100..3000];
+        let find = |lesson: &Lesson| -> Vec<Findings> {
+            let of = |place: &std::ops::Range<usize>| {
+                lesson.find(&rows[place.start * DIM..place.end * DIM], &classes[place.clone()])
+            };
+            places.iter().map(of).collect()
+        };
+        while !lesson.is_over() {
+            assert_eq!(lesson.left(), ROUNDS - lesson.rounds);
+            lesson.advance(&find(&lesson));
+        }
+        let (atoms, costs, _) = lesson.finish(&find(&lesson)).unwrap();
+        let after = cost(atoms, costs);
+        let first = first_atoms(DIM, ATOMS, &rows);
+        let (atoms, costs) = learn(DIM, &rows, &classes, first, 0, StopRule::Balanced, &Silent).unwrap();
+        let one_by_one = cost(atoms, costs);
+        assert!(after < 0.8 * before && after < 1.03 * one_by_one, "{before} {after} {one_by_one}");
+    }
+}

@@ -227,6 +227,16 @@ impl Coded {
         Ok(Self { tables: tables.0.clone(), chunks, ..self })
     }
 
+    /// Flips a bit of a range.
+    #[cfg(test)]
+    pub(super) fn damage(&mut self, at: usize) {
+        let ranges =
+            self.chunks.iter_mut().flat_map(|chunk| chunk.ranges.iter_mut().map(|range| &mut range.0));
+        let mut bytes: Vec<&mut u8> = ranges.flatten().collect();
+        let count = bytes.len();
+        *bytes[at % count] ^= 1 << (at % 8);
+    }
+
     /// Takes its chunks out, if they are coded with `tables`.
     pub(super) fn into_chunks(self, tables: &Tables) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
         if self.tables != tables.0 {

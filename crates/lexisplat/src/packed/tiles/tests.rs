@@ -220,3 +220,54 @@ fn damaged_messages_and_those_of_other_scenes_are_refused() {
     assert!(Sample::new().add(&plan, &part, &looked).is_err());
     assert!(Steps::new(&plan, &[statistics.clone(), statistics]).is_err());
 }
+
+/// A bucket of its own plan, coded, and what it was coded with.
+fn coded() -> (Plan, Coding, Counts, Coded) {
+    let tiles = [scene(3000, 4)];
+    let plan = Plan::new(&surveys(&tiles), &options(), 38.0, false).unwrap();
+    let mut reader = BucketReader::new(&plan, 0);
+    reader.add(0, &tiles[0], 0..3000, &Silent).unwrap();
+    let bucket = reader.finish();
+    let (statistics, looked) = bucket.look(&plan, None).unwrap();
+    let steps = Steps::new(&plan, &[statistics]).unwrap();
+    let mut sample = Sample::new();
+    sample.add(&plan, &bucket, &looked).unwrap();
+    let groups = [sample.statistics(&plan, &steps)];
+    let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
+    while !lesson.is_over() {
+        lesson.advance(&[sample.find(&plan, &steps, &lesson)]).unwrap();
+    }
+    let found = [sample.find(&plan, &steps, &lesson)];
+    let coding = Coding::new(&plan, &steps, &groups, Some((&lesson, &found))).unwrap();
+    let none = None::<&mut crate::packed::Refit<'_>>;
+    let (counts, coded) = coding.code(&plan, &bucket, &looked, none, &Silent).unwrap();
+    (plan, coding, counts, coded)
+}
+
+#[test]
+fn buckets_are_coded_anew_without_a_change() {
+    let (plan, coding, counts, coded) = coded();
+    // The tables of this bucket alone are its own.
+    let tables = Tables::new(std::slice::from_ref(&counts)).unwrap();
+    let same = coded.clone().with_tables(&plan, &coding, &tables).unwrap();
+    assert!(same.to_bytes() == coded.to_bytes());
+    // Other tables, and back.
+    let mut more = counts.clone();
+    more.0.add(&counts.0);
+    let other = Tables::new(&[more, counts.clone()]).unwrap();
+    let there = coded.clone().with_tables(&plan, &coding, &other).unwrap();
+    assert!(there.with_tables(&plan, &coding, &tables).unwrap().to_bytes() == coded.to_bytes());
+}
+
+#[test]
+fn damaged_buckets_are_refused_or_are_others() {
+    let (plan, coding, counts, coded) = coded();
+    let tables = Tables::new(&[counts]).unwrap();
+    let mut refused = 0;
+    for at in 0..400 {
+        let mut damaged = coded.clone();
+        damaged.damage(at * 7919);
+        refused += usize::from(damaged.with_tables(&plan, &coding, &tables).is_err());
+    }
+    assert!(refused > 300, "{refused}");
+}
