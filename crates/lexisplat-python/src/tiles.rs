@@ -25,37 +25,53 @@ use crate::files::{json, output, read_options};
 use crate::work::without_gil;
 
 /// A tile: a file, or arrays that Ray holds.
-enum Tile {
-    File(String, Bytes, PathBuf),
+struct Tile {
+    name: String,
+    content: Content,
+}
+
+enum Content {
+    File(Bytes, PathBuf),
     Splats(Box<Splats>),
 }
 
+/// The same from Python: its name in messages, and a path or arrays.
+type Named<'py> = (String, Bound<'py, PyAny>);
+
 impl Tile {
-    fn of(given: &Bound<'_, PyAny>, options: &ReadOptions) -> PyResult<Self> {
-        let Ok(path) = given.extract::<PathBuf>() else {
-            return Ok(Self::Splats(Box::new(from_python(given)?)));
+    fn of((name, given): Named<'_>, options: &ReadOptions) -> PyResult<Self> {
+        let content = match given.extract::<PathBuf>() {
+            Err(_) => Content::Splats(Box::new(from_python(&given)?)),
+            Ok(path) => {
+                let scene = scene_path(&path).into_owned();
+                let bytes = Given::Path(scene.clone()).bytes(&options.limits);
+                Content::File(bytes.map_err(|error| raise(given.py(), &error))?, scene)
+            }
         };
-        let name = path.display().to_string();
-        let scene = scene_path(&path).into_owned();
-        let bytes = Given::Path(scene.clone()).bytes(&options.limits).map_err(|e| raise(given.py(), &e))?;
-        Ok(Self::File(name, bytes, scene))
+        Ok(Self { name, content })
     }
 
-    /// Does `work` with it.
+    /// Does `work` with it. Errors name it.
     fn with<T>(
         &self,
         options: &ReadOptions,
         work: &mut dyn FnMut(&dyn SplatSource) -> Result<T>,
     ) -> Result<T> {
-        match self {
-            Self::Splats(splats) => work(&**splats),
-            Self::File(name, bytes, scene) => {
-                match open(name, bytes.as_ref(), Siblings::of(scene), options, false, &Silent)? {
-                    Opened::Lexi(_) => Err(Error::format(name, "it is compressed already")),
+        let done = match &self.content {
+            Content::Splats(splats) => work(&**splats),
+            Content::File(bytes, scene) => {
+                match open(&self.name, bytes.as_ref(), Siblings::of(scene), options, false, &Silent)? {
+                    Opened::Lexi(_) => return Err(Error::format(&self.name, "it is compressed already")),
                     opened => work(opened.source()),
                 }
             }
-        }
+        };
+        done.map_err(|error| match error {
+            Error::Codec(error @ lexisplat::Error::Parameter { .. }) => {
+                Error::format(&self.name, error.to_string())
+            }
+            error => error,
+        })
     }
 }
 
@@ -108,7 +124,7 @@ type Runs = Vec<(usize, usize)>;
 /// Of a bucket: tiles by number, with their rows; or pieces that were scattered.
 #[derive(FromPyObject)]
 pub(crate) enum Pieces<'py> {
-    Rows(Vec<(usize, Bound<'py, PyAny>, Runs)>),
+    Rows(Vec<(usize, Named<'py>, Runs)>),
     Scattered(Vec<PyBackedBytes>),
 }
 
@@ -123,8 +139,8 @@ impl From {
         Ok(match pieces {
             Pieces::Scattered(pieces) => Self::Scattered(pieces),
             Pieces::Rows(tiles) => {
-                let of = |(number, tile, rows): (usize, Bound<'_, PyAny>, _)| {
-                    Ok((number, Tile::of(&tile, options)?, rows))
+                let of = |(number, tile, rows): (usize, Named<'_>, Runs)| {
+                    Ok((number, Tile::of(tile, options)?, rows))
                 };
                 Self::Rows(tiles.into_iter().map(of).collect::<PyResult<_>>()?)
             }
@@ -165,7 +181,7 @@ fn all<T>(messages: &[PyBackedBytes], read: impl Fn(&[u8]) -> lexisplat::Result<
 #[pyo3(signature = (tile, choices, limit))]
 pub(crate) fn tile_open(
     py: Python<'_>,
-    tile: &Bound<'_, PyAny>,
+    tile: Named<'_>,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(usize, u64, Vec<String>)> {
@@ -183,7 +199,7 @@ pub(crate) fn tile_open(
 #[pyo3(signature = (tile, rows, choices, limit))]
 pub(crate) fn tile_survey(
     py: Python<'_>,
-    tile: &Bound<'_, PyAny>,
+    tile: Named<'_>,
     rows: (usize, usize),
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
@@ -245,7 +261,7 @@ pub(crate) fn tile_count(
     py: Python<'_>,
     plan: PyBackedBytes,
     number: usize,
-    tile: &Bound<'_, PyAny>,
+    tile: Named<'_>,
     rows: (usize, usize),
     chunk: usize,
     choices: Choices,
@@ -280,7 +296,7 @@ pub(crate) fn tile_scatter(
     py: Python<'_>,
     plan: PyBackedBytes,
     number: usize,
-    tile: &Bound<'_, PyAny>,
+    tile: Named<'_>,
     rows: (usize, usize),
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
@@ -369,7 +385,7 @@ impl TileSample {
     /// Sums over the sample.
     fn statistics(&mut self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
         let bytes = without_gil(py, None, |_| {
-            Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?).to_bytes())
+            Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?)?.to_bytes())
         })?;
         Ok(made(py, bytes))
     }
@@ -378,7 +394,7 @@ impl TileSample {
     fn find(&mut self, py: Python<'_>, steps: PyBackedBytes, lesson: PyBackedBytes) -> PyResult<Py<PyBytes>> {
         let bytes = without_gil(py, None, |_| {
             let (steps, lesson) = (Steps::from_bytes(&steps)?, Lesson::from_bytes(&lesson)?);
-            Ok(self.sample.find(&self.plan, &steps, &lesson).to_bytes())
+            Ok(self.sample.find(&self.plan, &steps, &lesson)?.to_bytes())
         })?;
         Ok(made(py, bytes))
     }
@@ -491,7 +507,7 @@ pub(crate) fn tile_finish(
 
 /// Writes file `file` of the coded buckets that `next` gives one after the other. Returns the report as JSON.
 #[pyfunction]
-#[pyo3(signature = (plan, coding, tables, file, next, counts, path, *, overwrite, guess, gpu))]
+#[pyo3(signature = (plan, coding, tables, file, next, counts, path, *, source_bytes, overwrite, guess, gpu))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn tile_assemble(
     py: Python<'_>,
@@ -502,6 +518,7 @@ pub(crate) fn tile_assemble(
     next: &Bound<'_, PyAny>,
     counts: Vec<PyBackedBytes>,
     path: PathBuf,
+    source_bytes: u64,
     overwrite: bool,
     guess: bool,
     gpu: Option<String>,
@@ -521,26 +538,31 @@ pub(crate) fn tile_assemble(
     let done = without_gil(py, None, move |watch| {
         Ok(assembly.finish(&counts, gpu, output(&path, overwrite), watch)?)
     })?;
-    json(py, &tiles::report(&done, guess))
+    let mut report = tiles::report(&done, guess);
+    report.source_bytes = source_bytes;
+    json(py, &report)
 }
 
 /// Packs all tiles in this process. Returns the file and its report as JSON.
 #[pyfunction]
-#[pyo3(signature = (given, choices, limit))]
+#[pyo3(signature = (tiles, choices, limit))]
 pub(crate) fn tile_whole(
     py: Python<'_>,
-    given: Vec<(String, Bound<'_, PyAny>)>,
+    tiles: Vec<Named<'_>>,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Py<PyBytes>, String)> {
     let options = choices.reading(py, limit)?;
     let device = device(py, &choices.device)?;
-    let read = |(name, tile): (String, Bound<'_, PyAny>)| Ok((name, Tile::of(&tile, &options)?));
-    let given = given.into_iter().map(read).collect::<PyResult<Vec<_>>>()?;
+    let given = tiles.into_iter().map(|tile| Tile::of(tile, &options)).collect::<PyResult<Vec<_>>>()?;
     let (bytes, report) = without_gil(py, None, move |watch| {
-        let mut scenes = Vec::new();
-        for (name, tile) in &given {
-            scenes.push((name.clone(), tile.with(&options, &mut |source| Ok(source.whole()?.into_owned()))?));
+        let (mut scenes, mut bytes) = (Vec::new(), 0);
+        for tile in &given {
+            let scene = tile.with(&options, &mut |source| {
+                bytes += source.source_bytes();
+                Ok(source.whole()?.into_owned())
+            })?;
+            scenes.push((tile.name.clone(), scene));
         }
         let named: Vec<(String, &dyn SplatSource)> =
             scenes.iter().map(|(name, scene)| (name.clone(), scene as &dyn SplatSource)).collect();
@@ -548,8 +570,23 @@ pub(crate) fn tile_whole(
         let mut file = Vec::new();
         let renderer = choices.renderer(device)?;
         let (options, preset) = (choices.options(), choices.preset()?);
-        let report = tiles::pack(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
+        let mut report = tiles::pack(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
+        report.source_bytes = bytes;
         Ok((file, report))
     })?;
     Ok((made(py, bytes), json(py, &report)?))
+}
+
+/// Refuses choices that are out of range, before any work.
+#[pyfunction]
+#[pyo3(signature = (choices, limit))]
+pub(crate) fn tile_choices(
+    py: Python<'_>,
+    choices: Choices,
+    limit: Option<&Bound<'_, PyDict>>,
+) -> PyResult<()> {
+    choices.reading(py, limit)?;
+    device(py, &choices.device)?;
+    let check = || choices.preset().and_then(|_| Ok(choices.options().check()?));
+    check().map_err(|error: Error| raise(py, &error))
 }

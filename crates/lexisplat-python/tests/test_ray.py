@@ -215,7 +215,12 @@ def test_names_of_outputs_are_checked_before_any_work(few: list[Path], tmp_path:
         ({"tiles": few, "out": tmp_path / "no" / "city.lexi"}, "a folder that is there"),
         ({"tiles": [few[0], few[0]], "out": tmp_path / "city.lexi"}, "each tile once"),
         ({"tiles": tmp_path / "*.nothing", "out": tmp_path / "city.lexi"}, "with tiles in it"),
-        ({"tiles": few, "out": tmp_path / "city.lexi", "threads": 0}, "at least 1"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "threads": 0}, "processors of the largest machine"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "threads": 99}, "processors of the largest machine"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "preset": "tiny"}, "preset"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "tol": -1.0}, "tolerance"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "device": "auto"}, "cpu or gpu"),
+        ({"tiles": few, "out": tmp_path / "city.lexi", "limit": {"nonsense": 1}}, "nonsense"),
     ]:
         with pytest.raises(lx.ParameterError, match=text):
             lexisplat.ray.compress(**options)  # type: ignore[arg-type]

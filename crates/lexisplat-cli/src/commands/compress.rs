@@ -34,6 +34,12 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if args.output.is_none() && !others.is_empty() {
         return Err(Error::parameter("--output", "missing", "the file that several inputs become").into());
     }
+    let resolved = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    for (k, path) in args.inputs.iter().enumerate() {
+        if args.inputs[..k].iter().any(|other| resolved(other) == resolved(path)) {
+            return Err(Error::parameter("INPUT", path.display(), "each tile once").into());
+        }
+    }
     let output = output_path(first, args.output.as_deref(), "lexi", common)?;
     let mut inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.dictionary.as_deref());

@@ -98,6 +98,9 @@ impl Written {
     ) -> Option<Self> {
         let own: Vec<&[u8]> = self.ranges.iter().map(|(bytes, _)| bytes.as_slice()).collect();
         let symbols = form.transcribe(layer, self.gaussians, lookup, &own)?;
+        if !symbols.iter().all(|range| range.is_within(tables)) {
+            return None;
+        }
         let lanes = lanes(self.gaussians);
         let coded = symbols.iter().map(|range| range.finish(tables, lanes));
         let ranges = coded.zip(&self.ranges).map(|(bytes, (_, sum))| (bytes, *sum)).collect();

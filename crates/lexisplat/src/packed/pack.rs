@@ -88,7 +88,10 @@ impl PackOptions {
     }
 
     /// Refuses options out of range.
-    pub(crate) fn check(&self) -> Result<()> {
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the option.
+    pub fn check(&self) -> Result<()> {
         if let Some(atoms) = self.atoms
             && !(1..=MAX_ATOMS).contains(&atoms)
         {

@@ -36,12 +36,7 @@ impl<'a> Joined<'a> {
         for (name, tile) in tiles {
             let own = tile.empty();
             Survey::check_tile(name, empty.as_ref(), &own, tile.len())?;
-            let empty = empty.get_or_insert_with(|| own.clone());
-            for comment in own.meta.comments {
-                if !empty.meta.comments.contains(&comment) {
-                    empty.meta.comments.push(comment);
-                }
-            }
+            empty.get_or_insert_with(|| own.clone()).meta.join(&own.meta);
             warnings.extend(tile.warnings().iter().map(|warning| format!("{name}: {warning}")));
             firsts.push(firsts.last().copied().unwrap_or(0).saturating_add(tile.len()));
         }

@@ -43,6 +43,17 @@ pub struct SceneMeta {
     pub antialiased: bool,
 }
 
+impl SceneMeta {
+    /// Adds the comments of `other` that are not there yet.
+    pub(crate) fn join(&mut self, other: &Self) {
+        for comment in &other.comments {
+            if !self.comments.contains(comment) {
+                self.comments.push(comment.clone());
+            }
+        }
+    }
+}
+
 /// A scene with dense SH: what a trainer's PLY holds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Splats {

@@ -44,11 +44,12 @@ impl Ordered {
         let mut buckets = Buckets::new(folder, plan.buckets())?;
         let mut bytes = Vec::new();
         for (number, tile) in tiles.iter().enumerate() {
+            let of_tile = plan.buckets_of(number);
             plan.each(number, *tile, 0..tile.len(), progress, &mut |splats, keys| {
                 rows.pack(splats, &mut bytes);
                 for (key, row) in keys.iter().zip(bytes.chunks_exact(rows.bytes())) {
                     let record = [&key.cell.to_le_bytes()[..], &key.source.to_le_bytes(), row];
-                    buckets.push(plan.bucket_of(number, *key), &record)?;
+                    buckets.push(of_tile.of(*key), &record)?;
                 }
                 Ok(())
             })?;

@@ -184,15 +184,16 @@ fn in_buckets<E: From<Error>>(
 
 /// Everything that buckets are coded with, learned from the samples of all groups.
 fn learn(plan: &Plan, steps: &Steps, mut samples: Vec<Sample>, progress: &dyn Progress) -> Result<Coding> {
-    let groups: Vec<_> = samples.iter_mut().map(|sample| sample.statistics(plan, steps)).collect();
+    let groups =
+        samples.iter_mut().map(|sample| sample.statistics(plan, steps)).collect::<Result<Vec<_>>>()?;
     let Some(mut lesson) = Lesson::new(plan, steps, &groups)? else {
         return Coding::new(plan, steps, &groups, None);
     };
     progress.begin(Stage::Learn, lesson.left() as u64);
     loop {
         progress.check()?;
-        let found: Vec<Findings> =
-            samples.iter_mut().map(|sample| sample.find(plan, steps, &lesson)).collect();
+        let found = samples.iter_mut().map(|sample| sample.find(plan, steps, &lesson));
+        let found = found.collect::<Result<Vec<Findings>>>()?;
         if lesson.is_over() {
             progress.end();
             return Coding::new(plan, steps, &groups, Some((&lesson, &found)));

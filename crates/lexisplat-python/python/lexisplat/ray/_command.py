@@ -67,8 +67,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = parser().parse_args(arguments)
     try:
         report = _run(given)
-    except (Error, ImportError, KeyboardInterrupt) as error:
-        print(f"error: {error or 'interrupted'}", file=sys.stderr)
+    except (Error, ImportError, ConnectionError, KeyboardInterrupt) as error:
+        print(f"error: {str(error) or 'interrupted'}", file=sys.stderr)
         return next(status for kind, status in STATUSES if isinstance(error, kind))
     print(json.dumps(report, indent=2) if given.json else _text(report))
     return 0
@@ -82,7 +82,7 @@ def _run(given: argparse.Namespace) -> dict[str, Any]:
     if given.address is not None and given.workers is not None:
         raise ParameterError(f"--workers = {given.workers}: not together with --address, whose workers are all used")
     here = {} if given.address else {"num_cpus": given.workers, "include_dashboard": False}
-    ray.init(address=given.address, log_to_driver=False, logging_level="error", **here)
+    ray.init(address=given.address or "local", log_to_driver=False, logging_level="error", **here)
     passed = (
         "preset tol atoms seed keep_order keep_all guess device one_each skip_bad drop_invalid drop_extras overwrite threads"
     )

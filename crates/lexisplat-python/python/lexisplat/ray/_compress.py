@@ -92,8 +92,6 @@ def compress(
     ParameterError, FormatError, IoError, LimitError, GpuError
         They name the tile. No file is then written, or with ``one_each`` none but whole ones.
     """
-    if threads < 1:
-        raise ParameterError(f"threads = {threads}: at least 1")
     started = time.monotonic()
     listed = tiles_of(tiles)
     outputs(listed, out, one_each, overwrite)
@@ -109,9 +107,16 @@ def compress(
         "drop_invalid": drop_invalid,
         "drop_extras": drop_extras,
     }
+    limits = None if limit is None else dict(limit)
+    _native.tile_choices(choices, limits)
+    if device == "auto":
+        raise ParameterError("device = auto: cpu or gpu, which is the same on all workers")
     if not ray.is_initialized():
         ray.init(log_to_driver=False, include_dashboard=False)
-    context = tasks.Context(choices, None if limit is None else dict(limit), threads)
+    most = max((int(node["Resources"].get("CPU", 0)) for node in ray.nodes() if node["Alive"]), default=0)
+    if not 1 <= threads <= most:
+        raise ParameterError(f"threads = {threads}: 1 to {most}, the processors of the largest machine")
+    context = tasks.Context(choices, limits, threads)
     work = Work(context, reporter(progress))
     try:
         scene = _Scene(work, choices, listed, one_each, skip_bad)
@@ -138,49 +143,48 @@ class _Scene:
         self.skipped: list[dict[str, str]] = []
         self.tiles: list[Tile] = []
         self._lengths: list[int] = []
-        self._bytes = 0
+        self._bytes: list[int] = []
+        # Every task that draws has a GPU of its own.
+        self._drawing = {} if choices["device"] == "cpu" or choices["guess"] else {"num_gpus": 1}
         self._surveys: list[tuple[str, list[bytes]]] = []
-        opened = self._good(skip_bad, listed, [work.start(tasks.open_tile, tile.given) for tile in listed], "open")
+        opened = self._good(skip_bad, listed, [work.start(tasks.open_tile, tile) for tile in listed])
         started = [
-            [work.start(tasks.survey, tile.given, rows) for rows in tasks.blocks(facts[0])]
+            [work.start(tasks.survey, tile, rows) for rows in tasks.blocks(facts[0])]
             for tile, facts in opened
         ]
         total, done = sum(len(own) for own in started), 0
         first: bytes | None = None
         for (tile, (gaussians, size, odd)), own in zip(opened, started):
+            done += len(own)
             try:
-                found = []
-                for ref in own:
-                    found.append(work.get(ref))
-                    done += 1
-                    work.tell("survey", done, total)
+                found = [work.get(ref) for ref in own]
                 _native.tile_check(tile.name, found[0], first)
             except Error as error:
                 self._skip(skip_bad, tile, error)
                 continue
+            finally:
+                work.tell("survey", done, total)
             first = first or found[0]
             work.traffic["statistics"] += sum(map(len, found))
             self.tiles.append(tile)
             self._lengths.append(gaussians)
-            self._bytes += size
+            self._bytes.append(size)
             self._surveys.append((tile.name, found))
             for text in odd:
-                warnings.warn(f"{tile.name}: {text}", LexisplatWarning, stacklevel=4)
+                warnings.warn(f"{tile.name}: {text}", LexisplatWarning, stacklevel=3)
         if not self.tiles:
             raise ParameterError(f"tiles = {len(listed)} tiles: at least one that is not skipped")
 
-    def _good(
-        self, skip_bad: bool, listed: Sequence[Tile], refs: Sequence[Any], stage: str
-    ) -> list[tuple[Tile, Any]]:
+    def _good(self, skip_bad: bool, listed: Sequence[Tile], refs: Sequence[Any]) -> list[tuple[Tile, Any]]:
         """The tiles whose tasks did not fail, and what these gave."""
         good = []
         for done, (tile, ref) in enumerate(zip(listed, refs)):
-            self._work.tell(stage, done, len(listed))
+            self._work.tell("open", done, len(listed))
             try:
                 good.append((tile, self._work.get(ref)))
             except Error as error:
                 self._skip(skip_bad, tile, error)
-        self._work.tell(stage, len(listed), len(listed))
+        self._work.tell("open", len(listed), len(listed))
         return good
 
     def _skip(self, skip_bad: bool, tile: Tile, error: Error) -> None:
@@ -192,7 +196,7 @@ class _Scene:
         """Writes the files. Returns the report."""
         work = self._work
         if sum(self._lengths) <= _native.TILE_BUCKET and not self._one_each:
-            file, report = work.results("pack", [work.start(tasks.whole, [tuple(tile) for tile in self.tiles])])[0]
+            file, report = work.results("pack", [work.start(tasks.whole, self.tiles, **self._drawing)])[0]
             work.traffic["results"] += len(file)
             _write(wanted[0], file, overwrite)
             return {**json.loads(report), "output": wanted[0]}
@@ -202,7 +206,8 @@ class _Scene:
         buckets = files[-1][1]
         pieces = self._read_by(buckets, gaussians)
         looks = [
-            work.start(tasks.look, self._plan, bucket, own, returns=2) for bucket, own in enumerate(pieces)
+            work.start(tasks.look, self._plan, bucket, own, returns=2, **self._drawing)
+            for bucket, own in enumerate(pieces)
         ]
         found = work.results("look", [look[0] for look in looks])
         looked = [look[1] for look in looks]
@@ -210,7 +215,8 @@ class _Scene:
         work.traffic["state"] += sum(own[1] for own in found)
         gpu = next((own[2] for own in found if own[2] is not None), None)
         steps = _native.tile_steps(plan, [own[0] for own in found])
-        coding, kept = self._learned(plan, steps, groups, pieces, looked)
+        coding = self._learned(plan, steps, groups, pieces, looked)
+        work.end_actors()
         shared = work.shared(coding)
         codes = [
             work.start(tasks.code, self._plan, shared, bucket, own, looked[bucket], returns=2)
@@ -236,6 +242,7 @@ class _Scene:
                 self._coded(ends, start, stop),
                 counts[start:stop],
                 path,
+                source_bytes=self._bytes[number] if self._one_each else sum(self._bytes),
                 overwrite=overwrite,
                 guess=self._choices["guess"],
                 gpu=gpu,
@@ -254,19 +261,19 @@ class _Scene:
     def _read_by(self, buckets: int, gaussians: int) -> list[tasks.Pieces]:
         """What each bucket is read from."""
         work = self._work
-        blocks = [(n, tile.given, rows) for n, tile in enumerate(self.tiles) for rows in tasks.blocks(self._lengths[n])]
+        blocks = [(n, tile, rows) for n, tile in enumerate(self.tiles) for rows in tasks.blocks(self._lengths[n])]
         found = work.results("count", [work.start(tasks.count, self._plan, *block) for block in blocks])
         reads: list[tasks.Reads] = [[] for _ in range(buckets)]
         read = 0
-        for (number, given, _), own in zip(blocks, found):
+        for (number, tile, _), own in zip(blocks, found):
             for bucket, rows in own:
                 work.traffic["statistics"] += 8 * len(rows)
                 read += sum(stop - start for start, stop in rows)
-                reads[bucket].append((number, given, rows))
+                reads[bucket].append((number, tile, rows))
         if read <= MOST_READ * gaussians:
             return list(reads)
         scattered = [work.start(tasks.scatter, self._plan, *block, buckets, returns=buckets) for block in blocks]
-        work.traffic["scattered"] += self._bytes
+        work.traffic["scattered"] += sum(self._bytes)
         refs = [own if buckets > 1 else [own] for own in scattered]
         return [[own[bucket] for own in refs] for bucket in range(buckets)]
 
@@ -277,7 +284,7 @@ class _Scene:
         groups: Sequence[Sequence[int]],
         pieces: Sequence[tasks.Pieces],
         looked: Sequence[Any],
-    ) -> tuple[bytes, int]:
+    ) -> bytes:
         work = self._work
         shared = work.shared(steps)
         actors = work.actors(tasks.Group, len(groups))
@@ -290,7 +297,7 @@ class _Scene:
         work.traffic["statistics"] += sum(map(len, found))
         begun = _native.tile_lesson(plan, steps, found)
         if begun is None:
-            return _native.tile_coding(plan, steps, found, None)
+            return _native.tile_coding(plan, steps, found, None)[0]
         lesson, rounds = begun
         left = rounds
         while True:
@@ -299,7 +306,7 @@ class _Scene:
             findings = [work.get(own) for own in [actor.find.remote(draw, shared, ref) for actor, draw in both]]
             work.traffic["statistics"] += sum(map(len, findings))
             if left == 0:
-                return _native.tile_coding(plan, steps, found, (lesson, findings))
+                return _native.tile_coding(plan, steps, found, (lesson, findings))[0]
             lesson, left = _native.tile_advance(lesson, findings)
 
 

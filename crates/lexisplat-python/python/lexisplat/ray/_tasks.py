@@ -10,12 +10,12 @@ import ray
 
 from .. import _native
 from .._device import quiet
-from ._tiles import loaded
+from ._tiles import Tile, loaded
 
 #: A range of rows.
 Rows = tuple[int, int]
 #: Of a bucket: numbers of tiles, the tiles, and the rows to look in.
-Reads = list[tuple[int, Any, list[Rows]]]
+Reads = list[tuple[int, Tile, list[Rows]]]
 #: The same, or references to pieces that were scattered.
 Pieces = Union[Reads, list[Any]]
 #: Rows that are told apart by the buckets that get some of them.
@@ -29,40 +29,41 @@ class Context:
         self.choices, self.limit, self.threads = choices, limit, threads
 
     def begin(self) -> None:
-        """Limits the threads of this process, which begin with the first work that it does."""
+        """Limits the threads of this process, which begin with the first work that it does. Processes that work on several threads
+        are started with the limit (:class:`Work`)."""
         os.environ.setdefault("RAYON_NUM_THREADS", str(self.threads))
 
 
-def _here(given: Any) -> Any:
+def _here(tile: Tile) -> tuple[str, Any]:
     """A tile as the native part reads it."""
-    return loaded(ray.get(given) if isinstance(given, ray.ObjectRef) else given)
+    return loaded(tile, ray.get(tile.given) if isinstance(tile.given, ray.ObjectRef) else tile.given)
 
 
 def _pieces(pieces: Pieces) -> Any:
     if pieces and isinstance(pieces[0], ray.ObjectRef):
         return [piece for piece in ray.get(list(pieces)) if piece is not None]
-    return [(number, _here(given), rows) for number, given, rows in pieces]
+    return [(number, _here(tile), rows) for number, tile, rows in pieces]
 
 
-def open_tile(context: Context, given: Any) -> tuple[int, int, list[str]]:
+def open_tile(context: Context, tile: Tile) -> tuple[int, int, list[str]]:
     """Number of Gaussians, bytes and warnings of a tile."""
     context.begin()
-    return _native.tile_open(_here(given), context.choices, context.limit)
+    return _native.tile_open(_here(tile), context.choices, context.limit)
 
 
-def survey(context: Context, given: Any, rows: Rows) -> bytes:
+def survey(context: Context, tile: Tile, rows: Rows) -> bytes:
     context.begin()
-    return _native.tile_survey(_here(given), rows, context.choices, context.limit)
+    return _native.tile_survey(_here(tile), rows, context.choices, context.limit)
 
 
-def count(context: Context, plan: bytes, number: int, given: Any, rows: Rows) -> list[tuple[int, list[Rows]]]:
+def count(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows) -> list[tuple[int, list[Rows]]]:
     context.begin()
-    return _native.tile_count(plan, number, _here(given), rows, COUNTED, context.choices, context.limit)
+    return _native.tile_count(plan, number, _here(tile), rows, COUNTED, context.choices, context.limit)
 
 
-def scatter(context: Context, plan: bytes, number: int, given: Any, rows: Rows, buckets: int) -> Any:
+def scatter(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows, buckets: int) -> Any:
     context.begin()
-    found = dict(_native.tile_scatter(plan, number, _here(given), rows, context.choices, context.limit))
+    found = dict(_native.tile_scatter(plan, number, _here(tile), rows, context.choices, context.limit))
     pieces = [found.get(bucket) for bucket in range(buckets)]
     return pieces[0] if buckets == 1 else pieces
 
@@ -124,9 +125,9 @@ def finish(context: Context, plan: bytes, coding: bytes, tables: bytes, coded: b
     return _native.tile_finish(plan, coding, tables, coded)
 
 
-def whole(context: Context, tiles: Sequence[tuple[str, Any]]) -> tuple[bytes, str]:
+def whole(context: Context, tiles: Sequence[Tile]) -> tuple[bytes, str]:
     context.begin()
-    given = [(name, _here(tile)) for name, tile in tiles]
+    given = [_here(tile) for tile in tiles]
     with quiet(context.choices["device"]):
         return _native.tile_whole(given, context.choices, context.limit)
 

@@ -35,6 +35,8 @@ class Tile(NamedTuple):
 def tiles_of(given: Paths | ray.data.Dataset) -> list[Tile]:
     """The tiles that ``given`` means, in order."""
     if hasattr(given, "to_numpy_refs"):
+        # Otherwise blocks come in the order in which they were made.
+        given.context.execution_options.preserve_order = True
         return [Tile(f"block {k}", ref) for k, ref in enumerate(given.to_numpy_refs())]
     if isinstance(given, (str, os.PathLike)):
         found = _paths(os.fspath(given))
@@ -42,7 +44,7 @@ def tiles_of(given: Paths | ray.data.Dataset) -> list[Tile]:
         found = [path for each in given for path in _paths(os.fspath(each))]
     if not found:
         raise _parameter("tiles", given, "a folder or a pattern with tiles in it")
-    absolute = [os.path.abspath(path) for path in found]
+    absolute = [os.path.realpath(path) for path in found]
     for k, path in enumerate(absolute):
         if path in absolute[:k]:
             raise _parameter("tiles", path, "each tile once")
@@ -59,14 +61,17 @@ def _paths(path: str) -> list[str]:
     return [path]
 
 
-def loaded(given: Any) -> Any:
-    """What the native part reads: a path as it is, and a block of a dataset as :class:`lexisplat.Splats`."""
+def loaded(tile: Tile, given: Any) -> tuple[str, Any]:
+    """The tile for the native part: its name, and a path as it is or a block of a dataset as :class:`lexisplat.Splats`."""
     if isinstance(given, str):
-        return given
+        return tile.name, given
     missing = [name for name in COLUMNS if name not in given]
     if missing:
-        raise _parameter("tiles", sorted(given), f"a dataset with the columns {', '.join(COLUMNS)}")
-    return Splats.from_dict({name: _dense(given[name]) for name in COLUMNS})._checked()
+        raise _parameter(tile.name, ", ".join(sorted(given)), f"a dataset with the columns {', '.join(COLUMNS)}")
+    try:
+        return tile.name, Splats.from_dict({name: _dense(given[name]) for name in COLUMNS})._checked()
+    except (ValueError, TypeError) as error:
+        raise _parameter(tile.name, "columns that do not fit", str(error)) from None
 
 
 def _dense(column: Any) -> np.ndarray[Any, Any]:
@@ -78,7 +83,7 @@ def _dense(column: Any) -> np.ndarray[Any, Any]:
 
 def outputs(tiles: Sequence[Tile], out: str | os.PathLike[str], one_each: bool, overwrite: bool) -> list[str]:
     """The files to write. Refuses names that two files would have, and files that are there or are read."""
-    out = os.path.abspath(out)
+    out = os.path.realpath(out)
     if not one_each:
         wanted = [out]
         if os.path.isdir(out):

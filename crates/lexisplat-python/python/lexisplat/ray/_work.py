@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import ray
-from ray.exceptions import RayTaskError
+from ray.exceptions import RayError, RayTaskError
 
-from .._errors import Error
 from .._progress import ProgressCallback
 from ._tasks import Context
 
@@ -25,6 +24,7 @@ class Work:
         self._threads = context.threads
         self._progress = progress
         self._pending: set[Any] = set()
+        self._actors: list[Any] = []
         self._remotes: dict[Callable[..., Any], Any] = {}
         #: Bytes that passed between processes: statistics and what all tasks take, what is remembered of each Gaussian, scattered
         #: rows, and coded buckets.
@@ -38,46 +38,55 @@ class Work:
         self.traffic["statistics"] += len(message)
         return ray.put(message)
 
-    def start(self, task: Callable[..., Any], *arguments: Any, returns: int = 1) -> Any:
+    def start(self, task: Callable[..., Any], *arguments: Any, returns: int = 1, **options: Any) -> Any:
         """Starts a task. Returns references to what it gives."""
         # Ray sends a function to all workers each time one is made of it.
         if task not in self._remotes:
-            self._remotes[task] = ray.remote(num_cpus=self._threads, max_retries=RETRIES)(task)
-        refs = self._remotes[task].options(num_returns=returns).remote(self.context, *arguments)
-        self._pending.update(refs if returns > 1 else [refs])
+            self._remotes[task] = ray.remote(num_cpus=self._threads, max_retries=RETRIES, **self._several())(task)
+        refs = self._remotes[task].options(num_returns=returns, **options).remote(self.context, *arguments)
+        # One of them is enough to cancel the task; the others are freed when those who asked drop them.
+        self._pending.add(refs[0] if returns > 1 else refs)
         return refs
+
+    def _several(self) -> dict[str, Any]:
+        """What tasks of several threads need: processes of their own, which begin with as many."""
+        if self._threads == 1:
+            return {}
+        return {"runtime_env": {"env_vars": {"RAYON_NUM_THREADS": str(self._threads)}}}
 
     def actors(self, kind: type, count: int) -> list[Any]:
         """Starts actors. They take no processors of their own, since all others are idle while they work."""
-        remote = ray.remote(num_cpus=0, max_restarts=-1, max_task_retries=-1)(kind)
-        return [remote.remote() for _ in range(count)]
+        remote = ray.remote(num_cpus=0, max_restarts=RETRIES, max_task_retries=RETRIES)(kind)
+        self._actors = [remote.remote() for _ in range(count)]
+        return self._actors
 
-    def results(self, stage: str, refs: Sequence[Any], weights: Sequence[int] | None = None) -> list[Any]:
+    def end_actors(self) -> None:
+        """Ends the actors, and what they hold."""
+        for actor in self._actors:
+            ray.kill(actor)
+        self._actors = []
+
+    def results(self, stage: str, refs: Sequence[Any]) -> list[Any]:
         """What all of ``refs`` give, in order. The first failure ends the wait."""
-        weights = [1] * len(refs) if weights is None else weights
-        total, done = sum(weights), 0
-        self.tell(stage, 0, total)
-        by_ref = dict(zip(refs, weights))
+        found: dict[Any, Any] = {}
         left = list(refs)
+        self.tell(stage, 0, len(refs))
         while left:
             ready, left = ray.wait(left, num_returns=1)
-            # Raises what the task raised.
-            self.get(ready[0])
-            done += by_ref[ready[0]]
-            self.tell(stage, done, total)
-        return [self.get(ref) for ref in refs]
+            found[ready[0]] = self.get(ready[0])
+            self.tell(stage, len(found), len(refs))
+        return [found[ref] for ref in refs]
 
     def get(self, ref: Any) -> Any:
         """What ``ref`` gives. What a task raised is raised as if it had been done here."""
+        self._pending.discard(ref)
         try:
-            result = ray.get(ref)
+            return ray.get(ref)
         except RayTaskError as error:
             cause = error.cause
-            if isinstance(cause, (Error, ImportError, TypeError, MemoryError, KeyboardInterrupt)):
+            if isinstance(cause, Exception) and not isinstance(cause, RayError):
                 raise cause from None
             raise
-        self._pending.discard(ref)
-        return result
 
     def tell(self, stage: str, done: int, total: int) -> None:
         if stage != self._stage:
@@ -93,10 +102,11 @@ class Work:
         self._since = now
 
     def cancel(self) -> None:
-        """Cancels what was started and not waited for."""
+        """Cancels what was started and not waited for, and ends the actors."""
+        self.end_actors()
         for ref in self._pending:
             try:
                 ray.cancel(ref)
-            except (ValueError, TypeError, ray.exceptions.RayError):
+            except (ValueError, TypeError, RayError):
                 continue
         self._pending.clear()

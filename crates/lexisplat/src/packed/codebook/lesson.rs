@@ -52,7 +52,7 @@ impl Lesson {
         self.rounds >= ROUNDS
     }
 
-    /// Number of rounds, and that of those to come.
+    /// Number of rounds to come.
     pub(in crate::packed) fn left(&self) -> usize {
         ROUNDS.saturating_sub(self.rounds)
     }
@@ -184,7 +184,7 @@ mod tests {
             row.iter_mut().for_each(|r| *r += unit());
             rows.extend(row);
         }
-        (rows, (0..count).map(|i| (i % 5) as u8).collect())
+        (rows, (0..5_u8).cycle().take(count).collect())
     }
 
     fn begun(rows: &[f32]) -> Lesson {

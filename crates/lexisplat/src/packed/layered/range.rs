@@ -81,6 +81,12 @@ impl Recorder {
         }
     }
 
+    /// Whether `tables` have all symbols.
+    pub(in crate::packed) fn is_within(&self, tables: &Tables) -> bool {
+        let has = |entry: &u32| entry & RAW != 0 || tables.has((entry >> 8) as usize, entry.to_le_bytes()[0]);
+        self.lanes.iter().flatten().all(has)
+    }
+
     /// All entries, lane by lane, to be [put back](Self::restore) later.
     #[cfg(test)]
     pub(in crate::packed) fn entries(&self) -> &[Vec<u32>; LANES] {

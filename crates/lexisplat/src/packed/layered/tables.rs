@@ -147,6 +147,12 @@ impl Tables {
         model.copied().filter(|m| m.share > 0).unwrap_or(Model { start: 0, share: 1 })
     }
 
+    /// Whether a symbol has a share in a context.
+    pub(super) fn has(&self, context: usize, symbol: u8) -> bool {
+        let model = self.table(context).and_then(|table| table.models.get(usize::from(symbol)));
+        model.is_some_and(|model| model.share > 0)
+    }
+
     /// Bits of all symbols counted in `histogram` of a context.
     pub(in crate::packed) fn bits(&self, context: usize, histogram: &Histogram) -> f64 {
         let used = (0_u8..=u8::MAX).zip(&histogram.counts).filter(|(_, count)| **count > 0);

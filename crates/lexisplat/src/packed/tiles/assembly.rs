@@ -74,7 +74,7 @@ impl<'a> Assembly<'a> {
         if coded.bucket != self.next {
             return Err(Error::parameter("coded bucket", coded.bucket, format!("{}, the next", self.next)));
         }
-        let (chunks, layers) = coded.into_chunks(self.tables)?;
+        let (chunks, layers) = coded.into_chunks(self.plan, self.tables, self.layers.len())?;
         chunks.into_iter().try_for_each(|chunk| self.ranges.push(chunk))?;
         for (layer, own) in self.layers.iter_mut().zip(layers) {
             layer.gaussians += own.gaussians;
@@ -104,11 +104,11 @@ impl<'a> Assembly<'a> {
         let all = Counts::sum(counts).filter(|_| next == own.end && counts.len() == own.len());
         let missing = || Error::parameter("buckets", counts.len(), format!("all {} of the file", own.len()));
         let mut encoding = coding.encoding(plan)?;
-        encoding.counts.add(&all.ok_or_else(missing)?.0);
+        encoding.counts.add(&all.ok_or_else(missing)?.counts);
         let gaussians: usize = layers.iter().map(|layer| layer.gaussians).sum();
         let meta = plan.like.meta.clone();
         let Finished { mut head, data, report } =
-            encoding.assemble(gaussians, &plan.options, meta, &tables.read()?, ranges)?;
+            encoding.assemble(gaussians, &plan.options, meta, &tables.read(plan)?, ranges)?;
         head.device = device;
         head.removed = plan.gaussians_of_file(file).saturating_sub(gaussians as u64);
         let (mut orders, mut extras) = (Vec::new(), Vec::new());

@@ -51,8 +51,9 @@ impl<'p> BucketReader<'p> {
     ) -> Result<()> {
         let Bucket { number: wanted, splats, places } = &mut self.bucket;
         let plan = self.plan;
+        let buckets = plan.buckets_of(number);
         plan.each(number, tile, rows, progress, &mut |part, keys| {
-            let keep: Vec<bool> = keys.iter().map(|key| plan.bucket_of(number, *key) == *wanted).collect();
+            let keep: Vec<bool> = keys.iter().map(|key| buckets.of(*key) == *wanted).collect();
             places.extend(keys.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(key, _)| *key));
             part.retain(&keep);
             let mut own = tile.empty();
@@ -65,9 +66,17 @@ impl<'p> BucketReader<'p> {
     /// Takes a piece that [`Plan::scatter`] made for the bucket.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for other bytes.
+    /// [`Error::Parameter`] for other bytes, and for pieces of other buckets and scenes.
     pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
-        let Piece { places, rows } = Piece::from_bytes(bytes)?;
+        let Piece { scene, bucket, places, rows } = Piece::from_bytes(bytes)?;
+        self.plan.check("piece", [scene], None)?;
+        if bucket != self.bucket.number {
+            return Err(Error::parameter(
+                "piece",
+                format!("of bucket {bucket}"),
+                self.bucket.number.to_string(),
+            ));
+        }
         let layout = RowLayout::new(self.plan.empty());
         if rows.len() != places.len() * layout.bytes() {
             let expected = format!("{} rows of {} bytes", places.len(), layout.bytes());
@@ -141,6 +150,6 @@ impl Bucket {
             }
         };
         check(&self.splats, &found)?;
-        Ok(LookStatistics::of(&self.splats, &found, plan))
+        Ok(LookStatistics::of(self, &found, plan))
     }
 }

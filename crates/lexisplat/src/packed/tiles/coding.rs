@@ -9,7 +9,7 @@ use super::plan::Plan;
 use super::sample::{Findings, Lesson, SampleStatistics};
 use super::steps::Steps;
 use crate::packed::canonical::MortonKey;
-use crate::packed::codebook::{self, Costs};
+use crate::packed::codebook::Costs;
 use crate::packed::coder::{ChunkCoder, too_large};
 use crate::packed::encoding::{self, Encoding, Written};
 use crate::packed::floor::Floor;
@@ -28,6 +28,7 @@ use crate::support::stopwatch::Stopwatch;
 /// Everything that buckets are coded with.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Coding {
+    scene: u32,
     pub(super) steps: Steps,
     floor: Floor,
     most_dc: f64,
@@ -39,6 +40,7 @@ pub struct Coding {
 /// The coded Gaussians of a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Coded {
+    scene: u32,
     pub(super) bucket: usize,
     /// The tables it is coded with, its own ones.
     tables: Vec<u8>,
@@ -57,11 +59,17 @@ pub(super) struct CodedLayer {
 
 /// How often each symbol occurs in a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Counts(pub(super) encoding::Counts);
+pub struct Counts {
+    scene: u32,
+    pub(super) counts: encoding::Counts,
+}
 
 /// The tables that all buckets are coded with.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Tables(pub(super) Vec<u8>);
+pub struct Tables {
+    scene: u32,
+    pub(super) bytes: Vec<u8>,
+}
 
 messages!(Coding => "coding", Coded => "coded bucket", Counts => "counts", Tables => "tables");
 
@@ -77,6 +85,7 @@ impl Coding {
         groups: &[SampleStatistics],
         learned: Option<(&Lesson, &[Findings])>,
     ) -> Result<Self> {
+        plan.check("steps", [steps.scene], None)?;
         let all = SampleStatistics::sum(plan, groups)?;
         let degree = plan.like.degree;
         let mut floor = steps.floor.clone().within(all.over);
@@ -90,8 +99,8 @@ impl Coding {
                 (WholeAtoms::new(degree, &first, 0, false), None)
             }
             Some((lesson, findings)) => {
-                let findings: Vec<codebook::Findings> = findings.iter().map(|f| f.0.clone()).collect();
-                let found = lesson.0.finish(&findings).filter(|_| lesson.is_over());
+                plan.check("lesson", [lesson.scene], None)?;
+                let found = lesson.lesson.finish(&lesson.found(findings)?).filter(|_| lesson.is_over());
                 let wrong =
                     || Error::parameter("findings", findings.len(), "those of all groups, at the end");
                 let (rows, costs, squares) = found.ok_or_else(wrong)?;
@@ -100,7 +109,7 @@ impl Coding {
             }
         };
         let most_dc = f64::from(all.dc.quantile(USUAL_DC));
-        Ok(Self { steps: steps.clone(), floor, most_dc, atoms, costs })
+        Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs })
     }
 
     /// Number of Gaussians that are coded.
@@ -111,6 +120,7 @@ impl Coding {
 
     /// The encoder, before anything is coded.
     pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
+        plan.check("coding", [self.scene], None)?;
         let clock = Stopwatch::start();
         let mean_view = MeanView::new(&plan.options.viewpoints);
         let (floor, stop) = (&self.floor, self.steps.stop);
@@ -142,7 +152,7 @@ impl Coding {
         progress: &dyn Progress,
     ) -> Result<(Counts, Coded), E> {
         let splats = &bucket.splats;
-        let (weights, stays) = looked.of_each(splats.len(), self.steps.first_stays(bucket.number))?;
+        let (weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
         let kept = || (0..splats.len()).filter(|&i| stays[i]);
         let places = (0..).zip(&bucket.places).zip(&stays).filter(|(_, stays)| **stays);
         let scene: Vec<MortonKey> =
@@ -178,7 +188,9 @@ impl Coding {
             }
             layers.push(CodedLayer { gaussians, order, extras });
         }
-        Ok((Counts(counts), Coded { bucket: bucket.number, tables: tables.write(), chunks, layers }))
+        let scene = self.scene;
+        let coded = Coded { scene, bucket: bucket.number, tables: tables.write(), chunks, layers };
+        Ok((Counts { scene, counts }, coded))
     }
 }
 
@@ -188,23 +200,24 @@ impl Tables {
     /// # Errors
     /// [`Error::Parameter`] if there are more symbols than a file holds.
     pub fn new(counts: &[Counts]) -> Result<Self> {
-        let all =
-            Counts::sum(counts).ok_or_else(|| Error::parameter("counts", 0, "at least those of one"))?;
-        Ok(Self(layered::Tables::of(&all.0)?.write()))
+        let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
+        let all = Counts::sum(counts).ok_or_else(wrong)?;
+        Ok(Self { scene: all.scene, bytes: layered::Tables::of(&all.counts)?.write() })
     }
 
-    pub(super) fn read(&self) -> Result<layered::Tables> {
-        layered::Tables::read(&self.0).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+    pub(super) fn read(&self, plan: &Plan) -> Result<layered::Tables> {
+        plan.check("tables", [self.scene], None)?;
+        layered::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
     }
 }
 
 impl Counts {
-    /// The sum of all, one after the other; `None` if there are none.
+    /// The sum of all, one after the other; `None` if there are none, or of several scenes.
     pub(super) fn sum(all: &[Self]) -> Option<Self> {
         let (first, rest) = all.split_first()?;
         let mut sum = first.clone();
-        rest.iter().for_each(|more| sum.0.add(&more.0));
-        Some(sum)
+        rest.iter().for_each(|more| sum.counts.add(&more.counts));
+        rest.iter().all(|more| more.scene == sum.scene).then_some(sum)
     }
 }
 
@@ -214,9 +227,11 @@ impl Coded {
     /// # Errors
     /// [`Error::Parameter`] if it is not of this coding.
     pub fn with_tables(self, plan: &Plan, coding: &Coding, tables: &Tables) -> Result<Self> {
-        let wrong = || Error::parameter("coded bucket", self.bucket, "a bucket of this scene");
+        plan.check("coded bucket", [self.scene], None)?;
+        let wrong =
+            || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
         let own = layered::Tables::read(&self.tables).ok_or_else(wrong)?;
-        let (lookup, common) = (Lookup::new(&own), tables.read()?);
+        let (lookup, common) = (Lookup::new(&own), tables.read(plan)?);
         let encoding = coding.encoding(plan)?;
         let forms = encoding.layering.forms(encoding.head.rest.least.len());
         let recoded = map_vec(self.chunks.iter().collect(), |chunk: &Written| {
@@ -224,7 +239,7 @@ impl Coded {
             chunk.recoded(&encoding.form, form, &lookup, &common)
         });
         let chunks = recoded.into_iter().collect::<Option<Vec<Written>>>().ok_or_else(wrong)?;
-        Ok(Self { tables: tables.0.clone(), chunks, ..self })
+        Ok(Self { tables: tables.bytes.clone(), chunks, ..self })
     }
 
     /// Flips a bit of a range.
@@ -237,10 +252,27 @@ impl Coded {
         *bytes[at % count] ^= 1 << (at % 8);
     }
 
-    /// Takes its chunks out, if they are coded with `tables`.
-    pub(super) fn into_chunks(self, tables: &Tables) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
-        if self.tables != tables.0 {
+    /// Takes its chunks and layers out, if they are coded with `tables` and belong together.
+    pub(super) fn into_chunks(
+        self,
+        plan: &Plan,
+        tables: &Tables,
+        layers: usize,
+    ) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
+        plan.check("coded bucket", [self.scene], None)?;
+        if self.tables != tables.bytes {
             return Err(Error::parameter("coded bucket", self.bucket, "one with the tables of the file"));
+        }
+        let gaussians = |layer: usize| -> usize {
+            self.chunks.iter().filter(|chunk| chunk.layer == layer).map(|chunk| chunk.gaussians).sum()
+        };
+        let belongs = |(number, layer): (usize, &CodedLayer)| {
+            layer.gaussians == gaussians(number)
+                && layer.order.as_ref().map(Vec::len) == plan.options.keep_order.then_some(layer.gaussians)
+                && layer.extras.len() == plan.like.extras.len()
+        };
+        if self.layers.len() != layers || !self.layers.iter().enumerate().all(belongs) {
+            return Err(Error::parameter("coded bucket", self.bucket, "layers that hold its chunks"));
         }
         Ok((self.chunks, self.layers))
     }

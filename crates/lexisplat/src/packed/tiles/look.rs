@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bucket::Bucket;
 use super::message::messages;
 use super::plan::Plan;
 use crate::packed::canonical::MortonKey;
@@ -10,7 +11,6 @@ use crate::packed::layered::MeanView;
 use crate::packed::octaves::{Histogram, Pairs};
 use crate::packed::removal::{changes_without, is_worth_its_bits};
 use crate::scene::sensitivity::Sensitivity;
-use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 
 /// Sum of the squared weights that views measure. The heuristic scales its weights to a sum of 1, but squares sum
@@ -21,6 +21,8 @@ pub(crate) const SHOWN: f64 = 0.1;
 /// What is remembered of each Gaussian of a bucket: its weights, rounded to eighths of an octave, and whether it stays.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
+    scene: u32,
+    bucket: usize,
     pairs: Pairs,
     /// One bit a Gaussian, the lowest first.
     stays: Vec<u8>,
@@ -29,6 +31,8 @@ pub struct Looked {
 /// Sums over the Gaussians of a bucket.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct LookStatistics {
+    pub(super) scene: u32,
+    pub(super) bucket: usize,
     pub(super) gaussians: u64,
     /// Number of those that stay.
     pub(super) kept: u64,
@@ -43,12 +47,16 @@ pub struct LookStatistics {
 messages!(Looked => "looked", LookStatistics => "look statistics");
 
 impl LookStatistics {
-    pub(super) fn of(splats: &Splats, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
+    pub(super) fn of(bucket: &Bucket, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
+        let Bucket { number: bucket, splats, .. } = bucket;
+        let (scene, bucket) = (plan.scene(), *bucket);
         let n = splats.len();
         let changes = changes_without(&splats.geometry, found, plan.options.may_change());
         let stays: Vec<bool> = changes.into_iter().map(|c| is_worth_its_bits(c, plan.step)).collect();
-        let looked = Looked::new(&found.appearances(), &stays);
+        let looked = Looked::new(scene, bucket, &found.appearances(), &stays);
         let mut out = Self {
+            scene,
+            bucket,
             gaussians: n as u64,
             kept: stays.iter().filter(|&&stays| stays).count() as u64,
             weights: Default::default(),
@@ -78,28 +86,33 @@ impl LookStatistics {
         self.colours.merge(&next.colours);
         self.derivatives.merge(&next.derivatives);
     }
-
-    /// Number of Gaussians that stay.
-    #[must_use]
-    pub fn kept(&self) -> usize {
-        usize::try_from(self.kept).unwrap_or(usize::MAX)
-    }
 }
 
 impl Looked {
-    fn new(weights: &[[f32; 2]], stays: &[bool]) -> Self {
+    fn new(scene: u32, bucket: usize, weights: &[[f32; 2]], stays: &[bool]) -> Self {
         let mut bits = vec![0; stays.len().div_ceil(8)];
         for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
             bits[i / 8] |= 1_u8 << (i % 8);
         }
-        Self { pairs: Pairs::of(weights), stays: bits }
+        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits }
     }
 
     /// The weights of each Gaussian, and whether it stays. The first does in any case if `first_stays`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if these are not `count` Gaussians.
-    pub(super) fn of_each(&self, count: usize, first_stays: bool) -> Result<(Vec<[f32; 2]>, Vec<bool>)> {
+    /// [`Error::Parameter`] if these are of another bucket.
+    pub(super) fn of_each(
+        &self,
+        plan: &Plan,
+        bucket: &Bucket,
+        first_stays: bool,
+    ) -> Result<(Vec<[f32; 2]>, Vec<bool>)> {
+        plan.check("looked", [self.scene], None)?;
+        let count = bucket.splats.len();
+        if self.bucket != bucket.number {
+            let expected = format!("of bucket {}", bucket.number);
+            return Err(Error::parameter("looked", format!("of bucket {}", self.bucket), expected));
+        }
         if self.pairs.len() != count || self.stays.len() != count.div_ceil(8) {
             return Err(Error::parameter("looked", self.pairs.len(), format!("{count} Gaussians")));
         }

@@ -7,7 +7,7 @@ use crate::support::crc32;
 use crate::support::error::{Error, Result};
 
 /// Bytes of the checksum at the end.
-const CHECKSUM: usize = 4;
+pub(super) const CHECKSUM: usize = 4;
 /// What bytes are of one version: those of another may mean something else.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 

@@ -1,8 +1,8 @@
 //! Packing of scenes in parts that need not be in one process: the steps, and what passes from one to the next.
 //!
 //! A scene is one or more tiles, each a [`SplatSource`](crate::SplatSource). Tiles may overlap. The Gaussians of all tiles are
-//! divided into *buckets* along the Morton curve, of about [`BUCKET`] each, so the file is the same however the scene is cut into
-//! tiles, but for the rounding of sums. Each bucket is looked at and coded on its own.
+//! divided into *buckets* along the Morton curve, of about [`BUCKET`] each, so the file is about the same however the scene is cut
+//! into tiles. Each bucket is looked at and coded on its own.
 //!
 //! | step | of each | takes | gives |
 //! |---|---|---|---|

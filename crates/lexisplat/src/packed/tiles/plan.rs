@@ -14,6 +14,7 @@ use crate::scene::extra::{Extra, ExtraValues};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Geometry, Splats};
 use crate::stream::RowLayout;
+use crate::support::crc32;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::maths::Vec3;
@@ -27,6 +28,8 @@ const SAMPLED: usize = 32;
 /// What is settled of a scene before any of it is looked at.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Plan {
+    /// What tells the plan from others: a checksum of all else.
+    scene: u32,
     pub(super) options: PackOptions,
     /// The overall step.
     pub(super) step: f64,
@@ -77,12 +80,7 @@ impl Plan {
                 return Err(Error::malformed(name, "the tile has no Gaussians"));
             };
             first.like.check(name, like.as_ref(), first.gaussians)?;
-            let like = like.get_or_insert_with(|| first.like.clone());
-            for comment in &first.like.meta.comments {
-                if !like.meta.comments.contains(comment) {
-                    like.meta.comments.push(comment.clone());
-                }
-            }
+            like.get_or_insert_with(|| first.like.clone()).meta.join(&first.like.meta);
             for block in blocks {
                 let own = block.positions.iter();
                 looked.extend(own.map(|&(row, position)| (number, position, total + u64::from(row))));
@@ -116,7 +114,34 @@ impl Plan {
         };
         let ends = (0..count).map(ends_of).collect();
         let step = expected_step(gaussians, decibels);
-        Ok(Self { options: options.clone(), step, firsts, grid, heuristic_total, like, ends })
+        let mut plan =
+            Self { scene: 0, options: options.clone(), step, firsts, grid, heuristic_total, like, ends };
+        // With its own checksum at the end, the checksum of any message is the same.
+        let bytes = plan.to_bytes();
+        plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
+        Ok(plan)
+    }
+
+    /// What tells the plan from others. What is made by it holds this.
+    pub(super) fn scene(&self) -> u32 {
+        self.scene
+    }
+
+    /// Refuses `found` things called `kind` if they are of another scene or are not `expected` ones.
+    pub(super) fn check(
+        &self,
+        kind: &'static str,
+        scenes: impl IntoIterator<Item = u32>,
+        expected: Option<usize>,
+    ) -> Result<()> {
+        let scenes: Vec<u32> = scenes.into_iter().collect();
+        if scenes.iter().any(|&scene| scene != self.scene) {
+            return Err(Error::parameter(kind, "of another scene", "of this scene"));
+        }
+        match expected.filter(|&expected| expected != scenes.len()) {
+            Some(expected) => Err(Error::parameter(kind, scenes.len(), format!("all {expected}"))),
+            None => Ok(()),
+        }
     }
 
     /// Number of Gaussians.
@@ -197,8 +222,9 @@ impl Plan {
         progress: &dyn Progress,
     ) -> Result<Vec<u64>> {
         let mut counts = vec![0; self.buckets()];
+        let buckets = self.buckets_of(number);
         self.each(number, tile, rows, progress, &mut |_, keys| {
-            keys.iter().for_each(|key| counts[self.bucket_of(number, *key)] += 1);
+            keys.iter().for_each(|key| counts[buckets.of(*key)] += 1);
             Ok(())
         })?;
         Ok(counts)
@@ -220,17 +246,19 @@ impl Plan {
     ) -> Result<Vec<(usize, Vec<u8>)>> {
         let layout = RowLayout::new(self.empty());
         let mut pieces: BTreeMap<usize, Piece> = BTreeMap::new();
+        let buckets = self.buckets_of(number);
         let mut bytes = Vec::new();
         self.each(number, tile, rows, progress, &mut |splats, keys| {
             layout.pack(splats, &mut bytes);
             for (key, row) in keys.iter().zip(bytes.chunks_exact(layout.bytes())) {
-                let piece = pieces.entry(self.bucket_of(number, *key)).or_default();
+                let piece = pieces.entry(buckets.of(*key)).or_default();
                 piece.places.push(*key);
                 piece.rows.extend_from_slice(row);
             }
             Ok(())
         })?;
-        Ok(pieces.into_iter().map(|(bucket, piece)| (bucket, piece.to_bytes())).collect())
+        let of = |(bucket, piece)| (bucket, Piece { scene: self.scene, bucket, ..piece }.to_bytes());
+        Ok(pieces.into_iter().map(of).collect())
     }
 
     /// Hands `rows` of a tile to `take`, some at a time, with their places.
@@ -251,6 +279,9 @@ impl Plan {
             return Err(Error::parameter("tile", format!("{} Gaussians", tile.len()), expected));
         }
         let mut part = tile.empty();
+        if let Some(difference) = self.like.difference(&Like::of(&part)) {
+            return Err(Error::parameter("tile", difference, "what it was when it was surveyed"));
+        }
         for start in rows.clone().step_by(AT_ONCE) {
             progress.check()?;
             let own = start..rows.end.min(start + AT_ONCE);
@@ -265,11 +296,11 @@ impl Plan {
         Ok(())
     }
 
-    /// The bucket of a Gaussian of a tile.
-    pub(crate) fn bucket_of(&self, tile: usize, key: MortonKey) -> usize {
+    /// The buckets of the Gaussians of a tile.
+    pub(crate) fn buckets_of(&self, tile: usize) -> Buckets<'_> {
         let list = if self.is_one_each() { tile } else { 0 };
-        let before: usize = self.ends[..list].iter().map(|ends| ends.len() + 1).sum();
-        before + self.ends[list].partition_point(|end| *end <= key)
+        let before = self.ends.iter().take(list).map(|ends| ends.len() + 1).sum();
+        Buckets { before, ends: self.ends.get(list).map_or(&[], Vec::as_slice) }
     }
 
     /// The number of the first Gaussian of the file that a bucket is of.
@@ -302,9 +333,26 @@ impl Plan {
     }
 }
 
+/// Where buckets end, of a tile or of all.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Buckets<'p> {
+    /// Number of the buckets of the tiles before.
+    before: usize,
+    ends: &'p [MortonKey],
+}
+
+impl Buckets<'_> {
+    /// The bucket of a Gaussian.
+    pub(crate) fn of(&self, key: MortonKey) -> usize {
+        self.before + self.ends.partition_point(|end| *end <= key)
+    }
+}
+
 /// Rows of a bucket.
 #[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub(super) struct Piece {
+    pub(super) scene: u32,
+    pub(super) bucket: usize,
     pub(super) places: Vec<MortonKey>,
     pub(super) rows: Vec<u8>,
 }

@@ -44,6 +44,7 @@ struct Part {
 /// Sums over the sample of a group.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct SampleStatistics {
+    scene: u32,
     pub(super) predictors: Predictors,
     /// By how many classes shapes ask for smaller steps.
     pub(super) over: f32,
@@ -57,11 +58,17 @@ pub struct SampleStatistics {
 
 /// What a group found out in a round of a [`Lesson`].
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Findings(pub(super) codebook::Findings);
+pub struct Findings {
+    scene: u32,
+    pub(super) found: codebook::Findings,
+}
 
 /// A dictionary that is being learned.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub struct Lesson(pub(super) codebook::Lesson);
+pub struct Lesson {
+    pub(super) scene: u32,
+    pub(super) lesson: codebook::Lesson,
+}
 
 messages!(SampleStatistics => "sample statistics", Findings => "findings", Lesson => "lesson");
 
@@ -78,7 +85,7 @@ impl Sample {
     /// [`Error::Parameter`] if `looked` is of another bucket.
     pub fn add(&mut self, plan: &Plan, bucket: &Bucket, looked: &Looked) -> Result<()> {
         let n = bucket.splats.len();
-        let (weights, stays) = looked.of_each(n, false)?;
+        let (weights, stays) = looked.of_each(plan, bucket, false)?;
         // Of so many runs one is taken, in the next bucket the next.
         let share = plan.sampled() as f64 / plan.buckets().max(1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
@@ -102,10 +109,13 @@ impl Sample {
     }
 
     /// Sums over the sample.
-    #[must_use]
-    pub fn statistics(&mut self, plan: &Plan, steps: &Steps) -> SampleStatistics {
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `steps` are of another scene.
+    pub fn statistics(&mut self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
+        plan.check("steps", [steps.scene], None)?;
         let dim = plan.like.degree.rest();
-        let mut out = SampleStatistics::none(dim);
+        let mut out = SampleStatistics::none(plan);
         let mean_view = MeanView::new(&plan.options.viewpoints);
         let parameters = &steps.floor.parameters;
         for part in &self.parts {
@@ -127,18 +137,22 @@ impl Sample {
                     sums.for_each(|(sum, x)| *sum += f64::from(row[i]) * f64::from(*x));
                 }
             }
-            // Half of the first atoms are rows, of all groups together.
+            // Half of the first atoms are rows, the first ones of each group.
             let some = atoms_to_learn(steps.kept(), dim, &plan.options).div_ceil(plan.groups());
             out.rows = rows[..(some * dim).min(rows.len())].to_vec();
         }
-        out
+        Ok(out)
     }
 
     /// What the sample says of the atoms of a round.
-    #[must_use]
-    pub fn find(&mut self, plan: &Plan, steps: &Steps, lesson: &Lesson) -> Findings {
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `steps` or `lesson` are of another scene.
+    pub fn find(&mut self, plan: &Plan, steps: &Steps, lesson: &Lesson) -> Result<Findings> {
+        plan.check("steps", [steps.scene], None)?;
+        plan.check("lesson", [lesson.scene], None)?;
         let (rows, classes) = self.rows(plan, steps);
-        Findings(lesson.0.find(rows, classes))
+        Ok(Findings { scene: lesson.scene, found: lesson.lesson.find(rows, classes) })
     }
 
     /// The rows to learn from, and their colour classes.
@@ -175,8 +189,10 @@ impl Part {
 }
 
 impl SampleStatistics {
-    fn none(dim: usize) -> Self {
+    fn none(plan: &Plan) -> Self {
+        let dim = plan.like.degree.rest();
         Self {
+            scene: plan.scene(),
             predictors: Predictors::default(),
             over: 0.0,
             dc: Histogram::default(),
@@ -187,14 +203,8 @@ impl SampleStatistics {
 
     /// The sums of all groups, in order.
     pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
-        let dim = plan.like.degree.rest();
-        let mut out = Self::none(dim);
-        let fits = |group: &Self| {
-            group.moments.len() == out.moments.len() && group.rows.len().is_multiple_of(dim.max(1))
-        };
-        if groups.len() != plan.groups() || !groups.iter().all(fits) {
-            return Err(Error::parameter("groups", groups.len(), format!("all {}", plan.groups())));
-        }
+        plan.check("sample statistics", groups.iter().map(|group| group.scene), Some(plan.groups()))?;
+        let mut out = Self::none(plan);
         for group in groups {
             out.predictors.merge(&group.predictors);
             out.over = out.over.max(group.over);
@@ -221,31 +231,38 @@ impl Lesson {
         let moment = |i: usize, j: usize| all.moments[i.max(j) * (i.max(j) + 1) / 2 + i.min(j)];
         let moments = (0..dim).map(|i| (0..dim).map(|j| moment(i, j)).collect()).collect();
         let atoms = atoms_to_learn(steps.kept(), dim, &plan.options);
-        Ok(Some(Self(codebook::Lesson::new(atoms, moments, &all.rows, steps.stop))))
+        let lesson = codebook::Lesson::new(atoms, moments, &all.rows, steps.stop);
+        Ok(Some(Self { scene: plan.scene(), lesson }))
     }
 
     /// Moves the atoms by what all groups found, in order.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for findings of another dictionary.
+    /// [`Error::Parameter`] for findings of another scene or another dictionary.
     pub fn advance(&mut self, groups: &[Findings]) -> Result<()> {
-        let groups: Vec<codebook::Findings> = groups.iter().map(|group| group.0.clone()).collect();
-        if groups.is_empty() || !groups.iter().all(|found| self.0.fits(found)) {
+        let groups = self.found(groups)?;
+        self.lesson.advance(&groups);
+        Ok(())
+    }
+
+    /// What all groups found on these atoms.
+    pub(super) fn found(&self, groups: &[Findings]) -> Result<Vec<codebook::Findings>> {
+        let own = |group: &&Findings| group.scene == self.scene && self.lesson.fits(&group.found);
+        if groups.is_empty() || !groups.iter().all(|group| own(&group)) {
             return Err(Error::parameter("findings", groups.len(), "those of all groups on these atoms"));
         }
-        self.0.advance(&groups);
-        Ok(())
+        Ok(groups.iter().map(|group| group.found.clone()).collect())
     }
 
     /// Whether the atoms are as good as they get. [`Coding::new`](super::Coding::new) needs the findings on these.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.0.is_over()
+        self.lesson.is_over()
     }
 
     /// Number of rounds to come.
     #[must_use]
     pub fn left(&self) -> usize {
-        self.0.left()
+        self.lesson.left()
     }
 }

@@ -15,6 +15,7 @@ use crate::support::error::{Error, Result};
 /// The steps of a scene, without predictors and dictionary.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Steps {
+    pub(super) scene: u32,
     pub(super) steps: fit::Steps,
     /// The limits of steps before the shapes of Gaussians are known.
     pub(super) floor: Floor,
@@ -34,8 +35,10 @@ impl Steps {
     /// # Errors
     /// [`Error::Parameter`] if they are not those of all buckets.
     pub fn new(plan: &Plan, buckets: &[LookStatistics]) -> Result<Self> {
-        let Some((first, rest)) = buckets.split_first().filter(|_| buckets.len() == plan.buckets()) else {
-            return Err(Error::parameter("buckets", buckets.len(), format!("all {}", plan.buckets())));
+        plan.check("look statistics", buckets.iter().map(|bucket| bucket.scene), Some(plan.buckets()))?;
+        let in_order = buckets.iter().enumerate().all(|(number, bucket)| bucket.bucket == number);
+        let Some((first, rest)) = buckets.split_first().filter(|_| in_order) else {
+            return Err(Error::parameter("look statistics", "in another order", "in the order of buckets"));
         };
         let mut all = first.clone();
         rest.iter().for_each(|next| all.merge(next));
@@ -55,7 +58,15 @@ impl Steps {
         let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
         let of_file = usize::try_from(of_file).unwrap_or(usize::MAX);
         let layering = Layering::new(of_file, plan.options.layers_from, all.energies.iter());
-        Ok(Self { steps, floor: Floor::begin(parameters), layering, stop, kept, first_stays })
+        Ok(Self {
+            scene: plan.scene(),
+            steps,
+            floor: Floor::begin(parameters),
+            layering,
+            stop,
+            kept,
+            first_stays,
+        })
     }
 
     /// Number of Gaussians of the scene that stay.

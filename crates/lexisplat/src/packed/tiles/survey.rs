@@ -67,7 +67,7 @@ impl Like {
     }
 
     /// What of `next` does not go together with this.
-    fn difference(&self, next: &Self) -> Option<String> {
+    pub(super) fn difference(&self, next: &Self) -> Option<String> {
         if self.degree != next.degree {
             let (own, other) = (self.degree.get(), next.degree.get());
             return Some(format!("SH degree {other}, where the tiles before have degree {own}"));

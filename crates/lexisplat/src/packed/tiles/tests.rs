@@ -75,13 +75,13 @@ fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
         all.reverse();
         all
     };
-    let groups = of_groups(&|group| sample(group).statistics(&plan, &steps).to_bytes());
+    let groups = of_groups(&|group| sample(group).statistics(&plan, &steps).unwrap().to_bytes());
     let groups: Vec<_> = groups.iter().map(|bytes| SampleStatistics::from_bytes(bytes).unwrap()).collect();
     let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
     let found = loop {
         lesson = Lesson::from_bytes(&lesson.to_bytes()).unwrap();
         // Every worker is a new one, which draws the sample again.
-        let found = of_groups(&|group| sample(group).find(&plan, &steps, &lesson).to_bytes());
+        let found = of_groups(&|group| sample(group).find(&plan, &steps, &lesson).unwrap().to_bytes());
         let found: Vec<_> = found.iter().map(|bytes| Findings::from_bytes(bytes).unwrap()).collect();
         if lesson.is_over() {
             break found;
@@ -232,12 +232,12 @@ fn coded() -> (Plan, Coding, Counts, Coded) {
     let steps = Steps::new(&plan, &[statistics]).unwrap();
     let mut sample = Sample::new();
     sample.add(&plan, &bucket, &looked).unwrap();
-    let groups = [sample.statistics(&plan, &steps)];
+    let groups = [sample.statistics(&plan, &steps).unwrap()];
     let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
     while !lesson.is_over() {
-        lesson.advance(&[sample.find(&plan, &steps, &lesson)]).unwrap();
+        lesson.advance(&[sample.find(&plan, &steps, &lesson).unwrap()]).unwrap();
     }
-    let found = [sample.find(&plan, &steps, &lesson)];
+    let found = [sample.find(&plan, &steps, &lesson).unwrap()];
     let coding = Coding::new(&plan, &steps, &groups, Some((&lesson, &found))).unwrap();
     let none = None::<&mut crate::packed::Refit<'_>>;
     let (counts, coded) = coding.code(&plan, &bucket, &looked, none, &Silent).unwrap();
@@ -253,7 +253,7 @@ fn buckets_are_coded_anew_without_a_change() {
     assert!(same.to_bytes() == coded.to_bytes());
     // Other tables, and back.
     let mut more = counts.clone();
-    more.0.add(&counts.0);
+    more.counts.add(&counts.counts);
     let other = Tables::new(&[more, counts.clone()]).unwrap();
     let there = coded.clone().with_tables(&plan, &coding, &other).unwrap();
     assert!(there.with_tables(&plan, &coding, &tables).unwrap().to_bytes() == coded.to_bytes());
@@ -270,4 +270,27 @@ fn damaged_buckets_are_refused_or_are_others() {
         refused += usize::from(damaged.with_tables(&plan, &coding, &tables).is_err());
     }
     assert!(refused > 300, "{refused}");
+}
+
+/// What was made for one scene is refused by another, whatever its shape.
+#[test]
+fn messages_of_another_scene_are_refused() {
+    let (plan, coding, counts, coded) = coded();
+    let other = [scene(3000, 5).with_degree_cut(ShDegree::ZERO)];
+    let other = Plan::new(&surveys(&other), &options(), 38.0, false).unwrap();
+    let tables = Tables::new(&[counts]).unwrap();
+    assert!(coded.clone().with_tables(&other, &coding, &tables).is_err());
+    assert!(coding.encoding(&other).is_err() && coding.encoding(&plan).is_ok());
+    assert!(tables.read(&other).is_err());
+    // Tables of other counts lack symbols.
+    let mut reader = BucketReader::new(&other, 0);
+    reader.add(0, &scene(3000, 5).with_degree_cut(ShDegree::ZERO), 0..3000, &Silent).unwrap();
+    let bucket = reader.finish();
+    let (statistics, looked) = bucket.look(&other, None).unwrap();
+    assert!(Steps::new(&plan, std::slice::from_ref(&statistics)).is_err());
+    let steps = Steps::new(&other, &[statistics]).unwrap();
+    assert!(Sample::new().statistics(&plan, &steps).is_err());
+    assert!(Sample::new().add(&plan, &bucket, &looked).is_err());
+    let none = None::<&mut crate::packed::Refit<'_>>;
+    assert!(coding.code(&plan, &bucket, &looked, none, &Silent).is_err());
 }
