@@ -35,9 +35,10 @@ class Tile(NamedTuple):
 def tiles_of(given: Paths | ray.data.Dataset) -> list[Tile]:
     """The tiles that ``given`` means, in order."""
     if hasattr(given, "to_numpy_refs"):
+        dataset: Any = given
         # Otherwise blocks come in the order in which they were made.
-        given.context.execution_options.preserve_order = True
-        return [Tile(f"block {k}", ref) for k, ref in enumerate(given.to_numpy_refs())]
+        dataset.context.execution_options.preserve_order = True
+        return [Tile(f"block {k}", ref) for k, ref in enumerate(dataset.to_numpy_refs())]
     if isinstance(given, (str, os.PathLike)):
         found = _paths(os.fspath(given))
     else:
