@@ -18,7 +18,7 @@ use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::from_python;
-use crate::bytes::{Bytes, Given};
+use crate::bytes::Given;
 use crate::draw::device;
 use crate::errors::{Result, raise};
 use crate::files::{json, output, read_options};
@@ -31,7 +31,7 @@ struct Tile {
 }
 
 enum Content {
-    File(Bytes, PathBuf),
+    File(PathBuf),
     Splats(Box<Splats>),
 }
 
@@ -39,14 +39,10 @@ enum Content {
 type Named<'py> = (String, Bound<'py, PyAny>);
 
 impl Tile {
-    fn of((name, given): Named<'_>, options: &ReadOptions) -> PyResult<Self> {
+    fn of((name, given): Named<'_>) -> PyResult<Self> {
         let content = match given.extract::<PathBuf>() {
+            Ok(path) => Content::File(scene_path(&path).into_owned()),
             Err(_) => Content::Splats(Box::new(from_python(&given)?)),
-            Ok(path) => {
-                let scene = scene_path(&path).into_owned();
-                let bytes = Given::Path(scene.clone()).bytes(&options.limits);
-                Content::File(bytes.map_err(|error| raise(given.py(), &error))?, scene)
-            }
         };
         Ok(Self { name, content })
     }
@@ -59,7 +55,9 @@ impl Tile {
     ) -> Result<T> {
         let done = match &self.content {
             Content::Splats(splats) => work(&**splats),
-            Content::File(bytes, scene) => {
+            Content::File(scene) => {
+                // It is mapped while it is read, so that not all tiles of a bucket are at once.
+                let bytes = Given::Path(scene.clone()).bytes(&options.limits)?;
                 match open(&self.name, bytes.as_ref(), Siblings::of(scene), options, false, &Silent)? {
                     Opened::Lexi(_) => return Err(Error::format(&self.name, "it is compressed already")),
                     opened => work(opened.source()),
@@ -135,13 +133,11 @@ enum From {
 }
 
 impl From {
-    fn of(pieces: Pieces<'_>, options: &ReadOptions) -> PyResult<Self> {
+    fn of(pieces: Pieces<'_>) -> PyResult<Self> {
         Ok(match pieces {
             Pieces::Scattered(pieces) => Self::Scattered(pieces),
             Pieces::Rows(tiles) => {
-                let of = |(number, tile, rows): (usize, Named<'_>, Runs)| {
-                    Ok((number, Tile::of(tile, options)?, rows))
-                };
+                let of = |(number, tile, rows): (usize, Named<'_>, Runs)| Ok((number, Tile::of(tile)?, rows));
                 Self::Rows(tiles.into_iter().map(of).collect::<PyResult<_>>()?)
             }
         })
@@ -186,7 +182,7 @@ pub(crate) fn tile_open(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(usize, u64, Vec<String>)> {
     let options = choices.reading(py, limit)?;
-    let tile = Tile::of(tile, &options)?;
+    let tile = Tile::of(tile)?;
     without_gil(py, None, move |_| {
         tile.with(&options, &mut |source| {
             Ok((source.len(), source.source_bytes(), source.warnings().to_vec()))
@@ -205,7 +201,7 @@ pub(crate) fn tile_survey(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Py<PyBytes>> {
     let options = choices.reading(py, limit)?;
-    let tile = Tile::of(tile, &options)?;
+    let tile = Tile::of(tile)?;
     let seed = choices.seed;
     let bytes = without_gil(py, None, move |watch| {
         let survey =
@@ -268,7 +264,7 @@ pub(crate) fn tile_count(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Vec<(usize, Runs)>> {
     let options = choices.reading(py, limit)?;
-    let tile = Tile::of(tile, &options)?;
+    let tile = Tile::of(tile)?;
     without_gil(py, None, move |watch| {
         let plan = Plan::from_bytes(&plan)?;
         let mut runs = vec![Runs::new(); plan.buckets()];
@@ -302,7 +298,7 @@ pub(crate) fn tile_scatter(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Vec<(usize, Py<PyBytes>)>> {
     let options = choices.reading(py, limit)?;
-    let tile = Tile::of(tile, &options)?;
+    let tile = Tile::of(tile)?;
     let pieces = without_gil(py, None, move |watch| {
         let plan = Plan::from_bytes(&plan)?;
         tile.with(&options, &mut |source| Ok(plan.scatter(number, source, rows.0..rows.1, watch)?))
@@ -322,7 +318,7 @@ pub(crate) fn tile_look(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Py<PyBytes>, Py<PyBytes>, Option<String>)> {
     let options = choices.reading(py, limit)?;
-    let (from, device) = (From::of(pieces, &options)?, device(py, &choices.device)?);
+    let (from, device) = (From::of(pieces)?, device(py, &choices.device)?);
     let (statistics, looked, gpu) = without_gil(py, None, move |watch| {
         let plan = Plan::from_bytes(&plan)?;
         let bucket = from.bucket(&plan, bucket, &options)?;
@@ -375,7 +371,7 @@ impl TileSample {
         limit: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<()> {
         let options = choices.reading(py, limit)?;
-        let from = From::of(pieces, &options)?;
+        let from = From::of(pieces)?;
         without_gil(py, None, |_| {
             let bucket = from.bucket(&self.plan, bucket, &options)?;
             Ok(self.sample.add(&self.plan, &bucket, &Looked::from_bytes(&looked)?)?)
@@ -470,7 +466,7 @@ pub(crate) fn tile_code(
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<(Py<PyBytes>, Py<PyBytes>)> {
     let options = choices.reading(py, limit)?;
-    let from = From::of(pieces, &options)?;
+    let from = From::of(pieces)?;
     let (counts, coded) = without_gil(py, None, move |watch| {
         let (plan, coding) = (Plan::from_bytes(&plan)?, Coding::from_bytes(&coding)?);
         let (bucket, looked) = (from.bucket(&plan, bucket, &options)?, Looked::from_bytes(&looked)?);
@@ -554,7 +550,7 @@ pub(crate) fn tile_whole(
 ) -> PyResult<(Py<PyBytes>, String)> {
     let options = choices.reading(py, limit)?;
     let device = device(py, &choices.device)?;
-    let given = tiles.into_iter().map(|tile| Tile::of(tile, &options)).collect::<PyResult<Vec<_>>>()?;
+    let given = tiles.into_iter().map(Tile::of).collect::<PyResult<Vec<_>>>()?;
     let (bytes, report) = without_gil(py, None, move |watch| {
         let (mut scenes, mut bytes) = (Vec::new(), 0);
         for tile in &given {

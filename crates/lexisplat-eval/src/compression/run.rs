@@ -97,7 +97,7 @@ pub(super) fn in_parts(
 }
 
 /// The sensitivity to a part of a scene, from views like photographs of it and from all around. With the latter alone files of
-/// the same size were 2.5 dB worse (docs/results/scale.md).
+/// the same size were 1.7 dB worse (docs/results/scale.md).
 pub(super) fn look_at_part(
     renderer: &mut Renderer,
     part: &Splats,

@@ -228,6 +228,18 @@ impl Splats {
         self.sh_rest.extend(other.sh_rest);
     }
 
+    /// Gives back the memory that a longer scene took, but for that of extras.
+    pub(crate) fn shrink_to_fit(&mut self) {
+        let g = &mut self.geometry;
+        g.positions.shrink_to_fit();
+        g.normals.shrink_to_fit();
+        g.dc.shrink_to_fit();
+        g.opacities.shrink_to_fit();
+        g.scales.shrink_to_fit();
+        g.rotations.shrink_to_fit();
+        self.sh_rest.shrink_to_fit();
+    }
+
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
         self.geometry.retain(keep);

@@ -95,6 +95,7 @@ impl Sample {
         let mut splats = bucket.splats.clone();
         splats.geometry.extras = Vec::new();
         splats.retain(&keep);
+        splats.shrink_to_fit();
         let taken = || (0..n).filter(|&i| keep[i]);
         let scene = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.places[i] }).collect();
         self.parts.push(Part {
