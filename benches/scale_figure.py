@@ -15,7 +15,7 @@ import numpy as np
 BUCKET = 262_144
 #: Seconds of a bucket on one thread: in tasks, and in the process that calls. Seconds of a scene: drawing samples of a bucket, of
 #: which there are at most 32 in two groups, and learning.
-TASKS, CALLER, DRAW, LEARN = 10.2, 0.06, 0.35, 1.0
+TASKS, CALLER, DRAW, LEARN = 9.7, 0.06, 0.36, 1.0
 #: Gaussians, workers and seconds that were measured (docs/results/scale.md).
 MEASURED = [(1_894_752, 1, 80.8), (1_894_752, 2, 44.7), (20_147_646, 2, None)]
 WORKERS = [1, 2, 10, 100, 1000]
