@@ -39,7 +39,7 @@ def main(path):
         axes.axhline(mark, color="0.85", zorder=0)
         axes.text(1.05e6, mark * 1.08, name, color="0.5", fontsize=8)
     axes.grid(axis="x", color="0.92")
-    axes.legend(frameon=False, loc="lower right", title="dots were measured")
+    axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0), title="dots were measured")
     figure.tight_layout()
     figure.savefig(path, metadata={"Date": None})
 
