@@ -176,7 +176,7 @@ pub(crate) fn new_output(path: &Path, overwrite: bool) -> Output<'_> {
 }
 
 /// Returns the one path of the file that `path` leads to, whether there is such a file yet or not.
-fn resolved(path: &Path) -> Option<PathBuf> {
+pub(crate) fn resolved(path: &Path) -> Option<PathBuf> {
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;

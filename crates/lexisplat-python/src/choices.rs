@@ -9,7 +9,6 @@ use lexisplat::{
 };
 use lexisplat_eval::compression::choose_layout;
 use lexisplat_eval::{Compression, Error, Packing, Quality, SceneKind, Target};
-use lexisplat_formats::{Opened, Siblings, open, scene_path};
 use lexisplat_render::Device;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -20,7 +19,7 @@ use crate::bytes::{Bytes, Given};
 use crate::cameras::{CameraTuple, cameras};
 use crate::draw::device;
 use crate::errors::{Result, parameter, raise};
-use crate::files::{json, read_options};
+use crate::files::{json, read_options, with_source};
 use crate::scene::Scene;
 use crate::work::{Watch, without_gil};
 
@@ -125,13 +124,8 @@ impl Choices {
         if layout != Layout::Packed {
             return Ok(Compression::Exact(self.exact(layout, dictionary)?, layout.codes()));
         }
-        let options = PackOptions::default()
-            .with_tolerance(self.tol)
-            .with_atoms(self.atoms)
-            .with_keep_order(self.keep_order)
-            .with_keep_all(self.keep_all)
-            .with_seed(self.seed);
-        let preset = self.preset.map_or(Ok(Preset::default()), |name| name.parse())?;
+        let options = pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.seed);
+        let preset = preset(self.preset.as_deref())?;
         if self.guess {
             return Ok(Compression::Heuristic(preset, options));
         }
@@ -163,6 +157,27 @@ impl Choices {
         options.dictionary = dictionary;
         Ok(options)
     }
+}
+
+/// The options that packed files have, however they are packed.
+pub(crate) fn pack_options(
+    tol: Option<f64>,
+    atoms: Option<usize>,
+    keep_order: bool,
+    keep_all: bool,
+    seed: u64,
+) -> PackOptions {
+    PackOptions::default()
+        .with_tolerance(tol)
+        .with_atoms(atoms)
+        .with_keep_order(keep_order)
+        .with_keep_all(keep_all)
+        .with_seed(seed)
+}
+
+/// The preset of this name, or the default one.
+pub(crate) fn preset(name: Option<&str>) -> Result<Preset> {
+    Ok(name.map_or(Ok(Preset::default()), str::parse)?)
 }
 
 /// A dictionary: an array of (atoms, coefficients), a file, or its bytes.
@@ -224,19 +239,10 @@ pub(crate) fn compress(
         match source {
             Source::Splats(splats) => run(&compression, &*splats, watch),
             Source::File(given) => {
-                let name = given.name();
-                let path = match &given {
-                    Given::Path(path) => Some(scene_path(path).into_owned()),
-                    Given::Memory(_) => None,
-                };
-                let siblings = path.as_deref().map_or(Siblings::NONE, Siblings::of);
-                let bytes = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
-                let bytes = bytes.as_ref();
-                let whole = compression.holds_whole(bytes.len() as u64);
-                match open(&name, bytes, siblings, &options, whole, watch)? {
-                    Opened::Lexi(_) => Err(Error::format(&name, "it is compressed already")),
-                    opened => run(&compression, opened.source(), watch),
-                }
+                let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes));
+                with_source(given, &name, &options, whole, watch, &mut |source| {
+                    run(&compression, source, watch)
+                })
             }
         }
     })?;

@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use lexisplat::output::{Existing, Output};
 use lexisplat::ply::ReadOptions;
-use lexisplat_eval::{Compression, Loaded, Packing, SceneFile};
-use lexisplat_formats::{Kind, Siblings, WriteOptions, write};
+use lexisplat::{Progress, SplatSource};
+use lexisplat_eval::{Compression, Error, Loaded, Packing, SceneFile};
+use lexisplat_formats::{Kind, Opened, Siblings, WriteOptions, open, scene_path, write};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use crate::arrays::{ShOrder, from_python, to_python};
 use crate::bytes::{Given, limits};
-use crate::errors::{parameter, raise};
+use crate::errors::{Result, parameter, raise};
 use crate::work::without_gil;
 
 /// Reads the scene in a file or in bytes. Returns its arrays and its warnings.
@@ -56,6 +57,29 @@ pub(crate) fn read_options(
         .with_drop_invalid(drop_invalid)
         .with_drop_extras(drop_extras)
         .with_limits(limits(py, limit)?))
+}
+
+/// Opens the scene `given`, which messages call `name`, and does `work` with it. It is read as a whole if `whole` says so of its bytes.
+/// A compressed scene is refused.
+pub(crate) fn with_source<T>(
+    given: Given,
+    name: &str,
+    options: &ReadOptions,
+    whole: impl FnOnce(u64) -> bool,
+    progress: &dyn Progress,
+    work: &mut dyn FnMut(&dyn SplatSource) -> Result<T>,
+) -> Result<T> {
+    let path = match &given {
+        Given::Path(path) => Some(scene_path(path).into_owned()),
+        Given::Memory(_) => None,
+    };
+    let siblings = path.as_deref().map_or(Siblings::NONE, Siblings::of);
+    let bytes = path.clone().map_or(given, Given::Path).bytes(&options.limits)?;
+    let bytes = bytes.as_ref();
+    match open(name, bytes, siblings, options, whole(bytes.len() as u64), progress)? {
+        Opened::Lexi(_) => Err(Error::format(name, "it is compressed already")),
+        opened => work(opened.source()),
+    }
 }
 
 /// Writes a scene in the format that `format` or the extension of `path` names. Returns what the file lacks, as JSON.
@@ -109,7 +133,6 @@ pub(crate) fn output(path: &std::path::Path, overwrite: bool) -> Output<'_> {
 
 /// `value` as JSON, which Python reads.
 pub(crate) fn json(py: Python<'_>, value: &impl serde::Serialize) -> PyResult<String> {
-    serde_json::to_string(value).map_err(|error| {
-        raise(py, &lexisplat_eval::Error::parameter("report", error, "a report that can be told as JSON"))
-    })
+    serde_json::to_string(value)
+        .map_err(|error| raise(py, &Error::parameter("report", error, "a report that can be told as JSON")))
 }

@@ -44,7 +44,7 @@ mod _native {
     #[pymodule_export]
     use crate::tiles::{
         TileSample, tile_advance, tile_assemble, tile_check, tile_choices, tile_code, tile_coding,
-        tile_count, tile_finish, tile_lesson, tile_look, tile_open, tile_plan, tile_scatter, tile_steps,
+        tile_finish, tile_lesson, tile_look, tile_open, tile_plan, tile_runs, tile_scatter, tile_steps,
         tile_survey, tile_tables, tile_whole,
     };
     use pyo3::prelude::*;

@@ -11,7 +11,6 @@ use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
 use lexisplat_eval::Error;
 use lexisplat_eval::compression::tiles;
-use lexisplat_formats::{Opened, Siblings, open, scene_path};
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
@@ -19,9 +18,10 @@ use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::from_python;
 use crate::bytes::Given;
+use crate::choices::{pack_options, preset};
 use crate::draw::device;
 use crate::errors::{Result, raise};
-use crate::files::{json, output, read_options};
+use crate::files::{json, output, read_options, with_source};
 use crate::work::without_gil;
 
 /// A tile: a file, or arrays that Ray holds.
@@ -41,7 +41,7 @@ type Named<'py> = (String, Bound<'py, PyAny>);
 impl Tile {
     fn of((name, given): Named<'_>) -> PyResult<Self> {
         let content = match given.extract::<PathBuf>() {
-            Ok(path) => Content::File(scene_path(&path).into_owned()),
+            Ok(path) => Content::File(path),
             Err(_) => Content::Splats(Box::new(from_python(&given)?)),
         };
         Ok(Self { name, content })
@@ -55,13 +55,9 @@ impl Tile {
     ) -> Result<T> {
         let done = match &self.content {
             Content::Splats(splats) => work(&**splats),
-            Content::File(scene) => {
-                // It is mapped while it is read, so that not all tiles of a bucket are at once.
-                let bytes = Given::Path(scene.clone()).bytes(&options.limits)?;
-                match open(&self.name, bytes.as_ref(), Siblings::of(scene), options, false, &Silent)? {
-                    Opened::Lexi(_) => return Err(Error::format(&self.name, "it is compressed already")),
-                    opened => work(opened.source()),
-                }
+            // It is mapped while it is read, so that not all tiles of a bucket are at once.
+            Content::File(path) => {
+                with_source(Given::Path(path.clone()), &self.name, options, |_| false, &Silent, work)
             }
         };
         done.map_err(|error| match error {
@@ -95,16 +91,11 @@ impl Choices {
     }
 
     fn options(&self) -> PackOptions {
-        PackOptions::default()
-            .with_tolerance(self.tol)
-            .with_atoms(self.atoms)
-            .with_keep_order(self.keep_order)
-            .with_keep_all(self.keep_all)
-            .with_seed(self.seed)
+        pack_options(self.tol, self.atoms, self.keep_order, self.keep_all, self.seed)
     }
 
     fn preset(&self) -> Result<Preset> {
-        Ok(self.preset.as_deref().map_or(Ok(Preset::default()), str::parse)?)
+        preset(self.preset.as_deref())
     }
 
     /// What draws, unless it is guessed.
@@ -249,17 +240,15 @@ pub(crate) fn tile_plan(
     Ok((made(py, bytes), gaussians, groups, files))
 }
 
-/// Of each bucket the runs of rows, of `chunk` each, that it gets some of.
+/// Of each bucket the runs of rows that it reads.
 #[pyfunction]
-#[pyo3(signature = (plan, number, tile, rows, chunk, choices, limit))]
-#[expect(clippy::too_many_arguments, reason = "Python names them")]
-pub(crate) fn tile_count(
+#[pyo3(signature = (plan, number, tile, rows, choices, limit))]
+pub(crate) fn tile_runs(
     py: Python<'_>,
     plan: PyBackedBytes,
     number: usize,
     tile: Named<'_>,
     rows: (usize, usize),
-    chunk: usize,
     choices: Choices,
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Vec<(usize, Runs)>> {
@@ -267,21 +256,10 @@ pub(crate) fn tile_count(
     let tile = Tile::of(tile)?;
     without_gil(py, None, move |watch| {
         let plan = Plan::from_bytes(&plan)?;
-        let mut runs = vec![Runs::new(); plan.buckets()];
-        tile.with(&options, &mut |source| {
-            for start in (rows.0..rows.1).step_by(chunk.max(1)) {
-                let own = start..rows.1.min(start + chunk.max(1));
-                let counts = plan.count(number, source, own.clone(), watch)?;
-                for (runs, _) in runs.iter_mut().zip(counts).filter(|(_, count)| *count > 0) {
-                    match runs.last_mut() {
-                        Some(last) if last.1 == own.start => last.1 = own.end,
-                        _ => runs.push((own.start, own.end)),
-                    }
-                }
-            }
-            Ok(())
-        })?;
-        Ok(runs.into_iter().enumerate().filter(|(_, runs)| !runs.is_empty()).collect())
+        let runs =
+            tile.with(&options, &mut |source| Ok(plan.runs(number, source, rows.0..rows.1, watch)?))?;
+        let pairs = |runs: Vec<std::ops::Range<usize>>| runs.into_iter().map(|r| (r.start, r.end)).collect();
+        Ok(runs.into_iter().map(|(bucket, runs)| (bucket, pairs(runs))).collect())
     })
 }
 
@@ -427,8 +405,7 @@ pub(crate) fn tile_advance(
     Ok((made(py, bytes), left))
 }
 
-/// Everything that buckets are coded with, and the number of Gaussians that are coded. `learned` is the lesson that is over and
-/// what all groups found on its atoms.
+/// Everything that buckets are coded with. `learned` is the lesson that is over and what all groups found on its atoms.
 #[pyfunction]
 pub(crate) fn tile_coding(
     py: Python<'_>,
@@ -436,8 +413,8 @@ pub(crate) fn tile_coding(
     steps: PyBackedBytes,
     groups: Vec<PyBackedBytes>,
     learned: Option<(PyBackedBytes, Vec<PyBackedBytes>)>,
-) -> PyResult<(Py<PyBytes>, usize)> {
-    let (bytes, kept) = without_gil(py, None, move |_| {
+) -> PyResult<Py<PyBytes>> {
+    let bytes = without_gil(py, None, move |_| {
         let (plan, steps) = (Plan::from_bytes(&plan)?, Steps::from_bytes(&steps)?);
         let groups = all(&groups, SampleStatistics::from_bytes)?;
         let learned = match learned {
@@ -445,10 +422,9 @@ pub(crate) fn tile_coding(
             Some((lesson, found)) => Some((Lesson::from_bytes(&lesson)?, all(&found, Findings::from_bytes)?)),
         };
         let learned = learned.as_ref().map(|(lesson, found)| (lesson, found.as_slice()));
-        let coding = Coding::new(&plan, &steps, &groups, learned)?;
-        Ok((coding.to_bytes(), coding.kept()))
+        Ok(Coding::new(&plan, &steps, &groups, learned)?.to_bytes())
     })?;
-    Ok((made(py, bytes), kept))
+    Ok(made(py, bytes))
 }
 
 /// How often each symbol occurs in a bucket, and the bucket, coded with tables of its own.
@@ -566,7 +542,7 @@ pub(crate) fn tile_whole(
         let mut file = Vec::new();
         let renderer = choices.renderer(device)?;
         let (options, preset) = (choices.options(), choices.preset()?);
-        let mut report = tiles::pack(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
+        let mut report = tiles::in_parts(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
         report.source_bytes = bytes;
         Ok((file, report))
     })?;

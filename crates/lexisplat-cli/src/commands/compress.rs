@@ -1,5 +1,6 @@
 //! `lexisplat compress`.
 
+use std::collections::HashSet;
 use std::fmt::{Display, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -19,7 +20,7 @@ use lexisplat_render::read_views;
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
 use crate::files::{
-    check_output, input, is_pipe, new_output, note, output_path, siblings, tell, warn, write_output,
+    check_output, input, is_pipe, new_output, note, output_path, resolved, siblings, tell, warn, write_output,
 };
 use crate::progress::Bars;
 use crate::stop::{self, Work};
@@ -34,11 +35,10 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if args.output.is_none() && !others.is_empty() {
         return Err(Error::parameter("--output", "missing", "the file that several inputs become").into());
     }
-    let resolved = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
-    for (k, path) in args.inputs.iter().enumerate() {
-        if args.inputs[..k].iter().any(|other| resolved(other) == resolved(path)) {
-            return Err(Error::parameter("INPUT", path.display(), "each tile once").into());
-        }
+    let mut seen = HashSet::new();
+    let mut is_new = |path: &PathBuf| seen.insert(resolved(path).unwrap_or_else(|| path.clone()));
+    if let Some(twice) = args.inputs.iter().find(|path| !is_new(path)) {
+        return Err(Error::parameter("INPUT", twice.display(), "each tile once").into());
     }
     let output = output_path(first, args.output.as_deref(), "lexi", common)?;
     let mut inputs: Vec<&Path> = args.inputs.iter().map(PathBuf::as_path).collect();

@@ -13,6 +13,7 @@ use super::packing::{Compression, Packing, Quality};
 use super::refit::{Fit, Refitting, appearances_of_part};
 use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
+use super::tiles;
 use super::views::{Looked, PackingViews};
 use crate::error::Result;
 
@@ -61,8 +62,11 @@ impl Compression {
     }
 }
 
-/// Packs part by part. `renderer` measures the parts. Without one the heuristic does.
-pub(super) fn in_parts(
+/// Packs part by part, or as a whole a scene that is one part. `renderer` measures the parts. Without one the heuristic does.
+///
+/// # Errors
+/// As [`stream::pack`], and errors of drawing.
+pub fn in_parts(
     options: &PackOptions,
     preset: Preset,
     mut renderer: Option<Renderer>,
@@ -72,7 +76,7 @@ pub(super) fn in_parts(
 ) -> Result<CompressionReport> {
     let clock = Stopwatch::start();
     let device = renderer.as_ref().and_then(gpu);
-    let origin = if renderer.is_some() { SensitivitySource::Views } else { SensitivitySource::Heuristic };
+    let guessed = renderer.is_none();
     let mut look_seconds = 0.0;
     let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
         appearances_of_part(part, model, weights, progress)
@@ -91,9 +95,8 @@ pub(super) fn in_parts(
         }
     };
     let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;
-    let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
     let pack_seconds = clock.seconds() - look_seconds;
-    Ok(CompressionReport { in_parts: true, look_seconds, pack_seconds, ..report })
+    Ok(CompressionReport { look_seconds, pack_seconds, ..tiles::report(&done, guessed) })
 }
 
 /// The sensitivity to a part of a scene, from views like photographs of it and from all around. With the latter alone files of

@@ -1,14 +1,14 @@
 //! The steps of [`lexisplat::packed::tiles`] that draw.
 
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::stream::PackedFile;
-use lexisplat::{Model, Progress, Sink, SplatSource, Splats};
+use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
 use super::refit::appearances_of_part;
 use super::report::{CompressionReport, SensitivitySource};
-use super::run::{in_parts, look_at_part};
+pub use super::run::in_parts;
+use super::run::look_at_part;
 use crate::error::Result;
 
 /// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.
@@ -47,21 +47,6 @@ pub fn code(
         appearances_of_part(part, model, weights, progress)
     };
     coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
-}
-
-/// Packs a scene in one process as several would do it: bucket by bucket, or as a whole if it is one bucket.
-///
-/// # Errors
-/// As [`lexisplat::stream::pack`], and errors of drawing.
-pub fn pack(
-    options: &PackOptions,
-    preset: Preset,
-    renderer: Option<Renderer>,
-    source: &dyn SplatSource,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<CompressionReport> {
-    in_parts(options, preset, renderer, source, sink, progress)
 }
 
 /// The report of a file that was assembled of buckets, which were looked at or `guessed`.

@@ -151,8 +151,8 @@ def tile_check(name: str, own: bytes, first: bytes | None) -> None: ...
 def tile_plan(
     surveys: list[tuple[str, list[bytes]]], choices: dict[str, Any], one_each: bool
 ) -> tuple[bytes, int, list[list[int]], list[_Rows]]: ...
-def tile_count(
-    plan: bytes, number: int, tile: _Tile, rows: _Rows, chunk: int, choices: dict[str, Any], limit: _Limit
+def tile_runs(
+    plan: bytes, number: int, tile: _Tile, rows: _Rows, choices: dict[str, Any], limit: _Limit
 ) -> list[tuple[int, list[_Rows]]]: ...
 def tile_scatter(
     plan: bytes, number: int, tile: _Tile, rows: _Rows, choices: dict[str, Any], limit: _Limit
@@ -165,7 +165,7 @@ def tile_lesson(plan: bytes, steps: bytes, groups: list[bytes]) -> tuple[bytes, 
 def tile_advance(lesson: bytes, groups: list[bytes]) -> tuple[bytes, int]: ...
 def tile_coding(
     plan: bytes, steps: bytes, groups: list[bytes], learned: tuple[bytes, list[bytes]] | None
-) -> tuple[bytes, int]: ...
+) -> bytes: ...
 def tile_code(
     plan: bytes,
     coding: bytes,

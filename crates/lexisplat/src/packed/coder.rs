@@ -218,8 +218,9 @@ impl ChunkCoder {
     ) -> Result<Self> {
         let degree = atoms.degree();
         let dim = degree.rest();
-        let dictionary = if dim > 0 { Dictionary::new(degree, atoms.rows())? } else { Dictionary::empty() };
-        let book = costs.map(|costs| Codebook::new(dim, atoms.rows(), costs));
+        let rows = atoms.rows();
+        let book = costs.map(|costs| Codebook::new(dim, rows.clone(), costs));
+        let dictionary = if dim > 0 { Dictionary::new(degree, rows)? } else { Dictionary::empty() };
         Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
     }
 

@@ -85,9 +85,7 @@ impl Written {
             ranges: ranges.collect(),
         }
     }
-}
 
-impl Written {
     /// The same chunk coded with `tables`. Its ranges are coded with those of `lookup`. `None` if no encoder writes them.
     pub(super) fn recoded(
         &self,

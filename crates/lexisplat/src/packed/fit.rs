@@ -144,16 +144,20 @@ pub(super) struct Classes {
 impl Classes {
     /// The classes for a scene whose weights are like these.
     fn fit(weights: impl Iterator<Item = f32>) -> Self {
-        let weights: Vec<f64> = weights.map(f64::from).collect();
-        let floor = (quantile(&weights, FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
-        let logs: Vec<f64> = weights.iter().map(|w| 0.5 * libm::log2(w + floor)).collect();
-        Self { floor, top: quantile(&logs, TOP_QUANTILE).round() }
+        let mut weights: Vec<f64> = weights.map(f64::from).collect();
+        weights.sort_by(f64::total_cmp);
+        Self::of_quantiles(|share| at_share(&weights, share))
     }
 
     /// The classes for a scene of which these are the weights.
     pub(super) fn of_histogram(weights: &Histogram) -> Self {
-        let floor = (f64::from(weights.quantile(FLOOR_QUANTILE)) * WEIGHT_FLOOR).max(1e-30);
-        let top = 0.5 * libm::log2(f64::from(weights.quantile(TOP_QUANTILE)) + floor);
+        Self::of_quantiles(|share| weights.quantile(share).into())
+    }
+
+    /// The classes for weights with these quantiles.
+    fn of_quantiles(quantile: impl Fn(f64) -> f64) -> Self {
+        let floor = (quantile(FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
+        let top = 0.5 * libm::log2(quantile(TOP_QUANTILE) + floor);
         Self { floor, top: top.round() }
     }
 

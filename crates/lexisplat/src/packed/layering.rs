@@ -102,14 +102,10 @@ impl Layering {
         self.factors.get(layer).map_or(1.0, |factor| (factor * power(energy)).min(1.0))
     }
 
-    /// Gaussians of the next chunk of a layer of which so many are left, or 0 if more may follow and decide.
-    pub(super) fn next_chunk(&self, layer: usize, left: usize, all: bool) -> usize {
+    /// Gaussians of the next chunk of a layer of which so many are left.
+    pub(super) fn next_chunk(&self, layer: usize, left: usize) -> usize {
         let size = self.chunks.get(layer).copied().unwrap_or(MOST_CHUNK);
-        match left > size + size / REST {
-            true => size,
-            false if all => left,
-            false => 0,
-        }
+        if left > size + size / REST { size } else { left }
     }
 
     /// How rows of `dim` coefficients are coded with `atoms` atoms.

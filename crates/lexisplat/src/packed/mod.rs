@@ -59,5 +59,5 @@ pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};
 pub use stream::StreamBits;
 
 /// Gaussians of a chunk of version 2, in which each chunk is decoded without the others. A file of version 3 says how many
-/// Gaussians each of its chunks has. Scenes larger than memory are sorted and coded in parts of multiples of this.
+/// Gaussians each of its chunks has.
 pub const CHUNK: usize = 32_768;

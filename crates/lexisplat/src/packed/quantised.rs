@@ -90,13 +90,7 @@ impl<'a> Quantised<'a> {
     ) -> Result<Self> {
         let n = gaussians.scene.len();
         let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
-        let view = View {
-            splats,
-            scene: &gaussians.scene,
-            classes: &gaussians.classes,
-            appearances: None,
-            changes: None,
-        };
+        let view = View::new(splats, &gaussians.scene, &gaussians.classes);
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, n, parameters, mean_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
@@ -108,7 +102,7 @@ impl<'a> Quantised<'a> {
         Ok(whole)
     }
 
-    /// A part of a scene, with what all parts are coded with. The state of its layering goes on from that of `encoding`.
+    /// A part of a scene, with what all parts are coded with.
     pub(super) fn of_part(
         splats: &'a Splats,
         options: &'a PackOptions,
@@ -122,7 +116,7 @@ impl<'a> Quantised<'a> {
         for (layer, &count) in counts.iter().enumerate() {
             let end = start + count;
             while start < end {
-                let next = start + encoding.layering.next_chunk(layer, end - start, true);
+                let next = start + encoding.layering.next_chunk(layer, end - start);
                 chunks.push((layer, start..next));
                 start = next;
             }
@@ -195,7 +189,7 @@ impl<'a> Quantised<'a> {
             encoding.finish(n, self.options, meta, SpillTo::Memory, &mut code_chunks)?;
         head.removed = (self.splats.len() - n) as u64;
         let order = self.options.keep_order.then(|| self.gaussians.scene.iter().map(|g| g.source).collect());
-        Ok((Packed::new(head, self.extras(), order, data.into_bytes()?), report))
+        Ok((Packed::new(head, self.extras(0..n), order, data.into_bytes()?), report))
     }
 
     /// The layer and the symbols of each chunk with these appearances, or with the scene's own, and how often each symbol occurs.
@@ -228,7 +222,7 @@ impl<'a> Quantised<'a> {
             all.iter().try_for_each(Appearance::check)?;
         }
         let Gaussians { scene, classes, .. } = &self.gaussians;
-        Ok(View { splats: self.splats, scene, classes, appearances, changes: None })
+        Ok(View { appearances, ..View::new(self.splats, scene, classes) })
     }
 
     /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
@@ -283,13 +277,27 @@ impl<'a> Quantised<'a> {
         &self.gaussians.scene
     }
 
-    /// The columns that are not drawn, with the rows of the file.
-    fn extras(&self) -> Vec<Extra> {
+    /// The columns that are not drawn, of the Gaussians `range` in the order of the file.
+    pub(super) fn extras(&self, range: Range<usize>) -> Vec<Extra> {
+        let sources = &self.gaussians.scene[range];
         let mut extras = self.splats.geometry.extras.clone();
         for extra in &mut extras {
-            for_extra!(&mut extra.values, v => gather(v, self.gaussians.scene.iter().map(|g| g.index())));
+            for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));
         }
         extras
+    }
+
+    /// What `refit` fits to pictures, if base colours and opacities may change and there is something to fit.
+    pub(crate) fn refitted<E: From<Error>>(
+        &self,
+        refit: Option<&mut Refit<'_, E>>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<Appearance>>, E> {
+        let Some(refit) = refit.filter(|_| self.options.may_change() && !self.is_empty()) else {
+            return Ok(None);
+        };
+        let model = self.finish(None, None, progress)?.0.unpack()?;
+        refit(self.splats, &model, self.weights()).map(Some)
     }
 }
 

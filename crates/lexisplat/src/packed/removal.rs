@@ -18,7 +18,7 @@ const NEVER_DRAWN: f32 = -5.541_264;
 /// Squared change of the pictures if each Gaussian is left out; infinite if it must stay. On average that change is the
 /// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian. No single picture
 /// may change much more.
-pub(crate) fn changes_without(geometry: &Geometry, sensitivity: &Sensitivity, may_change: bool) -> Vec<f32> {
+pub(super) fn changes_without(geometry: &Geometry, sensitivity: &Sensitivity, may_change: bool) -> Vec<f32> {
     let share = WORST_SHARE / usual_excess(sensitivity);
     let change = |i: usize| {
         // What no view showed may show in others. Where nothing was measured it is infinite.
@@ -46,7 +46,7 @@ fn usual_excess(sensitivity: &Sensitivity) -> f32 {
 }
 
 /// Whether a Gaussian without which pictures change by `change` stays at an overall step.
-pub(crate) fn is_worth_its_bits(change: f32, step: f64) -> bool {
+pub(super) fn is_worth_its_bits(change: f32, step: f64) -> bool {
     f64::from(change) >= REMOVAL * step * step
 }
 

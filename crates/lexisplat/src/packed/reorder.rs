@@ -4,6 +4,7 @@ use half::f16;
 
 use super::place::indices;
 use crate::scene::extra::for_extra;
+use crate::scene::splats::Geometry;
 use crate::sparse::codes::{CodedRest, Escapes, SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
@@ -28,7 +29,13 @@ pub(super) fn reordered(model: Model, order: &[u32], file: &str) -> Result<Model
     let from = inverse(order, model.len())
         .ok_or_else(|| Error::malformed(file, "the packed order is not a permutation of the Gaussians"))?;
     let (mut geometry, meta, dictionary, codes, record) = model.into_parts();
-    let g = &mut geometry;
+    gather_geometry(&mut geometry, &from);
+    let codes = codes_reordered(&codes, &from, &dictionary)?;
+    Model::new(geometry, meta, dictionary, codes, record)
+}
+
+/// Replaces the Gaussians of `g` by those at the indices `from`.
+pub(super) fn gather_geometry(g: &mut Geometry, from: &[usize]) {
     gather(&mut g.positions, from.iter().copied());
     gather(&mut g.normals, from.iter().copied());
     gather(&mut g.dc, from.iter().copied());
@@ -38,8 +45,6 @@ pub(super) fn reordered(model: Model, order: &[u32], file: &str) -> Result<Model
     for extra in &mut g.extras {
         for_extra!(&mut extra.values, v => gather(v, from.iter().copied()));
     }
-    let codes = codes_reordered(&codes, &from, &dictionary)?;
-    Model::new(geometry, meta, dictionary, codes, record)
 }
 
 /// Replaces `values` by the entries at the indices `from`. Empty arrays stay empty.

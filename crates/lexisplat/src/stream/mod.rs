@@ -46,24 +46,26 @@ pub(crate) use rows::RowLayout;
 pub use source_order::in_source_order;
 pub use survey::{Survey, lint, survey};
 
+use std::ops::Range;
+
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
+use crate::sparse::compress::AT_ONCE;
 use crate::support::error::Result;
 use crate::support::progress::Progress;
 
-/// Reads `source` into `splats`, `at_once` Gaussians at a time, and hands `take` the number of the first of them each
-/// time. Reports the bytes read to `progress`.
-fn each_part(
+/// Reads Gaussians `rows` of `source` into `splats`, [`AT_ONCE`] of them at a time, and hands `take` the number of the first of
+/// them each time. Reports the bytes read to `progress`.
+pub(crate) fn each_part(
     source: &dyn SplatSource,
-    at_once: usize,
+    rows: Range<usize>,
     splats: &mut Splats,
     progress: &dyn Progress,
     take: &mut dyn FnMut(usize, &mut Splats) -> Result<()>,
 ) -> Result<()> {
-    let n = source.len();
-    for start in (0..n).step_by(at_once) {
+    for start in rows.clone().step_by(AT_ONCE) {
         progress.check()?;
-        let range = start..n.min(start + at_once);
+        let range = start..rows.end.min(start + AT_ONCE);
         source.read(range.clone(), splats)?;
         take(start, splats)?;
         progress.advance(range.len() as u64 * source.row_bytes());

@@ -5,7 +5,7 @@ use std::path::Path;
 use super::buckets::Buckets;
 use super::rows::RowLayout;
 use crate::packed::MortonKey;
-use crate::packed::tiles::{Bucket, Plan, Survey};
+use crate::packed::tiles::{Bucket, BucketReader, Plan, Survey};
 use crate::scene::source::SplatSource;
 use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
@@ -58,22 +58,25 @@ impl Ordered {
     }
 
     /// Bucket `number`, which is taken away if it is the `last` time. Then buckets are taken in order.
-    pub(super) fn bucket(&mut self, number: usize, last: bool) -> Result<Bucket> {
+    pub(super) fn bucket(&mut self, plan: &Plan, number: usize, last: bool) -> Result<Bucket> {
         let records = if last { self.buckets.take(number)? } else { self.buckets.read(number)? };
         let width = KEY_BYTES + self.rows.bytes();
-        let key = |record: &[u8]| MortonKey {
-            cell: record.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),
-            source: record[8..].first_chunk().map_or(0, |s| u32::from_le_bytes(*s)),
-        };
-        let mut order: Vec<(MortonKey, &[u8])> =
-            records.chunks_exact(width).map(|record| (key(record), record)).collect();
-        order.sort_unstable_by_key(|o| o.0);
-        let places = order.iter().map(|o| o.0).collect();
-        let mut bytes = Vec::with_capacity(order.len() * self.rows.bytes());
-        order.iter().for_each(|(_, record)| bytes.extend_from_slice(&record[KEY_BYTES..]));
-        drop(order);
+        let count = records.len() / width;
+        let (mut rows, mut places) =
+            (Vec::with_capacity(count * self.rows.bytes()), Vec::with_capacity(count));
+        for record in records.chunks_exact(width) {
+            let (key, row) = record.split_at(KEY_BYTES);
+            places.push(MortonKey {
+                cell: key.first_chunk().map_or(0, |c| u64::from_le_bytes(*c)),
+                source: key[8..].first_chunk().map_or(0, |s| u32::from_le_bytes(*s)),
+            });
+            rows.extend_from_slice(row);
+        }
         drop(records);
-        Ok(Bucket::of_rows(number, self.rows.unpack(&bytes), places))
+        let mut reader = BucketReader::new(plan, number);
+        reader.add_rows(&self.rows, &rows, places);
+        drop(rows);
+        Ok(reader.finish())
     }
 }
 

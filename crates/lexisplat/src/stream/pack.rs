@@ -14,7 +14,7 @@ use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 use crate::support::progress::{Progress, Stage};
 use crate::support::sink::Sink;
-use crate::support::spill::{Spill, SpillTo, Spilled};
+use crate::support::spill::{SpillTo, Temporary};
 use crate::support::stopwatch::Stopwatch;
 
 /// What [`pack`] did.
@@ -96,12 +96,7 @@ fn whole<E: From<Error>>(
     let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
     let quantised = packer.quantise(packer.step_for(decibels), true, progress)?;
     let device = importance.device().map(str::to_owned);
-    let refit = importance.refit().filter(|_| options.may_change() && !quantised.is_empty());
-    let mut appearances = None;
-    if let Some(refit) = refit {
-        let model = quantised.finish(None, None, progress)?.0.unpack()?;
-        appearances = Some(refit(&splats, &model, quantised.weights())?);
-    }
+    let appearances = quantised.refitted(importance.refit(), progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
     let packed = packed.with_device(device);
     let writer = LexiWriter::packed(&packed);
@@ -139,7 +134,7 @@ fn in_buckets<E: From<Error>>(
     let mut samples: Vec<Sample> = groups.iter().map(|_| Sample::new()).collect();
     for number in 0..plan.buckets() {
         progress.check()?;
-        let bucket = ordered.bucket(number, false)?;
+        let bucket = ordered.bucket(&plan, number, false)?;
         let (own, looked) = bucket.look(&plan, importance.of(bucket.splats())?)?;
         for (sample, _) in samples.iter_mut().zip(&groups).filter(|(_, group)| group.contains(&number)) {
             sample.add(&plan, &bucket, &looked)?;
@@ -156,11 +151,10 @@ fn in_buckets<E: From<Error>>(
 
     progress.begin(Stage::Code, coding.kept() as u64);
     let (mut counts, mut all_coded) = (Vec::new(), Messages::new(to)?);
-    let mut all_looked = all_looked.finish()?;
     for number in 0..plan.buckets() {
         progress.check()?;
-        let bucket = ordered.bucket(number, true)?;
-        let looked = Looked::from_bytes(&all_looked.take()?)?;
+        let bucket = ordered.bucket(&plan, number, true)?;
+        let looked = Looked::from_bytes(&all_looked.read(number)?)?;
         let (own, coded) = coding.code(&plan, &bucket, &looked, importance.refit(), progress)?;
         counts.push(own);
         all_coded.push(&coded.to_bytes())?;
@@ -169,10 +163,9 @@ fn in_buckets<E: From<Error>>(
     drop((ordered, all_looked));
     let tables = Tables::new(&counts)?;
     let mut assembly = Assembly::new(&plan, &coding, &tables, 0, &folder)?;
-    let mut all_coded = all_coded.finish()?;
-    for _ in 0..plan.buckets() {
+    for number in 0..plan.buckets() {
         progress.check()?;
-        let coded = Coded::from_bytes(&all_coded.take()?)?;
+        let coded = Coded::from_bytes(&all_coded.read(number)?)?;
         assembly.push(coded.with_tables(&plan, &coding, &tables)?)?;
     }
     let device = importance.device().map(str::to_owned);
@@ -203,37 +196,30 @@ fn learn(plan: &Plan, steps: &Steps, mut samples: Vec<Sample>, progress: &dyn Pr
     }
 }
 
-/// Messages of one bucket after the other, in a temporary file.
+/// A message of each bucket, in a temporary file.
 struct Messages {
-    spill: Spill,
-    lengths: Vec<usize>,
-}
-
-/// The same, to be read.
-struct Written {
-    spilled: Spilled,
-    lengths: std::vec::IntoIter<usize>,
+    file: Temporary,
+    /// Where each starts, and its length.
+    places: Vec<(u64, usize)>,
 }
 
 impl Messages {
     fn new(to: SpillTo<'_>) -> Result<Self> {
-        Ok(Self { spill: Spill::new(to)?, lengths: Vec::new() })
+        Ok(Self { file: Temporary::new(to)?, places: Vec::new() })
     }
 
+    /// Adds that of the next bucket.
     fn push(&mut self, message: &[u8]) -> Result<()> {
-        self.lengths.push(message.len());
-        self.spill.push(message)
+        self.places.push((self.file.append(message)?, message.len()));
+        Ok(())
     }
 
-    fn finish(self) -> Result<Written> {
-        Ok(Written { spilled: self.spill.finish()?, lengths: self.lengths.into_iter() })
-    }
-}
-
-impl Written {
-    /// The next message; empty after the last.
-    fn take(&mut self) -> Result<Vec<u8>> {
-        self.spilled.take(self.lengths.next().unwrap_or(0))
+    /// That of bucket `number`; empty if there is none.
+    fn read(&mut self, number: usize) -> Result<Vec<u8>> {
+        let (start, length) = self.places.get(number).copied().unwrap_or_default();
+        let mut message = vec![0; length];
+        self.file.read_at(start, &mut message)?;
+        Ok(message)
     }
 }
 

@@ -10,11 +10,7 @@ use crate::scene::source::SplatSource;
 use crate::scene::stats::{Lint, Linter};
 use crate::sparse::codes::SparseCodes;
 use crate::support::error::Result;
-use crate::support::parallel::GAUSSIANS_PER_TASK;
 use crate::support::progress::{Progress, Stage};
-
-/// Gaussians read together.
-const AT_ONCE: usize = 32 * GAUSSIANS_PER_TASK;
 
 /// Statistics of the Gaussians and the codes of a .lexi file.
 #[derive(Debug, Clone)]
@@ -45,7 +41,7 @@ pub fn lint(source: &dyn SplatSource, progress: &dyn Progress) -> Result<Lint> {
     let mut splats = source.empty();
     linter.add(&splats)?;
     progress.begin(Stage::Read, source.len() as u64 * source.row_bytes());
-    each_part(source, AT_ONCE, &mut splats, progress, &mut |_, splats| linter.add(splats))?;
+    each_part(source, 0..source.len(), &mut splats, progress, &mut |_, splats| linter.add(splats))?;
     progress.end();
     Ok(linter.finish())
 }

@@ -297,7 +297,7 @@ class _Scene:
         work.traffic["statistics"] += sum(map(len, found))
         begun = _native.tile_lesson(plan, steps, found)
         if begun is None:
-            return _native.tile_coding(plan, steps, found, None)[0]
+            return _native.tile_coding(plan, steps, found, None)
         lesson, rounds = begun
         left = rounds
         while True:
@@ -306,7 +306,7 @@ class _Scene:
             findings = [work.get(own) for own in [actor.find.remote(draw, shared, ref) for actor, draw in both]]
             work.traffic["statistics"] += sum(map(len, findings))
             if left == 0:
-                return _native.tile_coding(plan, steps, found, (lesson, findings))[0]
+                return _native.tile_coding(plan, steps, found, (lesson, findings))
             lesson, left = _native.tile_advance(lesson, findings)
 
 

@@ -18,8 +18,6 @@ Rows = tuple[int, int]
 Reads = list[tuple[int, Tile, list[Rows]]]
 #: The same, or references to pieces that were scattered.
 Pieces = Union[Reads, list[Any]]
-#: Rows that are told apart by the buckets that get some of them.
-COUNTED = 4096
 
 
 class Context:
@@ -58,7 +56,7 @@ def survey(context: Context, tile: Tile, rows: Rows) -> bytes:
 
 def count(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows) -> list[tuple[int, list[Rows]]]:
     context.begin()
-    return _native.tile_count(plan, number, _here(tile), rows, COUNTED, context.choices, context.limit)
+    return _native.tile_runs(plan, number, _here(tile), rows, context.choices, context.limit)
 
 
 def scatter(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows, buckets: int) -> Any:

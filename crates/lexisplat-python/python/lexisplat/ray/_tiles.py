@@ -45,12 +45,13 @@ def tiles_of(given: Paths | ray.data.Dataset) -> list[Tile]:
         found = [path for each in given for path in _paths(os.fspath(each))]
     if not found:
         raise _parameter("tiles", given, "a folder or a pattern with tiles in it")
-    absolute = [os.path.realpath(path) for path in found]
-    for k, path in enumerate(absolute):
-        if path in absolute[:k]:
-            raise _parameter("tiles", path, "each tile once")
     # Tasks may run in other folders.
-    return [Tile(path, path) for path in absolute]
+    tiles: dict[str, Tile] = {}
+    for path in map(os.path.realpath, found):
+        if path in tiles:
+            raise _parameter("tiles", path, "each tile once")
+        tiles[path] = Tile(path, path)
+    return list(tiles.values())
 
 
 def _paths(path: str) -> list[str]:
@@ -94,8 +95,9 @@ def outputs(tiles: Sequence[Tile], out: str | os.PathLike[str], one_each: bool, 
             raise _parameter("out", out, "a folder, for one file for each tile")
         wanted = [os.path.join(out, Path(tile.name).stem + ".lexi") for tile in tiles]
         _refuse_twice(wanted, [tile.name for tile in tiles])
+    read = {tile.given for tile in tiles if isinstance(tile.given, str)}
     for path in wanted:
-        if path in [tile.given for tile in tiles if isinstance(tile.given, str)]:
+        if path in read:
             raise _parameter("out", path, "another file than the tiles")
         if os.path.exists(path) and not overwrite:
             raise os_error(errno.EEXIST, "it is there already, and overwrite=True was not given", path)

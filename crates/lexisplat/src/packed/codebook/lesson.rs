@@ -129,7 +129,7 @@ impl Lesson {
     /// The atoms most used first, without unused ones, the costs at which all places used them in the last round, and the mean
     /// square of their values.
     pub(in crate::packed) fn finish(&self, all: &[Findings]) -> Option<(Vec<f32>, Costs, f64)> {
-        let found = Findings::sum(all).filter(|_| all.iter().all(|found| self.fits(found)))?;
+        let found = Findings::sum(all)?;
         let count = self.atoms.len() / self.dim;
         let (atoms, costs) = most_used_first(self.dim, &self.atoms, count, &found.usage, &self.costs);
         let values: f64 = found.usage.atoms.iter().sum();

@@ -83,7 +83,8 @@ impl Recorder {
 
     /// Whether `tables` have all symbols.
     pub(in crate::packed) fn is_within(&self, tables: &Tables) -> bool {
-        let has = |entry: &u32| entry & RAW != 0 || tables.has((entry >> 8) as usize, entry.to_le_bytes()[0]);
+        let share = |entry: u32| tables.share((entry >> 8) as usize, entry.to_le_bytes()[0]);
+        let has = |&entry: &u32| entry & RAW != 0 || share(entry).is_some();
         self.lanes.iter().flatten().all(has)
     }
 

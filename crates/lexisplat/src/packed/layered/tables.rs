@@ -143,14 +143,13 @@ impl Tables {
 
     /// The model of a symbol, which was counted when the tables were made.
     pub(super) fn model(&self, context: usize, symbol: u8) -> Model {
-        let model = self.table(context).and_then(|table| table.models.get(usize::from(symbol)));
-        model.copied().filter(|m| m.share > 0).unwrap_or(Model { start: 0, share: 1 })
+        self.share(context, symbol).unwrap_or(Model { start: 0, share: 1 })
     }
 
-    /// Whether a symbol has a share in a context.
-    pub(super) fn has(&self, context: usize, symbol: u8) -> bool {
-        let model = self.table(context).and_then(|table| table.models.get(usize::from(symbol)));
-        model.is_some_and(|model| model.share > 0)
+    /// The same, if the symbol has a share in the context.
+    pub(super) fn share(&self, context: usize, symbol: u8) -> Option<Model> {
+        let model = self.table(context)?.models.get(usize::from(symbol))?;
+        (model.share > 0).then_some(*model)
     }
 
     /// Bits of all symbols counted in `histogram` of a context.

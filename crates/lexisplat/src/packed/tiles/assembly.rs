@@ -6,10 +6,9 @@ use super::coding::{Coded, Coding, Counts, Tables};
 use super::plan::Plan;
 use crate::formats::lexi::LexiWriter;
 use crate::packed::encoding::{Finished, Ranges};
-use crate::packed::scene::{PackedHead, SpilledPacked};
+use crate::packed::scene::SpilledPacked;
 use crate::scene::extra::Extra;
 use crate::scene::spilled::SpilledExtras;
-use crate::sparse::tally::CompressReport;
 use crate::stream::PackedFile;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
@@ -118,21 +117,12 @@ impl<'a> Assembly<'a> {
         }
         let orders = orders.into_iter().collect::<Result<Vec<_>>>()?;
         let order = (!orders.is_empty()).then_some(orders);
-        write(head, SpilledPacked { data, order, extras: by_column(extras) }, report, sink.into(), progress)
+        let spilled = SpilledPacked { data, order, extras: by_column(extras) };
+        let writer = LexiWriter::spilled_packed(&head, spilled)?;
+        let tensor_bytes = writer.attribute_bytes().to_vec();
+        writer.write(sink, progress)?;
+        Ok(PackedFile { head, report, tensor_bytes })
     }
-}
-
-fn write(
-    head: PackedHead,
-    spilled: SpilledPacked,
-    report: CompressReport,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<PackedFile> {
-    let writer = LexiWriter::spilled_packed(&head, spilled)?;
-    let tensor_bytes = writer.attribute_bytes().to_vec();
-    writer.write(sink, progress)?;
-    Ok(PackedFile { head, report, tensor_bytes })
 }
 
 /// The values of each column of all layers, from the columns of each layer.

@@ -6,8 +6,7 @@ use super::look::{LookStatistics, Looked, SHOWN};
 use super::plan::{Piece, Plan};
 use crate::packed::canonical::MortonKey;
 use crate::packed::pack::check;
-use crate::packed::reorder::gather;
-use crate::scene::extra::for_extra;
+use crate::packed::reorder::{gather, gather_geometry};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
@@ -41,7 +40,7 @@ impl<'p> BucketReader<'p> {
     /// Takes those of `rows` of tile `number` that are of the bucket. Rows come in any order.
     ///
     /// # Errors
-    /// As [`Plan::count`].
+    /// As [`Plan::runs`].
     pub fn add(
         &mut self,
         number: usize,
@@ -82,45 +81,36 @@ impl<'p> BucketReader<'p> {
             let expected = format!("{} rows of {} bytes", places.len(), layout.bytes());
             return Err(Error::parameter("piece", rows.len(), expected));
         }
-        self.bucket.splats.append(layout.unpack(&rows));
-        self.bucket.places.extend(places);
+        self.add_rows(&layout, &rows, places);
         Ok(())
+    }
+
+    /// Takes rows of the bucket, which are at these `places`.
+    pub(crate) fn add_rows(&mut self, layout: &RowLayout, rows: &[u8], mut places: Vec<MortonKey>) {
+        self.bucket.splats.append(layout.unpack(rows));
+        self.bucket.places.append(&mut places);
     }
 
     /// The bucket.
     #[must_use]
     pub fn finish(self) -> Bucket {
-        let Bucket { number, splats, places } = self.bucket;
-        Bucket::sorted(number, splats, places)
+        let Bucket { number, mut splats, mut places } = self.bucket;
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_unstable_by_key(|&i| places[i]);
+        gather(&mut places, order.iter().copied());
+        gather_geometry(&mut splats.geometry, &order);
+        let dim = splats.degree.rest();
+        let mut rest = Vec::with_capacity(splats.sh_rest.len());
+        order.iter().for_each(|&i| rest.extend_from_slice(&splats.sh_rest[i * dim..(i + 1) * dim]));
+        splats.sh_rest = rest;
+        Bucket { number, splats, places }
     }
 }
 
 impl Bucket {
-    /// The Gaussians `splats` of bucket `number`, which are at these `places`.
-    fn sorted(number: usize, mut splats: Splats, mut places: Vec<MortonKey>) -> Self {
-        let mut order: Vec<usize> = (0..places.len()).collect();
-        order.sort_unstable_by_key(|&i| places[i]);
-        let order = || order.iter().copied();
-        let g = &mut splats.geometry;
-        gather(&mut places, order());
-        gather(&mut g.positions, order());
-        gather(&mut g.dc, order());
-        gather(&mut g.opacities, order());
-        gather(&mut g.scales, order());
-        gather(&mut g.rotations, order());
-        for extra in &mut g.extras {
-            for_extra!(&mut extra.values, v => gather(v, order()));
-        }
-        let dim = splats.degree.rest();
-        let mut rest = Vec::with_capacity(splats.sh_rest.len());
-        order().for_each(|i| rest.extend_from_slice(&splats.sh_rest[i * dim..(i + 1) * dim]));
-        splats.sh_rest = rest;
-        Self { number, splats, places }
-    }
-
-    /// The Gaussians of bucket `number` in order.
-    pub(crate) fn of_rows(number: usize, splats: Splats, places: Vec<MortonKey>) -> Self {
-        Self { number, splats, places }
+    /// The cell of each Gaussian, and its number in the bucket.
+    pub(super) fn scene(&self) -> Vec<MortonKey> {
+        (0..).zip(&self.places).map(|(source, place)| MortonKey { source, ..*place }).collect()
     }
 
     /// Its number among all buckets.

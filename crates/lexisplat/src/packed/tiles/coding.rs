@@ -17,8 +17,8 @@ use crate::packed::layered::{self, Lookup, MeanView, WholeAtoms};
 use crate::packed::pack::USUAL_DC;
 use crate::packed::parameters::Parameters;
 use crate::packed::quantised::{Gaussians, Quantised, Refit};
-use crate::packed::reorder::gather;
-use crate::scene::extra::{Extra, for_extra};
+use crate::scene::extra::Extra;
+use crate::scene::splats::filter;
 use crate::sparse::learn::unit_axis;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
@@ -152,22 +152,16 @@ impl Coding {
         progress: &dyn Progress,
     ) -> Result<(Counts, Coded), E> {
         let splats = &bucket.splats;
-        let (weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
-        let kept = || (0..splats.len()).filter(|&i| stays[i]);
-        let places = (0..).zip(&bucket.places).zip(&stays).filter(|(_, stays)| **stays);
-        let scene: Vec<MortonKey> =
-            places.map(|((source, place), _)| MortonKey { source, ..*place }).collect();
-        let weights: Vec<[f32; 2]> = kept().map(|i| weights[i]).collect();
+        let (mut weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
+        let mut scene = bucket.scene();
+        filter(&mut scene, &stays);
+        filter(&mut weights, &stays);
         let free = self.steps.steps.classes_of(&weights);
         let classes = self.floor.classes(&free, &splats.geometry, &scene);
         let gaussians = Gaussians { scene, classes, weights };
         let options = &plan.options;
         let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
-        let mut appearances = None;
-        if let Some(refit) = refit.filter(|_| options.may_change() && !quantised.is_empty()) {
-            let model = quantised.finish(None, None, progress)?.0.unpack()?;
-            appearances = Some(refit(splats, &model, quantised.weights())?);
-        }
+        let appearances = quantised.refitted(refit, progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
         let tables = layered::Tables::of(&counts)?;
         let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));
@@ -175,18 +169,15 @@ impl Coding {
         let mut start = 0;
         let mut layers = Vec::new();
         for gaussians in quantised.layer_counts() {
-            let sources = &quantised.sources()[start..start + gaussians];
-            start += gaussians;
+            let own = start..start + gaussians;
+            start = own.end;
             let place = |g: &MortonKey| {
                 let place = u64::from(bucket.places[g.index()].source).saturating_sub(first);
                 u32::try_from(place).unwrap_or(u32::MAX)
             };
-            let order = options.keep_order.then(|| sources.iter().map(place).collect());
-            let mut extras = splats.geometry.extras.clone();
-            for extra in &mut extras {
-                for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));
-            }
-            layers.push(CodedLayer { gaussians, order, extras });
+            let order =
+                options.keep_order.then(|| quantised.sources()[own.clone()].iter().map(place).collect());
+            layers.push(CodedLayer { gaussians, order, extras: quantised.extras(own) });
         }
         let scene = self.scene;
         let coded = Coded { scene, bucket: bucket.number, tables: tables.write(), chunks, layers };

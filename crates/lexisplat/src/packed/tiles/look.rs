@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use super::bucket::Bucket;
 use super::message::messages;
 use super::plan::Plan;
-use crate::packed::canonical::MortonKey;
 use crate::packed::fit::{ColourMoments, Derivatives};
 use crate::packed::layered::MeanView;
 use crate::packed::octaves::{Histogram, Pairs};
@@ -48,16 +47,14 @@ messages!(Looked => "looked", LookStatistics => "look statistics");
 
 impl LookStatistics {
     pub(super) fn of(bucket: &Bucket, found: &Sensitivity, plan: &Plan) -> (Self, Looked) {
-        let Bucket { number: bucket, splats, .. } = bucket;
-        let (scene, bucket) = (plan.scene(), *bucket);
-        let n = splats.len();
+        let (scene, splats) = (plan.scene(), &bucket.splats);
         let changes = changes_without(&splats.geometry, found, plan.options.may_change());
         let stays: Vec<bool> = changes.into_iter().map(|c| is_worth_its_bits(c, plan.step)).collect();
-        let looked = Looked::new(scene, bucket, &found.appearances(), &stays);
+        let looked = Looked::new(scene, bucket.number, &found.appearances(), &stays);
         let mut out = Self {
             scene,
-            bucket,
-            gaussians: n as u64,
+            bucket: bucket.number,
+            gaussians: splats.len() as u64,
             kept: stays.iter().filter(|&&stays| stays).count() as u64,
             weights: Default::default(),
             energies: Histogram::default(),
@@ -72,8 +69,7 @@ impl LookStatistics {
             }
         }
         out.colours.add(&MeanView::new(&plan.options.viewpoints).colours(splats));
-        let all = (0..).zip(0..n).map(|(source, _)| MortonKey { cell: 0, source });
-        out.derivatives.add(&splats.geometry, found, &all.collect::<Vec<_>>());
+        out.derivatives.add(&splats.geometry, found, &bucket.scene());
         (out, looked)
     }
 

@@ -8,7 +8,7 @@
 //! |---|---|---|---|
 //! | [`Survey::of`] | block of [`BLOCK`] rows of a tile | the rows | number, bounds, some positions |
 //! | [`Plan::new`] | scene | all surveys | the grid, and where buckets end |
-//! | [`Plan::count`] | block | the rows | how many Gaussians each bucket gets of it |
+//! | [`Plan::runs`] | block | the rows | which of them each bucket reads |
 //! | [`Bucket::look`] | bucket | its Gaussians and their sensitivity | [`LookStatistics`], and [`Looked`] |
 //! | [`Steps::new`] | scene | all statistics | steps of values |
 //! | [`Sample::add`] | bucket of a group | its Gaussians, [`Looked`] | some of them, which stay where they are |

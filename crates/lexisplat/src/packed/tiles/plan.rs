@@ -6,14 +6,14 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::message::messages;
-use super::survey::{AT_ONCE, BLOCK, Like, Survey};
+use super::survey::{BLOCK, Like, Survey};
 use super::{BUCKET, message};
 use crate::packed::canonical::{Bounds, Grid, MortonKey};
 use crate::packed::pack::{PackOptions, expected_step};
 use crate::scene::extra::{Extra, ExtraValues};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Geometry, Splats};
-use crate::stream::RowLayout;
+use crate::stream::{RowLayout, each_part};
 use crate::support::crc32;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
@@ -24,6 +24,9 @@ use crate::support::progress::Progress;
 const GROUPS: usize = 2;
 /// Most buckets that are sampled, evenly spread, so that drawing samples takes as long in any scene.
 const SAMPLED: usize = 32;
+
+/// Rows of a piece of a tile that a bucket reads whole if one of them is its own.
+const RUN: usize = 4096;
 
 /// What is settled of a scene before any of it is looked at.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -210,24 +213,35 @@ impl Plan {
         (0..gaussians).step_by(BLOCK).map(move |start| start..gaussians.min(start + BLOCK))
     }
 
-    /// How many of `rows` of a tile are of each bucket. Reports their bytes to `progress`.
+    /// Which of `rows` of a tile each bucket has to read: runs of whole pieces of [`RUN`] rows of which some are its own, by its
+    /// number. Reports the bytes of the rows to `progress`.
     ///
     /// # Errors
     /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile.
-    pub fn count(
+    pub fn runs(
         &self,
         number: usize,
         tile: &dyn SplatSource,
         rows: Range<usize>,
         progress: &dyn Progress,
-    ) -> Result<Vec<u64>> {
-        let mut counts = vec![0; self.buckets()];
+    ) -> Result<BTreeMap<usize, Vec<Range<usize>>>> {
+        let mut runs: BTreeMap<usize, Vec<Range<usize>>> = BTreeMap::new();
         let buckets = self.buckets_of(number);
-        self.each(number, tile, rows, progress, &mut |_, keys| {
-            keys.iter().for_each(|key| counts[buckets.of(*key)] += 1);
+        let mut row = rows.start;
+        self.each(number, tile, rows.clone(), progress, &mut |_, keys| {
+            for key in keys {
+                let start = rows.start + (row - rows.start) / RUN * RUN;
+                let end = rows.end.min(start + RUN);
+                row += 1;
+                let own = runs.entry(buckets.of(*key)).or_default();
+                match own.last_mut() {
+                    Some(last) if last.end >= start => last.end = end,
+                    _ => own.push(start..end),
+                }
+            }
             Ok(())
         })?;
-        Ok(counts)
+        Ok(runs)
     }
 
     /// The rows of a tile that each bucket gets, in pieces: of which bucket, and bytes for [`BucketReader::add_piece`]. For tiles that
@@ -236,7 +250,7 @@ impl Plan {
     /// [`BucketReader::add_piece`]: super::BucketReader::add_piece
     ///
     /// # Errors
-    /// As [`Self::count`].
+    /// As [`Self::runs`].
     pub fn scatter(
         &self,
         number: usize,
@@ -282,18 +296,13 @@ impl Plan {
         if let Some(difference) = self.like.difference(&Like::of(&part)) {
             return Err(Error::parameter("tile", difference, "what it was when it was surveyed"));
         }
-        for start in rows.clone().step_by(AT_ONCE) {
-            progress.check()?;
-            let own = start..rows.end.min(start + AT_ONCE);
-            tile.read(own.clone(), &mut part)?;
+        each_part(tile, rows, &mut part, progress, &mut |start, part| {
             part.geometry.normals = Vec::new();
             let number = (first + start as u64)..;
             let keys = number.zip(&part.geometry.positions);
             let keys: Vec<MortonKey> = keys.map(|(row, &p)| placed(&self.grid, p, row)).collect();
-            take(&mut part, &keys)?;
-            progress.advance(own.len() as u64 * tile.row_bytes());
-        }
-        Ok(())
+            take(part, &keys)
+        })
     }
 
     /// The buckets of the Gaussians of a tile.

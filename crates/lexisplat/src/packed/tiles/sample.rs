@@ -160,6 +160,9 @@ impl Sample {
     fn rows(&mut self, plan: &Plan, steps: &Steps) -> &(Vec<f32>, Vec<u8>) {
         let parts = &self.parts;
         self.rows.get_or_insert_with(|| {
+            let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
+            let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
+            let all_kept = sampled.map(kept).sum::<f64>().max(1.0);
             let (mut rows, mut all_classes) = (Vec::new(), Vec::new());
             for part in parts {
                 let scene: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
@@ -167,9 +170,7 @@ impl Sample {
                 let free = steps.steps.classes_of(&weights);
                 let classes = steps.floor.classes(&free, &part.splats.geometry, &scene);
                 let view = View::new(&part.splats, &scene, &classes);
-                let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
-                let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
-                let share = kept(part.bucket) / sampled.map(kept).sum::<f64>().max(1.0);
+                let share = kept(part.bucket) / all_kept;
                 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
                 let wanted = (SAMPLE as f64 * share).round() as usize;
                 let seed = plan.options.seed ^ SAMPLE_STREAM ^ part.bucket as u64;

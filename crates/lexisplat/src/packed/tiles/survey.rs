@@ -11,6 +11,7 @@ use crate::scene::sensitivity::heuristic_total;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{SceneMeta, Splats};
+use crate::stream::each_part;
 use crate::support::error::{Error, Result};
 use crate::support::maths::Vec3;
 use crate::support::progress::Progress;
@@ -20,8 +21,6 @@ use crate::support::rng::SplitMix64;
 pub const BLOCK: usize = 262_144;
 /// Of so many rows the position of one is kept. Grid and buckets depend on these.
 pub(super) const STRIDE: usize = 128;
-/// Rows that are read at a time.
-pub(super) const AT_ONCE: usize = 65_536;
 /// Mixed into the seed of the choice of rows.
 const LOOK_STREAM: u64 = 0x6c_6f_6f_6b;
 
@@ -112,11 +111,8 @@ impl Survey {
         let mut random = SplitMix64::new(seed ^ LOOK_STREAM ^ rows.start as u64);
         let chosen = rows.clone().step_by(STRIDE);
         let mut chosen = chosen.map(|row| row + random.below(STRIDE.min(rows.end - row))).peekable();
-        for start in rows.clone().step_by(AT_ONCE) {
-            progress.check()?;
-            let own = start..rows.end.min(start + AT_ONCE);
-            tile.read(own.clone(), &mut part)?;
-            let geometry = &part.geometry;
+        each_part(tile, rows.clone(), &mut part, progress, &mut |start, part| {
+            let (own, geometry) = (start..start + part.len(), &part.geometry);
             let bounds = Bounds::of(&geometry.positions);
             survey.bounds.get_or_insert(bounds).add(bounds);
             survey.heuristic_total = heuristic_total(survey.heuristic_total, geometry);
@@ -125,8 +121,8 @@ impl Survey {
                 let number = u32::try_from(row - rows.start).unwrap_or(u32::MAX);
                 survey.positions.push((number, geometry.positions[row - own.start]));
             }
-            progress.advance(own.len() as u64 * tile.row_bytes());
-        }
+            Ok(())
+        })?;
         Ok(survey)
     }
 
