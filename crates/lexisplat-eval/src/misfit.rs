@@ -1,6 +1,7 @@
 //! Signs that cameras do not belong to a scene.
 
-use lexisplat_render::Image;
+use lexisplat::Geometry;
+use lexisplat_render::{Camera, Image, hidden_share};
 
 use crate::scores::Comparison;
 
@@ -9,6 +10,9 @@ const ALMOST_NOTHING: f64 = 0.02;
 /// Largest mean PSNR against photos that warns, in dB. Published models reach 20 dB and more on their hardest
 /// scenes, and a plain grey picture 10 to 14 dB.
 const MISFIT_DB: f64 = 15.0;
+/// Share of what is before cameras that their near planes may hide without a warning. Of the models in docs/results they hide
+/// nothing.
+const HIDDEN: f64 = 0.03;
 
 /// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show
 /// nothing but `background`, or they are far from the photos.
@@ -37,6 +41,19 @@ pub fn misfit(
         ));
     }
     warnings
+}
+
+/// Returns a warning if the near planes of `cameras` hide more than 3 % of what is before them, by opacity: a scene in small
+/// units, drawn with the trainer's near plane.
+#[must_use]
+pub(crate) fn near_plane_hides(geometry: &Geometry, cameras: &[Camera]) -> Option<String> {
+    let (share, near) = (hidden_share(geometry, cameras), cameras.first()?.near);
+    (share > HIDDEN).then(|| {
+        format!(
+            "the near plane, {near} units from the cameras, hides {:.0} % of what is before them; if the scene is in small units, a smaller --near shows it",
+            100.0 * share
+        )
+    })
 }
 
 #[cfg(test)]

@@ -9,9 +9,9 @@ use pyo3::prelude::*;
 use crate::draw::Subject;
 use crate::work::without_gil;
 
-/// Name, width, height, focal lengths, position, rotation from camera to world, and `train`, `test` or `None`.
+/// Name, width, height, focal lengths, position, rotation from camera to world, and the near plane, `train`, `test` or `None`.
 #[derive(FromPyObject, IntoPyObject)]
-pub(crate) struct CameraTuple(String, u32, u32, f32, f32, [f32; 3], [[f32; 3]; 3], Option<String>);
+pub(crate) struct CameraTuple(String, u32, u32, f32, f32, [f32; 3], [[f32; 3]; 3], f32, Option<String>);
 
 impl From<Camera> for CameraTuple {
     fn from(camera: Camera) -> Self {
@@ -27,19 +27,20 @@ impl From<Camera> for CameraTuple {
             camera.fy,
             camera.position,
             camera.rotation,
+            camera.near,
             split,
         )
     }
 }
 
 impl From<CameraTuple> for Camera {
-    fn from(CameraTuple(name, width, height, fx, fy, position, rotation, split): CameraTuple) -> Self {
+    fn from(CameraTuple(name, width, height, fx, fy, position, rotation, near, split): CameraTuple) -> Self {
         let split = match split.as_deref() {
             Some("train") => Some(Split::Train),
             Some("test") => Some(Split::Test),
             _ => None,
         };
-        Self { name, width, height, fx, fy, position, rotation, split }
+        Self { name, width, height, fx, fy, position, rotation, near, split }
     }
 }
 

@@ -6,7 +6,6 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
-use crate::conventions::NEAR_Z;
 use crate::surround::PLASTIC;
 
 /// Half the width of the middle of a picture, as a tangent, in which a camera's subject is looked for.
@@ -61,7 +60,7 @@ fn subject_distance(camera: &Camera, geometry: &Geometry) -> Option<f64> {
         geometry.positions.iter().zip(geometry.scales.iter().zip(&geometry.opacities))
     {
         let [x, y, z] = camera.to_view(*position);
-        if z.is_finite() && z > NEAR_Z && x.abs() < MIDDLE * z && y.abs() < MIDDLE * z {
+        if z.is_finite() && z > camera.near && x.abs() < MIDDLE * z && y.abs() < MIDDLE * z {
             let mut sorted = scales.map(f64::from);
             sorted.sort_by(f64::total_cmp);
             let size = libm::exp(sorted[1] + sorted[2]) / (f64::from(z) * f64::from(z));

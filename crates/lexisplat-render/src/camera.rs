@@ -1,5 +1,6 @@
 //! Pinhole cameras.
 
+use crate::conventions::NEAR_Z;
 use crate::error::{Error, Result};
 
 /// Largest width or height of a picture, in pixels.
@@ -37,12 +38,15 @@ pub struct Camera {
     /// Camera-to-world rotation, row by row. Its columns are the camera's right, down and forward
     /// directions in the world.
     pub rotation: [[f32; 3]; 3],
+    /// Distance of the near plane in world units, above 0. What is not beyond it is not drawn. It is
+    /// [`NEAR_Z`](crate::conventions::NEAR_Z), the trainer's, unless something else is chosen.
+    pub near: f32,
     /// Which part of the data set it belongs to, where the file says so.
     pub split: Option<Split>,
 }
 
 impl Camera {
-    /// Returns a camera whose numbers are rounded to single precision, without a split. `size` is width and height,
+    /// Returns a camera whose numbers are rounded to single precision, without a split and with the trainer's near plane. `size` is width and height,
     /// `focal` the focal lengths along x and y. What overflows becomes infinite, which [`Self::validate`] refuses.
     #[must_use]
     pub fn rounded(
@@ -54,7 +58,13 @@ impl Camera {
     ) -> Self {
         let [fx, fy] = focal.map(single);
         let (position, rotation) = (position.map(single), rotation.map(|row| row.map(single)));
-        Self { name, width, height, fx, fy, position, rotation, split: None }
+        Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None }
+    }
+
+    /// Returns this camera with another near plane, in world units.
+    #[must_use]
+    pub fn with_near(self, near: f32) -> Self {
+        Self { near, ..self }
     }
 
     /// Returns this camera with pictures at most `width` pixels wide and the same field of view. A wider picture is
@@ -102,9 +112,9 @@ impl Camera {
                 return Err(Error::parameter(name, side, format!("1 to {MAX_SIDE} pixels")));
             }
         }
-        for (name, focal) in [("fx", self.fx), ("fy", self.fy)] {
-            if !(focal.is_finite() && focal > 0.0) {
-                return Err(Error::parameter(name, focal, "a finite number above 0"));
+        for (name, length) in [("fx", self.fx), ("fy", self.fy), ("near", self.near)] {
+            if !(length.is_finite() && length > 0.0) {
+                return Err(Error::parameter(name, length, "a finite number above 0"));
             }
         }
         if !self.position.iter().all(|v| v.is_finite()) {
@@ -142,6 +152,7 @@ pub(crate) fn straight_ahead(width: u32, height: u32, focal: f32) -> Camera {
         fy: focal,
         position: [0.0; 3],
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        near: NEAR_Z,
         split: None,
     }
 }
@@ -186,6 +197,7 @@ mod tests {
             ("height", Camera { height: MAX_SIDE + 1, ..good.clone() }),
             ("fx", Camera { fx: 0.0, ..good.clone() }),
             ("fy", Camera { fy: f32::NAN, ..good.clone() }),
+            ("near", good.clone().with_near(0.0)),
             ("position", Camera { position: [0.0, f32::INFINITY, 0.0], ..good }),
             ("rotation", scaled),
         ];

@@ -7,11 +7,12 @@
 //! lie at integers (`ndc2Pix`: `((v + 1) * size - 1) / 2`). Gaussians are blended in order of view-space z, and
 //! those of equal z in order of index. A pixel is `colour + transmittance * background`, not clamped.
 
-/// A Gaussian is drawn only if its view-space z, in world units, is above this
-/// (`auxiliary.h`, `in_frustum`).
+/// A Gaussian is drawn only if its view-space z, in world units, is above this (`auxiliary.h`, `in_frustum`). It is the near
+/// plane of cameras that were given. Generated cameras have one of the scene's own size ([`crate::near_plane`]).
 pub const NEAR_Z: f32 = 0.2;
 
-/// Added to the homogeneous w, in world units, before dividing by it (`forward.cu`, `preprocessCUDA`).
+/// Added to the homogeneous w, in world units, before dividing by it (`forward.cu`, `preprocessCUDA`). It is in proportion to
+/// the camera's near plane, so that a scene looks the same in all units.
 pub const W_EPSILON: f32 = 1e-7;
 
 /// Limit of `x / z` and `y / z` in the Jacobian, in units of the tangent of half the field of view

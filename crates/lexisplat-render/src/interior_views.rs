@@ -4,7 +4,7 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
-use crate::conventions::NEAR_Z;
+use crate::near::near_plane;
 use crate::object::{object, subject};
 use crate::orbit::{TRIM, UP, axes, bulk, middle, opacity_weights, pinhole};
 use crate::surround::{PLASTIC, detail};
@@ -72,12 +72,13 @@ pub fn is_interior(geometry: &Geometry) -> bool {
 /// Returns the share of the lines from `places` to `targets` that are free; `None` if there are no lines.
 fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3]) -> Option<f64> {
     let (_, radius) = subject(geometry);
+    let from = f64::from(near_plane(geometry));
     let mut lines = Vec::with_capacity(places.len() * targets.len());
     for &origin in places {
         lines.extend(targets.iter().map(|target| {
             let way = target - origin;
             let to = way.length() - SHORT * radius;
-            Ray { origin, direction: way.normalize_or_zero(), from: f64::from(NEAR_Z), to }
+            Ray { origin, direction: way.normalize_or_zero(), from, to }
         }));
     }
     let free = transmittances(geometry, &lines).iter().filter(|light| **light >= SEEN).count();
@@ -108,7 +109,7 @@ pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32
     let focal = f64::from(size[0].min(size[1])) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians());
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     let (_, radius) = bulk(geometry);
-    let stands = stands(geometry, radius);
+    let (stands, near) = (stands(geometry, radius), near_plane(geometry));
     let looks: Vec<[DVec3; 3]> = (0..steps).map(|i| axes(look(i, steps), UP)).collect();
     let light = free_ways(geometry, &stands, &looks, radius);
     let light = |stand: usize, look: usize| light[stand * looks.len() + look];
@@ -120,7 +121,7 @@ pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32
             let own = at % stands.len();
             let best = (0..stands.len()).fold(own, |a, b| if light(b, at) > light(a, at) { b } else { a });
             let stand = if light(own, at) >= CLEAR { own } else { best };
-            pinhole(format!("room_{i:03}"), size, focal, stands[stand], *columns)
+            pinhole(format!("room_{i:03}"), size, focal, stands[stand], *columns).with_near(near)
         })
         .collect()
 }
@@ -134,7 +135,7 @@ fn look(i: u32, count: u32) -> DVec3 {
 
 /// Returns the mean light left on the way along every look from every place, place by place.
 fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius: f64) -> Vec<f64> {
-    let from = f64::from(NEAR_Z);
+    let from = f64::from(near_plane(geometry));
     let mut rays = Vec::with_capacity(places.len() * looks.len() * BUNDLE.len());
     for &origin in places {
         for [right, down, forward] in looks {
@@ -258,7 +259,7 @@ mod tests {
             // What is before it is as far as a room's width allows.
             let near = g.positions.iter().filter(|p| {
                 let [x, y, z] = camera.to_view(**p);
-                z > NEAR_Z && z < 0.7 && x.abs() < 0.3 * z && y.abs() < 0.3 * z
+                z > camera.near && z < 0.7 && x.abs() < 0.3 * z && y.abs() < 0.3 * z
             });
             assert_eq!(near.count(), 0);
         }

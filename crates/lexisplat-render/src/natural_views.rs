@@ -7,6 +7,7 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
+use crate::near::near_plane;
 use crate::orbit::{axes, opacity_weights, pinhole};
 use crate::surround::PLASTIC;
 use crate::transmittance::unit_rotation;
@@ -18,8 +19,6 @@ const DISTANCES: [f64; 2] = [3.0, 5.5];
 const FOCALS: [f64; 4] = [0.55, 0.75, 0.95, 1.3];
 /// A direction whose y is larger than this needs another up than the world's.
 const STEEP: f64 = 0.95;
-/// Largest distance in world units. Beyond it positions have no digits left.
-const FARTHEST: f64 = 1e6;
 
 /// Returns at most `count` cameras of a `size` (width and height), named `natural_000`, `natural_001` and so on. Each
 /// looks at a Gaussian from its natural distance, mostly at its flat side. Opaque Gaussians are looked at more often.
@@ -29,7 +28,7 @@ const FARTHEST: f64 = 1e6;
 #[must_use]
 pub fn natural_views(geometry: &Geometry, count: usize, size: [u32; 2]) -> Vec<Camera> {
     let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));
-    let weights = opacity_weights(geometry);
+    let (weights, near) = (opacity_weights(geometry), near_plane(geometry));
     let total: f64 = weights.iter().filter(|w| w.is_finite()).sum();
     let mut out = Vec::with_capacity(count);
     let mut sum = 0.0;
@@ -38,7 +37,7 @@ pub fn natural_views(geometry: &Geometry, count: usize, size: [u32; 2]) -> Vec<C
         // Evenly spread over the sum of the weights.
         while out.len() < count && sum * count as f64 > (out.len() as f64 + 0.5) * total {
             let Some(camera) = natural_view(geometry, i, out.len(), size) else { break };
-            out.push(camera);
+            out.push(camera.with_near(near));
         }
     }
     out
@@ -51,7 +50,7 @@ fn natural_view(geometry: &Geometry, i: usize, number: usize, size: [u32; 2]) ->
     let shortest = (0..3).min_by(|&a, &b| scales[a].total_cmp(&scales[b])).unwrap_or(0);
     let largest = scales.into_iter().fold(f64::NEG_INFINITY, f64::max);
     let distance = libm::exp(largest + DISTANCES[0] + (DISTANCES[1] - DISTANCES[0]) * spread(0));
-    if !(distance > 0.0 && distance < FARTHEST) {
+    if !(distance > 0.0 && distance < f64::from(f32::MAX)) {
         return None;
     }
     // Directions by their cosine with the flat side, on both sides of it.

@@ -3,6 +3,7 @@
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
+use crate::near::near_plane;
 use crate::orbit::{bulk, ring};
 use crate::surround::detail;
 
@@ -17,7 +18,7 @@ const AIR: f64 = 1.8;
 /// [`crate::orbit`], which goes around the bulk.
 #[must_use]
 pub fn object(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
-    ring(subject(geometry), count, width, height)
+    ring(subject(geometry), count, [width, height], near_plane(geometry))
 }
 
 /// Returns the centre and radius, in world units, of the subject: where most of the small opaque Gaussians are, if

@@ -4,6 +4,7 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
+use crate::near::near_plane;
 
 /// Share of the opacity at either end of each axis that does not count for the bulk. Floaters and far backgrounds
 /// are many, but have little opacity.
@@ -18,10 +19,14 @@ const ELEVATION_SWAY: f64 = 10.0;
 const SWAYS: f64 = 3.0;
 /// Radius of the bulk, in units of the half diagonal of the trimmed box. It leaves a little space around.
 const AIR: f64 = 1.2;
-/// Radius of a scene that has none, in world units.
-const MIN_RADIUS: f64 = 1e-3;
-/// Nearest distance to the centre, in world units: well beyond [`crate::conventions::NEAR_Z`].
-const MIN_DISTANCE: f64 = 0.5;
+/// Least radius in standard deviations of the middle Gaussian, for scenes whose Gaussians are all at about one place.
+const LEAST_SIGMAS: f64 = 3.0;
+/// Least radius as a share of the distance of the centre from the origin: 8 units in the last place of a position.
+const LEAST_SHARE: f64 = 1e-6;
+/// Radius of a scene that has no size at all, in world units.
+const NO_RADIUS: f64 = 1e-3;
+/// Natural logarithms of standard deviations are clamped to this on both sides of 0, so that their sums are finite.
+const MAX_LOG_SCALE: f64 = 60.0;
 /// Up in the world. Scenes trained from COLMAP's cameras are about upright with y down.
 pub(crate) const UP: DVec3 = DVec3::NEG_Y;
 
@@ -32,16 +37,21 @@ pub(crate) const UP: DVec3 = DVec3::NEG_Y;
 /// is taken to point down, as in scenes trained from COLMAP's cameras.
 #[must_use]
 pub fn orbit(geometry: &Geometry, count: usize, width: u32, height: u32) -> Vec<Camera> {
-    ring(bulk(geometry), count, width, height)
+    ring(bulk(geometry), count, [width, height], near_plane(geometry))
 }
 
 /// [`orbit`] around a centre, at a distance from which a ball of the radius fits the field of view.
-pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, height: u32) -> Vec<Camera> {
-    let size = [width, height].map(|side| side.clamp(1, crate::MAX_SIDE));
+pub(crate) fn ring(
+    (centre, radius): ([f64; 3], f64),
+    count: usize,
+    size: [u32; 2],
+    near: f32,
+) -> Vec<Camera> {
+    let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));
     let centre = DVec3::from_array(centre);
     let half_view = (FIELD_OF_VIEW / 2.0).to_radians();
     let focal = f64::from(size[0].min(size[1])) / 2.0 / libm::tan(half_view);
-    let distance = (radius / libm::sin(half_view)).max(MIN_DISTANCE);
+    let distance = radius / libm::sin(half_view);
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     (0..steps)
         .map(|i| {
@@ -50,6 +60,7 @@ pub(crate) fn ring((centre, radius): ([f64; 3], f64), count: usize, width: u32, 
             let around = DVec3::new(libm::sin(turn), 0.0, -libm::cos(turn));
             let out = around * libm::cos(elevation) + UP * libm::sin(elevation);
             pinhole(format!("orbit_{i:03}"), size, focal, centre + out * distance, axes(-out, UP))
+                .with_near(near)
         })
         .collect()
 }
@@ -72,7 +83,20 @@ pub(crate) fn pinhole(name: String, size: [u32; 2], focal: f64, position: DVec3,
 #[must_use]
 pub fn bulk(geometry: &Geometry) -> ([f64; 3], f64) {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
-    (centre.to_array(), (half.length() * AIR).max(MIN_RADIUS))
+    (centre.to_array(), (half.length() * AIR).max(least_radius(geometry, centre)))
+}
+
+/// The radius, above 0, of a scene around `centre` whose Gaussians are all at about one place.
+pub(crate) fn least_radius(geometry: &Geometry, centre: DVec3) -> f64 {
+    let largest = |scales: &[f32; 3]| scales.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
+    let mut sizes: Vec<f32> = geometry.scales.iter().map(largest).filter(|size| size.is_finite()).collect();
+    if sizes.is_empty() {
+        return NO_RADIUS;
+    }
+    let middle = sizes.len() / 2;
+    let size = f64::from(*sizes.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let sigmas = LEAST_SIGMAS * libm::exp(size.clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE));
+    sigmas.max(LEAST_SHARE * centre.length())
 }
 
 /// Returns the opacities after the sigmoid.
@@ -110,7 +134,6 @@ fn quantiles<const N: usize>(values: impl Iterator<Item = (f64, f64)>, shares: [
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::conventions::NEAR_Z;
 
     fn cloud() -> Geometry {
         // A cube of side 2 around (5, -3, 1), and floaters far away.
@@ -149,7 +172,7 @@ mod tests {
             assert!((cross - 1.0).abs() < 1e-5, "a rotation, not a mirror");
             let inside = geometry.positions[..1000].iter().filter(|p| {
                 let [x, y, z] = camera.to_view(**p);
-                z > NEAR_Z && (x / z * camera.fx).abs() < 160.0 && (y / z * camera.fy).abs() < 100.0
+                z > camera.near && (x / z * camera.fx).abs() < 160.0 && (y / z * camera.fy).abs() < 100.0
             });
             assert!(inside.count() >= 900);
         }

@@ -4,7 +4,8 @@ use glam::DVec3;
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
-use crate::orbit::{axes, middle, pinhole};
+use crate::near::near_plane;
+use crate::orbit::{axes, least_radius, middle, pinhole};
 
 /// Share of the detail at either end of each axis that does not count for its radius.
 const TRIM: f64 = 0.2;
@@ -16,8 +17,6 @@ pub(crate) const PLASTIC: [f64; 4] =
     [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.430_159_709_001_946_8, 0.324_717_957_244_746];
 /// Focal length in picture widths: a field of view of 53 degrees.
 const FOCAL: f64 = 1.0;
-/// Radius of a scene without extent, in world units.
-const MIN_RADIUS: f64 = 1e-3;
 /// A direction whose y is larger than this needs another up than the world's.
 const STEEP: f64 = 0.9;
 
@@ -31,7 +30,8 @@ const STEEP: f64 = 0.9;
 pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f64; 2]) -> Vec<Camera> {
     let size = size.map(|side| side.clamp(1, crate::MAX_SIDE));
     let (centre, half) = detail(geometry);
-    let radius = half.length().max(MIN_RADIUS);
+    let radius = half.length().max(least_radius(geometry, centre));
+    let plane = near_plane(geometry);
     let focal = f64::from(size[0]) * FOCAL;
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     (0..steps)
@@ -48,7 +48,7 @@ pub fn surround(geometry: &Geometry, count: usize, size: [u32; 2], distances: [f
             let target = centre + offset * half.max_element();
             let forward = (target - position).normalize_or(-out);
             let up = if forward.y.abs() > STEEP { DVec3::X } else { DVec3::NEG_Y };
-            pinhole(format!("surround_{i:03}"), size, focal, position, axes(forward, up))
+            pinhole(format!("surround_{i:03}"), size, focal, position, axes(forward, up)).with_near(plane)
         })
         .collect()
 }

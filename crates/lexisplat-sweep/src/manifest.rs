@@ -13,7 +13,7 @@ use lexisplat_eval::{Error, Result};
 const MAX_BYTES: u64 = 1 << 20;
 
 /// One model of a sweep.
-#[derive(Debug, Clone, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 #[non_exhaustive]
 pub struct Entry {
@@ -32,6 +32,8 @@ pub struct Entry {
     pub images: Option<PathBuf>,
     /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_eval::views::ViewOptions`].
     pub resolution: Option<u32>,
+    /// Distance of the near plane, as in [`lexisplat_eval::views::ViewOptions`].
+    pub near: Option<f32>,
     /// Which of the cameras to use. The default is the test split.
     #[serde(default = "test_split")]
     pub split: SplitFilter,
@@ -55,6 +57,7 @@ impl Entry {
             cameras: None,
             images: None,
             resolution: None,
+            near: None,
             split: SplitFilter::Test,
             shipped: None,
         }

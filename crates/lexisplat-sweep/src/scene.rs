@@ -178,6 +178,7 @@ impl Evaluator<'_> {
             cameras: entry.cameras.clone(),
             images: entry.images.clone(),
             resolution: entry.resolution,
+            near: entry.near.or(self.options.views.near),
             ..self.options.views.clone()
         };
         if entry.cameras.is_some() {

@@ -152,7 +152,8 @@ impl App {
     }
 
     pub(crate) fn orbit_size(&self) -> OrbitSize {
-        OrbitSize { views: self.options.orbit.max(1), max_width: self.options.max_width.max(1) }
+        let Options { orbit, max_width, near, .. } = &self.options;
+        OrbitSize { views: (*orbit).max(1), max_width: (*max_width).max(1), near: *near }
     }
 
     /// Shows a message in the panel.
@@ -200,7 +201,7 @@ impl App {
             Some(cameras) => (cameras.clone(), true),
             None => (model.orbit.clone(), false),
         };
-        let bounds = SceneBounds::new(model.bulk, if given { &cameras } else { &[] });
+        let bounds = SceneBounds::new(model.bulk, model.near, if given { &cameras } else { &[] });
         self.state.set_cameras(cameras, given, bounds);
     }
 

@@ -19,16 +19,18 @@ pub struct SceneBounds {
     pub centre: DVec3,
     /// In world units, above 0.
     pub radius: f64,
+    /// Distance of the near plane of free views, in world units, above 0.
+    pub near: f32,
     /// The scene's upward direction in the world, a unit vector.
     pub up: DVec3,
 }
 
 impl SceneBounds {
     /// Returns the bounds of a scene whose bulk, as [`lexisplat_render::bulk`] returns it, is the ball `(centre,
-    /// radius)`. Up is that of the `given` cameras; generated ones, which say nothing about it, are not given.
+    /// radius)`, with free views' `near` plane ([`lexisplat_render::near_plane`]). Up is that of the `given` cameras; generated ones, which say nothing about it, are not given.
     #[must_use]
-    pub fn new((centre, radius): ([f64; 3], f64), given: &[Camera]) -> Self {
-        Self { centre: DVec3::from_array(centre), radius, up: Self::up_of(given) }
+    pub fn new((centre, radius): ([f64; 3], f64), near: f32, given: &[Camera]) -> Self {
+        Self { centre: DVec3::from_array(centre), radius, near, up: Self::up_of(given) }
     }
 
     /// Returns the mean upward direction of `cameras`. Returns world -y, which is up in most scenes trained from
@@ -52,6 +54,8 @@ pub struct CameraController {
     distance: f64,
     /// Focal length, in units of the picture's shorter side.
     focal: f64,
+    /// Distance of the near plane, in world units.
+    near: f32,
     bounds: SceneBounds,
 }
 
@@ -68,6 +72,7 @@ impl CameraController {
             axes,
             distance: ahead.max(SHORTEST * bounds.radius),
             focal: f64::from(camera.fy) / short,
+            near: camera.near.min(bounds.near),
             bounds,
         }
     }
@@ -77,7 +82,7 @@ impl CameraController {
     pub fn from_pose(pose: &Pose, bounds: SceneBounds) -> Self {
         let axes = pose.axes();
         let position = DVec3::from_array(pose.position);
-        Self { position, axes, distance: pose.distance, focal: pose.focal, bounds }
+        Self { position, axes, distance: pose.distance, focal: pose.focal, near: bounds.near, bounds }
     }
 
     /// Returns the place of the camera.
@@ -167,6 +172,7 @@ impl CameraController {
         let focal = self.focal * f64::from(width.min(height));
         let rotation = self.axes.transpose().to_cols_array_2d();
         Camera::rounded("free".to_owned(), [width, height], [focal; 2], self.position.to_array(), rotation)
+            .with_near(self.near)
     }
 }
 
@@ -195,7 +201,8 @@ pub fn fitted(aspect: f64, width: u32, height: u32) -> (u32, u32) {
 mod tests {
     use super::*;
 
-    const BOUNDS: SceneBounds = SceneBounds { centre: DVec3::ZERO, radius: 2.0, up: DVec3::NEG_Y };
+    const BOUNDS: SceneBounds =
+        SceneBounds { centre: DVec3::ZERO, radius: 2.0, near: 0.04, up: DVec3::NEG_Y };
 
     /// At z = -5, looking along z at the origin; y is down.
     fn controller() -> CameraController {
@@ -207,6 +214,7 @@ mod tests {
             fy: 250.0,
             position: [0.0, 0.0, -5.0],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         CameraController::at(&camera, BOUNDS)

@@ -98,10 +98,11 @@ mod tests {
             fy: 200.0,
             position: [0.0, 0.0, -5.0],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         let mut state = State::new([0.0; 3]);
-        state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 2.0), &[]));
+        state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 2.0), 0.04, &[]));
         state
     }
 

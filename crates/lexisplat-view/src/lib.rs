@@ -31,11 +31,12 @@
 //!     fy: 500.0,
 //!     position: [0.0, 0.0, -4.0],
 //!     rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+//!     near: 0.2,
 //!     split: None,
 //! };
 //! let mut state = State::new([0.0; 3]);
 //! state.set_open([true, false]);
-//! state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 1.0), &[]));
+//! state.set_cameras(vec![camera], true, SceneBounds::new(([0.0; 3], 1.0), 0.02, &[]));
 //! for command in script::parse("orbit=30:10,degree=1")? {
 //!     state.apply(&command);
 //! }

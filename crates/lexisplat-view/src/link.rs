@@ -111,11 +111,12 @@ mod tests {
             fy: 250.0,
             position: [x, 0.0, -5.0],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         let mut state = State::new([0.0; 3]);
         state.set_open([true; 2]);
-        let bounds = SceneBounds { centre: DVec3::ZERO, radius: 2.0, up: DVec3::NEG_Y };
+        let bounds = SceneBounds { centre: DVec3::ZERO, radius: 2.0, near: 0.04, up: DVec3::NEG_Y };
         state.set_cameras(vec![camera(0.0), camera(1.0)], true, bounds);
         state
     }

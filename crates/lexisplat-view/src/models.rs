@@ -9,7 +9,7 @@ use lexisplat::ply::{Dialect, ReadOptions};
 use lexisplat::simd::Simd;
 use lexisplat::{CodeLayout, CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
 use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
-use lexisplat_render::{Camera, bulk};
+use lexisplat_render::{Camera, bulk, near_plane};
 
 use crate::command::{Quality, Slot};
 use crate::error::{Error, Result};
@@ -35,6 +35,8 @@ pub(crate) struct OpenModel {
     pub(crate) orbit: Vec<Camera>,
     /// Centre and radius of a ball that holds most Gaussians, in world units.
     pub(crate) bulk: ([f64; 3], f64),
+    /// Distance of the near plane of free views, in world units.
+    pub(crate) near: f32,
 }
 
 /// Number of views of a generated orbit, and their largest width in pixels.
@@ -42,13 +44,16 @@ pub(crate) struct OpenModel {
 pub(crate) struct OrbitSize {
     pub(crate) views: u16,
     pub(crate) max_width: u32,
+    /// Distance of the near plane, in world units; without it that of the scene's size.
+    pub(crate) near: Option<f32>,
 }
 
 impl OpenModel {
     fn new(id: u64, scene: SceneFile, path: Option<PathBuf>, size: OrbitSize) -> Result<Self> {
         let geometry = scene.scene().geometry();
-        let orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
-        let bulk = bulk(geometry);
+        let mut orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
+        let (bulk, near) = (bulk(geometry), size.near.unwrap_or_else(|| near_plane(geometry)));
+        orbit.iter_mut().for_each(|camera| camera.near = near);
         let (layout, guarantee) = match &scene.loaded {
             Loaded::Ply(read) => (dialect(read.summary.dialect), None),
             Loaded::Other(read) => (read.kind.to_string(), None),
@@ -58,7 +63,7 @@ impl OpenModel {
                 (layout.to_string(), guarantee(model, packed.as_deref()))
             }
         };
-        Ok(Self { id, scene, path, layout, guarantee, orbit, bulk })
+        Ok(Self { id, scene, path, layout, guarantee, orbit, bulk, near })
     }
 
     /// Returns the name without folders.
@@ -298,7 +303,7 @@ mod tests {
 
     use super::*;
 
-    const SIZE: OrbitSize = OrbitSize { views: 3, max_width: 100 };
+    const SIZE: OrbitSize = OrbitSize { views: 3, max_width: 100, near: None };
 
     #[test]
     fn compressing_makes_what_a_file_would_hold() {

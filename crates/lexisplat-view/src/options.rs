@@ -20,6 +20,9 @@ pub struct Options {
     pub orbit: u16,
     /// Largest width of a screenshot, in pixels; 0 counts as 1.
     pub max_width: u32,
+    /// Distance of the near plane, in world units, above 0; without it the trainer's for cameras of a file, and that of the
+    /// scene's size for others.
+    pub near: Option<f32>,
     /// Colour behind the scenes, 0 to 1 in each channel.
     pub background: [f32; 3],
     /// The device that draws the scenes. The window itself always needs a graphics adapter, which may be software.

@@ -284,6 +284,7 @@ mod tests {
             fy: 10.0,
             position: [0.0; 3],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         View { camera, options: RenderOptions::default(), models: [Some(1), None] }

@@ -56,7 +56,8 @@ impl State {
     /// channel.
     #[must_use]
     pub fn new(background: [f32; 3]) -> Self {
-        let bounds = SceneBounds { centre: glam::DVec3::ZERO, radius: 1.0, up: glam::DVec3::NEG_Y };
+        let bounds =
+            SceneBounds { centre: glam::DVec3::ZERO, radius: 1.0, near: 0.02, up: glam::DVec3::NEG_Y };
         Self {
             cameras: Vec::new(),
             given: false,
@@ -254,7 +255,8 @@ mod tests {
 
     use super::*;
 
-    const BOUNDS: SceneBounds = SceneBounds { centre: DVec3::ZERO, radius: 1.0, up: DVec3::NEG_Y };
+    const BOUNDS: SceneBounds =
+        SceneBounds { centre: DVec3::ZERO, radius: 1.0, near: 0.02, up: DVec3::NEG_Y };
 
     fn cameras() -> Vec<Camera> {
         let at = |x: f32| Camera {
@@ -265,6 +267,7 @@ mod tests {
             fy: 2500.0,
             position: [x, 0.0, -5.0],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         vec![at(0.0), at(1.0), at(2.0)]

@@ -84,7 +84,10 @@ pub fn run(options: Options) -> Result<()> {
 fn given_cameras(options: &Options) -> Result<Option<Vec<Camera>>> {
     let Some(path) = &options.cameras else { return Ok(None) };
     let nothing = Geometry::default();
-    let cameras = choose_views(Some(path), options.split, 0, options.max_width, &nothing)?;
+    let mut cameras = choose_views(Some(path), options.split, 0, options.max_width, &nothing)?;
+    if let Some(near) = options.near {
+        cameras.iter_mut().for_each(|camera| camera.near = near);
+    }
     for camera in &cameras {
         camera.validate()?;
     }

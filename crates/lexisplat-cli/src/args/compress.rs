@@ -10,7 +10,7 @@ use lexisplat_eval::compression::choose_layout;
 use lexisplat_render::Device;
 
 use super::part::Part;
-use super::values::{preset, scene_kind, size, whole};
+use super::values::{length, preset, scene_kind, size, whole};
 
 /// Heading of the options that say how good or how small the file shall be.
 const TARGET: &str = "Target, at most one of";
@@ -49,6 +49,10 @@ pub(crate) struct Compress {
     /// views like photographs, which are looked for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
+    /// Distance of the near plane of --cameras, in the scene's units, above 0. What is not beyond it is not drawn
+    /// [default: the trainer's 0.2].
+    #[arg(long, value_name = "UNITS", value_parser = length, requires = "cameras")]
+    pub(crate) near: Option<f32>,
     /// Draw and judge the scene from around an `object` or from inside a `room`. `auto` looks for views like
     /// photographs [default: auto].
     #[arg(long, value_parser = scene_kind(), conflicts_with = "cameras")]

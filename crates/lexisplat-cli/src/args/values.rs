@@ -69,6 +69,12 @@ pub(super) fn size(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Parses a length above 0.
+pub(super) fn length(text: &str) -> Result<f32, String> {
+    let length = text.trim().parse().ok().filter(|v: &f32| v.is_finite() && *v > 0.0);
+    length.ok_or_else(|| "expected a length in the scene's units, above 0, such as 0.01".to_owned())
+}
+
 /// Parses `N` finite numbers with commas between them.
 pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();

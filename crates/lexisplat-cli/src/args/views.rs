@@ -6,7 +6,7 @@ use clap::Args;
 use lexisplat_eval::{SceneKind, SplitFilter, ViewOptions};
 use lexisplat_render::Device;
 
-use super::values::{colour, scene_kind, split, whole};
+use super::values::{colour, length, scene_kind, split, whole};
 
 /// Which cameras to draw from, and on what.
 #[derive(Debug, Args)]
@@ -32,6 +32,10 @@ pub(crate) struct Views {
     /// Largest width of a picture, 1 to 16384 pixels. Wider pictures are drawn smaller.
     #[arg(long, default_value_t = lexisplat_eval::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
     pub(crate) width: u32,
+    /// Distance of the near plane, in the scene's units, above 0. What is not beyond it is not drawn [default: the
+    /// trainer's 0.2 for --cameras, else by the scene's size].
+    #[arg(long, value_name = "UNITS", value_parser = length)]
+    pub(crate) near: Option<f32>,
     /// Colour behind the scene: `black`, `white`, or R,G,B, each from 0 to 1.
     #[arg(long, default_value = "black", value_parser = colour)]
     pub(crate) background: [f32; 3],
@@ -63,6 +67,7 @@ impl Views {
         options.kind = self.scene;
         options.count = self.orbit;
         options.max_width = self.width;
+        options.near = self.near;
         if let Some(photos) = photos {
             options.images.clone_from(&photos.images);
             options.resolution = photos.resolution;

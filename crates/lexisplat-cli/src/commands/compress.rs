@@ -15,7 +15,7 @@ use lexisplat::{
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_formats::{Opened, open};
-use lexisplat_render::read_views;
+use lexisplat_render::{Camera, read_views};
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
@@ -151,7 +151,11 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
     if let Some(path) = &args.cameras {
         let set = read_views(path, &mut |_| None)?;
         warn("cameras", &set.warnings);
-        packing = packing.with_cameras(set.cameras);
+        let near = |camera: Camera| match args.near {
+            Some(near) => camera.with_near(near),
+            None => camera,
+        };
+        packing = packing.with_cameras(set.cameras.into_iter().map(near).collect());
     }
     Ok(packing.into())
 }

@@ -86,6 +86,7 @@ fn entries(args: &Sweep) -> Result<Vec<Entry>> {
         entry.cameras.clone_from(&args.views.cameras);
         entry.images.clone_from(&args.photos.images);
         entry.resolution = args.photos.resolution;
+        entry.near = args.views.near;
         entry.split = args.views.split.unwrap_or(SplitFilter::Test);
     }
     Ok(entries)

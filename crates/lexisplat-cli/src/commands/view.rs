@@ -14,6 +14,7 @@ pub(crate) fn run(args: &View, common: &Common) -> Result<()> {
         split: views.split.unwrap_or_default(),
         orbit: views.orbit,
         max_width: views.width,
+        near: views.near,
         background: views.background,
         device: views.device,
         overwrite: common.overwrite,

@@ -16,6 +16,7 @@ use super::target::{pack_to_preset, pack_to_target};
 use super::tiles;
 use super::views::{Looked, PackingViews};
 use crate::error::Result;
+use crate::misfit::near_plane_hides;
 
 /// Views that judge a preset, at most.
 const PRESET_JUDGES: usize = 12;
@@ -56,7 +57,7 @@ impl Compression {
             Self::Packed(packing) => packing.run(source, sink, progress)?,
         };
         report.source_bytes = source.source_bytes();
-        report.warnings = source.warnings().to_vec();
+        report.warnings = [source.warnings(), &report.warnings].concat();
         report.total_seconds = clock.seconds();
         Ok(report)
     }
@@ -152,6 +153,7 @@ impl Packing {
         let clock = Stopwatch::start();
         let fit = if self.options.may_change() { Some(Fit::to(&splats, &views, progress)?) } else { None };
         let given = views.are_given();
+        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
         let most = self.max_gaussians.filter(|&most| most < splats.len());
         let (fewer, sensitivity) = match (most, &fit) {
             (Some(most), Some(fit)) => {
@@ -200,7 +202,8 @@ impl Packing {
         writer.write(sink, progress)?;
         let write_seconds = clock.seconds();
         let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
-        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, ..report })
+        let warnings = hidden.into_iter().collect();
+        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, warnings, ..report })
     }
 }
 

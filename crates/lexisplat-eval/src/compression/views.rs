@@ -267,3 +267,49 @@ impl PackingViews {
         Ok(measured)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+
+    /// `splats` in units that are `factor` times as small, moved by `shift` of the old units.
+    fn in_other_units(splats: &Splats, factor: f32, shift: f32) -> Splats {
+        let mut out = splats.clone();
+        for position in &mut out.geometry.positions {
+            *position = position.map(|v| (v + shift) * factor);
+        }
+        for scales in &mut out.geometry.scales {
+            *scales = scales.map(|v| v + factor.ln());
+        }
+        out
+    }
+
+    #[test]
+    fn a_scene_is_looked_at_in_its_own_size() {
+        let splats = scene(&SampleOptions::new(1500, 3));
+        let looked = |splats: &Splats| {
+            Looked::at(&mut Renderer::cpu(), splats, None, SceneKind::Auto, &Silent).unwrap()
+        };
+        let whole = looked(&splats);
+        for (factor, shift) in [(1e-4, 0.0), (0.03, 0.0), (1e4, 0.0), (0.5, 64.0)] {
+            let other = looked(&in_other_units(&splats, factor, shift));
+            let others = other.views.measuring();
+            for (view, other) in whole.views.measuring().iter().zip(others) {
+                let off = (0..3).map(|k| (view.position[k] + shift) * factor - other.position[k]);
+                assert!(
+                    off.map(f32::abs).fold(0.0, f32::max) < 1e-3 * factor,
+                    "{factor} {shift}: {view:?} {other:?}"
+                );
+                assert!((view.near * factor / other.near - 1.0).abs() < 1e-3, "{} {}", view.near, other.near);
+            }
+            let off = |(a, b): (&f32, &f32)| (a / b - 1.0).abs();
+            let pairs = whole.sensitivity.colour.iter().zip(&other.sensitivity.colour);
+            let mut off: Vec<f32> = pairs.filter(|(a, _)| **a > 0.0).map(off).collect();
+            off.sort_by(f32::total_cmp);
+            assert!(off[off.len() * 99 / 100] < 1e-3, "{factor} {shift}: {off:?}");
+        }
+    }
+}

@@ -62,6 +62,7 @@ mod tests {
             fy: 900.0,
             position: [0.0; 3],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         }
     }

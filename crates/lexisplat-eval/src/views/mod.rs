@@ -14,6 +14,7 @@ use lexisplat::Geometry;
 use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orbit, read_views};
 
 use crate::error::{Error, Result};
+use crate::misfit::near_plane_hides;
 use folder::PhotoFolder;
 pub use photo::photo;
 pub use split::{DEFAULT_HOLD, SplitFilter};
@@ -70,6 +71,9 @@ pub struct ViewOptions {
     pub max_width: u32,
     /// Folder of photos. Cameras without one are left out.
     pub images: Option<PathBuf>,
+    /// Distance of the near plane of all views, in world units, above 0. Without it cameras that are read have the trainer's,
+    /// and generated ones one of the scene's own size.
+    pub near: Option<f32>,
     /// Divisor of the photos' size: 1, 2, 4 or 8. The photos come from the folder of this divisor beside the given
     /// one (`images_4`), or are scaled when they are read. Without photos the cameras are scaled.
     pub resolution: Option<u32>,
@@ -85,6 +89,7 @@ impl Default for ViewOptions {
             count: DEFAULT_ORBIT,
             max_width: DEFAULT_MAX_WIDTH,
             images: None,
+            near: None,
             resolution: None,
         }
     }
@@ -121,8 +126,14 @@ pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenVi
     if !DIVISORS.contains(&divisor) {
         return Err(Error::parameter("resolution", divisor, "expected 1, 2, 4 or 8"));
     }
+    let near = |view: View| match options.near {
+        Some(near) => View { camera: view.camera.with_near(near), ..view },
+        None => view,
+    };
     let Some(source) = &options.cameras else {
-        return generated(options, divisor, geometry);
+        let mut found = generated(options, divisor, geometry)?;
+        found.views = found.views.into_iter().map(near).collect();
+        return Ok(found);
     };
     let photos = options.images.as_deref().map(|images| PhotoFolder::open(images, divisor)).transpose()?;
     let ViewSet { cameras, mut warnings } = read(source, photos.as_ref())?;
@@ -142,7 +153,10 @@ pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenVi
             alone.map(|camera| View { camera, photo: None }).collect()
         }
     };
-    Ok(ChosenViews { views: capped(views, options.max_width), from: source.display().to_string(), warnings })
+    let views: Vec<View> = capped(views, options.max_width).into_iter().map(near).collect();
+    let cameras: Vec<Camera> = views.iter().map(|view| view.camera.clone()).collect();
+    warnings.extend(near_plane_hides(geometry, &cameras));
+    Ok(ChosenViews { views, from: source.display().to_string(), warnings })
 }
 
 /// Reads the cameras of `source`. A size that it does not state is that of the photo, in the folder or where the

@@ -93,6 +93,7 @@ mod tests {
             fy: 8.0,
             position: [0.0; 3],
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            near: 0.2,
             split: None,
         };
         names.iter().map(camera).collect()

@@ -39,6 +39,9 @@ class Camera:
         Name of the photo or the view.
     split : {"train", "test"}, optional
         Which part of a data set it belongs to.
+    near : float
+        Distance of the near plane, in world units. What is not beyond it is not drawn. The default is the trainer's.
+        Cameras that :func:`orbit` and :func:`photographs` make have one of the scene's own size.
     """
 
     width: int
@@ -49,6 +52,7 @@ class Camera:
     rotation: npt.NDArray[np.float32]
     name: str = ""
     split: Literal["train", "test"] | None = None
+    near: float = 0.2
 
     def __post_init__(self) -> None:
         self.position = np.asarray(self.position, np.float32)
@@ -89,7 +93,7 @@ class Camera:
         """The camera with pictures of this width, of the same field of view."""
         height = max(1, round(self.height * width / self.width))
         focal = self.fx * width / self.width, self.fy * height / self.height
-        return Camera(width, height, *focal, self.position, self.rotation, self.name, self.split)
+        return Camera(width, height, *focal, self.position, self.rotation, self.name, self.split, self.near)
 
 
 def cameras(path: str | os.PathLike[str]) -> list[Camera]:
@@ -129,11 +133,13 @@ def native(scene: Splats | Scene) -> Any:
 def as_tuples(cameras: Iterable[Camera]) -> list[_native.CameraTuple]:
     """What the native part takes for cameras."""
     return [
-        (c.name, c.width, c.height, c.fx, c.fy, c.position.tolist(), c.rotation.tolist(), c.split) for c in cameras
+        (c.name, c.width, c.height, c.fx, c.fy, c.position.tolist(), c.rotation.tolist(), c.near, c.split)
+        for c in cameras
     ]
 
 
 def _of_tuple(camera: _native.CameraTuple) -> Camera:
-    name, width, height, fx, fy, position, rotation, split = camera
-    return Camera(width, height, fx, fy, np.array(position, np.float32), np.array(rotation, np.float32), name, split)
+    name, width, height, fx, fy, position, rotation, near, split = camera
+    place = np.array(position, np.float32), np.array(rotation, np.float32)
+    return Camera(width, height, fx, fy, *place, name, split, near)
 

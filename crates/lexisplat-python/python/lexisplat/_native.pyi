@@ -13,7 +13,7 @@ _Source = str | os.PathLike[str] | bytes
 _Progress = Callable[[str, int, int], object] | None
 _Floats = npt.NDArray[np.float32]
 CameraTuple = tuple[
-    str, int, int, float, float, list[float], list[list[float]], Literal["train", "test"] | None
+    str, int, int, float, float, list[float], list[list[float]], float, Literal["train", "test"] | None
 ]
 
 @final

@@ -34,6 +34,8 @@ pub(crate) struct Projection {
     tan: [f32; 2],
     focal: [f32; 2],
     size: [f32; 2],
+    /// [`W_EPSILON`], in proportion to the near plane.
+    w_epsilon: f32,
     pub(super) grid: Grid,
     antialiased: bool,
     /// Whether to leave out what cannot reach [`ALPHA_MIN`]. It makes no difference to the picture; tests check
@@ -111,7 +113,8 @@ impl Projection {
         let size = [camera.width as f32, camera.height as f32];
         let focal = [camera.fx, camera.fy];
         let tan = [size[0] / (2.0 * focal[0]), size[1] / (2.0 * focal[1])];
-        Self { camera: camera.clone(), tan, focal, size, grid, antialiased, tighten: true }
+        let w_epsilon = W_EPSILON * (camera.near / NEAR_Z);
+        Self { camera: camera.clone(), tan, focal, size, w_epsilon, grid, antialiased, tighten: true }
     }
 
     /// Width and height of the picture in pixels.
@@ -131,7 +134,7 @@ impl Projection {
         let view = self.view(body);
         let [x, y, z] = &view;
         let centre = each([x, y, z], |[x, y, z]| {
-            let near = 1.0 / (z + W_EPSILON);
+            let near = 1.0 / (z + self.w_epsilon);
             let pixel = |k: usize, v: f32| ((v / self.tan[k] * near + 1.0) * self.size[k] - 1.0) * 0.5;
             [pixel(0, x), pixel(1, y)]
         });
@@ -145,7 +148,7 @@ impl Projection {
         let [visible] = each([z, &centre[0], &centre[1], a, b, c, &ellipse.det, &opacity], |values| {
             let [z, x, y, a, b, c, det, opacity] = values;
             let finite = is_finite(x) & is_finite(y) & is_finite(a) & is_finite(b) & is_finite(c);
-            let drawn = (z > NEAR_Z) & is_ellipse(det) & finite & (opacity >= ALPHA_MIN);
+            let drawn = (z > self.camera.near) & is_ellipse(det) & finite & (opacity >= ALPHA_MIN);
             [if drawn & is_finite(opacity) { 1.0 } else { 0.0 }]
         });
         // Where nothing is drawn, the pixels end where they begin.

@@ -3,7 +3,6 @@
 use lexisplat::Geometry;
 use lexisplat::simd::Simd;
 
-use crate::conventions::NEAR_Z;
 use crate::parallel::*;
 use crate::radiance::Radiance;
 
@@ -87,7 +86,7 @@ impl Task<'_> {
         let mut count = 0;
         for start in (first..end).step_by(LANES) {
             let group = start..end.min(start + LANES);
-            let in_front = |p: &[f32; 3]| projection.camera.to_view(*p)[2] > NEAR_Z;
+            let in_front = |p: &[f32; 3]| projection.camera.to_view(*p)[2] > projection.camera.near;
             if !geometry.positions[group.clone()].iter().any(in_front) {
                 continue;
             }

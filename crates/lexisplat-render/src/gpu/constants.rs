@@ -43,8 +43,6 @@ const COUNT_BINS: u32 = 128;
 /// Texels along a side of a face of the table of atom radiance. Tests of `gpu::radiance_table` measure the
 /// error.
 pub(super) const TABLE_SIDE: u32 = 32;
-/// The bits of z at the near limit. A depth key is what the bits of z are above this.
-pub(super) const KEY_FIRST: u32 = NEAR_Z.to_bits();
 /// Relative slack of the coarse test in `cull`, far above its rounding errors.
 const CULL_SLACK: f32 = 1e-3;
 /// Relative slack of an ellipse's extent when tiles are chosen, far above its rounding errors.
@@ -144,7 +142,6 @@ pub(super) fn declarations() -> String {
         ("MOMENTS", sums + 1),
         ("MOMENT_SPLATS", MOMENT_SPLATS),
         ("MOMENT_BATCH", MOMENT_BATCH),
-        ("KEY_FIRST", KEY_FIRST),
         ("KEY_LAST", u32::MAX),
         ("NO_SLOT", u32::MAX),
         ("MAX_BASIS", basis),

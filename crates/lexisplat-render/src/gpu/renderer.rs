@@ -10,7 +10,7 @@ use crate::cpu::RenderOptions;
 use crate::error::{Error, Result};
 use crate::image::Image;
 
-use super::constants::{COUNTERS, Counter, KEY_FIRST};
+use super::constants::{COUNTERS, Counter};
 use super::device::Gpu;
 use super::path::ShPath;
 use super::plan::{DrawStage, Plan, Shape, Size, dimensions};
@@ -476,7 +476,7 @@ fn depth_bits(scene: &GpuScene, camera: &Camera) -> u32 {
         .fold(0.0, f32::max);
     // The depth of a corner may round differently than that of a Gaussian there.
     const ROUNDING: f32 = 1.0001;
-    let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(KEY_FIRST);
+    let key = (farthest * ROUNDING).min(f32::MAX).to_bits().saturating_sub(camera.near.to_bits());
     // One bit more, so that the key of slots that come last is above all others.
     (u32::BITS - key.leading_zeros() + 1).min(u32::BITS)
 }
@@ -512,6 +512,6 @@ fn frame_uniform(
         blocks: scene.blocks(),
         chunks: u32::try_from(scene.chunks().count()).unwrap_or(u32::MAX),
         entries: capacity.entries,
-        padding: 0,
+        near: camera.near,
     }
 }

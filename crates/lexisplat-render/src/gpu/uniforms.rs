@@ -25,7 +25,8 @@ pub(super) struct FrameUniform {
     pub(super) blocks: u32,
     pub(super) chunks: u32,
     pub(super) entries: u32,
-    pub(super) padding: u32,
+    /// View-space z beyond which something is drawn.
+    pub(super) near: f32,
 }
 
 /// A part of the scene that fits in one binding.

@@ -44,6 +44,7 @@ pub(crate) fn straight(width: u32, height: u32, focal: f32) -> Camera {
         fy: focal,
         position: [0.0; 3],
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        near: 0.2,
         split: None,
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lexisplat::Geometry;
 use lexisplat_render::gpu::ScenePart;
-use lexisplat_render::{Camera, bulk, orbit};
+use lexisplat_render::{Camera, bulk, near_plane, orbit};
 use lexisplat_view::{DVec3, SceneBounds, Slot};
 
 /// Gaussians that are remembered of each part.
@@ -63,20 +63,25 @@ impl Bounds {
         for part in self.parts.values() {
             all.positions.extend(&part.positions);
             all.opacities.extend(&part.opacities);
+            all.scales.extend(&part.scales);
         }
         all
     }
 
     /// The bounds of the scene that `cameras` look at.
     pub(super) fn of_scene(&self, cameras: &[Camera]) -> SceneBounds {
-        SceneBounds::new(bulk(&self.geometry()), cameras)
+        Self::bounds(&self.geometry(), cameras)
     }
 
     /// Cameras around the scene, and its bounds.
     pub(super) fn around(&self) -> (Vec<Camera>, SceneBounds) {
         let geometry = self.geometry();
         let cameras = orbit(&geometry, ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
-        (cameras, SceneBounds::new(bulk(&geometry), &[]))
+        (cameras, Self::bounds(&geometry, &[]))
+    }
+
+    fn bounds(geometry: &Geometry, cameras: &[Camera]) -> SceneBounds {
+        SceneBounds::new(bulk(geometry), near_plane(geometry), cameras)
     }
 
     /// The point of the scene that `camera` sees at a place, in shares of its picture.

@@ -17,7 +17,7 @@ var<workgroup> words: array<atomic<u32>, MASK_WORDS>;
 fn may_be_seen(body: vec4<f32>) -> bool {
     let d = body.xyz - frame.position;
     let z = dot(frame.forward, d);
-    if !(body.w >= 0.0 && z > NEAR_Z * (1.0 - CULL_SLACK) && z < FAR_LIMIT) {
+    if !(body.w >= 0.0 && z > frame.near * (1.0 - CULL_SLACK) && z < FAR_LIMIT) {
         return false;
     }
     let ratio = vec2<f32>(dot(frame.right, d), dot(frame.down, d)) / z;

@@ -28,7 +28,8 @@ struct Frame {
     chunks: u32,
     // Number of entries that the buffers of the tiles' lists hold.
     entries: u32,
-    padding: u32,
+    // View-space z beyond which something is drawn.
+    near: f32,
 }
 
 // A part of the scene that fits in one binding, laid out as `gpu::uniforms::ChunkUniform`.

@@ -48,10 +48,10 @@ fn project(
     let d = body.xyz - frame.position;
     let view = vec3<f32>(dot(frame.right, d), dot(frame.down, d), dot(frame.forward, d));
     let z = view.z;
-    if !(z > NEAR_Z) {
+    if !(z > frame.near) {
         return;
     }
-    let ndc = view.xy / frame.tangents * (1.0 / (z + W_EPSILON));
+    let ndc = view.xy / frame.tangents * (1.0 / (z + W_EPSILON * (frame.near / NEAR_Z)));
     let centre = ((ndc + 1.0) * frame.size - 1.0) * 0.5;
 
     let shape = shapes[2u * i];
@@ -108,7 +108,7 @@ fn project(
     }
     let corner = vec2<u32>(least);
     let corner_end = vec2<u32>(most);
-    keys[slot] = bitcast<u32>(z) - KEY_FIRST;
+    keys[slot] = bitcast<u32>(z) - bitcast<u32>(frame.near);
     rects[slot] = vec2<u32>(corner.x | (corner.y << 16u), corner_end.x | (corner_end.y << 16u));
     centres[slot] = vec4<f32>(centre, c / det, -b / det);
     conics[slot] = vec4<f32>(a / det, 1.0 / det, opacity, level);

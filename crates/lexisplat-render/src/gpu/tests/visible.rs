@@ -5,7 +5,6 @@ use lexisplat::ShDegree;
 use super::super::constants::{Counter, GROUP};
 use super::{View, gpu, made};
 use crate::camera::Camera;
-use crate::conventions::NEAR_Z;
 use crate::cpu::{RenderOptions, twin};
 use crate::scene::Scene;
 
@@ -15,7 +14,7 @@ fn check(view: &View, scene: &Scene<'_>, camera: &Camera) -> [usize; 2] {
     let marked = |i: usize| masks[i / 32] >> (i % 32) & 1 == 1;
     for seen in twin::seen(scene, camera) {
         // The near limit is rounded otherwise.
-        if f32::from_bits(seen.depth) > NEAR_Z * 1.001 {
+        if f32::from_bits(seen.depth) > camera.near * 1.001 {
             assert!(marked(seen.gaussian as usize), "lost {seen:?}");
         }
     }

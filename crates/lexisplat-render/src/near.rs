@@ -1,0 +1,61 @@
+//! The near plane of views of a scene that comes without cameras, in the scene's own size.
+
+use lexisplat::Geometry;
+
+use crate::camera::{Camera, single};
+use crate::object::subject;
+
+/// Distance of the near plane in radii of the subject. In six models with cameras of their own that is 0.02 to 0.3 units. What
+/// their cameras see begins beyond 1.9 units (99 % of it by area), so any smaller plane shows them the same.
+const NEAR_SHARE: f64 = 0.02;
+/// Most Gaussians that the subject is found by. Of a larger scene it is every second, third and so on.
+const MOST: usize = 1 << 16;
+/// Most cameras that [`hidden_share`] asks, evenly spread.
+const MOST_CAMERAS: usize = 16;
+
+/// Returns the distance of the near plane, in world units, above 0, for views of `geometry` that were not given: it is in
+/// proportion to the radius of the scene's subject, so that a scene shows the same in all units.
+#[must_use]
+pub fn near_plane(geometry: &Geometry) -> f32 {
+    let step = geometry.len().div_ceil(MOST).max(1);
+    let near = if step == 1 { subject(geometry).1 } else { subject(&thinned(geometry, step)).1 } * NEAR_SHARE;
+    single(near).clamp(f32::MIN_POSITIVE, f32::MAX)
+}
+
+/// Every `step`-th Gaussian of `geometry`, as far as [`subject`] looks at it.
+fn thinned(geometry: &Geometry, step: usize) -> Geometry {
+    Geometry {
+        positions: geometry.positions.iter().copied().step_by(step).collect(),
+        opacities: geometry.opacities.iter().copied().step_by(step).collect(),
+        scales: geometry.scales.iter().copied().step_by(step).collect(),
+        ..Geometry::default()
+    }
+}
+
+/// Returns the share, 0 to 1, of what is before `cameras` that their near planes hide: of the opacity of the Gaussians whose
+/// centres a picture would show, without any near plane. It is 0 if there are none.
+#[must_use]
+pub fn hidden_share(geometry: &Geometry, cameras: &[Camera]) -> f64 {
+    let step = geometry.len().div_ceil(MOST).max(1);
+    let stride = cameras.len().div_ceil(MOST_CAMERAS).max(1);
+    let (mut all, mut hidden) = (0.0, 0.0);
+    for camera in cameras.iter().step_by(stride) {
+        let [width, height] = [camera.width, camera.height].map(f64::from);
+        let tangents = [width / (2.0 * f64::from(camera.fx)), height / (2.0 * f64::from(camera.fy))];
+        let some = geometry.positions.iter().zip(&geometry.opacities).step_by(step);
+        for (position, &opacity) in some {
+            let [x, y, z] = camera.to_view(*position);
+            let weight = 1.0 / (1.0 + libm::exp(-f64::from(opacity)));
+            let [right, down, depth] = [x, y, z].map(f64::from);
+            if weight.is_finite()
+                && depth > 0.0
+                && right.abs() < tangents[0] * depth
+                && down.abs() < tangents[1] * depth
+            {
+                all += weight;
+                hidden += if z > camera.near { 0.0 } else { weight };
+            }
+        }
+    }
+    if all > 0.0 { hidden / all } else { 0.0 }
+}
