@@ -76,6 +76,25 @@ mod tests {
     }
 
     #[test]
+    fn a_near_plane_beyond_the_scene_is_told() {
+        let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(300, 1));
+        let mut small = splats.geometry.clone();
+        small.positions.iter_mut().flatten().for_each(|v| *v *= 0.01);
+        small.scales.iter_mut().flatten().for_each(|v| *v += 0.01_f32.ln());
+        let around = |geometry: &Geometry, near: f32| -> Vec<Camera> {
+            let views = lexisplat_render::orbit(geometry, 4, 60, 40);
+            views.into_iter().map(|camera| camera.with_near(near)).collect()
+        };
+        let told = near_plane_hides(&small, &around(&small, 0.2)).unwrap();
+        assert!(
+            told.starts_with("the near plane, 0.2 units from the cameras, hides") && told.contains("--near"),
+            "{told}"
+        );
+        assert!(near_plane_hides(&small, &around(&small, 0.001)).is_none());
+        assert!(near_plane_hides(&splats.geometry, &around(&splats.geometry, 0.2)).is_none());
+    }
+
+    #[test]
     fn pictures_far_from_their_photos_are_told() {
         let score = |psnr| Comparison::of(vec![ViewScore::new("v", [10, 10], psnr, 0.5, Default::default())]);
         let warnings = |psnr| misfit("a.ply", &[picture(50)], [1.0; 3], Some(&score(psnr)));

@@ -59,3 +59,52 @@ pub fn hidden_share(geometry: &Geometry, cameras: &[Camera]) -> f64 {
     }
     if all > 0.0 { hidden / all } else { 0.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::straight_ahead;
+
+    /// A plane of Gaussians across the view, `distance` before the camera at the origin.
+    fn plane(distance: f32, half: f32) -> Geometry {
+        let mut g = Geometry::default();
+        for i in 0..400_u16 {
+            let at = |k: u16| (f32::from(k) / 19.0 * 2.0 - 1.0) * half;
+            g.positions.push([at(i % 20), at(i / 20), distance]);
+            g.opacities.push(2.0);
+            g.scales.push([(half / 20.0).ln(); 3]);
+            g.rotations.push([1.0, 0.0, 0.0, 0.0]);
+        }
+        g
+    }
+
+    #[test]
+    fn the_plane_is_in_proportion_to_the_scene() {
+        let one = near_plane(&plane(5.0, 1.0));
+        assert!((0.005..0.05).contains(&one), "{one}");
+        for factor in [1e-4, 1e-2, 1e4] {
+            let other = near_plane(&plane(5.0 * factor, factor));
+            assert!((other / (one * factor) - 1.0).abs() < 1e-3, "{factor}: {other}");
+        }
+        // Gaussians at one place have the size of one.
+        let mut pile = plane(5.0, 1.0);
+        pile.positions.fill([1.0, 2.0, 3.0]);
+        assert!((0.002..0.01).contains(&near_plane(&pile)), "{}", near_plane(&pile));
+        for nothing in [Geometry::default(), Geometry { scales: vec![[f32::NAN; 3]], ..Geometry::default() }]
+        {
+            assert!(near_plane(&nothing) > 0.0);
+        }
+    }
+
+    #[test]
+    fn what_is_before_the_plane_is_a_share() {
+        let camera = straight_ahead(100, 100, 50.0);
+        let mut both = plane(0.1, 0.05);
+        assert_eq!(hidden_share(&both, std::slice::from_ref(&camera)), 1.0);
+        assert_eq!(hidden_share(&both, &[camera.clone().with_near(0.01)]), 0.0);
+        both.positions.extend(plane(2.0, 1.0).positions);
+        both.opacities.extend(plane(2.0, 1.0).opacities);
+        assert!((hidden_share(&both, std::slice::from_ref(&camera)) - 0.5).abs() < 1e-6);
+        assert_eq!(hidden_share(&Geometry::default(), &[camera]), 0.0);
+    }
+}

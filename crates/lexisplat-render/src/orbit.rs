@@ -19,8 +19,10 @@ const ELEVATION_SWAY: f64 = 10.0;
 const SWAYS: f64 = 3.0;
 /// Radius of the bulk, in units of the half diagonal of the trimmed box. It leaves a little space around.
 const AIR: f64 = 1.2;
-/// Least radius in standard deviations of the middle Gaussian, for scenes whose Gaussians are all at about one place.
+/// Least radius in standard deviations of a small Gaussian, for scenes whose Gaussians are all at about one place.
 const LEAST_SIGMAS: f64 = 3.0;
+/// One of this many Gaussians is smaller than that one.
+const SMALL_SHARE: usize = 10;
 /// Least radius as a share of the distance of the centre from the origin: 8 units in the last place of a position.
 const LEAST_SHARE: f64 = 1e-6;
 /// Radius of a scene that has no size at all, in world units.
@@ -93,8 +95,8 @@ pub(crate) fn least_radius(geometry: &Geometry, centre: DVec3) -> f64 {
     if sizes.is_empty() {
         return NO_RADIUS;
     }
-    let middle = sizes.len() / 2;
-    let size = f64::from(*sizes.select_nth_unstable_by(middle, f32::total_cmp).1);
+    let small = sizes.len() / SMALL_SHARE;
+    let size = f64::from(*sizes.select_nth_unstable_by(small, f32::total_cmp).1);
     let sigmas = LEAST_SIGMAS * libm::exp(size.clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE));
     sigmas.max(LEAST_SHARE * centre.length())
 }
