@@ -254,3 +254,44 @@ fn options_that_do_not_go_together_are_refused() {
     assert!(error.contains("layout"), "{error}");
     assert_eq!(folder.names(), ["scene.ply"]);
 }
+
+#[test]
+fn a_scene_in_other_units_is_packed_as_well() {
+    let folder = Folder::new();
+    let packed = |scene: &str| {
+        let report = folder.json(&["compress", scene, "--overwrite", "-o", "scene.lexi"]);
+        let score = folder.json(&[&["compare", scene, "scene.lexi"], &SMALL[..]].concat());
+        (number(&report["file_bytes"]), number(&report["gaussians"]), number(&score["psnr"]["mean"]))
+    };
+    let whole = packed("scene.ply");
+    for scale in ["0.0001", "0.03", "10000"] {
+        folder.run(&["convert", "scene.ply", "other.ply", "--scale", scale, "--overwrite"]);
+        let other = packed("other.ply");
+        assert!((other.0 / whole.0 - 1.0).abs() < 0.02, "{scale}: {other:?}, {whole:?}");
+        assert!((other.1 / whole.1 - 1.0).abs() < 0.01, "{scale}: {other:?}, {whole:?}");
+        assert!((other.2 - whole.2).abs() < 0.5, "{scale}: {other:?}, {whole:?}");
+    }
+}
+
+#[test]
+fn a_near_plane_that_hides_the_scene_is_told() {
+    let folder = Folder::new();
+    folder.run(&["convert", "scene.ply", "small.ply", "--scale", "0.01"]);
+    let cameras: Vec<Value> = [-0.004, 0.0, 0.004]
+        .map(|x| {
+            serde_json::json!({
+                "id": 0, "img_name": format!("c{x}"), "width": 90, "height": 60, "fx": 80.0, "fy": 80.0,
+                "position": [x, -0.005, -0.04], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+            })
+        })
+        .to_vec();
+    std::fs::write(folder.path("cameras.json"), Value::from(cameras).to_string()).unwrap();
+    let warned = |more: &[&str]| {
+        let arguments =
+            [&["compress", "small.ply", "--cameras", "cameras.json", "--overwrite"], more].concat();
+        folder.json(&arguments)["warnings"].to_string()
+    };
+    assert!(warned(&[]).contains("the near plane, 0.2 units"), "{}", warned(&[]));
+    assert!(!warned(&["--near", "0.002"]).contains("near plane"));
+    folder.fail(&["compress", "small.ply", "--near", "0.002", "--overwrite"], 2);
+}

@@ -33,10 +33,12 @@ pub(crate) struct Compress {
     /// [default: balanced].
     #[arg(long, value_parser = preset(), group = "goal", value_name = "NAME", help_heading = TARGET)]
     pub(crate) preset: Option<Preset>,
-    /// Make the smallest file whose pictures have at least this PSNR on average, in dB, above 0.
+    /// Make the smallest file that has at least this PSNR on average over the views that it is judged by, in dB,
+    /// above 0.
     #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
     pub(crate) psnr: Option<f64>,
-    /// Make the smallest file of which every picture has at least this PSNR, in dB, above 0.
+    /// Make the smallest file that has at least this PSNR in each of the views that it is judged by, in dB, above 0.
+    /// Other views may be worse.
     #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
     pub(crate) min_psnr: Option<f64>,
     /// Make the best file of at most this size, such as 10MB or 800kB.
