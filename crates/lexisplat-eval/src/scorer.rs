@@ -54,7 +54,7 @@ impl Scorer {
     /// Scores picture `b` against `a`. The score's name is `name`.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] if their sizes differ, or are too small for a network.
+    /// [`crate::Error::Parameter`] if their sizes differ or are too small for a network, or if one has NaN.
     pub fn score(&self, name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
         let psnr = psnr(a, b)?;
         let identical = psnr.is_none();

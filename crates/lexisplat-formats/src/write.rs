@@ -65,7 +65,8 @@ impl Lost {
 ///
 /// # Errors
 /// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, for
-/// a scene whose arrays differ in length, and for an empty one as glTF; [`Error::Limit`] for a scene too large for the format; errors of the sink.
+/// a scene whose arrays differ in length, and for an empty one as glTF; [`Error::Limit`] for a scene too large for the format; [`Error::Cancelled`] if
+/// `progress` cancels; errors of the sink.
 pub fn write<'a>(
     kind: Kind,
     splats: &Splats,
@@ -77,7 +78,7 @@ pub fn write<'a>(
     let (bytes, lost) = match kind {
         Kind::Ply => return Ok((ply::write(sink, splats)?, Lost::default())),
         Kind::Spz => spz::write(splats, options)?,
-        Kind::Sog => sog::write(splats, options)?,
+        Kind::Sog => sog::write(splats, options, progress)?,
         Kind::CompressedPly => compressed_ply::write(splats),
         Kind::Splat => splat::write(splats),
         Kind::Gltf => gltf::write(splats, options)?,

@@ -12,6 +12,7 @@ use pyo3::types::PyDict;
 use rayon::prelude::*;
 
 use crate::errors::parameter;
+use crate::invalid::finite;
 use crate::work::check_process;
 
 /// Gaussians whose SH one task turns from one order to the other.
@@ -103,7 +104,19 @@ macro_rules! extras {
 }
 extras! { I8(i8) U8(u8) I16(i16) U16(u16) I32(i32) U32(u32) F32(f32) F64(f64) }
 
-/// The scene that the attributes of Python's `Splats` hold.
+/// The scene that the attributes of Python's `Splats` hold, with finite values. Gaussians with others are refused, or left out
+/// if `drop_invalid` says so, and `told` then says how many.
+pub(crate) fn finite_from_python(
+    splats: &Bound<'_, PyAny>,
+    drop_invalid: bool,
+    told: &mut Vec<String>,
+) -> PyResult<Splats> {
+    let (splats, dropped) = finite(splats.py(), from_python(splats)?, drop_invalid)?;
+    told.extend(dropped);
+    Ok(splats)
+}
+
+/// The scene that the attributes of Python's `Splats` hold, with whatever values.
 pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
     let py = splats.py();
     check_process()?;

@@ -14,7 +14,7 @@ use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::arrays::from_python;
+use crate::arrays::finite_from_python;
 use crate::bytes::{Bytes, Given};
 use crate::cameras::{CameraTuple, cameras};
 use crate::draw::device;
@@ -40,7 +40,7 @@ pub(crate) struct Choices {
     sample: Option<usize>,
     seed: u64,
     cameras: Option<Vec<CameraTuple>>,
-    scene: Option<String>,
+    views: Option<String>,
     keep_order: bool,
     keep_all: bool,
     max_gaussians: Option<usize>,
@@ -87,7 +87,7 @@ impl Choices {
         [
             ("guess", self.guess),
             ("cameras", self.cameras.is_some()),
-            ("scene", self.scene.is_some()),
+            ("views", self.views.is_some()),
             ("keep_order", self.keep_order),
             ("keep_all", self.keep_all),
             ("max_gaussians", self.max_gaussians.is_some()),
@@ -103,9 +103,9 @@ impl Choices {
         let goals = self.goals();
         (1..goals.len()).try_for_each(|k| refuse(&goals[..k], &goals[k..=k]))?;
         let [_, psnr, min_psnr, size, ratio] = goals;
-        let [guess, cameras, scene, keep_order, keep_all, max_gaussians] = self.packed_only();
-        refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, scene, max_gaussians])?;
-        refuse(&[cameras], &[scene])?;
+        let [guess, cameras, views, keep_order, keep_all, max_gaussians] = self.packed_only();
+        refuse(&[guess], &[psnr, min_psnr, size, ratio, cameras, views, max_gaussians])?;
+        refuse(&[cameras], &[views])?;
         refuse(&[max_gaussians], &[keep_all, keep_order, ("tol", self.tol.is_some())])?;
         refuse(&[("dictionary", has_dictionary)], &[("atoms", self.atoms.is_some())])
     }
@@ -134,7 +134,7 @@ impl Choices {
         let mut packing = Packing::new(quality)
             .with_options(options)
             .with_gpu(device.open_gpu()?)
-            .with_scene_kind(self.scene.map_or(Ok(SceneKind::Auto), |name| name.parse())?)
+            .with_scene_kind(self.views.as_deref().map_or(Ok(SceneKind::Auto), views)?)
             .with_max_gaussians(self.max_gaussians);
         if let Some(bytes) = self.memory {
             packing = packing.with_memory(bytes);
@@ -157,6 +157,14 @@ impl Choices {
         options.dictionary = dictionary;
         Ok(options)
     }
+}
+
+/// Where generated views are taken from, by name.
+fn views(name: &str) -> Result<SceneKind> {
+    name.parse().map_err(|error| match error {
+        Error::Parameter { value, expected, .. } => Error::parameter("views", value, expected),
+        error => error,
+    })
 }
 
 /// The options that packed files have, however they are packed.
@@ -213,7 +221,7 @@ enum Source {
     File(Given),
 }
 
-/// Compresses arrays or a file by `choices`. The result is in memory.
+/// Compresses arrays or a file by `choices`. The result is in memory. Returns it, and what was left out of arrays.
 #[pyfunction]
 #[pyo3(signature = (source, choices, *, dictionary, drop_invalid, drop_extras, limit, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
@@ -226,13 +234,14 @@ pub(crate) fn compress(
     drop_extras: bool,
     limit: Option<&Bound<'_, PyDict>>,
     progress: Option<&Bound<'_, PyAny>>,
-) -> PyResult<Scene> {
+) -> PyResult<(Scene, Vec<String>)> {
+    let mut told = Vec::new();
     let dictionary = dictionary_of(dictionary)?;
     let device = device(py, &choices.device)?;
     let options = read_options(py, drop_invalid, drop_extras, limit)?;
     let source = match source.extract::<Given>() {
         Ok(file) => Source::File(file),
-        Err(_) => Source::Splats(Box::new(from_python(source)?)),
+        Err(_) => Source::Splats(Box::new(finite_from_python(source, drop_invalid, &mut told)?)),
     };
     let (bytes, report) = without_gil(py, progress, move |watch| {
         let compression = choices.compression(device, dictionary)?;
@@ -247,7 +256,8 @@ pub(crate) fn compress(
         }
     })?;
     let report = json(py, &report)?;
-    Ok(Scene::new(MADE.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report)))
+    let scene = Scene::new(MADE.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report));
+    Ok((scene, told))
 }
 
 fn run(

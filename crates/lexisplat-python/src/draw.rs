@@ -10,7 +10,7 @@ use lexisplat_render::{Device, Image, Renderer, Scene as Drawable};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
-use crate::arrays::from_python;
+use crate::arrays::finite_from_python;
 use crate::cameras::{CameraTuple, cameras};
 use crate::errors::{Result, raise};
 use crate::files::json;
@@ -30,11 +30,16 @@ pub(crate) enum Resolved {
 }
 
 impl Subject {
-    /// The scene that `given` is: a compressed one, or one with the attributes of `Splats`.
+    /// The scene that `given` is: a compressed one, or one with the attributes of `Splats`, all of them finite.
     pub(crate) fn of(given: &Bound<'_, PyAny>) -> PyResult<Self> {
+        Self::dropping(given, false, &mut Vec::new())
+    }
+
+    /// The same, without Gaussians that hold other values if `drop_invalid` says so; `told` then says how many.
+    fn dropping(given: &Bound<'_, PyAny>, drop_invalid: bool, told: &mut Vec<String>) -> PyResult<Self> {
         match given.cast::<Scene>() {
             Ok(scene) => Ok(Self::Held(Arc::clone(&scene.get().held))),
-            Err(_) => Ok(Self::Dense(Box::new(from_python(given)?))),
+            Err(_) => Ok(Self::Dense(Box::new(finite_from_python(given, drop_invalid, told)?))),
         }
     }
 
@@ -68,9 +73,10 @@ pub(crate) fn device(py: Python<'_>, text: &str) -> PyResult<Device> {
     text.parse().map_err(|error: lexisplat_render::Error| raise(py, &error.into()))
 }
 
-/// Draws the scene as each camera sees it: arrays of (height, width, 3).
+/// Draws the scene as each camera sees it: arrays of (height, width, 3), and warnings.
 #[pyfunction]
-#[pyo3(signature = (scene, views, *, background, max_degree, device_name, progress))]
+#[pyo3(signature = (scene, views, *, background, max_degree, device_name, drop_invalid, progress))]
+#[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn render<'py>(
     py: Python<'py>,
     scene: &Bound<'py, PyAny>,
@@ -78,16 +84,19 @@ pub(crate) fn render<'py>(
     background: [f32; 3],
     max_degree: Option<u8>,
     device_name: &str,
+    drop_invalid: bool,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<Vec<Bound<'py, PyArray3<f32>>>> {
-    let (subject, views, device) = (Subject::of(scene)?, cameras(views), device(py, device_name)?);
+) -> PyResult<(Vec<Bound<'py, PyArray3<f32>>>, Vec<String>)> {
+    let mut told = Vec::new();
+    let (views, device) = (cameras(views), device(py, device_name)?);
+    let subject = Subject::dropping(scene, drop_invalid, &mut told)?;
     let degree = max_degree.map(ShDegree::new).transpose().map_err(|error| raise(py, &error.into()))?;
     let images = without_gil(py, progress, move |watch| {
         let resolved = subject.resolved()?;
         let options = DrawOptions::new(background, false).with_max_degree(degree);
         draw_views(&mut Renderer::open(device)?, &resolved.scene(), &views, &options, watch)
     })?;
-    images.into_iter().map(|image| picture(py, image)).collect()
+    Ok((images.into_iter().map(|image| picture(py, image)).collect::<PyResult<_>>()?, told))
 }
 
 fn picture(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
@@ -95,9 +104,10 @@ fn picture(py: Python<'_>, image: Image) -> PyResult<Bound<'_, PyArray3<f32>>> {
     PyArray1::from_vec(py, image.pixels.into_flattened()).reshape(shape)
 }
 
-/// Scores scene `b` against `a` view by view, as JSON. Without views some like photographs are looked for.
+/// Scores scene `b` against `a` view by view, as JSON. Without views some like photographs are looked for. Returns warnings
+/// too.
 #[pyfunction]
-#[pyo3(signature = (a, b, views, *, count, background, eight_bit, device_name, progress))]
+#[pyo3(signature = (a, b, views, *, count, background, eight_bit, device_name, drop_invalid, progress))]
 #[expect(clippy::too_many_arguments, reason = "Python names them")]
 pub(crate) fn compare<'py>(
     py: Python<'py>,
@@ -108,9 +118,12 @@ pub(crate) fn compare<'py>(
     background: [f32; 3],
     eight_bit: bool,
     device_name: &str,
+    drop_invalid: bool,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<String> {
-    let (a, b, device) = (Subject::of(a)?, Subject::of(b)?, device(py, device_name)?);
+) -> PyResult<(String, Vec<String>)> {
+    let (device, mut told) = (device(py, device_name)?, Vec::new());
+    let a = Subject::dropping(a, drop_invalid, &mut told)?;
+    let b = Subject::dropping(b, drop_invalid, &mut told)?;
     let views = views.map(cameras);
     let found: Comparison = without_gil(py, progress, move |watch| {
         let (a, b) = (a.resolved()?, b.resolved()?);
@@ -128,5 +141,5 @@ pub(crate) fn compare<'py>(
             Ok::<(), lexisplat_eval::Error>(())
         })
     })?;
-    json(py, &found)
+    Ok((json(py, &found)?, told))
 }

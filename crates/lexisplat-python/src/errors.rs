@@ -2,6 +2,7 @@
 
 use std::io;
 
+use lexisplat::FormatError;
 use lexisplat_eval::Error;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
@@ -36,7 +37,10 @@ fn make(py: Python<'_>, error: &Error) -> PyResult<PyErr> {
     use lexisplat::Error as Codec;
     use lexisplat_render::Error as Render;
 
-    let message = error.to_string();
+    let mut message = error.to_string();
+    if let Error::Codec(Codec::Format { problem: FormatError::NotFinite { .. }, .. }) = error {
+        message.push_str("; drop_invalid=True leaves such Gaussians out");
+    }
     let (class, attributes): (&str, Vec<(&str, &str)>) = match error {
         Error::Io { file, source } | Error::Codec(Codec::Io { file, source }) => {
             return os_error(py, source, file);

@@ -1,20 +1,21 @@
 //! Dictionaries of rows of any length.
 
 use lexisplat::learn::{DEFAULT_MOMENTUM, LearnOptions, Statistics as Sums, learn_atoms};
-use lexisplat::pursuit::{Coder, StopRule, ValueType, encode_rows as encode_all};
+use lexisplat::pursuit::{Coder, RowCodes, RowValue, StopRule, ValueType, encode_rows as encode_all};
 use lexisplat::{Atoms, Pursuit};
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::errors::{Result, parameter, raise};
 use crate::work::without_gil;
 
-/// Row starts, atoms, values, the error of each row, and the numbers of rows that are not within the tolerance.
+/// Row starts, atoms, values of the type of the rows, the error of each row, and the numbers of rows that are not within the
+/// tolerance.
 type Codes<'py> = (
     Bound<'py, PyArray1<i64>>,
     Bound<'py, PyArray1<i32>>,
-    Bound<'py, PyArray1<f32>>,
+    Bound<'py, PyAny>,
     Bound<'py, PyArray1<f64>>,
     Bound<'py, PyArray1<i64>>,
 );
@@ -37,8 +38,27 @@ impl Rule {
     }
 }
 
+/// Rows in single or double precision.
+#[derive(FromPyObject)]
+pub(crate) enum Rows<'py> {
+    #[pyo3(transparent)]
+    Single(PyReadonlyArray2<'py, f32>),
+    #[pyo3(transparent)]
+    Double(PyReadonlyArray2<'py, f64>),
+}
+
+/// Does `$work` with the rows of `$given`, which are called `$rows` there, of whichever type they are.
+macro_rules! for_rows {
+    ($given:expr, $rows:ident => $work:expr) => {
+        match $given {
+            Rows::Single($rows) => $work,
+            Rows::Double($rows) => $work,
+        }
+    };
+}
+
 /// A copy of the values of `rows`, and the length of a row. Other threads may change an array while the GIL is not held.
-fn copied(rows: &PyReadonlyArray2<'_, f32>) -> (usize, Vec<f32>) {
+fn copied<T: Element + Copy>(rows: &PyReadonlyArray2<'_, T>) -> (usize, Vec<T>) {
     let dim = rows.shape()[1];
     let values = match rows.as_slice() {
         Ok(values) => values.to_vec(),
@@ -61,23 +81,25 @@ fn to_array<'py>(py: Python<'py>, atoms: &Atoms) -> PyResult<Bound<'py, PyArray2
 #[pyo3(signature = (rows, *, atoms, rule, seed, sample, progress))]
 pub(crate) fn learn_rows<'py>(
     py: Python<'py>,
-    rows: PyReadonlyArray2<'py, f32>,
+    rows: Rows<'py>,
     atoms: Option<usize>,
     rule: Rule,
     seed: u64,
     sample: usize,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Bound<'py, PyArray2<f32>>, usize, usize, f64)> {
-    let (dim, rows) = copied(&rows);
-    let learned = without_gil(py, progress, move |watch| {
-        let options = LearnOptions::new(rule.stop()?)
+    let options = move || -> Result<LearnOptions> {
+        Ok(LearnOptions::new(rule.stop()?)
             .with_atoms(atoms)
             .with_pursuit(rule.pursuit()?)
             .with_seed(seed)
             .with_sample(sample)
-            .with_momentum(DEFAULT_MOMENTUM);
-        Ok(learn_atoms(dim, &rows, &options, watch)?)
-    })?;
+            .with_momentum(DEFAULT_MOMENTUM))
+    };
+    let learned = for_rows!(rows, rows => {
+        let (dim, rows) = copied(&rows);
+        without_gil(py, progress, move |watch| Ok(learn_atoms(dim, &rows, &options()?, watch)?))?
+    });
     Ok((to_array(py, &learned.atoms)?, learned.rounds, learned.sample, learned.held_out_nonzeros))
 }
 
@@ -87,18 +109,24 @@ pub(crate) fn learn_rows<'py>(
 pub(crate) fn encode_rows<'py>(
     py: Python<'py>,
     components: PyReadonlyArray2<'py, f32>,
-    rows: PyReadonlyArray2<'py, f32>,
+    rows: Rows<'py>,
     rule: Rule,
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Codes<'py>> {
     let atoms = atoms_of(&components)?;
-    let (dim, rows) = copied(&rows);
-    check_length(py, &atoms, dim)?;
-    let codes = without_gil(py, progress, move |watch| Ok(encode_all(&rule.coder(&atoms)?, &rows, watch)?))?;
+    for_rows!(rows, rows => {
+        let (dim, rows) = copied(&rows);
+        check_length(py, &atoms, dim)?;
+        let coded = without_gil(py, progress, move |watch| Ok(encode_all(&rule.coder(&atoms)?, &rows, watch)?))?;
+        to_arrays(py, coded)
+    })
+}
+
+fn to_arrays<V: RowValue + Element>(py: Python<'_>, codes: RowCodes<V>) -> PyResult<Codes<'_>> {
     Ok((
         PyArray1::from_vec(py, numbers(py, codes.starts)?),
         PyArray1::from_vec(py, codes.atoms.into_iter().map(i32::from).collect()),
-        PyArray1::from_vec(py, codes.values),
+        PyArray1::from_vec(py, codes.values).into_any(),
         PyArray1::from_vec(py, codes.errors),
         PyArray1::from_vec(py, numbers(py, codes.escapes)?),
     ))
@@ -129,14 +157,16 @@ impl Statistics {
     fn of<'py>(
         py: Python<'py>,
         components: PyReadonlyArray2<'py, f32>,
-        rows: PyReadonlyArray2<'py, f32>,
+        rows: Rows<'py>,
         rule: Rule,
         progress: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Self> {
         let atoms = atoms_of(&components)?;
-        let (dim, rows) = copied(&rows);
-        check_length(py, &atoms, dim)?;
-        without_gil(py, progress, move |watch| Ok(Self(Sums::of(&rule.coder(&atoms)?, &rows, watch)?)))
+        for_rows!(rows, rows => {
+            let (dim, rows) = copied(&rows);
+            check_length(py, &atoms, dim)?;
+            without_gil(py, progress, move |watch| Ok(Self(Sums::of(&rule.coder(&atoms)?, &rows, watch)?)))
+        })
     }
 
     /// The sums of both.

@@ -12,6 +12,7 @@ mod chunks;
 mod draw;
 mod errors;
 mod files;
+mod invalid;
 mod learn;
 mod metrics;
 mod scene;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use lexisplat::Limits;
 use lexisplat_eval::Scorer;
-use lexisplat_eval::metrics::{Lpips, Metric};
+use lexisplat_eval::metrics::{Lpips, Metric, outside};
 use lexisplat_render::Image;
 use numpy::{PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -12,6 +12,9 @@ use pyo3::prelude::*;
 use crate::bytes::Given;
 use crate::errors::parameter;
 use crate::work::without_gil;
+
+/// Scores by name, and of each picture the least and largest value if one is outside of 0..1.
+type Scores = (BTreeMap<&'static str, f64>, [Option<[f32; 2]>; 2]);
 
 /// Scores picture `b` against `a`, both arrays of (height, width, 3). PSNR is missing if they are identical.
 #[pyfunction]
@@ -22,7 +25,7 @@ pub(crate) fn score(
     b: PyReadonlyArray3<'_, f32>,
     flip: bool,
     lpips: Option<Given>,
-) -> PyResult<BTreeMap<&'static str, f64>> {
+) -> PyResult<Scores> {
     let (a, b) = (image(py, &a)?, image(py, &b)?);
     without_gil(py, None, move |_| {
         let mut scorer = Scorer::new();
@@ -35,7 +38,8 @@ pub(crate) fn score(
             scorer = scorer.with_lpips(Lpips::from_bytes(&name, bytes.as_ref())?);
         }
         let score = scorer.score("pictures", &a, &b)?;
-        Ok(Metric::ALL.iter().filter_map(|&metric| Some((metric.name(), score.get(metric)?))).collect())
+        let scores = Metric::ALL.iter().filter_map(|&metric| Some((metric.name(), score.get(metric)?)));
+        Ok((scores.collect(), [outside(&a), outside(&b)]))
     })
 }
 

@@ -1,5 +1,6 @@
 //! A .lexi file that is held as it is, and decoded when that is needed.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
@@ -71,19 +72,21 @@ impl Scene {
     }
 }
 
-/// Opens a .lexi file, or its bytes. Its header is checked, and nothing is decoded.
+/// Opens a .lexi file, or its bytes. Its header is checked, and nothing is decoded. `report` is that of its compression, if
+/// it was made by this package.
 #[pyfunction]
-#[pyo3(signature = (source, *, name, limit))]
+#[pyo3(signature = (source, *, name, report, limit))]
 pub(crate) fn open_scene(
     py: Python<'_>,
     source: Given,
     name: Option<String>,
+    report: Option<String>,
     limit: Option<&Bound<'_, PyDict>>,
 ) -> PyResult<Scene> {
     let limits = limits(py, limit)?;
     let name = name.unwrap_or_else(|| source.name());
     without_gil(py, None, move |_| {
-        let scene = Scene::new(name, source.bytes(&limits)?, limits, None);
+        let scene = Scene::new(name, source.bytes(&limits)?, limits, report);
         scene.held.reader()?;
         Ok(scene)
     })
@@ -93,6 +96,26 @@ pub(crate) fn open_scene(
 impl Scene {
     fn __len__(&self, py: Python<'_>) -> PyResult<usize> {
         Ok(self.reader(py)?.len())
+    }
+
+    /// What messages call the file.
+    #[getter]
+    fn name(&self) -> &str {
+        &self.held.name
+    }
+
+    /// Whether both files have the same bytes.
+    fn equals(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.held, &other.held) || self.held.bytes.as_ref() == other.held.bytes.as_ref()
+    }
+
+    /// A hash of the bytes.
+    fn hash(&self, py: Python<'_>) -> u64 {
+        py.detach(|| {
+            let mut hasher = DefaultHasher::new();
+            self.held.bytes.as_ref().hash(&mut hasher);
+            hasher.finish()
+        })
     }
 
     /// Size of the file in bytes.

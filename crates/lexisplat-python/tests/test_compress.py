@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
+import pickle
 import signal
 import subprocess
 import threading
@@ -114,13 +116,19 @@ def test_the_order_is_kept_if_asked(splats: lx.Splats, views: list[lx.Camera]) -
     [
         ({"psnr": 40, "size": 1000}, "size = given: not together with psnr"),
         ({"guess": True, "psnr": 40}, "psnr = given: not together with guess"),
-        ({"views": "room", "cameras": []}, "scene = given: not together with cameras"),
+        ({"views": "room", "cameras": []}, "views = given: not together with cameras"),
         ({"layout": "packed", "max_nonzeros": 3}, "layout = packed: f16, f32 or paper, which max_nonzeros is for"),
         ({"layout": "f32", "psnr": 40}, "layout = f32: packed, which psnr is for"),
         ({"preset": "tiny"}, "preset = tiny: one of small"),
+        ({"views": "sea"}, "views = sea: auto, object or room"),
+        ({"size": "2 furlongs"}, "size = 2 furlongs: bytes, as"),
+        ({"max_nonzeros": 300}, "max_nonzeros = 300: a whole number, 0 to 255"),
+        ({"seed": -1}, "seed = -1"),
+        ({"atoms": 2.5}, "atoms = 2.5"),
+        ({"limit": {"splats": 1}}, "limit = splats"),
         ({"psnr": -1}, "psnr = -1"),
         ({"psnr": float("nan")}, "psnr = NaN"),
-        ({"tol": 0}, "tolerance = 0"),
+        ({"tol": 0}, "tol = 0"),
         ({"atoms": 5000}, "atoms = 5000: 1 to 1024"),
         ({"device": "tpu"}, "device = tpu"),
         ({"cameras": []}, "cameras"),
@@ -131,6 +139,86 @@ def test_choices_that_cannot_be_met_are_named(splats: lx.Splats, options: dict[s
     with pytest.raises(lx.ParameterError) as refused:
         lx.compress(splats, **options)
     assert text in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [
+        ({"psnr": "forty"}, "psnr = forty (str): a number"),
+        ({"preset": 5}, "preset = 5 (int): text"),
+        ({"keep_order": "yes"}, "keep_order = yes (str): True or False"),
+        ({"size": [1]}, "size = [1] (list): bytes"),
+        ({"atoms": "90"}, "atoms = 90 (str): a whole number"),
+        ({"cameras": 3}, "cameras = 3 (int): a Camera"),
+        ({"cameras": [3]}, "cameras[0] = 3 (int): a Camera"),
+        ({"limit": 5}, "limit = 5 (int): a dict"),
+        ({"memory": None}, "memory = a NoneType: bytes"),
+        ({"progress": 1}, "progress = 1 (int): True"),
+        ({"dictionary": object()}, "dictionary = a object: an array of numbers"),
+        ({"prset": "small"}, "compress has no option prset; did you mean preset?"),
+        ({"zzz": 1}, "compress has no option zzz: it has scene, preset"),
+    ],
+)
+def test_types_and_names_are_refused_before_any_work(options: dict[str, Any], text: str, tmp_path: Path) -> None:
+    # There is no file, so a look for it would raise another error.
+    with pytest.raises(lx.WrongTypeError) as refused:
+        lx.compress(tmp_path / "none.ply", **options)
+    assert text in str(refused.value)
+    assert isinstance(refused.value, TypeError) and isinstance(refused.value, lx.ParameterError)
+
+
+def test_checkpoints_refuse_options_when_they_are_chosen() -> None:
+    with pytest.raises(lx.WrongTypeError, match="LexiCompression has no option prset; did you mean preset"):
+        lx.LexiCompression(prset="small")
+    with pytest.raises(TypeError, match="psnr = forty"):
+        lx.LexiCompression(psnr="forty")
+
+
+def test_arguments_of_other_functions_are_checked_too(splats: lx.Splats, views: list[lx.Camera], tmp_path: Path) -> None:
+    cases: list[tuple[Any, str]] = [
+        (lambda: lx.save(splats, "x.lexi"), "save(path, scene) takes the path first"),
+        (lambda: lx.save(lx.compress(splats, guess=True), tmp_path / "x.lexi"), "takes the path first"),
+        (lambda: lx.render(views[0], splats), "render(scene, camera) takes the scene first"),
+        (lambda: lx.LexiCompression().compress(splats.to_dict(), tmp_path), "takes the folder first"),
+        (lambda: lx.load(3), "source = 3 (int): a path, the bytes of a file, or a file object"),
+        (lambda: lx.load("a.ply", contigous=True), "load has no option contigous; did you mean contiguous?"),
+        (lambda: lx.open("a.lexi", name=b"a"), "name = b'a' (bytes): text"),
+        (lambda: lx.save("a.spz", splats, sh_bits=5), "sh_bits = 5 (int): 2 values"),
+        (lambda: lx.render(splats, views[0], background="red"), "background = red: 3 values"),
+        (lambda: lx.orbit(splats, "3"), "count = 3 (str): a whole number"),
+        (lambda: lx.compare(splats, "a.ply"), "b = a.ply (str): Splats or a Scene"),
+        (lambda: lx.Camera("800", 600, 1, 1, [0] * 3, np.eye(3)), "width = 800 (str): a whole number"),
+        (lambda: lx.DictionaryLearner(atoms=3), "DictionaryLearner has no option atoms"),
+        (lambda: lx.DictionaryLearner(tol="1").fit(np.eye(4)), "tol = 1 (str): a number"),
+        (lambda: lx.metrics.psnr(np.zeros((2, 2, 3)), "a.png"), "picture b = an array of"),
+        (lambda: lx.Splats.from_dict("a.ply"), "arrays = a.ply (str): a dict of arrays"),
+        (lambda: lx.Splats.from_dict(splats.to_dict() | {"quats": "none"}), "quats = none (str): an array of numbers"),
+    ]
+    for call, text in cases:
+        with pytest.raises(lx.ParameterError) as refused:
+            call()
+        assert text in str(refused.value)
+
+
+def test_sizes_are_told_in_many_ways(splats: lx.Splats, views: list[lx.Camera]) -> None:
+    part = splats[:400]
+    made = [lx.compress(part, size=size, cameras=views) for size in (12_000, 12e3, "12kB", np.int64(12_000))]
+    assert made[0].nbytes <= 12_000 and all(scene == made[0] for scene in made)
+    assert lx.load(made[0].to_bytes(), limit={"bytes": "1GB", "gaussians": 1e6}).degree == 3
+    with pytest.raises(lx.LimitError):
+        lx.open(made[0].to_bytes(), limit={"bytes": "1kB"})
+
+
+def test_scenes_are_copied_pickled_and_compared(packed: lx.Scene, splats: lx.Splats, tmp_path: Path) -> None:
+    packed.save(tmp_path / "a.lexi")
+    opened = lx.open(tmp_path / "a.lexi", limit={"gaussians": 5000})
+    for scene in (packed, opened):
+        for again in (copy.copy(scene), copy.deepcopy(scene), pickle.loads(pickle.dumps(scene))):
+            assert again == scene and hash(again) == hash(scene) and again is not scene
+            assert again.report == scene.report and again.to_bytes() == scene.to_bytes()
+            np.testing.assert_array_equal(again.decode().means, scene.decode().means)
+    other = lx.compress(splats[:500], guess=True)
+    assert packed == opened and packed != other and packed != packed.to_bytes() and len({packed, opened, other}) == 2
 
 
 def test_what_is_compressed_is_not_compressed_again(packed: lx.Scene) -> None:

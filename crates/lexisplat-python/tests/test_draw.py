@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from pathlib import Path
 
 import lexisplat as lx
@@ -43,6 +44,45 @@ def test_scenes_are_compared(splats: lx.Splats, packed: lx.Scene, views: list[lx
     assert compared["psnr"]["mean"] == pytest.approx(np.mean(each)) and compared["psnr"]["min"] == min(each)
     assert len(compared["views"]) == len(views) and not compared["identical"]
     assert lx.compare(splats, splats, views, device="cpu")["identical"]
+
+
+def test_scenes_with_nan_are_neither_drawn_nor_compared(splats: lx.Splats, views: list[lx.Camera]) -> None:
+    bad = splats[:]
+    bad.scales = bad.scales.copy()
+    bad.scales[5, 2] = np.nan
+    advice = "scales = NaN of Gaussian 5: finite values; 1 of 3000 .*drop_invalid=True"
+    for refused in (
+        lambda: lx.render(bad, views[0], device="cpu"),
+        lambda: lx.compare(splats, bad, views, device="cpu"),
+        lambda: lx.compare(bad, splats, views, device="cpu"),
+        lambda: lx.orbit(bad),
+    ):
+        with pytest.raises(lx.ParameterError, match=advice):
+            refused()
+    good = splats[np.arange(3000) != 5]
+    with pytest.warns(lx.LexisplatWarning, match="dropped 1 of 3000"):
+        drawn = lx.render(bad, views[0], device="cpu", drop_invalid=True)
+    np.testing.assert_array_equal(drawn, lx.render(good, views[0], device="cpu"))
+    with pytest.warns(lx.LexisplatWarning, match="dropped 1 of 3000"):
+        assert lx.compare(bad, good, views, device="cpu", drop_invalid=True)["identical"]
+
+
+def test_pictures_with_nan_are_refused_and_others_out_of_range_told() -> None:
+    a = np.random.default_rng(0).random((20, 30, 3)).astype(np.float32)
+    bad = a.copy()
+    bad[4, 7, 1] = np.nan
+    for score in (lx.metrics.score, lx.metrics.psnr, lx.metrics.ssim, lx.metrics.flip):
+        for pair in ((a, bad), (bad, a), (bad, bad)):
+            with pytest.raises(lx.ParameterError, match="NaN at column 7, row 4"):
+                score(*pair)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            score(a, a * np.float32(0.5))
+        with pytest.warns(lx.LexisplatWarning, match="picture b: values from .* to 2.* are clipped .*divide by 255") as told:
+            score(a, a * 255)
+        assert told[0].filename == __file__
+    with pytest.warns(lx.LexisplatWarning, match=r"picture a: values from -.* are clipped to 0..1$"):
+        lx.metrics.psnr(a - 0.5, a)
 
 
 def test_views_like_photographs_are_found(splats: lx.Splats) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import pickle
 import subprocess
@@ -40,6 +41,11 @@ def test_lexi_is_a_format_too(splats: lx.Splats, packed: lx.Scene, tmp_path: Pat
     assert lx.save(tmp_path / "a.lexi", packed) == {}
     assert (tmp_path / "a.lexi").read_bytes() == packed.to_bytes()
     assert len(lx.load(tmp_path / "a.lexi")) == len(packed)
+    made = make(3000)
+    made.normals = np.ones((3000, 3), np.float32)
+    lost = lx.save(tmp_path / "b.lexi", made)
+    assert lost["removed"] == 3000 - len(lx.load(tmp_path / "b.lexi")) and lost["normals"] and lost["precision"]
+    assert lx.load(tmp_path / "b.lexi").normals is None and lost["extras"] == [] and lost["sh_degree"] is None
     lx.save(tmp_path / "a.ply", packed)
     np.testing.assert_array_equal(lx.load(tmp_path / "a.ply").means, packed.decode().means)
 
@@ -58,6 +64,10 @@ def test_options_of_formats(splats: lx.Splats, tmp_path: Path) -> None:
         lx.save(tmp_path / "a.ksplat", splats)
     with pytest.raises(lx.ParameterError, match="format"):
         lx.save(tmp_path / "a.txt", splats)
+    for wrong in ({"path": tmp_path / "a.GLTF"}, {"path": tmp_path / "a", "format": "gltf"}):
+        with pytest.raises(lx.ParameterError, match="glTF is written as one file, .glb"):
+            lx.save(scene=splats, **wrong)  # type: ignore[arg-type]
+    assert sorted(os.listdir(tmp_path)) == ["a", "a.spz"]
 
 
 def test_files_appear_whole_and_are_kept_if_asked(splats: lx.Splats, tmp_path: Path) -> None:
@@ -102,13 +112,31 @@ def test_limits_are_kept(ply: Path, packed: lx.Scene) -> None:
 
 
 def test_invalid_gaussians_are_refused_or_left_out(tmp_path: Path) -> None:
-    splats = make(100)
-    splats.means[7, 1] = np.nan
-    lx.save(tmp_path / "a.ply", splats)
-    with pytest.raises(lx.FormatError, match="number 7"):
-        lx.load(tmp_path / "a.ply")
+    path, splats = tmp_path / "a.ply", make(100)
+    splats.means[7, 1] = 1234.5
+    lx.save(path, splats)
+    whole = path.read_bytes()
+    path.write_bytes(whole.replace(np.float32(1234.5).tobytes(), np.float32(np.nan).tobytes()))
+    with pytest.raises(lx.FormatError, match="number 7 .*drop_invalid=True leaves such"):
+        lx.load(path)
     with pytest.warns(lx.LexisplatWarning):
-        assert len(lx.load(tmp_path / "a.ply", drop_invalid=True)) == 99
+        assert len(lx.load(path, drop_invalid=True)) == 99
+    splats.means[7, 1] = np.nan
+    splats.shN = splats.shN.copy()
+    splats.shN[3, 2, 1] = np.inf
+    advice = "inf of Gaussian 3: finite values; 2 of 100 .*drop_invalid=True leaves such"
+    for name in ("b.ply", "b.spz", "b.lexi"):
+        with pytest.raises(lx.ParameterError, match=advice) as refused:
+            lx.save(tmp_path / name, splats)
+        assert refused.value.name == "shN" and not (tmp_path / name).exists()
+    with pytest.warns(lx.LexisplatWarning, match="dropped 2 of 100"):
+        lx.save(tmp_path / "b.ply", splats, drop_invalid=True)
+    assert len(lx.load(tmp_path / "b.ply")) == 98
+    with pytest.warns(lx.LexisplatWarning, match="dropped 2 of 100"):
+        assert len(lx.compress(splats, guess=True, keep_all=True, drop_invalid=True)) == 98
+    splats.opacities[:] = np.nan
+    with pytest.raises(lx.ParameterError, match="none is left"):
+        lx.save(tmp_path / "c.ply", splats, drop_invalid=True)
 
 
 def test_errors_can_be_pickled(tmp_path: Path) -> None:
@@ -133,7 +161,42 @@ assert os.waitpid(child, 0)[1] == 0
     subprocess.run([sys.executable, "-W", "ignore", "-c", script, ply], check=True, timeout=60)
 
 
+@pytest.mark.parametrize("kind", ["ply", "lexi", "sog"])
+def test_bytes_and_file_objects_are_read(kind: str, packed: lx.Scene, tmp_path: Path) -> None:
+    path = tmp_path / f"a.{kind}"
+    lx.save(path, packed)
+    expected, data = lx.load(path), path.read_bytes()
+    with path.open("rb") as file:
+        sources = [data, bytearray(data), memoryview(data), io.BytesIO(data), file]
+        for source in sources:
+            np.testing.assert_array_equal(lx.load(source).means, expected.means)
+    with path.open("rb") as file:
+        if kind == "lexi":
+            assert lx.open(file) == packed and lx.open(io.BytesIO(data)).to_bytes() == data
+        else:
+            assert lx.compress(file, guess=True) == lx.compress(path, guess=True)
+    (tmp_path / "wrong").write_bytes(b"no scene")
+    with (tmp_path / "wrong").open("rb") as file, pytest.raises(lx.FormatError) as wrong:
+        lx.load(file)
+    assert wrong.value.file == str(tmp_path / "wrong")
+    with (tmp_path / "wrong").open("r") as file, pytest.raises(lx.ParameterError, match='mode "rb"'):
+        lx.load(file)  # type: ignore[arg-type]
+
+
 def test_what_is_no_scene_is_named(splats: lx.Splats, tmp_path: Path) -> None:
     for wrong in (lambda: lx.save(tmp_path / "a.ply", splats.to_dict()), lambda: lx.compress(splats.to_dict())):
-        with pytest.raises(TypeError, match="Splats.from_dict"):
+        with pytest.raises(TypeError, match="Splats.from_dict") as refused:
             wrong()
+        assert isinstance(refused.value, lx.Error)
+
+
+def test_the_command_for_ray_says_in_one_line_that_ray_is_missing(tmp_path: Path) -> None:
+    script = """
+import sys
+sys.modules["ray"] = None
+from lexisplat.ray._command import main
+sys.exit(main(["a.ply", "-o", "b.lexi"]))
+"""
+    ended = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path)
+    assert ended.returncode == 1 and ended.stdout == ""
+    assert ended.stderr == 'error: lexisplat.ray needs Ray: pip install "lexisplat[ray]"\n'

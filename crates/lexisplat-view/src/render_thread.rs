@@ -226,8 +226,10 @@ impl RenderWorker {
         let due = scale >= 1.0 || self.last_comparison.is_none_or(|last| last.elapsed() >= COMPARE_EVERY);
         let mut score = None;
         if let ([Some(first), Some(second)], true) = (&pictures, due) {
-            let decibels = psnr(&self.image(first)?, &self.image(second)?)?;
-            score = Some(decibels.map_or(Score::Identical, Score::Decibels));
+            let images = [self.image(first)?, self.image(second)?];
+            // Colours may overflow to NaN, and such pictures have no score.
+            let decibels = psnr(&images[0], &images[1]).ok();
+            score = decibels.map(|found| found.map_or(Score::Identical, Score::Decibels));
             self.last_comparison = Some(Instant::now());
         }
         let buffers: u64 = pictures.iter().flatten().map(|p| p.picture.pixels.size()).sum();

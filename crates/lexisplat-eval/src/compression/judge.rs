@@ -4,7 +4,7 @@ use lexisplat::{Progress, Splats};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
-use crate::metrics::psnr;
+use crate::metrics::psnr_of_drawn;
 
 /// PSNR that identical pictures count as, in dB, so that means are finite.
 const IDENTICAL: f64 = 100.0;
@@ -74,7 +74,7 @@ impl Judge {
         for (camera, original) in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
-            all.push(psnr(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL));
+            all.push(psnr_of_drawn(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL));
         }
         all.sort_by(f64::total_cmp);
         let mean = |views: &[f64]| views.iter().sum::<f64>() / views.len().max(1) as f64;

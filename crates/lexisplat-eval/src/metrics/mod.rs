@@ -1,5 +1,5 @@
-//! Differences between two pictures. Pixels are clipped to 0..1 first, and NaN counts as 0. Nothing is rounded to 8
-//! bits.
+//! Differences between two pictures. Values are clipped to 0..1 first; [`outside`] tells whether any is outside. Pictures
+//! with NaN are refused. Nothing is rounded to 8 bits.
 
 mod flip;
 pub mod lpips;
@@ -12,6 +12,7 @@ pub use flip::flip;
 pub use lpips::Lpips;
 pub use metric::Metric;
 pub use psnr::psnr;
+pub(crate) use psnr::psnr_of_drawn;
 pub use ssim::{ssim, ssim_inner};
 
 use lexisplat_render::Image;
@@ -24,10 +25,36 @@ fn clipped(value: f32) -> f64 {
     f64::from(clip(value))
 }
 
+/// The least and largest value of `image`, if one of them is outside of 0..1: metrics clip such values. Pictures of scenes
+/// may have some; values up to 255 mean that the picture should be divided by 255.
+#[must_use]
+pub fn outside(image: &Image) -> Option<[f32; 2]> {
+    let ends = [f32::INFINITY, f32::NEG_INFINITY];
+    let [low, high] =
+        image.pixels.as_flattened().iter().fold(ends, |[low, high], &v| [low.min(v), high.max(v)]);
+    (low < 0.0 || high > 1.0).then_some([low, high])
+}
+
 /// Returns `value` within 0..1. NaN becomes 0.
 #[inline]
 pub(crate) fn clip(value: f32) -> f32 {
     if value > 0.0 { value.min(1.0) } else { 0.0 }
+}
+
+/// Refuses two pictures of different sizes, pictures whose pixels do not fill them, and those with NaN.
+fn comparable(a: &Image, b: &Image) -> Result<()> {
+    same_size(a, b)?;
+    for image in [a, b] {
+        // Without a way out the loop is vectorised.
+        let has_nan = image.pixels.as_flattened().iter().fold(false, |found, v| found | v.is_nan());
+        let is_nan = |pixel: &[f32; 3]| pixel.iter().any(|v| v.is_nan());
+        if let Some(i) = image.pixels.iter().position(is_nan).filter(|_| has_nan) {
+            let width = image.width as usize;
+            let found = format!("NaN at column {}, row {}", i % width, i / width);
+            return Err(Error::parameter("picture", found, "numbers from 0 to 1"));
+        }
+    }
+    Ok(())
 }
 
 /// Refuses two pictures of different sizes, and pictures whose pixels do not fill them.
@@ -47,6 +74,44 @@ fn same_size(a: &Image, b: &Image) -> Result<()> {
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::testing::picture;
+    use super::*;
+    use crate::metrics::lpips::{Network, Range, testing::random};
+
+    #[test]
+    fn pictures_with_nan_are_refused_by_every_metric() {
+        let good = picture(40, 32, 1);
+        let mut bad = good.clone();
+        bad.pixels[40 * 7 + 3][2] = f32::NAN;
+        let lpips = random(Network::Alex, 1);
+        for (a, b) in [(&good, &bad), (&bad, &good), (&bad, &bad)] {
+            let said = [
+                psnr(a, b).map(drop),
+                ssim(a, b).map(drop),
+                ssim_inner(a, b).map(drop),
+                flip(a, b).map(drop),
+                lpips.distance(a, b, Range::Standard).map(drop),
+            ];
+            for said in said {
+                let said = said.unwrap_err().to_string();
+                assert!(said.contains("picture = NaN at column 3, row 7"), "{said}");
+            }
+        }
+    }
+
+    #[test]
+    fn values_outside_are_told() {
+        let of =
+            |value: f32| outside(&Image { width: 1, height: 2, pixels: vec![[0.0; 3], [1.0, value, 0.5]] });
+        assert_eq!([of(0.5), of(1.0), of(0.0)], [None; 3]);
+        assert_eq!(of(255.0), Some([0.0, 255.0]));
+        assert_eq!(of(-0.25), Some([-0.25, 1.0]));
+        assert_eq!(of(f32::INFINITY), Some([0.0, f32::INFINITY]));
+    }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use lexisplat::simd::Simd;
 use lexisplat_render::Image;
 
 use super::rows::{add_across, planes, sum_rows};
-use super::{clip, same_size};
+use super::{clip, comparable};
 use crate::error::{Error, Result};
 
 /// Side of the Gaussian window in pixels (INRIA `utils/loss_utils.py`, `window_size`).
@@ -33,9 +33,9 @@ enum Border {
 /// pictures have 1, the largest value.
 ///
 /// # Errors
-/// [`Error::Parameter`] if the sizes differ or a picture is empty.
+/// [`Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
 pub fn ssim(a: &Image, b: &Image) -> Result<f64> {
-    same_size(a, b)?;
+    comparable(a, b)?;
     Ok(mean(a, b, Border::Zero))
 }
 
@@ -45,7 +45,7 @@ pub fn ssim(a: &Image, b: &Image) -> Result<f64> {
 /// # Errors
 /// [`Error::Parameter`] if the sizes differ or a picture is smaller than 11 pixels either way.
 pub fn ssim_inner(a: &Image, b: &Image) -> Result<f64> {
-    same_size(a, b)?;
+    comparable(a, b)?;
     if (a.width.min(a.height) as usize) < WINDOW {
         let found = format!("{} x {}", a.width, a.height);
         return Err(Error::parameter("picture", found, format!("at least {WINDOW} x {WINDOW} pixels")));

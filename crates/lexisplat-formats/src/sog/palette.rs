@@ -8,6 +8,8 @@
 
 use std::collections::HashMap;
 
+use lexisplat::{Progress, Result};
+
 use super::tree;
 
 /// Sums that are taken side by side. Rows are multiples of it.
@@ -51,22 +53,25 @@ pub(super) struct Palette {
 }
 
 /// A palette of at most `most` entries for `rows`; with as few different rows, it is they themselves.
-pub(super) fn palette(rows: Rows<'_>, most: usize) -> Palette {
+///
+/// # Errors
+/// [`Error::Cancelled`](lexisplat::Error::Cancelled) soon after `progress` cancels, which every split and every task asks.
+pub(super) fn palette(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> Result<Palette> {
     if let Some(palette) = distinct(rows, most) {
-        return palette;
+        return Ok(palette);
     }
     let step = rows.len().div_ceil(MOST_TRAINING).max(1);
     let sample: Vec<f32> = (0..rows.len()).step_by(step).flat_map(|i| rows.get(i)).copied().collect();
     let sample = Rows { values: &sample, width: rows.width };
-    let mut entries = tree::split(sample, most);
+    let mut entries = tree::split(sample, most, progress)?;
     let mut labels = vec![0; sample.len()];
     for _ in 0..ROUNDS {
-        let distances = assign(sample, &entries, &mut labels);
+        let distances = assign(sample, &entries, &mut labels, progress)?;
         update(sample, &labels, &distances, &mut entries);
     }
     labels = vec![0; rows.len()];
-    assign(rows, &entries, &mut labels);
-    by_appearance(&entries, labels, rows.width)
+    assign(rows, &entries, &mut labels, progress)?;
+    Ok(by_appearance(&entries, labels, rows.width))
 }
 
 /// The different rows, if they are no more than `most`.
@@ -135,23 +140,23 @@ struct Groups {
 }
 
 impl Groups {
-    fn new(entries: Rows<'_>) -> Self {
+    fn new(entries: Rows<'_>, progress: &dyn Progress) -> Result<Self> {
         let count = entries.len().isqrt().saturating_mul(2).clamp(1, MOST_GROUPS);
-        let means = tree::split(entries, count);
+        let means = tree::split(entries, count, progress)?;
         let of_means = Rows { values: &means, width: entries.width };
         let mut nearest = vec![0_u32; entries.len()];
-        each_part(&mut nearest, |first, nearest| {
+        each_part(&mut nearest, progress, |first, nearest| {
             for (i, nearest) in (first..).zip(nearest) {
                 let row = entries.get(i);
                 *nearest = best((0_u32..).zip(of_means.values.chunks_exact(entries.width)), row).0;
             }
-        });
+        })?;
         let mut numbers: Vec<u32> = (0_u32..).take(entries.len()).collect();
         numbers.sort_by_key(|&i| nearest[i as usize]);
         let values = numbers.iter().flat_map(|&i| entries.get(i as usize)).copied().collect();
         let group_of = |place: &u32| nearest[*place as usize] as usize;
         let starts = (0..=of_means.len()).map(|g| numbers.partition_point(|i| group_of(i) < g)).collect();
-        Self { means, entries: values, numbers, starts }
+        Ok(Self { means, entries: values, numbers, starts })
     }
 
     /// The entry near to `row`, and its squared distance. `order` is scratch.
@@ -191,17 +196,17 @@ fn best<'a>(rows: impl Iterator<Item = (u32, &'a [f32])>, row: &[f32]) -> (u32, 
 }
 
 /// Gives each row an entry near to it. Returns the squared distances.
-fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32]) -> Vec<f32> {
-    let groups = Groups::new(Rows { values: entries, width: rows.width });
+fn assign(rows: Rows<'_>, entries: &[f32], labels: &mut [u32], progress: &dyn Progress) -> Result<Vec<f32>> {
+    let groups = Groups::new(Rows { values: entries, width: rows.width }, progress)?;
     let mut found: Vec<(u32, f32)> = vec![(0, 0.0); rows.len()];
-    each_part(&mut found, |first, part| {
+    each_part(&mut found, progress, |first, part| {
         let mut order = Vec::new();
         for (i, found) in (first..).zip(part) {
             *found = groups.nearest(rows.get(i), &mut order);
         }
-    });
+    })?;
     labels.iter_mut().zip(&found).for_each(|(label, found)| *label = found.0);
-    found.iter().map(|found| found.1).collect()
+    Ok(found.iter().map(|found| found.1).collect())
 }
 
 /// Moves each entry to the mean of its rows. Entries without rows go to the rows that are farthest from theirs.
@@ -230,20 +235,32 @@ fn update(rows: Rows<'_>, labels: &[u32], distances: &[f32], entries: &mut [f32]
     }
 }
 
-/// Works on parts of `items`, on all cores if there are threads. The work gets the number of the first item.
-fn each_part<T: Send>(items: &mut [T], work: impl Fn(usize, &mut [T]) + Sync) {
+/// Works on parts of `items`, on all cores if there are threads. The work gets the number of the first item. Once `progress`
+/// cancels, no more parts are begun.
+fn each_part<T: Send>(
+    items: &mut [T],
+    progress: &dyn Progress,
+    work: impl Fn(usize, &mut [T]) + Sync,
+) -> Result<()> {
+    let part = |(k, part): (usize, &mut [T])| {
+        progress.check()?;
+        work(k * ROWS_PER_TASK, part);
+        Ok(())
+    };
     #[cfg(feature = "parallel")]
     {
         use rayon::prelude::*;
-        let parts = items.par_chunks_mut(ROWS_PER_TASK).enumerate();
-        parts.for_each(|(k, part)| work(k * ROWS_PER_TASK, part));
+        items.par_chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(part)
     }
     #[cfg(not(feature = "parallel"))]
-    items.chunks_mut(ROWS_PER_TASK).enumerate().for_each(|(k, part)| work(k * ROWS_PER_TASK, part));
+    items.chunks_mut(ROWS_PER_TASK).enumerate().try_for_each(part)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    use lexisplat::{Error, Silent};
     use lexisplat_testing::Random;
 
     use super::*;
@@ -281,14 +298,14 @@ mod tests {
     fn palettes_are_as_near_as_plain_ones_on_any_number_of_threads() {
         let values = rows(4000, 16);
         let rows = Rows { values: &values, width: 16 };
-        let found = palette(rows, 500);
+        let found = palette(rows, 500, &Silent).unwrap();
         assert!(found.entries.len() / 16 <= 500);
         let [ours, theirs] = [error(rows, &found), plain(rows, 500)];
         assert!(ours < 1.03 * theirs, "{ours} {theirs}");
         #[cfg(feature = "parallel")]
         for threads in [1, 3] {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            assert!(pool.install(|| palette(rows, 500)) == found);
+            assert!(pool.install(|| palette(rows, 500, &Silent).unwrap()) == found);
         }
     }
 
@@ -296,9 +313,41 @@ mod tests {
     fn few_rows_are_kept_in_their_order() {
         let values: Vec<f32> = [3.0, 1.0, 3.0, 2.0].iter().flat_map(|v| [*v; LANES]).collect();
         let rows = Rows { values: &values, width: LANES };
-        let found = palette(rows, 3);
+        let found = palette(rows, 3, &Silent).unwrap();
         assert_eq!((found.entries.len(), found.labels), (3 * LANES, vec![0, 1, 0, 2]));
-        assert_eq!(palette(rows, 2).labels, [0, 1, 0, 1]);
-        assert_eq!(palette(Rows { values: &[], width: LANES }, 1).labels, [0_u32; 0]);
+        assert_eq!(palette(rows, 2, &Silent).unwrap().labels, [0, 1, 0, 1]);
+        assert_eq!(palette(Rows { values: &[], width: LANES }, 1, &Silent).unwrap().labels, [0_u32; 0]);
+    }
+
+    /// Cancels when it is asked for the time number `patience`.
+    struct Impatient {
+        patience: usize,
+        asked: AtomicUsize,
+    }
+
+    impl Progress for Impatient {
+        fn is_cancelled(&self) -> bool {
+            self.asked.fetch_add(1, Ordering::Relaxed) >= self.patience
+        }
+    }
+
+    #[test]
+    fn it_is_asked_often_whether_to_go_on_and_ends_where_it_is_not_to() {
+        let values = rows(5000, 16);
+        let ask = |patience: usize| {
+            let progress = Impatient { patience, asked: AtomicUsize::new(0) };
+            let outcome = palette(Rows { values: &values, width: 16 }, 300, &progress);
+            (outcome.map(drop), progress.asked.into_inner())
+        };
+        let (whole, asked) = ask(usize::MAX);
+        whole.unwrap();
+        // Every split of the entries, and every task of every round.
+        assert!(asked > 300 + 7 * 5000 / ROWS_PER_TASK, "{asked}");
+        for patience in [0, 100, 300, asked - 1] {
+            let (outcome, asked) = ask(patience);
+            assert!(matches!(outcome, Err(Error::Cancelled)));
+            // Tasks that other threads are about to begin ask too.
+            assert!(asked < patience + 100, "{asked}");
+        }
     }
 }

@@ -4,6 +4,8 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::ops::Range;
 
+use lexisplat::{Progress, Result};
+
 use super::palette::{Rows, add, distance};
 
 /// Steps of the search for the direction of the largest spread.
@@ -40,13 +42,14 @@ impl Ord for Group {
     }
 }
 
-/// The means of at most `most` groups of `rows`, one after the other.
-pub(super) fn split(rows: Rows<'_>, most: usize) -> Vec<f32> {
+/// The means of at most `most` groups of `rows`, one after the other. Ends with an error once `progress` cancels.
+pub(super) fn split(rows: Rows<'_>, most: usize, progress: &dyn Progress) -> Result<Vec<f32>> {
     let mut order: Vec<usize> = (0..rows.len()).collect();
     let mut scratch = Vec::with_capacity(rows.len());
     let mut heap = BinaryHeap::from([group(rows, &order, 0..rows.len())]);
     let mut done = Vec::new();
     while heap.len() + done.len() < most {
+        progress.check()?;
         let Some(worst) = heap.pop() else { break };
         match cut(rows, &mut order[worst.range.clone()], &worst.mean, &mut scratch) {
             0 => done.push(worst),
@@ -61,7 +64,8 @@ pub(super) fn split(rows: Rows<'_>, most: usize) -> Vec<f32> {
     groups.append(&mut done);
     groups.sort_by_key(|group| group.range.start);
     #[expect(clippy::cast_possible_truncation, reason = "values are in single precision")]
-    groups.iter().flat_map(|group| group.mean.iter().map(|v| *v as f32)).collect()
+    let means = groups.iter().flat_map(|group| group.mean.iter().map(|v| *v as f32)).collect();
+    Ok(means)
 }
 
 /// The group of the rows `order[range]`.

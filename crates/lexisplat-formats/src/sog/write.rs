@@ -1,7 +1,7 @@
 //! Writes SOG, version 2.
 
 use lexisplat::sh::CHANNELS;
-use lexisplat::{Error, Result, ShDegree, Splats};
+use lexisplat::{Error, Progress, Result, ShDegree, Splats};
 use serde_json::{Value, json};
 
 use super::code::{to_log, to_position, to_rotation};
@@ -22,8 +22,13 @@ const OPAQUE: u8 = u8::MAX;
 /// Writes `splats` as a SOG archive, with SH of degree 3 at most.
 ///
 /// # Errors
-/// [`Error::Parameter`] for options out of range, [`Error::Limit`] for more Gaussians than a WebP has pixels.
-pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>, Lost)> {
+/// [`Error::Parameter`] for options out of range, [`Error::Limit`] for more Gaussians than a WebP has pixels,
+/// [`Error::Cancelled`] if `progress` cancels.
+pub(crate) fn write(
+    splats: &Splats,
+    options: &WriteOptions,
+    progress: &dyn Progress,
+) -> Result<(Vec<u8>, Lost)> {
     let most = usize::try_from(options.sog_palette).unwrap_or(usize::MAX);
     if most > MOST_ENTRIES {
         let expected = format!("at most {MOST_ENTRIES} entries, or 0 for no SH");
@@ -51,6 +56,7 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
     let order = order(&codes);
     let mut members: Vec<(&str, Vec<u8>)> = Vec::new();
     let mut add = |name: &'static str, pixel: &dyn Fn(usize) -> [u8; 4]| -> Result<()> {
+        progress.check()?;
         let mut pixels: Vec<[u8; 4]> = order.iter().map(|&i| pixel(i)).collect();
         let last = pixels.last().copied().unwrap_or([0, 0, 0, OPAQUE]);
         pixels.resize(width * height, last);
@@ -89,7 +95,7 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
         "sh0": { "codebook": list(&colours), "files": ["sh0.webp"] },
     });
     if degree > ShDegree::ZERO && n > 0 {
-        let sh = Sh::new(splats, degree, &order, most);
+        let sh = Sh::new(splats, degree, &order, most, progress)?;
         lost.precision.push(format!("SH to {} entries of a palette of 256 values", sh.entries));
         let mut labels: Vec<[u8; 4]> = sh
             .labels
@@ -161,7 +167,13 @@ struct Sh {
 
 impl Sh {
     /// The SH up to `degree` of `splats` in this order, in at most `most` entries.
-    fn new(splats: &Splats, degree: ShDegree, order: &[usize], most: usize) -> Self {
+    fn new(
+        splats: &Splats,
+        degree: ShDegree,
+        order: &[usize],
+        most: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let (per, from) = (degree.rest_per_channel(), splats.degree.rest_per_channel());
         let used = CHANNELS * per;
         let width = used.next_multiple_of(LANES);
@@ -174,7 +186,7 @@ impl Sh {
         }
         // The largest power of two that is no more than there are Gaussians (`write-sog.ts`).
         let most = most.min(1 << order.len().max(1).ilog2());
-        let found = palette(Rows { values: &rows, width }, most);
+        let found = palette(Rows { values: &rows, width }, most, progress)?;
         let entries = found.entries.len() / width;
         let used_values: Vec<f32> =
             found.entries.chunks_exact(width).flat_map(|entry| &entry[..used]).copied().collect();
@@ -187,6 +199,6 @@ impl Sh {
             }));
         }
         pixels.resize(per * entries.next_multiple_of(ENTRIES_PER_ROW), [0, 0, 0, OPAQUE]);
-        Self { entries, labels: found.labels, pixels, values }
+        Ok(Self { entries, labels: found.labels, pixels, values })
     }
 }

@@ -24,6 +24,7 @@ from ._errors import (
     LexisplatWarning,
     LimitError,
     ParameterError,
+    WrongTypeError,
 )
 from ._files import load, save
 from ._native import __version__
@@ -48,6 +49,7 @@ __all__ = [
     "ParameterError",
     "Scene",
     "Splats",
+    "WrongTypeError",
     "__version__",
     "cameras",
     "compare",

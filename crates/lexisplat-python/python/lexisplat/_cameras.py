@@ -12,10 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._arguments import MOST_32, MOST_COUNT, checked, number, optional, text, wrong_type
+from ._arguments import count as whole
+from ._arguments import path as path_of
 from ._errors import LexisplatWarning, ParameterError
 from ._progress import Progress, reporter
 from ._scene import Scene
-from ._splats import Splats, host
+from ._splats import Splats, floats
 
 #: A principal point farther than this from the centre, in pixels, is told, because it is not drawn.
 _CENTRE_SLACK = 0.5
@@ -55,15 +58,25 @@ class Camera:
     near: float = 0.2
 
     def __post_init__(self) -> None:
-        self.position = np.asarray(self.position, np.float32)
-        self.rotation = np.asarray(self.rotation, np.float32)
+        self._checked()
+
+    def _checked(self) -> Camera:
+        """Brings every field to its type and shape."""
+        self.width, self.height = whole("width", self.width, MOST_32), whole("height", self.height, MOST_32)
+        self.fx, self.fy = number("fx", self.fx), number("fy", self.fy)
+        self.near = number("near", self.near)
+        self.name = text("name", self.name)
+        optional(text, "split", self.split, ("train", "test"))
+        self.position = floats("position", self.position)
+        self.rotation = floats("rotation", self.rotation)
         if self.position.shape != (3,) or self.rotation.shape != (3, 3):
             raise ParameterError("camera: expected a position of shape (3,) and a rotation of shape (3, 3)")
+        return self
 
     @classmethod
     def from_viewmat(cls, viewmat: Any, K: Any, width: int, height: int, name: str = "") -> Camera:
         """A camera as gsplat describes it: ``viewmat`` (4, 4) from world to camera, ``K`` (3, 3)."""
-        view, intrinsics = (np.asarray(host(m), np.float64) for m in (viewmat, K))
+        view, intrinsics = floats("viewmat", viewmat, np.float64), floats("K", K, np.float64)
         if view.shape != (4, 4) or intrinsics.shape != (3, 3):
             raise ParameterError("camera: expected a viewmat of shape (4, 4) and a K of shape (3, 3)")
         off = np.abs(intrinsics[:2, 2] - np.array([width, height]) / 2).max()
@@ -96,6 +109,7 @@ class Camera:
         return Camera(width, height, *focal, self.position, self.rotation, self.name, self.split, self.near)
 
 
+@checked()
 def cameras(path: str | os.PathLike[str]) -> list[Camera]:
     """Reads cameras: INRIA's ``cameras.json``, ``transforms.json``, a COLMAP folder, or a folder that has one of them.
 
@@ -103,39 +117,49 @@ def cameras(path: str | os.PathLike[str]) -> list[Camera]:
     ------
     IoError, FormatError, LimitError
     """
-    found, told = _native.read_cameras(path)
+    found, told = _native.read_cameras(path_of("path", path))
     for sentence in told:
-        warnings.warn(f"{path}: {sentence}", LexisplatWarning, stacklevel=2)
+        warnings.warn(f"{path}: {sentence}", LexisplatWarning, stacklevel=3)
     return [_of_tuple(camera) for camera in found]
 
 
+@checked()
 def orbit(scene: Splats | Scene, count: int = 24, *, width: int = 960, height: int = 640) -> list[Camera]:
     """Cameras on a circle around the scene."""
-    return [_of_tuple(camera) for camera in _native.orbit(native(scene), count, width, height)]
+    sides = whole("width", width, MOST_32), whole("height", height, MOST_32)
+    return [_of_tuple(camera) for camera in _native.orbit(native(scene), whole("count", count, MOST_COUNT), *sides)]
 
 
+@checked()
 def photographs(scene: Splats | Scene, count: int = 8, *, progress: Progress = None) -> list[Camera]:
     """Views of the scene that are like photographs. :func:`compress` judges by such views where no cameras are given."""
-    found = _native.photographs(native(scene), count, progress=reporter(progress))
+    found = _native.photographs(native(scene), whole("count", count, MOST_COUNT), progress=reporter(progress))
     return [_of_tuple(camera) for camera in found]
 
 
-def native(scene: Splats | Scene) -> Any:
+def native(scene: Splats | Scene, name: str = "scene") -> Any:
     """What the native part takes for a scene."""
     if isinstance(scene, Scene):
         return scene._native
     if isinstance(scene, Splats):
         return scene._checked()
-    kind = type(scene).__name__
-    raise TypeError(f"{kind}: expected Splats or a Scene; Splats.from_dict takes a dict of arrays, lexisplat.load a path")
+    expected = "Splats or a Scene; Splats.from_dict takes a dict of arrays, lexisplat.load a path"
+    raise wrong_type(name, scene, expected)
 
 
 def as_tuples(cameras: Iterable[Camera]) -> list[_native.CameraTuple]:
     """What the native part takes for cameras."""
-    return [
-        (c.name, c.width, c.height, c.fx, c.fy, c.position.tolist(), c.rotation.tolist(), c.near, c.split)
-        for c in cameras
-    ]
+    expected = "a Camera, Cameras, or the path of a file that lexisplat.cameras reads"
+    if not isinstance(cameras, Iterable) or isinstance(cameras, (bytes, dict)):
+        raise wrong_type("cameras", cameras, expected)
+    tuples = []
+    for place, c in enumerate(cameras):
+        if not isinstance(c, Camera):
+            raise wrong_type(f"cameras[{place}]", c, "a Camera")
+        c._checked()
+        place_of = c.position.tolist(), c.rotation.tolist()
+        tuples.append((c.name, c.width, c.height, c.fx, c.fy, *place_of, c.near, c.split))
+    return tuples
 
 
 def _of_tuple(camera: _native.CameraTuple) -> Camera:

@@ -3,37 +3,67 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from typing import Literal, Union
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Literal, Union
 
 import numpy as np
 
 from . import _native
-from ._cameras import Camera, as_tuples, cameras as read_cameras
+from ._arguments import BYTE, MOST_SEED, checked, count, flag, limits, number, optional, size as bytes_of, text, wrong_type
+from ._arguments import device as device_of
+from ._cameras import Camera, as_tuples
+from ._cameras import cameras as read_cameras
 from ._device import quiet
-from ._files import Source, warn
+from ._files import warn
 from ._progress import Progress, reporter
 from ._scene import Scene
-from ._splats import FloatArray, Splats
+from ._sources import Source, is_source, opened, shown
+from ._splats import FloatArray, Splats, floats
 
 Preset = Literal["small", "balanced", "high", "archive"]
 Layout = Literal["packed", "f16", "f32", "paper"]
 #: Cameras, or the path of a file or folder that :func:`lexisplat.cameras` reads.
 Cameras = Union[Sequence[Camera], str, "os.PathLike[str]"]
 
-#: What names a file, or is one.
-_FILE = (str, bytes, os.PathLike)
 #: Memory that packing a whole scene may take before it is packed in parts, as the program's default (2 GiB).
 DEFAULT_MEMORY = 2 << 30
 
 
+def _seed(name: str, value: object) -> int:
+    return count(name, value, MOST_SEED)
+
+
+#: What each option of :func:`compress` that the native part has may be, but for cameras.
+_OPTIONS: dict[str, Callable[[str, Any], object]] = {
+    **dict.fromkeys(["preset", "pursuit", "views", "layout"], text),
+    **dict.fromkeys(["psnr", "min_psnr", "ratio", "tol"], number),
+    **dict.fromkeys(["size", "memory"], bytes_of),
+    **dict.fromkeys(["atoms", "sample", "max_gaussians"], count),
+    **dict.fromkeys(["keep_order", "keep_all", "guess"], flag),
+    "max_nonzeros": lambda name, value: count(name, value, BYTE),
+    "seed": _seed,
+}
+#: Those that may not be ``None``.
+_NEEDED = ("seed", "keep_order", "keep_all", "guess", "memory")
+
+
+def options_of(given: Mapping[str, Any]) -> dict[str, Any]:
+    """Options of :func:`compress` as the native part takes them."""
+    return {
+        name: check(name, given[name]) if name in _NEEDED else optional(check, name, given[name])
+        for name, check in _OPTIONS.items()
+        if name in given
+    }
+
+
+@checked()
 def compress(
     scene: Splats | Source,
     *,
     preset: Preset | None = None,
     psnr: float | None = None,
     min_psnr: float | None = None,
-    size: int | None = None,
+    size: int | float | str | None = None,
     ratio: float | None = None,
     tol: float | None = None,
     cameras: Cameras | None = None,
@@ -49,26 +79,26 @@ def compress(
     keep_all: bool = False,
     max_gaussians: int | None = None,
     guess: bool = False,
-    memory: int = DEFAULT_MEMORY,
-    device: str = "cpu",
+    memory: int | float | str = DEFAULT_MEMORY,
+    device: str | int = "cpu",
     drop_invalid: bool = False,
     drop_extras: bool = False,
-    limit: Mapping[str, int] | None = None,
+    limit: Mapping[str, int | float | str] | None = None,
     progress: Progress = None,
 ) -> Scene:
     """Compresses a scene. Needs no photos and no training. Same input, options and seed give the same bytes as the program.
 
     Parameters
     ----------
-    scene : Splats, path or bytes
+    scene : Splats, path, bytes or file object
         The scene, or a file of any format that :func:`load` reads but .lexi. A file is read part by part where that is
         enough, and need not fit into memory.
     preset : {"small", "balanced", "high", "archive"}, optional
         About 35, 40, 45 or 54 dB of PSNR. ``"balanced"`` if no other target is given.
     psnr, min_psnr : float, optional
         The smallest file whose pictures have this PSNR in dB on average, or each of them.
-    size : int, optional
-        The best file of at most this many bytes.
+    size : int or str, optional
+        The best file of at most this many bytes: ``2_000_000``, ``2e6``, ``"2MB"`` or ``"2MiB"``.
     ratio : float, optional
         The best file that is this many times smaller than the source. Of arrays the source is their bytes.
     tol : float, optional
@@ -95,11 +125,13 @@ def compress(
         Most Gaussians in the file.
     guess : bool
         Whether what shows is estimated without drawing: several times faster, for larger files.
-    memory : int
+    memory : int or str
         Bytes that packing a whole scene may take, about. A scene that needs more is packed in parts.
     device : {"cpu", "gpu", "auto"} or a number as text
         What draws. With ``"cpu"`` the bytes are the same on every machine.
-    drop_invalid, drop_extras, limit
+    drop_invalid : bool
+        Whether Gaussians with NaN or infinite values are left out. Otherwise such a scene is refused.
+    drop_extras, limit
         For files, as :func:`load`.
     progress : callable or bool, optional
         Called as ``progress(stage, done, total)``; ``True`` shows bars by tqdm. Ctrl-C ends the work.
@@ -107,55 +139,36 @@ def compress(
     Raises
     ------
     ParameterError
-        An option is out of range, two do not go together, or a target cannot be met.
+        An option is out of range, two do not go together, or a target cannot be met. An option of a wrong type, or that does
+        not exist, is a :class:`WrongTypeError`.
     IoError, FormatError, LimitError, GpuError
     """
-    choices = {
-        "preset": preset,
-        "psnr": psnr,
-        "min_psnr": min_psnr,
-        "size": size,
-        "ratio": ratio,
-        "tol": tol,
-        "max_nonzeros": max_nonzeros,
-        "atoms": atoms,
-        "pursuit": pursuit,
-        "layout": layout,
-        "sample": sample,
-        "seed": seed,
-        "cameras": None if cameras is None else as_tuples(views_of(cameras)),
-        "scene": views,
-        "keep_order": keep_order,
-        "keep_all": keep_all,
-        "max_gaussians": max_gaussians,
-        "guess": guess,
-        "memory": memory,
-        "device": device,
-    }
+    given = locals()
+    choices = options_of(given)
+    choices["device"] = device = device_of(device)
+    kept = {name: flag(name, given[name]) for name in ("drop_invalid", "drop_extras")}
+    allowed, report = limits(limit), reporter(progress)
+    choices["cameras"] = None if cameras is None else as_tuples(views_of(cameras))
+    source, name = opened("scene", scene) if is_source(scene) else (_splats(scene), "the scene")
+    atoms_of = opened("dictionary", dictionary)[0] if is_source(dictionary) else _atoms(dictionary)
     with quiet(device):
-        made = _native.compress(
-            scene if isinstance(scene, _FILE) else _splats(scene),
-            choices,
-            dictionary=dictionary if isinstance(dictionary, _FILE) else _atoms(dictionary),
-            drop_invalid=drop_invalid,
-            drop_extras=drop_extras,
-            limit=None if limit is None else dict(limit),
-            progress=reporter(progress),
-        )
-    result = Scene(made)
-    warn((result.report or {})["warnings"], "the scene" if isinstance(scene, Splats) else scene)
+        made, told = _native.compress(source, choices, dictionary=atoms_of, limit=allowed, progress=report, **kept)
+    result = Scene(made, allowed)
+    warn([*told, *(result.report or {})["warnings"]], shown(scene, name))
     return result
 
 
 def _splats(scene: object) -> object:
     if isinstance(scene, Splats):
         return scene._checked()
-    kind = type(scene).__name__
-    raise TypeError(f"{kind}: expected Splats, a path or bytes; Splats.from_dict takes a dict of arrays")
+    expected = "Splats, a path, bytes or a file object; Splats.from_dict takes a dict of arrays"
+    if isinstance(scene, Scene):
+        expected = "Splats, a path, bytes or a file object; it is compressed already, and decode() gives its Splats"
+    raise wrong_type("scene", scene, expected)
 
 
 def _atoms(dictionary: object) -> object:
-    return None if dictionary is None else np.require(dictionary, np.float32, ["C", "A"])
+    return None if dictionary is None else np.require(floats("dictionary", dictionary), requirements=["C", "A"])
 
 
 def views_of(cameras: Cameras | Camera) -> Sequence[Camera]:

@@ -46,6 +46,10 @@ class ParameterError(Error, ValueError):
     value: str | None = None
 
 
+class WrongTypeError(ParameterError, TypeError):
+    """An argument has a wrong type, or does not exist."""
+
+
 class LimitError(Error, ValueError):
     """A file asks for more than a limit allows. ``limit={"gaussians": ...}`` raises or lowers limits."""
 
@@ -62,8 +66,8 @@ def _name_as_users_do() -> None:
     """Lets tracebacks name the exceptions as users import them."""
     for kind in (_NotFound, _Exists, _Denied, _Folder):
         kind.__name__ = kind.__qualname__ = "IoError"
-    public = (Error, IoError, _NotFound, _Exists, _Denied, _Folder, FormatError, ParameterError, LimitError, GpuError)
-    for named in (*public, LexisplatWarning):
+    files = (IoError, _NotFound, _Exists, _Denied, _Folder)
+    for named in (Error, *files, FormatError, ParameterError, WrongTypeError, LimitError, GpuError, LexisplatWarning):
         named.__module__ = "lexisplat"
 
 

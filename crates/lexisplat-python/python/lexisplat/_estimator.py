@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from ._arguments import wrong_type
 from ._errors import ParameterError
 
 
@@ -43,9 +44,12 @@ class Estimator:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in changed.items())})"
 
 
-def validated(learner: Any, X: Any, reset: bool) -> npt.NDArray[np.float32]:
-    """The rows of ``X`` as float32, of the length that the learner knows."""
-    rows = np.ascontiguousarray(X, np.float32)
+def validated(learner: Any, X: Any, reset: bool) -> npt.NDArray[Any]:
+    """The rows of ``X`` as float32 or float64, of the length that the learner knows."""
+    X = np.asarray(X)
+    if X.dtype.kind not in "fiub":
+        raise wrong_type("X", X, "rows of numbers")
+    rows = np.ascontiguousarray(X, np.float32 if X.dtype == np.float32 else np.float64)
     if rows.ndim != 2 or 0 in rows.shape:
         raise ParameterError(f"X = an array of shape {rows.shape}: (n_samples, n_features), at least one of each")
     if reset:

@@ -6,20 +6,22 @@ import json
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Literal, Union
+from typing import Literal
 
 from . import _native
+from ._arguments import BYTE, MOST_32, checked, count, flag, limits, optional, several, text, wrong, wrong_type
+from ._arguments import path as path_of
 from ._cameras import native
 from ._errors import LexisplatWarning
 from ._progress import Progress, reporter
 from ._scene import Scene
+from ._sources import Source, is_source, opened, shown
 from ._splats import Splats, of_native
 
-#: A path, or the bytes of a file.
-Source = Union[str, "os.PathLike[str]", bytes]
 Format = Literal["ply", "lexi", "spz", "sog", "compressed.ply", "splat", "glb"]
 
 
+@checked()
 def load(
     source: Source,
     *,
@@ -27,7 +29,7 @@ def load(
     contiguous: bool = False,
     drop_invalid: bool = False,
     drop_extras: bool = False,
-    limit: Mapping[str, int] | None = None,
+    limit: Mapping[str, int | float | str] | None = None,
 ) -> Splats:
     """Reads a scene with dense SH from a file of any format: PLY, .lexi, SPZ, SOG, compressed.ply, .splat, .ksplat, glTF.
 
@@ -35,8 +37,8 @@ def load(
 
     Parameters
     ----------
-    source : path or bytes
-        The file. A SOG may be a folder with ``meta.json``.
+    source : path, bytes or file object
+        The file. A SOG may be a folder with ``meta.json``. A file object is open for reading in binary.
     name : str, optional
         What messages call the file, if it is not its path.
     contiguous : bool
@@ -47,24 +49,25 @@ def load(
         Whether properties that 3DGS does not define are left out.
     limit : mapping of str to int, optional
         Limits on what the file may ask for: ``gaussians``, ``atoms``, ``nonzeros``, ``bytes``, ``expansion``,
-        ``header_bytes``, ``properties``. Lower them for files of strangers.
+        ``header_bytes``, ``properties``. Lower them for files of strangers. Sizes may be texts, as ``"4GB"``.
 
     Raises
     ------
     IoError, FormatError, LimitError
     """
-    arrays, told = _native.load(
-        source,
-        name=name,
-        contiguous=contiguous,
-        drop_invalid=drop_invalid,
-        drop_extras=drop_extras,
-        limit=None if limit is None else dict(limit),
-    )
-    warn(told, source if name is None else name)
+    options = {
+        "contiguous": flag("contiguous", contiguous),
+        "drop_invalid": flag("drop_invalid", drop_invalid),
+        "drop_extras": flag("drop_extras", drop_extras),
+    }
+    allowed = limits(limit)
+    file, name = opened("source", source, optional(text, "name", name))
+    arrays, told = _native.load(file, name=name, limit=allowed, **options)
+    warn(told, shown(file, name))
     return of_native(arrays)
 
 
+@checked()
 def save(
     path: str | os.PathLike[str],
     scene: Splats | Scene,
@@ -74,6 +77,7 @@ def save(
     sh_bits: Sequence[int] = (5, 4),
     sog_palette: int = 1 << 16,
     glb_spz: bool = False,
+    drop_invalid: bool = False,
     overwrite: bool = True,
     progress: Progress = None,
 ) -> dict[str, object]:
@@ -97,6 +101,8 @@ def save(
         Most entries of SOG's palette of SH; 0 leaves SH out.
     glb_spz : bool
         Whether the splats of a glb are an SPZ and not floats.
+    drop_invalid : bool
+        Whether Gaussians with NaN or infinite values are left out. Otherwise such a scene is refused.
     overwrite : bool
         Whether a file that exists is replaced. Otherwise it is refused.
     progress : callable or bool, optional
@@ -106,34 +112,45 @@ def save(
     -------
     dict
         What the file lacks of the scene: ``sh_degree``, ``extras``, ``normals``, ``antialiased``, ``precision`` and
-        ``limited``; empty for .lexi.
+        ``limited``; of a .lexi also ``removed``, the number of Gaussians that were left out because they hardly show. Empty
+        for a :class:`Scene` that is written as it is.
 
     Raises
     ------
     IoError, ParameterError
     """
-    is_lexi = format == "lexi" or (format is None and os.fspath(path).lower().endswith(".lexi"))
+    if isinstance(path, (Splats, Scene)):
+        raise wrong_type("path", path, "save(path, scene) takes the path first" if is_source(scene) else "a path")
+    path_of("path", path)
+    native(scene)
+    kind = optional(text, "format", format)
+    name = (os.fspath(path) if kind is None else f".{kind}").lower()
+    if name.endswith(".gltf"):
+        raise wrong("path" if kind is None else "format", path if kind is None else kind, "glTF is written as one file, .glb")
+    bits = several(count, "sh_bits", sh_bits, 2, BYTE)
+    replace = flag("overwrite", overwrite)
     if isinstance(scene, Scene):
-        if is_lexi:
-            scene.save(path, overwrite=overwrite)
+        if name.endswith(".lexi"):
+            scene.save(path, overwrite=replace)
             return {}
         scene = scene.decode()
-    lost = _native.save(
+    lost, told = _native.save(
         path,
         native(scene),
-        format=format,
-        spz_version=spz_version,
-        sh_bits=tuple(sh_bits),
-        sog_palette=sog_palette,
-        glb_spz=glb_spz,
-        overwrite=overwrite,
+        format=kind,
+        spz_version=count("spz_version", spz_version, BYTE),
+        sh_bits=bits,
+        sog_palette=count("sog_palette", sog_palette, MOST_32),
+        glb_spz=flag("glb_spz", glb_spz),
+        drop_invalid=flag("drop_invalid", drop_invalid),
+        overwrite=replace,
         progress=reporter(progress),
     )
-    return dict(json.loads(lost) or {})
+    warn(told, "the scene")
+    return dict(json.loads(lost))
 
 
 def warn(told: Sequence[str], file: object) -> None:
-    """Tells oddities of a file."""
-    where = "bytes" if isinstance(file, bytes) else file
+    """Tells oddities of a file to who called the public function that calls this."""
     for sentence in told:
-        warnings.warn(f"{where}: {sentence}", LexisplatWarning, stacklevel=3)
+        warnings.warn(f"{file}: {sentence}", LexisplatWarning, stacklevel=4)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Union
 
+from ._arguments import wrong_type
+
 #: Called with the stage, the units that are done, and the units in all or 0 if that is not known.
 ProgressCallback = Callable[[str, int, int], object]
 #: A callback; ``True`` for bars by tqdm, which must be installed; ``None`` or ``False`` for no reports.
@@ -15,7 +17,11 @@ def reporter(progress: Progress) -> ProgressCallback | None:
     """The callback that ``progress`` means."""
     if progress is None or progress is False:
         return None
-    return _Bars() if progress is True else progress
+    if progress is True:
+        return _Bars()
+    if not callable(progress):
+        raise wrong_type("progress", progress, "True, or a function of a stage, the units done and the units in all")
+    return progress
 
 
 class _Bars:

@@ -5,16 +5,15 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._arguments import checked, flag, limits, optional, path as path_of, text
+from ._sources import Source, opened
 from ._splats import FloatArray, Splats, of_native
-
-if TYPE_CHECKING:
-    from ._files import Source
 
 
 class Codes(NamedTuple):
@@ -46,12 +45,29 @@ class Codes(NamedTuple):
 class Scene:
     """A compressed scene: the bytes of a .lexi file. :func:`compress` and :func:`open` make it.
 
-    It is decoded, or drawn from its codes, when that is asked for.
+    It is decoded, or drawn from its codes, when that is asked for. It never changes: copies share its bytes. Two scenes are
+    equal if their bytes are. A pickle holds the bytes.
     """
 
-    def __init__(self, native: _native.Scene) -> None:
+    def __init__(self, native: _native.Scene, limit: dict[str, int] | None = None) -> None:
         self._native = native
+        self._limit = limit
         self._info: dict[str, Any] | None = None
+
+    def __eq__(self, other: object) -> bool:
+        return self._native.equals(other._native) if isinstance(other, Scene) else NotImplemented
+
+    def __hash__(self) -> int:
+        return self._native.hash()
+
+    def __copy__(self) -> Scene:
+        return Scene(self._native, self._limit)
+
+    def __deepcopy__(self, memo: object) -> Scene:
+        return self.__copy__()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, (self.to_bytes(), self._native.name, self._native.report_json, self._limit)
 
     def __len__(self) -> int:
         return len(self._native)
@@ -116,20 +132,31 @@ class Scene:
         for start, arrays in self._native.chunks():
             yield start, of_native(arrays)
 
+    @checked()
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = True) -> None:
         """Writes the .lexi file. It appears when it is whole."""
-        self._native.save(path, overwrite=overwrite)
+        self._native.save(path_of("path", path), overwrite=flag("overwrite", overwrite))
 
     def to_bytes(self) -> bytes:
         """The bytes of the .lexi file."""
         return self._native.to_bytes()
 
 
-def open(source: Source, *, name: str | None = None, limit: Mapping[str, int] | None = None) -> Scene:
-    """Opens a .lexi file, or its bytes. The header is checked, and nothing is decoded yet.
+@checked()
+def open(
+    source: Source, *, name: str | None = None, limit: Mapping[str, int | float | str] | None = None
+) -> Scene:
+    """Opens a .lexi file, its bytes, or a file object. The header is checked, and nothing is decoded yet.
 
     Raises
     ------
     IoError, FormatError, LimitError
     """
-    return Scene(_native.open_scene(source, name=name, limit=None if limit is None else dict(limit)))
+    allowed = limits(limit)
+    file, name = opened("source", source, optional(text, "name", name))
+    return Scene(_native.open_scene(file, name=name, report=None, limit=allowed), allowed)
+
+
+def _restored(file: bytes, name: str, report: str | None, limit: dict[str, int] | None) -> Scene:
+    """The scene of a pickle."""
+    return Scene(_native.open_scene(file, name=name, report=report, limit=limit), limit)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._arguments import flag, text, wrong_type
 from ._errors import ParameterError
 
 FloatArray = npt.NDArray[np.float32]
@@ -77,20 +78,24 @@ class Splats:
         count = len(self.means)
         self.scales = _rows("scales", self.scales, 3, count)
         self.quats = _rows("quats", self.quats, 4, count)
-        opacities = _floats(self.opacities)
+        opacities = floats("opacities", self.opacities)
         if opacities.shape == (count, 1):
             opacities = opacities.reshape(count)
         self.opacities = _contiguous(_shaped("opacities", opacities, (count,)))
-        sh0 = _floats(self.sh0)
+        sh0 = floats("sh0", self.sh0)
         self.sh0 = _contiguous(_shaped("sh0", sh0.reshape(count, 1, 3) if sh0.shape == (count, 3) else sh0, (count, 1, 3)))
-        shN = _floats(self.shN)
+        shN = floats("shN", self.shN)
         if shN.ndim != 3 or shN.shape[0] != count or shN.shape[1] not in (0, 3, 8, 15, 24) or shN.shape[2] != 3:
             raise _wrong_shape("shN", shN.shape, f"({count}, K, 3) with K of 0, 3, 8, 15 or 24")
         # The native part reads arrays of floats with strides of whole floats.
         self.shN = shN if _is_regular(shN) else shN.copy()
         if self.normals is not None:
             self.normals = _rows("normals", self.normals, 3, count)
+        if not isinstance(self.extras, Mapping):
+            raise wrong_type("extras", self.extras, "a dict of arrays by name")
         self.extras = {name: _contiguous(_shaped(name, np.asarray(v), (count,))) for name, v in self.extras.items()}
+        self.comments = [text("comments", line) for line in self.comments]
+        self.antialiased = flag("antialiased", self.antialiased)
         return self
 
     def __len__(self) -> int:
@@ -160,11 +165,13 @@ class Splats:
         space : {"log", "linear"}
             What ``scales`` and ``opacities`` are. gsplat's trainers keep ``"log"``.
         """
+        if not isinstance(arrays, Mapping):
+            raise wrong_type("arrays", arrays, f"a dict of arrays with {', '.join(NAMES)}")
         missing = [name for name in NAMES[:-1] if name not in arrays]
         if missing:
             raise ParameterError(f"arrays = {sorted(map(str, arrays))}: {', '.join(missing)} missing")
-        means, scales, quats, opacities, sh0 = (_floats(arrays[name]) for name in NAMES[:-1])
-        shN = _floats(arrays["shN"]) if "shN" in arrays else np.zeros((len(means), 0, 3), np.float32)
+        means, scales, quats, opacities, sh0 = (floats(name, arrays[name]) for name in NAMES[:-1])
+        shN = floats("shN", arrays["shN"]) if "shN" in arrays else np.zeros((len(means), 0, 3), np.float32)
         if _space(space) == "linear":
             if scales.size and not scales.min() >= 0:
                 raise ParameterError(f"scales = {scales.min()}: standard deviations of 0 or more in linear space")
@@ -194,12 +201,18 @@ def host(values: Any) -> Any:
     return values.detach().cpu() if hasattr(values, "detach") else values
 
 
-def _floats(values: Any) -> FloatArray:
-    """``values`` as float32, sharing memory if they have that type."""
+def floats(name: str, values: Any, dtype: Any = np.float32) -> npt.NDArray[Any]:
+    """``values`` as floats of a type, sharing memory if they have it. Messages call them ``name``."""
     values = host(values)
     if not isinstance(values, np.ndarray) and hasattr(values, "__dlpack__"):
         values = np.from_dlpack(values)
-    return np.asarray(values, np.float32)
+    try:
+        array = np.asarray(values)
+        if array.dtype.kind in "fiub":
+            return np.asarray(array, dtype)
+    except (TypeError, ValueError):
+        pass
+    raise wrong_type(name, values, "an array of numbers")
 
 
 def _contiguous(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -211,7 +224,7 @@ def _is_regular(values: npt.NDArray[Any]) -> bool:
 
 
 def _rows(name: str, values: Any, width: int, count: int | None = None) -> FloatArray:
-    array = _floats(values)
+    array = floats(name, values)
     expected = (len(array) if count is None and array.ndim else count or 0, width)
     return _contiguous(_shaped(name, array, expected))
 

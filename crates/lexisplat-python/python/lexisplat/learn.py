@@ -6,21 +6,24 @@ the same without it.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Union
 
 import numpy as np
 import numpy.typing as npt
 
 from . import _native
-from ._errors import ParameterError
+from ._arguments import MOST_COUNT, checked, count, number, optional, text, wrong_type
 from ._progress import Progress, reporter
+
+#: Rows and codes are of the type that rows come in.
+Rows = Union[npt.NDArray[np.float32], npt.NDArray[np.float64]]
 
 if TYPE_CHECKING:
     from typing_extensions import Self
 
     from ._estimator import Estimator as _Base
 
-    def _validated(learner: DictionaryLearner, X: Any, reset: bool) -> npt.NDArray[np.float32]: ...
+    def _validated(learner: DictionaryLearner, X: Any, reset: bool) -> Rows: ...
 
     def _is_fitted(learner: DictionaryLearner) -> None: ...
 
@@ -43,12 +46,12 @@ else:
 
             def __sklearn_tags__(self):
                 tags = super().__sklearn_tags__()
-                # Rows are coded in float32, whatever they come as.
-                tags.transformer_tags.preserves_dtype = ["float32"]
+                tags.transformer_tags.preserves_dtype = ["float64", "float32"]
                 return tags
 
         def _validated(learner, X, reset):
-            return np.require(validate_data(learner, X, reset=reset, dtype=np.float32, order="C"), requirements=["A"])
+            types = [np.float64, np.float32]
+            return np.require(validate_data(learner, X, reset=reset, dtype=types, order="C"), requirements=["A"])
 
 
 __all__ = ["DictionaryLearner"]
@@ -57,6 +60,8 @@ __all__ = ["DictionaryLearner"]
 DEFAULT_SAMPLE = 65_536
 #: Seeds are below this.
 _SEEDS = 1 << 32
+#: Parameters by their names in the native part.
+_NAMES = {"atoms": "n_components", "sample": "max_samples", "rows": "X", "factor": "forgetting"}
 
 
 class DictionaryLearner(_Base):
@@ -107,6 +112,7 @@ class DictionaryLearner(_Base):
     n_iter_: int
     mean_nonzeros_: float
 
+    @checked()
     def __init__(
         self,
         n_components: int | None = None,
@@ -128,12 +134,14 @@ class DictionaryLearner(_Base):
         self.sparse_output = sparse_output
         self.random_state = random_state
 
+    @checked(**_NAMES)
     def fit(self, X: Any, y: Any = None, *, progress: Progress = None) -> Self:
         """Learns the atoms from rows (n_samples, n_features). ``y`` is ignored."""
         self._learn(_validated(self, X, True), progress)
         self._statistics: _native.Statistics | None = None
         return self
 
+    @checked(**_NAMES)
     def partial_fit(self, X: Any, y: Any = None, *, progress: Progress = None) -> Self:
         """Refits the atoms to these rows and all before (online dictionary learning, Mairal et al. 2010).
 
@@ -147,7 +155,7 @@ class DictionaryLearner(_Base):
         rule, report = self._rule(), reporter(progress)
         sums = _native.Statistics.of(self.components_, rows, rule=rule, progress=report)
         before = getattr(self, "_statistics", None)
-        self._statistics = sums if before is None else before.scaled(self.forgetting).plus(sums)
+        self._statistics = sums if before is None else before.scaled(number("forgetting", self.forgetting)).plus(sums)
         if not first:
             self.components_ = self._statistics.update(self.components_)
         if sums.rows:
@@ -155,13 +163,19 @@ class DictionaryLearner(_Base):
         self.n_iter_ += 1
         return self
 
+    @checked(**_NAMES)
     def transform(self, X: Any, *, progress: Progress = None) -> Any:
-        """Codes rows: (n_samples, n_components). A row that no code brings within ``tol`` has the code that comes nearest."""
+        """Codes rows: (n_samples, n_components), as float32 if the rows are, else as float64.
+
+        A row that no code brings within ``tol`` has the code that comes nearest. Without ``max_nonzeros`` that is a row
+        that lies farther than ``tol`` from all that the atoms span, or one of float32 whose codes cannot be told finely enough.
+        """
         if not hasattr(self, "components_"):
             _is_fitted(self)
         rows = _validated(self, X, False)
+        components = np.require(self.components_, np.float32, ["C", "A"])
         starts, atoms, values, _, _ = _native.encode_rows(
-            np.require(self.components_, np.float32, ["C", "A"]), rows, rule=self._rule(), progress=reporter(progress)
+            components, rows, rule=self._rule(), progress=reporter(progress)
         )
         shape = (len(rows), len(self.components_))
         sparse = self.sparse_output
@@ -173,28 +187,32 @@ class DictionaryLearner(_Base):
                     raise
             else:
                 return csr_array((values, atoms, starts), shape=shape)
-        dense = np.zeros(shape, np.float32)
+        dense = np.zeros(shape, rows.dtype)
         dense[np.repeat(np.arange(len(rows)), np.diff(starts)), atoms] = values
         return dense
 
-    def inverse_transform(self, X: Any) -> npt.NDArray[np.float32]:
-        """Rows of codes: (n_samples, n_features)."""
+    def inverse_transform(self, X: Any) -> Rows:
+        """Rows of codes: (n_samples, n_features), of the type of the codes. They are summed in float64."""
         _is_fitted(self)
-        rows: npt.NDArray[np.float32] = np.asarray(X @ self.components_, np.float32)
-        return rows
+        rows = np.asarray(X @ np.asarray(self.components_, np.float64))
+        return rows.astype(np.float32) if X.dtype == np.float32 else rows
 
-    def _learn(self, rows: npt.NDArray[np.float32], progress: Progress) -> None:
+    def _learn(self, rows: Rows, progress: Progress) -> None:
         self.components_, self.n_iter_, _, self.mean_nonzeros_ = _native.learn_rows(
             rows,
-            atoms=self.n_components,
+            atoms=optional(count, "n_components", self.n_components),
             rule=self._rule(),
             seed=_seed(self.random_state),
-            sample=self.max_samples,
+            sample=count("max_samples", self.max_samples),
             progress=reporter(progress),
         )
 
     def _rule(self) -> tuple[float | None, int | None, str]:
-        return self.tol, self.max_nonzeros, self.pursuit
+        return (
+            optional(number, "tol", self.tol),
+            optional(count, "max_nonzeros", self.max_nonzeros),
+            text("pursuit", self.pursuit),
+        )
 
     def __getstate__(self) -> dict[str, Any]:
         state = dict(super().__getstate__())
@@ -218,8 +236,8 @@ def _seed(random_state: Any) -> int:
     if random_state is None:
         return 0
     if isinstance(random_state, (int, np.integer)):
-        if random_state < 0:
-            raise ParameterError(f"random_state = {random_state}: 0 or more")
-        return int(random_state)
-    draw = getattr(random_state, "integers", None) or random_state.randint
+        return count("random_state", random_state, MOST_COUNT)
+    draw = getattr(random_state, "integers", None) or getattr(random_state, "randint", None)
+    if draw is None:
+        raise wrong_type("random_state", random_state, "a whole number, a generator of random numbers, or None")
     return int(draw(_SEEDS, dtype=np.int64))

@@ -1,5 +1,6 @@
 //! Unit-norm atoms of any length. A [`Dictionary`](crate::Dictionary) is atoms of the length that an SH degree has.
 
+use crate::sparse::pursuit::RowValue;
 use crate::support::error::{Error, Result};
 use crate::support::limits::MAX_ATOMS;
 
@@ -124,7 +125,7 @@ pub(super) fn check_dim(dim: usize) -> Result<()> {
 }
 
 /// The number of rows in `rows`, each of `dim` values.
-pub(super) fn count_rows(dim: usize, rows: &[f32]) -> Result<usize> {
+pub(super) fn count_rows<V>(dim: usize, rows: &[V]) -> Result<usize> {
     if dim == 0 || !rows.len().is_multiple_of(dim) {
         let expected = format!("a whole number of rows of {dim} values");
         return Err(Error::parameter("rows", format!("{} values", rows.len()), expected));
@@ -133,13 +134,13 @@ pub(super) fn count_rows(dim: usize, rows: &[f32]) -> Result<usize> {
 }
 
 /// Refuses `rows`, each of `dim` values, if one holds NaN or infinity. Errors call the first row number `first`.
-pub(super) fn check_finite(dim: usize, rows: &[f32], first: usize) -> Result<()> {
+pub(super) fn check_finite<V: RowValue>(dim: usize, rows: &[V], first: usize) -> Result<()> {
     // Without a way out the loop is vectorised.
-    let good = rows.iter().fold(true, |good, v| good & v.is_finite());
+    let good = rows.iter().fold(true, |good, v| good & v.wide().is_finite());
     if good {
         return Ok(());
     }
-    let before = rows.iter().take_while(|v| v.is_finite()).count();
+    let before = rows.iter().take_while(|v| v.wide().is_finite()).count();
     let row = first + before / dim.max(1);
     Err(Error::parameter("rows", format!("NaN or infinity in row {row}"), "finite values"))
 }
@@ -170,9 +171,9 @@ mod tests {
     #[test]
     fn rows_are_counted_and_checked() {
         assert_eq!(count_rows(3, &[0.0; 6]).unwrap(), 2);
-        assert_eq!(count_rows(3, &[]).unwrap(), 0);
+        assert_eq!(count_rows::<f32>(3, &[]).unwrap(), 0);
         assert!(count_rows(3, &[0.0; 5]).is_err());
-        assert!(count_rows(0, &[]).is_err());
+        assert!(count_rows::<f32>(0, &[]).is_err());
         assert!(check_finite(2, &[0.0, f32::MAX, 1.0, -1.0], 0).is_ok());
         let error = check_finite(2, &[0.0, 0.0, 1.0, f32::INFINITY], 10).unwrap_err();
         assert!(error.to_string().contains("row 11"), "{error}");

@@ -12,7 +12,7 @@ use lexisplat_render::Image;
 use self::colour::{LIGHTNESS_SCALE, hyab, rgb_to_hunt_lab, srgb_to_ycxcz, ycxcz_to_rgb};
 use self::filters::{Blur, Features, pixels_per_degree};
 use super::rows::{add_across, add_rows, planes, sum_rows};
-use super::{clip, same_size};
+use super::{clip, comparable};
 use crate::error::Result;
 
 /// Exponent that compresses colour differences (`gqc`).
@@ -27,9 +27,9 @@ const COLOUR_KNEE_TO: f64 = 0.95;
 /// FLIP's default.
 ///
 /// # Errors
-/// [`crate::Error::Parameter`] if the sizes differ or a picture is empty.
+/// [`crate::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
 pub fn flip(reference: &Image, test: &Image) -> Result<f64> {
-    same_size(reference, test)?;
+    comparable(reference, test)?;
     let (width, height) = (reference.width as usize, reference.height as usize);
     let pictures = [reference, test].map(|image| planes(image, |pixel| srgb_to_ycxcz(pixel.map(clip))));
     let (filters, simd) = (&*FILTERS, Simd::current());

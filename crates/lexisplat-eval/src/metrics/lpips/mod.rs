@@ -16,7 +16,7 @@ use self::map::Map;
 pub use self::network::Network;
 use self::network::{COLOURS, Pool, STAGES};
 use super::rows::sum_rows;
-use super::{clip, same_size};
+use super::{clip, comparable};
 use crate::error::{Error, Result};
 
 /// Term added to the length of a pixel's features before the division by it (`lpips.normalize_tensor`).
@@ -97,10 +97,10 @@ impl Lpips {
     /// about five digits. At most three maps of the widest stage are in memory: 1.3 GB for VGG16 at 1600 x 1066.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the sizes differ, a picture is smaller than [`Network::min_size`], or the weights
-    /// make the features overflow.
+    /// [`Error::Parameter`] if the sizes differ, a picture has NaN or is smaller than [`Network::min_size`], or the
+    /// weights make the features overflow.
     pub fn distance(&self, a: &Image, b: &Image, range: Range) -> Result<f64> {
-        same_size(a, b)?;
+        comparable(a, b)?;
         let (mut a, mut b) = (self.input(a, range)?, self.input(b, range)?);
         let mut total = 0.0;
         for layers in &self.stages {
@@ -113,10 +113,10 @@ impl Lpips {
     /// Returns the features of `image`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if the picture's pixels do not fill it or it is smaller than
+    /// [`Error::Parameter`] if the picture's pixels do not fill it, it has NaN or it is smaller than
     /// [`Network::min_size`].
     pub fn features(&self, image: &Image, range: Range) -> Result<Features> {
-        same_size(image, image)?;
+        comparable(image, image)?;
         let mut map = self.input(image, range)?;
         let mut maps = Vec::with_capacity(STAGES);
         for layers in &self.stages {
@@ -131,7 +131,7 @@ impl Lpips {
     /// # Errors
     /// [`Error::Parameter`] as [`Self::distance`], and if `reference` is of another network.
     pub fn distance_to(&self, reference: &Features, image: &Image) -> Result<f64> {
-        same_size(image, image)?;
+        comparable(image, image)?;
         if reference.network != self.network {
             return Err(Error::parameter("features", reference.network, format!("of {}", self.network)));
         }

@@ -10,6 +10,22 @@ says what it costs. The command is ``lexisplat-ray``.
 
 from __future__ import annotations
 
-from ._compress import compress
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ._compress import compress
 
 __all__ = ["compress"]
+
+
+def __getattr__(name: str) -> object:
+    # The command says in one line that Ray is missing, so Ray is imported when it is needed.
+    if name != "compress":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from ._compress import compress
+
+    return compress
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

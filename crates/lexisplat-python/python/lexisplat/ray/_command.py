@@ -75,9 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(given: argparse.Namespace) -> dict[str, Any]:
-    import ray
-
+    # First, for it says what to do where Ray is missing.
     from ._compress import compress
+
+    import ray
 
     if given.address is not None and given.workers is not None:
         raise ParameterError(f"--workers = {given.workers}: not together with --address, whose workers are all used")

@@ -10,7 +10,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from .. import _native
-from .._compress import Preset
+from .._arguments import checked, count, flag
+from .._arguments import device as device_of
+from .._arguments import limits as limits_of
+from .._compress import Preset, options_of
 from .._errors import Error, LexisplatWarning, ParameterError
 from .._progress import Progress, reporter
 
@@ -30,6 +33,7 @@ if TYPE_CHECKING:
 MOST_READ = 6.0
 
 
+@checked()
 def compress(
     tiles: Paths | ray.data.Dataset,
     out: str | os.PathLike[str],
@@ -46,7 +50,7 @@ def compress(
     skip_bad: bool = False,
     drop_invalid: bool = False,
     drop_extras: bool = False,
-    limit: Mapping[str, int] | None = None,
+    limit: Mapping[str, int | float | str] | None = None,
     overwrite: bool = False,
     threads: int = 1,
     progress: Progress = None,
@@ -93,21 +97,16 @@ def compress(
         They name the tile. No file is then written, or with ``one_each`` none but whole ones.
     """
     started = time.monotonic()
+    flags = {"one_each": one_each, "skip_bad": skip_bad, "overwrite": overwrite}
+    reading = {"drop_invalid": drop_invalid, "drop_extras": drop_extras}
+    for name, value in {**flags, **reading}.items():
+        flag(name, value)
+    asked = {"preset": preset, "tol": tol, "atoms": atoms, "seed": seed}
+    asked.update(keep_order=keep_order, keep_all=keep_all, guess=guess)
+    choices = {**options_of(asked), **reading, "device": device_of(device)}
+    limits, threads = limits_of(limit), count("threads", threads)
     listed = tiles_of(tiles)
     outputs(listed, out, one_each, overwrite)
-    choices = {
-        "preset": preset,
-        "tol": tol,
-        "atoms": atoms,
-        "seed": seed,
-        "keep_order": keep_order,
-        "keep_all": keep_all,
-        "guess": guess,
-        "device": device,
-        "drop_invalid": drop_invalid,
-        "drop_extras": drop_extras,
-    }
-    limits = None if limit is None else dict(limit)
     _native.tile_choices(choices, limits)
     if device == "auto":
         raise ParameterError("device = auto: cpu or gpu, which is the same on all workers")

@@ -15,11 +15,13 @@ mod tests;
 mod training;
 mod update;
 
+use std::ops::RangeInclusive;
+
 use crate::scene::sh::ShDegree;
 use crate::sparse::atoms::{Atoms, check_dim, check_finite, count_rows};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Pursuit;
-use crate::sparse::pursuit::StopRule;
+use crate::sparse::pursuit::{RowValue, StopRule};
 use crate::support::builder::builder_methods;
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
@@ -36,6 +38,10 @@ pub const DEFAULT_SAMPLE: usize = 65_536;
 /// Share of an atom's last movement that the next round keeps. Values from 0.8 to 0.97 give the same nonzeros; 0 gives
 /// 3 to 18 % more.
 pub const DEFAULT_MOMENTUM: f32 = 0.9;
+/// Largest values of rows that are learned from as they are: squares of the norms of rows of
+/// [`MAX_DIM`](crate::MAX_DIM) values are then within what a pursuit in f32 takes.
+const IN_RANGE: RangeInclusive<f64> = 1e-12..=1e13;
+
 /// How to learn a dictionary.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -148,7 +154,8 @@ pub(crate) fn learn_from(
 ///
 /// This is [`learn`] for rows of any length, with two differences. A row that no code brings within the tolerance is not
 /// stored exactly but keeps the code that comes nearest ([`Visit::nearest`](crate::pursuit::Visit::nearest)). Atoms are
-/// therefore learned from such rows too, and few atoms for long rows lower their errors. Learning ends with some rounds
+/// therefore learned from such rows too, and few atoms for long rows lower their errors. Rows are learned from in f32; if
+/// they are too large or too small for that, they and the tolerance are scaled, which changes no atom. Learning ends with some rounds
 /// without momentum. `progress` is asked between rounds, but not while the first atoms are made, which takes half a
 /// minute for rows of 1024 values. Rows that
 /// [`LearnOptions::sample`] leaves out are checked but not learned from. Without any rows the atoms are unit axes, then
@@ -159,16 +166,25 @@ pub(crate) fn learn_from(
 /// # Errors
 /// [`Error::Parameter`] if `dim` is not from 1 to [`MAX_DIM`](crate::MAX_DIM), if the number of atoms or the momentum is
 /// out of range, or if `rows` are not a whole number of finite rows. [`Error::Cancelled`] if `progress` cancels.
-pub fn learn_atoms(
+pub fn learn_atoms<V: RowValue>(
     dim: usize,
-    rows: &[f32],
+    rows: &[V],
     options: &LearnOptions,
     progress: &dyn Progress,
 ) -> Result<LearnedAtoms> {
     check_dim(dim)?;
     let count = count_rows(dim, rows)?;
     check_finite(dim, rows, 0)?;
-    learner::learn(dim, count, &mut in_memory(dim, rows), options, Beyond::Nearest, progress)
+    let learn = |rows: &[f32], options: &LearnOptions| {
+        learner::learn(dim, count, &mut in_memory(dim, rows), options, Beyond::Nearest, progress)
+    };
+    let largest = rows.iter().map(|x| x.wide().abs()).fold(0.0, f64::max);
+    if largest == 0.0 || IN_RANGE.contains(&largest) {
+        return learn(&V::narrow(rows), options);
+    }
+    let (_, exponent) = libm::frexp(largest);
+    let scaled: Vec<f32> = rows.iter().map(|x| f32::nearest(libm::scalbn(x.wide(), -exponent))).collect();
+    learn(&scaled, &LearnOptions { stop: options.stop.scaled(-exponent), ..options.clone() })
 }
 
 /// Fetches from `rows`, each of `dim` values.

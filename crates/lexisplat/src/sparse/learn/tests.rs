@@ -66,6 +66,24 @@ fn odd_rows_and_sizes_give_unit_atoms() {
 }
 
 #[test]
+fn the_size_of_rows_does_not_change_the_atoms() {
+    let mut rng = SplitMix64::new(35);
+    let rows = sparse_rows(&random_atoms(9, 14, &mut rng), 3, 400, &mut rng);
+    let learned = |exponent: i32| {
+        let scaled: Vec<f64> = rows.iter().map(|&x| libm::scalbn(f64::from(x), exponent)).collect();
+        let stop = tolerance(libm::scalbn(0.1, exponent));
+        learn_atoms(9, &scaled, &LearnOptions::new(stop), &Silent).unwrap()
+    };
+    let plain = learned(0);
+    assert!(plain.atoms == learn_atoms(9, &rows, &LearnOptions::new(tolerance(0.1)), &Silent).unwrap().atoms);
+    for exponent in [-60, 900] {
+        let other = learned(exponent);
+        assert!(other.atoms == plain.atoms, "2 to the power {exponent}");
+        assert_eq!(other.held_out_nonzeros.to_bits(), plain.held_out_nonzeros.to_bits());
+    }
+}
+
+#[test]
 fn arguments_are_checked() {
     let options = LearnOptions::new(tolerance(0.1));
     let refused = |dim: usize, rows: &[f32], options: &LearnOptions| {

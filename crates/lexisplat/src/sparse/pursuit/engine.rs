@@ -14,6 +14,9 @@ use crate::support::simd::Simd;
 const PROMISE_MARGIN: f64 = 1e-12;
 /// Largest squared norm of a vector that is coded. Above it, f32 squares of correlations could overflow.
 const MAX_ENERGY: f64 = 1e30;
+/// Below this squared norm f32 squares of correlations lose their digits. Such vectors are coded if the tolerance is as
+/// small, and badly; rows are then coded in f64.
+pub(super) const MIN_ENERGY: f64 = 1e-24;
 /// Below this share of the signal's energy the f32 residual is rounding noise, and more atoms would not help.
 const NOISE_FLOOR: f64 = 1e-12;
 
@@ -59,6 +62,12 @@ impl StopRule {
         self.tolerance
     }
 
+    /// The rule for vectors that are scaled by two to the power `exponent`.
+    pub(crate) fn scaled(self, exponent: i32) -> Self {
+        let scaled = |tolerance| libm::scalbn(tolerance, exponent).clamp(f64::MIN_POSITIVE, f64::MAX);
+        Self { tolerance: self.tolerance.map(scaled), ..self }
+    }
+
     /// The rule without the cap; unchanged if it has no tolerance.
     #[must_use]
     pub fn without_cap(self) -> Self {
@@ -89,6 +98,8 @@ pub struct Visit<'a> {
     /// The outcome.
     pub outcome: Encoded,
     reconstruction: &'a [f32],
+    /// The atoms that the pursuit chose, in order.
+    pub(super) chosen: &'a [u16],
 }
 
 impl Visit<'_> {
@@ -129,7 +140,8 @@ impl<F: FnMut(Visit<'_>), const BLOCKS: usize> pulp::NullaryFnOnce for Job<'_, F
         let Self { coder, signals, scratch, code, sink } = self;
         for signal in signals.chunks_exact(coder.plan.dim) {
             let outcome = coder.encode_one::<BLOCKS>(scratch, signal, code);
-            sink(Visit { signal, code, outcome, reconstruction: &scratch.reconstruction });
+            let (reconstruction, chosen) = (&scratch.reconstruction[..], &scratch.chosen[..scratch.len]);
+            sink(Visit { signal, code, outcome, reconstruction, chosen });
         }
     }
 }
@@ -174,6 +186,29 @@ impl Coder {
         self.stop.tolerance
     }
 
+    /// The largest error that counts as within the tolerance; 0 without a tolerance.
+    pub(super) fn promise(&self) -> f64 {
+        self.stop.tolerance.map_or(0.0, |t| t * (1.0 - PROMISE_MARGIN))
+    }
+
+    /// The cap on nonzeros, if any.
+    pub(super) fn max_nonzeros(&self) -> Option<usize> {
+        self.stop.max_nonzeros
+    }
+
+    pub(super) fn pursuit(&self) -> Pursuit {
+        self.pursuit
+    }
+
+    pub(super) fn value_type(&self) -> ValueType {
+        self.values
+    }
+
+    /// The values of atom `j`.
+    pub(super) fn atom(&self, j: usize) -> impl Iterator<Item = f32> {
+        self.plan.atom(j)
+    }
+
     /// Codes the vectors in `signals`, each as long as an atom, and passes each result to `sink`, in order. Uses the
     /// vector instructions of [`Simd::current`](crate::simd::Simd::current).
     ///
@@ -202,8 +237,9 @@ impl Coder {
         code: &mut Vec<(u16, f32)>,
     ) -> Encoded {
         code.clear();
+        s.len = 0;
         let error = self.plan.error(s, signal, code);
-        let promise = self.stop.tolerance.map_or(0.0, |t| t * (1.0 - PROMISE_MARGIN));
+        let promise = self.promise();
         if error <= promise || self.stop.max_nonzeros == Some(0) {
             return Encoded::Code { error };
         }

@@ -101,6 +101,12 @@ impl Plan {
         self.blocks == blocks
     }
 
+    /// The values of atom `j`.
+    pub(super) fn atom(&self, j: usize) -> impl Iterator<Item = f32> {
+        let lanes = &self.padded[j * self.atom_blocks..(j + 1) * self.atom_blocks];
+        lanes.iter().flat_map(|lane| lane.0).take(self.dim)
+    }
+
     pub(super) fn scratch(&self) -> Scratch {
         Scratch {
             correlations: vec![ZERO; self.blocks],

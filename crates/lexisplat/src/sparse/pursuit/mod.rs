@@ -6,19 +6,26 @@
 //! chosen span. A step therefore costs `atoms * chosen` multiply-adds and never reads the signal again (Rubinstein et
 //! al. 2008, "Batch-OMP"; Mairal's SPAMS for the OLS form).
 //!
+//! **Rows** that the engine leaves over the tolerance, because f32 cannot tell the last atoms apart or because the rows are too
+//! large or too small for it, are coded anew in f64 ([`encode_rows`]). Scenes keep such vectors exactly instead.
+//!
 //! **Determinism.** All long loops run element by element over atoms in lanes of fixed width. Every multiplication and
 //! every addition is rounded by itself, and the only reduction is a maximum. The result is therefore the same bit for
 //! bit on every CPU, whatever vector width the compiler or the run-time dispatch picks.
 
+mod careful;
 mod engine;
 mod greedy;
 pub(crate) mod lanes;
 mod rows;
 #[cfg(test)]
 pub(super) mod tests;
+mod value;
 
 pub use engine::{Coder, Encoded, StopRule, ValueType, Visit};
+pub(crate) use rows::RowCoder;
 pub use rows::{RowCodes, encode_rows};
+pub use value::RowValue;
 
 /// Rows that one task codes: few enough that even small sets of long rows occupy all threads.
 pub(crate) const ROWS_PER_TASK: usize = 256;

@@ -2,6 +2,9 @@
 
 use std::ops::Range;
 
+use super::careful::{Careful, Work};
+use super::engine::MIN_ENERGY;
+use super::value::RowValue;
 use super::{Coder, Encoded, ROWS_PER_TASK, Visit};
 use crate::sparse::atoms::{check_finite, count_rows};
 use crate::support::error::Result;
@@ -11,26 +14,25 @@ use crate::support::progress::{Progress, Stage};
 /// Rows coded before their codes are appended. It bounds the codes that are in memory twice.
 const AT_ONCE: usize = 256 * ROWS_PER_TASK;
 
-/// Sparse codes of rows.
+/// Sparse codes of rows, with values of the type of the rows.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
-pub struct RowCodes {
+pub struct RowCodes<V = f32> {
     /// Where the pairs of each row start, and where those of the last row end: one entry more than there are rows.
     pub starts: Vec<usize>,
     /// The atom of each pair. Atoms ascend within a row.
     pub atoms: Vec<u16>,
-    /// The value of each pair, rounded to the coder's value type.
-    pub values: Vec<f32>,
-    /// The un-squared L2 norm of each row's error, computed in f64 from what
-    /// [`Atoms::reconstruct`](crate::Atoms::reconstruct) makes of its pairs.
+    /// The value of each pair. A coder of 16-bit values rounds them to 16 bits; others do not round rows of `f64`.
+    pub values: Vec<V>,
+    /// The un-squared L2 norm of each row's error: of what the sum of its values times atoms, taken in f64, leaves of it.
     pub errors: Vec<f64>,
-    /// The numbers of the rows that no code brings within the tolerance ([`Encoded::Escape`]), ascending. They have the
-    /// pairs that come nearest ([`Visit::nearest`]), which may be none. Rows that end at a cap on nonzeros are not among
-    /// them; their errors tell.
+    /// The numbers of the rows that no code brings within the tolerance, ascending. They have the pairs that come nearest,
+    /// which may be none. The error of such a row is the norm of what lies outside the span of all atoms, or what rounding
+    /// of values leaves. Rows that end at a cap on nonzeros are not among them; their errors tell.
     pub escapes: Vec<usize>,
 }
 
-impl Default for RowCodes {
+impl<V> Default for RowCodes<V> {
     fn default() -> Self {
         Self {
             starts: vec![0],
@@ -42,7 +44,7 @@ impl Default for RowCodes {
     }
 }
 
-impl RowCodes {
+impl<V: RowValue> RowCodes<V> {
     /// Number of rows.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -59,21 +61,20 @@ impl RowCodes {
     ///
     /// # Panics
     /// If `i` is not below [`Self::len`].
-    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, f32)> {
+    pub fn row(&self, i: usize) -> impl Iterator<Item = (usize, V)> {
         let pairs = self.starts[i]..self.starts[i + 1];
         self.atoms[pairs.clone()].iter().zip(&self.values[pairs]).map(|(&atom, &value)| (atom.into(), value))
     }
 
     /// Appends the next row.
-    fn push(&mut self, visit: &Visit<'_>) {
-        let (code, error) = visit.nearest();
-        if visit.outcome == Encoded::Escape {
+    fn push(&mut self, coded: &Coded<'_, V>) {
+        if coded.is_escape {
             self.escapes.push(self.len());
         }
-        self.atoms.extend(code.iter().map(|&(atom, _)| atom));
-        self.values.extend(code.iter().map(|&(_, value)| value));
+        self.atoms.extend(coded.code.iter().map(|&(atom, _)| atom));
+        self.values.extend(coded.code.iter().map(|&(_, value)| value));
         self.starts.push(self.atoms.len());
-        self.errors.push(error);
+        self.errors.push(coded.error);
     }
 
     /// Appends the rows of `part`.
@@ -87,20 +88,83 @@ impl RowCodes {
     }
 }
 
-/// Codes `rows`, one after the other, each as long as an atom. The codes are those of [`Coder::encode`], and do not
-/// depend on the number of threads. `progress` is told of [`Stage::Code`].
+/// The code of one row.
+#[derive(Debug)]
+pub(crate) struct Coded<'a, V> {
+    pub(crate) row: &'a [V],
+    /// (atom, value) pairs by ascending atom.
+    pub(crate) code: &'a [(u16, V)],
+    /// The un-squared L2 norm of the error, in f64.
+    pub(crate) error: f64,
+    /// Whether no code brings the row within the tolerance.
+    is_escape: bool,
+}
+
+/// Codes rows of any size: with a coder where its f32 is enough, and in f64 where it is not.
+#[derive(Debug)]
+pub(crate) struct RowCoder<'a> {
+    coder: &'a Coder,
+    careful: Careful<'a>,
+}
+
+impl<'a> RowCoder<'a> {
+    pub(crate) fn new(coder: &'a Coder) -> Self {
+        Self { coder, careful: Careful::new(coder) }
+    }
+
+    /// Codes `rows`, which are finite, one after the other on the calling thread, and passes each on.
+    pub(crate) fn each<V: RowValue>(&self, rows: &[V], mut sink: impl FnMut(&Coded<'_, V>)) {
+        let (mut work, mut own) = (Work::default(), Vec::new());
+        let mut wide = rows.chunks_exact(self.coder.dim());
+        self.coder.encode(&V::narrow(rows), |visit| {
+            let Some(row) = wide.next() else { return };
+            own.clear();
+            own.extend(visit.code.iter().map(|&(atom, value)| (atom, V::nearest(value.into()))));
+            let mut error = self.careful.error(row, &own, &mut work);
+            // Squares of a tiny row's error may be 0.
+            let is_tiny = is_tiny(row, visit.signal);
+            if is_tiny || !self.is_enough(&visit, error) {
+                let found = self.careful.code(row, visit.chosen, &mut work);
+                if is_tiny || error.is_nan() || found.error < error {
+                    (own, error) = (found.code, found.error);
+                }
+            }
+            let is_escape = self.coder.max_nonzeros().is_none() && error > self.coder.promise();
+            sink(&Coded { row, code: &own, error, is_escape });
+        });
+    }
+
+    /// Whether the code that `visit` has need not be searched for again. Its error in f64 is `error`.
+    fn is_enough(&self, visit: &Visit<'_>, error: f64) -> bool {
+        let is_capped = visit.outcome != Encoded::Escape && self.coder.tolerance().is_none();
+        is_capped || error <= self.coder.promise()
+    }
+}
+
+/// Whether `row`, which is `narrow` in f32, is not zero but too small for a pursuit in f32.
+fn is_tiny<V: RowValue>(row: &[V], narrow: &[f32]) -> bool {
+    let energy: f64 = narrow.iter().map(|&x| f64::from(x) * f64::from(x)).sum();
+    energy < MIN_ENERGY && row.iter().any(|&x| x != V::default())
+}
+
+/// Codes `rows`, one after the other, each as long as an atom. `progress` is told of [`Stage::Code`].
+///
+/// The codes are those of [`Coder::encode`] wherever these are within the tolerance. Other rows are coded anew in f64, and so
+/// are rows too large or too small for f32. A row stays over the tolerance only if no code is within it. The codes do not
+/// depend on the number of threads.
 ///
 /// # Errors
 /// [`Error::Parameter`](crate::Error::Parameter) if `rows` are not a whole number of finite rows, or if there are no
 /// atoms (SH degree 0). [`Error::Cancelled`](crate::Error::Cancelled) if `progress` cancels.
-pub fn encode_rows(coder: &Coder, rows: &[f32], progress: &dyn Progress) -> Result<RowCodes> {
+pub fn encode_rows<V: RowValue>(coder: &Coder, rows: &[V], progress: &dyn Progress) -> Result<RowCodes<V>> {
     let count = count_rows(coder.dim(), rows)?;
+    let row_coder = RowCoder::new(coder);
     let mut all = RowCodes::default();
     progress.begin(Stage::Code, count as u64);
     for start in (0..count).step_by(AT_ONCE) {
         let len = AT_ONCE.min(count - start);
         for part in map_chunks(len, ROWS_PER_TASK, |piece| {
-            encode_piece(coder, rows, start + piece.start..start + piece.end, progress)
+            encode_piece(&row_coder, rows, start + piece.start..start + piece.end, progress)
         }) {
             all.append(part?);
         }
@@ -110,17 +174,18 @@ pub fn encode_rows(coder: &Coder, rows: &[f32], progress: &dyn Progress) -> Resu
 }
 
 /// Codes the rows of `range` on the calling thread.
-fn encode_piece(
-    coder: &Coder,
-    rows: &[f32],
+fn encode_piece<V: RowValue>(
+    coder: &RowCoder<'_>,
+    rows: &[V],
     range: Range<usize>,
     progress: &dyn Progress,
-) -> Result<RowCodes> {
+) -> Result<RowCodes<V>> {
     progress.check()?;
-    let rows = &rows[range.start * coder.dim()..range.end * coder.dim()];
-    check_finite(coder.dim(), rows, range.start)?;
+    let dim = coder.coder.dim();
+    let rows = &rows[range.start * dim..range.end * dim];
+    check_finite(dim, rows, range.start)?;
     let mut part = RowCodes::default();
-    coder.encode(rows, |visit| part.push(&visit));
+    coder.each(rows, |coded| part.push(coded));
     progress.advance(range.len() as u64);
     Ok(part)
 }

@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use super::update::normalised_over;
 use crate::sparse::atoms::{Atoms, check_finite, count_rows};
-use crate::sparse::pursuit::Coder;
+use crate::sparse::pursuit::{Coder, RowCoder, RowValue};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::{Progress, Stage};
@@ -64,7 +64,7 @@ impl Statistics {
     }
 
     /// Codes `rows` with `coder`, one after the other, and sums their statistics. A row that no code brings within the
-    /// tolerance counts with the code that comes nearest ([`Visit::nearest`](crate::pursuit::Visit::nearest)).
+    /// tolerance counts with the code that comes nearest, as [`encode_rows`](crate::pursuit::encode_rows) has them.
     /// `progress` is told of [`Stage::Code`].
     ///
     /// Atoms learn from what codes leave. Codes to a small tolerance leave little, and atoms that are far from good ones
@@ -73,7 +73,7 @@ impl Statistics {
     /// # Errors
     /// [`Error::Parameter`] if `rows` are not a whole number of finite rows, or if there are no atoms (SH degree 0).
     /// [`Error::Cancelled`] if `progress` cancels.
-    pub fn of(coder: &Coder, rows: &[f32], progress: &dyn Progress) -> Result<Self> {
+    pub fn of<V: RowValue>(coder: &Coder, rows: &[V], progress: &dyn Progress) -> Result<Self> {
         let count = count_rows(coder.dim(), rows)?;
         let mut sum = Self::zeros(coder.dim(), coder.atoms());
         let block_bytes = size_of::<f64>() * (sum.pairs.len() + sum.products.len());
@@ -82,9 +82,11 @@ impl Statistics {
             .step_by(ROWS_PER_BLOCK)
             .map(|start| start..count.min(start + ROWS_PER_BLOCK))
             .collect();
+        let (coder, size) = (&RowCoder::new(coder), [coder.dim(), coder.atoms()]);
         progress.begin(Stage::Code, count as u64);
         for blocks in blocks.chunks(at_once) {
-            for block in map_vec(blocks.to_vec(), |range| Self::of_block(coder, rows, range, progress)) {
+            for block in map_vec(blocks.to_vec(), |range| Self::of_block(coder, size, rows, range, progress))
+            {
                 sum.add_sums(&block?);
             }
         }
@@ -93,27 +95,31 @@ impl Statistics {
     }
 
     /// The statistics of the rows of `range`, summed in order on the calling thread.
-    fn of_block(coder: &Coder, rows: &[f32], range: Range<usize>, progress: &dyn Progress) -> Result<Self> {
+    fn of_block<V: RowValue>(
+        coder: &RowCoder<'_>,
+        [dim, atoms]: [usize; 2],
+        rows: &[V],
+        range: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         progress.check()?;
-        let dim = coder.dim();
         let rows = &rows[range.start * dim..range.end * dim];
         check_finite(dim, rows, range.start)?;
-        let mut sum = Self::zeros(dim, coder.atoms());
-        coder.encode(rows, |visit| {
-            let (code, error) = visit.nearest();
+        let mut sum = Self::zeros(dim, atoms);
+        coder.each(rows, |coded| {
             sum.rows += 1.0;
-            sum.nonzeros += code.len() as f64;
-            sum.squared_error += error * error;
-            for (i, &(atom, value)) in code.iter().enumerate() {
-                let (j, value) = (usize::from(atom), f64::from(value));
+            sum.nonzeros += coded.code.len() as f64;
+            sum.squared_error += coded.error * coded.error;
+            for (i, &(atom, value)) in coded.code.iter().enumerate() {
+                let (j, value) = (usize::from(atom), value.wide());
                 let pairs = &mut sum.pairs[triangle(j)..triangle(j + 1)];
                 // Atoms ascend, so none of these is above `atom`.
-                for &(other, other_value) in &code[..=i] {
-                    pairs[usize::from(other)] += value * f64::from(other_value);
+                for &(other, other_value) in &coded.code[..=i] {
+                    pairs[usize::from(other)] += value * other_value.wide();
                 }
                 let products = &mut sum.products[j * dim..(j + 1) * dim];
-                for (p, &x) in products.iter_mut().zip(visit.signal) {
-                    *p += value * f64::from(x);
+                for (p, &x) in products.iter_mut().zip(coded.row) {
+                    *p += value * x.wide();
                 }
             }
         });

@@ -1,5 +1,6 @@
 //! Tests of the pursuit against a naive one in f64.
 
+mod careful;
 mod lengths;
 pub(in crate::sparse) mod oracle;
 mod rows;
