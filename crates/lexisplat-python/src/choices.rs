@@ -140,7 +140,7 @@ impl Choices {
             packing = packing.with_memory(bytes);
         }
         if let Some(views) = self.cameras {
-            packing = packing.with_cameras(cameras(views));
+            packing = packing.with_cameras(cameras(views, None));
         }
         Ok(packing.into())
     }
@@ -235,13 +235,14 @@ pub(crate) fn compress(
         Err(_) => Source::Splats(Box::new(from_python(source)?)),
     };
     let (bytes, report) = without_gil(py, progress, move |watch| {
+        let views = choices.cameras.clone();
         let compression = choices.compression(device, dictionary)?;
         match source {
-            Source::Splats(splats) => run(&compression, &*splats, watch),
+            Source::Splats(splats) => run(&compression, views, &*splats, watch),
             Source::File(given) => {
                 let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes));
                 with_source(given, &name, &options, whole, watch, &mut |source| {
-                    run(&compression, source, watch)
+                    run(&compression, views.clone(), source, watch)
                 })
             }
         }
@@ -250,12 +251,19 @@ pub(crate) fn compress(
     Ok(Scene::new(MADE.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report)))
 }
 
+/// Compresses `source`. The cameras `views`, which `compression` has too, are in the world.
 fn run(
     compression: &Compression,
+    views: Option<Vec<CameraTuple>>,
     source: &dyn SplatSource,
     watch: &Watch,
 ) -> Result<(Vec<u8>, lexisplat_eval::CompressionReport)> {
     let mut file = Vec::new();
+    if let (Some(views), offset @ Some(_)) = (views, source.empty().meta.offset) {
+        let compression = compression.clone().with_cameras(cameras(views, offset));
+        let report = compression.run(source, &mut file, watch)?;
+        return Ok((file, report));
+    }
     let report = compression.run(source, &mut file, watch)?;
     Ok((file, report))
 }

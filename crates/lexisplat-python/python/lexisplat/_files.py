@@ -105,8 +105,8 @@ def save(
     Returns
     -------
     dict
-        What the file lacks of the scene: ``sh_degree``, ``extras``, ``normals``, ``antialiased``, ``precision`` and
-        ``limited``; empty for .lexi.
+        What the file lacks of the scene: ``sh_degree``, ``extras``, ``normals``, ``antialiased``, ``offset``, ``precision``
+        and ``limited``; empty for .lexi. Roundings that are coarse against the sizes of Gaussians are warned of.
 
     Raises
     ------
@@ -129,7 +129,9 @@ def save(
         overwrite=overwrite,
         progress=reporter(progress),
     )
-    return dict(json.loads(lost) or {})
+    found = dict(json.loads(lost) or {})
+    warn(found.pop("coarse", []), path)
+    return found
 
 
 def warn(told: Sequence[str], file: object) -> None:
