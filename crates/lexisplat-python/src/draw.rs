@@ -61,8 +61,10 @@ impl Resolved {
 
     /// Makes positions relative to `offset`.
     fn rebase(&mut self, offset: Option<Offset>) {
+        if self.offset() == offset {
+            return;
+        }
         match self {
-            _ if self.offset() == offset => {}
             Self::Dense(splats) => drop(splats.rebase(offset)),
             Self::Sparse(model) => Arc::make_mut(model).rebase(offset),
         }

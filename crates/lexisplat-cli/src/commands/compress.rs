@@ -55,7 +55,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     });
     let limits = common.limits()?;
     let given = args.cameras.as_ref().map(|path| read_views(path, &mut |_| None)).transpose()?;
-    warn("cameras", given.as_ref().map_or(&[], |set| set.warnings.as_slice()));
+    warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
     let mut compression = compression(args, given.as_ref(), &limits)?;
     if args.prune.is_some() && !common.quiet {
         note(

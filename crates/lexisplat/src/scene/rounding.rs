@@ -92,7 +92,7 @@ mod tests {
         for scales in
             [[one, two, three], [three, one, two], [two, three, one], [f32::NEG_INFINITY, two, three]]
         {
-            assert!((Rounding::size_of(scales) - 1.0_f64.exp()).abs() < 1e-9, "{scales:?}");
+            assert!((Rounding::size_of(scales) - std::f64::consts::E).abs() < 1e-9, "{scales:?}");
         }
         assert!((Rounding::median(vec![3.0, 1.0, 2.0]) - 2.0).abs() < 1e-12);
         assert_eq!((sample(0), sample(4096), sample(4097)), (1, 1, 2));

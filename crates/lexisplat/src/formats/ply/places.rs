@@ -138,10 +138,10 @@ mod tests {
             assert_eq!(places(centre, 500, 0.05).settle(), Settled { offset: None, warnings: Vec::new() });
         }
         let found = places([500_000.4, 4_649_776.3, 100.0], 500, 0.05).settle();
-        assert_eq!(found.offset, Offset::new([500_000.5, 4_649_776.0, 100.0]).unwrap());
+        assert_eq!(found.offset, Offset::new([500_000.5, 4_649_776.5, 100.0]).unwrap());
         assert_eq!(found.warnings.len(), 1, "{:?}", found.warnings);
         let said = "32-bit floats move positions by up to 0.25, and the median Gaussian has a size of 0.050; they are \
-                    kept relative to an offset of 500000.5, 4649776, 100";
+                    kept relative to an offset of 500000.5, 4649776.5, 100";
         assert_eq!(found.warnings[0], said);
     }
 
