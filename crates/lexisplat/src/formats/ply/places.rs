@@ -153,7 +153,7 @@ mod tests {
         let found = wide.settle();
         assert_eq!((found.offset, found.warnings.len()), (None, 1));
         let mut far = places([5e8, 0.0, 0.0], 500, 0.01);
-        far.add(Places::of(500..501, 1, &[], &[5.2e8, 0.0, 0.0], &[0.0; 3]));
+        far.add(Places::of(500..501, 1, &[], &[5.02e8, 0.0, 0.0], &[0.0; 3]));
         let found = far.settle();
         assert!(found.offset.is_some());
         assert!(found.warnings[1].starts_with("relative to the offset, 32-bit floats move"), "{found:?}");
