@@ -163,6 +163,16 @@ def check_object(meta, key, numbers, target):
     check(not target or o["target"] in ("psnr", "min-psnr", "size"), f"bad target of {key}")
 
 
+def offset_of(meta):
+    """What is added to positions to get to the world of the source; None if there is none."""
+    if "offset" not in meta:
+        return None
+    offset = parse_json(meta["offset"])
+    check(isinstance(offset, list) and len(offset) == 3 and all(type(v) in (int, float) and math.isfinite(v) for v in offset),
+          "bad metadata offset")
+    return [float(v) for v in offset]
+
+
 def check_metadata_3(meta):
     """Check every key of version 3, and return the degree."""
     degree = whole(meta, "degree", 5)
@@ -176,6 +186,7 @@ def check_metadata_3(meta):
     check(meta.get("antialiased", "false") in ("true", "false"), "bad metadata antialiased")
     comments = parse_json(meta.get("comments", "[]"))
     check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
+    offset_of(meta)
     check_object(meta, "promise", ("asked", "mean_psnr", "min_psnr"), True)
     check_object(meta, "reached", ("judged_psnr", "mean_psnr", "min_psnr"), False)
     return degree
@@ -200,6 +211,7 @@ def check_metadata(meta, layout):
     check("generator" in meta, "no metadata generator")
     comments = parse_json(meta.get("comments", ""))
     check(isinstance(comments, list) and all(isinstance(c, str) for c in comments), "bad metadata comments")
+    offset_of(meta)
     if packed:
         whole(meta, "gaussians", (1 << 32) - 1)
         atoms = whole(meta, "atoms", 1025)
@@ -745,6 +757,8 @@ def main():
     arrays = {k: v for k, v in out.items() if isinstance(v, np.ndarray)}
     arrays.update({f"extra.{k}": v for k, v in out["extras"].items()})
     np.savez(given.out, **arrays)
+    if offset_of(meta):
+        print(f"positions are relative to {offset_of(meta)}")
     print(f"{len(out['position'])} Gaussians, layout {meta.get('layout', 'packed')}, SH degree {meta['degree']}")
     if "integers" in out:
         good = [right for _, right in out["integers"].values()]

@@ -64,6 +64,6 @@ pub fn scene(bytes: &mut Bytes<'_>) -> Splats {
         g.rotations.push(bytes.numbers());
         sh_rest.extend((0..degree.rest()).map(|_| bytes.number()));
     }
-    let meta = SceneMeta { comments: Vec::new(), antialiased: bytes.byte() % 2 == 1 };
+    let meta = SceneMeta { antialiased: bytes.byte() % 2 == 1, ..SceneMeta::default() };
     Splats { geometry: g, degree, sh_rest, meta }
 }

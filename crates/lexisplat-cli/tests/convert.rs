@@ -1,5 +1,6 @@
 //! `convert`, and the other commands with files of other programs' formats.
 
+use lexisplat::{Offset, ply};
 use serde_json::Value;
 
 use crate::folder::{Folder, GAUSSIANS, read};
@@ -87,6 +88,137 @@ fn scenes_are_cut_moved_and_merged() {
     folder.run(&["convert", "scene.ply", "turned.ply", "--rotate", "0,0,180", "--scale", "2"]);
     let turned = read(&folder.path("turned.ply")).geometry.positions[7];
     assert!((turned[0] + 2.0 * x).abs() < 1e-5 && (turned[2] - 2.0 * z).abs() < 1e-5, "{turned:?}");
+}
+
+/// What single precision rounds the test scene by, relative to an offset; without one that is 0.25.
+const EXACT: f64 = 8e-6;
+/// The same with what packing rounds by.
+const PACKED: f64 = 0.2;
+/// Where the scene of the next tests is: coordinates of a survey.
+const FAR: [f64; 3] = [500_000.123, 4_649_776.456, 100.789];
+
+/// Bytes of a PLY of `splats` at [`FAR`] whose positions are doubles, and the positions.
+fn surveyed(splats: &lexisplat::Splats) -> (Vec<u8>, Vec<[f64; 3]>) {
+    let mut bytes = Vec::new();
+    ply::write(&mut bytes, splats).unwrap();
+    let end = bytes.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
+    let mut header = String::from_utf8(bytes[..end].to_vec()).unwrap();
+    for axis in ["x", "y", "z"] {
+        header = header.replace(&format!("property float {axis}\n"), &format!("property double {axis}\n"));
+    }
+    let width = (bytes.len() - end) / splats.len();
+    let (mut out, mut places) = (header.into_bytes(), Vec::new());
+    for (row, position) in bytes[end..].chunks_exact(width).zip(&splats.geometry.positions) {
+        let place = [0, 1, 2].map(|k| f64::from(position[k]) + FAR[k]);
+        place.iter().for_each(|v| out.extend(v.to_le_bytes()));
+        out.extend(&row[3 * size_of::<f32>()..]);
+        places.push(place);
+    }
+    (out, places)
+}
+
+fn worst(path: &std::path::Path, places: &[[f64; 3]]) -> f64 {
+    let splats = read(path);
+    let offset = Offset::numbers(splats.meta.offset);
+    let far = |(p, place): (&[f32; 3], &[f64; 3])| {
+        (0..3).map(|k| (f64::from(p[k]) + offset[k] - place[k]).abs()).fold(0.0, f64::max)
+    };
+    assert_eq!(splats.len(), places.len());
+    splats.geometry.positions.iter().zip(places).map(far).fold(0.0, f64::max)
+}
+
+#[test]
+fn surveys_keep_their_places() {
+    let folder = Folder::new();
+    let near = read(&folder.path("scene.ply"));
+    let (bytes, places) = surveyed(&near);
+    std::fs::write(folder.path("far.ply"), bytes).unwrap();
+    let info = folder.json(&["info", "far.ply"]);
+    assert!((number(&info["offset"][1]) - FAR[1]).abs() < 10.0, "{}", info["offset"]);
+    folder.run(&["compress", "far.ply", "--layout", "f32", "-o", "exact.lexi"]);
+    folder.run(&["decompress", "exact.lexi", "-o", "back.ply"]);
+    let header = std::fs::read(folder.path("back.ply")).unwrap();
+    assert!(String::from_utf8_lossy(&header[..400]).contains("property double x\n"));
+    assert!(worst(&folder.path("back.ply"), &places) < EXACT);
+    folder.run(&["compress", "far.ply", "--guess", "--keep-order", "--keep-all", "-o", "packed.lexi"]);
+    assert_eq!(folder.json(&["info", "packed.lexi"])["offset"], info["offset"]);
+    folder.run(&["decompress", "packed.lexi", "-o", "packed.ply"]);
+    assert!(worst(&folder.path("packed.ply"), &places) < PACKED);
+    folder.run(&["convert", "packed.lexi", "a.glb"]);
+    folder.run(&["convert", "a.glb", "glb.ply"]);
+    assert!(worst(&folder.path("glb.ply"), &places) < PACKED);
+    let lost = folder.json(&["convert", "far.ply", "a.spz"]);
+    assert_eq!(lost["lost"]["offset"], info["offset"]);
+    // The opposite of where it is brings it to the origin, in single precision.
+    let by = format!("--translate={},{},{}", -FAR[0], -FAR[1], -FAR[2]);
+    folder.run(&["convert", "far.ply", "moved.ply", &by]);
+    let moved = read(&folder.path("moved.ply"));
+    assert_eq!(moved.meta.offset, None);
+    let pairs = moved.geometry.positions.iter().zip(&near.geometry.positions);
+    assert!(pairs.flat_map(|(a, b)| [0, 1, 2].map(|k| (a[k] - b[k]).abs())).all(|d| f64::from(d) < EXACT));
+    // A scene of single precision that goes there gets an offset; a tile beside it shares one with it.
+    let there = format!("--translate={},{},{}", FAR[0], FAR[1] + 8.0, FAR[2]);
+    folder.run(&["convert", "scene.ply", "tile.ply", &there]);
+    let tile: Vec<[f64; 3]> = places.iter().map(|[x, y, z]| [*x, y + 8.0, *z]).collect();
+    assert!(worst(&folder.path("tile.ply"), &tile) < EXACT);
+    folder.run(&["convert", "far.ply", "tile.ply", "both.ply"]);
+    let both = [places, tile].concat();
+    assert!(worst(&folder.path("both.ply"), &both) < EXACT);
+    folder.run(&["compress", "far.ply", "tile.ply", "--layout", "f32", "-o", "both.lexi"]);
+    folder.run(&["decompress", "both.lexi", "-o", "both-back.ply"]);
+    assert!(worst(&folder.path("both-back.ply"), &both) < EXACT);
+}
+
+/// Cameras are in the world of the source, and pictures are those of the scene at the origin.
+#[test]
+fn cameras_of_surveys_are_in_their_world() {
+    let folder = Folder::new();
+    let near = read(&folder.path("scene.ply"));
+    std::fs::write(folder.path("far.ply"), surveyed(&near).0).unwrap();
+    for (name, far) in [("near.json", [0.0; 3]), ("far.json", FAR)] {
+        let one = |k: usize, x: f64| {
+            format!(
+                r#"{{"id": {k}, "img_name": "{k}", "width": 48, "height": 32, "fx": 40, "fy": 40,
+                    "position": [{}, {}, {}], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}"#,
+                far[0] + x,
+                far[1],
+                far[2] - 6.0
+            )
+        };
+        let list = format!("[{}, {}]", one(0, 0.3), one(1, -0.3));
+        std::fs::write(folder.path(name), list).unwrap();
+    }
+    // A picture that shows nothing has far fewer bytes.
+    let draw = |scene: &str, cameras: &str, out: &str| {
+        folder.run(&["render", scene, "--cameras", cameras, "-o", out, "--device", "cpu", "--quiet"]);
+        std::fs::read(folder.path(&format!("{out}/000_0.png"))).unwrap().len() as f64
+    };
+    let pictures = [draw("scene.ply", "near.json", "a"), draw("far.ply", "far.json", "b")];
+    assert!((pictures[0] / pictures[1] - 1.0).abs() < 0.05, "{pictures:?}");
+    let compared = |a: &str, b: &str, cameras: &str| {
+        let all = folder.json(&["compare", a, b, "--cameras", cameras, "--device", "cpu"]);
+        number(&all["psnr"]["min"])
+    };
+    folder.run(&["compress", "far.ply", "--cameras", "far.json", "-o", "far.lexi", "--quiet"]);
+    folder.run(&["convert", "far.ply", "far.spz", "--sh-bits", "8,8"]);
+    folder.run(&["compress", "scene.ply", "--cameras", "near.json", "-o", "near.lexi", "--quiet"]);
+    let [far, near] = [("far.ply", "far.lexi", "far.json"), ("scene.ply", "near.lexi", "near.json")]
+        .map(|(a, b, c)| compared(a, b, c));
+    assert!((far - near).abs() < 1.0 && far > 30.0, "{far} {near}");
+    // A file that could not keep the offset lies beside it all the same.
+    assert!(compared("far.ply", "far.spz", "far.json") > 30.0);
+    let scores = folder.json(&[
+        "eval",
+        "far.lexi",
+        "--original",
+        "far.ply",
+        "--cameras",
+        "far.json",
+        "--device",
+        "cpu",
+        "--no-flip",
+    ]);
+    assert!(number(&scores["models"][0]["to_original"]["psnr"]["min"]) > 30.0);
 }
 
 #[test]

@@ -52,7 +52,7 @@ pub use drawing::{DrawOptions, draw_views};
 pub use error::{Error, Result};
 pub use misfit::misfit;
 pub use png::png;
-pub use scene_file::{Loaded, OtherRead, SceneFile};
+pub use scene_file::{Loaded, OtherRead, SceneFile, Whereabouts};
 pub use scorer::Scorer;
 pub use scores::{Comparison, Summary, ViewScore};
 pub use views::{

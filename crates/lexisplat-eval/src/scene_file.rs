@@ -5,7 +5,7 @@ use std::path::Path;
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{Packed, PackedHead};
 use lexisplat::ply::{PlyRead, ReadOptions};
-use lexisplat::{Error, FileKind, FormatError, Input, Model, Result, Silent, Splats};
+use lexisplat::{Error, FileKind, FormatError, Input, Model, Offset, Result, Silent, Splats};
 use lexisplat_formats::{Kind, Opened, Siblings, scene_path};
 use lexisplat_render::Scene;
 
@@ -29,6 +29,43 @@ pub enum Loaded {
     Other(Box<OtherRead>),
     /// A .lexi, and before it was decoded if it is a packed one.
     Lexi(Box<Model>, Option<Box<Packed>>),
+}
+
+/// Where a scene is.
+#[derive(Debug, Clone, Copy)]
+pub struct Whereabouts {
+    offset: Option<Offset>,
+    /// The mean of the positions, relative to the offset.
+    middle: [f64; 3],
+}
+
+impl Whereabouts {
+    /// Where `scene` is.
+    #[must_use]
+    pub fn of(scene: &Scene<'_>) -> Self {
+        let positions = &scene.geometry().positions;
+        let mut middle = [0.0; 3];
+        for position in positions {
+            (0..3).for_each(|k| middle[k] += f64::from(position[k]));
+        }
+        let count = positions.len().max(1) as f64;
+        Self { offset: scene.meta().offset, middle: middle.map(|sum| sum / count) }
+    }
+
+    /// Whether the scene, which has no offset, is nearer to the origin than to `offset`.
+    fn is_beside(&self, offset: Offset) -> bool {
+        let far = |to: [f64; 3]| (0..3).map(|k| (self.middle[k] - to[k]).abs()).sum::<f64>();
+        far([0.0; 3]) < far(offset.get())
+    }
+}
+
+/// Moves the positions of `splats`, or only says that they are relative to `offset`.
+fn aligned(splats: &mut Splats, moves: bool, offset: Option<Offset>) {
+    if moves {
+        splats.rebase(offset);
+    } else {
+        splats.meta.offset = offset;
+    }
 }
 
 impl Loaded {
@@ -101,6 +138,24 @@ impl SceneFile {
     pub fn of_lexi(reader: &LexiReader<'_>, name: &str, bytes: u64) -> Result<Self> {
         let loaded = Loaded::Lexi(Box::new(reader.model()?), None);
         Ok(Self { loaded, name: name.to_owned(), bytes })
+    }
+
+    /// Makes positions relative to what those of another scene are relative to, so that both can be drawn from the same
+    /// cameras. Positions of a file that cannot keep an offset are taken as relative to that of the other scene, if the
+    /// Gaussians are nearer to the origin than to the offset.
+    pub fn align(&mut self, with: &Whereabouts) {
+        let own = Whereabouts::of(&self.scene());
+        let (moves, offset) = match (own.offset, with.offset) {
+            (Some(offset), None) => (!with.is_beside(offset), None),
+            (None, Some(offset)) => (!own.is_beside(offset), Some(offset)),
+            (_, offset) => (true, offset),
+        };
+        match &mut self.loaded {
+            Loaded::Ply(read) => aligned(&mut read.splats, moves, offset),
+            Loaded::Other(read) => aligned(&mut read.splats, moves, offset),
+            Loaded::Lexi(model, _) if moves => model.rebase(offset),
+            Loaded::Lexi(..) => {}
+        }
     }
 
     /// The scene, to draw.

@@ -1,24 +1,25 @@
 //! Changes of a whole scene: cut, scaled, turned, moved, of a lower SH degree.
 
-use lexisplat::{Error, Result, ShDegree, Splats};
+use lexisplat::{Error, Offset, Result, ShDegree, Splats};
 
 use crate::turn_sh::ShRotation;
 
-/// Changes, made in the order of the fields. All are along the axes of a trainer's PLY.
+/// Changes, made in the order of the fields. All are along the axes of a trainer's PLY, in the world of the scene's file: a
+/// scene's offset counts.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Edits {
     /// SH above this degree are cut off.
     pub degree: Option<ShDegree>,
     /// Corners of a box, the lower ones first. Gaussians whose centres are outside are left out.
-    pub crop_box: Option<[[f32; 3]; 2]>,
+    pub crop_box: Option<[[f64; 3]; 2]>,
     /// Centre and radius of a sphere. Gaussians whose centres are outside are left out.
-    pub crop_sphere: Option<([f32; 3], f32)>,
+    pub crop_sphere: Option<([f64; 3], f64)>,
     /// Factor on positions and sizes, above 0.
     pub scale: Option<f64>,
     /// Angles of rotations about x, then y, then z, through the origin, in degrees.
     pub rotate: Option<[f64; 3]>,
-    /// Added to positions.
+    /// Added to positions, in double precision ([`Splats::translate`]).
     pub translate: Option<[f64; 3]>,
 }
 
@@ -34,19 +35,22 @@ impl Edits {
             *splats = splats.with_degree_cut(degree);
         }
         if self.crop_box.is_some() || self.crop_sphere.is_some() {
-            let keep: Vec<bool> = splats.geometry.positions.iter().map(|p| self.keeps(*p)).collect();
+            let offset = splats.meta.offset;
+            let keep: Vec<bool> = splats.geometry.positions.iter().map(|p| self.keeps(*p, offset)).collect();
             splats.retain(&keep);
         }
+        let offset = |splats: &Splats| Offset::numbers(splats.meta.offset);
         if let Some(scale) = self.scale {
+            splats.meta.offset = Offset::new(offset(splats).map(|v| v * scale))?;
             scale_by(splats, scale);
         }
         if let Some(angles) = self.rotate {
-            rotate_by(splats, quaternion(angles));
+            let q = quaternion(angles);
+            splats.meta.offset = Offset::new(turned(q, offset(splats)))?;
+            rotate_by(splats, q);
         }
         if let Some(by) = self.translate {
-            for position in &mut splats.geometry.positions {
-                (0..3).for_each(|k| position[k] = single(f64::from(position[k]) + by[k]));
-            }
+            splats.translate(by)?;
         }
         match splats.geometry.positions.as_flattened().iter().find(|v| !v.is_finite()) {
             Some(value) => Err(Error::parameter("position", value, "finite positions after all changes")),
@@ -68,12 +72,18 @@ impl Edits {
         finite("translate", self.translate)
     }
 
-    /// Whether a Gaussian at `position` is within box and sphere.
-    fn keeps(&self, position: [f32; 3]) -> bool {
-        let in_box = |[low, high]: [[f32; 3]; 2]| (0..3).all(|k| (low[k]..=high[k]).contains(&position[k]));
-        let in_sphere = |(centre, radius): ([f32; 3], f32)| {
-            let squares = (0..3).map(|k| (f64::from(position[k]) - f64::from(centre[k])).powi(2));
-            squares.sum::<f64>() <= f64::from(radius).powi(2)
+    /// Whether a Gaussian at `position`, relative to `offset`, is within box and sphere.
+    fn keeps(&self, position: [f32; 3], offset: Option<Offset>) -> bool {
+        let numbers = Offset::numbers(offset);
+        let position = [0, 1, 2].map(|k| f64::from(position[k]) + numbers[k]);
+        // A side that is given as 0.1 means the number that single precision has for it, unless doubles are beside it.
+        let rounded = |v: f64| if offset.is_some() { v } else { f64::from(single(v)) };
+        let in_box = |[low, high]: [[f64; 3]; 2]| {
+            (0..3).all(|k| (rounded(low[k])..=rounded(high[k])).contains(&position[k]))
+        };
+        let in_sphere = |(centre, radius): ([f64; 3], f64)| {
+            let squares = (0..3).map(|k| (position[k] - rounded(centre[k])).powi(2));
+            squares.sum::<f64>() <= rounded(radius).powi(2)
         };
         self.crop_box.is_none_or(in_box) && self.crop_sphere.is_none_or(in_sphere)
     }
@@ -198,6 +208,30 @@ mod tests {
             let found = axis(splats.geometry.rotations[i]);
             assert!((0..3).all(|k| (expected[k] - found[k]).abs() < 1e-5));
         }
+    }
+
+    /// What is done to a scene with an offset is what is done to positions with the offset.
+    #[test]
+    fn the_offset_counts() {
+        let near = sample();
+        let mut far = near.clone();
+        far.meta.offset = Offset::new([5e5, 4_649_776.0, -40.0]).unwrap();
+        let centre = near.geometry.positions[7].map(f64::from);
+        let centre = [centre[0] + 5e5, centre[1] + 4_649_776.0, centre[2] - 40.0];
+        let mut cut = far.clone();
+        let crop = Edits { crop_sphere: Some((centre, 1e-4)), ..Edits::default() };
+        crop.apply(&mut cut).unwrap();
+        assert_eq!(cut.geometry.positions, [near.geometry.positions[7]]);
+        let mut back = far.clone();
+        let edits = Edits { translate: Some([-5e5, -4_649_776.0, 40.0]), ..Edits::default() };
+        edits.apply(&mut back).unwrap();
+        assert_eq!(back, near);
+        let mut turned = far;
+        let edits = Edits { scale: Some(2.0), rotate: Some([0.0, 0.0, 90.0]), ..Edits::default() };
+        edits.apply(&mut turned).unwrap();
+        let found = Offset::numbers(turned.meta.offset);
+        let expected = [-2.0 * 4_649_776.0, 1e6, -80.0];
+        assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 1e-6), "{found:?}");
     }
 
     #[test]

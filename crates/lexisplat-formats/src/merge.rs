@@ -1,11 +1,12 @@
 //! Several scenes as one.
 
-use lexisplat::Splats;
+use lexisplat::{Splats, unite};
 
 /// Appends `next` to `scene`. SH of the lower degree become those of the higher one, with zeros. Extra properties that
 /// both do not have with the same names and types are left out; their names are returned. Comments are those of both,
-/// without repetitions.
+/// without repetitions. Positions are relative to one offset ([`unite`]).
 pub fn merge(scene: &mut Splats, mut next: Splats) -> Vec<String> {
+    unite(scene, &mut next);
     raise(scene, &next);
     raise(&mut next, scene);
     let mut lost = Vec::new();
@@ -57,13 +58,31 @@ fn raise(scene: &mut Splats, other: &Splats) {
 
 #[cfg(test)]
 mod tests {
-    use lexisplat::{Extra, ExtraValues, ShDegree};
+    use lexisplat::{Extra, ExtraValues, Offset, ShDegree};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
 
     fn extra(name: &str, values: ExtraValues) -> Extra {
         Extra { name: name.to_owned(), values }
+    }
+
+    #[test]
+    fn scenes_with_different_offsets_stay_where_they_are() {
+        let [mut a, b] = [0, 1].map(|seed| scene(&SampleOptions::new(20, seed)));
+        let mut b = b;
+        a.meta.offset = Offset::new([5e5, 0.0, 0.0]).unwrap();
+        b.meta.offset = Offset::new([5e5 + 16.0, 8.0, 0.0]).unwrap();
+        let world = |splats: &Splats, i: usize| {
+            let by = Offset::numbers(splats.meta.offset);
+            [0, 1, 2].map(|k| f64::from(splats.geometry.positions[i][k]) + by[k])
+        };
+        let expected: Vec<_> = [&a, &b].into_iter().flat_map(|s| (0..20).map(|i| world(s, i))).collect();
+        merge(&mut a, b);
+        for (i, expected) in expected.iter().enumerate() {
+            let found = world(&a, i);
+            assert!((0..3).all(|k| (found[k] - expected[k]).abs() < 1e-5), "{found:?} {expected:?}");
+        }
     }
 
     #[test]

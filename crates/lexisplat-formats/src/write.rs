@@ -1,6 +1,6 @@
 //! Writes a scene in any of the formats that can be written.
 
-use lexisplat::{Error, Progress, Result, ShDegree, Sink, Splats, ply};
+use lexisplat::{Error, Offset, Progress, Result, ShDegree, Sink, Splats, ply};
 use serde::Serialize;
 
 use crate::kind::Kind;
@@ -40,10 +40,14 @@ pub struct Lost {
     pub normals: bool,
     /// Whether the mark of anti-aliasing was left out.
     pub antialiased: bool,
+    /// The offset that was left out: positions in the file are relative to it.
+    pub offset: Option<Offset>,
     /// What values are rounded to, one phrase each; empty if they are exact.
     pub precision: Vec<String>,
     /// How many values were out of the format's range and are at its end now.
     pub limited: u64,
+    /// Which roundings are coarse against the sizes of Gaussians, one sentence each.
+    pub coarse: Vec<String>,
 }
 
 impl Lost {
@@ -54,6 +58,7 @@ impl Lost {
             extras: splats.geometry.extras.iter().map(|extra| extra.name.clone()).collect(),
             normals: !splats.geometry.normals.is_empty(),
             antialiased: splats.meta.antialiased && !antialiased,
+            offset: splats.meta.offset,
             ..Self::default()
         }
     }

@@ -1,7 +1,7 @@
 //! Scenes as NumPy arrays. What leaves is moved into arrays without a copy; what comes in is copied once.
 
 use lexisplat::sh::{CHANNELS, MAX_REST};
-use lexisplat::{Extra, ExtraValues, Geometry, SURE_OPACITY, SceneMeta, ShDegree, Splats};
+use lexisplat::{Extra, ExtraValues, Geometry, Offset, SURE_OPACITY, SceneMeta, ShDegree, Splats};
 use numpy::ndarray::ArrayView3;
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -56,6 +56,7 @@ pub(crate) fn to_python(py: Python<'_>, splats: Splats, order: ShOrder) -> PyRes
     out.set_item("extras", extras)?;
     out.set_item("comments", meta.comments)?;
     out.set_item("antialiased", meta.antialiased)?;
+    out.set_item("offset", meta.offset.map(|offset| PyArray1::from_slice(py, &offset.get())))?;
     Ok(out)
 }
 
@@ -154,10 +155,18 @@ pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
         meta: SceneMeta {
             comments: splats.getattr("comments")?.extract()?,
             antialiased: splats.getattr("antialiased")?.extract()?,
+            offset: offset(splats)?,
         },
     };
     splats.validate().map_err(|error| crate::errors::raise(py, &error.into()))?;
     Ok(splats)
+}
+
+/// The offset, of which `None` and zeros are none.
+fn offset(splats: &Bound<'_, PyAny>) -> PyResult<Option<Offset>> {
+    let numbers: Option<[f64; 3]> = splats.getattr("offset")?.extract()?;
+    let found = numbers.map_or(Ok(None), Offset::new);
+    found.map_err(|error| crate::errors::raise(splats.py(), &error.into()))
 }
 
 /// Infinite opacities as readers of files take them.

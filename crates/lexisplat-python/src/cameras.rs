@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use lexisplat::Offset;
 use lexisplat_eval::compression::judging_views;
 use lexisplat_render::{Camera, Device, Renderer, Split, orbit as orbit_around, read_views};
 use pyo3::prelude::*;
@@ -9,55 +10,57 @@ use pyo3::prelude::*;
 use crate::draw::Subject;
 use crate::work::without_gil;
 
-/// Name, width, height, focal lengths, position, rotation from camera to world, and the near plane, `train`, `test` or `None`.
-#[derive(FromPyObject, IntoPyObject)]
-pub(crate) struct CameraTuple(String, u32, u32, f32, f32, [f32; 3], [[f32; 3]; 3], f32, Option<String>);
+/// Name, width, height, focal lengths, position in the world, rotation from camera to world, the near plane, and `train`,
+/// `test` or `None`.
+#[derive(Clone, FromPyObject, IntoPyObject)]
+pub(crate) struct CameraTuple(String, u32, u32, f32, f32, [f64; 3], [[f32; 3]; 3], f32, Option<String>);
 
-impl From<Camera> for CameraTuple {
-    fn from(camera: Camera) -> Self {
+impl CameraTuple {
+    /// `camera`, which is at `position` in the world.
+    fn at(position: [f64; 3], camera: Camera) -> Self {
         let split = camera.split.map(|split| match split {
             Split::Train => "train".to_owned(),
             Split::Test => "test".to_owned(),
         });
-        Self(
-            camera.name,
-            camera.width,
-            camera.height,
-            camera.fx,
-            camera.fy,
-            camera.position,
-            camera.rotation,
-            camera.near,
-            split,
-        )
+        let Camera { name, width, height, fx, fy, rotation, near, .. } = camera;
+        Self(name, width, height, fx, fy, position, rotation, near, split)
     }
-}
 
-impl From<CameraTuple> for Camera {
-    fn from(CameraTuple(name, width, height, fx, fy, position, rotation, near, split): CameraTuple) -> Self {
+    /// The camera for a scene whose positions are relative to `offset`.
+    fn camera(self, offset: Option<Offset>) -> Camera {
+        let Self(name, width, height, fx, fy, position, rotation, near, split) = self;
+        let numbers = Offset::numbers(offset);
+        #[expect(clippy::cast_possible_truncation, reason = "what is drawn is in single precision")]
+        let position = [0, 1, 2].map(|k| (position[k] - numbers[k]) as f32);
         let split = match split.as_deref() {
             Some("train") => Some(Split::Train),
             Some("test") => Some(Split::Test),
             _ => None,
         };
-        Self { name, width, height, fx, fy, position, rotation, near, split }
+        Camera { name, width, height, fx, fy, position, rotation, near, split }
     }
 }
 
-/// What the library draws with.
-pub(crate) fn cameras(given: Vec<CameraTuple>) -> Vec<Camera> {
-    given.into_iter().map(Camera::from).collect()
+/// What the library draws a scene with whose positions are relative to `offset`.
+pub(crate) fn cameras(given: Vec<CameraTuple>, offset: Option<Offset>) -> Vec<Camera> {
+    given.into_iter().map(|camera| camera.camera(offset)).collect()
 }
 
-fn tuples(cameras: Vec<Camera>) -> Vec<CameraTuple> {
-    cameras.into_iter().map(CameraTuple::from).collect()
+/// Cameras of a scene whose positions are relative to `offset`, in the world.
+fn tuples(cameras: Vec<Camera>, offset: Option<Offset>) -> Vec<CameraTuple> {
+    let numbers = Offset::numbers(offset);
+    let of = |camera: Camera| {
+        CameraTuple::at([0, 1, 2].map(|k| f64::from(camera.position[k]) + numbers[k]), camera)
+    };
+    cameras.into_iter().map(of).collect()
 }
 
 /// Reads cameras of any kind. Returns them and warnings.
 #[pyfunction]
 pub(crate) fn read_cameras(py: Python<'_>, path: PathBuf) -> PyResult<(Vec<CameraTuple>, Vec<String>)> {
     let set = without_gil(py, None, move |_| Ok(read_views(path, &mut |_| None)?))?;
-    Ok((tuples(set.cameras), set.warnings))
+    let placed = set.positions.into_iter().zip(set.cameras);
+    Ok((placed.map(|(position, camera)| CameraTuple::at(position, camera)).collect(), set.warnings))
 }
 
 /// Cameras on a circle around the scene.
@@ -69,11 +72,11 @@ pub(crate) fn orbit(
     height: u32,
 ) -> PyResult<Vec<CameraTuple>> {
     let subject = Subject::of(scene)?;
-    let views = without_gil(scene.py(), None, move |_| {
+    without_gil(scene.py(), None, move |_| {
         let subject = subject.resolved()?;
-        Ok(orbit_around(subject.scene().geometry(), count, width, height))
-    })?;
-    Ok(tuples(views))
+        let scene = subject.scene();
+        Ok(tuples(orbit_around(scene.geometry(), count, width, height), scene.meta().offset))
+    })
 }
 
 /// Views of the scene that are like photographs, as those that judge what is compressed without cameras.
@@ -85,9 +88,10 @@ pub(crate) fn photographs(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<CameraTuple>> {
     let subject = Subject::of(scene)?;
-    let views = without_gil(scene.py(), progress, move |watch| {
+    without_gil(scene.py(), progress, move |watch| {
         let mut renderer = Renderer::open(Device::Cpu)?;
-        judging_views(&mut renderer, &subject.resolved()?.dense(), count, watch)
-    })?;
-    Ok(tuples(views))
+        let subject = subject.resolved()?;
+        let views = judging_views(&mut renderer, &subject.dense(), count, watch)?;
+        Ok(tuples(views, subject.scene().meta().offset))
+    })
 }

@@ -140,7 +140,7 @@ impl Choices {
             packing = packing.with_memory(bytes);
         }
         if let Some(views) = self.cameras {
-            packing = packing.with_cameras(cameras(views));
+            packing = packing.with_cameras(cameras(views, None));
         }
         Ok(packing.into())
     }
@@ -244,13 +244,14 @@ pub(crate) fn compress(
         Err(_) => Source::Splats(Box::new(finite_from_python(source, drop_invalid, &mut told)?)),
     };
     let (bytes, report) = without_gil(py, progress, move |watch| {
+        let views = choices.cameras.clone();
         let compression = choices.compression(device, dictionary)?;
         match source {
-            Source::Splats(splats) => run(&compression, &*splats, watch),
+            Source::Splats(splats) => run(&compression, views, &*splats, watch),
             Source::File(given) => {
                 let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes));
                 with_source(given, &name, &options, whole, watch, &mut |source| {
-                    run(&compression, source, watch)
+                    run(&compression, views.clone(), source, watch)
                 })
             }
         }
@@ -260,12 +261,19 @@ pub(crate) fn compress(
     Ok((scene, told))
 }
 
+/// Compresses `source`. The cameras `views`, which `compression` has too, are in the world.
 fn run(
     compression: &Compression,
+    views: Option<Vec<CameraTuple>>,
     source: &dyn SplatSource,
     watch: &Watch,
 ) -> Result<(Vec<u8>, lexisplat_eval::CompressionReport)> {
     let mut file = Vec::new();
+    if let (Some(views), offset @ Some(_)) = (views, source.empty().meta.offset) {
+        let compression = compression.clone().with_cameras(cameras(views, offset));
+        let report = compression.run(source, &mut file, watch)?;
+        return Ok((file, report));
+    }
     let report = compression.run(source, &mut file, watch)?;
     Ok((file, report))
 }

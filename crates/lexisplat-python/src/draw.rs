@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use lexisplat::{Model, ShDegree, Splats};
+use lexisplat::{Model, Offset, ShDegree, Splats};
 use lexisplat_eval::compression::judging_views;
 use lexisplat_eval::{Comparison, DEFAULT_MAX_WIDTH, DrawOptions, compare as compare_scenes, draw_views};
 use lexisplat_render::{Device, Image, Renderer, Scene as Drawable};
@@ -59,6 +59,22 @@ impl Resolved {
         }
     }
 
+    /// What positions are relative to.
+    pub(crate) fn offset(&self) -> Option<Offset> {
+        self.scene().meta().offset
+    }
+
+    /// Makes positions relative to `offset`.
+    fn rebase(&mut self, offset: Option<Offset>) {
+        if self.offset() == offset {
+            return;
+        }
+        match self {
+            Self::Dense(splats) => drop(splats.rebase(offset)),
+            Self::Sparse(model) => Arc::make_mut(model).rebase(offset),
+        }
+    }
+
     /// The scene with dense SH.
     pub(crate) fn dense(&self) -> Cow<'_, Splats> {
         match self {
@@ -88,11 +104,12 @@ pub(crate) fn render<'py>(
     progress: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<(Vec<Bound<'py, PyArray3<f32>>>, Vec<String>)> {
     let mut told = Vec::new();
-    let (views, device) = (cameras(views), device(py, device_name)?);
+    let device = device(py, device_name)?;
     let subject = Subject::dropping(scene, drop_invalid, &mut told)?;
     let degree = max_degree.map(ShDegree::new).transpose().map_err(|error| raise(py, &error.into()))?;
     let images = without_gil(py, progress, move |watch| {
         let resolved = subject.resolved()?;
+        let views = cameras(views, resolved.offset());
         let options = DrawOptions::new(background, false).with_max_degree(degree);
         draw_views(&mut Renderer::open(device)?, &resolved.scene(), &views, &options, watch)
     })?;
@@ -124,12 +141,12 @@ pub(crate) fn compare<'py>(
     let (device, mut told) = (device(py, device_name)?, Vec::new());
     let a = Subject::dropping(a, drop_invalid, &mut told)?;
     let b = Subject::dropping(b, drop_invalid, &mut told)?;
-    let views = views.map(cameras);
     let found: Comparison = without_gil(py, progress, move |watch| {
-        let (a, b) = (a.resolved()?, b.resolved()?);
+        let (a, mut b) = (a.resolved()?, b.resolved()?);
+        b.rebase(a.offset());
         let mut renderer = Renderer::open(device)?;
         let views = match views {
-            Some(views) => views,
+            Some(views) => cameras(views, a.offset()),
             None => {
                 let found = judging_views(&mut renderer, &a.dense(), count, watch)?;
                 found.iter().map(|camera| camera.with_max_width(DEFAULT_MAX_WIDTH)).collect()

@@ -134,6 +134,12 @@ impl Scene {
         Ok(self.reader(py)?.layout().name())
     }
 
+    /// What positions are relative to.
+    #[getter]
+    fn offset(&self, py: Python<'_>) -> PyResult<Option<[f64; 3]>> {
+        Ok(self.reader(py)?.meta().offset.map(lexisplat::Offset::get))
+    }
+
     /// The report of the compression as JSON, or `None` of a file that was opened.
     #[getter]
     fn report_json(&self) -> Option<&str> {
@@ -174,6 +180,7 @@ impl Scene {
                 "device": head.map(|head| head.device.as_deref().unwrap_or("cpu")),
                 "order_kept": reader.order_kept(),
                 "antialiased": reader.meta().antialiased,
+                "offset": reader.meta().offset,
                 "comments": reader.meta().comments,
                 "extras": reader.empty().geometry.extras.iter().map(|e| e.name.as_str()).collect::<Vec<_>>(),
             }))

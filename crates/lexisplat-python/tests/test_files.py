@@ -30,6 +30,31 @@ def test_every_format_is_written_and_read(extension: str, splats: lx.Splats, tmp
         np.testing.assert_array_equal(read.means, again.means)
 
 
+def test_an_offset_is_kept_and_put_back(tmp_path: Path) -> None:
+    offset = np.array([500_000.0, 4_649_776.0, -128.0])
+    splats = make(200)
+    splats.offset = offset
+    world = splats.means.astype(np.float64) + offset
+    lost = lx.save(tmp_path / "a.ply", splats)
+    with pytest.warns(lx.LexisplatWarning, match="kept relative"):
+        read = lx.load(tmp_path / "a.ply")
+    assert lost["offset"] is None
+    assert read.offset is not None
+    assert read.means.dtype == np.float32
+    np.testing.assert_allclose(read.means + read.offset, world, atol=1e-6)
+    scene = lx.compress(read, layout="f32")
+    np.testing.assert_array_equal(scene.offset, read.offset)
+    np.testing.assert_array_equal(scene.decode()[:9].offset, read.offset)
+    lost = lx.save(tmp_path / "a.spz", read)
+    assert lost["offset"] == read.offset.tolist()
+    views = lx.orbit(read, 2, width=32, height=32)
+    assert abs(views[0].position[0] - offset[0]) < 100
+    near = make(200)
+    pictures = lx.render(near, [view.relative_to(read.offset) for view in views])
+    for far, picture in zip(lx.render(read, views), pictures, strict=True):
+        assert np.abs(far - picture).mean() < 0.05
+
+
 def test_golden_files_are_read(golden: Path) -> None:
     for path in sorted(golden.glob("*.lexi")):
         scene = lx.open(path) if "dictionary" not in path.name else None

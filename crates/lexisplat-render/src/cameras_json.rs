@@ -19,6 +19,11 @@ pub(crate) const MAX_NAME: usize = 1024;
 /// [`lexisplat::Error::Format`] naming the camera, by its position from 0, and the field, if the text is not such
 /// a list, a value is out of range, or it is over [`crate::MAX_CAMERAS_BYTES`] or [`MAX_CAMERAS`].
 pub fn read_cameras_bytes(file: &str, bytes: &[u8]) -> Result<Vec<Camera>> {
+    Ok(read_placed(file, bytes)?.into_iter().map(|placed| placed.0).collect())
+}
+
+/// [`read_cameras_bytes`] with the positions before rounding.
+pub(crate) fn read_placed(file: &str, bytes: &[u8]) -> Result<Vec<(Camera, [f64; 3])>> {
     let list = List {
         expected: "a list of cameras as INRIA's cameras.json".to_owned(),
         most: MAX_CAMERAS,
@@ -41,7 +46,7 @@ struct CameraFields {
 }
 
 impl Fields for CameraFields {
-    type Value = Camera;
+    type Value = (Camera, [f64; 3]);
 
     fn read<'de, A: MapAccess<'de>>(&mut self, key: &str, map: &mut A) -> Result<bool, A::Error> {
         match key {
@@ -57,7 +62,7 @@ impl Fields for CameraFields {
         }
     }
 
-    fn finish(self, about: &str) -> Result<Camera, String> {
+    fn finish(self, about: &str) -> Result<(Camera, [f64; 3]), String> {
         let name = required(self.name, "img_name", about)?;
         if name.len() > MAX_NAME {
             return Err(format!("{about}field 'img_name' is over the limit of {MAX_NAME} bytes"));
@@ -82,7 +87,7 @@ impl Fields for CameraFields {
         let camera = Camera { split, ..Camera::rounded(name, size, focal, position, rotation) };
         let index = about.trim_end_matches(": ");
         camera.validate().map_err(|e| format!("{index} ('{}'): {e}", camera.name))?;
-        Ok(camera)
+        Ok((camera, position))
     }
 }
 

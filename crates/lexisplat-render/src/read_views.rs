@@ -5,7 +5,9 @@ use std::path::Path;
 
 #[cfg(not(target_family = "wasm"))]
 use crate::camera::Camera;
+#[cfg(not(target_family = "wasm"))]
 use crate::cameras_json::read_cameras_bytes;
+use crate::cameras_json::read_placed;
 use crate::colmap;
 use crate::error::{Error, Result};
 use crate::transforms::{self, read_transforms_bytes};
@@ -41,14 +43,14 @@ pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) ->
     ))
 }
 
-/// Reads the cameras in `bytes`: a JSON list as [`read_cameras_bytes`], a JSON object as
+/// Reads the cameras in `bytes`: a JSON list as [`crate::read_cameras_bytes`], a JSON object as
 /// [`read_transforms_bytes`]. `file` stands for them in errors.
 ///
 /// # Errors
 /// [`lexisplat::Error::Format`] if they are neither; otherwise as those two.
 pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
     match bytes.iter().find(|byte| !byte.is_ascii_whitespace()) {
-        Some(b'[') => Ok(ViewSet { cameras: read_cameras_bytes(file, bytes)?, warnings: Vec::new() }),
+        Some(b'[') => Ok(ViewSet::new(read_placed(file, bytes)?, Vec::new())),
         Some(b'{') => read_transforms_bytes(file, bytes, size_of),
         _ => Err(Error::format(
             file,

@@ -1,6 +1,8 @@
 //! A set of cameras, with warnings about the files they were read from.
 
-use crate::camera::Camera;
+use lexisplat::Offset;
+
+use crate::camera::{Camera, single};
 
 /// A principal point farther than this from the picture's centre, in pixels on either axis, is worth a
 /// warning. Rounding a picture's size moves it by as much.
@@ -11,8 +13,30 @@ const CENTRE_SLACK: f64 = 0.5;
 pub struct ViewSet {
     /// The cameras; every one passes [`Camera::validate`].
     pub cameras: Vec<Camera>,
+    /// Where each camera is, before it was rounded.
+    pub positions: Vec<[f64; 3]>,
     /// What was ignored or looks wrong, one sentence each.
     pub warnings: Vec<String>,
+}
+
+impl ViewSet {
+    /// Cameras with their positions before rounding.
+    pub(crate) fn new(placed: Vec<(Camera, [f64; 3])>, warnings: Vec<String>) -> Self {
+        let (cameras, positions) = placed.into_iter().unzip();
+        Self { cameras, positions, warnings }
+    }
+
+    /// The cameras for a scene whose positions are relative to `offset`, which is subtracted in double precision. Without
+    /// one nothing changes.
+    #[must_use]
+    pub fn relative_to(mut self, offset: Option<Offset>) -> Self {
+        let Some(offset) = offset.map(Offset::get) else { return self };
+        for (camera, position) in self.cameras.iter_mut().zip(&mut self.positions) {
+            *position = [0, 1, 2].map(|k| position[k] - offset[k]);
+            camera.position = position.map(single);
+        }
+        self
+    }
 }
 
 /// Returns the width and height, in pixels, of the photo of a name; `None` if they are not known. It is asked
@@ -53,6 +77,32 @@ impl PrincipalPoints {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The camera is 0.015625 beside the offset, which single precision cannot tell from it.
+    #[test]
+    fn an_offset_is_subtracted_before_rounding() {
+        let far = [500_000.015_625, 4_649_776.5, -3.0];
+        let list = format!(
+            r#"[{{"img_name": "a", "width": 8, "height": 8, "fx": 8, "fy": 8, "position": {far:?},
+                "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}}]"#
+        );
+        let transforms = format!(
+            r#"{{"w": 8, "h": 8, "fl_x": 8, "frames": [{{"file_path": "a", "transform_matrix":
+                [[1, 0, 0, {}], [0, 1, 0, {}], [0, 0, 1, {}], [0, 0, 0, 1]]}}]}}"#,
+            far[0], far[1], far[2]
+        );
+        let model = |x: f64| format!("1 1 0 0 0 {x} {} {} 1 a\n\n", -far[1], -far[2]);
+        let colmap =
+            crate::read_colmap_text("m", b"1 PINHOLE 8 8 8 8 4 4\n", model(-far[0]).as_bytes()).unwrap();
+        let read = |text: &str| crate::read_views_bytes("v", text.as_bytes(), &mut |_| None).unwrap();
+        let offset = Offset::new([500_000.0, 4_649_776.0, 0.0]).unwrap();
+        for set in [read(&list), read(&transforms), colmap] {
+            assert_eq!(set.clone().relative_to(None), set);
+            let set = set.relative_to(offset);
+            assert_eq!(set.cameras[0].position, [0.015_625, 0.5, -3.0]);
+            assert_eq!(set.positions[0], [0.015_625, 0.5, -3.0]);
+        }
+    }
 
     #[test]
     fn principal_points_are_told_once() {

@@ -93,7 +93,12 @@ pub fn scene(options: &SampleOptions) -> Splats {
         sh_rest.extend_from_slice(&g.rest);
     }
     let comments = vec![format!("lexisplat sample scene, seed {}", options.seed)];
-    Splats { geometry, degree: ShDegree::THREE, sh_rest, meta: SceneMeta { comments, antialiased: false } }
+    Splats {
+        geometry,
+        degree: ShDegree::THREE,
+        sh_rest,
+        meta: SceneMeta { comments, ..SceneMeta::default() },
+    }
 }
 
 /// Returns the number of Gaussians of each thing; they sum to `total`.

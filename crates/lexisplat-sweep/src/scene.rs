@@ -121,7 +121,8 @@ impl Evaluator<'_> {
         }
         let source_bytes = read.bytes;
         let splats = read.into_splats()?;
-        let found = find_views(&self.view_options(entry), &splats.geometry)?;
+        let options = ViewOptions { offset: splats.meta.offset, ..self.view_options(entry) };
+        let found = find_views(&options, &splats.geometry)?;
         for warning in &found.warnings {
             self.progress.warn(&entry.name, warning);
         }

@@ -62,6 +62,8 @@ pub use formats::lexi::{CodeLayout, Layout};
 pub use formats::{lexi, ply};
 pub use scene::extra::{Extra, ExtraValues};
 pub use scene::joined::Joined;
+pub use scene::offset::{Offset, unite};
+pub use scene::rounding::Rounding;
 pub use scene::sensitivity::Sensitivity;
 pub use scene::sh::ShDegree;
 pub use scene::source::SplatSource;

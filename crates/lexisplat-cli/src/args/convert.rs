@@ -52,7 +52,8 @@ pub(crate) struct Convert {
     /// rotate too.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, help_heading = CHANGES)]
     pub(crate) rotate: Option<[f64; 3]>,
-    /// Move the scene.
+    /// Move the scene. This is done in double precision: what single precision cannot hold stays an offset of the scene,
+    /// and an offset goes away with its opposite.
     #[arg(long, value_name = "X,Y,Z", value_parser = numbers::<3>, allow_hyphen_values = true, help_heading = CHANGES)]
     pub(crate) translate: Option<[f64; 3]>,
     /// Version of SPZ: 2, 3 or 4 [default: 4].
@@ -77,9 +78,8 @@ impl Convert {
     pub(crate) fn edits(&self) -> Result<Edits, lexisplat::Error> {
         let mut edits = Edits::default();
         edits.degree = self.degree.map(ShDegree::new).transpose()?;
-        edits.crop_box =
-            self.crop_box.map(|[a, b, c, x, y, z]| [[a, b, c], [x, y, z]].map(|v| v.map(single)));
-        edits.crop_sphere = self.crop_sphere.map(|[x, y, z, r]| ([x, y, z].map(single), single(r)));
+        edits.crop_box = self.crop_box.map(|[a, b, c, x, y, z]| [[a, b, c], [x, y, z]]);
+        edits.crop_sphere = self.crop_sphere.map(|[x, y, z, r]| ([x, y, z], r));
         edits.scale = self.scale;
         edits.rotate = self.rotate;
         edits.translate = self.translate;
@@ -95,11 +95,6 @@ impl Convert {
         options.glb_spz = self.glb_spz;
         options
     }
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "positions are in single precision")]
-fn single(x: f64) -> f32 {
-    x as f32
 }
 
 /// Returns the parser of a format that can be written, which also lists the names in the help.

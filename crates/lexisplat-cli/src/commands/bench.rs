@@ -26,7 +26,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = super::cameras(views, scene.geometry())?;
+    let cameras = super::cameras(views, &scene)?;
     let gpu = open_gpu(views.device)?;
     if gpu.is_none() && views.device == Device::Auto {
         note(

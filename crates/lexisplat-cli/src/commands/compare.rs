@@ -6,7 +6,9 @@ use anyhow::Result;
 use lexisplat::{Model, Progress};
 use lexisplat_eval::compression::judging_views;
 use lexisplat_eval::metrics::Metric;
-use lexisplat_eval::{Comparison, DrawOptions, Loaded, SceneFile, SceneKind, compare, format, montage, png};
+use lexisplat_eval::{
+    Comparison, DrawOptions, Loaded, SceneFile, SceneKind, Whereabouts, compare, format, montage, png,
+};
 use lexisplat_render::{Camera, Renderer};
 use serde_json::json;
 
@@ -19,7 +21,8 @@ use crate::progress::Bars;
 use crate::stop::{self, Work};
 
 pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
-    let (a, b) = (load(&args.a, common)?, load(&args.b, common)?);
+    let (a, mut b) = (load(&args.a, common)?, load(&args.b, common)?);
+    b.align(&Whereabouts::of(&a.scene()));
     warn_of(&a);
     warn_of(&b);
     let (scene_a, scene_b) = (a.scene(), b.scene());
@@ -29,7 +32,7 @@ pub(crate) fn run(args: &Compare, common: &Common) -> Result<()> {
     let found = views.cameras.is_none() && views.scene == SceneKind::Auto;
     let cameras = match found {
         true => photographs(&a, views, &mut renderer, &bars)?,
-        false => super::cameras(views, scene_a.geometry())?,
+        false => super::cameras(views, &scene_a)?,
     };
     let mut saved = Vec::new();
     if let Some(folder) = &args.save_views {

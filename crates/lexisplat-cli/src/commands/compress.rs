@@ -15,7 +15,7 @@ use lexisplat::{
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_formats::{Opened, open};
-use lexisplat_render::{Camera, read_views};
+use lexisplat_render::{Camera, ViewSet, read_views};
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
@@ -54,7 +54,9 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         Some(_) => Work::Files(2),
     });
     let limits = common.limits()?;
-    let compression = compression(args, &limits)?;
+    let given = args.cameras.as_ref().map(|path| read_views(path, &mut |_| None)).transpose()?;
+    warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
+    let mut compression = compression(args, given.as_ref(), &limits)?;
     if args.prune.is_some() && !common.quiet {
         note(
             "note: --prune does nothing of its own: packed files leave out what hardly shows (--keep-all keeps it)",
@@ -84,6 +86,9 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
             (output.display().to_string(), &joined as &dyn SplatSource)
         }
     };
+    if let (Some(set), Some(offset)) = (given, source.empty().meta.offset) {
+        compression = compression.with_cameras(set.relative_to(Some(offset)).cameras);
+    }
     let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
         compression.run(source, sink, &bars).map_err(|error| match error {
@@ -126,7 +131,7 @@ pub(crate) fn source_to_compress<'a>(name: &str, opened: &'a Opened<'_>) -> Resu
 }
 
 /// The choices of the library that the options mean.
-fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
+fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Result<Compression> {
     let layout = args.chosen_layout()?;
     if layout != Layout::Packed {
         return Ok(Compression::Exact(exact(args, layout, limits)?, layout.codes()));
@@ -148,14 +153,12 @@ fn compression(args: &Compress, limits: &Limits) -> Result<Compression> {
         .with_scene_kind(args.scene.unwrap_or_default())
         .with_max_gaussians(args.max_gaussians)
         .with_memory(args.memory);
-    if let Some(path) = &args.cameras {
-        let set = read_views(path, &mut |_| None)?;
-        warn("cameras", &set.warnings);
+    if let Some(set) = given {
         let near = |camera: Camera| match args.near {
             Some(near) => camera.with_near(near),
             None => camera,
         };
-        packing = packing.with_cameras(set.cameras.into_iter().map(near).collect());
+        packing = packing.with_cameras(set.cameras.iter().cloned().map(near).collect());
     }
     Ok(packing.into())
 }

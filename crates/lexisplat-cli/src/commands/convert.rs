@@ -6,9 +6,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Input, Splats};
+use lexisplat::{Input, Splats, unite};
 use lexisplat_eval::compression::judging_views;
-use lexisplat_eval::{Compression, DrawOptions, Packing, SceneFile, compare, format};
+use lexisplat_eval::{Compression, DrawOptions, Packing, SceneFile, Whereabouts, compare, format};
 use lexisplat_formats::{Kind, Lost, merge, open, write};
 use lexisplat_render::{Device, Scene};
 use serde_json::{Value, json};
@@ -20,6 +20,8 @@ use crate::files::{check_output, input, is_pipe, siblings, tell, warn, write_out
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
+/// What rounds when scenes become one.
+const UNITED: &str = "32-bit floats, relative to one offset for all scenes,";
 /// Views that --psnr draws.
 const VIEWS: usize = 8;
 
@@ -41,6 +43,7 @@ pub(crate) fn run(args: &Convert, common: &Common) -> Result<()> {
         kind => Ok(write(kind, &splats, &args.write_options(), sink, &bars)?),
     })?;
     lost.extras.extend(lost_extras);
+    warn(&output.display().to_string(), &lost.coarse);
     if is_pipe(output) {
         return Ok(());
     }
@@ -119,7 +122,7 @@ fn read_all(
         bytes_in += bytes.len() as u64;
         let opened = open(&name, &bytes, siblings(&name), &options, true, bars)?;
         warn(&name, opened.source().warnings());
-        let next = opened.source().whole()?.into_owned();
+        let mut next = opened.source().whole()?.into_owned();
         match &mut all {
             None => all = Some(next),
             Some(all) => {
@@ -128,6 +131,7 @@ fn read_all(
                         "only some of the scenes were trained with anti-aliasing; the first one decides";
                     warn(&name, &[said.to_owned()]);
                 }
+                warn(&name, unite(all, &mut next).warning(UNITED).as_slice());
                 for name in merge(all, next) {
                     if !lost.contains(&name) {
                         lost.push(name);
@@ -144,7 +148,8 @@ fn read_all(
 fn psnr(output: &Path, splats: &Splats, common: &Common, bars: &Bars) -> Result<Value> {
     let options = ReadOptions::default().with_limits(common.limits()?);
     let bytes = Input::open_within(output, &options.limits)?;
-    let written = SceneFile::read_bytes(&output.display().to_string(), &bytes, &options)?;
+    let mut written = SceneFile::read_bytes(&output.display().to_string(), &bytes, &options)?;
+    written.align(&Whereabouts::of(&Scene::from(splats)));
     let mut renderer = open_renderer(Device::Cpu)?;
     let cameras = judging_views(&mut renderer, splats, VIEWS, bars)?;
     let draw = DrawOptions::default();
@@ -167,6 +172,9 @@ fn lost_lines(lost: &Lost) -> Vec<String> {
     }
     if lost.normals {
         lines.push("normals".to_owned());
+    }
+    if let Some(offset) = lost.offset {
+        lines.push(format!("the offset {offset}: positions are relative to it"));
     }
     if lost.antialiased {
         lines.push("the mark that the scene was trained with anti-aliasing".to_owned());

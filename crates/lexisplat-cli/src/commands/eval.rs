@@ -4,9 +4,10 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use lexisplat_eval::views::{ChosenViews, View, find_views, photo};
+use lexisplat_eval::views::{ChosenViews, View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, draw_views, format, misfit, montage, png, score_views,
+    Comparison, DrawOptions, SceneFile, Scorer, Whereabouts, draw_views, format, misfit, montage, png,
+    score_views,
 };
 use lexisplat_render::{Camera, Image};
 use serde::Serialize;
@@ -76,7 +77,9 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         None => Some(load(&args.models[0], common)?),
     };
     let Some(reference) = original.as_ref().or(first.as_ref()) else { return Ok(()) };
-    let found = find_views(&args.views.options(Some(&args.photos)), reference.scene().geometry())?;
+    let (offset, place) = (reference.scene().meta().offset, Whereabouts::of(&reference.scene()));
+    let options = ViewOptions { offset, ..args.views.options(Some(&args.photos)) };
+    let found = find_views(&options, reference.scene().geometry())?;
     warn("views", &found.warnings);
     let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
     let photos = photos(&found, args.views.background)?;
@@ -92,10 +95,11 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     let mut warnings = found.warnings;
     let mut first = first;
     for path in &args.models {
-        let model = match first.take() {
+        let mut model = match first.take() {
             Some(model) => model,
             None => load(path, common)?,
         };
+        model.align(&place);
         warn_of(&model);
         let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &bars)?;
         let against = |references: &[Image]| {

@@ -20,10 +20,10 @@ mod view;
 
 use anyhow::{Context, Result};
 
+use lexisplat::Error;
 use lexisplat::simd::Simd;
-use lexisplat::{Error, Geometry};
-use lexisplat_eval::views::find_views;
-use lexisplat_render::Camera;
+use lexisplat_eval::views::{ViewOptions, find_views};
+use lexisplat_render::{Camera, Scene};
 
 use crate::args::{Cli, Command, Views};
 use crate::progress;
@@ -94,8 +94,9 @@ fn allowed_threads(asked: usize) -> usize {
 }
 
 /// Returns the cameras that `views` mean for a scene, and prints what is odd about them.
-fn cameras(views: &Views, geometry: &Geometry) -> lexisplat_eval::Result<Vec<Camera>> {
-    let found = find_views(&views.options(None), geometry)?;
+fn cameras(views: &Views, scene: &Scene<'_>) -> lexisplat_eval::Result<Vec<Camera>> {
+    let options = ViewOptions { offset: scene.meta().offset, ..views.options(None) };
+    let found = find_views(&options, scene.geometry())?;
     warn("views", &found.warnings);
     Ok(found.views.into_iter().map(|view| view.camera).collect())
 }

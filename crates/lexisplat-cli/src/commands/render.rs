@@ -23,7 +23,7 @@ pub(crate) fn run(args: &Render, common: &Common) -> Result<()> {
     warn_of(&input);
     let scene = input.scene();
     let views = &args.views;
-    let cameras = super::cameras(views, scene.geometry())?;
+    let cameras = super::cameras(views, &scene)?;
     let paths: Vec<PathBuf> =
         cameras.iter().enumerate().map(|(i, c)| folder.join(view_name(i, cameras.len(), &c.name))).collect();
     for path in &paths {

@@ -32,6 +32,17 @@ pub enum Compression {
     Heuristic(Preset, PackOptions),
 }
 
+impl Compression {
+    /// The same with these cameras ([`Packing::with_cameras`]), if it is one that draws.
+    #[must_use]
+    pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
+        match self {
+            Self::Packed(packing) => Self::Packed(packing.with_cameras(cameras)),
+            other => other,
+        }
+    }
+}
+
 impl From<CompressOptions> for Compression {
     fn from(options: CompressOptions) -> Self {
         Self::Exact(options, CodeLayout::default())
@@ -109,7 +120,8 @@ impl Packing {
         Self { options, ..self }
     }
 
-    /// Measures and judges by these cameras instead of generated ones. [`Compression::run`] refuses fewer than
+    /// Measures and judges by these cameras instead of generated ones. Their positions are relative to the scene's
+    /// [offset](lexisplat::SceneMeta::offset), as those of Gaussians are. [`Compression::run`] refuses fewer than
     /// two.
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {

@@ -10,7 +10,7 @@ mod tests;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use lexisplat::Geometry;
+use lexisplat::{Geometry, Offset};
 use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orbit, read_views};
 
 use crate::error::{Error, Result};
@@ -77,6 +77,8 @@ pub struct ViewOptions {
     /// Divisor of the photos' size: 1, 2, 4 or 8. The photos come from the folder of this divisor beside the given
     /// one (`images_4`), or are scaled when they are read. Without photos the cameras are scaled.
     pub resolution: Option<u32>,
+    /// The offset of the scene's positions, in whose world given cameras are: it is subtracted from theirs.
+    pub offset: Option<Offset>,
 }
 
 impl Default for ViewOptions {
@@ -91,6 +93,7 @@ impl Default for ViewOptions {
             images: None,
             near: None,
             resolution: None,
+            offset: None,
         }
     }
 }
@@ -136,7 +139,8 @@ pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenVi
         return Ok(found);
     };
     let photos = options.images.as_deref().map(|images| PhotoFolder::open(images, divisor)).transpose()?;
-    let ViewSet { cameras, mut warnings } = read(source, photos.as_ref())?;
+    let set = read(source, photos.as_ref())?.relative_to(options.offset);
+    let ViewSet { cameras, mut warnings, .. } = set;
     let cameras = split::filter(cameras, options.split, options.hold)?;
     let views = match &photos {
         Some(photos) => {

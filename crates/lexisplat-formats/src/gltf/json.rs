@@ -2,9 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use lexisplat::Offset;
 use serde::Serialize;
 
 use super::document::Shape;
+use super::place::GLTF;
 
 /// `componentType` of floats of 32 bits.
 const FLOAT: u32 = 5126;
@@ -46,6 +48,8 @@ struct SceneNodes {
 #[derive(Debug, Serialize)]
 struct Node {
     mesh: usize,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    translation: Option<[f64; 3]>,
 }
 
 #[derive(Debug, Serialize)]
@@ -139,6 +143,18 @@ impl Attribute {
 }
 
 impl Root {
+    /// Moves the splats by `offset`, which is along a trainer's axes.
+    pub(super) fn set_translation(&mut self, offset: Option<Offset>) {
+        let signs = GLTF.map(|change| if change { -1.0 } else { 1.0 });
+        let along = |offset: Offset| {
+            let numbers = offset.get();
+            [0, 1, 2].map(|k| signs[k] * numbers[k])
+        };
+        for node in &mut self.nodes {
+            node.translation = offset.map(along);
+        }
+    }
+
     /// Of `count` splats with `attributes`, the first of which are positions between `bounds`. The attributes lie one after
     /// another in the buffer; if there is an SPZ of `spz` bytes, the buffer holds that alone.
     pub(super) fn new(
@@ -191,7 +207,7 @@ impl Root {
             extensions_used,
             scene: 0,
             scenes: [SceneNodes { nodes: [0] }],
-            nodes: [Node { mesh: 0 }],
+            nodes: [Node { mesh: 0, translation: None }],
             meshes: [Mesh { primitives: [primitive] }],
             accessors,
             buffer_views: views,

@@ -85,7 +85,7 @@ pub(crate) fn read<'a>(name: &str, bytes: &'a [u8], options: &ReadOptions) -> Re
     // Many nodes may show one mesh. The limit of bytes is that of parts, and their reader checks it.
     let each = size_of::<f32>() * (3 + 3 + 1 + 3 + 4 + degree.rest());
     options.limits.with_bytes(u64::MAX).check_arrays(name, file_bytes, len, each)?;
-    let meta = SceneMeta { antialiased, ..SceneMeta::default() };
+    let meta = SceneMeta { antialiased, offset: scene.settle_offset(), ..SceneMeta::default() };
     Ok(Described { rows: Box::new(scene), len, degree, meta, warnings, facts })
 }
 

@@ -1,6 +1,6 @@
 //! Where a primitive's splats are along the axes of a trainer's PLY.
 
-use lexisplat::{Error, Result, ShDegree};
+use lexisplat::{Error, Offset, Result, ShDegree};
 
 use super::nodes::Matrix;
 use crate::axes::Flip;
@@ -69,6 +69,17 @@ impl Place {
         let x = if is_mirrored { x.map(|v| -v) } else { x };
         let flip = Flip::of([is_mirrored, false, false]);
         Ok(Self { flip, turn: Some(quaternion([x, y, z])), scale, translation, is_mirrored })
+    }
+
+    /// Where the origin of the splats is.
+    pub(super) fn translation(&self) -> [f64; 3] {
+        self.translation
+    }
+
+    /// Puts the splats where they are relative to `offset`.
+    pub(super) fn rebase(&mut self, offset: Offset) {
+        let numbers = offset.get();
+        self.translation = [0, 1, 2].map(|k| self.translation[k] - numbers[k]);
     }
 
     /// Puts the splats of `out`, of `degree`, in their place.

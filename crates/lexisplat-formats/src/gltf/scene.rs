@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use lexisplat::ply::ReadOptions;
-use lexisplat::{Error, Result, ShDegree};
+use lexisplat::{Error, Offset, Result, Rounding, ShDegree};
 
 use super::buffers::Buffers;
 use super::columns::Accessors;
@@ -16,6 +16,11 @@ use super::primitive::{Found, Source};
 use super::warn;
 use crate::rows::{Rows, RowsMut};
 use crate::spz;
+
+/// Gaussians whose sizes say whether single precision is too coarse for a translation.
+const SAMPLE: usize = 4096;
+/// Half the distance of neighbouring values in single precision is at most this share of them.
+const HALF_STEP: f64 = 1.0 / (1_u64 << 24) as f64;
 
 /// An SPZ of a bufferView.
 #[derive(Clone)]
@@ -71,6 +76,34 @@ impl<'a> Scene<'a> {
     /// Whether all parts have the mark of anti-aliasing, which only an SPZ has.
     pub(super) fn is_antialiased(&self) -> bool {
         self.parts.iter().all(|part| matches!(&part.splats, Splats::Packed(packed) if packed.antialiased))
+    }
+
+    /// Takes the translation of the first part off all of them and returns it, if single precision is too coarse so far
+    /// from the origin for the sizes of the first Gaussians.
+    pub(super) fn settle_offset(&mut self) -> Option<Offset> {
+        let translation = self.parts.first()?.place.translation();
+        let offset = Offset::new(translation).ok()??;
+        let most = translation.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+        let n = self.len().min(SAMPLE);
+        let (mut positions, mut dc, mut scales) = (vec![[0.0; 3]; n], vec![[0.0; 3]; n], vec![[0.0; 3]; n]);
+        let (mut opacities, mut rotations) = (vec![0.0; n], vec![[0.0; 4]; n]);
+        let mut sh_rest = vec![0.0; n * self.degree.rest()];
+        let out = RowsMut {
+            positions: &mut positions,
+            dc: &mut dc,
+            opacities: &mut opacities,
+            scales: &mut scales,
+            rotations: &mut rotations,
+            sh_rest: &mut sh_rest,
+        };
+        self.fill(0..n, out);
+        let sizes = scales.into_iter().map(Rounding::size_of).filter(|size| size.is_finite()).collect();
+        let rounding = Rounding { error: most * HALF_STEP, size: Rounding::median(sizes) };
+        if !rounding.is_coarse() {
+            return None;
+        }
+        self.parts.iter_mut().for_each(|part| part.place.rebase(offset));
+        Some(offset)
     }
 
     /// Adds the splats of all of `found`.

@@ -45,9 +45,10 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
     let kept = cut.as_ref().unwrap_or(splats);
     let attributes = attributes(kept.degree);
     let mut lost = Lost::beside(splats, kept.degree, options.glb_spz);
-    let (root, bin) = if options.glb_spz {
+    let (mut root, bin) = if options.glb_spz {
         let (spz, lost_in_spz) = spz::write(kept, &WriteOptions { spz_version: SPZ_VERSION, ..*options })?;
         (lost.precision, lost.limited) = (lost_in_spz.precision, lost_in_spz.limited);
+        lost.coarse = lost_in_spz.coarse;
         (Root::new(kept.len(), &attributes, flipped(spz_bounds(&spz)?), Some(spz.len())), spz)
     } else {
         let width: usize = attributes.iter().map(Attribute::width).sum();
@@ -57,6 +58,8 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
         let bounds = bounds(kept.geometry.positions.iter().copied());
         (Root::new(kept.len(), &attributes, flipped(bounds), None), bin)
     };
+    root.set_translation(splats.meta.offset);
+    lost.offset = None;
     Ok((glb(&root, &bin)?, lost))
 }
 

@@ -231,6 +231,22 @@ mod tests {
         WriteOptions { spz_version: version, ..WriteOptions::default() }
     }
 
+    /// What is said of scenes at the origin, far away, and of those with an offset.
+    #[test]
+    fn steps_that_are_coarse_far_away_are_told() {
+        let near = scene(&SampleOptions::new(60, 1));
+        let lost = |splats: &Splats| write(splats, &crate::WriteOptions::default()).unwrap().1;
+        assert_eq!(lost(&near).coarse, [""; 0]);
+        let mut far = near.clone();
+        far.geometry.positions.iter_mut().for_each(|p| p[0] += 500_000.0);
+        let said = lost(&far).coarse.join("");
+        assert!(said.contains("the steps of SPZ, of 0.0625, move positions by up to 0.031, and"), "{said}");
+        let mut offset = near;
+        offset.meta.offset = lexisplat::Offset::new([500_000.0, 0.0, 0.0]).unwrap();
+        let lost = lost(&offset);
+        assert_eq!((lost.offset, lost.coarse.len()), (offset.meta.offset, 0));
+    }
+
     #[test]
     fn what_is_written_is_read_within_the_quantum_and_written_again() {
         for degree in 0..=4 {

@@ -1,7 +1,7 @@
 //! Writes SPZ.
 
 use lexisplat::sh::{CHANNELS, COLOUR_OFFSET};
-use lexisplat::{Error, Result, Splats};
+use lexisplat::{Error, Result, Rounding, Splats};
 
 use super::header::{FIRST_ZSTD, Header, STREAMS};
 use super::inflate::{gzip, zstd};
@@ -47,6 +47,7 @@ pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>,
         table: None,
     };
     lost.precision.push(format!("positions to 1/{}", 1_u64 << header.fraction));
+    lost.coarse.extend(coarse(splats, header.fraction));
     lost.precision.push("logarithms of scales to 1/16".to_owned());
     lost.precision.push("colours and opacities to 8 bits".to_owned());
     lost.precision.push(format!("rotations to {} bits", 8 * header.widths()[4]));
@@ -82,6 +83,18 @@ fn fraction(splats: &Splats) -> u8 {
     (0..=FRACTION).rev().find(|bits| most * (1_u32 << bits) as f32 <= MOST_FIXED).unwrap_or(0)
 }
 
+/// A sentence if positions are so far from the origin that their steps are coarse.
+fn coarse(splats: &Splats, fraction: u8) -> Option<String> {
+    if fraction == FRACTION {
+        return None;
+    }
+    let step = 1.0 / f64::from(1_u32 << fraction);
+    let rounding = Rounding { error: step / 2.0, size: splats.median_size() };
+    let said = rounding
+        .warning(&format!("positions are so far from the origin that the steps of SPZ, of {step},"))?;
+    Some(format!("{said}; --translate brings the scene to the origin"))
+}
+
 /// The bytes of all values. Adds how many were out of range.
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited before")]
 fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64) -> [Vec<u8>; STREAMS] {
@@ -92,11 +105,14 @@ fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64)
         *limited += u64::from(!(0.0..=MOST).contains(&rounded));
         rounded.clamp(0.0, MOST) as u8
     };
+    let mut far = 0;
     let mut positions = Vec::with_capacity(9 * splats.len());
     let unit = (1_u32 << header.fraction) as f32;
     for position in &geometry.positions {
         for v in flip.position(*position) {
-            let fixed = (v * unit).round().clamp(-MOST_FIXED, MOST_FIXED) as i32;
+            let rounded = (v * unit).round();
+            far += u64::from(rounded.abs() > MOST_FIXED);
+            let fixed = rounded.clamp(-MOST_FIXED, MOST_FIXED) as i32;
             positions.extend(&fixed.to_le_bytes()[..3]);
         }
     }
@@ -127,6 +143,7 @@ fn streams(splats: &Splats, header: Header, sh_bits: [u8; 2], limited: &mut u64)
             }
         }
     }
+    *limited += far;
     [positions, alphas, colours, scales, rotations, sh]
 }
 

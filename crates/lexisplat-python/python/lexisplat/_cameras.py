@@ -35,7 +35,7 @@ class Camera:
     fx, fy : float
         Focal lengths, in pixels.
     position : (3,)
-        Centre of the camera, in world units.
+        Centre of the camera, in the world, in float64. The offset of a scene is subtracted when it is drawn.
     rotation : (3, 3)
         Camera to world. The columns are the camera's right, down and forward directions in the world.
     name : str
@@ -51,7 +51,7 @@ class Camera:
     height: int
     fx: float
     fy: float
-    position: npt.NDArray[np.float32]
+    position: npt.NDArray[np.float64]
     rotation: npt.NDArray[np.float32]
     name: str = ""
     split: Literal["train", "test"] | None = None
@@ -67,7 +67,7 @@ class Camera:
         self.near = number("near", self.near)
         self.name = text("name", self.name)
         optional(text, "split", self.split, ("train", "test"))
-        self.position = floats("position", self.position)
+        self.position = floats("position", self.position, np.float64)
         self.rotation = floats("rotation", self.rotation)
         if self.position.shape != (3,) or self.rotation.shape != (3, 3):
             raise ParameterError("camera: expected a position of shape (3,) and a rotation of shape (3, 3)")
@@ -86,14 +86,14 @@ class Camera:
         rotation = view[:3, :3].T
         position = -rotation @ view[:3, 3]
         focal = float(intrinsics[0, 0]), float(intrinsics[1, 1])
-        return cls(width, height, *focal, position.astype(np.float32), rotation.astype(np.float32), name)
+        return cls(width, height, *focal, position, rotation.astype(np.float32), name)
 
     @property
     def viewmat(self) -> npt.NDArray[np.float32]:
         """(4, 4), from world to camera."""
         view = np.eye(4, dtype=np.float32)
         view[:3, :3] = self.rotation.T
-        view[:3, 3] = -self.rotation.T @ self.position
+        view[:3, 3] = -self.rotation.T.astype(np.float64) @ self.position
         return view
 
     @property
@@ -101,6 +101,11 @@ class Camera:
         """(3, 3), the intrinsics."""
         half = self.width / 2, self.height / 2
         return np.array([[self.fx, 0, half[0]], [0, self.fy, half[1]], [0, 0, 1]], np.float32)
+
+    def relative_to(self, offset: Any) -> Camera:
+        """The camera beside ``means`` that are relative to ``offset``, for other renderers; ``None`` changes nothing."""
+        position = self.position if offset is None else self.position - np.asarray(host(offset), np.float64)
+        return Camera(self.width, self.height, self.fx, self.fy, position, self.rotation, self.name, self.split)
 
     def resized(self, width: int) -> Camera:
         """The camera with pictures of this width, of the same field of view."""
@@ -164,6 +169,6 @@ def as_tuples(cameras: Iterable[Camera]) -> list[_native.CameraTuple]:
 
 def _of_tuple(camera: _native.CameraTuple) -> Camera:
     name, width, height, fx, fy, position, rotation, near, split = camera
-    place = np.array(position, np.float32), np.array(rotation, np.float32)
+    place = np.array(position, np.float64), np.array(rotation, np.float32)
     return Camera(width, height, fx, fy, *place, name, split, near)
 

@@ -111,9 +111,10 @@ def save(
     Returns
     -------
     dict
-        What the file lacks of the scene: ``sh_degree``, ``extras``, ``normals``, ``antialiased``, ``precision`` and
-        ``limited``; of a .lexi also ``removed``, the number of Gaussians that were left out because they hardly show. Empty
-        for a :class:`Scene` that is written as it is.
+        What the file lacks of the scene: ``sh_degree``, ``extras``, ``normals``, ``antialiased``, ``offset``, ``precision``
+        and ``limited``; of a .lexi also ``removed``, the number of Gaussians that were left out because they hardly show.
+        Empty for a :class:`Scene` that is written as it is. Roundings that are coarse against the sizes of Gaussians are
+        warned of.
 
     Raises
     ------
@@ -147,7 +148,9 @@ def save(
         progress=reporter(progress),
     )
     warn(told, "the scene")
-    return dict(json.loads(lost))
+    found = dict(json.loads(lost) or {})
+    warn(found.pop("coarse", []), path)
+    return found
 
 
 def warn(told: Sequence[str], file: object) -> None:

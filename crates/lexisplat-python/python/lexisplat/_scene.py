@@ -92,6 +92,12 @@ class Scene:
         return self._native.layout
 
     @property
+    def offset(self) -> npt.NDArray[np.float64] | None:
+        """What is added to positions to get to the world of the source, (3,); see :class:`Splats`."""
+        offset = self._native.offset
+        return None if offset is None else np.array(offset, np.float64)
+
+    @property
     def report(self) -> dict[str, Any] | None:
         """What the compression did, by the keys of ``lexisplat compress --json``; ``None`` of a file that was opened."""
         report = self._native.report_json

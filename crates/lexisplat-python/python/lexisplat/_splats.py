@@ -36,7 +36,7 @@ class Splats:
     Parameters
     ----------
     means : (N, 3)
-        Centres, in world units.
+        Centres, in world units. Those of a scene with an ``offset`` are relative to it.
     scales : (N, 3)
         Natural logarithms of the standard deviations along the three axes, in world units.
     quats : (N, 4)
@@ -56,6 +56,10 @@ class Splats:
         Comment lines of the file.
     antialiased : bool
         Whether the scene was trained with the anti-aliased (Mip-Splatting) dilation, and is drawn with it.
+    offset : (3,), optional
+        What is added to ``means`` to get to the world of the file, in float64: ``means.astype(float) + offset``. Files with
+        double coordinates that are too far from the origin for float32 have one. It is kept in .lexi files, and put back by
+        :func:`save` where the format can hold it. Cameras are in the world.
     """
 
     means: FloatArray
@@ -68,6 +72,7 @@ class Splats:
     extras: dict[str, npt.NDArray[Any]] = field(default_factory=dict)
     comments: list[str] = field(default_factory=list)
     antialiased: bool = False
+    offset: npt.NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         self._checked()
@@ -93,6 +98,8 @@ class Splats:
             self.normals = _rows("normals", self.normals, 3, count)
         if not isinstance(self.extras, Mapping):
             raise wrong_type("extras", self.extras, "a dict of arrays by name")
+        if self.offset is not None:
+            self.offset = _shaped("offset", np.array(host(self.offset), np.float64), (3,))
         self.extras = {name: _contiguous(_shaped(name, np.asarray(v), (count,))) for name, v in self.extras.items()}
         self.comments = [text("comments", line) for line in self.comments]
         self.antialiased = flag("antialiased", self.antialiased)
@@ -125,7 +132,12 @@ class Splats:
         extras = {name: values[which] for name, values in self.extras.items()}
         normals = None if self.normals is None else self.normals[which]
         return Splats(
-            **arrays, normals=normals, extras=extras, comments=[*self.comments], antialiased=self.antialiased
+            **arrays,
+            normals=normals,
+            extras=extras,
+            comments=[*self.comments],
+            antialiased=self.antialiased,
+            offset=self.offset,
         )
 
     def to_dict(self, space: Space = "log", *, contiguous: bool = True) -> dict[str, FloatArray]:

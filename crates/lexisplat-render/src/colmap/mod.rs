@@ -18,6 +18,7 @@ mod text;
 
 use std::io::Read;
 
+use crate::camera::Camera;
 use crate::error::{Error, Result};
 use crate::view_files::{ViewFile, ViewFiles, within};
 use crate::view_set::{PrincipalPoints, ViewSet};
@@ -116,7 +117,7 @@ fn join(is_binary: bool, cameras_file: ViewFile<'_>, images_file: ViewFile<'_>) 
         points.see(intrinsics.centre, intrinsics.width, intrinsics.height);
         views.push(image.camera(intrinsics).map_err(about)?);
     }
-    views.sort_by(|a, b| a.name.cmp(&b.name));
+    views.sort_by(|a: &(Camera, [f64; 3]), b| a.0.name.cmp(&b.0.name));
     warnings.extend(points.warning());
-    Ok(ViewSet { cameras: views, warnings })
+    Ok(ViewSet::new(views, warnings))
 }

@@ -18,8 +18,8 @@ pub(super) struct Posed {
 }
 
 impl Posed {
-    /// Returns the image as a camera with `intrinsics`.
-    pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Result<Camera, String> {
+    /// Returns the image as a camera with `intrinsics`, and its position before rounding.
+    pub(super) fn camera(&self, intrinsics: &Intrinsics) -> Result<(Camera, [f64; 3]), String> {
         let [w, x, y, z] = self.quaternion;
         let quaternion = DQuat::from_xyzw(x, y, z, w);
         let squares = quaternion.length_squared();
@@ -37,6 +37,6 @@ impl Posed {
         let camera =
             Camera::rounded(self.name.clone(), size, intrinsics.focal, position.to_array(), rotation);
         camera.validate().map_err(|e| e.to_string())?;
-        Ok(camera)
+        Ok((camera, position.to_array()))
     }
 }

@@ -50,6 +50,7 @@ pub(crate) fn read_nerf_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<
         }
         let (name, bytes) = files.open(file)?.read_limited()?;
         let set = read_transforms_bytes(&name, &bytes, size_of)?;
+        all.positions.extend(set.positions);
         all.cameras.extend(set.cameras.into_iter().map(|camera| Camera { split: Some(split), ..camera }));
         all.warnings.extend(set.warnings.into_iter().map(|warning| format!("{file}: {warning}")));
     }
@@ -82,7 +83,7 @@ pub fn read_transforms_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> R
     }
     let mut warnings = splits.warnings(&transforms.frames);
     warnings.extend(points.warning());
-    Ok(ViewSet { cameras, warnings })
+    Ok(ViewSet::new(cameras, warnings))
 }
 
 fn camera(
@@ -91,7 +92,7 @@ fn camera(
     split: Option<Split>,
     size_of: SizeOf<'_>,
     points: &mut PrincipalPoints,
-) -> Result<Camera, String> {
+) -> Result<(Camera, [f64; 3]), String> {
     if frame.path.len() > MAX_NAME {
         return Err(format!("field 'file_path' is over the limit of {MAX_NAME} bytes"));
     }
@@ -128,7 +129,7 @@ fn camera(
     camera.validate().map_err(|e| e.to_string())?;
     let centre = [(frame.lens.cx.or(global.cx), width), (frame.lens.cy.or(global.cy), height)];
     points.see(centre.map(|(at, side)| at.unwrap_or(f64::from(side) / 2.0)), width, height);
-    Ok(camera)
+    Ok((camera, position))
 }
 
 impl Frame {

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::morton;
+use crate::scene::offset::{Offset, shift};
 use crate::scene::splats::Geometry;
 use crate::support::maths::{Vec3, at_share, columns, cross, dot, log_sigmoid, longest_first};
 
@@ -64,6 +65,14 @@ impl Bounds {
         let mut bounds = Self { least: first, most: first };
         positions.for_each(|&p| bounds.add(Self { least: p, most: p }));
         bounds
+    }
+
+    /// The bounds of the same positions relative to another offset.
+    pub(super) fn rebased(mut self, from: Option<Offset>, to: Option<Offset>) -> Self {
+        // Moving and rounding keep the order of numbers.
+        shift(std::slice::from_mut(&mut self.least), from, to);
+        shift(std::slice::from_mut(&mut self.most), from, to);
+        self
     }
 
     /// Includes `other`.

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::packed::tiles::Survey;
+use crate::scene::offset::{Offset, shift};
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
@@ -24,7 +25,8 @@ impl std::fmt::Debug for Joined<'_> {
 }
 
 impl<'a> Joined<'a> {
-    /// Joins `tiles`, each with its name. Comments are those of all, without repetitions.
+    /// Joins `tiles`, each with its name. Comments are those of all, without repetitions, and positions are relative to one
+    /// offset ([`Offset::shared`]).
     ///
     /// # Errors
     /// [`Error::Format`] that names a tile without Gaussians or with another degree, other extras or another mark than the first,
@@ -32,15 +34,17 @@ impl<'a> Joined<'a> {
     pub fn new(tiles: &[(String, &'a dyn SplatSource)]) -> Result<Self> {
         let mut firsts = vec![0_usize];
         let mut empty: Option<Splats> = None;
-        let mut warnings = Vec::new();
+        let (mut warnings, mut offsets) = (Vec::new(), Vec::new());
         for (name, tile) in tiles {
             let own = tile.empty();
             Survey::check_tile(name, empty.as_ref(), &own, tile.len())?;
+            offsets.push((own.meta.offset, tile.len() as u64));
             empty.get_or_insert_with(|| own.clone()).meta.join(&own.meta);
             warnings.extend(tile.warnings().iter().map(|warning| format!("{name}: {warning}")));
             firsts.push(firsts.last().copied().unwrap_or(0).saturating_add(tile.len()));
         }
-        let empty = empty.ok_or_else(|| Error::parameter("tiles", 0, "at least one"))?;
+        let mut empty = empty.ok_or_else(|| Error::parameter("tiles", 0, "at least one"))?;
+        empty.meta.offset = Offset::shared(&offsets);
         Limits::check("Gaussians", firsts.last().copied().unwrap_or(0) as u64, MAX_GAUSSIANS)?;
         Ok(Self { tiles: tiles.iter().map(|tile| tile.1).collect(), firsts, empty, warnings })
     }
@@ -85,6 +89,7 @@ impl SplatSource for Joined<'_> {
             }
             let mut next = tile.empty();
             tile.read(own.start - bounds[0]..own.end - bounds[0], &mut next)?;
+            shift(&mut next.geometry.positions, next.meta.offset, self.empty.meta.offset);
             if !self.has_normals() {
                 next.geometry.normals = Vec::new();
             }
@@ -97,6 +102,28 @@ impl SplatSource for Joined<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// However much is read at a time.
+    #[test]
+    fn tiles_with_other_offsets_lie_beside_each_other() {
+        let offset = |x| Offset::new([x, 0.0, 4e6]).unwrap();
+        let mut tiles = [1, 2, 3].map(|seed| crate::support::testing::scene(40, seed));
+        for (tile, x) in tiles.iter_mut().zip([5e5, 5e5 + 64.0, 5e5 + 128.0]) {
+            tile.meta.offset = offset(x);
+        }
+        let named: Vec<(String, &dyn SplatSource)> =
+            tiles.iter().map(|tile| (String::new(), tile as &dyn SplatSource)).collect();
+        let joined = Joined::new(&named).unwrap();
+        assert_eq!(joined.empty().meta.offset, offset(5e5 + 64.0));
+        let whole = joined.whole().unwrap();
+        let mut part = joined.empty();
+        for (t, tile) in tiles.iter().enumerate() {
+            joined.read(40 * t + 3..40 * t + 9, &mut part).unwrap();
+            assert_eq!(part.geometry.positions, whole.geometry.positions[40 * t + 3..40 * t + 9]);
+            let expected = tile.geometry.positions[3][0] - 64.0 + 64.0 * [0.0, 1.0, 2.0][t];
+            assert!((part.geometry.positions[0][0] - expected).abs() < 1e-5);
+        }
+    }
 
     #[test]
     fn ranges_reach_over_tiles() {

@@ -2,6 +2,8 @@
 
 pub(crate) mod extra;
 pub(crate) mod joined;
+pub(crate) mod offset;
+pub(crate) mod rounding;
 pub(crate) mod sensitivity;
 pub mod sh;
 pub(crate) mod source;

@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, for_extra};
+use crate::scene::offset::Offset;
 use crate::scene::sh::ShDegree;
 use crate::support::error::{Error, Result};
 
@@ -17,7 +18,7 @@ pub const SURE_OPACITY: f32 = 100.0;
 /// Values are as the trainer stored them, before any activation.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Geometry {
-    /// Centres in world units.
+    /// Centres in world units, relative to [`SceneMeta::offset`].
     pub positions: Vec<[f32; 3]>,
     /// Normals. Empty if the file has none or all are zero; every known trainer writes zeros.
     pub normals: Vec<[f32; 3]>,
@@ -41,6 +42,8 @@ pub struct SceneMeta {
     /// Trained with the anti-aliased (Mip-Splatting) dilation: Brush `SplatRenderMode: mip`,
     /// Postshot `antialiased 1`.
     pub antialiased: bool,
+    /// What is added to positions to get to where the source has them. None if positions are those of the source.
+    pub offset: Option<Offset>,
 }
 
 impl SceneMeta {

@@ -1,5 +1,6 @@
 //! Compressed scenes.
 
+use crate::scene::offset::{Offset, shift};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::{Geometry, SceneMeta, Splats};
 use crate::sparse::codes::SparseCodes;
@@ -140,6 +141,12 @@ impl Model {
     #[must_use]
     pub fn meta(&self) -> &SceneMeta {
         &self.meta
+    }
+
+    /// Makes positions relative to `offset`, as [`Splats::rebase`] does.
+    pub fn rebase(&mut self, offset: Option<Offset>) {
+        shift(&mut self.geometry.positions, self.meta.offset, offset);
+        self.meta.offset = offset;
     }
 
     /// The atoms.

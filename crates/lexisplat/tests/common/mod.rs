@@ -87,7 +87,11 @@ fn model(
         Escapes::default()
     };
     let codes = SparseCodes::new(&dictionary, counts, indices, values, escapes).unwrap();
-    let meta = SceneMeta { comments: vec!["made by \"hand\"".to_owned()], antialiased: escape };
+    let meta = SceneMeta {
+        comments: vec!["made by \"hand\"".to_owned()],
+        antialiased: escape,
+        ..SceneMeta::default()
+    };
     let mut geometry = geometry(n);
     change(&mut geometry, &mut record);
     Model::new(geometry, meta, dictionary, codes, record).unwrap()

@@ -182,6 +182,10 @@ fn a_packed_scene_changed_by_hand_is_refused() {
             ("head", |p| set(p, "gaussians", "0")),
             ("head", |p| set(p, "gaussians", "199")),
             ("head", |p| set(p, "degree", "0")),
+            ("'offset'", |p| set(p, "offset", "[1.5,2.0]")),
+            ("'offset'", |p| set(p, "offset", "[1.5,2.0,\"3\"]")),
+            ("'offset'", |p| set(p, "offset", "[1e999,0,0]")),
+            ("'offset'", |p| set(p, "offset", "1.5")),
         ],
     );
     for packed in [good, plain] {

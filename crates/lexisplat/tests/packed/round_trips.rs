@@ -2,7 +2,7 @@
 
 use lexisplat::lexi::{LexiReader, LexiWriter};
 use lexisplat::packed::{CHUNK, PackOptions, Packed, ReachedRecord, TargetRecord};
-use lexisplat::{Input, Layout, Limits, Silent, Splats, lexi};
+use lexisplat::{Input, Layout, Limits, Offset, Silent, Splats, lexi};
 
 use super::support::{STEP, bytes, options, pack, row_errors, sample, with_extras};
 
@@ -42,6 +42,7 @@ fn a_file_holds_comments_marks_and_promise() {
     let mut splats = with_extras(sample(90, 2, 1));
     splats.meta.comments = vec!["made by \"hand\"".to_owned(), String::new(), "größer".to_owned()];
     splats.meta.antialiased = true;
+    splats.meta.offset = Offset::new([500_000.25, -4_649_776.0, 0.0]).unwrap();
     let (packed, _) = pack(&splats, STEP, &options(|o| o.keep_order = true));
     let packed = packed.with_target(TargetRecord::new("min-psnr", 38.5, [41.127, 38.507], 18, true));
     let packed = packed.with_reached(ReachedRecord::new([39.25, 41.127, 38.507], 18, true));

@@ -1,7 +1,7 @@
 //! One scene in every trainer's dialect reads as the same scene.
 
-use lexisplat::ply::{self, Dialect, Format, PlyRead, ReadOptions, ScalarType};
-use lexisplat::{Extra, ExtraValues, Splats};
+use lexisplat::ply::{self, Dialect, Format, PlyRead, PlySource, ReadOptions, ScalarType};
+use lexisplat::{Extra, ExtraValues, Offset, Silent, SplatSource as _, Splats};
 
 use super::support::{Column, File, assert_same, columns, scene};
 
@@ -105,6 +105,63 @@ fn every_dialect_is_the_same_scene() {
                 assert_same(&found.splats, &expected, &what);
             }
         }
+    }
+}
+
+/// Coordinates of a survey: millions of units away, where single precision has steps of half a unit.
+const FAR: [f64; 3] = [500_000.123, 4_649_776.456, 100.789];
+
+/// `splats` moved to [`FAR`] in double precision, and the positions.
+fn surveyed(splats: &Splats) -> (File, Vec<[f64; 3]>) {
+    let mut file = inria(splats);
+    for (name, far) in ["x", "y", "z"].into_iter().zip(FAR) {
+        let column = file.column(name);
+        column.ty = ScalarType::F64;
+        column.values.iter_mut().for_each(|v| *v += far);
+    }
+    let [x, y, z] = ["x", "y", "z"].map(|name| file.column(name).values.clone());
+    (file, x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]).collect())
+}
+
+/// The farthest that Gaussians of `splats` are from `places`, along an axis.
+fn farthest(splats: &Splats, places: &[[f64; 3]]) -> f64 {
+    assert_eq!(splats.len(), places.len());
+    let offset = Offset::numbers(splats.meta.offset);
+    let far = |(p, place): (&[f32; 3], &[f64; 3])| {
+        (0..3).map(|k| (f64::from(p[k]) + offset[k] - place[k]).abs()).fold(0.0, f64::max)
+    };
+    splats.geometry.positions.iter().zip(places).map(far).fold(0.0, f64::max)
+}
+
+#[test]
+fn far_doubles_stay_where_they_are() {
+    let splats = scene(1, ROWS, 8);
+    for format in [Format::BinaryLittleEndian, Format::BinaryBigEndian, Format::Ascii] {
+        let (mut file, places) = surveyed(&splats);
+        file.format = format;
+        file.column("scale_1").values[3] = f64::NAN;
+        let bytes = file.bytes();
+        let options = ReadOptions::default().with_drop_invalid(true);
+        let found = ply::read_bytes("t.ply", &bytes, &options).unwrap();
+        let kept: Vec<[f64; 3]> =
+            places.iter().enumerate().filter(|(i, _)| *i != 3).map(|(_, place)| *place).collect();
+        assert!(farthest(&found.splats, &kept) < 1e-6);
+        assert!(found.warnings.iter().any(|w| w.contains("they are kept relative to an offset of")));
+        // However much is read at a time.
+        let parts = PlySource::open("t.ply", &bytes, &options, &Silent).unwrap();
+        assert_eq!(parts.warnings(), found.warnings);
+        let mut part = parts.empty();
+        parts.read(1500..1600, &mut part).unwrap();
+        assert_eq!(part.geometry.positions, found.splats.geometry.positions[1500..1600]);
+        assert_eq!(*parts.whole().unwrap(), found.splats);
+        // What is written has doubles again.
+        let mut written = Vec::new();
+        ply::write(&mut written, &found.splats).unwrap();
+        let again = ply::read_bytes("w.ply", &written, &ReadOptions::default()).unwrap();
+        assert_eq!(again.summary.properties[..3], ["x", "y", "z"].map(|n| (n.to_owned(), ScalarType::F64)));
+        assert_eq!(again.summary.properties[3].1, ScalarType::F32);
+        assert!(farthest(&again.splats, &kept) < 1e-6);
+        assert_eq!(again.splats.geometry.scales, found.splats.geometry.scales);
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
-use lexisplat::{Extra, ExtraValues, Geometry, SceneMeta, ShDegree, Splats};
+use lexisplat::{Extra, ExtraValues, Geometry, Offset, SceneMeta, ShDegree, Splats};
 use lexisplat_testing::Random;
 use proptest::prelude::*;
 
@@ -24,6 +24,15 @@ impl Value {
             Self::Int(v) => v as f32,
             Self::F32(v) => v,
             Self::F64(v) => v as f32,
+        }
+    }
+
+    #[expect(clippy::cast_precision_loss, reason = "integers have 32 bits")]
+    fn f64(self) -> f64 {
+        match self {
+            Self::Int(v) => v as f64,
+            Self::F32(v) => f64::from(v),
+            Self::F64(v) => v,
         }
     }
 }
@@ -86,8 +95,9 @@ fn naive(bytes: &[u8]) -> Table {
     (properties, rows)
 }
 
-/// What the fast reader should make of `bytes`.
-fn expected(bytes: &[u8]) -> Splats {
+/// What the fast reader should make of `bytes`, if it decides on `offset`.
+#[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+fn expected(bytes: &[u8], offset: Option<Offset>) -> Splats {
     let (properties, rows) = naive(bytes);
     let has = |name: &str| properties.iter().any(|(_, n)| n == name);
     let rest = (0..).take_while(|k| has(&format!("f_rest_{k}"))).count();
@@ -133,7 +143,13 @@ fn expected(bytes: &[u8]) -> Splats {
     });
     Splats {
         geometry: Geometry {
-            positions: triple(["x", "y", "z"]),
+            positions: match offset.map(Offset::get) {
+                None => triple(["x", "y", "z"]),
+                Some([x, y, z]) => {
+                    let less = |r: &HashMap<String, Value>, name: &str, by: f64| (r[name].f64() - by) as f32;
+                    rows.iter().map(|r| [less(r, "x", x), less(r, "y", y), less(r, "z", z)]).collect()
+                }
+            },
             normals,
             dc: triple(["f_dc_0", "f_dc_1", "f_dc_2"]),
             opacities: rows.iter().map(|r| get(r, "opacity")).collect(),
@@ -143,7 +159,7 @@ fn expected(bytes: &[u8]) -> Splats {
         },
         degree: ShDegree::from_rest(rest).expect("a degree"),
         sh_rest: rows.iter().flat_map(|r| (0..rest).map(|k| get(r, &format!("f_rest_{k}")))).collect(),
-        meta: SceneMeta::default(),
+        meta: SceneMeta { offset, ..SceneMeta::default() },
     }
 }
 
@@ -214,6 +230,6 @@ proptest! {
     ) {
         let bytes = random_file(degree, rows, normals, extras, format, seed).bytes();
         let found = ply::read_bytes("t.ply", &bytes, &ReadOptions::default()).unwrap();
-        assert_same(&found.splats, &expected(&bytes), "naive");
+        assert_same(&found.splats, &expected(&bytes, found.splats.meta.offset), "naive");
     }
 }

@@ -10,7 +10,7 @@ use anyhow::Result;
 use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySummary, ReadOptions};
 use lexisplat::stats::{Lint, NORM_BINS};
-use lexisplat::{Error, FileKind, SplatSource as _, Splats, stream};
+use lexisplat::{Error, FileKind, Offset, SplatSource as _, Splats, stream};
 use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
 use serde::Serialize;
@@ -68,6 +68,8 @@ struct Facts<'a> {
     gaussians: u64,
     sh_degree: u8,
     antialiased: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    offset: Option<Offset>,
     comments: &'a [String],
     extras: Vec<&'a str>,
     statistics: &'a Lint,
@@ -98,6 +100,7 @@ impl<'a> Facts<'a> {
             gaussians: statistics.gaussians,
             sh_degree: like.degree.get(),
             antialiased: like.meta.antialiased,
+            offset: like.meta.offset,
             comments: &like.meta.comments,
             extras: like.geometry.extras.iter().map(|e| e.name.as_str()).collect(),
             statistics,
@@ -119,6 +122,12 @@ impl<'a> Facts<'a> {
         writeln!(out, "{}: {bytes}, {count} Gaussians, SH degree {}", self.file, self.sh_degree)?;
         if self.antialiased {
             writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
+        }
+        if let Some(offset) = self.offset {
+            writeln!(
+                out,
+                "offset {offset}: positions are relative to it, and decompress and convert put it back"
+            )?;
         }
         for comment in self.comments {
             writeln!(out, "comment: {}", format::escape(comment))?;

@@ -28,6 +28,23 @@ fn floats_come_back_and_so_do_the_bytes() {
     }
 }
 
+/// The offset is the translation of the node, in doubles.
+#[test]
+fn an_offset_comes_back() {
+    for glb_spz in [false, true] {
+        let mut splats = sample(1);
+        splats.meta.offset = lexisplat::Offset::new([500_000.0, 4_649_776.5, -128.0]).unwrap();
+        let (bytes, lost) = write(&splats, &WriteOptions { glb_spz, ..WriteOptions::default() }).unwrap();
+        assert_eq!((lost.offset, lost.coarse.len()), (None, 0));
+        let found = read(&bytes);
+        assert_eq!(found.meta.offset, splats.meta.offset);
+        let (a, b) = (&found.geometry.positions, &splats.geometry.positions);
+        assert!(most(a.as_flattened(), b.as_flattened()) <= if glb_spz { 2e-4 } else { 0.0 });
+        splats.meta.offset = None;
+        assert_eq!(spz::write(&splats, &WriteOptions::default()).unwrap().1.offset, None);
+    }
+}
+
 /// Values that floats hold badly or not at all.
 #[test]
 fn extreme_values_come_back_or_are_limited() {

@@ -10,6 +10,7 @@ use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, FLAT_VERSION, PACKED_VERSION, key, tensor};
 use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, ScalarType, with_scalar};
+use crate::scene::offset::Offset;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::dictionary::Dictionary;
@@ -48,7 +49,23 @@ pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
             comments.items()?.iter().map(|comment| comment.text().map(str::to_owned)).collect()
         })?,
     };
-    Ok(SceneMeta { comments, antialiased: checked.number_or_default(key::ANTIALIASED)? })
+    Ok(SceneMeta {
+        comments,
+        antialiased: checked.number_or_default(key::ANTIALIASED)?,
+        offset: offset(checked)?,
+    })
+}
+
+/// The offset of a scene, which few have.
+fn offset(checked: &Checked<'_>) -> Result<Option<Offset>> {
+    if !checked.has_text(key::OFFSET) {
+        return Ok(None);
+    }
+    let numbers = checked.json(key::OFFSET, |numbers| match numbers.items()? {
+        [x, y, z] => Some([x.number::<f64>()?, y.number::<f64>()?, z.number::<f64>()?]),
+        _ => None,
+    })?;
+    Offset::new(numbers).map_err(|e| checked.malformed(format!("metadata 'offset': {e}")))
 }
 
 /// The dictionary of a scene or of a dictionary file.

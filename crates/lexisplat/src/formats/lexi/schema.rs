@@ -84,6 +84,7 @@ pub(super) mod key {
     pub(crate) const OVER_TOLERANCE: &str = "over_tolerance";
     pub(crate) const ANTIALIASED: &str = "antialiased";
     pub(crate) const COMMENTS: &str = "comments";
+    pub(crate) const OFFSET: &str = "offset";
     pub(crate) const GAUSSIANS: &str = "gaussians";
     pub(crate) const REMOVED: &str = "removed";
     pub(crate) const ATOMS: &str = "atoms";

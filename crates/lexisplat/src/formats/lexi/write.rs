@@ -141,6 +141,7 @@ impl<'a> LexiWriter<'a> {
         metadata.extend((*over_tolerance != 0).then(|| (key::OVER_TOLERANCE, over_tolerance.to_string())));
         metadata.extend(head.meta.antialiased.then(|| (key::ANTIALIASED, "true".to_owned())));
         metadata.extend((!head.meta.comments.is_empty()).then(|| (key::COMMENTS, json(&head.meta.comments))));
+        metadata.extend(head.meta.offset.map(|offset| (key::OFFSET, json(&offset))));
         metadata.extend(tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
         metadata.extend(packed_metadata(head));
         // What draws the scene comes first.
@@ -264,6 +265,7 @@ fn scene_metadata(
         (key::ANTIALIASED, meta.antialiased.to_string()),
         (key::COMMENTS, json(&meta.comments)),
     ]);
+    metadata.extend(meta.offset.map(|offset| (key::OFFSET, json(&offset))));
     metadata.extend(record.tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
     metadata.extend(record.max_nonzeros.map(|cap| (key::MAX_NONZEROS, cap.to_string())));
     metadata

@@ -61,6 +61,9 @@ impl<'a> PlySource<'a> {
     ) -> Result<Self> {
         let (mut source, mut splats) = Self::look(name, bytes, options, usize::MAX, progress)?;
         source.file.check_memory(source.file.count, source.normals)?;
+        if source.file.meta.offset.is_some() {
+            source.file.fill_positions(0..source.file.count, &mut splats)?;
+        }
         source.finish(0..source.file.count, &mut splats)?;
         splats.meta = source.file.meta.clone();
         source.whole = Mutex::new(Some(splats));
@@ -85,7 +88,8 @@ impl<'a> PlySource<'a> {
         }
         progress.end();
         file.report(&found, options)?;
-        let Found { bad: dropped, normals, .. } = found;
+        let Found { bad: dropped, normals, places, .. } = found;
+        file.settle(places);
         Ok((Self { file, dropped, normals, whole: Mutex::default() }, splats))
     }
 

@@ -58,6 +58,29 @@ impl Group {
         Self { width: fields.len(), runs }
     }
 
+    /// Whether any property is of a type whose values f32 may not hold.
+    pub(super) fn is_finer_than_f32(&self) -> bool {
+        self.runs
+            .iter()
+            .any(|run| matches!(run.first.ty, ScalarType::F64 | ScalarType::I32 | ScalarType::U32))
+    }
+
+    /// Fills `out`, `width` values a row of `rows`, without rounding.
+    pub(super) fn read_exact(&self, rows: Packed<'_>, out: &mut [f64]) {
+        for run in &self.runs {
+            for k in 0..run.len {
+                let (offset, slot) = (run.first.offset + k * run.first.ty.bytes(), run.slot + k);
+                with_scalar!(run.first.ty, T => {
+                    let load = if rows.big { T::load::<true> } else { T::load::<false> };
+                    let values = rows.bytes.chunks_exact(rows.row_bytes).map(|row| &row[offset..offset + T::BYTES]);
+                    for (row, value) in out.chunks_exact_mut(self.width).zip(values) {
+                        row[slot] = load(value).to_f64();
+                    }
+                });
+            }
+        }
+    }
+
     /// Fills `out`, `width` values a row of `rows`.
     pub(super) fn read(&self, rows: Packed<'_>, out: &mut [f32]) {
         for &run in &self.runs {

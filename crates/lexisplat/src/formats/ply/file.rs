@@ -2,9 +2,10 @@
 
 use super::fill::Found;
 use super::header::Header;
-use super::layout::Layout;
+use super::layout::{Layout, POSITIONS};
 use super::marks::marks;
 use super::names::NORMAL;
+use super::places::Places;
 use super::read::ReadOptions;
 use super::rows::Rows;
 use super::summary::PlySummary;
@@ -25,6 +26,8 @@ pub(super) struct PlyFile<'a> {
     pub(super) meta: SceneMeta,
     pub(super) warnings: Vec<String>,
     pub(super) summary: PlySummary,
+    /// Whether positions are finer than f32 and no offset was decided on yet.
+    pub(super) looks_at_positions: bool,
     limits: Limits,
 }
 
@@ -49,8 +52,10 @@ impl<'a> PlyFile<'a> {
         if count == 0 {
             warnings.push("the scene holds no Gaussians".to_owned());
         }
-        let meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased };
-        Ok(Self { name, rows, layout, count, meta, warnings, summary, limits: options.limits })
+        let meta = SceneMeta { comments: header.comments, antialiased: marks.antialiased, offset: None };
+        let looks_at_positions = layout.groups[POSITIONS].is_finer_than_f32();
+        let limits = options.limits;
+        Ok(Self { name, rows, layout, count, meta, warnings, summary, looks_at_positions, limits })
     }
 
     /// Refuses to hold `rows` rows, with normals or without, if the limits do not allow it.
@@ -59,6 +64,15 @@ impl<'a> PlyFile<'a> {
         let floats = self.layout.degree.rest() + if normals { NORMAL.len() } else { 0 };
         let budget = MemoryBudget::new(&self.limits, self.name, self.summary.file_bytes);
         budget.take(rows, GEOMETRY_BYTES + floats * size_of::<f32>() + extras)
+    }
+
+    /// Decides on an offset, once all rows were looked at.
+    pub(super) fn settle(&mut self, places: Places) {
+        if std::mem::take(&mut self.looks_at_positions) {
+            let settled = places.settle();
+            self.meta.offset = settled.offset;
+            self.warnings.extend(settled.warnings);
+        }
     }
 
     /// Refuses the file if bad rows were `found`, or adds a warning that they are dropped. Adds a warning about

@@ -4,10 +4,13 @@ use std::ops::Range;
 
 use super::columns::{Packed, any_not_finite, read_column};
 use super::file::PlyFile;
-use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, REST, rest_name};
+use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, POSITIONS, REST, SCALES, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
+use super::places::Places;
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
+use crate::scene::offset::single;
+use crate::scene::rounding;
 use crate::scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
@@ -78,6 +81,8 @@ pub(super) struct Found {
     pub(super) normals: bool,
     /// Number of infinite opacities.
     pub(super) sure: usize,
+    /// What positions are like that are finer than f32, while the file is looked at.
+    pub(super) places: Places,
 }
 
 impl Found {
@@ -87,6 +92,7 @@ impl Found {
         self.bad_property = self.bad_property.take().or(next.bad_property);
         self.normals |= next.normals;
         self.sure += next.sure;
+        self.places.add(next.places);
     }
 }
 
@@ -130,13 +136,37 @@ impl PlyFile<'_> {
         done.into_iter().collect()
     }
 
+    /// Fills the positions anew, once there is an offset.
+    pub(super) fn fill_positions(&self, range: Range<usize>, splats: &mut Splats) -> Result<()> {
+        let parts = splats.geometry.positions.chunks_mut(ROWS_PER_TASK).enumerate().collect();
+        let done = map_vec(parts, |(c, part): (usize, &mut [[f32; 3]])| {
+            let start = range.start + c * ROWS_PER_TASK;
+            let (bytes, big) = self.rows.packed(start..start + part.len())?;
+            let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
+            self.positions(packed, part.as_flattened_mut());
+            Ok(())
+        });
+        done.into_iter().collect()
+    }
+
+    /// Fills `out` with positions less the offset.
+    fn positions(&self, rows: Packed<'_>, out: &mut [f32]) {
+        let group = &self.layout.groups[POSITIONS];
+        let Some(offset) = self.meta.offset else { return group.read(rows, out) };
+        let mut exact = vec![0.0; out.len()];
+        group.read_exact(rows, &mut exact);
+        let offset = offset.get().into_iter().cycle();
+        out.iter_mut().zip(exact).zip(offset).for_each(|((out, v), offset)| *out = single(v - offset));
+    }
+
     fn fill_piece(&self, piece: Piece<'_>) -> Result<Found> {
         let Piece { rows, mut floats, mut extras } = piece;
         let (bytes, big) = self.rows.packed(rows.clone())?;
         let packed = Packed { bytes: &bytes, row_bytes: self.layout.row_bytes, big };
         let mut normals = vec![0.0; self.layout.groups[NORMALS].width * rows.len()];
         floats[NORMALS] = &mut normals;
-        for (group, values) in self.layout.groups.iter().zip(&mut floats) {
+        self.positions(packed, floats[POSITIONS]);
+        for (group, values) in self.layout.groups.iter().zip(&mut floats).skip(POSITIONS + 1) {
             group.read(packed, values);
         }
         extras.iter_mut().for_each(|fill| fill(packed));
@@ -148,6 +178,12 @@ impl PlyFile<'_> {
         let floats = floats.each_ref().map(|values| &**values);
         if floats.iter().any(|values| any_not_finite(values)) {
             (found.bad, found.bad_property) = bad_rows(&rows, floats);
+        }
+        if self.looks_at_positions {
+            let mut exact = vec![0.0; floats[POSITIONS].len()];
+            self.layout.groups[POSITIONS].read_exact(packed, &mut exact);
+            let stride = rounding::sample(self.count);
+            found.places = Places::of(rows.clone(), stride, &found.bad, &exact, floats[SCALES]);
         }
         // A negative zero counts as a normal, because a value must keep all its bits.
         let any_bits = |values: &[f32]| values.iter().fold(0, |any, v| any | v.to_bits()) != 0;

@@ -12,10 +12,12 @@ use crate::support::error::{FormatError, Result};
 
 /// Number of arrays of floats: positions, normals, base colours, SH-rest, opacities, scales, rotations.
 pub(super) const GROUPS: usize = 7;
-/// Where the normals, SH-rest and the opacities are among them.
+/// Where the positions, normals, SH-rest, opacities and scales are among them.
+pub(super) const POSITIONS: usize = 0;
 pub(super) const NORMALS: usize = 1;
 pub(super) const REST: usize = 3;
 pub(super) const OPACITIES: usize = 4;
+pub(super) const SCALES: usize = 5;
 
 /// What a header says, or why the file is refused.
 type Accepted<T> = Result<T, FormatError>;

@@ -4,6 +4,9 @@
 //! and in ASCII files. It keeps properties beyond 3DGS as [`Extra`](crate::Extra). It refuses files that this crate
 //! cannot code (compressed, 2D and anchor models, point clouds) and says what they are.
 //!
+//! Positions of other types than f32 are not rounded where that would move Gaussians by more than a hundredth of their
+//! size: an [`Offset`](crate::Offset) is subtracted from them first, and the writer puts it back.
+//!
 //! It is tested on the layouts of INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush and Postshot.
 //!
 //! A binary file is mapped, and the arrays are filled in parallel. Each task copies a chunk of rows, one run of
@@ -45,6 +48,7 @@ mod header;
 mod layout;
 mod marks;
 mod names;
+mod places;
 mod read;
 mod rows;
 mod scalar;

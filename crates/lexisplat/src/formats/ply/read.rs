@@ -53,7 +53,8 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 
 /// Reads the PLY in `bytes`. Errors call it `name`.
 ///
-/// Floats keep their bits. Other types become the nearest f32, with a warning. Infinite opacities become 100 and
+/// Floats keep their bits. Other types become the nearest f32, with a warning; positions that this would move coarsely get
+/// an offset ([`SceneMeta::offset`](crate::SceneMeta::offset)). Infinite opacities become 100 and
 /// -100, which look the same, with a warning. Memory: the arrays of the result, at most a few times `bytes`.
 ///
 /// # Errors

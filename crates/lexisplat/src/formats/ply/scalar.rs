@@ -9,6 +9,8 @@ pub(super) trait Scalar: Copy {
     fn load<const BIG: bool>(bytes: &[u8]) -> Self;
     /// The nearest f32; infinite if there is none.
     fn to_f32(self) -> f32;
+    /// The value; all types fit.
+    fn to_f64(self) -> f64;
     /// The value as the length of a list; `None` if it is negative.
     fn to_length(self) -> Option<usize>;
     /// Appends the value of `text` in little-endian bytes; `None` if `text` is no such value.
@@ -31,6 +33,12 @@ macro_rules! scalars {
             #[allow(clippy::cast_possible_truncation, trivial_numeric_casts, reason = "rounding is meant")]
             fn to_f32(self) -> f32 {
                 self as f32
+            }
+
+            #[inline(always)]
+            #[allow(clippy::cast_lossless, trivial_numeric_casts, reason = "for any type")]
+            fn to_f64(self) -> f64 {
+                self as f64
             }
 
             #[allow(clippy::cast_possible_truncation, clippy::cast_lossless, reason = "the header refuses floats")]

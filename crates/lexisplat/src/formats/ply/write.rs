@@ -4,7 +4,8 @@ use super::layout::rest_name;
 use super::marks::{ANTIALIASED, mark, marks};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE, shown};
 use super::rows::ROWS_PER_TASK;
-use crate::scene::extra::for_extra;
+use crate::scene::extra::{ScalarType, for_extra};
+use crate::scene::offset::Offset;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{SceneMeta, Splats};
 use crate::support::error::{Error, Result};
@@ -23,7 +24,7 @@ const FIXED_FLOATS: usize = POSITION.len() + DC.len() + OPACITY.len() + SCALE.le
 /// Writes `splats`. Returns the number of bytes written.
 ///
 /// Values are little-endian and in the order x y z nx ny nz `f_dc` `f_rest` opacity scale rot, then extras in their
-/// own types. Normals are zeros if the scene has none, and left out if an extra besides has one of their names. The
+/// own types. Positions of a scene with an offset are doubles, and the offset is put back. Normals are zeros if the scene has none, and left out if an extra besides has one of their names. The
 /// scene's comments are written too. If the scene is anti-aliased and no comment says so, a comment is added.
 ///
 /// # Errors
@@ -98,7 +99,9 @@ fn header(splats: &Splats, normal: &'static [&'static str], count: usize) -> Str
     }
     text.push_str(&format!("element vertex {count}\n"));
     for name in names(splats.degree.rest(), normal) {
-        text.push_str(&format!("property float {name}\n"));
+        let is_double = splats.meta.offset.is_some() && POSITION.contains(&name.as_str());
+        let ty = if is_double { ScalarType::F64 } else { ScalarType::F32 };
+        text.push_str(&format!("property {} {name}\n", ty.name()));
     }
     for extra in &splats.geometry.extras {
         text.push_str(&format!("property {} {}\n", extra.values.scalar_type().name(), extra.name));
@@ -126,13 +129,17 @@ struct RowLayout {
     row_bytes: usize,
     /// Floats of a normal; 0 if normals are left out.
     normal: usize,
+    /// Added to positions, which are doubles then.
+    offset: Option<Offset>,
 }
 
 impl RowLayout {
     fn new(splats: &Splats, normal: &[&str]) -> Self {
         let extras: usize = splats.geometry.extras.iter().map(|e| e.values.width()).sum();
         let floats = FIXED_FLOATS + normal.len() + splats.degree.rest();
-        Self { row_bytes: floats * size_of::<f32>() + extras, normal: normal.len() }
+        let offset = splats.meta.offset;
+        let more = if offset.is_some() { POSITION.len() * (size_of::<f64>() - size_of::<f32>()) } else { 0 };
+        Self { row_bytes: floats * size_of::<f32>() + more + extras, normal: normal.len(), offset }
     }
 
     /// Writes `splats` to `writer` by way of `block`.
@@ -154,7 +161,7 @@ impl RowLayout {
         let geometry = &splats.geometry;
         let no_normals = vec![0.0; if geometry.normals.is_empty() { self.normal * count } else { 0 }];
         let [positions, dc, opacities, scales, rotations, normals] = geometry.floats();
-        let groups = [
+        let mut groups = [
             (positions, POSITION.len()),
             (normals, self.normal),
             (dc, DC.len()),
@@ -164,6 +171,15 @@ impl RowLayout {
             (rotations, ROTATION.len()),
         ];
         let mut offset = 0;
+        if let Some(by) = self.offset {
+            for (row, position) in
+                rows.chunks_exact_mut(self.row_bytes).zip(&geometry.positions[range.clone()])
+            {
+                let places = row.chunks_exact_mut(size_of::<f64>()).zip(position.iter().zip(by.get()));
+                places.for_each(|(to, (v, by))| to.copy_from_slice(&(f64::from(*v) + by).to_le_bytes()));
+            }
+            (groups[0].1, offset) = (0, POSITION.len() * size_of::<f64>());
+        }
         for (values, width) in groups.into_iter().filter(|group| group.1 > 0) {
             let field = offset..offset + width * size_of::<f32>();
             let values = values.get(range.start * width..range.end * width).unwrap_or(&no_normals);

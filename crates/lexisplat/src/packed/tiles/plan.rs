@@ -11,6 +11,7 @@ use super::{BUCKET, message};
 use crate::packed::canonical::{Bounds, Grid, MortonKey};
 use crate::packed::pack::{PackOptions, expected_step};
 use crate::scene::extra::{Extra, ExtraValues};
+use crate::scene::offset::{Offset, shift};
 use crate::scene::source::SplatSource;
 use crate::scene::splats::{Geometry, Splats};
 use crate::stream::{RowLayout, each_part};
@@ -73,6 +74,7 @@ impl Plan {
     ) -> Result<Self> {
         options.check()?;
         let mut like: Option<Like> = None;
+        let offset = shared_offset(tiles);
         let mut firsts = vec![0_u64];
         let mut bounds: Option<Bounds> = None;
         let mut heuristic_total = 0.0;
@@ -85,9 +87,12 @@ impl Plan {
             first.like.check(name, like.as_ref(), first.gaussians)?;
             like.get_or_insert_with(|| first.like.clone()).meta.join(&first.like.meta);
             for block in blocks {
-                let own = block.positions.iter();
-                looked.extend(own.map(|&(row, position)| (number, position, total + u64::from(row))));
-                if let Some(own) = block.bounds {
+                let from = first.like.meta.offset;
+                for &(row, mut position) in &block.positions {
+                    shift(std::slice::from_mut(&mut position), from, offset);
+                    looked.push((number, position, total + u64::from(row)));
+                }
+                if let Some(own) = block.bounds.map(|own| own.rebased(from, offset)) {
                     bounds.get_or_insert(own).add(own);
                 }
                 heuristic_total += block.heuristic_total;
@@ -95,7 +100,8 @@ impl Plan {
             }
             firsts.push(total);
         }
-        let Some(like) = like else { return Err(Error::parameter("tiles", 0, "at least one")) };
+        let Some(mut like) = like else { return Err(Error::parameter("tiles", 0, "at least one")) };
+        like.meta.offset = offset;
         Limits::check("Gaussians", total, MAX_GAUSSIANS)?;
         let gaussians = usize::try_from(total).unwrap_or(usize::MAX);
         let positions: Vec<Vec3> = looked.iter().map(|l| l.1).collect();
@@ -293,11 +299,13 @@ impl Plan {
             return Err(Error::parameter("tile", format!("{} Gaussians", tile.len()), expected));
         }
         let mut part = tile.empty();
+        let own_offset = part.meta.offset;
         if let Some(difference) = self.like.difference(&Like::of(&part)) {
             return Err(Error::parameter("tile", difference, "what it was when it was surveyed"));
         }
         each_part(tile, rows, &mut part, progress, &mut |start, part| {
             part.geometry.normals = Vec::new();
+            shift(&mut part.geometry.positions, own_offset, self.like.meta.offset);
             let number = (first + start as u64)..;
             let keys = number.zip(&part.geometry.positions);
             let keys: Vec<MortonKey> = keys.map(|(row, &p)| placed(&self.grid, p, row)).collect();
@@ -377,6 +385,16 @@ impl Piece {
     pub(super) fn from_bytes(bytes: &[u8]) -> Result<Self> {
         message::from_bytes(Self::KIND, bytes)
     }
+}
+
+/// The offset of a scene of `tiles`, which is that of the same tiles joined.
+fn shared_offset(tiles: &[(String, Vec<Survey>)]) -> Option<Offset> {
+    let of = |blocks: &Vec<Survey>| {
+        let gaussians = blocks.iter().map(|block| block.gaussians).fold(0, u64::saturating_add);
+        Some((blocks.first()?.like.meta.offset, gaussians))
+    };
+    let offsets: Vec<_> = tiles.iter().filter_map(|(_, blocks)| of(blocks)).collect();
+    Offset::shared(&offsets)
 }
 
 fn placed(grid: &Grid, position: Vec3, row: u64) -> MortonKey {

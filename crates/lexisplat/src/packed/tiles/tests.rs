@@ -6,7 +6,7 @@ use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
 use crate::stream::{self, Importance};
 use crate::support::sink::Sink;
-use crate::{Error, Extra, ExtraValues, Limits, Result, ShDegree, Silent, lexi};
+use crate::{Error, Extra, ExtraValues, Limits, Offset, Result, ShDegree, Silent, lexi};
 
 /// Gaussians of a bucket of these tests.
 const SMALL: usize = 9000;
@@ -270,6 +270,25 @@ fn damaged_buckets_are_refused_or_are_others() {
         refused += usize::from(damaged.with_tables(&plan, &coding, &tables).is_err());
     }
     assert!(refused > 300, "{refused}");
+}
+
+/// Tiles of a survey, each with an offset of its own, become one scene on workers and in one process.
+#[test]
+fn tiles_with_other_offsets_are_one_scene() {
+    let mut tiles = [scene(6000, 1), scene(7000, 2), scene(5000, 3)];
+    for (tile, x) in tiles.iter_mut().zip([5e5, 5e5 + 2.0, 5e5 + 4.0]) {
+        tile.meta.offset = Offset::new([x, 4_649_776.0, 0.0]).unwrap();
+    }
+    let [file] = by_workers(&tiles, false).try_into().unwrap();
+    assert!(file == in_one_process(&tiles));
+    let model = lexi::read_bytes("t", &file, &Limits::default()).unwrap();
+    assert_eq!(model.meta().offset, tiles[1].meta.offset);
+    let moved = tiles.iter().zip([-2.0, 0.0, 2.0]);
+    let expected =
+        moved.flat_map(|(tile, x)| tile.geometry.positions.iter().map(move |p| [p[0] + x, p[1], p[2]]));
+    let pairs = model.geometry().positions.iter().zip(expected);
+    let far = pairs.filter(|(a, b)| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1));
+    assert_eq!(far.count(), 0);
 }
 
 /// What was made for one scene is refused by another, whatever its shape.

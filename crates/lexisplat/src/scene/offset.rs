@@ -1,0 +1,216 @@
+//! Where a scene lies, if that is too far from the origin for positions in single precision.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::rounding::Rounding;
+use super::splats::Splats;
+use crate::support::error::{Error, Result};
+
+/// What is added to every position, in double precision, to get to the world that the scene's file is in. At least one
+/// number is not 0, and all are finite.
+///
+/// Coordinates of surveys are millions of units from the origin. Single precision has steps of half a unit there.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "[f64; 3]", into = "[f64; 3]")]
+pub struct Offset([f64; 3]);
+
+// None of the numbers is NaN.
+impl Eq for Offset {}
+
+impl Offset {
+    /// The offset of these three numbers; none if all are 0.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for numbers that are not finite.
+    pub fn new(numbers: [f64; 3]) -> Result<Option<Self>> {
+        if numbers.iter().any(|v| !v.is_finite()) {
+            return Err(Error::parameter("offset", format!("{numbers:?}"), "three finite numbers"));
+        }
+        Ok(numbers.iter().any(|v| *v != 0.0).then_some(Self(numbers)))
+    }
+
+    /// The three numbers.
+    #[must_use]
+    pub fn get(self) -> [f64; 3] {
+        self.0
+    }
+
+    /// The numbers of `offset`, which are 0 if there is none.
+    #[must_use]
+    pub fn numbers(offset: Option<Self>) -> [f64; 3] {
+        offset.map_or([0.0; 3], Self::get)
+    }
+
+    /// The one offset of a scene of several parts, each with its offset and its number of Gaussians: along each axis that
+    /// of the part in the middle. Parts without one do not count: they are not far away, or large.
+    #[must_use]
+    pub fn shared(parts: &[(Option<Self>, u64)]) -> Option<Self> {
+        let parts: Vec<([f64; 3], u64)> = parts.iter().filter_map(|p| Some((p.0?.get(), p.1))).collect();
+        let total = parts.iter().map(|part| part.1).fold(0, u64::saturating_add);
+        let middle = |axis: usize| {
+            let mut along: Vec<(f64, u64)> = parts.iter().map(|part| (part.0[axis], part.1)).collect();
+            along.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let mut before = 0_u64;
+            let found = along.iter().find(|(_, count)| {
+                before = before.saturating_add(*count);
+                before > total / 2
+            });
+            found.or(along.last()).map_or(0.0, |part| part.0)
+        };
+        Self::new([middle(0), middle(1), middle(2)]).ok().flatten()
+    }
+}
+
+impl TryFrom<[f64; 3]> for Offset {
+    type Error = Error;
+
+    fn try_from(numbers: [f64; 3]) -> Result<Self> {
+        let zero = || Error::parameter("offset", "0, 0, 0", "a number that is not 0, or no offset");
+        Self::new(numbers)?.ok_or_else(zero)
+    }
+}
+
+impl From<Offset> for [f64; 3] {
+    fn from(offset: Offset) -> Self {
+        offset.0
+    }
+}
+
+impl fmt::Display for Offset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.0;
+        write!(f, "{x}, {y}, {z}")
+    }
+}
+
+/// Makes positions that are relative to `from` relative to `to`. Returns by how much rounding moves the one that it moves
+/// most, along an axis.
+pub(crate) fn shift(positions: &mut [[f32; 3]], from: Option<Offset>, to: Option<Offset>) -> f64 {
+    if from == to {
+        return 0.0;
+    }
+    let (from, to) = (Offset::numbers(from), Offset::numbers(to));
+    move_by(positions, [0, 1, 2].map(|k| from[k] - to[k]))
+}
+
+/// Moves `positions`. Returns by how much rounding moves the one that it moves most, along an axis.
+fn move_by(positions: &mut [[f32; 3]], by: [f64; 3]) -> f64 {
+    let mut most = 0.0_f64;
+    for position in positions {
+        for (value, by) in position.iter_mut().zip(by) {
+            let exact = f64::from(*value) + by;
+            *value = single(exact);
+            most = most.max((exact - f64::from(*value)).abs());
+        }
+    }
+    most
+}
+
+/// `value` in single precision; infinite if it is too large.
+#[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+pub(crate) fn single(value: f64) -> f32 {
+    value as f32
+}
+
+impl Splats {
+    /// Makes positions relative to `offset` instead of their own. Every Gaussian stays where it is, but for rounding.
+    /// Returns what rounding did.
+    pub fn rebase(&mut self, offset: Option<Offset>) -> Rounding {
+        let error = shift(&mut self.geometry.positions, self.meta.offset, offset);
+        self.meta.offset = offset;
+        Rounding { error, size: self.median_size() }
+    }
+
+    /// Moves every Gaussian by `by`. What single precision can hold is in the positions afterwards. If rounding would be
+    /// [coarse](Rounding::is_coarse), positions stay as they are and the offset changes.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for numbers that are not finite, and for positions that leave single precision.
+    pub fn translate(&mut self, by: [f64; 3]) -> Result<()> {
+        let all = Offset::numbers(self.meta.offset);
+        let all = [0, 1, 2].map(|k| all[k] + by[k]);
+        let offset = Offset::new(all)?;
+        let mut moved = self.geometry.positions.clone();
+        let rounding = Rounding { error: move_by(&mut moved, all), size: self.median_size() };
+        if let Some(value) = moved.as_flattened().iter().find(|v| !v.is_finite()) {
+            return Err(Error::parameter("position", value, "finite positions after all changes"));
+        }
+        if rounding.is_coarse() {
+            self.meta.offset = offset;
+        } else {
+            (self.geometry.positions, self.meta.offset) = (moved, None);
+        }
+        Ok(())
+    }
+
+    /// The median of the sizes of a sample of Gaussians; 0 if there are none.
+    #[must_use]
+    pub fn median_size(&self) -> f64 {
+        let chosen = super::rounding::sample(self.len());
+        Rounding::median(self.geometry.scales.iter().step_by(chosen).map(|s| Rounding::size_of(*s)).collect())
+    }
+}
+
+/// Makes the positions of both scenes relative to one offset ([`Offset::shared`]). Returns what rounding did to the one
+/// that it did more to.
+pub fn unite(a: &mut Splats, b: &mut Splats) -> Rounding {
+    let shared = Offset::shared(&[(a.meta.offset, a.len() as u64), (b.meta.offset, b.len() as u64)]);
+    let (a, b) = (a.rebase(shared), b.rebase(shared));
+    if a.share() >= b.share() { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::testing::scene;
+
+    fn offset(numbers: [f64; 3]) -> Option<Offset> {
+        Offset::new(numbers).unwrap()
+    }
+
+    #[test]
+    fn the_part_in_the_middle_has_the_offset_of_all() {
+        let parts = [([8e5, 1.0, 0.0], 10), ([5e5, 0.0, 0.0], 15), ([9e5, 2.0, 0.0], 8)];
+        let parts = parts.map(|(numbers, count)| (offset(numbers), count));
+        assert_eq!(Offset::shared(&parts), offset([8e5, 1.0, 0.0]));
+        assert_eq!(Offset::shared(&[(None, 3), (None, 4)]), None);
+        assert_eq!(Offset::shared(&[(None, 9), (offset([1e6; 3]), 4)]), offset([1e6; 3]));
+        assert_eq!(Offset::shared(&[]), None);
+        assert!(Offset::new([f64::NAN, 0.0, 0.0]).is_err());
+    }
+
+    #[test]
+    fn small_moves_change_positions_and_large_ones_the_offset() {
+        let original = scene(300, 7);
+        let mut splats = original.clone();
+        splats.translate([0.5, -0.25, 1.0]).unwrap();
+        assert_eq!(splats.meta.offset, None);
+        let expected = original.geometry.positions[5].map(f64::from);
+        let expected = [expected[0] + 0.5, expected[1] - 0.25, expected[2] + 1.0].map(single);
+        assert_eq!(splats.geometry.positions[5], expected);
+        let mut splats = original.clone();
+        splats.translate([5e5, 4_649_776.25, 0.0]).unwrap();
+        assert_eq!(splats.meta.offset, offset([5e5, 4_649_776.25, 0.0]));
+        assert_eq!(splats.geometry, original.geometry);
+        splats.translate([-5e5, -4_649_776.25, 0.0]).unwrap();
+        assert_eq!(splats, original);
+        assert!(splats.translate([1e300, 0.0, 0.0]).is_err());
+        assert_eq!(splats, original);
+    }
+
+    #[test]
+    fn rebasing_says_what_it_rounds() {
+        let mut splats = scene(300, 7);
+        splats.meta.offset = offset([5e5, 0.0, 0.0]);
+        let original = splats.clone();
+        let rounding = splats.rebase(offset([5e5 + 1.0, 0.0, 0.0]));
+        assert!(!rounding.is_coarse(), "{rounding:?}");
+        let rounding = splats.rebase(None);
+        assert!(rounding.is_coarse() && rounding.error > 0.01, "{rounding:?}");
+        for (a, b) in splats.geometry.positions.iter().zip(&original.geometry.positions) {
+            assert!((f64::from(a[0]) - f64::from(b[0]) - 5e5).abs() <= rounding.error + 1e-6);
+        }
+    }
+}
