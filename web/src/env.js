@@ -7,7 +7,8 @@ import { handlerOf } from './handler.js';
 const compiled = new Map();
 
 /**
- * How parts of the package are loaded. Bundlers find a worker by `new Worker(new URL(...))` as it stands in the text.
+ * How parts of the package are loaded. Bundlers find a worker by `new Worker(new URL(...))` as it
+ * stands in the text; webpack makes one of those with the same name.
  * @typedef {object} Platform
  * @property {(url: URL) => Promise<WebAssembly.Module>} compile
  * @property {() => Worker} worker starts a worker that decodes
@@ -19,8 +20,8 @@ const compiled = new Map();
 /** @type {Platform} */
 let platform = {
   compile: compileFetched,
-  worker: () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'lexisplat' }),
-  filesWorker: () => new Worker(new URL('./files-worker.js', import.meta.url), { type: 'module', name: 'lexisplat' }),
+  worker: () => new Worker(new URL('./worker.js', import.meta.url), { type: 'module', name: 'lexisplat-decoder' }),
+  filesWorker: () => new Worker(new URL('./files-worker.js', import.meta.url), { type: 'module', name: 'lexisplat-files' }),
   hasWorkers: typeof Worker !== 'undefined',
   source: () => undefined,
 };
