@@ -27,11 +27,11 @@ export function makeNotice({ poster, open }) {
     button.hidden = !open || Boolean(why) || loads;
     bar.hidden = !loads;
     setBar(bar, load);
-    // The panel says it, too.
-    text.hidden = loads && Boolean(open);
     say(title, why ? 'The scene cannot be drawn here' : loads ? `Loading ${load?.name ?? ''}` : 'Open a scene');
-    const came = load ? [stalled(load), arrived(load)].filter(Boolean).join('. ') : 'Preparing';
-    say(text, why || (loads && came) || 'Drop one or two files here, or choose them: .lexi, .ply, .spz, .sog, .splat, .ksplat or .glb. They stay on this device.');
+    // Where there is a panel, it says what came.
+    text.hidden = loads && Boolean(open);
+    const came = open ? '' : load ? [stalled(load), arrived(load)].filter(Boolean).join('. ') : 'Preparing';
+    say(text, why || (loads ? came : 'Drop one or two files here, or choose them: .lexi, .ply, .spz, .sog, .splat, .ksplat or .glb. They stay on this device.'));
   }
 
   return {

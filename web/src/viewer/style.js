@@ -71,7 +71,7 @@ canvas:focus-visible { outline-offset: -3px; }
   display: grid; gap: 10px; justify-items: center; max-width: 25rem; padding: 22px 26px; border-radius: 12px;
   background: var(--panel); text-align: center; pointer-events: auto; position: relative;
 }
-.whole:not(.still) .notice { border: 1.5px dashed var(--line); }
+.whole:not(.still, .clean) .notice { border: 1.5px dashed var(--line); }
 .notice h2 { font-size: 17px; font-weight: 600; }
 .notice p { color: var(--quiet); text-wrap: balance; }
 .notice progress { width: 12rem; max-width: 100%; }
