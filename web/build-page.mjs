@@ -22,6 +22,8 @@ const MARKERS = [
   '<title>lexisplat</title>',
   'data-poster=""',
   'data-words=""',
+  'data-controls="all"',
+  'connect-src * blob: data:',
   'id="scene" data-name=""></script>',
   'id="scene2" data-name=""></script>',
 ];

@@ -18,7 +18,7 @@ import { cpus, tmpdir } from 'node:os';
 import { dirname, join } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { open } from '../src/index.js';
+import { open } from 'lexisplat';
 import { launch } from '../test/support/chromium.mjs';
 import { serveViewers } from '../test/support/viewers.mjs';
 import { makeFiles } from './decoders-files.mjs';

@@ -10,7 +10,7 @@ let env;
 async function start(workers = 2) {
   const module = await WebAssembly.compileStreaming(fetch('../wasm/viewer_bg.wasm'));
   wasm.initSync({ module });
-  env = { wasm: module, worker: new URL('../src/viewer-worker.js', import.meta.url).href, workers };
+  env = { wasm: module, worker: () => new Worker(new URL('../src/viewer-worker.js', import.meta.url), { type: 'module' }), workers };
   viewer = await wasm.Viewer.create(canvas, '{}');
 }
 

@@ -11,7 +11,7 @@ import { tmpdir } from 'node:os';
 import { basename, dirname, join, resolve } from 'node:path';
 import { fileURLToPath } from 'node:url';
 import { parseArgs } from 'node:util';
-import { open } from '../src/index.js';
+import { open } from 'lexisplat';
 import { launch, psnr, serve } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
 

@@ -9,7 +9,7 @@
 
 import { existsSync, readdirSync, readFileSync } from 'node:fs';
 import { join, resolve } from 'node:path';
-import { open } from '../src/index.js';
+import { open } from 'lexisplat';
 import { launch, psnr } from '../test/support/chromium.mjs';
 import { decodePng } from '../test/support/png.mjs';
 import { openViewer, serveViewers } from '../test/support/viewers.mjs';

@@ -21,6 +21,8 @@ export interface Progress {
   decoded: number;
   /** Gaussians of the scene; 0 where that is not known. */
   gaussians: number;
+  /** Milliseconds for which no byte came; undefined unless a download has stalled. */
+  stalled?: number;
 }
 
 /** What a file says of itself. */
@@ -87,6 +89,21 @@ export interface Chunk {
   rows?: Uint8Array;
 }
 
+/** A chunk `as: 'codes'`. */
+export interface CodesChunk extends Chunk {
+  codes: Codes;
+}
+
+/** A chunk `as: 'dense'`. */
+export interface DenseChunk extends Chunk {
+  sh: Float32Array;
+}
+
+/** A chunk `as: 'rows'`. */
+export interface RowsChunk extends Chunk {
+  rows: Uint8Array;
+}
+
 /** Sparse codes: SH-rest of a Gaussian is the sum of its values times the atoms that its indices name. */
 export interface Codes {
   /** Nonzeros of each Gaussian. */
@@ -107,15 +124,21 @@ export class Scene {
    * Decodes the chunks, once. With `refine` they come coarse first and again as they get finer; without, each comes once, as
    * fine as it will be, in the order in which its bytes come.
    */
-  chunks(options?: { as?: Form; refine?: boolean }): AsyncIterableIterator<Chunk>;
+  chunks(options?: { as?: 'codes'; refine?: boolean }): AsyncIterableIterator<CodesChunk>;
+  chunks(options: { as: 'dense'; refine?: boolean }): AsyncIterableIterator<DenseChunk>;
+  chunks(options: { as: 'rows'; refine?: boolean }): AsyncIterableIterator<RowsChunk>;
+  chunks(options: { as?: Form; refine?: boolean }): AsyncIterableIterator<Chunk>;
   /** Decodes everything to one chunk, in the order of the file. */
-  all(options?: { as?: Form }): Promise<Chunk>;
+  all(options?: { as?: 'codes' }): Promise<CodesChunk>;
+  all(options: { as: 'dense' }): Promise<DenseChunk>;
+  all(options: { as: 'rows' }): Promise<RowsChunk>;
+  all(options: { as?: Form }): Promise<Chunk>;
   /** Ends the workers and frees memory. */
   close(): void;
 }
 
 /**
- * Opens the .lexi file at an address, in a Blob or in memory. Gives the header before the rest of the file came.
+ * Opens the .lexi file at an address, in a Blob or in memory; in Node also at a path. Gives the header before the rest of the file came.
  */
 export function open(
   source: string | URL | Blob | ArrayBuffer | ArrayBufferView,

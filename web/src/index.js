@@ -6,7 +6,7 @@ import { openWith } from './open.js';
 export { Scene } from './scene.js';
 
 /**
- * Opens the .lexi file at an address, in a Blob or in memory.
+ * Opens the .lexi file at an address, in a Blob or in memory; in Node also at a path.
  *
  * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
  * @param {import('./index.d.ts').OpenOptions} [options]

@@ -2,7 +2,7 @@
 
 import { Pool } from './pool.js';
 import { Scene } from './scene.js';
-import { after, feedOnce, sourceOf } from './source.js';
+import { after, feedOnce, sourceOf, watched } from './source.js';
 
 /** Most bytes of a file that are held at once, unless options say otherwise. */
 export const MEMORY = 256 << 20;
@@ -20,11 +20,11 @@ export const LAYERED = '3';
  * @returns {Promise<Scene>}
  */
 export async function openWith(env, source, options) {
-  const settings = { memory: MEMORY, shParts: ALL_PARTS, ...options };
+  const input = { source: env.source(source) ?? sourceOf(source), feed: undefined };
+  const settings = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, ...options });
   const { signal } = settings;
   signal?.throwIfAborted();
-  const workers = settings.workers ?? (typeof Worker === 'undefined' && typeof process === 'undefined' ? 0 : WORKERS);
-  const input = { source: sourceOf(source), feed: undefined };
+  const workers = settings.workers ?? (env.hasWorkers ? WORKERS : 0);
   let pool;
   try {
     const start = await readStart(input.source, signal);
@@ -68,7 +68,13 @@ export function restOf(degree) {
   return 3 * ((degree + 1) ** 2 - 1);
 }
 
-/** The first bytes of a file, and its version if it is a .lexi. */
+/** How a web page begins, which some servers send for every address that they do not know. */
+const WEB_PAGE = /^\s*<(!doctype html|html)/i;
+
+/**
+ * The first bytes of a file, and its version if it is a .lexi.
+ * @throws {Error} if the file is empty, or a web page
+ */
 export async function readStart(source, signal) {
   let bytes = new Uint8Array(0);
   const reach = async (length) => {
@@ -83,8 +89,13 @@ export async function readStart(source, signal) {
     return true;
   };
   const LENGTH = 8;
+  const isLong = await reach(LENGTH + 1);
+  if (bytes.length === 0) throw new Error(`${source.name}: the file is empty`);
+  if (WEB_PAGE.test(new TextDecoder().decode(bytes.subarray(0, 64)))) {
+    throw new Error(`${source.name}: this is a web page, not a scene; servers send one where there is no file`);
+  }
   // A .lexi begins with the length of a JSON object and the object.
-  if (!(await reach(LENGTH + 1)) || bytes[LENGTH] !== 0x7b) return { bytes, version: undefined };
+  if (!isLong || bytes[LENGTH] !== 0x7b) return { bytes, version: undefined };
   const view = new DataView(bytes.buffer);
   const length = view.getUint32(0, true);
   if (view.getUint32(4, true) > 0 || length > MOST_HEADER || !(await reach(LENGTH + length))) return { bytes, version: undefined };

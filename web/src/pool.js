@@ -1,9 +1,9 @@
 /** Workers that answer messages, each one at a time. */
 
-const isNode = typeof process !== 'undefined' && Boolean(process.versions?.node) && typeof Worker === 'undefined';
-
 /** What was told when the WebAssembly of a worker failed, which happens when memory runs out. */
 const FAULT = 'the decoder failed, perhaps for lack of memory';
+/** What is told of a worker that never began. Browsers give no reason. */
+const NO_SCRIPT = "its script could not be loaded: is it where the package's other files are, and does the page allow it (worker-src)?";
 
 export class Pool {
   #workers = [];
@@ -11,7 +11,7 @@ export class Pool {
 
   /**
    * @param {number} count how many workers; 0 for none
-   * @param {{module: WebAssembly.Module, worker: () => Promise<Worker>, handler: () => (message: object) => {reply: object}}} env
+   * @param {{module: WebAssembly.Module, worker: () => Worker, handler: () => (message: object) => {reply: object}}} env
    */
   static async of(count, env) {
     const pool = new Pool();
@@ -27,7 +27,7 @@ export class Pool {
   }
 
   async #start(env) {
-    const worker = await env.worker();
+    const worker = env.worker();
     const waiting = new Map();
     const listen = (name, take) => (worker.on ? worker.on(name, take) : worker.addEventListener(name, take));
     const failAll = (error) => {
@@ -52,7 +52,7 @@ export class Pool {
       if (error !== undefined) reject?.(new Error(fatal ? `lexisplat: ${FAULT} (${error})` : error));
       else resolve?.(reply);
     });
-    listen('error', (event) => failAll(new Error(`lexisplat: a worker failed: ${event.message ?? event}`)));
+    listen('error', (event) => failAll(new Error(`lexisplat: a worker failed: ${event.message ?? NO_SCRIPT}`)));
     const slot = {
       busy: 0,
       failed: false,
@@ -106,11 +106,4 @@ export class Pool {
 
 function turn() {
   return new Promise((resolve) => setTimeout(resolve));
-}
-
-/** Starts the module worker at `url` in a browser or in Node. */
-export async function startWorker(url) {
-  if (!isNode) return new Worker(url, { type: 'module', name: 'lexisplat' });
-  const { Worker: NodeWorker } = await import('node:worker_threads');
-  return new NodeWorker(url);
 }

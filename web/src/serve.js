@@ -3,9 +3,9 @@
 /**
  * @param {(module: WebAssembly.Module) => object} start gives the exports of the WebAssembly
  * @param {(exports: object) => (message: object, emit: (part: object, transfer: ArrayBuffer[]) => void) => {reply: object, transfer: ArrayBuffer[]}} handlerOf
+ * @param {any} [port] where messages come from: the worker itself, or in Node the port of its parent
  */
-export async function serve(start, handlerOf) {
-  const port = globalThis.postMessage ? globalThis : (await import('node:worker_threads')).parentPort;
+export function serve(start, handlerOf, port = globalThis) {
   let handle;
   const take = (message) => {
     const { id } = message;

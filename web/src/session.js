@@ -4,7 +4,7 @@ import * as wasm from '../wasm/viewer.js';
 import { ALL_PARTS, LAYERED, MEMORY, readStart, readWhole, startDecoders, startFeed } from './open.js';
 import { Pool } from './pool.js';
 import { streamed } from './scene.js';
-import { sourceOf } from './source.js';
+import { sourceOf, watched } from './source.js';
 import { viewerHandlerOf } from './viewer-handler.js';
 
 /** Bytes of a Gaussian on the GPU, besides its nonzeros: position and size, shape, base colour, and its place among codes. */
@@ -20,7 +20,7 @@ const SCENE_SHARE = 0.75;
 /**
  * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
  * @param {object} options
- * @param {{wasm: WebAssembly.Module, worker: string, workers: number}} options.env
+ * @param {{wasm: WebAssembly.Module, worker: () => Worker, workers: number}} options.env
  * @param {(bytes: Uint8Array, info: object) => unknown} options.onForm takes what `Viewer.form` takes
  * @param {(index: number, bytes: Uint8Array) => unknown} options.onPart takes what `Viewer.part` takes
  * @param {(progress: object) => void} [options.onProgress]
@@ -33,13 +33,13 @@ export async function show(source, { env, onForm, onPart, onProgress, signal, bu
   let pool;
   const stats = { milliseconds: 0 };
   const report = (progress) => onProgress?.({ ...progress, ms: stats.milliseconds });
-  const options = { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report };
+  const options = watched(input.source, { memory: MEMORY, shParts: ALL_PARTS, signal, onProgress: report });
   try {
     signal?.throwIfAborted();
     const start = await readStart(input.source, signal);
     pool = await Pool.of(start.version === LAYERED ? env.workers : Math.min(env.workers, 1), {
       module: env.wasm,
-      worker: async () => new Worker(env.worker, env.worker.startsWith('blob:') ? {} : { type: 'module' }),
+      worker: env.worker,
       handler: () => viewerHandlerOf(wasm),
     });
     const given = { input, start, pool, options, stats, budget, onForm, onPart };

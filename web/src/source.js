@@ -5,10 +5,15 @@
  * are to be skipped and the server has ranges.
  */
 
+import { whyUnreachable } from './unreachable.js';
+
 /** Bytes of a Blob or of memory that are handed on at once. */
 const PIECE = 1 << 20;
 /** Fewer bytes than this are fetched and dropped rather than skipped by another request. */
 const WORTH_SKIPPING = 256 << 10;
+/** Milliseconds without a byte after which a download has stalled, and between two times that this is told. */
+const STALLED = 5000;
+const TOLD_EVERY = 1000;
 
 /**
  * @param {string | URL | Blob | ArrayBuffer | ArrayBufferView} source
@@ -22,6 +27,20 @@ export function sourceOf(source) {
     return new Memory(new Uint8Array(source.buffer, source.byteOffset, source.byteLength));
   }
   throw new TypeError('lexisplat: a source is an address, a Blob, an ArrayBuffer or bytes');
+}
+
+/**
+ * Tells `options.onProgress` when no bytes of `source` come for a while, too.
+ * @param {object} source of `sourceOf`
+ * @param {object} options
+ * @returns {object} the options to go on with
+ */
+export function watched(source, options) {
+  const { onProgress } = options;
+  if (!onProgress) return options;
+  let last = { loaded: 0, total: undefined, decoded: 0, gaussians: 0 };
+  source.onStall = (stalled) => onProgress({ ...last, stalled });
+  return { ...options, onProgress: (progress) => onProgress((last = progress)) };
 }
 
 /** `source`, whose first bytes were read already and are given again. */
@@ -84,6 +103,8 @@ class BlobSource {
 
 class Address {
   size = undefined;
+  /** Is told for how many milliseconds no bytes came. */
+  onStall = undefined;
   #address;
   #controller;
   #reader;
@@ -117,13 +138,28 @@ class Address {
 
   async #next() {
     try {
-      const { done, value } = await this.#reader.read();
+      const { done, value } = await this.#awaited(this.#reader.read());
       if (!done) return value;
     } catch (cause) {
       throw this.#cut(cause);
     }
     if (this.size !== undefined && this.#at < this.size) throw this.#cut();
     return null;
+  }
+
+  /** Waits for `work`, and tells when it takes long. */
+  async #awaited(work) {
+    if (!this.onStall) return work;
+    let waited = 0;
+    const timer = setInterval(() => {
+      waited += TOLD_EVERY;
+      if (waited >= STALLED) this.onStall?.(waited);
+    }, TOLD_EVERY);
+    try {
+      return await work;
+    } finally {
+      clearInterval(timer);
+    }
   }
 
   #cut(cause) {
@@ -141,10 +177,10 @@ class Address {
     const headers = at > 0 ? { Range: `bytes=${at}-` } : {};
     let response;
     try {
-      response = await fetch(this.#address, { headers, signal: this.#controller.signal });
+      response = await this.#awaited(fetch(this.#address, { headers, signal: this.#controller.signal }));
     } catch (cause) {
       if (signal?.aborted) throw signal.reason;
-      throw new Error(`${this.name}: it could not be fetched`, { cause });
+      throw new Error(`${this.name}: ${await whyUnreachable(this.#address, cause)}`, { cause });
     }
     if (!response.ok || !response.body) {
       throw new Error(`${this.name}: the server answered ${response.status} ${response.statusText}`.trim());

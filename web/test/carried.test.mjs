@@ -1,4 +1,5 @@
-// The page that the program carries, as `lexisplat html` writes it, beside the page that was just built: both show the same.
+// The page that the program carries, as `lexisplat html` writes it: it shows what the page shows that was just built, and its
+// still picture lies under its first view.
 //
 // LEXISPLAT_PROGRAM names a built `lexisplat`, LEXISPLAT_PAGE the built page.
 
@@ -18,6 +19,10 @@ const { LEXISPLAT_PROGRAM: program, LEXISPLAT_PAGE: built } = process.env;
 const missing = [!npm && 'LEXISPLAT_NPM', !program && 'LEXISPLAT_PROGRAM', !built && 'LEXISPLAT_PAGE'].filter(Boolean).join(' and ');
 /** Time for a page to draw in software, in milliseconds. */
 const PATIENCE = 120_000;
+/** Pixels by which a still picture is moved for comparison, besides one. */
+const MOVED = 3;
+/** Least likeness of the still picture and the view, in decibels. */
+const STILL = 28;
 /** Share of the pixels that are not black in a picture of the scene, at least. */
 const LIT = 0.05;
 /** Least likeness of the same picture drawn twice, in decibels: compilers may round otherwise. */
@@ -58,14 +63,58 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
 
   it('draws what the page draws that was just built', { timeout: 3 * PATIENCE }, async () => {
     const carried = join(folder, 'carried.html');
-    execFileSync(program, ['html', golden, '-o', carried, '--quiet']);
+    execFileSync(program, ['html', golden, '-o', carried, '--tools', '--quiet']);
     const scene = (await readFile(golden)).toString('base64');
     const place = 'id="scene" data-name=""></script>';
     const page = await readFile(built, 'utf8');
     assert.equal(page.split(place).length, 2);
     const fresh = join(folder, 'fresh.html');
-    await writeFile(fresh, page.replace(place, () => `id="scene" data-name="${SCENE}">${scene}</script>`));
+    const [words] = /data-words="[^"]*"/.exec(await readFile(carried, 'utf8'));
+    const filled = page.replace(place, () => `id="scene" data-name="${SCENE}">${scene}</script>`).replace('data-words=""', () => words);
+    await writeFile(fresh, filled);
     const [a, b] = [await shown(carried), await shown(fresh)];
     assert.ok(psnr(a, b) >= SAME, `${psnr(a, b)} dB`);
   });
+
+  for (const [width, height] of [[400, 160], [160, 240]]) {
+    it(`has its still picture under its first view: ${width} x ${height}`, { timeout: 3 * PATIENCE }, async () => {
+      const path = join(folder, `${width}.html`);
+      execFileSync(program, ['html', golden, '-o', path, '--quiet']);
+      const picture = async (init) => {
+        const page = await newPage(browser, { viewport: { width, height } });
+        page.setDefaultTimeout(PATIENCE);
+        if (init) await page.addInitScript(init);
+        await page.goto(pathToFileURL(path).href);
+        // The hint says that the scene is whole; without WebGPU there is a notice.
+        await page.locator(init ? '.notice' : '.hint').waitFor();
+        if (!init) await page.locator('canvas[aria-busy=false]').waitFor();
+        await page.evaluate(() => {
+          const { shadowRoot } = document.getElementById('viewer');
+          for (const over of shadowRoot.querySelectorAll('.notice, .hint, .dock, .overlay')) over.hidden = true;
+        });
+        const shown = await shot(page, '.view');
+        assert.deepEqual(page.faults, []);
+        await page.close();
+        return shown;
+      };
+      const view = await picture();
+      const still = await picture(() => delete Navigator.prototype.gpu);
+      const likeness = (right, down) => {
+        const at = (x, y) => 4 * (y * width + x);
+        let sum = 0;
+        for (let y = MOVED; y < height - MOVED; y++) {
+          for (let x = MOVED; x < width - MOVED; x++) {
+            const [a, b] = [at(x, y), at(x + right, y + down)];
+            for (let c = 0; c < 3; c++) sum += (view.data[a + c] - still.data[b + c]) ** 2;
+          }
+        }
+        return -sum;
+      };
+      const moves = [-1, 0, 1].flatMap((step) => [[step, 0], [0, step], [MOVED * step, 0], [0, MOVED * step]]);
+      const best = moves.reduce((a, b) => (likeness(...b) > likeness(...a) ? b : a), [0, 0]);
+      assert.deepEqual(best, [0, 0], 'moved by these pixels it would lie better');
+      // JPEG, and another size.
+      assert.ok(psnr(view, still) > STILL, `${psnr(view, still)} dB`);
+    });
+  }
 });

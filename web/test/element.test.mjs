@@ -2,6 +2,7 @@
 
 import assert from 'node:assert/strict';
 import { writeFile } from 'node:fs/promises';
+import { createServer } from 'node:http';
 import { join } from 'node:path';
 import { after, before, describe, it } from 'node:test';
 import { launch, npm } from './support/chromium.mjs';
@@ -50,8 +51,126 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
     assert.ok(box.width > 800 && box.height >= 128, 'it has a height without any style');
   });
 
+  test('opens clean: a small bar, no figures, no files', async () => {
+    await open('<lexi-viewer src="/made/first.lexi"></lexi-viewer>');
+    await loaded();
+    await page.getByRole('button', { name: 'Back to the first view' }).waitFor();
+    await page.getByRole('button', { name: 'Full screen' }).waitFor();
+    for (const text of ['Open files', 'Figures', 'Gaussians', 'Side']) assert.equal(await page.getByText(text).filter({ visible: true }).count(), 0, text);
+    const hint = page.locator('.hint');
+    assert.match(await hint.textContent(), /^Drag to turn, click and scroll/);
+    assert.equal(await hint.isVisible(), true);
+    await page.mouse.click(300, 60);
+    assert.equal(await hint.isVisible(), false, 'who moves knows how');
+    await page.evaluate(() => (document.querySelector('lexi-viewer').controls = 'none'));
+    await loaded(2);
+    assert.equal(await page.getByRole('button').filter({ visible: true }).count(), 0);
+  });
+
+  test('turns until it is touched', async () => {
+    await open('<lexi-viewer src="/made/first.lexi"></lexi-viewer>', { reducedMotion: 'no-preference' });
+    await loaded();
+    const turns = () => page.evaluate(() => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit'));
+    await page.waitForFunction(() => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length > 3);
+    assert.ok((await turns()).every(([, right, down]) => right > 0 && down === 0));
+    await page.mouse.click(300, 60);
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    const before = (await turns()).length;
+    await page.waitForTimeout(200);
+    assert.equal((await turns()).length, before);
+    await page.getByRole('button', { name: 'Turn', exact: true }).click();
+    await page.waitForFunction((before) => globalThis.viewers[0].calls.filter(([name]) => name === 'orbit').length > before, before);
+    await page.getByRole('button', { name: 'Stop turning' }).click();
+    await page.locator('canvas[aria-busy=false]').waitFor();
+  });
+
+  test('stands still where it is asked to, by people or the page', async () => {
+    const orbits = () => page.evaluate(() => globalThis.viewers.flatMap(({ calls }) => calls).filter(([name]) => name === 'orbit').length);
+    for (const [more, options] of [['', {}], ['still', { reducedMotion: 'no-preference' }], ['controls="all"', { reducedMotion: 'no-preference' }]]) {
+      await page?.context().close();
+      await open(`<lexi-viewer src="/made/first.lexi" ${more}></lexi-viewer>`, options);
+      await loaded();
+      await page.waitForTimeout(150);
+      assert.equal(await orbits(), 0, more);
+    }
+  });
+
+  test('begins with its camera and returns to it', async () => {
+    await open('<lexi-viewer src="/made/first.lexi" camera="1:2:3:0:0:0:1:4:1.2"></lexi-viewer>');
+    await loaded();
+    const runs = () => page.evaluate(() => globalThis.viewers[0].calls.filter(([name]) => name === 'run' || name === 'key'));
+    assert.deepEqual((await runs()).at(-1), ['run', 'view=1:2:3:0:0:0:1:4:1.2']);
+    await page.mouse.click(300, 60);
+    await page.keyboard.press('ArrowRight');
+    await page.getByRole('button', { name: 'Back to the first view' }).click();
+    await page.waitForFunction(() => globalThis.viewers[0].calls.filter(([name]) => name === 'key').length === 1);
+    await page.locator('canvas[aria-busy=false]').waitFor();
+    assert.deepEqual((await runs()).slice(-2), [['key', 'r'], ['run', 'view=1:2:3:0:0:0:1:4:1.2']]);
+    await page.evaluate(() => (document.querySelector('lexi-viewer').camera = '2'));
+    await page.waitForFunction(() => globalThis.viewers[0].calls.at(-1)[1] === 'camera=2');
+    const link = await page.evaluate(() => document.querySelector('lexi-viewer').link());
+    await page.evaluate((link) => (document.querySelector('lexi-viewer').camera = link), link);
+    await page.waitForFunction((link) => globalThis.viewers[0].calls.some(([name, text]) => name === 'set_link' && text === link), link);
+  });
+
+  test('puts annotations where their points are', async () => {
+    const marks = JSON.stringify([{ at: [0, 0, 0], text: 'Middle' }, { at: [1.5, 0, 0], text: 'Right', view: '9:9:9' }, { at: [0, 0, -5], text: 'Behind' }]);
+    await open(`<lexi-viewer src="/made/first.lexi" annotations='${marks}'></lexi-viewer>`);
+    await loaded();
+    const place = async (text) => {
+      const { x, y, height } = await page.locator('.mark', { hasText: text }).boundingBox();
+      return [x + 7, y + height / 2].map(Math.round);
+    };
+    const box = await page.locator('lexi-viewer canvas').boundingBox();
+    const [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+    const near = ([a, b], [c, d]) => assert.ok(Math.abs(a - c) <= 2 && Math.abs(b - d) <= 2, `${a} ${b}, not ${c} ${d}`);
+    near(await place('Middle'), [x, y]);
+    near(await place('Right'), [x + box.height / 2, y]);
+    assert.equal(await page.locator('.mark', { hasText: 'Behind' }).isVisible(), false);
+    await page.getByRole('button', { name: 'Right' }).click();
+    await page.waitForFunction(() => globalThis.viewers[0].calls.some(([name, words]) => name === 'run' && words === 'view=9:9:9'));
+    await page.evaluate(() => (document.querySelector('lexi-viewer').annotations = '[{"at": [1, 2]}]'));
+    await page.locator('.message', { hasText: 'annotations: number 1: at has to be three numbers.' }).waitFor();
+  });
+
+  test('says that it loads again when it was removed and put back', async () => {
+    const slow = createServer((_, response) => {
+      response.writeHead(200, { 'content-length': 1000, 'access-control-allow-origin': '*' });
+      response.write('lexi');
+    });
+    await new Promise((done) => slow.listen(0, '127.0.0.1', done));
+    try {
+      const src = `http://localhost:${slow.address().port}/slow.lexi`;
+      await writeFile(join(server.made, 'host.html'), HOST(`<lexi-viewer src="${src}" poster="${STILL}"></lexi-viewer>`).replace("connect-src 'self'", 'connect-src *'));
+      page = await newPage(browser);
+      await page.goto(`${server.url}/made/host.html`);
+      await page.getByRole('button', { name: 'Show in 3D' }).click();
+      await page.getByText('Loading slow.lexi').waitFor();
+      await page.getByText('4 B of 1.0 kB, 0 %').waitFor();
+      await page.evaluate(() => {
+        const viewer = document.querySelector('lexi-viewer');
+        viewer.remove();
+        document.body.append(viewer);
+      });
+      await page.getByText('Loading slow.lexi').waitFor();
+      await page.getByText('4 B of 1.0 kB, 0 %').waitFor();
+    } finally {
+      slow.closeAllConnections();
+      slow.close();
+    }
+  });
+
+  test('says that a download has stalled', async () => {
+    await writeFile(join(server.made, 'stalls.lexi'), scene('stalls'));
+    await open('<lexi-viewer src="/made/stalls.lexi"></lexi-viewer>');
+    await page.locator('.waits', { hasText: 'Nothing has come for 12 s' }).waitFor();
+    await page.locator('progress.thin').waitFor();
+    await page.evaluate(() => (document.querySelector('lexi-viewer').controls = 'all'));
+    await page.locator('.card', { hasText: 'Nothing has come for 12 s' }).waitFor();
+  });
+
   test('compares two scenes, and its mode follows the user', async () => {
-    await open('<lexi-viewer src="/made/first.lexi" src2="/made/second.lexi" mode="difference" controls></lexi-viewer>');
+    await open('<lexi-viewer src="/made/first.lexi" src2="/made/second.lexi" mode="difference" controls="all"></lexi-viewer>');
     await loaded(2);
     assert.equal((await reportOf(page)).mode, 'difference');
     await page.getByRole('button', { name: 'Side' }).click();
@@ -65,7 +184,7 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
   });
 
   test('takes new addresses, reflects its properties, and says what failed', async () => {
-    await open('<lexi-viewer src="/made/first.lexi" controls></lexi-viewer>');
+    await open('<lexi-viewer src="/made/first.lexi" controls="all"></lexi-viewer>');
     await loaded();
     await page.evaluate(() => (document.querySelector('lexi-viewer').src = '/made/second.lexi'));
     await loaded(2);
@@ -74,7 +193,7 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
       [viewer.src2, viewer.alt] = ['/made/none.lexi', 'A room'];
       return [viewer.getAttribute('src'), viewer.getAttribute('src2'), viewer.getAttribute('alt'), viewer.controls];
     });
-    assert.deepEqual(reflected, ['/made/second.lexi', '/made/none.lexi', 'A room', true]);
+    assert.deepEqual(reflected, ['/made/second.lexi', '/made/none.lexi', 'A room', 'all']);
     await page.locator('.message', { hasText: 'none.lexi: the server answered 404.' }).waitFor();
     assert.deepEqual((await heard('error')).map(({ message }) => message), ['none.lexi: the server answered 404.']);
     assert.equal((await reportOf(page)).models[0].name, 'second.lexi', 'what it had stays');
@@ -171,6 +290,6 @@ describe('<lexi-viewer>', { skip: !npm && 'LEXISPLAT_NPM is not set' }, () => {
 describe('the module of <lexi-viewer>', () => {
   it('can be loaded where there is no browser', async () => {
     const { LexiViewer } = await import('../src/viewer/element.js');
-    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt']);
+    assert.deepEqual(LexiViewer.observedAttributes, ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still']);
   });
 });

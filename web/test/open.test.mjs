@@ -3,19 +3,20 @@
 // LEXISPLAT_PROGRAM names a built `lexisplat`; without it nothing is compared with its PLYs.
 
 import assert from 'node:assert/strict';
-import { execFileSync } from 'node:child_process';
-import { mkdtempSync, readFileSync, readdirSync, rmSync } from 'node:fs';
+import { execFileSync, spawnSync } from 'node:child_process';
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, symlinkSync, writeFileSync } from 'node:fs';
 import { createServer } from 'node:http';
 import { tmpdir } from 'node:os';
-import { join } from 'node:path';
-import { after, test } from 'node:test';
-import { fileURLToPath } from 'node:url';
-import { open } from '../src/index.js';
+import { join, relative } from 'node:path';
+import { after, mock, test } from 'node:test';
+import { fileURLToPath, pathToFileURL } from 'node:url';
+import { open } from 'lexisplat';
 
 const golden = fileURLToPath(new URL('../../crates/lexisplat/tests/golden/', import.meta.url));
 const files = readdirSync(golden).filter((file) => file.endsWith('.lexi'));
 const layered = readFileSync(join(golden, 'packed3_layers.lexi'));
-const program = process.env.LEXISPLAT_PROGRAM;
+const web = fileURLToPath(new URL('..', import.meta.url));
+const { LEXISPLAT_PROGRAM: program, LEXISPLAT_NPM: npm } = process.env;
 const scratch = mkdtempSync(join(tmpdir(), 'lexisplat-open-'));
 after(() => rmSync(scratch, { recursive: true }));
 
@@ -228,13 +229,105 @@ test('a cut connection, a wrong address and a wrong file are told', async () => 
     await assert.rejects(open(url), /a scene\.lexi: the server answered 404/);
   });
   await assert.rejects(open('http://localhost:9/x.lexi'), /x\.lexi: it could not be fetched/);
-  for (const wrong of [new Uint8Array(0), new TextEncoder().encode('ply\nformat'), new Uint8Array(5000).fill(0x7b)]) {
+  await served(layered, (_, response) => response.writeHead(200, { 'content-length': 0 }).end(), async (url) => {
+    await assert.rejects(open(url), /a scene\.lexi: the file is empty/);
+  });
+  const page = Buffer.from('<!DOCTYPE html><title>no such page</title>');
+  await served(page, plain, async (url) => assert.rejects(open(url), /a scene\.lexi: this is a web page, not a scene/));
+  const closed = createServer();
+  await new Promise((done) => closed.listen(0, '127.0.0.1', done));
+  const { port } = closed.address();
+  await new Promise((done) => closed.close(done));
+  await assert.rejects(open(`http://127.0.0.1:${port}/x.lexi`), /x\.lexi: the server refuses connections/);
+  await assert.rejects(open(new Uint8Array(0)), /the file is empty/);
+  for (const wrong of [new TextEncoder().encode('ply\nformat'), new Uint8Array(5000).fill(0x7b)]) {
     await assert.rejects(open(wrong), /this is not a \.lexi file/);
   }
   await assert.rejects(open(5), /a source is/);
   const scene = await open(layered);
   await assert.rejects(scene.all({ as: 'pictures' }), /as is codes, dense, rows, not pictures/);
   scene.close();
+});
+
+test('paths and addresses of files are opened', async () => {
+  const path = join(scratch, 'a scene.lexi');
+  writeFileSync(path, layered);
+  const whole = await open(layered);
+  const { positions } = await whole.all();
+  whole.close();
+  for (const source of [path, relative(process.cwd(), path), pathToFileURL(path), pathToFileURL(path).href]) {
+    const progress = [];
+    const scene = await open(source, { onProgress: (p) => progress.push(p) });
+    assert.deepEqual((await scene.all()).positions, positions);
+    assert.equal(progress.at(-1).loaded, layered.length);
+    scene.close();
+  }
+  await assert.rejects(open(join(scratch, 'none.lexi')), /none\.lexi: there is no such file/);
+  await assert.rejects(open(scratch), /it is not a file/);
+});
+
+test('a stalled download is told', async () => {
+  const half = (_, response, bytes) => response.writeHead(200, { 'content-length': bytes.length }).write(bytes.subarray(0, bytes.length >> 1));
+  const stop = new AbortController();
+  await served(layered, half, async (url) => {
+    mock.timers.enable({ apis: ['setInterval'] });
+    try {
+      const progress = [];
+      const scene = await open(url, { signal: stop.signal, onProgress: (p) => progress.push(p) });
+      const all = scene.all();
+      while (progress.length === 0 || progress.at(-1).loaded < layered.length >> 1) await new Promise((go) => setTimeout(go, 5));
+      assert.ok(progress.every(({ stalled }) => stalled === undefined));
+      mock.timers.tick(6000);
+      const { stalled, loaded, total } = progress.at(-1);
+      assert.deepEqual({ stalled, loaded, total }, { stalled: 6000, loaded: layered.length >> 1, total: layered.length });
+      stop.abort();
+      await assert.rejects(all, { name: 'AbortError' });
+      scene.close();
+    } finally {
+      mock.timers.reset();
+    }
+  });
+});
+
+test('what the documentation shows has types', { skip: npm ? false : 'LEXISPLAT_NPM is not set' }, () => {
+  const folder = join(scratch, 'types');
+  mkdirSync(join(folder, 'node_modules'), { recursive: true });
+  symlinkSync(web, join(folder, 'node_modules/lexisplat'));
+  const shown = ['../docs/WEB.md', 'README.md'].map((file) => readFileSync(join(web, file), 'utf8'));
+  const examples = shown.flatMap((text) => [...text.matchAll(/```js\n([^]*?)```/g)].map(([, code]) => code));
+  const ours = examples.filter((code) => code.includes("from 'lexisplat'") || code.includes('lexi-viewer'));
+  assert.ok(ours.length >= 2, `${ours.length} examples`);
+  const fields = `import { open, type DenseChunk } from 'lexisplat';
+import 'lexisplat/viewer';
+const scene = await open('scene.lexi');
+for await (const { sh } of scene.chunks({ as: 'dense', refine: true })) console.log(sh.length);
+const { codes } = await scene.all();
+const { rows }: { rows: Uint8Array } = await scene.all({ as: 'rows' });
+const dense: DenseChunk = await scene.all({ as: 'dense' });
+console.log(codes.counts.length, rows.length, dense.sh.length);
+const viewer = document.querySelector('lexi-viewer');
+viewer?.addEventListener('progress', ({ detail }) => console.log(detail.stalled));
+// @ts-expect-error codes have no dense SH
+(await scene.all({ as: 'codes' })).sh.length;
+`;
+  [...ours, fields].forEach((code, i) => writeFileSync(join(folder, `example${i}.mts`), code));
+  const options = { strict: true, noEmit: true, target: 'es2022', module: 'nodenext', lib: ['es2022', 'dom', 'esnext.asynciterable'], types: [] };
+  writeFileSync(join(folder, 'tsconfig.json'), JSON.stringify({ compilerOptions: options, include: ['*.mts'] }));
+  const { status, stdout } = spawnSync(process.execPath, [join(npm, 'typescript/bin/tsc'), '-p', folder], { encoding: 'utf8' });
+  assert.equal(status, 0, stdout);
+});
+
+test('the package has its licences and all that it names', () => {
+  const { stdout } = spawnSync('npm', ['pack', '--dry-run', '--json', '--ignore-scripts'], { cwd: web, encoding: 'utf8', shell: process.platform === 'win32' });
+  const files = JSON.parse(stdout)[0].files.map(({ path }) => path);
+  const { exports } = JSON.parse(readFileSync(join(web, 'package.json'), 'utf8'));
+  const named = Object.values(exports).flatMap((entry) => (typeof entry === 'string' ? [entry] : Object.values(entry)));
+  for (const path of ['LICENSE-MIT', 'LICENSE-APACHE', 'README.md', ...named.filter((path) => !path.includes('*')).map((path) => path.slice(2))]) {
+    assert.ok(files.includes(path), path);
+  }
+  for (const licence of ['LICENSE-MIT', 'LICENSE-APACHE']) {
+    assert.equal(readFileSync(join(web, licence), 'utf8'), readFileSync(join(web, '..', licence), 'utf8'), licence);
+  }
 });
 
 test('damage is an error, and never a fault', async () => {

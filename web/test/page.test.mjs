@@ -220,7 +220,7 @@ describe('the page of the viewer', { skip: !npm && 'LEXISPLAT_NPM is not set' },
     await new Promise((done) => cutter.listen(0, '127.0.0.1', done));
     try {
       await open(`?url=${encodeURIComponent(`http://localhost:${cutter.address().port}/cut.lexi`)}`);
-      await message('60 % of it had come, which stays');
+      await message('67 % of it had come, which stays');
       const { models } = await report();
       assert.equal(models[0].name, 'cut.lexi');
       await drop(page, 'body', [file('next.lexi')], { shift: true });

@@ -5,7 +5,7 @@ import { mkdtempSync, readFileSync, rmSync, writeFileSync } from 'node:fs';
 import { tmpdir } from 'node:os';
 import { join } from 'node:path';
 import { after, before, test } from 'node:test';
-import { open } from '../src/index.js';
+import { open } from 'lexisplat';
 import { launch, npm, psnr, shot } from './support/chromium.mjs';
 import { plyOf } from './support/ply.mjs';
 import { dense, golden, lit, openViewer, serveViewers } from './support/viewers.mjs';

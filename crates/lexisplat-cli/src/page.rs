@@ -15,6 +15,10 @@ const VIEWER: &[u8] = include_bytes!("../assets/viewer.html.gz");
 const TITLE: &str = "<title>lexisplat</title>";
 const POSTER: &str = "data-poster=\"\"";
 const WORDS: &str = "data-words=\"\"";
+const CONTROLS: &str = "data-controls=\"all\"";
+/// What a page may fetch that carries no scene, and one that does.
+const FETCHES: &str = "connect-src * blob: data:";
+const FETCHES_NOTHING: &str = "connect-src 'none'";
 const SCENES: [(&str, &str); 2] =
     [("id=\"scene\"", " data-name=\"\"></script>"), ("id=\"scene2\"", " data-name=\"\"></script>")];
 
@@ -34,6 +38,10 @@ pub(crate) struct Page<'a> {
     pub(crate) poster: Option<Poster<'a>>,
     /// Words of a script of the viewer.
     pub(crate) words: &'a str,
+    /// Whether a page with a scene has the whole panel, not the small bar.
+    pub(crate) tools: bool,
+    /// Whether the scene does not turn by itself.
+    pub(crate) still: bool,
     /// Names and bytes of up to two scenes.
     pub(crate) scenes: Vec<(&'a str, &'a [u8])>,
 }
@@ -53,6 +61,12 @@ impl Page<'_> {
             (POSTER.to_owned(), poster.unwrap_or_else(|| POSTER.to_owned())),
             (WORDS.to_owned(), format!("data-words=\"{}\"", escaped(self.words))),
         ];
+        if !self.scenes.is_empty() {
+            let controls = if self.tools { CONTROLS } else { "data-controls=\"bar\"" };
+            let still = if self.still { " data-still=\"\"" } else { "" };
+            edits.push((CONTROLS.to_owned(), format!("{controls}{still}")));
+            edits.push((FETCHES.to_owned(), FETCHES_NOTHING.to_owned()));
+        }
         for ((name, bytes), (id, rest)) in self.scenes.iter().zip(SCENES) {
             let scene = BASE64.encode(bytes);
             edits.push((
@@ -114,7 +128,9 @@ mod tests {
         assert!(VIEWER.len() <= MOST, "{} bytes", VIEWER.len());
         let scenes = SCENES.map(|(id, rest)| format!("{id}{rest}"));
         let viewer = viewer().unwrap();
-        for place in [TITLE, POSTER, WORDS].into_iter().chain(scenes.iter().map(String::as_str)) {
+        for place in
+            [TITLE, POSTER, WORDS, CONTROLS, FETCHES].into_iter().chain(scenes.iter().map(String::as_str))
+        {
             assert_eq!(viewer.matches(place).count(), 1, "{place}");
         }
     }
@@ -126,6 +142,8 @@ mod tests {
             title: "a <b> & \"c\"",
             poster: Some(poster),
             words: "mode=wipe",
+            tools: false,
+            still: true,
             scenes: vec![("a\".lexi", b"first"), ("b.lexi", b"second")],
         };
         let html = page.pieces().unwrap().concat();
@@ -133,11 +151,16 @@ mod tests {
             "<title>a &lt;b&gt; &amp; &quot;c&quot;</title>",
             "data-poster=\"data:image/png;base64,iVBORw==\"",
             "data-words=\"mode=wipe\"",
+            "data-controls=\"bar\" data-still=\"\"",
+            "connect-src 'none'",
             "id=\"scene\" data-name=\"a&quot;.lexi\">Zmlyc3Q=</script>",
             "id=\"scene2\" data-name=\"b.lexi\">c2Vjb25k</script>",
         ] {
             assert_eq!(html.matches(text).count(), 1, "{text}");
         }
+        assert!(!html.contains(FETCHES));
+        let tools = Page { tools: true, scenes: vec![("a.lexi", b"first")], ..Page::default() };
+        assert!(tools.pieces().unwrap().concat().contains(CONTROLS));
         let empty = Page { title: "lexisplat", ..Page::default() };
         assert_eq!(empty.pieces().unwrap().concat(), viewer().unwrap());
     }

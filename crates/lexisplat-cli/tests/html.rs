@@ -24,6 +24,9 @@ fn a_page_holds_the_scene_and_a_picture_of_it() {
     let page = std::fs::read_to_string(folder.path("scene.html")).unwrap();
     assert_eq!(report["bytes"], page.len());
     assert!(page.contains("<title>scene</title>"), "the scene's name");
+    assert!(page.contains("data-controls=\"bar\">"), "a small bar");
+    assert!(page.contains("data-words=\"view="), "the view of the picture");
+    assert!(page.contains("connect-src 'none'") && !page.contains("connect-src *"), "it loads nothing");
     assert_eq!(
         held(&page, "id=\"scene\" data-name=\"scene.lexi\">"),
         std::fs::read(folder.path("scene.lexi")).unwrap()
@@ -41,12 +44,12 @@ fn a_page_holds_the_scene_and_a_picture_of_it() {
 fn two_scenes_are_compared_and_options_are_kept() {
     let folder = compressed();
     let args = ["html", "scene.ply", "scene.lexi", "-o", "both.html", "--title", "a & b", "--no-poster"];
-    folder.run(&[&args[..], &["--actions", "mode=wipe,split=0.25"]].concat());
+    folder.run(&[&args[..], &["--tools", "--still", "--actions", "mode=wipe,split=0.25"]].concat());
     let page = std::fs::read_to_string(folder.path("both.html")).unwrap();
     assert!(
-        page.contains("<title>a &amp; b</title>") && page.contains("data-words=\"mode=wipe,split=0.25\"")
+        page.contains("<title>a &amp; b</title>") && page.contains("data-words=\"mode=wipe,split=0.25,view=")
     );
-    assert!(page.contains("data-poster=\"\""));
+    assert!(page.contains("data-poster=\"\"") && page.contains("data-controls=\"all\" data-still=\"\""));
     assert_eq!(
         held(&page, "id=\"scene\" data-name=\"scene.ply\">"),
         std::fs::read(folder.path("scene.ply")).unwrap()
@@ -55,6 +58,50 @@ fn two_scenes_are_compared_and_options_are_kept() {
         held(&page, "id=\"scene2\" data-name=\"scene.lexi\">"),
         std::fs::read(folder.path("scene.lexi")).unwrap()
     );
+}
+
+#[test]
+fn a_sog_of_several_files_is_bundled_and_its_bytes_are_counted() {
+    let folder = Folder::new();
+    folder.run(&["convert", "scene.ply", "scene.sog", "--quiet"]);
+    let parts = stored(&std::fs::read(folder.path("scene.sog")).unwrap());
+    std::fs::create_dir(folder.path("garden")).unwrap();
+    for (name, bytes) in &parts {
+        std::fs::write(folder.path("garden").join(name), bytes).unwrap();
+    }
+    let all: usize = parts.iter().map(|(_, bytes)| bytes.len()).sum();
+    for (from, page) in [("garden/meta.json", "a.html"), ("garden", "b.html")] {
+        let report = folder.json(&["html", from, "-o", page, "--no-poster"]);
+        let page = std::fs::read_to_string(folder.path(page)).unwrap();
+        let mut bundled = stored(&held(&page, "id=\"scene\" data-name=\"garden.sog\">"));
+        let mut expected = parts.clone();
+        bundled.sort();
+        expected.sort();
+        assert!(bundled == expected, "the very files");
+        assert!(report["scene_bytes"].as_u64().unwrap() > all as u64);
+    }
+    let small = ["--orbit", "1", "--width", "32", "--device", "cpu"];
+    let compared = folder.json(&[&["compare", "scene.sog", "garden/meta.json"][..], &small].concat());
+    assert_eq!(compared["b"]["bytes"], all);
+    assert_eq!(compared["identical"], true);
+    std::fs::remove_file(folder.path("garden/quats.webp")).unwrap();
+    folder.fail(&["html", "garden/meta.json", "-o", "c.html", "--no-poster"], 3);
+}
+
+/// The names and contents of the members of a zip archive that stores them.
+fn stored(archive: &[u8]) -> Vec<(String, Vec<u8>)> {
+    let number =
+        |at: usize, bytes: usize| (0..bytes).rev().fold(0, |n, k| n << 8 | usize::from(archive[at + k]));
+    let mut members = Vec::new();
+    let mut at = 0;
+    while archive[at..].starts_with(b"PK\x03\x04") {
+        let (size, name, extra) = (number(at + 18, 4), number(at + 26, 2), number(at + 28, 2));
+        let start = at + 30 + name + extra;
+        let called = String::from_utf8(archive[at + 30..at + 30 + name].to_vec()).unwrap();
+        members.push((called, archive[start..start + size].to_vec()));
+        at = start + size;
+    }
+    members
 }
 
 #[test]

@@ -118,16 +118,18 @@ impl SceneFile {
         siblings: Siblings<'_>,
         options: &ReadOptions,
     ) -> Result<Self> {
+        let mut file_bytes = bytes.len() as u64;
         let loaded = match lexisplat_formats::open(name, bytes, siblings, options, true, &Silent)? {
             Opened::Ply(source) => Loaded::Ply(Box::new(source.into_read()?)),
             Opened::Lexi(reader) => Loaded::lexi(&reader)?,
             opened => {
                 let (kind, source) = (opened.kind(), opened.source());
+                file_bytes = source.source_bytes();
                 let (splats, warnings) = (source.whole()?.into_owned(), source.warnings().to_vec());
                 Loaded::Other(Box::new(OtherRead { kind, splats, warnings }))
             }
         };
-        Ok(Self { loaded, name: name.to_owned(), bytes: bytes.len() as u64 })
+        Ok(Self { loaded, name: name.to_owned(), bytes: file_bytes })
     }
 
     /// The scene that is there of a .lexi file called `name`, of `bytes` bytes in all, with what `reader` was told to leave

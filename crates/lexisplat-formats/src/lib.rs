@@ -31,5 +31,6 @@ pub use kind::Kind;
 pub use merge::merge;
 pub use open::{Opened, open};
 pub use siblings::{Siblings, scene_path};
+pub use sog::bundle;
 pub use source::FormatSource;
 pub use write::{Lost, WriteOptions, write};

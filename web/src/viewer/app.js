@@ -2,8 +2,11 @@
 
 import { load as loadEngine, obstacle } from './engine.js';
 import { make, reason } from './dom.js';
+import { makeDock } from './dock.js';
+import { makeHint } from './hint.js';
 import { Keys } from './keys.js';
 import { Loads } from './loads.js';
+import { makeMarks, parseMarks } from './marks.js';
 import { makeMessages, makeOverlay } from './overlay.js';
 import { makeNotice } from './notice.js';
 import { makePanel } from './panel.js';
@@ -11,14 +14,19 @@ import { listenToPointers } from './pointer.js';
 import { save } from './picture.js';
 import { Stage } from './stage.js';
 import { adopt } from './style.js';
+import { Turn, wantsStill } from './turn.js';
 
 /** Ends of the names of files that are read. */
 export const EXTENSIONS = ['.lexi', '.ply', '.spz', '.sog', '.splat', '.ksplat', '.glb'];
 
+/** Words of a script, or parts of a link, that say where the view is from. */
+const PLACES = /^\s*(view|camera|orbit|frame)\b/;
+
 /**
  * @typedef {object} Options
  * @property {import('./engine.js').Place} place where the program's parts are
- * @property {boolean} controls whether there is a panel
+ * @property {'all' | 'bar' | 'none'} controls the whole panel, a small bar, or nothing
+ * @property {boolean} [still] whether the scene does not turn by itself
  * @property {boolean} whole whether the viewer is all of its page, which then takes keys and the wheel from everywhere
  * @property {string} [poster] address of a still picture, shown until the scene is
  * @property {string} [label] what the scene is, for those who do not see it
@@ -31,6 +39,8 @@ export class App {
   report;
   #stop = new AbortController();
   #begun;
+  #home = '';
+  #isTouched = false;
   #wanted = { words: '', link: '', slots: new Set() };
 
   /** @param {ShadowRoot} root @param {Options} options */
@@ -42,46 +52,71 @@ export class App {
     this.canvas = make('canvas', { tabIndex: 0, role: 'application' });
     this.overlay = makeOverlay((split) => run(`split=${split}`));
     this.messages = makeMessages();
-    this.notice = makeNotice({ poster: options.poster, open: options.controls && (() => this.choose()) });
+    const all = options.controls === 'all';
+    this.notice = makeNotice({ poster: options.poster, open: all && (() => this.choose()) });
+    this.hint = makeHint(options.whole);
+    this.marks = makeMarks((view) => {
+      this.#touched();
+      run(`view=${view}`);
+    });
     this.files = make('input', { type: 'file', multiple: true, accept: EXTENSIONS.join(','), hidden: true });
     this.files.addEventListener('change', () => {
       this.take(this.files.files);
       this.files.value = '';
     });
-    this.panel = makePanel({
-      run,
-      open: () => this.choose(),
-      link: options.link,
-      picture: () => this.picture(),
-      full: document.fullscreenEnabled ? () => this.fullScreen() : undefined,
-      remove: (slot) => this.remove(slot),
-      cancel: (slot) => this.loads.cancel(slot),
-    });
+    const full = document.fullscreenEnabled ? () => this.fullScreen() : undefined;
+    const reset = () => this.reset();
+    if (all) {
+      this.panel = makePanel({
+        run,
+        reset,
+        full,
+        open: () => this.choose(),
+        link: options.link,
+        picture: () => this.picture(),
+        remove: (slot) => this.remove(slot),
+        cancel: (slot) => this.loads.cancel(slot),
+      });
+    } else if (options.controls === 'bar') {
+      this.dock = makeDock({ run, reset, full, turn: () => (this.turn.on ? this.turn.stop() : this.turn.start()) });
+    }
     this.label(options.label);
-    const view = make('div', { class: 'view' }, this.canvas, this.notice.element, this.overlay.element);
-    this.element = make('div', { class: options.whole ? 'app whole' : 'app' }, view, this.messages.element);
+    const over = [this.notice.element, this.marks.element, this.overlay.element, this.hint.element];
+    const view = make('div', { class: 'view' }, this.canvas, ...over);
+    const look = ['app', options.whole && 'whole', !all && 'clean'].filter(Boolean).join(' ');
+    this.element = make('div', { class: look }, view, this.messages.element);
     if (options.whole) this.element.prepend(make('h1', { class: 'unseen' }, 'Viewer of Gaussian splats'));
-    if (options.controls) this.element.append(this.panel.element, this.files);
+    if (this.panel) this.element.append(this.panel.element, this.files);
+    if (this.dock) this.element.append(this.dock.element);
     adopt(root);
     root.append(this.element);
 
     this.stage = new Stage(this.canvas, {
       drawn: (report, moving) => this.#update(report, moving),
       failed: (error) => this.fail(error),
-      step: (now) => this.keys.fly(now, (change) => this.stage.act(change, true).catch(() => {})),
+      step: (now) => {
+        const act = (change) => this.stage.act(change, true).catch(() => {});
+        const flies = this.keys.fly(now, act);
+        return this.turn.step(now, act) || flies;
+      },
     });
+    this.turn = new Turn(this.stage, { element: this.element, signal, changed: () => this.dock?.update(this.report, this.turn.on) });
     this.loads = new Loads(this.stage, {
       changed: (slot) => this.#changed(slot),
       formed: () => this.#tell(() => {}).catch((error) => this.fail(error)),
       begun: (slot) => this.#first(slot),
-      loaded: (slot, load) => options.on('load', { slot, name: load.name, ...this.report?.models[slot] }),
+      loaded: (slot, load) => {
+        this.#welcome();
+        options.on('load', { slot, name: load.name, ...this.report?.models[slot] });
+      },
       failed: (slot, message, error) => this.fail(message, error),
     });
-    const own = { p: () => this.picture(), h: () => this.panel.toggle() };
-    this.keys = new Keys(options.whole ? window : root, this.stage, { signal, own });
-    listenToPointers(this.stage, { signal, wheel: () => options.whole || root.activeElement === this.canvas });
+    const own = { p: () => this.picture(), h: () => this.panel?.toggle(), r: reset };
+    const touched = () => this.#touched();
+    this.keys = new Keys(options.whole ? window : root, this.stage, { signal, own, touched });
+    listenToPointers(this.stage, { signal, touched, wheel: () => options.whole || root.activeElement === this.canvas });
     // A wide panel leaves the picture room, a narrow one would not.
-    this.panel.show(this.element.clientWidth >= 640);
+    this.panel?.show(this.element.clientWidth >= 640);
     this.#look();
   }
 
@@ -125,7 +160,36 @@ export class App {
   /** Arranges the view by words or a link, now and again as the scenes of the page come. */
   arrange({ words = this.#wanted.words, link = this.#wanted.link }) {
     this.#wanted = { ...this.#wanted, words, link };
-    if (this.report?.models.some(Boolean)) this.#arranged();
+    const home = [...words.split(','), ...link.split('&')].filter((word) => PLACES.test(word));
+    if (home.length > 0) this.#home = home.join(',');
+    const [, behind] = /background=([^,&]+)/.exec(link || words) ?? [];
+    const colour = behind?.split(':').map((share) => `${100 * share}%`);
+    if (colour?.length === 3) this.element.style.setProperty('--picture', `rgb(${colour.join(' ')})`);
+    if (!this.report?.models.some(Boolean)) return;
+    // With no scene to come, nothing else would say it.
+    if (words && this.#wanted.slots.size === 0) this.run(words).catch((error) => this.fail(error));
+    this.#arranged();
+  }
+
+  /** Returns to the first view: the one that was asked for, or else that of the scene. */
+  async reset() {
+    this.#touched();
+    try {
+      await this.stage.act((viewer) => viewer.key('r'));
+      if (this.#home) await this.run(this.#home);
+    } catch (error) {
+      this.fail(error);
+    }
+  }
+
+  /** Shows annotations, a text that `parseMarks` reads. */
+  annotate(text) {
+    try {
+      this.marks.set(parseMarks(text));
+      if (this.report) this.marks.update(this.report);
+    } catch (error) {
+      this.fail(error);
+    }
   }
 
   /** The link's text for what is shown. */
@@ -233,7 +297,7 @@ export class App {
 
   #changed(slot) {
     const load = this.loads.slots[slot];
-    this.panel.cards[slot].load(load);
+    this.panel?.cards[slot].load(load);
     if (load?.progress) this.options.on('progress', { slot, ...load.progress });
     this.#look();
   }
@@ -244,7 +308,8 @@ export class App {
     if (moving && !report.identical) report.psnr ??= this.report?.psnr ?? null;
     this.report = report;
     this.overlay.update(report);
-    this.panel.update(report);
+    this.panel?.update(report);
+    this.marks.update(report);
     this.#look();
     this.options.on('view', report);
   }
@@ -253,11 +318,27 @@ export class App {
     return Boolean(this.report?.models[slot] || this.loads.slots[slot]);
   }
 
-  // The notice is there until a scene is.
+  // The notice, or the still picture, is there until something of a scene is drawn.
   #look() {
-    const shown = Boolean(this.report?.models.some(Boolean));
     const load = this.loads?.slots.find((load) => load?.active);
+    const { models = [], drawn = [] } = this.report ?? {};
+    const shown = models.some(Boolean) && (!load || drawn.some((count) => count > 0));
     this.element.classList.toggle('shown', shown);
     this.notice.update({ shown, load });
+    this.dock?.update(shown ? this.report : undefined, Boolean(this.turn?.on));
+    this.dock?.load(shown ? load : undefined);
+  }
+
+  // One scene that is whole turns until somebody touches it.
+  #welcome() {
+    if (this.#isTouched || this.options.controls === 'all') return;
+    this.hint.show();
+    if (!this.options.still && !wantsStill() && !this.#occupied(1)) this.turn.start();
+  }
+
+  #touched() {
+    this.#isTouched = true;
+    this.hint.hide();
+    this.turn.stop();
   }
 }

@@ -1,5 +1,6 @@
 // What the panel says of one scene.
 
+import { arrived, setBar, stalled } from './arrival.js';
 import { bytes, count, icon, make, say, time } from './dom.js';
 
 const CROSS = 'M6 6l8 8M14 6l-8 8';
@@ -36,12 +37,8 @@ export function sceneCard(slot, on) {
     const { shown = model?.gaussians } = load?.info ?? {};
     const less = shown < model?.gaussians ? `${count(shown)} of ` : '';
     say(about, model ? `${less}${count(model.gaussians)} Gaussians, ${model.layout}` : '');
-    const progress = load?.progress;
     bar.hidden = !load?.active;
-    if (load?.active) {
-      if (progress?.total) bar.value = progress.loaded / progress.total;
-      else bar.removeAttribute('value');
-    }
+    if (load?.active) setBar(bar, load);
     say(decode, load ? came(load) : '');
   }
 
@@ -60,11 +57,10 @@ export function sceneCard(slot, on) {
   };
 }
 
-function came({ active, progress }) {
-  if (!progress) return active ? 'Waiting for the first bytes' : '';
-  const { loaded, total, decoded, gaussians, ms } = progress;
-  const whole = active && total ? `${bytes(loaded)} of ${bytes(total)}` : '';
-  const part = active && gaussians ? `${count(decoded)} of ${count(gaussians)} Gaussians` : '';
-  const took = active || !ms ? '' : `Decoded in ${time(ms)}`;
-  return [whole, part, took].filter(Boolean).join(', ');
+function came(load) {
+  const { active, progress } = load;
+  const { decoded, gaussians, ms } = progress ?? {};
+  if (!active) return ms ? `Decoded in ${time(ms)}` : '';
+  const part = gaussians ? `${count(decoded)} of ${count(gaussians)} Gaussians` : '';
+  return [stalled(load), arrived(load), part].filter(Boolean).join(', ');
 }

@@ -37,6 +37,24 @@ export function icon(path) {
   return svg;
 }
 
+/**
+ * Makes buttons of which one is pressed.
+ * @param {string} label
+ * @param {string[][]} options of each the value, the text and at will a title
+ * @param {(value: string) => void} chosen
+ * @returns {{element: HTMLElement, set: (value: string) => void}}
+ */
+export function choice(label, options, chosen) {
+  const buttons = options.map(([value, text, title = '']) =>
+    make('button', { type: 'button', title, value, onclick: () => chosen(value), 'aria-pressed': 'false' }, text),
+  );
+  const element = make('div', { class: 'choice', role: 'group', 'aria-label': label }, ...buttons);
+  const set = (value) => {
+    for (const button of buttons) button.setAttribute('aria-pressed', String(button.value === value));
+  };
+  return { element, set };
+}
+
 /** Sets the text of `element`, only where it changes, so that screen readers and selections are left in peace. */
 export function say(element, text) {
   if (element.textContent !== text) element.textContent = text;

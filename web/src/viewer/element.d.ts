@@ -2,8 +2,8 @@
 export interface Place {
   /** Gives the compiled viewer. */
   compile: () => Promise<WebAssembly.Module>;
-  /** Address of the script of decoding workers. */
-  worker: string;
+  /** Starts a worker that decodes. */
+  worker: () => Worker;
   /** How many of them; 0 decodes on the page's thread. */
   workers: number;
 }
@@ -23,6 +23,7 @@ export interface ViewerModel {
 export interface ViewerReport {
   device: string;
   mode: ViewMode;
+  view: ViewerView | null;
   /** Name of the camera. */
   camera: string | null;
   /** Number of the camera among `cameras`, from 0. */
@@ -51,6 +52,26 @@ export interface ViewerReport {
   models: [ViewerModel | null, ViewerModel | null];
 }
 
+/** Words at a point of the scene. */
+export interface Annotation {
+  /** The point, in units of the scene. */
+  at: [number, number, number];
+  text: string;
+  /** Where the view goes when it is chosen: a link's part after `view=`. */
+  view?: string;
+}
+
+/** From where the picture is drawn. */
+export interface ViewerView {
+  /** Of the picture, and its focal lengths, in device pixels. */
+  width: number;
+  height: number;
+  focal: [number, number];
+  position: [number, number, number];
+  /** Its columns are right, down and forward in the scene. */
+  rotation: [[number, number, number], [number, number, number], [number, number, number]];
+}
+
 export interface SceneBytes {
   geometry: number;
   sh: number;
@@ -59,12 +80,15 @@ export interface SceneBytes {
 export interface LexiViewerEventMap extends HTMLElementEventMap {
   /** All of a scene came. */
   load: CustomEvent<{ slot: 0 | 1; name: string } & Partial<ViewerModel>>;
-  progress: CustomEvent<{ slot: 0 | 1; loaded: number; total?: number; decoded: number; gaussians: number; ms: number }> & ProgressEvent;
+  progress: CustomEvent<{ slot: 0 | 1; loaded: number; total?: number; decoded: number; gaussians: number; ms: number; stalled?: number }> & ProgressEvent;
   /** Something failed; the viewer goes on with what it had. */
   error: CustomEvent<{ message: string }> & ErrorEvent;
 }
 
-/** `<lexi-viewer>`: shows a scene, or two to compare. It begins when it is seen; with a poster, when it is asked to. */
+/**
+ * `<lexi-viewer>`: shows a scene, or two to compare. It begins when it is seen; with a poster, when it is asked to. A scene
+ * alone turns until somebody touches it.
+ */
 export class LexiViewer extends HTMLElement {
   /** Where the program's parts are. Set it before the first element begins if they are not beside the module. */
   static place: Place;
@@ -75,8 +99,14 @@ export class LexiViewer extends HTMLElement {
   poster: string;
   /** Follows what the user chooses. */
   mode: ViewMode | '';
-  /** Whether the panel is shown. */
-  controls: boolean;
+  /** `all` shows the whole panel, `none` nothing; else there is a small bar. */
+  controls: 'all' | 'none' | '';
+  /** The first view: what `link()` gives, or its part after `view=`. */
+  camera: string;
+  /** JSON: a list of {@link Annotation}. */
+  annotations: string;
+  /** Whether the scene does not turn by itself. It never does for people who want less motion. */
+  still: boolean;
   /** What the scene is, in words. */
   alt: string;
   /** What is shown and its figures; undefined before there is a picture. */
@@ -85,6 +115,8 @@ export class LexiViewer extends HTMLElement {
   start(): Promise<boolean>;
   /** Opens a scene in slot 0 or 1. Resolves with whether all of it came. */
   open(source: string | URL | Blob, slot?: 0 | 1): Promise<boolean>;
+  /** What `camera` would be for the view that is shown; undefined before there is one. */
+  link(): Promise<string | undefined>;
   /** Carries out words of a script of `lexisplat view`. Rejects with the reason if one is wrong. */
   run(words: string): Promise<void>;
   addEventListener<K extends keyof LexiViewerEventMap>(

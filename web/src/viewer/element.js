@@ -5,7 +5,13 @@ import { listenToDrops } from './drop.js';
 import { obstacle } from './engine.js';
 import { folder } from './folder.js';
 
-const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt'];
+const ATTRIBUTES = ['src', 'src2', 'poster', 'mode', 'controls', 'alt', 'camera', 'annotations', 'still'];
+// Those that are there or not.
+const FLAGS = ['still'];
+// Those after a change of which the element begins anew.
+const SHAPES = ['controls', 'still'];
+// A number of a camera, not a place.
+const NUMBER = /^\s*\d+\s*$/;
 // Where there is no browser the module can still be loaded, as servers that prepare pages do.
 const Base = globalThis.HTMLElement ?? class {};
 
@@ -13,8 +19,10 @@ const Base = globalThis.HTMLElement ?? class {};
  * Shows a scene, or two to compare. It begins when it is seen; with a poster, when it is asked to.
  *
  * Attributes, which are properties, too: `src` and `src2` (addresses), `poster` (address of a still picture), `mode`
- * (first, second, side, wipe or difference; follows what the user chooses), `controls` (shows the panel), `alt` (what the
- * scene is, in words). Events: `load`, `progress`, `error`, each with a `detail`.
+ * (first, second, side, wipe or difference; follows what the user chooses), `controls` (nothing for a small bar, `all` for the
+ * panel, `none`), `camera` (the first view: a link's text, or its part after `view=`), `annotations` (JSON: a list of `at`,
+ * `text`, `view`), `still` (the scene does not turn by itself), `alt` (what the scene is, in words). Events: `load`,
+ * `progress`, `error`, each with a `detail`.
  */
 export class LexiViewer extends Base {
   /** Where the program's parts are. Set it before the first element begins if they are not beside this file. */
@@ -34,23 +42,27 @@ export class LexiViewer extends Base {
   connectedCallback() {
     const on = (name, detail) => this.#told(name, detail);
     this.#stop = new AbortController();
+    // What was begun before the element was moved, or changed its shape, goes on without being asked for again.
+    const goesOn = this.#begun;
     this.#begun = false;
     this.#app = new App(this.shadowRoot, {
       place: LexiViewer.place,
-      controls: this.controls,
+      controls: this.#controls(),
+      still: this.still,
       whole: false,
       poster: this.poster,
       label: this.alt,
       on,
     });
-    if (this.controls) {
+    this.#app.annotate(this.annotations);
+    if (this.#controls() === 'all') {
       listenToDrops(this, {
         signal: this.#stop.signal,
         hover: (over) => this.#app?.element.classList.toggle('over', over),
         take: (files, first) => this.#app?.take(files, first),
       });
     }
-    if (this.poster && !obstacle()) return this.#app.notice.begin(() => this.start());
+    if (this.poster && !goesOn && !obstacle()) return this.#app.notice.begin(() => this.start());
     this.#seen = new IntersectionObserver((entries) => {
       if (entries.some((entry) => entry.isIntersecting)) this.start();
     });
@@ -66,12 +78,14 @@ export class LexiViewer extends Base {
 
   attributeChangedCallback(name, before, after) {
     if (!this.#app || before === after) return;
-    if (name === 'controls') {
+    if (SHAPES.includes(name)) {
       this.disconnectedCallback();
       this.connectedCallback();
     } else if (name === 'poster') this.#app.notice.poster(after);
     else if (name === 'alt') this.#app.label(after);
+    else if (name === 'annotations') this.#app.annotate(after);
     else if (!this.#begun) return;
+    else if (name === 'camera') this.#app.arrange(this.#view());
     else if (name !== 'mode') this.#open(name === 'src' ? 0 : 1, after);
     else if (after && after !== this.report?.mode) this.#app.run(`mode=${after}`).catch((error) => this.#app?.fail(error));
   }
@@ -83,7 +97,7 @@ export class LexiViewer extends Base {
     if (!this.#begun) {
       this.#begun = true;
       this.#app.notice.begun();
-      if (this.mode) this.#app.arrange({ words: `mode=${this.mode}` });
+      this.#app.arrange(this.#view());
       for (const [slot, source] of [this.src, this.src2].entries()) if (source) this.#open(slot, source);
     }
     return this.#app.start();
@@ -100,9 +114,26 @@ export class LexiViewer extends Base {
     return this.#app?.run(words);
   }
 
+  /** What `camera` would be for the view that is shown. */
+  async link() {
+    return this.#app?.link();
+  }
+
   /** What is shown and its figures; undefined before there is a picture. */
   get report() {
     return this.#app?.report;
+  }
+
+  #controls() {
+    return ['all', 'none'].includes(this.controls) ? this.controls : 'bar';
+  }
+
+  // The first view in words and as a link.
+  #view() {
+    const { camera, mode } = this;
+    const isLink = camera.includes('=');
+    const place = camera && !isLink && (NUMBER.test(camera) ? `camera=${camera.trim()}` : `view=${camera.trim()}`);
+    return { words: [place, mode && `mode=${mode}`].filter(Boolean).join(','), link: isLink ? camera.replace(/^#/, '') : '' };
   }
 
   #open(slot, source) {
@@ -118,7 +149,7 @@ export class LexiViewer extends Base {
 }
 
 for (const name of ATTRIBUTES) {
-  const flag = name === 'controls';
+  const flag = FLAGS.includes(name);
   Object.defineProperty(LexiViewer.prototype, name, {
     configurable: true,
     enumerable: true,

@@ -4,7 +4,7 @@
  * Where the program's parts are.
  * @typedef {object} Place
  * @property {() => Promise<WebAssembly.Module>} compile gives the compiled viewer
- * @property {string} worker address of the script of decoding workers
+ * @property {() => Worker} worker starts a worker that decodes
  * @property {number} workers how many of them; 0 decodes on the page's thread
  */
 
@@ -19,7 +19,7 @@ export function obstacle() {
 /**
  * Loads the viewer. Later calls give what the first one loaded; a failure is forgotten, so that a later call tries again.
  * @param {Place} place
- * @returns {Promise<{Viewer: any, env: {wasm: WebAssembly.Module, worker: string, workers: number}}>}
+ * @returns {Promise<{Viewer: any, env: {wasm: WebAssembly.Module, worker: () => Worker, workers: number}}>}
  */
 export function load(place) {
   loading ??= start(place).catch((error) => {

@@ -11,6 +11,6 @@ export const folder = {
     // compileStreaming refuses what a server sends under another type than application/wasm.
     return WebAssembly.compile(await answer.arrayBuffer());
   },
-  worker: new URL('../viewer-worker.js', import.meta.url).href,
+  worker: () => new Worker(new URL('../viewer-worker.js', import.meta.url), { type: 'module', name: 'lexisplat-viewer' }),
   workers: WORKERS,
 };

@@ -42,11 +42,12 @@ export class Keys {
   /**
    * @param {EventTarget} target what keys are pressed on
    * @param {import('./stage.js').Stage} stage
-   * @param {{signal: AbortSignal, own: Record<string, () => void>}} options own: what keys of the page do
+   * @param {{signal: AbortSignal, own: Record<string, () => void>, touched: () => void}} options own: what keys of the page
+   *     do; touched: is told of a key that steers
    */
-  constructor(target, stage, { signal, own }) {
+  constructor(target, stage, { signal, own, touched }) {
     const on = (on, name, listener) => on.addEventListener(name, listener, { signal });
-    on(target, 'keydown', (event) => this.#press(event, stage, own));
+    on(target, 'keydown', (event) => this.#press(event, stage, own, touched));
     // A key may be released elsewhere than it was pressed.
     on(window, 'keyup', (event) => {
       this.#held.delete(event.code);
@@ -68,7 +69,7 @@ export class Keys {
     return true;
   }
 
-  #press(event, stage, own) {
+  #press(event, stage, own, touched) {
     if (event.ctrlKey || event.altKey || event.metaKey || event.defaultPrevented || writes(event)) return;
     this.#fast = event.shiftKey;
     const key = event.key.length === 1 ? event.key.toLowerCase() : event.key;
@@ -79,6 +80,7 @@ export class Keys {
     else if (own[key]) own[key]();
     else if (COMMANDS.has(key)) stage.act((viewer) => viewer.key(event.key)).catch(stage.on.failed);
     else return;
+    touched();
     event.preventDefault();
   }
 }

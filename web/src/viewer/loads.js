@@ -1,5 +1,6 @@
 // Scenes on their way into the two slots of the viewer.
 
+import { percent, shareOf } from './arrival.js';
 import { reason } from './dom.js';
 
 // Most bytes that a scene and its drawing may take on the GPU. Phones end pages that take more.
@@ -14,7 +15,7 @@ const BUDGET = 2 ** 30;
  * @property {boolean} begun whether there is something to see of it
  * @property {Promise<unknown>} [last] the last part on its way to the viewer; those before are done when it is
  * @property {any} [info] what its header says
- * @property {{loaded: number, total?: number, decoded: number, gaussians: number, ms: number}} [progress]
+ * @property {{loaded: number, total?: number, decoded: number, gaussians: number, ms: number, stalled?: number}} [progress]
  */
 
 export class Loads {
@@ -134,9 +135,8 @@ function named(name, text) {
 
 function rest(load) {
   if (!load.shown) return '';
-  const { decoded, gaussians } = load.progress ?? {};
-  const part = gaussians > 0 ? ` ${Math.floor((100 * decoded) / gaussians)} % of it had come, which stays.` : '';
-  return part || ' What had come of it stays.';
+  const share = shareOf(load);
+  return share === undefined ? ' What had come of it stays.' : ` ${percent(share)} of it had come, which stays.`;
 }
 
 // A file's name, or the last part of an address.

@@ -1,5 +1,6 @@
 // What is in the place of a picture that is not there: how to open a scene, why there is none, a still picture.
 
+import { arrived, setBar, stalled } from './arrival.js';
 import { make, say } from './dom.js';
 
 /**
@@ -7,6 +8,8 @@ import { make, say } from './dom.js';
  */
 export function makeNotice({ poster, open }) {
   const still = make('img', { class: 'poster', alt: '', hidden: !poster });
+  // The viewer fits a view to the shorter side of its picture, and so a still picture has to be.
+  still.addEventListener('load', () => still.classList.toggle('tall', still.naturalHeight > still.naturalWidth));
   if (poster) still.src = poster;
   const title = make('h2', {});
   const text = make('p', {});
@@ -23,12 +26,12 @@ export function makeNotice({ poster, open }) {
     card.hidden = !why && !loads && !open;
     button.hidden = !open || Boolean(why) || loads;
     bar.hidden = !loads;
-    const { loaded, total } = load?.progress ?? {};
-    if (total) bar.value = loaded / total;
-    else bar.removeAttribute('value');
-    text.hidden = loads;
+    setBar(bar, load);
     say(title, why ? 'The scene cannot be drawn here' : loads ? `Loading ${load?.name ?? ''}` : 'Open a scene');
-    say(text, why || 'Drop one or two files here, or choose them: .lexi, .ply, .spz, .sog, .splat, .ksplat or .glb. They stay on this device.');
+    // Where there is a panel, it says what came.
+    text.hidden = loads && Boolean(open);
+    const came = open ? '' : load ? [stalled(load), arrived(load)].filter(Boolean).join('. ') : 'Preparing';
+    say(text, why || (loads ? came : 'Drop one or two files here, or choose them: .lexi, .ply, .spz, .sog, .splat, .ksplat or .glb. They stay on this device.'));
   }
 
   return {

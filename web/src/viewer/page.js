@@ -12,16 +12,20 @@ const PLAIN_TITLE = 'lexisplat';
  * @param {(string | Blob | undefined)[]} [scenes] those that the page carries
  */
 export function startPage(place, scenes = []) {
-  const { poster, words } = document.body.dataset;
+  const { poster, words, controls, still } = document.body.dataset;
+  // A page that carries its scene loads nothing.
+  const carries = scenes.some(Boolean);
   const titled = document.title !== PLAIN_TITLE;
   const root = document.getElementById('viewer').attachShadow({ mode: 'open' });
-  const app = new App(root, { place, controls: true, whole: true, poster, link, on: told });
-  const address = new URLSearchParams(location.search);
-  listenToDrops(window, {
-    signal: new AbortController().signal,
-    hover: (over) => app.element.classList.toggle('over', over),
-    take: (files, first) => app.take(files, first),
-  });
+  const app = new App(root, { place, controls, still: still !== undefined, whole: true, poster, link, on: told });
+  const address = new URLSearchParams(carries ? '' : location.search);
+  if (controls === 'all') {
+    listenToDrops(window, {
+      signal: new AbortController().signal,
+      hover: (over) => app.element.classList.toggle('over', over),
+      take: (files, first) => app.take(files, first),
+    });
+  }
   window.addEventListener('hashchange', () => restore());
 
   app.arrange({ words });

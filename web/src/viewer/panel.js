@@ -1,6 +1,6 @@
 // The panel: buttons, what is shown, and its figures.
 
-import { bytes, count, icon, make, say, time } from './dom.js';
+import { bytes, choice, count, icon, make, say, time } from './dom.js';
 import { HELP } from './keys.js';
 import { sceneCard } from './card.js';
 
@@ -35,6 +35,7 @@ const GAIN_STEPS = 100;
  * @param {object} on what the user asks for
  * @param {(words: string) => void} on.run
  * @param {(() => void)} on.open
+ * @param {() => void} on.reset
  * @param {(() => void) | undefined} on.link undefined leaves the button out
  * @param {() => void} on.picture
  * @param {(() => void) | undefined} on.full
@@ -62,7 +63,7 @@ export function makePanel(on) {
     round('previous', 'Previous camera', () => on.run('key=[')),
     round('next', 'Next camera', () => on.run('key=]')),
   ];
-  const reset = make('button', { type: 'button', onclick: () => on.run('key=R') }, 'Reset');
+  const reset = make('button', { type: 'button', onclick: on.reset }, 'Reset');
   const cameras = section('Camera', make('div', { class: 'row' }, ...steps, camera, reset));
 
   const degree = choice('SH degree', DEGREES, (value) => on.run(`degree=${value}`));
@@ -132,18 +133,6 @@ export function makePanel(on) {
 
   update();
   return { element, cards, update, show, toggle: () => show(body.hidden) };
-}
-
-// Buttons of which one is pressed.
-function choice(label, options, chosen) {
-  const buttons = options.map(([value, text, title = '']) =>
-    make('button', { type: 'button', title, value, onclick: () => chosen(value), 'aria-pressed': 'false' }, text),
-  );
-  const element = make('div', { class: 'choice', role: 'group', 'aria-label': label }, ...buttons);
-  const set = (value) => {
-    for (const button of buttons) button.setAttribute('aria-pressed', String(button.value === value));
-  };
-  return { element, set };
 }
 
 function rows(report) {

@@ -10,16 +10,17 @@ const LINE = 16;
 /**
  * Steers by pointers.
  * @param {import('./stage.js').Stage} stage
- * @param {{signal: AbortSignal, wheel: () => boolean}} options wheel: whether the wheel is the canvas's at the moment,
- *     or scrolls the page around it
+ * @param {{signal: AbortSignal, wheel: () => boolean, touched: () => void}} options wheel: whether the wheel is the canvas's
+ *     at the moment, or scrolls the page around it; touched: is told that somebody steers
  */
-export function listenToPointers(stage, { signal, wheel }) {
+export function listenToPointers(stage, { signal, wheel, touched }) {
   const { canvas } = stage;
   const held = new Map();
   const move = (change) => stage.act(change, true).catch(stage.on.failed);
   const on = (name, listener, options) => canvas.addEventListener(name, listener, { signal, ...options });
 
   on('pointerdown', (event) => {
+    touched();
     canvas.setPointerCapture(event.pointerId);
     held.set(event.pointerId, event);
   });
@@ -48,6 +49,7 @@ export function listenToPointers(stage, { signal, wheel }) {
     (event) => {
       if (!wheel()) return;
       event.preventDefault();
+      touched();
       const pixels = event.deltaY * (event.deltaMode === WheelEvent.DOM_DELTA_PIXEL ? 1 : LINE);
       move((viewer) => viewer.dolly(WHEEL ** -pixels));
     },

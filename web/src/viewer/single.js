@@ -22,7 +22,9 @@ async function compile() {
 }
 
 const code = new Blob([document.getElementById('worker').textContent], { type: 'text/javascript' });
-const place = { compile, worker: URL.createObjectURL(code), workers: WORKERS };
+const address = URL.createObjectURL(code);
+// Chromium starts no module worker from a blob of a page from disk.
+const place = { compile, worker: () => new Worker(address), workers: WORKERS };
 
 const scenes = ['scene', 'scene2'].map((id) => {
   const element = document.getElementById(id);

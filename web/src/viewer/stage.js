@@ -63,6 +63,11 @@ export class Stage {
     });
   }
 
+  /** The share of the canvas's width at which a moving view is drawn fluently, at most 1. */
+  get scale() {
+    return this.#scale;
+  }
+
   /** Draws with the next frame of the screen. */
   request() {
     if (this.#drawing) this.#again = true;

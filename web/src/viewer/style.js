@@ -63,12 +63,15 @@ canvas:focus-visible { outline-offset: -3px; }
 
 .instead { display: grid; place-items: center; padding: 16px; pointer-events: none; }
 .instead > * { grid-area: 1 / 1; }
-.poster { position: absolute; inset: 0; width: 100%; height: 100%; object-fit: contain; }
+.instead:has(.poster:not([hidden])) { background: var(--picture, #000); }
+.poster { position: absolute; left: 50%; top: 50%; height: 100cqmin; max-width: none; transform: translate(-50%, -50%); }
+.poster.tall { width: 100cqmin; height: auto; }
+.clean:not(.still) .instead:has(.poster:not([hidden])):has(.begin[hidden]) { place-items: end center; }
 .notice {
   display: grid; gap: 10px; justify-items: center; max-width: 25rem; padding: 22px 26px; border-radius: 12px;
   background: var(--panel); text-align: center; pointer-events: auto; position: relative;
 }
-.whole:not(.still) .notice { border: 1.5px dashed var(--line); }
+.whole:not(.still, .clean) .notice { border: 1.5px dashed var(--line); }
 .notice h2 { font-size: 17px; font-weight: 600; }
 .notice p { color: var(--quiet); text-wrap: balance; }
 .notice progress { width: 12rem; max-width: 100%; }
@@ -151,6 +154,29 @@ input[type='color'] { width: 34px; height: 32px; padding: 2px; border: 1px solid
 .message.wrong { background: var(--wrong-panel); color: var(--wrong); }
 .message.wrong .small { color: inherit; }
 
+
+.foot { position: absolute; inset: auto 0 0; pointer-events: none; }
+.dock {
+  position: absolute; right: 10px; bottom: calc(10px + env(safe-area-inset-bottom)); display: flex; gap: 2px; align-items: center; padding: 3px;
+  border-radius: 10px; background: var(--panel); pointer-events: auto; backdrop-filter: blur(14px);
+}
+.dock .choice { flex: none; }
+.thin { position: absolute; inset: auto 0 0; width: 100%; height: 3px; margin: 0; border-radius: 0; }
+.waits, .hint {
+  position: absolute; bottom: 16px; padding: 4px 11px; border-radius: 8px; background: rgb(12 12 14 / 0.68); color: #fff; pointer-events: none;
+}
+.waits { left: 12px; max-width: calc(100% - 190px); }
+.hint { left: 50%; bottom: 64px; width: max-content; max-width: calc(100% - 24px); transform: translateX(-50%); text-align: center; }
+.marks { position: absolute; inset: 0; overflow: hidden; pointer-events: none; }
+.mark {
+  position: absolute; display: flex; gap: 6px; align-items: center; min-height: 0; margin: -11px 0 0 -7px; padding: 2px 9px 2px 4px; border: 0; border-radius: 11px;
+  background: rgb(12 12 14 / 0.68); color: #fff; font-size: 12px; line-height: 18px; white-space: nowrap;
+}
+button.mark { pointer-events: auto; }
+button.mark:hover:not(:disabled) { background: rgb(12 12 14 / 0.9); }
+.dot { width: 8px; height: 8px; border: 2px solid #fff; border-radius: 50%; background: var(--accent); }
+.clean .messages { width: min(430px, calc(100% - 24px)); }
+
 @container (width < 640px) {
   .panel { inset: auto 0 0; width: auto; max-height: min(56%, 420px); border-width: 1px 0 0; border-radius: 14px 14px 0 0; flex-direction: column-reverse; }
   .bar { padding: 7px 10px calc(7px + env(safe-area-inset-bottom)); }
@@ -166,7 +192,7 @@ input[type='color'] { width: 34px; height: 32px; padding: 2px; border: 1px solid
   .cards:has(.card + .card:not([hidden])) { grid-template-columns: 1fr 1fr; }
   .cards .strong + p { text-wrap: balance; }
 }
-@media (prefers-reduced-transparency: reduce) { .panel, .message { backdrop-filter: none; } }
+@media (prefers-reduced-transparency: reduce) { .panel, .dock, .message { backdrop-filter: none; } }
 @media (prefers-reduced-motion: no-preference) { button, .turn svg { transition: background-color 120ms, transform 160ms; } }
 @media (forced-colors: active) { .choice [aria-pressed='true'] { outline: 2px solid Highlight; } }
 `;

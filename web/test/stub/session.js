@@ -4,7 +4,7 @@ const PART = 100;
 
 export async function show(source, { slot, onForm, onPart, onProgress, signal, env, budget }) {
   if (!(slot === 0 || slot === 1) || !env.wasm || !(budget > 0)) throw new Error('a call without what it needs');
-  if (env.worker.startsWith('blob:')) await echo(env.worker);
+  if (location.protocol === 'file:') await echo(env.worker());
   const answer = source instanceof Blob ? new Response(source) : await fetch(source, { signal });
   if (!answer.ok) throw new Error(`the server answered ${answer.status}`);
   const total = source instanceof Blob ? source.size : Number(answer.headers.get('content-length')) || undefined;
@@ -25,6 +25,10 @@ export async function show(source, { slot, onForm, onPart, onProgress, signal, e
       await onForm(new Uint8Array(8), info);
     }
     for (; info && text.length >= PART; text = text.slice(PART)) await onPart(parts++, new Uint8Array(PART));
+    if (info?.name === 'stalls') {
+      onProgress({ loaded: 100, total, decoded: 0, gaussians: info.gaussians, ms: 1, stalled: 12_000 });
+      await new Promise((_, failed) => signal.addEventListener('abort', () => failed(signal.reason)));
+    }
     const decoded = info ? Math.min(info.gaussians, (info.gaussians * parts) / Math.max(1, info.many)) : 0;
     onProgress({ loaded, total, decoded, gaussians: info?.gaussians ?? 0, ms: performance.now() - began });
   }
@@ -34,10 +38,8 @@ export async function show(source, { slot, onForm, onPart, onProgress, signal, e
 }
 
 // The worker of the page of one file is asked whether it is there.
-function echo(address) {
+function echo(worker) {
   return new Promise((done, failed) => {
-    // Chromium starts no module worker from a blob of a page from disk.
-    const worker = new Worker(address);
     worker.onmessage = () => done(worker.terminate());
     worker.onerror = () => failed(new Error('the worker did not start'));
     worker.postMessage('there');

@@ -49,6 +49,7 @@ export class Viewer {
       else if (word === 'degree=all') this.view.degree = null;
       else if (name === 'background') this.view.background = value.split(':').map(Number);
       else if (name === 'orbit') value.split(':').forEach((turn, axis) => (this.view.turn[axis] += (turn * Math.PI) / 180));
+      else if (name === 'view' || name === 'camera') this.view.turn = [0.5, 0];
       else if (name === 'key') this.#command(value);
       else throw `${word}: expected one of the words of a script`;
     }
@@ -163,13 +164,21 @@ export class Viewer {
     return true;
   }
 
+  // From the point `at`, along z, as wide as high.
+  #seen() {
+    const { width, height } = this.canvas;
+    const focal = [Math.min(width, height), Math.min(width, height)];
+    const [x, y, z] = this.view.at;
+    return { width, height, focal, position: [-x, -y, -z], rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] };
+  }
+
   report() {
     if (this.busy) throw new Error('recursive use of an object');
     const { mode, split, gain, degree, background } = this.view;
     const both = this.models.every(Boolean);
     const drawn = this.models.map((model) => model && model.gaussians);
     return JSON.stringify({
-      device: DEVICE, mode, camera: 'orbit 0', index: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
+      device: DEVICE, mode, view: this.#seen(), camera: 'orbit 0', index: 0, cameras: 4, free: true, width: this.canvas.width, height: this.canvas.height,
       milliseconds: globalThis.cost ?? 3.2, drawn, resident_bytes: 5e6, scene_bytes: this.models.map((model) => model && { geometry: 2e6, sh: 5e5 }),
       psnr: both ? 41.27 : null, identical: false, split, gain, degree, background, models: this.models,
     });

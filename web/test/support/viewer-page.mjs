@@ -49,7 +49,7 @@ export function scene(name, { gaussians = 12_345, parts = 5 } = {}) {
  * @param {import('playwright-core').BrowserContextOptions} [options]
  */
 export async function newPage(browser, options = {}) {
-  const page = await browser.newPage({ viewport: { width: 900, height: 600 }, ...options });
+  const page = await browser.newPage({ viewport: { width: 900, height: 600 }, reducedMotion: 'reduce', ...options });
   page.faults = [];
   page.on('pageerror', (error) => page.faults.push(String(error)));
   page.on('console', (message) => {

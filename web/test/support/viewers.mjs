@@ -3,7 +3,7 @@
 import { readFileSync } from 'node:fs';
 import { join } from 'node:path';
 import { fileURLToPath } from 'node:url';
-import { open } from '../../src/index.js';
+import { open } from 'lexisplat';
 import { npm, serve, shot } from './chromium.mjs';
 
 const web = fileURLToPath(new URL('../..', import.meta.url));

@@ -152,11 +152,14 @@ pub(crate) fn run(args: &Demo, common: &Common) -> Result<()> {
 /// Writes a page with a viewer and the file `packed_path`, which holds `packed`.
 fn write_viewer(path: &Path, packed_path: &Path, packed: &Model, common: &Common) -> Result<()> {
     let (_, bytes) = input(packed_path, common)?;
-    let still = html::still(&Scene::from(packed))?;
+    let view = html::FirstView::new(&Scene::from(packed), "")?;
+    let still = view.still(&Scene::from(packed))?;
     let viewer = Page {
         title: "lexisplat demo",
         poster: Some(Poster { bytes: &still, kind: html::JPEG_TYPE }),
-        words: "",
+        words: &view.words,
+        tools: true,
+        still: false,
         scenes: vec![(FILES[1], &bytes)],
     };
     write_pieces(path, &viewer.pieces()?, common.overwrite)?;

@@ -1,13 +1,15 @@
 //! `lexisplat html`.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat::Error;
 use lexisplat_eval::{ORBIT_SIZE, SceneFile, format};
-use lexisplat_formats::Kind;
-use lexisplat_render::{Camera, RenderOptions, Scene, orbit, render};
+use lexisplat_formats::{Kind, bundle};
+use lexisplat_render::{Scene, bulk, orbit, render};
 use lexisplat_sweep::report::jpeg;
+use lexisplat_view::{Command, SceneBounds, State, script};
 use serde_json::json;
 
 use crate::args::{Common, Html};
@@ -18,10 +20,12 @@ use crate::stop::{self, Work};
 /// Name of a page without a scene, and of the scene of standard input in its page.
 const VIEWER: &str = "viewer.html";
 const STANDARD_INPUT_SCENE: &str = "scene.lexi";
+/// Name of an archive of the files in a folder without a name.
+const BUNDLE: &str = "scene.sog";
 /// Views of the orbit whose first one is the still picture, as the viewer begins.
 const ORBIT: usize = 24;
-/// Largest width of the still picture that is drawn, in pixels.
-const POSTER_WIDTH: u32 = 640;
+/// Width and height of the still picture that is drawn, in pixels. What is right and left of it in wider windows is empty.
+const POSTER_SIZE: (u32, u32) = (640, 360);
 /// The first bytes of a PNG and of a JPEG.
 const PNG: &[u8] = b"\x89PNG\r\n\x1a\n";
 const JPEG: &[u8] = &[0xff, 0xd8, 0xff];
@@ -35,7 +39,7 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
     };
     let inputs: Vec<&Path> = args.files.iter().chain(&args.poster).map(PathBuf::as_path).collect();
     check_output(&output, &inputs, common.overwrite)?;
-    check_words(&args.actions)?;
+    script::parse(&args.actions)?;
     stop::while_writing(if is_pipe(&output) { Work::Stream } else { Work::Files(1) });
     let files = args.files.iter().map(|path| input(path, common)).collect::<Result<Vec<_>>>()?;
     let scene = match files.first() {
@@ -51,8 +55,18 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
             return Err(Error::malformed(name, "the format is not known").into());
         }
     }
-    let poster = poster(args, scene.as_ref(), common)?;
-    let names: Vec<String> = args.files.iter().map(|path| scene_name(path)).collect();
+    let view = match &scene {
+        Some(scene) if !scene.scene().is_empty() => Some(FirstView::new(&scene.scene(), &args.actions)?),
+        _ => None,
+    };
+    let poster = poster(args, scene.as_ref().zip(view.as_ref()), common)?;
+    let mut names = Vec::new();
+    let mut contents: Vec<Cow<'_, [u8]>> = Vec::new();
+    for (path, (name, bytes)) in args.files.iter().zip(&files) {
+        let archive = bundle(name, bytes, siblings(name), &common.limits()?)?;
+        names.push(scene_name(path, Path::new(name), archive.is_some()));
+        contents.push(archive.map_or(Cow::Borrowed(&**bytes), Cow::Owned));
+    }
     let title = match (&args.title, names.first()) {
         (Some(title), _) => title.clone(),
         (None, Some(name)) => Path::new(name).file_stem().unwrap_or_default().to_string_lossy().into_owned(),
@@ -61,15 +75,17 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
     let page = Page {
         title: &title,
         poster: poster.as_ref().map(|(bytes, kind)| Poster { bytes, kind }),
-        words: &args.actions,
-        scenes: names.iter().map(String::as_str).zip(files.iter().map(|(_, bytes)| &**bytes)).collect(),
+        words: view.as_ref().map_or(&args.actions, |view| &view.words),
+        tools: args.tools,
+        still: args.still,
+        scenes: names.iter().map(String::as_str).zip(contents.iter().map(|bytes| &**bytes)).collect(),
     };
     let pieces = page.pieces()?;
     let bytes = write_pieces(&output, &pieces, common.overwrite)?;
     if is_pipe(&output) {
         return Ok(());
     }
-    let scene_bytes: u64 = files.iter().map(|(_, bytes)| bytes.len() as u64).sum();
+    let scene_bytes: u64 = contents.iter().map(|bytes| bytes.len() as u64).sum();
     let name = output.display();
     let json = json!({
         "output": name.to_string(),
@@ -86,30 +102,58 @@ pub(crate) fn run(args: &Html, common: &Common) -> Result<()> {
     })
 }
 
-/// Refuses words that the viewer would.
-#[cfg(feature = "view")]
-fn check_words(words: &str) -> Result<()> {
-    lexisplat_view::script::parse(words)?;
-    Ok(())
-}
-
-#[cfg(not(feature = "view"))]
-fn check_words(_words: &str) -> Result<()> {
-    Ok(())
-}
-
-/// The name of a scene in the page, without folders.
-fn scene_name(path: &Path) -> String {
+/// The name in the page of the scene that was given as `path` and is read from `file`, without folders. An archive that was
+/// made of the files of a folder has the folder's name.
+fn scene_name(path: &Path, file: &Path, is_bundled: bool) -> String {
+    if is_bundled {
+        let folder = file.parent().and_then(Path::file_name);
+        return folder.map_or(BUNDLE.to_owned(), |folder| format!("{}.sog", folder.to_string_lossy()));
+    }
     match path.file_name() {
         Some(name) if !is_pipe(path) => name.to_string_lossy().into_owned(),
         _ => STANDARD_INPUT_SCENE.to_owned(),
     }
 }
 
+/// What a page shows first. The viewer finds its own view from the parts of a scene that come first, so the page says which
+/// one the still picture was drawn from.
+pub(super) struct FirstView {
+    /// The words that were given, and the very view.
+    pub(super) words: String,
+    state: State,
+}
+
+impl FirstView {
+    /// The view of `scene` that a viewer has after `words`, which are those of a script.
+    pub(super) fn new(scene: &Scene<'_>, words: &str) -> Result<Self> {
+        let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
+        let mut state = State::new([0.0; 3]);
+        state.set_open([true, false]);
+        state.set_cameras(cameras, false, SceneBounds::new(bulk(scene.geometry()), &[]));
+        for command in script::parse(words)? {
+            state.apply(&command);
+        }
+        // A camera that was chosen becomes one that fills the window.
+        let pose = state.free_camera().map(|camera| camera.pose());
+        let pose = pose.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
+        state.apply(&Command::View(pose));
+        let view = format!("view={pose}");
+        let words = if words.trim().is_empty() { view } else { format!("{words},{view}") };
+        Ok(Self { words, state })
+    }
+
+    /// A picture of `scene`, as a JPEG.
+    pub(super) fn still(&self, scene: &Scene<'_>) -> Result<Vec<u8>> {
+        let camera = self.state.camera(POSTER_SIZE.0, POSTER_SIZE.1);
+        let camera = camera.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
+        Ok(jpeg(&render(scene, &camera, &self.state.options())?)?)
+    }
+}
+
 /// The bytes and the media type of the still picture.
 fn poster(
     args: &Html,
-    scene: Option<&SceneFile>,
+    scene: Option<(&SceneFile, &FirstView)>,
     common: &Common,
 ) -> Result<Option<(Vec<u8>, &'static str)>> {
     if let Some(path) = &args.poster {
@@ -122,17 +166,7 @@ fn poster(
         return Ok(Some((bytes.to_vec(), kind)));
     }
     match scene {
-        Some(scene) if !args.no_poster && !scene.scene().is_empty() => {
-            Ok(Some((still(&scene.scene())?, JPEG_TYPE)))
-        }
+        Some((scene, view)) if !args.no_poster => Ok(Some((view.still(&scene.scene())?, JPEG_TYPE))),
         _ => Ok(None),
     }
-}
-
-/// A picture of `scene` as the viewer shows it first, as a JPEG.
-pub(super) fn still(scene: &Scene<'_>) -> Result<Vec<u8>> {
-    let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
-    let camera = cameras.first().map(|camera: &Camera| camera.with_max_width(POSTER_WIDTH));
-    let camera = camera.ok_or_else(|| anyhow::anyhow!("there is no view of the scene"))?;
-    Ok(jpeg(&render(scene, &camera, &RenderOptions::default())?)?)
 }

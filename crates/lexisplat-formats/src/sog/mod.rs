@@ -7,6 +7,7 @@
 //! place of lists, and is read.
 
 mod archive;
+mod bundle;
 mod code;
 mod codebook;
 mod meta;
@@ -28,6 +29,7 @@ use self::picture::{Budget, Picture};
 use crate::rows::{Described, Rows, RowsMut};
 use crate::siblings::Siblings;
 
+pub use self::bundle::bundle;
 pub(crate) use self::write::write;
 
 /// The name of the file that describes the others.

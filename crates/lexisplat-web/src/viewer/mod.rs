@@ -254,6 +254,13 @@ impl Viewer {
             "device": self.screen.device_name(),
             "mode": arrangement.mode.name(),
             "modes": Mode::ALL.map(Mode::name),
+            "view": camera.as_ref().map(|camera| json!({
+                "width": camera.width,
+                "height": camera.height,
+                "focal": [camera.fx, camera.fy],
+                "position": camera.position,
+                "rotation": camera.rotation,
+            })),
             "camera": camera.map(|camera| camera.name),
             "cameras": self.state.cameras().len(),
             "index": self.state.index(),

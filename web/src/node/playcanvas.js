@@ -1,0 +1,5 @@
+/** lexisplat/playcanvas in Node. */
+
+import './index.js';
+
+export * from '../playcanvas.js';

@@ -1,0 +1,5 @@
+/** lexisplat/three in Node. */
+
+import './index.js';
+
+export * from '../three.js';
