@@ -119,7 +119,7 @@ fn read_all(
         bytes_in += bytes.len() as u64;
         let opened = open(&name, &bytes, siblings(&name), &options, true, bars)?;
         warn(&name, opened.source().warnings());
-        let next = opened.source().whole()?.into_owned();
+        let next = opened.some(&name)?.whole()?.into_owned();
         match &mut all {
             None => all = Some(next),
             Some(all) => {

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use super::columns::{Packed, any_not_finite, read_column};
 use super::file::PlyFile;
-use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, REST, rest_name};
+use super::layout::{GROUPS, Layout, NORMALS, OPACITIES, REST, SCALES, rest_name};
 use super::names::{DC, NORMAL, OPACITY, POSITION, ROTATION, SCALE};
 use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
-use crate::scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
+use crate::scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, flatten_scales};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
@@ -78,6 +78,8 @@ pub(super) struct Found {
     pub(super) normals: bool,
     /// Number of infinite opacities.
     pub(super) sure: usize,
+    /// Number of Gaussians with a scale of minus infinity.
+    pub(super) flat: usize,
 }
 
 impl Found {
@@ -87,6 +89,7 @@ impl Found {
         self.bad_property = self.bad_property.take().or(next.bad_property);
         self.normals |= next.normals;
         self.sure += next.sure;
+        self.flat += next.flat;
     }
 }
 
@@ -145,6 +148,11 @@ impl PlyFile<'_> {
             *opacity = SURE_OPACITY.copysign(*opacity);
             found.sure += 1;
         }
+        let scales = floats[SCALES].as_chunks_mut().0;
+        if self.layout.is_flat {
+            scales.iter_mut().for_each(|row: &mut [f32; SCALE.len()]| row[SCALE.len() - 1] = FLAT_SCALE);
+        }
+        found.flat = flatten_scales(scales);
         let floats = floats.each_ref().map(|values| &**values);
         if floats.iter().any(|values| any_not_finite(values)) {
             (found.bad, found.bad_property) = bad_rows(&rows, floats);

@@ -2,7 +2,7 @@
 //!
 //! The reader finds properties by name, in any order and of any scalar type, in binary files of either byte order
 //! and in ASCII files. It keeps properties beyond 3DGS as [`Extra`](crate::Extra). It refuses files that this crate
-//! cannot code (compressed, 2D and anchor models, point clouds) and says what they are.
+//! cannot code (compressed and anchor models, point clouds) and says what they are. 2D Gaussians are read as flat ones.
 //!
 //! It is tested on the layouts of INRIA (also 3DGS-MCMC and Pixel-GS), gsplat, nerfstudio, Brush and Postshot.
 //!
