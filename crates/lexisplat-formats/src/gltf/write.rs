@@ -37,6 +37,9 @@ const SRGB: [f32; 5] = [0.040_45, 12.92, 0.055, 1.055, 2.4];
 /// [`Error::Parameter`] for no splats, which a glTF cannot hold, and for options of SPZ out of range; [`Error::Limit`] for
 /// more bytes than a glb can have.
 pub(crate) fn write(splats: &Splats, options: &WriteOptions) -> Result<(Vec<u8>, Lost)> {
+    if splats.is_empty() {
+        return Err(Error::parameter("scene", "no Gaussians", "one or more: glTF has no empty accessors"));
+    }
     let most = ShDegree::new(MOST_DEGREE)?;
     let cut = (splats.degree > most).then(|| splats.with_degree_cut(most));
     let kept = cut.as_ref().unwrap_or(splats);
