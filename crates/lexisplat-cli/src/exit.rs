@@ -120,7 +120,37 @@ fn eval(error: &lexisplat_eval::Error) -> Blame {
         Error::Io { source, .. } => io(source),
         Error::Format { .. } => (Kind::Format, None),
         Error::Limit { .. } => (Kind::Limit, None),
+        Error::Parameter { name, .. } => parameter(name),
         _ => (Kind::Parameter, None),
+    }
+}
+
+/// What the library calls the values of scenes and cameras. No option has such a name: they come from files.
+const OF_FILES: [&str; 14] = [
+    "values",
+    "position",
+    "rotation",
+    "fx",
+    "fy",
+    "positions",
+    "dc",
+    "opacities",
+    "scales",
+    "rotations",
+    "normals",
+    "sh_rest",
+    "extra",
+    "geometry",
+];
+
+/// The blame for the parameter `name` of the library: of the user, or of a file.
+fn parameter(name: &str) -> Blame {
+    match OF_FILES.contains(&name) {
+        true => (
+            Kind::Format,
+            Some("this is of the scene or its cameras and not of an option: `lexisplat info` shows their ranges".into()),
+        ),
+        false => (Kind::Parameter, None),
     }
 }
 
@@ -142,7 +172,7 @@ fn codec(error: &lexisplat::Error) -> Blame {
             (Kind::Format, advice)
         }
         Error::Format { .. } => (Kind::Format, None),
-        Error::Parameter { .. } => (Kind::Parameter, None),
+        Error::Parameter { name, .. } => parameter(name),
         Error::Limit { name: Some(name), .. } => (
             Kind::Limit,
             Some(format!("if you trust the file, raise the limit with --limit {name}=N").into()),
@@ -159,7 +189,7 @@ fn render(error: &lexisplat_render::Error) -> Blame {
         Error::Parameter { name: "device", .. } => {
             (Kind::Parameter, Some("`lexisplat devices` lists the devices".into()))
         }
-        Error::Parameter { .. } => (Kind::Parameter, None),
+        Error::Parameter { name, .. } => parameter(name),
         Error::GpuLimit { .. } => {
             (Kind::Limit, Some("--device cpu draws without the limits of a GPU".into()))
         }

@@ -233,6 +233,81 @@ fn invalid_gaussians_are_refused_or_dropped() {
 }
 
 #[test]
+fn a_run_that_leaves_nothing_is_an_error() {
+    let folder = Folder::new();
+    let mut splats = scene(&SampleOptions::new(60, 0));
+    splats.geometry.opacities.fill(f32::NAN);
+    ply::write(&folder.path("nan.ply"), &splats).unwrap();
+    splats.retain(&[false; 60]);
+    ply::write(&folder.path("empty.ply"), &splats).unwrap();
+    let before = folder.names();
+    for (input, options) in [("nan.ply", &["--drop-invalid"][..]), ("empty.ply", &[])] {
+        for command in [
+            &["compress", input, "-o", "a.lexi"][..],
+            &["compress", input, "-o", "a.lexi", "--layout", "f16"],
+            &["compress", input, "-o", "a.lexi", "--guess"],
+            &["convert", input, "a.ply"],
+            &["convert", input, "a.spz"],
+            &["convert", input, "a.lexi"],
+        ] {
+            let error = folder.fail(&[command, options].concat(), 4);
+            assert!(error.contains(&format!("error: {input}: no Gaussian is left")), "{error}");
+        }
+    }
+    let error = folder.fail(&["convert", "scene.ply", "a.spz", "--crop-sphere=900,0,0,1"], 5);
+    assert!(error.contains("crop = sphere") && error.contains("leaves none"), "{error}");
+    assert_eq!(folder.names(), before);
+}
+
+#[test]
+fn values_of_a_scene_are_not_the_fault_of_an_option() {
+    let folder = Folder::new();
+    let mut splats = scene(&SampleOptions::new(60, 0));
+    for (i, position) in splats.geometry.positions.iter_mut().enumerate() {
+        *position = [f32::MAX * if i % 2 == 0 { 1.0 } else { -1.0 }, 0.0, 0.0];
+    }
+    ply::write(&folder.path("wide.ply"), &splats).unwrap();
+    for options in [&["--guess"][..], &[]] {
+        let error = folder.fail(&[&["compress", "wide.ply"][..], options].concat(), 4);
+        assert!(error.contains("not of an option"), "{error}");
+    }
+}
+
+#[test]
+fn files_of_no_format_are_named_where_that_can_be() {
+    let folder = Folder::new();
+    let of_zip = |member: &str| {
+        let name = u16::try_from(member.len()).unwrap().to_le_bytes();
+        // A member of no bytes: its header, its entry in the directory, and the end of that.
+        let fields = [&[20, 0, 0, 0, 0, 0, 0, 0, 0, 0][..], &[0; 12], &name, &[0; 2]].concat();
+        let local = [&b"PK\x03\x04"[..], &fields[..], member.as_bytes()].concat();
+        let central = [&b"PK\x01\x02\x14\x00"[..], &fields[..], &[0; 14], member.as_bytes()].concat();
+        let [size, at] = [&central, &local].map(|part| u32::try_from(part.len()).unwrap().to_le_bytes());
+        let end = [&b"PK\x05\x06"[..], &[0, 0, 0, 0, 1, 0, 1, 0], &size, &at, &[0; 2]].concat();
+        [local, central, end].concat()
+    };
+    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 100\n";
+    std::fs::create_dir(folder.path("folder")).unwrap();
+    for (name, bytes, said) in [
+        ("pointer.ply", pointer.into(), "a pointer of Git LFS"),
+        ("page.ply", b"\n<!DOCTYPE html><title>404</title>".to_vec(), "a page of HTML"),
+        ("scene.zip", of_zip("a/point_cloud.ply"), "a zip archive with 'a/point_cloud.ply' in it"),
+        ("deep.zip", of_zip("scene/meta.json"), "there is 'scene/meta.json'"),
+        ("other.zip", of_zip("a.txt"), "so it is no SOG"),
+        ("unknown", b"nothing that is known".to_vec(), "these are read: PLY"),
+    ] {
+        std::fs::write(folder.path(name), bytes).unwrap();
+        for command in [&["info", name][..], &["compress", name, "-o", "a.lexi"], &["convert", name, "a.spz"]]
+        {
+            let error = folder.fail(command, 4);
+            assert!(error.contains(said) && error.contains(name), "{command:?}: {error}");
+        }
+    }
+    let error = folder.fail(&["info", "folder"], 4);
+    assert!(error.contains("folder: it is a folder"), "{error}");
+}
+
+#[test]
 fn extra_properties_are_kept_or_dropped() {
     let folder = Folder::new();
     let mut splats = scene(&SampleOptions::new(60, 0));

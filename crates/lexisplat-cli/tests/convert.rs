@@ -1,6 +1,6 @@
 //! `convert`, and the other commands with files of other programs' formats.
 
-use lexisplat::{Offset, ply};
+use lexisplat::{FLAT_SCALE, Offset, ply};
 use serde_json::Value;
 
 use crate::folder::{Folder, GAUSSIANS, read};
@@ -45,6 +45,35 @@ fn every_format_is_written_and_every_command_reads_it() {
         folder.run(&["compress", output, "--guess", "--quiet", "-o", &packed]);
         assert_eq!(number(&folder.json(&["info", &packed])["gaussians"]), GAUSSIANS as f64);
     }
+}
+
+/// 2D Gaussians have a third size of zero, and go wherever others go.
+#[test]
+fn flat_scenes_go_everywhere() {
+    let folder = Folder::new();
+    let mut splats = read(&folder.path("scene.ply"));
+    splats.geometry.scales.iter_mut().for_each(|scales| scales[2] = f32::NEG_INFINITY);
+    ply::write(&folder.path("flat.ply"), &splats).unwrap();
+    let view = ["--orbit", "1", "--width", "96", "--device", "cpu"];
+    for (output, least) in [
+        ("a.ply", 100.0),
+        ("a.glb", 60.0),
+        ("a.splat", 20.0),
+        ("a.sog", 30.0),
+        ("a.compressed.ply", 30.0),
+        ("a.spz", 30.0),
+    ] {
+        folder.run(&["convert", "flat.ply", output]);
+        let report = folder.json(&[&["compare", "flat.ply", output][..], &view].concat());
+        let psnr = &report["psnr"]["mean"];
+        assert!(psnr.is_null() || number(psnr) > least, "{output}: {psnr}");
+    }
+    folder.run(&["compress", "flat.ply", "--layout", "f32", "-o", "exact.lexi"]);
+    folder.run(&["decompress", "exact.lexi", "-o", "exact.ply"]);
+    assert!(read(&folder.path("exact.ply")).geometry.scales.iter().all(|scales| scales[2] == FLAT_SCALE));
+    folder.run(&["compress", "flat.ply", "--guess", "-o", "packed.lexi"]);
+    let report = folder.json(&[&["compare", "flat.ply", "packed.lexi"][..], &view].concat());
+    assert!(number(&report["psnr"]["mean"]) > 25.0, "{report}");
 }
 
 #[test]

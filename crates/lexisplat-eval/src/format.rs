@@ -43,6 +43,17 @@ fn is_obeyed(c: char) -> bool {
     c.is_control() || is_direction || matches!(c, '\u{2028}' | '\u{2029}')
 }
 
+/// Returns `text` as a cell of CSV that no spreadsheet takes for a formula: what would begin one begins with `'` instead. Names
+/// come from files. Numbers stay as they are.
+#[must_use]
+pub fn csv_cell(text: &str) -> Cow<'_, str> {
+    let is_formula = text.starts_with(['=', '+', '-', '@', '\t', '\r']);
+    match is_formula && text.parse::<f64>().is_err() {
+        true => Cow::Owned(format!("'{text}")),
+        false => Cow::Borrowed(text),
+    }
+}
+
 /// Returns `count` bytes in the largest unit that keeps a digit before the point (powers of 1000).
 #[must_use]
 pub fn bytes(count: u64) -> String {
@@ -97,6 +108,16 @@ pub fn file_name(name: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn formulas_in_cells_are_text() {
+        for formula in ["=1+1", "+SUM(A1)", "-2+3", "@a", "\tb", "=", "-"] {
+            assert_eq!(csv_cell(formula), format!("'{formula}"));
+        }
+        for plain in ["-0.5", "+1e-3", "-inf", "12", "a=b", "", "bonsai-7", "'a"] {
+            assert_eq!(csv_cell(plain), plain);
+        }
+    }
 
     #[test]
     fn what_a_terminal_obeys_is_written_out() {

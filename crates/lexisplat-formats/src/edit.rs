@@ -27,8 +27,8 @@ impl Edits {
     /// Makes the changes.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a scale that is not above 0, values that are not finite, and changes after which a position
-    /// is not finite.
+    /// [`Error::Parameter`] for a scale that is not above 0, values that are not finite, changes after which a position is not
+    /// finite, and a box or sphere that leaves no Gaussian.
     pub fn apply(&self, splats: &mut Splats) -> Result<()> {
         self.check()?;
         if let Some(degree) = self.degree.filter(|degree| *degree < splats.degree) {
@@ -38,6 +38,10 @@ impl Edits {
             let offset = splats.meta.offset;
             let keep: Vec<bool> = splats.geometry.positions.iter().map(|p| self.keeps(*p, offset)).collect();
             splats.retain(&keep);
+            if splats.is_empty() {
+                let expected = "a box or sphere in which a Gaussian's centre is; this one leaves none";
+                return Err(Error::parameter("crop", self.crops(), expected));
+            }
         }
         let offset = |splats: &Splats| Offset::numbers(splats.meta.offset);
         if let Some(scale) = self.scale {
@@ -53,7 +57,7 @@ impl Edits {
             splats.translate(by)?;
         }
         match splats.geometry.positions.as_flattened().iter().find(|v| !v.is_finite()) {
-            Some(value) => Err(Error::parameter("position", value, "finite positions after all changes")),
+            Some(value) => Err(Error::parameter("changes", value, "finite positions after all changes")),
             None => Ok(()),
         }
     }
@@ -70,6 +74,13 @@ impl Edits {
         };
         finite("rotate", self.rotate)?;
         finite("translate", self.translate)
+    }
+
+    /// What is cut to, for messages.
+    fn crops(&self) -> String {
+        let crop_box = self.crop_box.map(|corners| format!("box {corners:?}"));
+        let sphere = self.crop_sphere.map(|(centre, radius)| format!("sphere {centre:?} of radius {radius}"));
+        crop_box.into_iter().chain(sphere).collect::<Vec<_>>().join(" and ")
     }
 
     /// Whether a Gaussian at `position`, relative to `offset`, is within box and sphere.
@@ -241,6 +252,7 @@ mod tests {
             Edits { scale: Some(f64::NAN), ..Edits::default() },
             Edits { translate: Some([f64::INFINITY, 0.0, 0.0]), ..Edits::default() },
             Edits { translate: Some([1e300, 0.0, 0.0]), ..Edits::default() },
+            Edits { crop_sphere: Some(([1e6; 3], 1.0)), ..Edits::default() },
         ] {
             assert!(edits.apply(&mut sample()).is_err(), "{edits:?}");
         }

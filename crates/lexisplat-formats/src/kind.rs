@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use lexisplat::FileKind;
+use lexisplat::{FileKind, without_byte_order_mark};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
@@ -18,7 +18,8 @@ pub enum Kind {
     Lexi,
     /// Niantic's SPZ, versions 1 to 4.
     Spz,
-    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures.
+    /// `PlayCanvas`' SOG, version 2: a zip archive, or `meta.json` in a folder of pictures; or streamed SOG, version 1:
+    /// `lod-meta.json` in a folder of those.
     Sog,
     /// `PlayCanvas`' compressed PLY.
     CompressedPly,
@@ -50,6 +51,7 @@ impl Kind {
     /// The format of the file that has `bytes` and is called `name`. Only if the bytes say nothing the name decides.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Option<Self> {
+        let bytes = without_byte_order_mark(bytes);
         match bytes {
             [b'N', b'G', b'S', b'P', ..] => return Some(Self::Spz),
             [b'P', b'K', 3, 4, ..] => return Some(Self::Sog),
@@ -136,18 +138,21 @@ impl fmt::Display for Kind {
 struct Marks {
     asset: Option<IgnoredAny>,
     means: Option<IgnoredAny>,
+    filenames: Option<IgnoredAny>,
+    tree: Option<IgnoredAny>,
     quats: Option<IgnoredAny>,
 }
 
 /// The format of a file of JSON.
 fn of_json(bytes: &[u8]) -> Option<Kind> {
     let marks: Marks = serde_json::from_slice(bytes).ok()?;
-    match (marks.asset, marks.means, marks.quats) {
-        // It has an `asset` too.
-        (_, Some(_), Some(_)) => Some(Kind::Sog),
-        (Some(_), ..) => Some(Kind::Gltf),
-        _ => None,
+    let is_sog = marks.means.is_some() && marks.quats.is_some();
+    let is_streamed_sog = marks.filenames.is_some() && marks.tree.is_some();
+    // Both have an `asset` too.
+    if is_sog || is_streamed_sog {
+        return Some(Kind::Sog);
     }
+    marks.asset.map(|_| Kind::Gltf)
 }
 
 #[cfg(test)]
@@ -156,7 +161,7 @@ mod tests {
 
     #[test]
     fn kinds_are_told_by_their_bytes() {
-        let cases: [(&str, &[u8], Option<Kind>); 15] = [
+        let cases: [(&str, &[u8], Option<Kind>); 18] = [
             ("a.spz", b"", None),
             ("a.spz", b"ply\nformat ascii 1.0\nelement vertex 0\nend_header\n", Some(Kind::Ply)),
             (
@@ -173,6 +178,9 @@ mod tests {
             ("a", b" {\"asset\":{}}", Some(Kind::Gltf)),
             ("a", b"{\"means\":{},\"quats\":{}}", Some(Kind::Sog)),
             ("a", b"{\"asset\":{},\"means\":{},\"quats\":{}}", Some(Kind::Sog)),
+            ("a", b"{\"asset\":{},\"filenames\":[],\"tree\":{}}", Some(Kind::Sog)),
+            ("a", b"\xef\xbb\xbf{\"asset\":{}}", Some(Kind::Gltf)),
+            ("a", b"\xef\xbb\xbfply\nformat ascii 1.0\n", Some(Kind::Ply)),
             ("a", b"{\"other\":{}}", None),
             ("a.SPLAT", &[0; 32], Some(Kind::Splat)),
             ("a.ksplat", &[0; 7], Some(Kind::Ksplat)),

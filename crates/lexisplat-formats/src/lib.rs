@@ -24,6 +24,7 @@ mod source;
 mod splat;
 mod spz;
 mod turn_sh;
+mod unknown;
 mod write;
 
 pub use edit::Edits;

@@ -2,12 +2,17 @@
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::ply::{PlySource, ReadOptions};
-use lexisplat::{Error, FileKind, Progress, Result, SplatSource};
+use lexisplat::{Error, FileKind, Progress, Result, SplatSource, without_byte_order_mark};
 
 use crate::kind::Kind;
 use crate::siblings::Siblings;
+use crate::sog::Sizes;
 use crate::source::FormatSource;
+use crate::unknown::unknown;
 use crate::{compressed_ply, gltf, ksplat, sog, splat, spz};
+
+/// Why a file without Gaussians is not written in another form.
+const NONE_LEFT: &str = "no Gaussian is left of it, so there is nothing to write";
 
 /// A scene of any format, opened.
 #[derive(Debug)]
@@ -41,6 +46,18 @@ impl Opened<'_> {
             Self::Other(_, source) => &**source,
         }
     }
+
+    /// The scene, to write in another form. Messages call its file `name`.
+    ///
+    /// # Errors
+    /// [`Error::Format`] if it has no Gaussians, or all were left out.
+    pub fn some(&self, name: &str) -> Result<&dyn SplatSource> {
+        let source = self.source();
+        match source.is_empty() {
+            true => Err(Error::malformed(name, NONE_LEFT)),
+            false => Ok(source),
+        }
+    }
 }
 
 /// Opens the scene in `bytes`, of any format, which its content tells; messages call it `name`. A scene of several
@@ -58,12 +75,13 @@ pub fn open<'a>(
     progress: &dyn Progress,
 ) -> Result<Opened<'a>> {
     let kind = Kind::of(name, bytes);
-    let mut file_bytes = bytes.len() as u64;
+    let mut sizes = Sizes::of(bytes.len());
+    let bytes = without_byte_order_mark(bytes);
     let file = match kind {
         // The PLY reader refuses other files by what they are.
         None | Some(Kind::Ply) => {
             if kind.is_none() && FileKind::of(name, bytes) == FileKind::Unknown {
-                return Err(Error::malformed(name, "the format is not known"));
+                return Err(Error::malformed(name, unknown(bytes)));
             }
             let open = if whole { PlySource::open_whole } else { PlySource::open };
             return Ok(Opened::Ply(Box::new(open(name, bytes, options, progress)?)));
@@ -73,8 +91,8 @@ pub fn open<'a>(
         }
         Some(Kind::Spz) => spz::read(name, bytes, options)?,
         Some(Kind::Sog) => {
-            let (file, all_bytes) = sog::read(name, bytes, siblings, options)?;
-            file_bytes = all_bytes;
+            let (file, all) = sog::read(name, bytes, siblings, options)?;
+            sizes = all;
             file
         }
         Some(Kind::CompressedPly) => compressed_ply::read(name, bytes, options)?,
@@ -83,6 +101,6 @@ pub fn open<'a>(
         Some(Kind::Gltf) => gltf::read(name, bytes, options)?,
     };
     progress.check()?;
-    let source = FormatSource::new(name, file_bytes, file, options)?;
+    let source = FormatSource::new(name, sizes, file, options)?;
     Ok(Opened::Other(kind.unwrap_or(Kind::Ply), Box::new(source)))
 }

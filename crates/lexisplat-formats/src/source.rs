@@ -7,6 +7,7 @@ use lexisplat::{Error, FormatError, Geometry, Limits, Result, SURE_OPACITY, Spla
 use serde_json::Value;
 
 use crate::rows::{Described, RowsMut};
+use crate::sog::Sizes;
 
 /// Gaussians that one task decodes.
 const GAUSSIANS_PER_TASK: usize = 8192;
@@ -21,7 +22,7 @@ const PROPERTIES: [&str; 6] = ["x", "f_dc_0", "f_rest_0", "opacity", "scale_0", 
 #[derive(Debug)]
 pub struct FormatSource<'a> {
     name: String,
-    file_bytes: u64,
+    sizes: Sizes,
     limits: Limits,
     file: Described<'a>,
     /// Gaussians left out, ascending.
@@ -29,10 +30,10 @@ pub struct FormatSource<'a> {
 }
 
 impl<'a> FormatSource<'a> {
-    /// Looks once at all values of `file`, called `name`, of `file_bytes` bytes.
+    /// Looks once at all values of `file`, called `name`, of these sizes.
     pub(crate) fn new(
         name: &str,
-        file_bytes: u64,
+        sizes: Sizes,
         mut file: Described<'a>,
         options: &ReadOptions,
     ) -> Result<Self> {
@@ -41,7 +42,7 @@ impl<'a> FormatSource<'a> {
             file.warnings.push("the scene holds no Gaussians".to_owned());
         }
         let limits = options.limits;
-        let mut source = Self { name: name.to_owned(), file_bytes, limits, file, dropped: Vec::new() };
+        let mut source = Self { name: name.to_owned(), sizes, limits, file, dropped: Vec::new() };
         if !source.file.rows.is_finite() {
             source.look(options)?;
         }
@@ -84,7 +85,8 @@ impl<'a> FormatSource<'a> {
     /// Decodes all Gaussians `rows` of the file into `part`, those that are left out too.
     fn fill(&self, rows: Range<usize>, part: &mut Splats) -> Result<()> {
         let (n, rest) = (rows.len(), self.file.degree.rest());
-        self.limits.check_arrays(&self.name, self.file_bytes, n, GEOMETRY_BYTES + rest * size_of::<f32>())?;
+        let each = GEOMETRY_BYTES + rest * size_of::<f32>();
+        self.limits.check_arrays(&self.name, self.sizes.counted, n, each)?;
         resize(part, n, rest);
         let Geometry { positions, dc, opacities, scales, rotations, .. } = &mut part.geometry;
         let mut left = RowsMut { positions, dc, opacities, scales, rotations, sh_rest: &mut part.sh_rest };
@@ -178,11 +180,11 @@ impl SplatSource for FormatSource<'_> {
     }
 
     fn row_bytes(&self) -> u64 {
-        self.file_bytes / (self.file.len as u64).max(1)
+        self.sizes.all / (self.file.len as u64).max(1)
     }
 
     fn source_bytes(&self) -> u64 {
-        self.file_bytes
+        self.sizes.all
     }
 
     fn warnings(&self) -> &[String] {

@@ -70,8 +70,8 @@ impl Lost {
 ///
 /// # Errors
 /// [`Error::Parameter`] for a kind that is none of [`Kind::WRITTEN`] (.lexi has its own writer), for options out of range, for
-/// a scene whose arrays differ in length, and for an empty one as glTF; [`Error::Limit`] for a scene too large for the format; [`Error::Cancelled`] if
-/// `progress` cancels; errors of the sink.
+/// a scene whose arrays differ in length, and for an empty one; [`Error::Limit`] for a scene too large for the
+/// format; [`Error::Cancelled`] if `progress` cancels; errors of the sink.
 pub fn write<'a>(
     kind: Kind,
     splats: &Splats,
@@ -80,6 +80,9 @@ pub fn write<'a>(
     progress: &dyn Progress,
 ) -> Result<(u64, Lost)> {
     splats.validate()?;
+    if splats.is_empty() {
+        return Err(Error::parameter("scene", "no Gaussians", "one or more, or there is nothing to write"));
+    }
     let (bytes, lost) = match kind {
         Kind::Ply => return Ok((ply::write(sink, splats)?, Lost::default())),
         Kind::Spz => spz::write(splats, options)?,

@@ -1,7 +1,9 @@
 //! Scenes as NumPy arrays. What leaves is moved into arrays without a copy; what comes in is copied once.
 
 use lexisplat::sh::{CHANNELS, MAX_REST};
-use lexisplat::{Extra, ExtraValues, Geometry, Offset, SURE_OPACITY, SceneMeta, ShDegree, Splats};
+use lexisplat::{
+    Extra, ExtraValues, Geometry, Offset, SURE_OPACITY, SceneMeta, ShDegree, Splats, flatten_scales,
+};
 use numpy::ndarray::ArrayView3;
 use numpy::{
     Element, PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2,
@@ -140,13 +142,15 @@ pub(crate) fn from_python(splats: &Bound<'_, PyAny>) -> PyResult<Splats> {
         extras.push(Extra { name, values });
     }
     let (degree, sh_rest) = sh_rest(splats, n)?;
+    let mut scales = rows::<3>(splats, "scales")?;
+    flatten_scales(&mut scales);
     let splats = Splats {
         geometry: Geometry {
             positions,
             normals,
             dc: dc.to_vec(),
             opacities,
-            scales: rows::<3>(splats, "scales")?,
+            scales,
             rotations: rows::<4>(splats, "quats")?,
             extras,
         },

@@ -79,7 +79,7 @@ pub(crate) fn with_source<T>(
     let bytes = bytes.as_ref();
     match open(name, bytes, siblings, options, whole(bytes.len() as u64), progress)? {
         Opened::Lexi(_) => Err(Error::format(name, "it is compressed already")),
-        opened => work(opened.source()),
+        opened => work(opened.some(name)?),
     }
 }
 

@@ -83,6 +83,29 @@ def test_both_spaces_come_back(splats: lx.Splats) -> None:
     assert sure.opacities[:2].tolist() == [-100, 100] and np.isfinite(sure.scales).all()
 
 
+def test_sizes_of_zero_are_flat(tmp_path: Path, splats: lx.Splats) -> None:
+    flat = splats[:]
+    flat.scales = flat.scales.copy()
+    flat.scales[:, 2] = -np.inf
+    assert len(lx.compress(flat, keep_all=True, guess=True)) == len(splats)
+    lx.save(tmp_path / "a.ply", flat)
+    assert (lx.load(tmp_path / "a.ply").scales[:, 2] == -20).all()
+
+
+def test_a_run_that_leaves_nothing_is_an_error(tmp_path: Path, splats: lx.Splats) -> None:
+    lx.save(tmp_path / "nan.ply", splats)
+    header, rows = (tmp_path / "nan.ply").read_bytes().split(b"end_header\n", 1)
+    nothing = np.full_like(np.frombuffer(rows, np.float32), np.nan).tobytes()
+    (tmp_path / "nan.ply").write_bytes(header + b"end_header\n" + nothing)
+    with pytest.raises(lx.FormatError, match="no Gaussian is left"):
+        lx.compress(tmp_path / "nan.ply", drop_invalid=True)
+    for name in ("a.ply", "a.spz", "a.lexi"):
+        with pytest.raises(lx.ParameterError, match="no Gaussians"):
+            lx.save(tmp_path / name, splats[:0])
+    with pytest.raises(lx.ParameterError, match="no Gaussians"):
+        lx.compress(splats[:0])
+
+
 def test_other_types_are_converted() -> None:
     splats = lx.Splats.from_dict(
         {

@@ -49,6 +49,7 @@ pub fn read_view_files<F: ViewFiles + ?Sized>(files: &F, size_of: SizeOf<'_>) ->
 /// # Errors
 /// [`lexisplat::Error::Format`] if they are neither; otherwise as those two.
 pub fn read_views_bytes(file: &str, bytes: &[u8], size_of: SizeOf<'_>) -> Result<ViewSet> {
+    let bytes = lexisplat::without_byte_order_mark(bytes);
     match bytes.iter().find(|byte| !byte.is_ascii_whitespace()) {
         Some(b'[') => Ok(ViewSet::new(read_placed(file, bytes)?, Vec::new())),
         Some(b'{') => read_transforms_bytes(file, bytes, size_of),

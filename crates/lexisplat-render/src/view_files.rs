@@ -52,11 +52,13 @@ impl<'a> ViewFile<'a> {
         Self { name, reader: Box::new(Cursor::new(bytes)), len: bytes.len() as u64 }
     }
 
-    /// Reads all bytes. Of a file over [`MAX_CAMERAS_BYTES`] it reads one byte more than that.
+    /// Reads all bytes, but for the mark of UTF-8. Of a file over [`MAX_CAMERAS_BYTES`] it reads one byte more than that.
     pub(crate) fn read_limited(self) -> Result<(String, Vec<u8>)> {
         let mut bytes = Vec::new();
         let read = self.reader.take(MAX_CAMERAS_BYTES + 1).read_to_end(&mut bytes);
         read.map_err(|source| Error::io(&self.name, source))?;
+        let mark = bytes.len() - lexisplat::without_byte_order_mark(&bytes).len();
+        bytes.drain(..mark);
         Ok((self.name, bytes))
     }
 }
@@ -82,7 +84,7 @@ impl ViewFiles for BTreeMap<String, Vec<u8>> {
     }
 }
 
-/// Files of a folder on disk.
+/// Files of a folder on disk. Only regular files inside of it are opened.
 #[cfg(not(target_family = "wasm"))]
 impl ViewFiles for Path {
     fn name(&self) -> String {
@@ -94,7 +96,10 @@ impl ViewFiles for Path {
     }
 
     fn open(&self, file: &str) -> Result<ViewFile<'_>> {
-        open(&self.join(file))
+        // A data set comes from anybody, and so do the links in it. Sizes are checked by the readers.
+        let found = lexisplat::file_inside(self, file, u64::MAX)?;
+        let opened = open(&found)?;
+        Ok(ViewFile { name: self.join(file).display().to_string(), ..opened })
     }
 }
 

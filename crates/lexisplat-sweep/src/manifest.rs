@@ -1,8 +1,10 @@
 //! `scenes.toml`: the models of a sweep with their cameras and photos.
 
 use std::collections::HashSet;
+use std::io::Read as _;
 use std::path::{Component, Path, PathBuf};
 
+use lexisplat::inside;
 use serde::Deserialize;
 
 use super::results::Method;
@@ -46,6 +48,12 @@ fn test_split() -> SplitFilter {
 }
 
 impl Entry {
+    /// All paths.
+    fn paths(&self) -> impl Iterator<Item = &Path> {
+        let others = [&self.cameras, &self.images, &self.shipped].into_iter().flatten();
+        others.chain([&self.model]).map(PathBuf::as_path)
+    }
+
     /// A model on its own: the scene's name is taken from the path, the method is [`Method::Other`].
     #[must_use]
     pub fn of_model(model: &Path) -> Self {
@@ -88,19 +96,31 @@ struct Document {
     scene: Vec<Entry>,
 }
 
-/// Reads a manifest. Relative paths in it start at `root`, or else at the manifest's folder.
+/// Reads a manifest. Relative paths in it start at `root`, or else at the manifest's folder, and lead to nothing outside of it.
+/// Absolute ones are taken at their word.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be read. [`Error::Format`] with line and field if it is no manifest, or if two
-/// entries have the same data set, name and method.
+/// [`Error::Io`] if it cannot be read. [`Error::Format`] with line and field if it is no manifest, if two entries have the
+/// same data set, name and method, or if a relative path leads out of its folder.
 pub fn read_manifest(path: &Path, root: Option<&Path>) -> Result<Vec<Entry>> {
-    let size = std::fs::metadata(path).map_err(|e| Error::io(path, e))?.len();
-    if size > MAX_BYTES {
-        return Err(Error::format(path, format!("{size} bytes: a manifest has at most {MAX_BYTES}")));
+    let mut text = String::new();
+    // A device may have no size, and no end.
+    let read = std::fs::File::open(path).and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text));
+    read.map_err(|e| Error::io(path, e))?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(Error::format(path, format!("a manifest has at most {MAX_BYTES} bytes")));
     }
-    let text = std::fs::read_to_string(path).map_err(|e| Error::io(path, e))?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    parse_manifest(path, &text, root.unwrap_or(folder))
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let root = root.unwrap_or(folder);
+    let entries = parse_manifest(path, &text, root)?;
+    for named in entries.iter().flat_map(Entry::paths) {
+        match named.strip_prefix(root).map(|named| inside(root, named)) {
+            // What is not there is said where it is needed, with the scene.
+            Err(_) | Ok(Ok(_) | Err(lexisplat::Error::Io { .. })) => {}
+            Ok(Err(error)) => return Err(error.into()),
+        }
+    }
+    Ok(entries)
 }
 
 /// The entries of the manifest `text`. Errors name `file`. Relative paths start at `root`.
@@ -185,6 +205,30 @@ mod tests {
         ] {
             let message = parse(text).unwrap_err().to_string();
             assert!(message.contains("scenes.toml") && message.contains(named), "{message}");
+        }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn relative_paths_stay_in_their_folder() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join("root");
+        std::fs::create_dir(&root).unwrap();
+        for file in ["outside.ply", "root/a.ply"] {
+            std::fs::write(folder.path().join(file), b"ply").unwrap();
+        }
+        std::os::unix::fs::symlink("../outside.ply", root.join("link.ply")).unwrap();
+        let read = |model: &str| {
+            let text = format!("[[scene]]\nname = \"a\"\nmethod = \"3dgs\"\nmodel = \"{model}\"");
+            std::fs::write(root.join("scenes.toml"), text).unwrap();
+            read_manifest(&root.join("scenes.toml"), None)
+        };
+        for good in ["a.ply", "missing.ply", "/elsewhere/a.ply"] {
+            assert!(read(good).is_ok(), "{good}");
+        }
+        for bad in ["../outside.ply", "link.ply"] {
+            let message = read(bad).unwrap_err().to_string();
+            assert!(message.contains("leads out of the folder"), "{message}");
         }
     }
 

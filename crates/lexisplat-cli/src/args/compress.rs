@@ -108,7 +108,8 @@ pub(crate) struct Compress {
     /// Seed of the choice of Gaussians that the dictionary is learned from.
     #[arg(long, default_value_t = 0, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX))]
     pub(crate) seed: u64,
-    /// Remove Gaussians with NaN or infinite values. Without this option such a file is refused.
+    /// Remove Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
+    /// -inf) and infinite opacities are always read.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
     /// Leave out properties that 3DGS does not define. Otherwise they are kept as they are, and a column of floats can

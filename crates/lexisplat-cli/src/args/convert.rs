@@ -30,7 +30,8 @@ pub(crate) struct Convert {
     /// Also draw both and print the PSNR of what was written against what was read, over views that are looked for.
     #[arg(long)]
     pub(crate) psnr: bool,
-    /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused.
+    /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
+    /// -inf) and infinite opacities are always read.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
     /// Leave out properties that 3DGS does not define.

@@ -109,7 +109,8 @@ impl Command {
 pub(crate) struct Info {
     /// The file; `-` reads standard input.
     pub(crate) file: PathBuf,
-    /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused.
+    /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
+    /// -inf) and infinite opacities are always read.
     #[arg(long)]
     pub(crate) drop_invalid: bool,
     /// Verify the checksums of all numbers that a packed file decodes to, too. Those of its bytes are always verified.

@@ -72,12 +72,12 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let whole = compression.holds_whole(files.iter().map(|(_, bytes)| bytes.len() as u64).sum());
     let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
+    for ((name, _), opened) in files.iter().zip(&opened) {
+        warn(name, opened.source().warnings());
+    }
     let named = files.iter().zip(&opened);
     let tiles = named.map(|((name, _), opened)| Ok((name.clone(), source_to_compress(name, opened)?)));
     let tiles = tiles.collect::<Result<Vec<(String, &dyn SplatSource)>>>()?;
-    for (name, tile) in &tiles {
-        warn(name, tile.warnings());
-    }
     let joined;
     let (name, source) = match tiles.as_slice() {
         [(name, tile)] => (name.clone(), *tile),
@@ -119,14 +119,14 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     tell(common, json, || text(&report, &output))
 }
 
-/// The scene of `opened`, which messages call `name`, unless it is compressed already.
+/// The scene of `opened`, which messages call `name`, unless it is compressed already or has no Gaussians.
 pub(crate) fn source_to_compress<'a>(name: &str, opened: &'a Opened<'_>) -> Result<&'a dyn SplatSource> {
     match opened {
         Opened::Lexi(_) => {
             let problem = FormatError::OtherKind { found: FileKind::Lexi, expected: FileKind::Ply };
             Err(Error::format(name, problem).into())
         }
-        opened => Ok(opened.source()),
+        opened => Ok(opened.some(name)?),
     }
 }
 

@@ -122,7 +122,7 @@ fn read_all(
         bytes_in += bytes.len() as u64;
         let opened = open(&name, &bytes, siblings(&name), &options, true, bars)?;
         warn(&name, opened.source().warnings());
-        let mut next = opened.source().whole()?.into_owned();
+        let mut next = opened.some(&name)?.whole()?.into_owned();
         match &mut all {
             None => all = Some(next),
             Some(all) => {

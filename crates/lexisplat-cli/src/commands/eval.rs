@@ -189,6 +189,7 @@ fn csv(scored: &[Scored]) -> Result<String> {
 
 /// A field of a CSV file (RFC 4180).
 fn quoted(text: &str) -> String {
+    let text = &*format::csv_cell(text);
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))
     } else {

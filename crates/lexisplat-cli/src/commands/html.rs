@@ -7,7 +7,7 @@ use anyhow::Result;
 use lexisplat::Error;
 use lexisplat_eval::{ORBIT_SIZE, SceneFile, format};
 use lexisplat_formats::{Kind, bundle};
-use lexisplat_render::{Scene, bulk, orbit, render};
+use lexisplat_render::{Scene, bulk, near_plane, orbit, render};
 use lexisplat_sweep::report::jpeg;
 use lexisplat_view::{Command, SceneBounds, State, script};
 use serde_json::json;
@@ -129,7 +129,8 @@ impl FirstView {
         let cameras = orbit(scene.geometry(), ORBIT, ORBIT_SIZE.0, ORBIT_SIZE.1);
         let mut state = State::new([0.0; 3]);
         state.set_open([true, false]);
-        state.set_cameras(cameras, false, SceneBounds::new(bulk(scene.geometry()), &[]));
+        let bounds = SceneBounds::new(bulk(scene.geometry()), near_plane(scene.geometry()), &[]);
+        state.set_cameras(cameras, false, bounds);
         for command in script::parse(words)? {
             state.apply(&command);
         }

@@ -15,7 +15,7 @@ use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
 use super::tiles;
 use super::views::{Looked, PackingViews};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
 
 /// Views that judge a preset, at most.
@@ -36,8 +36,8 @@ impl Compression {
     /// whether the scene is packed whole.
     ///
     /// # Errors
-    /// [`Error::Parameter`](crate::Error::Parameter) for choices out of range or that do not go together, and
-    /// for a target that cannot be met. [`Error::Memory`](crate::Error::Memory) if a choice needs the whole scene
+    /// [`Error::Parameter`](crate::Error::Parameter) for choices out of range or that do not go together, for a target
+    /// that cannot be met, and for a source without Gaussians. [`Error::Memory`](crate::Error::Memory) if a choice needs the whole scene
     /// and memory does not allow it. Errors of the source, of the sink and of a GPU.
     /// [`Error::Codec`](crate::Error::Codec) with [`lexisplat::Error::Cancelled`] if `progress` cancels.
     pub fn run<'a>(
@@ -48,6 +48,13 @@ impl Compression {
     ) -> Result<CompressionReport> {
         let clock = Stopwatch::start();
         let sink = sink.into();
+        if source.is_empty() {
+            return Err(Error::parameter(
+                "scene",
+                "no Gaussians",
+                "one or more, or there is nothing to write",
+            ));
+        }
         let mut report = match self {
             Self::Exact(options, codes) => {
                 let done = stream::compress(source, options, *codes, sink, progress)?;

@@ -4,12 +4,15 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use lexisplat::{file_inside, inside};
 use lexisplat_render::Camera;
 
 use crate::error::{Error, Result};
 
 /// Endings of photos, in lower case.
 const ENDINGS: [&str; 3] = ["png", "jpg", "jpeg"];
+/// Largest photo that is looked for by the name in a file of cameras, in bytes.
+const MAX_BYTES: u64 = super::photo::MAX_PHOTO_BYTES;
 /// Depth of folders that are searched. Links could make a circle.
 const MAX_DEPTH: usize = 8;
 /// Number of files and folders that are searched at most.
@@ -57,7 +60,7 @@ impl PhotoFolder {
         let smaller = smaller(images, &base, divisor);
         let (folder, divisor) = smaller.map_or((base, divisor), |folder| (folder, 1));
         let mut photos = Vec::new();
-        collect(&folder, 0, &mut 0, &mut photos)?;
+        collect(&folder, &folder, 0, &mut 0, &mut photos)?;
         photos.sort();
         let mut by_path: HashMap<String, Vec<usize>> = HashMap::new();
         let mut by_stem: HashMap<String, Vec<usize>> = HashMap::new();
@@ -179,15 +182,16 @@ impl Left {
     }
 }
 
-/// Finds the photo that a cameras file calls `name`: beside the file, with an extension if the name has none.
+/// Finds the photo that a cameras file calls `name`: beside the file or below, with an extension if the name has none.
+/// Cameras come from anybody: what they name elsewhere, or what is no regular file, is none.
 pub(super) fn beside(source: &Path, name: &str) -> Option<PathBuf> {
     let folder = if source.is_dir() { source } else { source.parent()? };
-    let path = folder.join(name);
-    if path.is_file() {
-        return Some(path);
-    }
-    let ended = |ending: &str| PathBuf::from(format!("{}.{ending}", path.display()));
-    ENDINGS.iter().flat_map(|ending| [ended(ending), ended(&ending.to_uppercase())]).find(|p| p.is_file())
+    let ended = |ending: &str| format!("{name}.{ending}");
+    let names = ENDINGS.iter().flat_map(|ending| [ended(ending), ended(&ending.to_uppercase())]);
+    let name = std::iter::once(name.to_owned())
+        .chain(names)
+        .find(|name| file_inside(folder, name, MAX_BYTES).is_ok());
+    Some(folder.join(name?))
 }
 
 /// Finds the folder of photos smaller by `divisor`, such as `images_4`: beside the folder with the photos, or in the
@@ -201,8 +205,14 @@ fn smaller(given: &Path, base: &Path, divisor: u32) -> Option<PathBuf> {
     [beside, given.join(format!("{IMAGES}_{divisor}"))].into_iter().find(|folder| folder.is_dir())
 }
 
-/// Adds the photos of a folder and its sub-folders.
-fn collect(folder: &Path, depth: usize, seen: &mut usize, photos: &mut Vec<PathBuf>) -> Result<()> {
+/// Adds the photos of a folder in `root` and its sub-folders.
+fn collect(
+    root: &Path,
+    folder: &Path,
+    depth: usize,
+    seen: &mut usize,
+    photos: &mut Vec<PathBuf>,
+) -> Result<()> {
     let io = |e| Error::io(folder, e);
     for entry in fs::read_dir(folder).map_err(io)? {
         let entry = entry.map_err(io)?;
@@ -217,11 +227,19 @@ fn collect(folder: &Path, depth: usize, seen: &mut usize, photos: &mut Vec<PathB
             continue;
         }
         let path = entry.path();
-        // This follows links. A link that leads nowhere is not a photo.
+        // This follows links. A link that leads nowhere is not a photo, nor is a pipe or a device.
         let Ok(metadata) = fs::metadata(&path) else { continue };
-        if metadata.is_dir() && depth < MAX_DEPTH {
-            collect(&path, depth + 1, seen, photos)?;
-        } else if metadata.is_file() && is_photo(&path) {
+        let is_folder = metadata.is_dir() && depth < MAX_DEPTH;
+        if !is_folder && !(metadata.is_file() && is_photo(&path)) {
+            continue;
+        }
+        // Only links lead out. Other files are not looked up once more, for there may be many.
+        if entry.file_type().map_err(io)?.is_symlink() {
+            inside(root, path.strip_prefix(root).unwrap_or(&path))?;
+        }
+        if is_folder {
+            collect(root, &path, depth + 1, seen, photos)?;
+        } else {
             photos.push(path);
         }
     }

@@ -12,7 +12,7 @@ use super::View;
 use crate::error::{Error, Result};
 
 /// Largest file read, in bytes: ten times what the largest camera writes.
-const MAX_PHOTO_BYTES: u64 = 512 << 20;
+pub(super) const MAX_PHOTO_BYTES: u64 = 512 << 20;
 /// Most memory that decoding may take, in bytes: a picture of [`MAX_SIDE`] squared with alpha.
 const MAX_DECODED: u64 = 4 * (MAX_SIDE as u64).pow(2);
 /// Bytes in which a size nearly always is: behind a preview and a colour profile.

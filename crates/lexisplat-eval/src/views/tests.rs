@@ -346,3 +346,41 @@ fn bonsai_is_evaluated_as_the_field_does() {
     println!("bonsai-3dgs, COLMAP's cameras, 13 held-out photos: {mean:.3} dB");
     assert!((mean - 26.0).abs() < 0.1, "{mean}");
 }
+
+/// A data set comes from anybody, with links and pipes in it.
+#[cfg(unix)]
+#[test]
+fn what_leads_out_of_a_data_set_is_not_read() {
+    use std::os::unix::fs::symlink;
+
+    let outside = tempfile::tempdir().unwrap();
+    photos(outside.path(), &["private.png", "more/b.png"], (32, 24));
+    let folder = colmap(&["a.png", "b.png"]);
+    let root = folder.path();
+    photos(root, &["images/a.png", "images/b.png"], (32, 24));
+    assert_eq!(found(&options(root, "images")).unwrap().views.len(), 2);
+    let refused = |link: &str, to: &Path| {
+        symlink(to, root.join(link)).unwrap();
+        let message = found(&options(root, "images")).unwrap_err().to_string();
+        fs::remove_file(root.join(link)).unwrap();
+        assert!(message.contains(link) && message.contains("leads out of the folder"), "{message}");
+    };
+    refused("images/c.png", &outside.path().join("private.png"));
+    refused("images/more", &outside.path().join("more"));
+    // Devices and pipes are no photos, wherever they are.
+    symlink("/dev/zero", root.join("images/d.png")).unwrap();
+    symlink("a.png", root.join("images/e.png")).unwrap();
+    assert_eq!(found(&options(root, "images")).unwrap().views.len(), 2);
+    // The photos that a file of cameras names.
+    photos(root, &["beside.png"], (32, 24));
+    symlink(outside.path().join("private.png"), root.join("link.png")).unwrap();
+    assert_eq!(folder::beside(root, "beside"), Some(root.join("beside.png")));
+    assert_eq!(folder::beside(root, "./beside.png"), Some(root.join("./beside.png")));
+    let absolute = outside.path().join("private.png").display().to_string();
+    for name in ["link", "link.png", "../private.png", &absolute, "/dev/zero", "images"] {
+        assert_eq!(folder::beside(root, name), None, "{name}");
+    }
+    // The model itself.
+    fs::rename(root.join("sparse/0/images.txt"), outside.path().join("images.txt")).unwrap();
+    refused("sparse/0/images.txt", &outside.path().join("images.txt"));
+}

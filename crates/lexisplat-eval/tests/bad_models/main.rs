@@ -6,7 +6,9 @@
 mod support;
 
 use lexisplat::packed::{PackOptions, Packer};
-use lexisplat::{CompressOptions, Error, FormatError, Sensitivity, Silent, Splats, compress, stats};
+use lexisplat::{
+    CompressOptions, Error, FLAT_SCALE, FormatError, Sensitivity, Silent, Splats, compress, stats,
+};
 use lexisplat_render::{Camera, RenderOptions, Scene, interior_views, object, orbit, render, surround};
 use support::{cameras, copies, everything, sample, through_ply};
 
@@ -56,9 +58,8 @@ fn refused(value: f32, property: &str, array: &str, change: Change) {
         let options = RenderOptions::default();
         let image = render(&Scene::from(&bad), &camera, &options).unwrap();
         assert!(image.pixels.iter().flatten().all(|v| v.is_finite()));
-        // Normals are not drawn, a standard deviation of 0 is one, and opacities have a test of their own.
-        let left_out =
-            !["normals", "opacities"].contains(&array) && (array, value) != ("scales", f32::NEG_INFINITY);
+        // Normals are not drawn, and opacities have a test of their own.
+        let left_out = !["normals", "opacities"].contains(&array);
         if left_out || value.is_nan() && array == "opacities" {
             assert!(image == render(&Scene::from(&kept), &camera, &options).unwrap(), "{value} in {array}");
         }
@@ -78,8 +79,33 @@ fn nan_is_refused_by_name_or_dropped() {
 fn infinity_is_refused_by_name_or_dropped() {
     for (property, array, change) in PROPERTIES.into_iter().filter(|p| p.0 != "opacity") {
         refused(f32::INFINITY, property, array, change);
-        refused(f32::NEG_INFINITY, property, array, change);
+        if property != "scale_0" {
+            refused(f32::NEG_INFINITY, property, array, change);
+        }
     }
+}
+
+/// As 2DGS' Gaussians are: wherever they go, they look as if their thinnest axis had no size at all.
+#[test]
+fn sizes_of_zero_are_flat() {
+    let mut splats = sample(60, 3);
+    splats.geometry.scales.iter_mut().for_each(|scales| scales[2] = f32::NEG_INFINITY);
+    splats.geometry.scales[3] = [f32::NEG_INFINITY; 3];
+    let read = through_ply(&splats, false).unwrap();
+    assert!(
+        read.warnings.iter().any(|w| w.starts_with("60 Gaussians have a size of zero")),
+        "{:?}",
+        read.warnings
+    );
+    let finite = read.splats;
+    assert_eq!(finite.geometry.scales[3], [FLAT_SCALE; 3]);
+    for camera in cameras() {
+        let options = RenderOptions::default();
+        let image = render(&Scene::from(&finite), &camera, &options).unwrap();
+        assert!(image == render(&Scene::from(&splats), &camera, &options).unwrap());
+    }
+    let outcome = everything(&finite);
+    assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
 }
 
 #[test]

@@ -18,6 +18,8 @@ const POINTS: u32 = 0;
 const DEFAULT_MODE: u32 = 4;
 /// Most characters of a word of the file in a message.
 const SHOWN: usize = 64;
+/// Attributes of the drafts of 2024 and 2025. They held no SH, and their colours were those of points.
+const DRAFT_ATTRIBUTES: [&str; 3] = ["_SCALE", "_ROTATION", "_OPACITY"];
 /// The highest SH degree of the extension.
 const EXTENSION_DEGREE: u8 = 3;
 /// The axes of an SPZ's bytes beside a trainer's. Half a turn about x leads to them.
@@ -197,6 +199,14 @@ fn plain(name: &str, label: &str, primitive: &Primitive, warnings: &mut Vec<Stri
         let text = || format!("{label}: the attribute {attribute} is missing");
         attributes.get(attribute).copied().ok_or_else(|| Error::malformed(name, text()))
     };
+    if let Some(old) = DRAFT_ATTRIBUTES.into_iter().find(|old| attributes.contains_key(*old)) {
+        let text = format!(
+            "{label}: the attribute {old} is of a draft of KHR_gaussian_splatting, which has {} in its place; write the file \
+             anew with a program of today",
+            attribute(&old[1..])
+        );
+        return Err(Error::malformed(name, text));
+    }
     let of = |word: &str| accessor(&attribute(word));
     let geometry =
         [accessor("POSITION")?, of("ROTATION")?, of("SCALE")?, of("OPACITY")?, of("SH_DEGREE_0_COEF_0")?];

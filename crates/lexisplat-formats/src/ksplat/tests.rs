@@ -150,7 +150,7 @@ fn damaged_files_are_refused_or_finite() {
     let options = ReadOptions::default();
     let try_read = |bytes: &[u8]| -> Result<Splats> {
         let file = read("a", bytes, &options)?;
-        let source = crate::FormatSource::new("a", bytes.len() as u64, file, &options)?;
+        let source = crate::FormatSource::new("a", crate::sog::Sizes::of(bytes.len()), file, &options)?;
         Ok(lexisplat::SplatSource::whole(&source)?.into_owned())
     };
     let mut random = Random::new(1);

@@ -12,6 +12,7 @@ use lexisplat::{Error, FormatError, Input, Limits, Result};
 
 use crate::numbers::{u16_at, u32_at};
 use crate::siblings::{Siblings, check_plain};
+use crate::unknown::no_sog;
 
 /// First bytes of the header of a member, of its entry in the directory, and of the end of the directory.
 const LOCAL: &[u8] = b"PK\x03\x04";
@@ -101,17 +102,26 @@ impl<'a> Archive<'a> {
         Ok(Self { name, bytes, members })
     }
 
+    /// Refuses an archive without `called`, the file that makes it a SOG.
+    pub(super) fn expect(&self, called: &str) -> Result<()> {
+        match self.members.contains_key(called) {
+            true => Ok(()),
+            false => Err(Error::malformed(self.name, no_sog(self.members.keys().copied()))),
+        }
+    }
+
     /// The content of the member `called`.
-    fn get(&self, called: &str, limits: &Limits) -> Result<Cow<'a, [u8]>> {
+    fn get(&self, called: &str, limits: &Limits) -> Result<Content<'a>> {
         let malformed = |text: &str| Error::malformed(self.name, format!("member '{called}' {text}"));
         let member = self.members.get(called).ok_or_else(|| malformed("is missing from the zip archive"))?;
-        let plain = usize::try_from(member.plain).unwrap_or(usize::MAX);
-        limits.check_arrays(self.name, self.bytes.len() as u64, plain, 1)?;
         let header = self.bytes.get(member.at as usize..).filter(|rest| rest.starts_with(LOCAL));
         let header = header.ok_or_else(|| malformed("is not where the directory says"))?;
         let start = LOCAL_BYTES + usize::from(u16_at(header, 26)) + usize::from(u16_at(header, 28));
         let packed = header.get(start..).and_then(|rest| rest.get(..member.packed as usize));
         let packed = packed.ok_or_else(|| malformed("is cut off"))?;
+        // What else is in the archive buys no room.
+        let plain = usize::try_from(member.plain).unwrap_or(usize::MAX);
+        limits.check_arrays(self.name, packed.len() as u64, plain, 1)?;
         if member.flags & ENCRYPTED != 0 {
             return Err(malformed("is encrypted"));
         }
@@ -133,7 +143,7 @@ impl<'a> Archive<'a> {
         if crc32fast::hash(&content) != member.checksum {
             return Err(Error::format(self.name, FormatError::Checksum { part: called.to_owned() }));
         }
-        Ok(content)
+        Ok(Content::Member(content, packed.len() as u64))
     }
 }
 
@@ -142,14 +152,15 @@ impl<'a> Archive<'a> {
 pub(super) enum Files<'a> {
     /// An archive.
     Archive(Archive<'a>),
-    /// Files beside the one that messages call by the name.
-    Beside(&'a str, Siblings<'a>),
+    /// Files beside the one that messages call by the name, in a folder that ends with `/` or has no name.
+    Beside(&'a str, Siblings<'a>, String),
 }
 
 /// The bytes of a file of a SOG.
 #[derive(Debug)]
 pub(super) enum Content<'a> {
-    Member(Cow<'a, [u8]>),
+    /// A member of an archive, and the bytes that it takes there.
+    Member(Cow<'a, [u8]>, u64),
     File(Input),
 }
 
@@ -158,8 +169,18 @@ impl Deref for Content<'_> {
 
     fn deref(&self) -> &[u8] {
         match self {
-            Self::Member(bytes) => bytes,
+            Self::Member(bytes, _) => bytes,
             Self::File(bytes) => bytes,
+        }
+    }
+}
+
+impl Content<'_> {
+    /// The bytes that it takes where it is.
+    pub(super) fn stored(&self) -> u64 {
+        match self {
+            Self::Member(_, packed) => *packed,
+            Self::File(bytes) => bytes.len() as u64,
         }
     }
 }
@@ -170,9 +191,12 @@ impl<'a> Files<'a> {
         match self {
             Self::Archive(archive) => {
                 check_plain(archive.name, called)?;
-                Ok(Content::Member(archive.get(called, limits)?))
+                archive.get(called, limits)
             }
-            Self::Beside(name, siblings) => Ok(Content::File(siblings.read(name, called, limits)?)),
+            Self::Beside(name, siblings, folder) => {
+                check_plain(name, called)?;
+                Ok(Content::File(siblings.read_below(name, &format!("{folder}{called}"), limits)?))
+            }
         }
     }
 }

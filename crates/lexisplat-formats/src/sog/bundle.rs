@@ -31,7 +31,7 @@ pub fn bundle(name: &str, bytes: &[u8], siblings: Siblings<'_>, limits: &Limits)
         .collect();
     let mut members = vec![(META, bytes.to_vec())];
     for file in files {
-        members.push((file, siblings.read(name, file, limits)?.to_vec()));
+        members.push((file, siblings.read_below(name, file, limits)?.to_vec()));
     }
     archive::write(&members).map(Some)
 }

@@ -13,6 +13,7 @@ mod codebook;
 mod meta;
 mod palette;
 mod picture;
+mod streamed;
 mod tree;
 mod write;
 
@@ -21,7 +22,7 @@ use std::ops::Range;
 use lexisplat::ply::ReadOptions;
 use lexisplat::sh::CHANNELS;
 use lexisplat::{Error, Limits, Result, SceneMeta, ShDegree};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use self::archive::{Archive, Files};
 use self::meta::{Meta, Table};
@@ -40,11 +41,17 @@ const LEVELS: usize = 256;
 const ENTRIES_PER_ROW: usize = 64;
 /// Most entries of a palette, whose numbers have 16 bits.
 const MOST_ENTRIES: usize = 1 << 16;
+/// Most SH coefficients of a channel in a palette, with room for degree 4.
+const MOST_REST: usize = 24;
+/// Most pixels of a picture for each Gaussian: sides that are powers of two and alike need up to 4. A picture of up to [`SMALL`]
+/// pixels may be larger.
+const MOST_SPARE: usize = 4;
+const SMALL: usize = 1 << 20;
 /// First bytes of a zip archive.
 const ZIP: &[u8] = b"PK";
 
-/// Reads the SOG in `bytes`, which messages call `name`: an archive, or `meta.json` beside the pictures that `siblings`
-/// gives. Also returns the number of bytes of all files that it read.
+/// Reads the SOG in `bytes`, which messages call `name`: an archive, `meta.json` beside the pictures that `siblings` gives, or
+/// `lod-meta.json` beside folders of SOGs.
 ///
 /// # Errors
 /// [`Error::Format`] for what is missing or damaged, [`Error::Limit`] for pictures that are too large, and errors of
@@ -54,27 +61,67 @@ pub(crate) fn read<'a>(
     bytes: &'a [u8],
     siblings: Siblings<'a>,
     options: &ReadOptions,
-) -> Result<(Described<'a>, u64)> {
-    let limits = &options.limits;
+) -> Result<(Described<'a>, Sizes)> {
+    if streamed::is_index(bytes) {
+        return streamed::read(name, bytes, siblings, options);
+    }
+    let Unit { rows, len, degree, antialiased, warnings, facts, sizes } =
+        unit(name, bytes, siblings, String::new(), &options.limits)?;
+    let meta = SceneMeta { antialiased, ..SceneMeta::default() };
+    Ok((Described { rows: Box::new(rows), len, degree, meta, warnings, facts }, sizes))
+}
+
+/// Bytes of the files of a SOG.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sizes {
+    /// All of them.
+    pub(crate) all: u64,
+    /// Those that count when limits are checked: of files and members that are read, and of each no more than its picture.
+    pub(crate) counted: u64,
+}
+
+impl Sizes {
+    /// Those of one file of `bytes` bytes.
+    pub(crate) fn of(bytes: usize) -> Self {
+        Self { all: bytes as u64, counted: bytes as u64 }
+    }
+}
+
+/// One SOG.
+#[derive(Debug)]
+struct Unit {
+    rows: SogRows,
+    len: usize,
+    degree: ShDegree,
+    antialiased: bool,
+    warnings: Vec<String>,
+    facts: Vec<(&'static str, Value)>,
+    sizes: Sizes,
+}
+
+/// Reads the SOG in `bytes`, an archive or the `meta.json` of `folder`, which ends with `/` or is that of `siblings`.
+fn unit(name: &str, bytes: &[u8], siblings: Siblings<'_>, folder: String, limits: &Limits) -> Result<Unit> {
     let is_archive = bytes.starts_with(ZIP);
-    let (files, meta) = if is_archive {
-        let files = Files::Archive(Archive::open(name, bytes)?);
-        let meta = files.get(META, limits)?;
-        limits.check_header(name, meta.len() as u64)?;
-        let meta = Meta::parse(name, &meta)?;
-        (files, meta)
+    let (files, meta, stored) = if is_archive {
+        let archive = Archive::open(name, bytes)?;
+        archive.expect(META)?;
+        let files = Files::Archive(archive);
+        let content = files.get(META, limits)?;
+        limits.check_header(name, content.len() as u64)?;
+        let meta = Meta::parse(name, &content)?;
+        (files, meta, content.stored())
     } else {
         limits.check_header(name, bytes.len() as u64)?;
-        (Files::Beside(name, siblings), Meta::parse(name, bytes)?)
+        (Files::Beside(name, siblings, folder), Meta::parse(name, bytes)?, bytes.len() as u64)
     };
     limits.check_gaussians(name, meta.count)?;
     let len = usize::try_from(meta.count).unwrap_or(usize::MAX);
     let mut loader = Loader {
         files,
-        is_archive,
         len,
         lossy: Vec::new(),
-        budget: Budget { name, limits, file_bytes: bytes.len() as u64, taken: 0 },
+        all_bytes: bytes.len() as u64,
+        budget: Budget { name, limits, file_bytes: stored, taken: 0 },
     };
     let [low, high] = &meta.means_files;
     let [low, high] = [loader.load(low)?, loader.load(high)?];
@@ -90,7 +137,8 @@ pub(crate) fn read<'a>(
     for file in &loader.lossy {
         warnings.push(format!("the picture '{file}' was written with loss: its values are not exact"));
     }
-    let file_bytes = loader.budget.file_bytes;
+    let all = if is_archive { bytes.len() as u64 } else { loader.all_bytes };
+    let sizes = Sizes { all, counted: loader.budget.file_bytes };
     let mut facts = vec![("version", json!(meta.version)), ("archive", json!(is_archive))];
     facts.extend(meta.generator.map(|generator| ("generator", json!(generator))));
     facts.push(("width", json!(low.width)));
@@ -108,25 +156,18 @@ pub(crate) fn read<'a>(
         opacity_values: meta.opacities,
         palette,
     };
-    let described = Described {
-        rows: Box::new(rows),
-        len,
-        degree,
-        meta: SceneMeta { antialiased: meta.antialiased, ..SceneMeta::default() },
-        warnings,
-        facts,
-    };
-    Ok((described, file_bytes))
+    Ok(Unit { rows, len, degree, antialiased: meta.antialiased, warnings, facts, sizes })
 }
 
 /// Decodes the pictures of a scene.
 struct Loader<'a> {
     files: Files<'a>,
-    is_archive: bool,
     /// Number of Gaussians.
     len: usize,
     /// Files that were written with loss.
     lossy: Vec<String>,
+    /// Bytes of all files.
+    all_bytes: u64,
     budget: Budget<'a>,
 }
 
@@ -135,14 +176,12 @@ impl Loader<'_> {
         Error::malformed(self.budget.name, text)
     }
 
-    /// The picture in the file `called`.
-    fn picture(&mut self, called: &str) -> Result<Picture> {
-        let limits: &Limits = self.budget.limits;
-        let bytes = self.files.get(called, limits)?;
-        if !self.is_archive {
-            self.budget.file_bytes = self.budget.file_bytes.saturating_add(bytes.len() as u64);
-        }
-        let picture = Picture::read(called, &bytes, &mut self.budget)?;
+    /// The picture in the file `called`, of at most `most` pixels.
+    fn picture(&mut self, called: &str, most: usize) -> Result<Picture> {
+        let content = self.files.get(called, self.budget.limits)?;
+        let stored = content.stored();
+        self.all_bytes = self.all_bytes.saturating_add(stored);
+        let picture = Picture::read(called, (&content, stored), most, &mut self.budget)?;
         if picture.is_lossy {
             self.lossy.push(called.escape_debug().to_string());
         }
@@ -151,7 +190,7 @@ impl Loader<'_> {
 
     /// The picture in the file `called`, which has a pixel for each Gaussian.
     fn load(&mut self, called: &str) -> Result<Picture> {
-        let picture = self.picture(called)?;
+        let picture = self.picture(called, self.len.saturating_mul(MOST_SPARE).max(SMALL))?;
         if picture.len() < self.len {
             let (width, height, len) = (picture.width, picture.height, self.len);
             let text = format!("the picture '{called}' has {width} x {height} pixels for {len} Gaussians");
@@ -162,7 +201,7 @@ impl Loader<'_> {
 
     fn palette(&mut self, sh: &meta::ShMeta) -> Result<Palette> {
         let [palette, labels] = &sh.files;
-        let picture = self.picture(palette)?;
+        let picture = self.picture(palette, MOST_ENTRIES * MOST_REST)?;
         let (width, height) = (picture.width, picture.height);
         let odd = |expected: String| format!("the picture '{palette}' is {width} x {height}, not {expected}");
         let of_width = |degree: &ShDegree| ENTRIES_PER_ROW * degree.rest_per_channel() == width;

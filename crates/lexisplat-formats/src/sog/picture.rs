@@ -19,7 +19,7 @@ const MOST_BESIDE: usize = 1 << 20;
 pub(super) struct Budget<'a> {
     pub(super) name: &'a str,
     pub(super) limits: &'a Limits,
-    /// Bytes of all files read.
+    /// Bytes of all files read, of each picture at most as many as its pixels take: what else a file holds buys no room.
     pub(super) file_bytes: u64,
     /// Bytes of all pictures decoded.
     pub(super) taken: usize,
@@ -38,8 +38,13 @@ pub(super) struct Picture {
 }
 
 impl Picture {
-    /// Decodes the WebP `bytes`, the file `called`.
-    pub(super) fn read(called: &str, bytes: &[u8], budget: &mut Budget<'_>) -> Result<Self> {
+    /// Decodes the WebP `bytes`, the file `called`, which takes `stored` bytes and has at most `most` pixels.
+    pub(super) fn read(
+        called: &str,
+        (bytes, stored): (&[u8], u64),
+        most: usize,
+        budget: &mut Budget<'_>,
+    ) -> Result<Self> {
         let name = budget.name;
         let damaged = |error: &dyn std::fmt::Display| {
             Error::malformed(name, format!("the picture '{called}' is no WebP that can be read: {error}"))
@@ -53,8 +58,13 @@ impl Picture {
         let each = if decoder.has_alpha() { RGBA } else { RGB };
         let size = width.checked_mul(height).and_then(|pixels| pixels.checked_mul(each));
         let size = size.unwrap_or(usize::MAX);
+        budget.file_bytes = budget.file_bytes.saturating_add(stored.min(size as u64));
         let all = budget.taken.saturating_add(size);
         budget.limits.check_arrays(name, budget.file_bytes, all, 1)?;
+        if width.saturating_mul(height) > most {
+            let text = format!("the picture '{called}' has {width} x {height} pixels, where {most} are most");
+            return Err(Error::malformed(name, text));
+        }
         decoder.set_memory_limit(bytes.len().saturating_add(MOST_BESIDE));
         let mut pixels = vec![0; size];
         decoder.read_image(&mut pixels).map_err(|error| damaged(&error))?;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write as _;
+use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::DeflateEncoder;
@@ -14,16 +15,16 @@ use crate::open::open;
 use crate::write::WriteOptions;
 
 /// Gaussians of the scene.
-const GAUSSIANS: usize = 300;
+pub(super) const GAUSSIANS: usize = 300;
 
 fn sample() -> Splats {
     scene(&SampleOptions::new(GAUSSIANS, 3))
 }
 
 /// The members of a SOG by name.
-type Members = BTreeMap<String, Vec<u8>>;
+pub(super) type Members = BTreeMap<String, Vec<u8>>;
 
-fn members(splats: &Splats) -> Members {
+pub(super) fn members(splats: &Splats) -> Members {
     let (bytes, _) = write(splats, &WriteOptions::default()).unwrap();
     let archive = Files::Archive(Archive::open("a", &bytes).unwrap());
     let names = ["means_l", "means_u", "quats", "scales", "sh0", "shN_centroids", "shN_labels"];
@@ -44,6 +45,52 @@ fn archive(members: &Members) -> Vec<u8> {
 fn opened(bytes: &[u8]) -> Result<Splats> {
     let opened = open("a.sog", bytes, Siblings::NONE, &ReadOptions::default(), true, &Silent)?;
     Ok(opened.source().whole()?.into_owned())
+}
+
+/// The scene in `folder`.
+pub(super) fn opened_at(folder: &Path) -> Result<Splats> {
+    let path = crate::scene_path(folder);
+    let (name, bytes) = (path.display().to_string(), Input::open(&path)?);
+    let opened = open(&name, &bytes, Siblings::of(&path), &ReadOptions::default(), true, &Silent)?;
+    Ok(opened.source().whole()?.into_owned())
+}
+
+/// A stranger's folder may hold links and pipes: what is no file of the folder is not read, nor waited for.
+#[cfg(unix)]
+#[test]
+fn pictures_that_are_links_and_pipes_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("scene");
+    std::fs::create_dir(&scene).unwrap();
+    let all = members(&sample());
+    for (name, content) in &all {
+        std::fs::write(scene.join(name), content).unwrap();
+    }
+    assert_eq!(opened_at(&scene).unwrap().len(), GAUSSIANS);
+    let refused = |picture: &dyn Fn(&Path)| {
+        let path = scene.join("means_l.webp");
+        std::fs::remove_file(&path).unwrap();
+        picture(&path);
+        opened_at(&scene).unwrap_err().to_string()
+    };
+    let link = |to: &Path, path: &Path| std::os::unix::fs::symlink(to, path).unwrap();
+    let said = refused(&|path| link(Path::new("/dev/zero"), path));
+    assert!(said.contains("means_l.webp: it leads out of the folder"), "{said}");
+    // The picture that is meant, but elsewhere.
+    let elsewhere = folder.path().join("elsewhere");
+    std::fs::write(&elsewhere, &all["means_l.webp"]).unwrap();
+    let said = refused(&|path| link(&elsewhere, path));
+    assert!(said.contains("it leads out of the folder"), "{said}");
+    let said = refused(&|path| {
+        let made = std::process::Command::new("mkfifo").arg(path).status().unwrap();
+        assert!(made.success());
+    });
+    assert!(said.contains("regular file"), "{said}");
+    // A link within the folder is as good as the file.
+    std::fs::write(scene.join("other"), &all["means_l.webp"]).unwrap();
+    std::fs::remove_file(scene.join("means_l.webp")).unwrap();
+    link(Path::new("other"), &scene.join("means_l.webp"));
+    assert_eq!(opened_at(&scene).unwrap().len(), GAUSSIANS);
 }
 
 /// What is said of a SOG that `change` made wrong.
@@ -117,19 +164,42 @@ fn pictures_of_other_sizes_are_refused() {
     assert!(error.to_string().contains("no WebP"), "{error}");
 }
 
-/// A picture of one colour has a few bytes for a gigabyte of pixels.
-#[test]
-fn small_pictures_that_claim_many_pixels_are_refused() {
+/// A picture of 16,383 pixels a side, as its few bytes say.
+fn huge() -> Vec<u8> {
     // A lossless WebP of one pixel, whose size is 14 bits of width less 1, then 14 of height less 1.
     let mut webp = picture::write(&[[1, 2, 3, 255]], 1, 1).unwrap();
     let at = webp.windows(4).position(|w| w == b"VP8L").unwrap() + 9;
     assert_eq!(webp[at - 1], 0x2f);
     let flags = u32::from_le_bytes(*webp[at..].first_chunk().unwrap()) & !0x0fff_ffff;
     webp[at..at + 4].copy_from_slice(&(flags | 0x3ffe << 14 | 0x3ffe).to_le_bytes());
+    webp
+}
+
+/// A picture of one colour has a few bytes for a gigabyte of pixels.
+#[test]
+fn small_pictures_that_claim_many_pixels_are_refused() {
+    let webp = huge();
     let error = refused(|members| {
         members.insert("means_l.webp".to_owned(), webp.clone());
     });
     assert!(matches!(error, Error::Limit { name: Some("expansion"), .. }), "{error}");
+}
+
+/// Bytes that are never read, beside pictures or in them, do not make room for larger ones.
+#[test]
+fn junk_in_an_archive_buys_no_memory() {
+    let junk = vec![7; 8 << 20];
+    let error = refused(|members| {
+        members.insert("means_l.webp".to_owned(), huge());
+        members.insert("junk".to_owned(), junk.clone());
+    });
+    assert!(matches!(error, Error::Limit { name: Some("expansion"), .. }), "{error}");
+    let error = refused(|members| {
+        let mut webp = huge();
+        webp.extend(&junk);
+        members.insert("means_l.webp".to_owned(), webp);
+    });
+    assert!(error.to_string().contains("16383 x 16383 pixels, where 1048576 are most"), "{error}");
 }
 
 #[test]

@@ -12,15 +12,20 @@ const DEFLATE_LEVEL: u32 = 6;
 /// Effort of Zstandard (`compressZstd` of the reference).
 const ZSTD_LEVEL: i32 = 12;
 
-/// The bytes inside a gzip file.
+/// The bytes inside a gzip file, or of a file that should be inside of one.
 pub(super) struct Gunzip<'a> {
     name: &'a str,
-    decoder: GzDecoder<&'a [u8]>,
+    decoder: Box<dyn Read + 'a>,
 }
 
 impl<'a> Gunzip<'a> {
     pub(super) fn new(name: &'a str, bytes: &'a [u8]) -> Self {
-        Self { name, decoder: GzDecoder::new(bytes) }
+        Self { name, decoder: Box::new(GzDecoder::new(bytes)) }
+    }
+
+    /// `bytes` as they are.
+    pub(super) fn plain(name: &'a str, bytes: &'a [u8]) -> Self {
+        Self { name, decoder: Box::new(bytes) }
     }
 
     /// Fills `out`, which is for `what`.

@@ -2,7 +2,7 @@
 //!
 //! Values are 6 streams of bytes: positions of 24 bits with a fixed point, opacities, colours and logarithms of scales of 8
 //! bits, rotations of 24 or 32 bits, SH of 8 bits, coefficient by coefficient with the colour inside. In versions 1 to 3 one
-//! gzip stream holds a header and all of them; in version 4 each is a Zstandard frame. Axes are x right, y up, z back,
+//! gzip stream holds a header and all of them, and what was inflated already is read too; in version 4 each is a Zstandard frame. Axes are x right, y up, z back,
 //! unless an extension names others.
 
 mod extensions;
@@ -20,9 +20,10 @@ use lexisplat::{Error, FormatError, Result, SceneMeta};
 use serde_json::json;
 
 use self::extensions::Extensions;
-use self::header::{BYTES, Header, NAMES, OLD_BYTES, STREAMS};
+use self::header::{BYTES, FIRST_ZSTD, Header, NAMES, OLD_BYTES, STREAMS};
 use self::inflate::{Gunzip, unzstd};
 use crate::axes::Flip;
+use crate::numbers::u32_at;
 use crate::opacity::{MOST, logits};
 use crate::rows::{Described, Rows, RowsMut};
 
@@ -37,6 +38,8 @@ const SCALE_LEAST: f32 = -10.0;
 const SH_ZERO: f32 = 128.0;
 /// Bytes of an entry of the table of streams: lengths before and after inflating.
 const ENTRY: usize = 16;
+/// Where the version is in a header.
+const VERSION_AT: usize = 4;
 /// First bytes of gzip.
 const GZIP: [u8; 2] = [0x1f, 0x8b];
 
@@ -45,10 +48,19 @@ const GZIP: [u8; 2] = [0x1f, 0x8b];
 /// # Errors
 /// [`Error::Format`] for damage, [`Error::Limit`] for a file that asks for too much.
 pub(crate) fn read(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Described<'static>> {
-    let (header, streams, records) =
-        if bytes.starts_with(&GZIP) { old(name, bytes, options)? } else { new(name, bytes, options)? };
-    let extensions =
+    let is_old = !bytes.starts_with(&GZIP) && (1..FIRST_ZSTD).contains(&u32_at(bytes, VERSION_AT));
+    let (header, streams, records) = match is_old {
+        true => old(name, bytes.len(), Gunzip::plain(name, bytes), options)?,
+        false if bytes.starts_with(&GZIP) => old(name, bytes.len(), Gunzip::new(name, bytes), options)?,
+        false => new(name, bytes, options)?,
+    };
+    let mut extensions =
         if header.has_extensions { Extensions::read(name, &records)? } else { Extensions::default() };
+    if is_old {
+        let text =
+            format!("SPZ version {} outside of gzip, where its programs do not read it", header.version);
+        extensions.warnings.push(text);
+    }
     Ok(Described {
         len: header.count as usize,
         degree: header.degree,
@@ -75,12 +87,11 @@ fn room(name: &str, file_bytes: usize, header: Header, options: &ReadOptions) ->
 }
 
 /// The parts of a file of version 1 to 3.
-fn old(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<Parts> {
-    let mut gunzip = Gunzip::new(name, bytes);
+fn old(name: &str, file_bytes: usize, mut gunzip: Gunzip<'_>, options: &ReadOptions) -> Result<Parts> {
     let mut head = [0; OLD_BYTES];
     gunzip.fill("the header", &mut head)?;
     let header = Header::parse(name, &head)?;
-    let mut streams = room(name, bytes.len(), header, options)?;
+    let mut streams = room(name, file_bytes, header, options)?;
     for (stream, what) in streams.iter_mut().zip(NAMES) {
         gunzip.fill(what, stream)?;
     }
@@ -272,6 +283,19 @@ mod tests {
                 let (again, _) = write(&read, &options(version)).unwrap();
                 assert!(again == bytes, "degree {degree}, version {version}");
             }
+        }
+    }
+
+    #[test]
+    fn what_was_inflated_already_is_read() {
+        let splats = scene(&SampleOptions::new(30, 2));
+        for version in 2..=3 {
+            let (bytes, _) = write(&splats, &options(version)).unwrap();
+            let plain = Gunzip::new("a", &bytes).rest("all", 1 << 20).unwrap();
+            assert_eq!(opened(&plain).unwrap(), opened(&bytes).unwrap());
+            let described = read("a", &plain, &ReadOptions::default()).unwrap();
+            assert_eq!(described.warnings.len(), 1, "{:?}", described.warnings);
+            assert!(opened(&plain[..plain.len() - 1]).is_err() && opened(&plain[..12]).is_err());
         }
     }
 

@@ -44,7 +44,8 @@ def load(
     contiguous : bool
         Whether ``shN`` is contiguous, which takes a pass over it in place. Otherwise it is a view with strides.
     drop_invalid : bool
-        Whether Gaussians with NaN or infinite values are left out. Otherwise such a file is refused.
+        Whether Gaussians with NaN or infinite values are left out. Otherwise such a file is refused. Sizes of zero
+        (scales of -inf) and infinite opacities are always read.
     drop_extras : bool
         Whether properties that 3DGS does not define are left out.
     limit : mapping of str to int, optional

@@ -280,12 +280,12 @@ impl Table {
     }
 }
 
-/// Records as CSV (RFC 4180, lines end with a line feed).
+/// Records as CSV (RFC 4180, lines end with a line feed). Text that a spreadsheet would take for a formula begins with `'`.
 pub(crate) fn csv_text(records: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
     for record in records {
         // Writing to memory cannot fail.
-        let _ = writer.write_record(&record);
+        let _ = writer.write_record(record.iter().map(|cell| format::csv_cell(cell).into_owned()));
     }
     String::from_utf8_lossy(&writer.into_inner().unwrap_or_default()).into_owned()
 }
@@ -344,6 +344,12 @@ mod tests {
         assert_eq!(Cell::Missing.shown(), "\u{2013}");
         assert_eq!(Cell::Count(3).value(), Some(3.0));
         assert_eq!(Cell::text("3").value(), None);
+    }
+
+    #[test]
+    fn csv_holds_no_formulas() {
+        let cells = ["=HYPERLINK(1)", "-0.5", "@b", "-x"].map(str::to_owned);
+        assert_eq!(csv_text([cells.into()]), "'=HYPERLINK(1),-0.5,'@b,'-x\n");
     }
 
     #[test]

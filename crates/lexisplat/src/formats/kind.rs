@@ -10,8 +10,16 @@ const SPLAT_EXTENSION: &str = ".splat";
 const KSPLAT_EXTENSION: &str = ".ksplat";
 /// What to do with a scene of another format where this crate alone reads.
 const CONVERT: &str = "'lexisplat convert' makes a PLY of it, and the crate lexisplat-formats reads it";
+/// The mark of UTF-8 that some editors put before text.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Where the JSON header of a safetensors file begins: after its length, a u64.
 const JSON_OFFSET: usize = 8;
+
+/// `bytes` without the mark of UTF-8 that some editors put before text.
+#[must_use]
+pub fn without_byte_order_mark(bytes: &[u8]) -> &[u8] {
+    bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes)
+}
 
 /// A kind of file, as far as its first bytes and its name tell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,14 +59,13 @@ pub enum Unsupported {
     Anchors,
     /// A PLY without opacities.
     PointCloud,
-    /// A PLY of 2D Gaussians.
-    TwoDimensional,
 }
 
 impl FileKind {
     /// The kind of the file called `name` that begins with `bytes`.
     #[must_use]
     pub fn of(name: &str, bytes: &[u8]) -> Self {
+        let bytes = without_byte_order_mark(bytes);
         let named = |extension: &str| name.to_ascii_lowercase().ends_with(extension);
         let unsupported = match bytes {
             [] => return Self::Empty,
@@ -130,10 +137,6 @@ impl Unsupported {
                 "a point cloud, not a Gaussian scene (no opacity)",
                 "pass the trained model, usually point_cloud/iteration_30000/point_cloud.ply",
             ],
-            Self::TwoDimensional => [
-                "a 2D Gaussian Splatting model (no scale_2)",
-                "give it a third axis first: add a column scale_2 of about -20",
-            ],
         }
     }
 
@@ -157,7 +160,8 @@ mod tests {
     #[test]
     fn kinds_are_told_by_their_first_bytes_or_their_name() {
         let unsupported = FileKind::Unsupported;
-        let cases: [(&str, &[u8], FileKind); 13] = [
+        let cases: [(&str, &[u8], FileKind); 14] = [
+            ("a", b"\xef\xbb\xbfply\nformat", FileKind::Ply),
             ("a", b"", FileKind::Empty),
             ("a", b"ply\nformat", FileKind::Ply),
             ("a.splat", b"ply\r\n", FileKind::Ply),

@@ -13,6 +13,28 @@ use crate::support::error::{Error, Result};
 /// infinities for 255 and 0.
 pub const SURE_OPACITY: f32 = 100.0;
 
+/// Stands for a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians write. e^-20 is
+/// 2e-9 units: no picture shows a size so small, since the rasteriser blurs by 0.3 squared pixels. It is the smallest
+/// logarithm that PlayCanvas' compressed PLY holds (`compressed-chunk.ts`). It does not depend on the scene, so parts of a
+/// scene read the same as the whole.
+pub const FLAT_SCALE: f32 = -20.0;
+
+/// Puts [`FLAT_SCALE`] for scales of minus infinity. Returns how many Gaussians have any.
+pub fn flatten_scales(scales: &mut [[f32; 3]]) -> usize {
+    let mut flat = 0;
+    for row in scales.iter_mut().filter(|row| row.contains(&f32::NEG_INFINITY)) {
+        flat += 1;
+        row.iter_mut().filter(|v| **v == f32::NEG_INFINITY).for_each(|v| *v = FLAT_SCALE);
+    }
+    flat
+}
+
+/// What a reader says of `flat` Gaussians of [`flatten_scales`].
+pub(crate) fn flat_note(flat: usize) -> String {
+    let gaussians = if flat == 1 { "Gaussian has" } else { "Gaussians have" };
+    format!("{flat} {gaussians} a size of zero (a scale of -inf), taken as e^{FLAT_SCALE}: flat")
+}
+
 /// Everything of a scene but its SH-rest coefficients, one entry a Gaussian in every array.
 ///
 /// Values are as the trainer stored them, before any activation.
@@ -26,7 +48,7 @@ pub struct Geometry {
     pub dc: Vec<[f32; 3]>,
     /// Opacity before the sigmoid.
     pub opacities: Vec<f32>,
-    /// Natural logarithms of the standard deviations along the three axes.
+    /// Natural logarithms of the standard deviations along the three axes. A reader gives [`FLAT_SCALE`] for a size of zero.
     pub scales: Vec<[f32; 3]>,
     /// Quaternions (w, x, y, z), not necessarily of unit length.
     pub rotations: Vec<[f32; 4]>,

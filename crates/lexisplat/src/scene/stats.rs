@@ -23,6 +23,9 @@ pub const HUGE_LOG_SCALE: f32 = 10.0;
 /// (`forward.cu`, `alpha < 1.0f / 255.0f`).
 pub const NEVER_DRAWN_OPACITY: f32 = -5.537_334;
 
+/// Fewest Gaussians whose values tell whether they are activated already.
+const TELLING: u64 = 16;
+
 /// Largest difference from 1 of the length of a unit quaternion.
 pub const UNIT_TOLERANCE: f64 = 1e-3;
 
@@ -191,9 +194,37 @@ fn warnings(lint: &Lint, view_dependent: bool) -> Vec<String> {
     warn(lint.zero_quaternions, "have a rotation of length 0, which no renderer can normalise");
     warn(lint.huge_scales, "have a logarithmic scale over 10 and may cover the whole picture");
     warn(lint.never_drawn, "are too transparent to be drawn (opacity under 1/255)");
+    out.extend(activated(lint));
     if view_dependent && lint.zero_rest == n {
         out.push(
             "All SH-rest values are 0: the scene has the size of its degree but no view dependence.".into(),
+        );
+    }
+    out
+}
+
+/// Warnings that values look as if the exponential and the sigmoid had been taken of them, which renderers do once more. Of
+/// logits about half are negative, and of logarithms of sizes those of all Gaussians smaller than a unit.
+fn activated(lint: &Lint) -> Vec<String> {
+    let of = |name: &str| lint.attributes.iter().find(|a| a.name == name);
+    let scales: Vec<_> = ["scale_0", "scale_1", "scale_2"].iter().filter_map(|name| of(name)).collect();
+    let mut out = Vec::new();
+    if lint.gaussians < TELLING {
+        return out;
+    }
+    if of("opacity").is_some_and(|a| a.min >= 0.0 && a.max <= 1.0 && a.min < a.max) {
+        out.push(
+            "All opacities are between 0 and 1: they look as if they were activated already. A PLY holds logits, whose sigmoid \
+             renderers take."
+                .to_owned(),
+        );
+    }
+    // Logarithms of sizes from 1 to e units on average, and of none below 1, would be a scene of boulders.
+    if !scales.is_empty() && scales.iter().all(|a| a.min > 0.0 && a.mean < 1.0) {
+        out.push(
+            "All scales are above 0 and small: they look as if they were activated already. A PLY holds logarithms of sizes, whose \
+             exponential renderers take."
+                .to_owned(),
         );
     }
     out
@@ -387,6 +418,19 @@ mod tests {
             }
             assert_eq!(linter.finish(), expected);
         }
+    }
+
+    #[test]
+    fn values_that_are_activated_already_are_warned_of() {
+        let mut splats = crate::support::testing::scene(300, 3);
+        assert_eq!(lint(&splats).unwrap().warnings, Vec::<String>::new());
+        let geometry = &mut splats.geometry;
+        geometry.opacities.iter_mut().for_each(|v| *v = 1.0 / (1.0 + (-*v).exp()));
+        let said = lint(&splats).unwrap().warnings;
+        assert!(said.len() == 1 && said[0].starts_with("All opacities are between 0 and 1"), "{said:?}");
+        splats.geometry.scales.as_flattened_mut().iter_mut().for_each(|v| *v = v.exp());
+        let said = lint(&splats).unwrap().warnings;
+        assert!(said.len() == 2 && said[1].starts_with("All scales are above 0"), "{said:?}");
     }
 
     #[test]

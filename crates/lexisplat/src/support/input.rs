@@ -31,7 +31,7 @@ impl Input {
     /// Maps `path` if it is a regular file, else reads it to its end.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`.
+    /// [`Error::Io`] that names `path`, [`Error::Format`] if it is a folder.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Limits::default())
     }
@@ -39,13 +39,16 @@ impl Input {
     /// [`Self::open`] that reads at most [`Limits::bytes`] of a file that cannot be mapped.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`, [`Error::Limit`] if the file is longer.
+    /// [`Error::Io`] that names `path`, [`Error::Format`] if it is a folder, [`Error::Limit`] if the file is longer.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self> {
         let name = path.display().to_string();
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
+        let kind = file.metadata().map_err(|e| Error::io(path, e))?;
+        if kind.is_dir() {
+            return Err(Error::malformed(name, "it is a folder, and a file is needed: name the file in it"));
+        }
         #[cfg(feature = "mmap")]
         {
-            let kind = file.metadata().map_err(|e| Error::io(path, e))?;
             // An empty mapping is an error on some systems.
             if kind.is_file() && kind.len() > 0 {
                 let map = map(&file).map_err(|e| Error::io(path, e))?;
@@ -132,6 +135,8 @@ mod tests {
                 assert_eq!(*input, *bytes, "{len}, replaced");
             }
         }
+        let said = Input::open(folder.path()).unwrap_err().to_string();
+        assert!(said.contains("it is a folder"), "{said}");
         let missing = Input::open(&folder.path().join("nothing")).unwrap_err().to_string();
         assert!(missing.contains("nothing"), "{missing}");
     }

@@ -4,6 +4,7 @@ pub(crate) mod builder;
 pub(crate) mod crc32;
 pub(crate) mod error;
 pub(crate) mod input;
+pub(crate) mod inside;
 pub(crate) mod limits;
 pub(crate) mod maths;
 pub(crate) mod memory_budget;

@@ -1,7 +1,7 @@
 //! Every refusal says what is wrong, where, and what to do, on one line.
 
 use lexisplat::ply::{self, Format, ReadOptions, ScalarType};
-use lexisplat::{CompressOptions, Error, Extra, ExtraValues, FormatError, Limits, Silent, lexi};
+use lexisplat::{CompressOptions, Error, Extra, ExtraValues, FLAT_SCALE, FormatError, Limits, Silent, lexi};
 
 use super::support::{Column, File, assert_same, columns, scene};
 
@@ -32,10 +32,6 @@ fn relatives_of_3dgs_are_named() {
         (
             packed.into_bytes(),
             "t.ply: this is a PlayCanvas compressed.ply, which is not supported; 'lexisplat convert' makes a PLY",
-        ),
-        (
-            good().without(&["scale_2"]).bytes(),
-            "t.ply: this is a 2D Gaussian Splatting model (no scale_2), which is not supported; give it a third axis",
         ),
         (
             good().without(&["opacity", "scale_0", "rot_0"]).bytes(),
@@ -216,6 +212,61 @@ fn infinite_opacities_are_sure_ones() {
             (opacities[0], opacities[1501], opacities[2999]) = (100.0, -100.0, 100.0);
             assert_same(&found.splats, &expected, "infinite opacities");
         }
+    }
+}
+
+/// Converters of 2D Gaussians write the logarithm of a thickness of 0 as it is.
+#[test]
+fn sizes_of_zero_are_flat_and_said_once() {
+    let rows = 3000;
+    let splats = scene(1, rows, 2);
+    let mut file = File::new(columns(&splats));
+    for (column, row) in [("scale_2", 0), ("scale_0", 1501), ("scale_1", 1501), ("scale_2", 2999)] {
+        file.column(column).values[row] = f64::NEG_INFINITY;
+    }
+    for format in [Format::BinaryLittleEndian, Format::Ascii] {
+        file.format = format;
+        for drop_invalid in [false, true] {
+            let options = ReadOptions::default().with_drop_invalid(drop_invalid);
+            let found = ply::read_bytes("t.ply", &file.bytes(), &options).unwrap();
+            assert_eq!(
+                found.warnings,
+                ["3 Gaussians have a size of zero (a scale of -inf), taken as e^-20: flat"]
+            );
+            let mut expected = splats.clone();
+            let scales = &mut expected.geometry.scales;
+            (scales[0][2], scales[2999][2]) = (FLAT_SCALE, FLAT_SCALE);
+            (scales[1501][0], scales[1501][1]) = (FLAT_SCALE, FLAT_SCALE);
+            assert_same(&found.splats, &expected, "flat Gaussians");
+        }
+    }
+    file.column("scale_1").values[7] = f64::INFINITY;
+    assert!(refuse(&file.bytes()).contains("(property 'scale_1')"));
+}
+
+#[test]
+fn models_of_2d_gaussians_are_flat() {
+    let splats = scene(1, 3000, 2);
+    let file = File::new(columns(&splats)).without(&["scale_2"]);
+    let found = ply::read_bytes("t.ply", &file.bytes(), &ReadOptions::default()).unwrap();
+    let said = "a 2D Gaussian Splatting model (no scale_2): its Gaussians are taken as flat";
+    assert_eq!(found.warnings, [said]);
+    let mut expected = splats;
+    expected.geometry.scales.iter_mut().for_each(|scales| scales[2] = FLAT_SCALE);
+    assert_same(&found.splats, &expected, "2D Gaussians");
+}
+
+#[test]
+fn a_mark_of_utf_8_before_the_header_is_nothing() {
+    for format in [Format::BinaryLittleEndian, Format::Ascii] {
+        let mut file = good();
+        file.format = format;
+        let marked = [&b"\xef\xbb\xbf"[..], &file.bytes()].concat();
+        let [plain, marked] =
+            [&file.bytes(), &marked].map(|b| ply::read_bytes("t.ply", b, &ReadOptions::default()).unwrap());
+        assert_same(&marked.splats, &plain.splats, "a marked file");
+        assert_eq!(marked.warnings, plain.warnings);
+        assert_eq!(marked.summary.file_bytes, plain.summary.file_bytes + 3);
     }
 }
 

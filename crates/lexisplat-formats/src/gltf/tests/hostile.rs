@@ -33,7 +33,16 @@ fn words(builder: &mut Builder) -> &mut Value {
 #[test]
 fn what_cannot_be_read_is_named() {
     type Change = fn(&mut Builder);
-    let cases: [(&str, Change); 22] = [
+    let cases: [(&str, Change); 24] = [
+        (
+            "the attribute _SCALE is of a draft of KHR_gaussian_splatting, which has KHR_gaussian_splatting:SCALE",
+            |b| {
+                let attributes = b.first()["attributes"].as_object_mut().unwrap();
+                let accessor = attributes.remove("KHR_gaussian_splatting:SCALE").unwrap();
+                attributes.insert("_SCALE".to_owned(), accessor);
+            },
+        ),
+        ("the attribute _ROTATION is of a draft", |b| b.first()["attributes"]["_ROTATION"] = json!(1)),
         ("accessor 3, KHR_gaussian_splatting:OPACITY, ends at byte", |b| {
             b.json["accessors"][3]["count"] = json!(4);
         }),

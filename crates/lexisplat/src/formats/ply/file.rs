@@ -9,7 +9,8 @@ use super::places::Places;
 use super::read::ReadOptions;
 use super::rows::Rows;
 use super::summary::PlySummary;
-use crate::scene::splats::{SURE_OPACITY, SceneMeta};
+use crate::formats::kind::without_byte_order_mark;
+use crate::scene::splats::{SURE_OPACITY, SceneMeta, flat_note};
 use crate::support::error::{Error, FormatError, Result};
 use crate::support::limits::Limits;
 use crate::support::memory_budget::{GEOMETRY_BYTES, MemoryBudget};
@@ -34,10 +35,12 @@ pub(super) struct PlyFile<'a> {
 impl<'a> PlyFile<'a> {
     /// Reads the header of `bytes`, which messages call `name`.
     pub(super) fn open(name: &'a str, bytes: &'a [u8], options: &ReadOptions) -> Result<Self> {
+        let file_bytes = bytes.len() as u64;
+        let bytes = without_byte_order_mark(bytes);
         let header = Header::parse(name, bytes, &options.limits)?;
         let layout =
             Layout::new(&header, options.drop_extras).map_err(|problem| Error::format(name, problem))?;
-        let summary = PlySummary::new(&header, &layout, bytes.len() as u64);
+        let summary = PlySummary::new(&header, &layout, file_bytes);
         options.limits.check_gaussians(name, summary.vertices)?;
         let marks = marks(&header.comments);
         let mut warnings = layout.warnings.clone();
@@ -76,13 +79,16 @@ impl<'a> PlyFile<'a> {
     }
 
     /// Refuses the file if bad rows were `found`, or adds a warning that they are dropped. Adds a warning about
-    /// infinite opacities.
+    /// infinite opacities, and one about flat Gaussians.
     pub(super) fn report(&mut self, found: &Found, options: &ReadOptions) -> Result<()> {
         if found.sure > 0 {
             self.warnings.push(format!(
                 "{} opacities are infinite, taken as {SURE_OPACITY} (opaque) or -{SURE_OPACITY} (invisible)",
                 found.sure
             ));
+        }
+        if found.flat > 0 {
+            self.warnings.push(flat_note(found.flat));
         }
         let (Some(&row), Some(property)) = (found.bad.first(), &found.bad_property) else { return Ok(()) };
         let (count, first) = (found.bad.len() as u64, row as u64);

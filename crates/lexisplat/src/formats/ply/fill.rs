@@ -11,7 +11,7 @@ use super::rows::ROWS_PER_TASK;
 use crate::scene::extra::{Extra, for_extra, with_scalar};
 use crate::scene::offset::single;
 use crate::scene::rounding;
-use crate::scene::splats::{Geometry, SURE_OPACITY, SceneMeta, Splats};
+use crate::scene::splats::{FLAT_SCALE, Geometry, SURE_OPACITY, SceneMeta, Splats, flatten_scales};
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
@@ -83,6 +83,8 @@ pub(super) struct Found {
     pub(super) sure: usize,
     /// What positions are like that are finer than f32, while the file is looked at.
     pub(super) places: Places,
+    /// Number of Gaussians with a scale of minus infinity.
+    pub(super) flat: usize,
 }
 
 impl Found {
@@ -93,6 +95,7 @@ impl Found {
         self.normals |= next.normals;
         self.sure += next.sure;
         self.places.add(next.places);
+        self.flat += next.flat;
     }
 }
 
@@ -175,6 +178,11 @@ impl PlyFile<'_> {
             *opacity = SURE_OPACITY.copysign(*opacity);
             found.sure += 1;
         }
+        let scales = floats[SCALES].as_chunks_mut().0;
+        if self.layout.is_flat {
+            scales.iter_mut().for_each(|row: &mut [f32; SCALE.len()]| row[SCALE.len() - 1] = FLAT_SCALE);
+        }
+        found.flat = flatten_scales(scales);
         let floats = floats.each_ref().map(|values| &**values);
         if floats.iter().any(|values| any_not_finite(values)) {
             (found.bad, found.bad_property) = bad_rows(&rows, floats);

@@ -11,6 +11,9 @@ use crate::support::limits::Limits;
 /// Most elements one header may declare. Real files have one to three.
 const MAX_ELEMENTS: u64 = 1024;
 
+/// Names of floats of 16 bits, which some programs write although no PLY has them.
+const HALF: [&str; 4] = ["half", "float16", "f2", "halffloat"];
+
 /// How values are stored after the header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -173,7 +176,15 @@ fn parse_element<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Element
 }
 
 fn parse_property<'a>(mut words: impl Iterator<Item = &'a str>) -> Parsed<Property> {
-    let ty = |word: Option<&str>| word.and_then(ScalarType::parse).ok_or("unknown type");
+    let ty = |word: Option<&str>| {
+        let why = match word {
+            Some(word) if HALF.contains(&word) => {
+                "floats of 16 bits are no type of a PLY; write them as float"
+            }
+            _ => "unknown type",
+        };
+        word.and_then(ScalarType::parse).ok_or(why)
+    };
     let kind = match words.next() {
         Some("list") => {
             let (count, item) = (ty(words.next())?, ty(words.next())?);
@@ -254,6 +265,16 @@ mod tests {
     const PLAIN: &str = "ply\nformat binary_little_endian 1.0\ncomment Made by hand\nobj_info x 1\n\
          element vertex 3\nproperty float x\nproperty uint8 red\nelement face 2\n\
          property list uchar int vertex_indices\nend_header\n";
+
+    #[test]
+    fn floats_of_16_bits_are_named() {
+        for ty in HALF {
+            let said = message(&format!(
+                "ply\nformat ascii 1.0\nelement vertex 1\nproperty {ty} f_rest_0\nend_header\n"
+            ));
+            assert!(said.contains(&format!("'property {ty} f_rest_0': floats of 16 bits")), "{said}");
+        }
+    }
 
     #[test]
     fn a_plain_header() {

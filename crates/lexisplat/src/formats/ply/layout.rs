@@ -33,6 +33,8 @@ pub(super) struct Layout {
     pub(super) groups: [Group; GROUPS],
     /// Properties that 3DGS does not define, in file order.
     pub(super) extras: Vec<(String, Field)>,
+    /// Whether the Gaussians are 2D ones: there is no third scale, and its column is to be filled.
+    pub(super) is_flat: bool,
     /// Oddities of the properties, one plain sentence each.
     pub(super) warnings: Vec<String>,
 }
@@ -46,12 +48,21 @@ impl Layout {
         let position = columns.group(&POSITION, "")?;
         let dc = columns.group(&DC, "; colours as red, green and blue alone are no spherical harmonics")?;
         let opacity = columns.group(&OPACITY, "")?;
-        let scale = columns.group(&SCALE, "")?;
+        let has = |name: &str| columns.fields.contains_key(name);
+        let is_flat = has(SCALE[0]) && has(SCALE[1]) && !has(SCALE[2]);
+        let sizes = if is_flat { 2 } else { SCALE.len() };
+        let mut scale = columns.group(&SCALE[..sizes], "")?;
+        scale.width = SCALE.len();
         let rotation = columns.group(&ROTATION, "")?;
         let (degree, rest_names) = rest_names(&columns)?;
         let rest = columns.group(&rest_names, "")?;
 
         let mut warnings = Vec::new();
+        if is_flat {
+            warnings.push(
+                "a 2D Gaussian Splatting model (no scale_2): its Gaussians are taken as flat".to_owned(),
+            );
+        }
         let mut normals: Vec<&str> = NORMAL.into_iter().filter(|n| columns.fields.contains_key(n)).collect();
         if !normals.is_empty() && normals.len() < NORMAL.len() {
             warnings.push(format!("only part of a normal is there, dropped: {}", listed(&normals)));
@@ -76,7 +87,7 @@ impl Layout {
             extras.clear();
         }
         let groups = [position, normal, dc, rest, opacity, scale, rotation];
-        Ok(Self { vertex, row_bytes, degree, groups, extras, warnings })
+        Ok(Self { vertex, row_bytes, degree, groups, extras, is_flat, warnings })
     }
 }
 
@@ -109,8 +120,6 @@ fn refuse_other_kinds(columns: &Columns<'_>) -> Accepted<()> {
         Unsupported::Anchors
     } else if !has(OPACITY[0]) && !shaped {
         Unsupported::PointCloud
-    } else if has(SCALE[0]) && has(SCALE[1]) && !has(SCALE[2]) {
-        Unsupported::TwoDimensional
     } else {
         return Ok(());
     };

@@ -2,7 +2,7 @@
 //!
 //! The reader finds properties by name, in any order and of any scalar type, in binary files of either byte order
 //! and in ASCII files. It keeps properties beyond 3DGS as [`Extra`](crate::Extra). It refuses files that this crate
-//! cannot code (compressed, 2D and anchor models, point clouds) and says what they are.
+//! cannot code (compressed and anchor models, point clouds) and says what they are. 2D Gaussians are read as flat ones.
 //!
 //! Positions of other types than f32 are not rounded where that would move Gaussians by more than a hundredth of their
 //! size: an [`Offset`](crate::Offset) is subtracted from them first, and the writer puts it back.

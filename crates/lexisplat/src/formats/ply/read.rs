@@ -55,11 +55,13 @@ pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
 ///
 /// Floats keep their bits. Other types become the nearest f32, with a warning; positions that this would move coarsely get
 /// an offset ([`SceneMeta::offset`](crate::SceneMeta::offset)). Infinite opacities become 100 and
-/// -100, which look the same, with a warning. Memory: the arrays of the result, at most a few times `bytes`.
+/// -100, and scales of minus infinity [`FLAT_SCALE`](crate::FLAT_SCALE), which look the same, with a warning. A file of
+/// 2D Gaussians, which has no third scale, is read as one of flat ones. Memory: the arrays of the result, at most a few
+/// times `bytes`.
 ///
 /// # Errors
 /// [`crate::Error::Format`] that says what is wrong: the bytes are no PLY, or an unsupported relative of 3DGS; a
-/// property is missing or repeated; a count does not match; or values other than opacities are NaN or infinite and
+/// property is missing or repeated; a count does not match; or other values are NaN or infinite and
 /// [`ReadOptions::drop_invalid`] is not set. [`crate::Error::Limit`] if the file asks for more than
 /// [`ReadOptions::limits`] allow.
 pub fn read_bytes(name: &str, bytes: &[u8], options: &ReadOptions) -> Result<PlyRead> {

@@ -20,6 +20,9 @@ use crate::support::error::{Error, Result};
 
 pub use self::group::OutputGroup;
 
+/// The part of a file's mode that says who may read, write and run it; not whose rights it runs with.
+#[cfg(unix)]
+const PERMISSIONS: u32 = 0o777;
 /// Bytes of the write buffer.
 const BUFFER: usize = 1 << 20;
 
@@ -149,6 +152,7 @@ pub fn write_whole<'a, T>(
             let (file, temporary) =
                 Temporary::create(folder, &group).map_err(|e| io(in_folder(folder, e)))?;
             let (file, done) = fill(file)?;
+            keep_mode(&file, &target).map_err(io)?;
             file.sync_all().map_err(io)?;
             temporary.name(file, &target, output.existing).map_err(io)?;
             sync_folder(folder);
@@ -156,6 +160,25 @@ pub fn write_whole<'a, T>(
         }
     };
     whole().map_err(|e| output.explained(e))
+}
+
+/// Gives `file`, which is to replace `target`, the permissions of that, if it is there.
+fn keep_mode(file: &File, target: &Path) -> io::Result<()> {
+    #[cfg(unix)]
+    let kept = match std::fs::metadata(target) {
+        Ok(old) => {
+            use std::os::unix::fs::PermissionsExt;
+            let mode = old.permissions().mode() & PERMISSIONS;
+            file.set_permissions(std::fs::Permissions::from_mode(mode))
+        }
+        Err(_) => Ok(()),
+    };
+    #[cfg(not(unix))]
+    let kept = {
+        let _ = (file, target);
+        Ok(())
+    };
+    kept
 }
 
 /// Asks the system to store the new name on the disk too. Not every file system can, so errors are ignored: the

@@ -106,6 +106,7 @@ fn copy(file: &mut File, target: &Path, existing: Existing, group: &OutputGroup)
     let (mut named, temporary) = Temporary::create_named(super::folder_of(target), group)?;
     io::Seek::rewind(file)?;
     io::copy(file, &mut named)?;
+    named.set_permissions(file.metadata()?.permissions())?;
     named.sync_all()?;
     temporary.name(named, target, existing)
 }

@@ -114,6 +114,27 @@ fn permissions_are_those_of_any_new_file() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_file_that_is_replaced_keeps_its_permissions() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a");
+    let mode = || path.metadata().unwrap().permissions().mode() & 0o7777;
+    std::fs::write(&path, "old").unwrap();
+    for (set, kept) in [(0o600, 0o600), (0o640, 0o640), (0o666, 0o666), (0o444, 0o444), (0o4755, 0o755)] {
+        std::fs::set_permissions(&path, std::fs::Permissions::from_mode(set)).unwrap();
+        put((&path).into(), "new").unwrap();
+        assert_eq!((mode(), std::fs::read_to_string(&path).unwrap().as_str()), (kept, "new"), "{set:o}");
+    }
+    // A temporary file that has a name, as on file systems that need one.
+    let (mut file, temporary) = Temporary::create(folder.path(), &OutputGroup::default()).unwrap();
+    file.write_all(b"newer").unwrap();
+    keep_mode(&file, &path).unwrap();
+    temporary.name(file, &path, Existing::Replace).unwrap();
+    assert_eq!(mode(), 0o755);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn devices_are_written_to_as_they_are() {
