@@ -42,6 +42,15 @@ const USE_CPU: &str = "--device cpu draws without a GPU";
 #[error("{0} exists")]
 pub(crate) struct OutputExists(pub(crate) String);
 
+/// A folder where a scene's file is needed.
+#[derive(Debug, thiserror::Error)]
+#[error("{folder}: this is a folder, not a file")]
+pub(crate) struct IsFolder {
+    pub(crate) folder: String,
+    /// A file that could be meant.
+    pub(crate) example: String,
+}
+
 /// Files on the command line that cannot be meant so.
 #[derive(Debug, thiserror::Error)]
 #[error("{problem}")]
@@ -73,6 +82,9 @@ fn classify(error: &anyhow::Error) -> Blame {
     if error.is::<OutputExists>() {
         return (Kind::Exists, Some(OVERWRITE.into()));
     }
+    if let Some(IsFolder { example, .. }) = error.downcast_ref() {
+        return (Kind::Io, Some(format!("name a file in it, such as {example}").into()));
+    }
     if let Some(misuse) = error.downcast_ref::<Misuse>() {
         return (Kind::Parameter, Some(misuse.help.clone().into()));
     }
@@ -101,7 +113,7 @@ fn view(error: &lexisplat_view::Error) -> Blame {
             "a window needs X11 or Wayland (over ssh: `ssh -X`; without a display: `xvfb-run`); `lexisplat render` needs neither"
         }
         Error::NoAdapter => {
-            "install a Vulkan driver (Debian: apt install libvulkan1 mesa-vulkan-drivers); `lexisplat render` needs none"
+            "install drivers (Debian: apt install libegl1 libgl1-mesa-dri for OpenGL in software, libvulkan1 mesa-vulkan-drivers for Vulkan); `lexisplat render` needs none"
         }
         Error::Window(_) => {
             "a window on X11 also needs libxkbcommon-x11-0; `lexisplat render` draws without a window"

@@ -18,7 +18,7 @@ use lexisplat_render::Image;
 use serde::Serialize;
 
 use crate::args::{Common, Part};
-use crate::exit::{Misuse, OutputExists};
+use crate::exit::{IsFolder, Misuse, OutputExists};
 use crate::terminal::STANDARD_OUTPUT;
 pub(crate) use crate::terminal::{note, print, print_json, warn};
 
@@ -26,6 +26,8 @@ pub(crate) use crate::terminal::{note, print, print_json, warn};
 const STANDARD_INPUT: &str = "standard input";
 /// Extensions of scene formats. An output of one kind under the extension of another would mislead.
 const SCENE_EXTENSIONS: [&str; 8] = ["lexi", "ply", "splat", "ksplat", "spz", "sog", "glb", "gltf"];
+/// Most entries of a folder that are looked at for a scene to advise.
+const MOST_ENTRIES: usize = 1000;
 /// Extensions of pictures, which the names of cameras often end in.
 const PICTURE_EXTENSIONS: [&str; 9] = ["bmp", "exr", "heic", "jpeg", "jpg", "png", "tif", "tiff", "webp"];
 /// Longest part of a camera's name in the name of a picture, in characters.
@@ -49,6 +51,9 @@ pub(crate) fn input(path: &Path, common: &Common) -> Result<(String, Input)> {
         return Ok((STANDARD_INPUT.to_owned(), bytes));
     }
     let path = &*scene_path(path);
+    if path.is_dir() {
+        return Err(folder_for_scene(path));
+    }
     Ok((path.display().to_string(), Input::open_within(path, &limits)?))
 }
 
@@ -161,6 +166,27 @@ fn is_folder(path: &Path) -> bool {
 fn folder_for_file(path: &Path, file: &Path) -> anyhow::Error {
     let problem = format!("{}: the output must be a file, not a folder", path.display());
     Misuse { problem, help: format!("name a file in it, such as {}", file.display()) }.into()
+}
+
+/// The error for the folder `path` where a scene is needed. It names a scene in the folder, if there is one.
+fn folder_for_scene(path: &Path) -> anyhow::Error {
+    let is_scene = |file: &PathBuf| {
+        let end = file.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);
+        end.is_some_and(|end| SCENE_EXTENSIONS.contains(&end.as_str())) && file.is_file()
+    };
+    let entries = |folder: &Path| {
+        let all = std::fs::read_dir(folder).into_iter().flatten().take(MOST_ENTRIES).flatten();
+        all.map(|entry| entry.path())
+    };
+    // Trainers leave a model for each number of rounds that they were to save.
+    let rounds = |model: &PathBuf| -> Option<u64> {
+        model.parent()?.file_name()?.to_str()?.strip_prefix("iteration_")?.parse().ok()
+    };
+    let models = entries(&path.join("point_cloud")).map(|folder| folder.join("point_cloud.ply"));
+    let trained = models.filter(|model| model.is_file()).max_by_key(rounds);
+    let scene = trained.or_else(|| entries(path).filter(is_scene).min());
+    let scene = scene.unwrap_or_else(|| path.join("scene.ply"));
+    IsFolder { folder: path.display().to_string(), example: scene.display().to_string() }.into()
 }
 
 /// All outputs of the program, which a signal ends together.

@@ -20,6 +20,7 @@ fn main() -> ExitCode {
     let json = cli.common.json;
     stop::listen();
     let done = commands::run(cli);
+    progress::clear();
     stop::wait_if_stopped();
     match done {
         Ok(()) => ExitCode::SUCCESS,

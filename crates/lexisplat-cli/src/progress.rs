@@ -1,4 +1,5 @@
-//! Progress on standard error: a bar on a terminal, otherwise a line every ten seconds.
+//! Progress on standard error: on a terminal a bar that moves as long as the command works, otherwise a line every
+//! ten seconds.
 
 use std::io::IsTerminal;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -10,66 +11,180 @@ use lexisplat_eval::format;
 
 use crate::terminal::note;
 
-/// A stage shorter than this shows no bar.
+/// A command shorter than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Time between two pictures of the bar.
+const TICK: Duration = Duration::from_millis(100);
 /// Time between two lines where standard error is no terminal.
 const LINE_INTERVAL: Duration = Duration::from_secs(10);
+/// Width of a bar, in characters.
+const WIDTH: usize = 24;
+/// Width of the block that moves where nothing is counted, in characters.
+const BLOCK: usize = 4;
+const FULL: &str = "█";
+const EMPTY: &str = "░";
+/// Shortest time from which a rate is taken. The first units of a step may be quicker than the others.
+const LEAST_TIMED: Duration = Duration::from_millis(500);
 
-/// The stage that the command is in.
-static CURRENT: Mutex<Option<Current>> = Mutex::new(None);
+/// What the command is doing.
+static WORK: Mutex<Work> = Mutex::new(Work { outer: None, step: None });
+/// The bar of the command. It is never used while [`WORK`] is locked: the thread that draws it locks them in the
+/// other order.
+static BAR: Mutex<Option<ProgressBar>> = Mutex::new(None);
 
+/// Locks `mutex`. A thread that panicked while it held the lock leaves at worst a wrong line on the screen.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// What a command is doing: a step, which may be within one of several larger parts.
 #[derive(Debug)]
-struct Current {
+struct Work {
+    outer: Option<Step>,
+    step: Option<Step>,
+}
+
+/// Work that is counted.
+#[derive(Debug)]
+struct Step {
     label: String,
     unit: String,
-    /// Counts the units, also while it is not shown.
-    bar: ProgressBar,
+    /// Number of units; 0 if it is not known.
+    total: u64,
+    done: u64,
     start: Instant,
-    shown: bool,
 }
 
-/// Locks [`CURRENT`]. A thread that panicked while it held the lock leaves at worst a bar on the screen.
-fn current() -> MutexGuard<'static, Option<Current>> {
-    CURRENT.lock().unwrap_or_else(PoisonError::into_inner)
-}
+impl Step {
+    fn new(label: &str, unit: &str, total: u64) -> Self {
+        let label = format::escape(label).into_owned();
+        Self { label, unit: unit.to_owned(), total, done: 0, start: Instant::now() }
+    }
 
-/// Ends the current stage and takes its bar off the screen.
-pub(crate) fn clear() {
-    if let Some(stage) = current().take() {
-        stage.bar.finish_and_clear();
+    /// What is being done, and how much of it is done.
+    fn text(&self) -> String {
+        let (label, unit) = (&self.label, &self.unit);
+        let done = format::count(self.done);
+        match self.total {
+            0 => format!("{label}, {done} {unit}"),
+            total => format!("{label}, {done} of {} {unit}", format::count(total)),
+        }
+    }
+
+    /// The time that the rest takes if it goes on as it went for `elapsed`.
+    fn left(&self, elapsed: Duration) -> Option<Duration> {
+        let rest = self.total.checked_sub(self.done).filter(|_| self.total > 0)?;
+        if self.done == 0 || elapsed < LEAST_TIMED {
+            return None;
+        }
+        Duration::try_from_secs_f64(elapsed.as_secs_f64() * rest as f64 / self.done as f64).ok()
+    }
+
+    /// The share that is done, if that can be told.
+    fn share(&self) -> Option<f64> {
+        (self.total > 0).then(|| (self.done as f64 / self.total as f64).min(1.0))
     }
 }
 
-/// Prints a line every ten seconds from now on, if standard error is no terminal.
-pub(crate) fn start_lines() {
-    if std::io::stderr().is_terminal() {
-        return;
+impl Work {
+    /// What is being done, and how much of it is done.
+    fn text(&self) -> String {
+        let steps: Vec<String> = self.outer.iter().chain(&self.step).map(Step::text).collect();
+        if steps.is_empty() { "working".to_owned() } else { steps.join("; ") }
     }
+
+    /// The line on a terminal `now`, when the command has worked since `start`: a bar, what is done, and the time left.
+    fn line(&self, start: Instant, now: Instant) -> String {
+        let main = self.outer.as_ref().or(self.step.as_ref());
+        let since = |from: Instant| now.saturating_duration_since(from);
+        let steps = self.outer.iter().chain(&self.step);
+        let left = steps.filter_map(|step| step.left(since(step.start))).next();
+        let left = match left {
+            Some(left) => format!("about {} left", seconds(left)),
+            None => "time left not known yet".to_owned(),
+        };
+        let whole = match (&self.outer, &self.step) {
+            (None, Some(_)) => " of this step",
+            _ => "",
+        };
+        let bar = main.and_then(Step::share).map_or_else(|| moving(since(start)), filled);
+        format!("{bar} {}, {left}{whole}, {} so far", self.text(), seconds(since(start)))
+    }
+}
+
+/// A bar of which `share` is full.
+fn filled(share: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the width")]
+    let full = (share.clamp(0.0, 1.0) * WIDTH as f64) as usize;
+    format!("{}{}", FULL.repeat(full), EMPTY.repeat(WIDTH - full))
+}
+
+/// A bar with a block that moves to and fro.
+fn moving(elapsed: Duration) -> String {
+    let places = WIDTH - BLOCK;
+    let step = usize::try_from(elapsed.as_millis() / TICK.as_millis()).unwrap_or(0) % (2 * places);
+    let at = if step < places { step } else { 2 * places - step };
+    format!("{}{}{}", EMPTY.repeat(at), FULL.repeat(BLOCK), EMPTY.repeat(places - at))
+}
+
+/// A time in whole seconds, or in minutes and hours.
+fn seconds(time: Duration) -> String {
+    let all = time.as_secs();
+    match (all / 3600, all / 60 % 60, all % 60) {
+        (0, 0, s) => format!("{s} s"),
+        (0, m, s) => format!("{m} min {s:02} s"),
+        (h, m, _) => format!("{h} h {m:02} min"),
+    }
+}
+
+/// Shows from now on what the command does: on a terminal as a bar, otherwise as a line every ten seconds.
+pub(crate) fn show() {
     let start = Instant::now();
-    // Without the thread there are no lines, and everything else is as usual. The thread ends with the program.
+    let terminal = std::io::stderr().is_terminal();
+    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+    bar.set_style(
+        ProgressStyle::with_template("{wide_msg}").unwrap_or_else(|_| ProgressStyle::default_bar()),
+    );
+    if terminal {
+        *lock(&BAR) = Some(bar.clone());
+    }
+    // Without the thread nothing is shown, and everything else is as usual. The thread ends with the program.
     let _ = std::thread::Builder::new().name("progress".to_owned()).spawn(move || {
-        loop {
-            std::thread::sleep(LINE_INTERVAL);
-            let seconds = start.elapsed().as_secs();
-            let stage = current().as_ref().map_or_else(|| "working".to_owned(), Current::text);
-            note(&format!("progress: {stage}, {seconds} s since the start"));
+        if !terminal {
+            loop {
+                std::thread::sleep(LINE_INTERVAL);
+                let what = lock(&WORK).text();
+                note(&format!("progress: {what}, {} s since the start", start.elapsed().as_secs()));
+            }
+        }
+        std::thread::sleep(PATIENCE);
+        bar.set_draw_target(ProgressDrawTarget::stderr());
+        while !bar.is_finished() {
+            let line = lock(&WORK).line(start, Instant::now());
+            bar.set_message(line);
+            bar.tick();
+            std::thread::sleep(TICK);
         }
     });
 }
 
-impl Current {
-    /// What is being done, and how much of it is done.
-    fn text(&self) -> String {
-        let (label, unit) = (&self.label, &self.unit);
-        let done = format::count(self.bar.position());
-        match self.bar.length() {
-            Some(total) if total > 0 => format!("{label}, {done} of {} {unit}", format::count(total)),
-            _ => format!("{label}, {done} {unit}"),
-        }
+/// Takes the bar off the screen for good.
+pub(crate) fn clear() {
+    if let Some(bar) = lock(&BAR).take() {
+        bar.finish_and_clear();
     }
 }
 
-/// Shows the stages of a command, unless it was asked to be quiet.
+/// Prints with `print` while the bar is off the screen.
+pub(crate) fn without_bar<T>(print: impl FnOnce() -> T) -> T {
+    let bar = lock(&BAR).clone();
+    match bar {
+        Some(bar) => bar.suspend(print),
+        None => print(),
+    }
+}
+
+/// Reports the steps of a command, unless it was asked to be quiet.
 #[derive(Debug)]
 pub(crate) struct Bars {
     quiet: bool,
@@ -80,37 +195,39 @@ impl Bars {
         Self { quiet }
     }
 
-    /// Starts a stage of `total` units called `unit`; 0 if their number is not known.
+    /// Starts a step of `total` units called `unit`; 0 if their number is not known.
     pub(crate) fn start(&self, label: &str, unit: &str, total: u64) {
-        if self.quiet {
-            return;
+        if !self.quiet {
+            lock(&WORK).step = Some(Step::new(label, unit, total));
         }
-        clear();
-        let template =
-            format!("{{msg:>10}} {{bar:32}} {{human_pos}}/{{human_len}} {unit} ({{per_sec}}, {{eta}} left)");
-        let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::hidden());
-        bar.set_style(style);
-        let stage =
-            Current { label: String::new(), unit: unit.to_owned(), bar, start: Instant::now(), shown: false };
-        *current() = Some(stage);
-        self.say(label);
     }
 
-    /// Changes the label of the current stage.
+    /// Starts `total` parts called `unit`, within which steps follow.
+    pub(crate) fn start_parts(&self, label: &str, unit: &str, total: u64) {
+        if !self.quiet {
+            *lock(&WORK) = Work { outer: Some(Step::new(label, unit, total)), step: None };
+        }
+    }
+
+    /// Changes the label of the parts.
     pub(crate) fn say(&self, label: &str) {
-        if let Some(stage) = current().as_mut() {
-            stage.label = format::escape(label).into_owned();
-            stage.bar.set_message(stage.label.clone());
+        if let Some(outer) = lock(&WORK).outer.as_mut() {
+            outer.label = format::escape(label).into_owned();
         }
     }
 
-    /// Prints a line to standard error, above the bar if it is shown.
-    pub(crate) fn aside(&self, line: &str) {
-        match current().as_ref() {
-            Some(stage) if stage.shown => stage.bar.suspend(|| note(line)),
-            _ => note(line),
+    /// One more part is done.
+    pub(crate) fn part_done(&self) {
+        let mut work = lock(&WORK);
+        work.step = None;
+        if let Some(outer) = work.outer.as_mut() {
+            outer.done += 1;
         }
+    }
+
+    /// All parts are over.
+    pub(crate) fn end_parts(&self) {
+        *lock(&WORK) = Work { outer: None, step: None };
     }
 }
 
@@ -123,24 +240,20 @@ impl Progress for Bars {
             Stage::Draw => ("drawing", "views"),
             Stage::Code => ("coding", "Gaussians"),
             Stage::Write => ("writing", "bytes"),
+            Stage::Score => ("scoring", "views"),
             _ => ("working", "steps"),
         };
         self.start(label, unit, total);
     }
 
     fn advance(&self, units: u64) {
-        if let Some(stage) = current().as_mut() {
-            stage.bar.inc(units);
-            if !stage.shown && stage.start.elapsed() > PATIENCE {
-                // Indicatif itself stays silent when standard error is no terminal.
-                stage.bar.set_draw_target(ProgressDrawTarget::stderr());
-                stage.shown = true;
-            }
+        if let Some(step) = lock(&WORK).step.as_mut() {
+            step.done += units;
         }
     }
 
     fn end(&self) {
-        clear();
+        lock(&WORK).step = None;
     }
 }
 
@@ -150,15 +263,53 @@ mod tests {
 
     #[test]
     fn lines_say_what_is_done_of_what() {
+        let text = || lock(&WORK).text();
         let bars = Bars::new(false);
         bars.begin(Stage::Code, 90_000);
         bars.advance(1234);
-        assert_eq!(current().as_ref().map(Current::text).unwrap(), "coding, 1,234 of 90,000 Gaussians");
-        bars.say("scene\u{1b}");
-        assert_eq!(current().as_ref().map(Current::text).unwrap(), r"scene\u001b, 1,234 of 90,000 Gaussians");
+        assert_eq!(text(), "coding, 1,234 of 90,000 Gaussians");
         bars.begin(Stage::Read, 0);
-        assert_eq!(current().as_ref().map(Current::text).unwrap(), "reading, 0 bytes");
+        assert_eq!(text(), "reading, 0 bytes");
         bars.end();
-        assert!(current().is_none());
+        assert_eq!(text(), "working");
+        bars.start_parts("sweeping", "parts", 12);
+        bars.say("scene\u{1b}");
+        bars.begin(Stage::Draw, 100);
+        bars.advance(3);
+        assert_eq!(text(), r"scene\u001b, 0 of 12 parts; drawing, 3 of 100 views");
+        bars.part_done();
+        assert_eq!(text(), r"scene\u001b, 1 of 12 parts");
+        bars.end_parts();
+        assert_eq!(text(), "working");
+    }
+
+    #[test]
+    fn a_bar_moves_and_tells_the_time_left_whatever_is_done() {
+        let start = Instant::now();
+        let at = |seconds| start + Duration::from_secs(seconds);
+        let step = |done, total| Step { done, start, ..Step::new("drawing", "views", total) };
+        let nothing = Work { outer: None, step: None };
+        let idle = [at(5), at(5) + TICK].map(|now| nothing.line(start, now));
+        assert_ne!(idle[0], idle[1], "it moves");
+        assert!(idle[0].ends_with(" working, time left not known yet, 5 s so far"), "{}", idle[0]);
+        let one = Work { outer: None, step: Some(step(25, 100)) };
+        let line = one.line(start, at(20));
+        assert!(line.starts_with(&format!("{}{}", FULL.repeat(6), EMPTY.repeat(18))), "{line}");
+        assert!(
+            line.ends_with("drawing, 25 of 100 views, about 1 min 00 s left of this step, 20 s so far"),
+            "{line}"
+        );
+        // Of parts of which none is done the step says how long.
+        let both = |done| Work { outer: Some(step(done, 4)), step: Some(step(50, 100)) };
+        assert!(
+            both(0).line(start, at(20)).contains(", about 20 s left, "),
+            "{}",
+            both(0).line(start, at(20))
+        );
+        assert!(both(1).line(start, at(20)).contains(", about 1 min 00 s left, "));
+        assert_eq!(seconds(Duration::from_secs(7384)), "2 h 03 min");
+        assert_eq!(filled(2.0).chars().count(), WIDTH);
+        let widths: Vec<usize> = (0..99).map(|k| moving(TICK * k).chars().count()).collect();
+        assert!(widths.iter().all(|width| *width == WIDTH), "{widths:?}");
     }
 }

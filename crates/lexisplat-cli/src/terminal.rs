@@ -10,6 +10,8 @@ use lexisplat_eval::format;
 use serde::Serialize;
 use serde_json::Value;
 
+use crate::progress::without_bar;
+
 /// What messages call standard output.
 pub(crate) const STANDARD_OUTPUT: &str = "standard output";
 /// Version of the objects that [`print_json`] prints. A member that changes its meaning or goes raises it.
@@ -17,7 +19,10 @@ const SCHEMA_VERSION: u32 = 1;
 
 /// Prints a line to standard error. A program whose standard error is full goes on.
 pub(crate) fn note(line: &str) {
-    let _ = writeln!(std::io::stderr().lock(), "{}", format::escape(line));
+    let line = format::escape(line);
+    without_bar(|| {
+        let _ = writeln!(std::io::stderr().lock(), "{line}");
+    });
 }
 
 /// Prints warnings about `name` to standard error.
@@ -34,10 +39,11 @@ pub(crate) fn print(text: &str) -> Result<()> {
 
 /// Prints text of which nothing comes from a file.
 pub(crate) fn print_unescaped(text: &str) -> Result<()> {
-    let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes())
-        .and_then(|()| out.flush())
-        .map_err(|e| Error::io(STANDARD_OUTPUT, e).into())
+    let write = || {
+        let mut out = std::io::stdout().lock();
+        out.write_all(text.as_bytes()).and_then(|()| out.flush())
+    };
+    without_bar(write).map_err(|e| Error::io(STANDARD_OUTPUT, e).into())
 }
 
 /// Prints a JSON object, with its schema version as the first member.

@@ -168,11 +168,16 @@ fn info_lints() {
     let info = folder.json(&["info", "odd.ply"]);
     assert_eq!((&info["kind"], &info["gaussians"]), (&Value::from("ply"), &Value::from(50)));
     assert_eq!(info["statistics"]["zero_quaternions"], 1);
-    let text = folder.run(&["info", "scene.ply"]);
+    let brief = folder.run(&["info", "scene.ply"]);
+    assert!(brief.contains("centres from ") && !brief.contains("opacity"), "{brief}");
+    let text = folder.run(&["info", "scene.ply", "--all"]);
+    assert!(text.starts_with(&brief), "{text}");
     assert!(text.contains("opacity") && text.contains("norm of a Gaussian's SH"), "{text}");
-    folder.run(&["compress", "scene.ply", "--tol", "0.1", "-q"]);
+    let brief = folder.run(&["compress", "scene.ply", "--tol", "0.1"]);
+    assert_eq!(brief.lines().count(), 3, "{brief}");
+    assert!(brief.lines().nth(2).unwrap().starts_with("SH error: maximum 0.0"), "{brief}");
     let text = folder.run(&["info", "scene.lexi"]);
-    assert!(text.contains("\nSH error: maximum"), "{text}");
+    assert!(text.contains("\nSH error: maximum") && text.lines().count() == 3, "{text}");
     assert!(!text.lines().any(|line| line.starts_with("error")), "the file is healthy: {text}");
 }
 

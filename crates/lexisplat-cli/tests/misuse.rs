@@ -6,6 +6,8 @@ use crate::folder::{Folder, lexisplat};
 const RANGE: i32 = 5;
 /// Exit code of a file of an unsupported kind.
 const FORMAT: i32 = 4;
+/// Exit code of a file that cannot be read.
+const IO: i32 = 3;
 /// Exit code of wrong usage.
 const USAGE: i32 = 2;
 
@@ -69,6 +71,62 @@ fn an_input_of_the_other_kind_is_named_by_its_content() {
         let error = folder.fail(&arguments, FORMAT);
         assert!(error.contains(&format!("this is {kind}, not")) && error.contains(help), "{error}");
         assert!(!error.contains("limit"), "{error}");
+    }
+}
+
+#[test]
+fn a_folder_in_place_of_a_scene_is_called_one() {
+    let folder = Folder::new();
+    let model = "out/point_cloud/iteration_30000/point_cloud.ply";
+    for rounds in ["7000", "30000"] {
+        let place = folder.path(&format!("out/point_cloud/iteration_{rounds}"));
+        std::fs::create_dir_all(&place).unwrap();
+        std::fs::copy(folder.path("scene.ply"), place.join("point_cloud.ply")).unwrap();
+    }
+    std::fs::create_dir(folder.path("empty")).unwrap();
+    for (arguments, example) in [
+        (&["compress", "out", "-o", "x.lexi"][..], model),
+        (&["info", "."], "./scene.ply"),
+        (&["compare", "scene.ply", "empty"], "empty/scene.ply"),
+        (&["convert", "empty/", "x.spz"], "empty/scene.ply"),
+    ] {
+        let error = folder.fail(arguments, IO).replace('\\', "/");
+        assert!(error.contains("this is a folder, not a file"), "{error}");
+        assert!(error.contains(&format!("help: name a file in it, such as {example}\n")), "{error}");
+    }
+}
+
+#[test]
+fn several_inputs_without_an_output_are_told_of_it() {
+    let folder = Folder::new();
+    std::fs::copy(folder.path("scene.ply"), folder.path("b.ply")).unwrap();
+    let error = folder.fail(&["compress", "scene.ply", "b.ply"], RANGE);
+    assert!(error.contains("2 inputs and no output") && error.contains("-o scene.lexi"), "{error}");
+    let error = folder.fail(&["compress", "scene.ply", "out.lexi"], RANGE);
+    assert!(
+        error.contains("help: the output is named by -o: lexisplat compress scene.ply -o out.lexi"),
+        "{error}"
+    );
+    let error = folder.fail(&["decompress", "a.lexi", "b.ply"], USAGE);
+    assert!(error.contains("tip: if this is the output, write -o b.ply"), "{error}");
+}
+
+#[test]
+fn numbers_that_are_none_are_told_the_option_and_the_form() {
+    let folder = Folder::new();
+    for (arguments, option, form) in [
+        (&["compress", "scene.ply", "--tol", "0,1"][..], "--tol <T>", "a number such as 0.1"),
+        (&["compress", "scene.ply", "--psnr", "4O"], "--psnr <DB>", "a number such as 40"),
+        (&["compress", "scene.ply", "--min-psnr", "x"], "--min-psnr <DB>", "a number such as 40"),
+        (&["compress", "scene.ply", "--ratio", "20x"], "--ratio <R>", "a number such as 20"),
+        (&["compress", "scene.ply", "--size", "2 apples"], "--size <BYTES>", "a size such as 800kB"),
+        (&["sweep", "scene.ply", "--tol", "0.1,x"], "--tol <LIST>", "a number such as 0.1"),
+        (&["convert", "scene.ply", "x.spz", "--scale", "1,5"], "--scale <FACTOR>", "a number such as 0.5"),
+        (&["convert", "scene.ply", "x.spz", "--translate", "1,2"], "--translate <X,Y,Z>", "3 numbers"),
+        (&["render", "scene.ply", "--orbit", "many"], "--orbit <N>", "a whole number from 1 to 65535"),
+    ] {
+        let error = folder.fail(arguments, USAGE);
+        assert!(error.contains(option) && error.contains(&format!("expected {form}")), "{error}");
     }
 }
 

@@ -168,7 +168,14 @@ fn the_tolerance_holds_in_packed_files() {
 #[test]
 fn info_says_what_a_packed_file_is_made_of() {
     let folder = Folder::new();
-    folder.run(&["compress", "scene.ply", "-q"]);
+    let text = folder.run(&["compress", "scene.ply", "--all"]);
+    let lines: Vec<&str> = text.lines().collect();
+    assert!(
+        lines[0].starts_with("wrote scene.lexi: ") && lines[0].contains(" Gaussians, SH degree "),
+        "{text}"
+    );
+    assert!(lines[1].contains("x smaller, in ") && lines[2].starts_with("pictures: about "), "{text}");
+    assert!(lines[3].is_empty() && text.contains("\nbits each ") && text.contains("\nseconds "), "{text}");
     let info = folder.json(&["info", "scene.lexi"]);
     let lexi = &info["lexi"];
     assert_eq!(
@@ -184,7 +191,10 @@ fn info_says_what_a_packed_file_is_made_of() {
     let usage = lexi["atom_usage"].as_array().unwrap();
     assert_eq!(usage.iter().map(number).sum::<f64>(), number(&lexi["nonzeros"]));
     assert!(number(&lexi["resident_sh_bytes_per_gaussian"]) < 192.0);
-    let text = folder.run(&["info", "scene.lexi"]);
+    let brief = folder.run(&["info", "scene.lexi"]);
+    assert!(brief.lines().count() == 3 && brief.contains("\npictures: about "), "{brief}");
+    let text = folder.run(&["info", "scene.lexi", "--all"]);
+    assert!(text.starts_with(&brief), "{text}");
     for part in ["bits a Gaussian", "beside 192 dense", "Gaussians by nonzeros", "atoms:", "Position0"] {
         assert!(text.contains(part), "{part} in {text}");
     }

@@ -41,18 +41,18 @@ fn nothing_in_a_scene_acts_on_the_terminal() {
     assert!(bytes.starts_with(header.as_bytes()));
     bytes.splice(header.len()..header.len(), format!("comment {RUDE}\n").into_bytes());
     std::fs::write(folder.path("rude.ply"), bytes).unwrap();
-    printed(&folder, &["info", "rude.ply"]);
+    printed(&folder, &["info", "rude.ply", "--all"]);
     printed(&folder, &["info", "rude.ply", "--json"]);
     for (layout, file) in [("packed", "packed.lexi"), ("f16", "exact.lexi")] {
         run(&folder, &["compress", "rude.ply", "--layout", layout, "-o", file, "--quiet"]);
-        printed(&folder, &["info", file]);
+        printed(&folder, &["info", file, "--all"]);
     }
     // A .lexi holds comments that no header of a PLY can.
     let mut splats = read(&folder.path("scene.ply"));
     splats.meta.comments.push(format!("{RUDE}\nforged"));
     let (model, _) = compress(splats, &CompressOptions::default(), &Silent).unwrap();
     lexi::write(&folder.path("rude.lexi"), &model).unwrap();
-    for command in [&["info", "rude.lexi"][..], &["info", "rude.lexi", "--json"]] {
+    for command in [&["info", "rude.lexi", "--all"][..], &["info", "rude.lexi", "--json"]] {
         let text = printed(&folder, command);
         assert!(!text.lines().any(|line| line.starts_with("forged")), "{text}");
     }

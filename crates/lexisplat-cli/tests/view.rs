@@ -50,6 +50,11 @@ impl Drop for Display {
 
 /// What `lexisplat view` does on a display of its own; `None` where windows cannot be had.
 fn view(folder: &Folder, arguments: &[&str]) -> Option<Output> {
+    view_with(folder, arguments, &[], Need::Display)
+}
+
+/// The same with variables of the environment. `need` is what is missing if no window can be had with them.
+fn view_with(folder: &Folder, arguments: &[&str], variables: &[(&str, &str)], need: Need) -> Option<Output> {
     // One after another: servers that start at once may choose the same number.
     static ONE: Mutex<()> = Mutex::new(());
     let _turn = ONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -57,6 +62,7 @@ fn view(folder: &Folder, arguments: &[&str]) -> Option<Output> {
     let output = display.as_ref().map(|display| {
         let mut command = lexisplat();
         command.current_dir(folder.0.path()).env("DISPLAY", &display.name).env_remove("WAYLAND_DISPLAY");
+        command.envs(variables.iter().copied());
         command.arg("view").args(arguments).timeout(PATIENCE).output().unwrap()
     });
     match output {
@@ -64,7 +70,7 @@ fn view(folder: &Folder, arguments: &[&str]) -> Option<Output> {
         found => {
             let why = found.map(|o| String::from_utf8_lossy(&o.stderr).into_owned());
             let why = why.unwrap_or_else(|| "no Xvfb".to_owned());
-            missing(Need::Display, &format!("no window can be opened here: {why}"));
+            missing(need, &format!("no window can be opened here: {why}"));
             None
         }
     }
@@ -165,6 +171,29 @@ fn a_window_shows_what_render_draws() {
         let score = report["psnr"].as_f64().unwrap();
         assert!((20.0..60.0).contains(&score), "{report}");
     }
+}
+
+/// Without any driver for the kernels the processor draws, and OpenGL shows its pictures.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_window_opens_without_any_gpu() {
+    let folder = Folder::new();
+    let draw = ["--orbit", "1", "--width", "160"];
+    folder.run(&[&["render", "scene.ply", "--device", "cpu", "-o", "views", "--quiet"], &draw[..]].concat());
+    let drawn = std::fs::read_dir(folder.path("views")).unwrap().next().unwrap().unwrap().path();
+    let arguments = ["scene.ply", "--orbit", "1", "--width", "160"];
+    let actions = ["--actions", "camera=0,screenshot=shot.png,report,quit"];
+    let all = [&arguments[..], &actions].concat();
+    let Some(output) = view_with(&folder, &all, &crate::gpu::NO_DRIVERS, Need::OpenGl) else { return };
+    let error = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success(), "{:?}: {error}", output.status);
+    let found = psnr(&picture(&folder.path("shot.png")), &picture(&drawn), |_| true);
+    assert!(found >= SAME, "{found:.1} dB");
+    // What only a GPU can do is refused.
+    let mut command = lexisplat();
+    command.current_dir(folder.0.path()).envs(crate::gpu::NO_DRIVERS).env("DISPLAY", ":nowhere");
+    let output = command.args(["view", "scene.ply", "--device", "gpu"]).output().unwrap();
+    assert_eq!(output.status.code(), Some(NO_GRAPHICS));
 }
 
 /// Two files of other formats beside each other: both are shown as `render` draws them.

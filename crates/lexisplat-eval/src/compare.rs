@@ -45,15 +45,17 @@ pub fn compare<E: From<Error>>(
     Ok(Comparison::of(views))
 }
 
-/// Scores each of `pictures` against its reference. All three lists are in the same order.
+/// Scores each of `pictures` against its reference. All three lists are in the same order. Reports [`Stage::Score`] to
+/// `progress`, in views.
 ///
 /// # Errors
-/// [`Error::Parameter`] if the lists differ in length, or two pictures in size.
+/// [`Error::Parameter`] if the lists differ in length, or two pictures in size. [`Error::Codec`] if `progress` cancels.
 pub fn score_views(
     scorer: &Scorer,
     cameras: &[Camera],
     references: &[Image],
     pictures: &[Image],
+    progress: &dyn Progress,
 ) -> Result<Comparison> {
     for found in [references.len(), pictures.len()] {
         if found != cameras.len() {
@@ -62,6 +64,14 @@ pub fn score_views(
         }
     }
     let views = cameras.iter().zip(references.iter().zip(pictures));
-    let scores = views.map(|(camera, (a, b))| scorer.score(&camera.name, a, b));
-    Ok(Comparison::of(scores.collect::<Result<Vec<_>>>()?))
+    progress.begin(Stage::Score, cameras.len() as u64);
+    let scores = views.map(|(camera, (a, b))| {
+        progress.check()?;
+        let score = scorer.score(&camera.name, a, b);
+        progress.advance(1);
+        score
+    });
+    let scores = scores.collect::<Result<Vec<_>>>()?;
+    progress.end();
+    Ok(Comparison::of(scores))
 }

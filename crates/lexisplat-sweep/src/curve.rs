@@ -1,10 +1,10 @@
 //! Means at each setting: the points of lines in figures.
 
-use lexisplat_eval::Summary;
+use lexisplat_eval::{FrameRate, Summary};
 
 use super::grid::Grid;
 use super::measure::Measure;
-use super::{Method, Point, SceneResult, Setting};
+use super::{Fps, Method, Point, SceneResult, Setting};
 
 /// Models of one method at one setting: those of all scenes, or that of one.
 #[derive(Debug, Clone)]
@@ -30,10 +30,36 @@ impl At<'_> {
         Summary::of(values.filter(|value| value.is_finite())).mean
     }
 
+    /// The mean of the slowest and of the fastest rounds of a rate over the scenes that have it.
+    pub(super) fn rounds(&self, rate: fn(&Fps) -> FrameRate) -> Option<(f64, f64)> {
+        let rates: Vec<FrameRate> =
+            self.models.iter().filter_map(|(_, point)| point.fps.as_ref().map(rate)).collect();
+        let mean = |of: fn(&FrameRate) -> f64| Summary::of(rates.iter().map(of)).mean;
+        Some((mean(|rate| rate.least)?, mean(|rate| rate.most)?))
+    }
+
     /// The paper's ratio. `None` where nothing is coded.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.mean(Measure::CoefficientRatio)
     }
+}
+
+/// By how much the same drawing of dense SH varied over all rounds beside all of `points`: the range over the mean, of the
+/// model where it is largest. `None` if frames were not timed.
+pub(super) fn dense_noise(points: &[At<'_>]) -> Option<f64> {
+    let rates: Vec<(&SceneResult, FrameRate)> = points
+        .iter()
+        .flat_map(|at| &at.models)
+        .filter_map(|(scene, point)| Some((*scene, point.fps?.dense)))
+        .collect();
+    let noise = rates.iter().filter_map(|(scene, _)| {
+        let own = || rates.iter().filter(|(other, _)| std::ptr::eq(*scene, *other)).map(|(_, rate)| rate);
+        let mean = Summary::of(own().map(|rate| rate.mean)).mean?;
+        let least = own().map(|rate| rate.least).reduce(f64::min)?;
+        let most = own().map(|rate| rate.most).reduce(f64::max)?;
+        (mean > 0.0).then(|| (most - least) / mean)
+    });
+    noise.reduce(f64::max)
 }
 
 /// Kinds of settings. Each makes a line.

@@ -47,6 +47,7 @@ pub fn write_report(
     for figure in figures {
         files.push((format!("figures/{}.svg", figure.name), figure.svg.into_bytes()));
         files.push((format!("figures/{}.png", figure.name), figure.png));
+        files.push((format!("figures/{}.pdf", figure.name), figure.pdf));
     }
     files.extend(
         survey(results).into_iter().map(|(path, text)| (format!("survey/{path}"), text.into_bytes())),

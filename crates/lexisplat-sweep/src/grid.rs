@@ -18,6 +18,8 @@ pub(super) struct Grid<'a> {
     /// from large to small files.
     pub(super) settings: Vec<Setting>,
     cells: Vec<(usize, &'a SceneResult)>,
+    /// The pursuit of all points with exact geometry.
+    pursuit: &'a str,
 }
 
 /// A key that sorts settings by kind, then from close to the original to far from it.
@@ -78,12 +80,18 @@ impl<'a> Grid<'a> {
             .filter(|method| results.scenes.iter().any(|scene| scene.method == *method))
             .collect();
         let names = first.iter().map(|scene| scene.name.as_str()).collect();
-        Self { headings, names, methods, settings, cells }
+        Self { headings, names, methods, settings, cells, pursuit: &results.pursuit }
     }
 
     /// The name of a column's scene without what makes its heading unique. Empty beyond the last column.
     pub(super) fn name(&self, column: usize) -> &'a str {
         self.names.get(column).copied().unwrap_or_default()
+    }
+
+    /// What rows of the paper's numbers for `name` are called. Beside another pursuit than the paper's its own is named.
+    pub(super) fn paper_label(&self, name: &str) -> String {
+        let pursuit = if self.pursuit == paper::PURSUIT { "" } else { " (OMP)" };
+        format!("{name}, paper{pursuit}")
     }
 
     /// The model of a method in a column.

@@ -31,6 +31,7 @@ pub use manifest::{Entry, parse_manifest, read_manifest};
 pub use options::{SweepOptions, SweepProgress};
 pub use picture::{Picture, PictureFiles};
 pub use results::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
+pub use scene::shown_path;
 pub use sweep::sweep;
 
 use figures::Figure;

@@ -44,8 +44,12 @@ pub(crate) fn long_csv(results: &Results) -> String {
                 number("max_residual", point.max_residual),
                 number("over_tolerance", Some(point.over_tolerance)),
                 number("seconds", Some(point.seconds)),
-                number("fps", point.fps.map(|fps| fps.sparse)),
-                number("fps_dense", point.fps.map(|fps| fps.dense)),
+                number("fps", point.fps.map(|fps| fps.sparse.mean)),
+                number("fps_least", point.fps.map(|fps| fps.sparse.least)),
+                number("fps_most", point.fps.map(|fps| fps.sparse.most)),
+                number("fps_dense", point.fps.map(|fps| fps.dense.mean)),
+                number("fps_dense_least", point.fps.map(|fps| fps.dense.least)),
+                number("fps_dense_most", point.fps.map(|fps| fps.dense.most)),
             ];
             let scores = scores("original", Some(&point.to_original))
                 .into_iter()

@@ -83,6 +83,7 @@ mod tests {
             caption: "A caption.".to_owned(),
             svg: String::new(),
             png: Vec::new(),
+            pdf: Vec::new(),
         };
         let mut results = results();
         results.command = "lexisplat ``` sweep".to_owned();

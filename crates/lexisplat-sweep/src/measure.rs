@@ -1,7 +1,7 @@
 //! What is measured of a compressed model, in one description for tables, figures and the page.
 
-use lexisplat_eval::Comparison;
 use lexisplat_eval::metrics::Metric;
+use lexisplat_eval::{Comparison, FrameRate};
 
 use crate::paper::Quantity;
 use crate::table::Cell;
@@ -37,6 +37,11 @@ pub(crate) enum Measure {
     DenseFps,
     /// Frames from codes over frames from dense SH.
     Speedup,
+    /// By how much the rounds of drawing from codes differ: half of the difference of the fastest and the slowest, in percent
+    /// of the mean.
+    SparseSpread,
+    /// The same of the original from dense SH.
+    DenseSpread,
 }
 
 impl Measure {
@@ -54,6 +59,8 @@ impl Measure {
             Self::SparseFps => format!("{device} FPS"),
             Self::DenseFps => format!("{device} FPS(-Comp)"),
             Self::Speedup => "Speedup".to_owned(),
+            Self::SparseSpread => format!("{device} FPS, \u{b1}\u{a0}%"),
+            Self::DenseSpread => format!("{device} FPS(-Comp), \u{b1}\u{a0}%"),
         }
     }
 
@@ -76,7 +83,7 @@ impl Measure {
     pub(crate) fn digits(self) -> usize {
         match self {
             Self::ToOriginal(metric) | Self::ToPhotos(metric) => metric.digits(),
-            Self::SparseFps | Self::DenseFps => FPS_DIGITS,
+            Self::SparseFps | Self::DenseFps | Self::SparseSpread | Self::DenseSpread => FPS_DIGITS,
             _ => DIGITS,
         }
     }
@@ -118,9 +125,11 @@ impl Measure {
             Self::CoefficientRatio => point.coefficient_ratio,
             Self::FileRatio => quotient(scene.ply_bytes as f64, point.file_bytes as f64),
             Self::BytesEach => quotient(point.file_bytes as f64, scene.gaussians as f64),
-            Self::SparseFps => Some(point.fps?.sparse),
-            Self::DenseFps => Some(point.fps?.dense),
-            Self::Speedup => quotient(point.fps?.sparse, point.fps?.dense),
+            Self::SparseFps => Some(point.fps?.sparse.mean),
+            Self::DenseFps => Some(point.fps?.dense.mean),
+            Self::Speedup => quotient(point.fps?.sparse.mean, point.fps?.dense.mean),
+            Self::SparseSpread => spread(point.fps?.sparse),
+            Self::DenseSpread => spread(point.fps?.dense),
         }
     }
 
@@ -132,6 +141,11 @@ impl Measure {
             _ => Cell::number(self.value(scene, point), self.digits()),
         }
     }
+}
+
+/// Half of the range of rounds in percent of their mean.
+fn spread(rate: FrameRate) -> Option<f64> {
+    Some(50.0 * quotient(rate.most - rate.least, rate.mean)?)
 }
 
 /// `a / b`, or `None` if `b` is not above 0.

@@ -14,7 +14,7 @@ use lexisplat_eval::{DrawOptions, Error, Result, ViewOptions};
 pub struct SweepOptions {
     /// Ways to compress, each of them once, in the order of tables.
     pub settings: Vec<Setting>,
-    /// The pursuit of settings with exact geometry.
+    /// The pursuit of settings with exact geometry. The default is the paper's.
     pub pursuit: Pursuit,
     /// The layout of settings with exact geometry.
     pub layout: Layout,
@@ -44,7 +44,7 @@ impl Default for SweepOptions {
     fn default() -> Self {
         Self {
             settings: paper::TOLERANCES.map(Setting::Tolerance).to_vec(),
-            pursuit: Pursuit::Ols,
+            pursuit: Pursuit::Omp,
             layout: Layout::F16,
             seed: 0,
             drawing: DrawOptions::default(),

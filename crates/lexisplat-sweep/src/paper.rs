@@ -10,6 +10,8 @@ use super::Method;
 const PRINTED: &str = include_str!("paper.csv");
 /// The tolerance of the paper's main table. Its table against photos names none; its text suggests the same.
 pub(crate) const TOLERANCE: f64 = 0.1;
+/// The pursuit of the paper's method, orthogonal matching pursuit (section 4), by its name in results.
+pub(crate) const PURSUIT: &str = "omp";
 /// Tolerances of the paper's supplementary table.
 pub(crate) const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
 /// SH-rest coefficients of the paper's Gaussians: degree 3.

@@ -7,7 +7,7 @@ use lexisplat::packed::Preset;
 use serde::{Deserialize, Serialize};
 
 use super::paper::same_tolerance;
-use lexisplat_eval::{Comparison, Error, Result};
+use lexisplat_eval::{Comparison, Error, FrameRate, Result};
 
 /// Who trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -124,13 +124,13 @@ mod by_name {
     }
 }
 
-/// Frames a second.
+/// Frames a second, measured in turn.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Fps {
     /// Of the original, from dense SH.
-    pub dense: f64,
+    pub dense: FrameRate,
     /// Of the compressed model, straight from codes.
-    pub sparse: f64,
+    pub sparse: FrameRate,
 }
 
 /// One model compressed in one way.
@@ -173,7 +173,7 @@ pub struct SceneResult {
     pub name: String,
     /// Who trained it.
     pub method: Method,
-    /// Path of the model, as given.
+    /// The model's file, by a name without folders of this machine.
     pub model: String,
     /// Number of Gaussians.
     pub gaussians: u64,
@@ -241,6 +241,17 @@ pub struct Results {
 }
 
 impl Results {
+    /// The pursuit and the layout of files with exact geometry, for captions. Empty if they are not known.
+    pub(crate) fn how(&self) -> String {
+        let pursuit = match self.pursuit.as_str() {
+            "" => return String::new(),
+            "omp" => "OMP, the paper\u{2019}s (ours is OLS)".to_owned(),
+            "ols" => "OLS, ours (the paper\u{2019}s is OMP)".to_owned(),
+            other => other.to_owned(),
+        };
+        format!("Pursuit: {pursuit}. Layout: {}.", self.layout)
+    }
+
     /// The version, the pursuit and the layout, for the reports.
     pub(crate) fn facts(&self) -> Vec<String> {
         let facts = [

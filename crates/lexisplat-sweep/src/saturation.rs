@@ -1,8 +1,9 @@
 //! Whether quality stops falling as fewer and fewer coefficients are kept, in words made from the numbers.
 
-use super::curve::{At, Kind, curve};
+use super::curve::{At, Kind, curve, dense_noise};
 use super::grid::Grid;
 use super::measure::Measure;
+use super::table::signed;
 use super::{Method, Results, Setting};
 
 /// Shortest step along a curve that has a slope, in doublings of the ratio.
@@ -18,6 +19,8 @@ struct Step {
     to: Setting,
     /// Change of the value for each doubling of the ratio.
     slope: f64,
+    /// Change of the value.
+    change: f64,
 }
 
 /// The steps between neighbours by ratio that are long enough to have a slope.
@@ -30,6 +33,7 @@ fn steps(curve: &[At<'_>], value: impl Fn(&At<'_>) -> Option<f64>) -> Vec<Step> 
         from: pair[0].2,
         to: pair[1].2,
         slope: (pair[1].1 - pair[0].1) / (pair[1].0 - pair[0].0),
+        change: pair[1].1 - pair[0].1,
     })
     .collect()
 }
@@ -93,7 +97,8 @@ fn paragraph(grid: &Grid<'_>, method: Method) -> Option<String> {
     Some(format!("{}. {}", method.title(), sentences.join(" ")))
 }
 
-/// How FPS change from the first to the last setting that has them.
+/// How FPS change from the first to the last setting that has them. Of differences within what the same drawing of dense SH
+/// varies by nothing is said but that.
 fn speed(grid: &Grid<'_>, points: &[At<'_>]) -> Option<String> {
     let fps = |at: &At<'_>| at.mean(Measure::SparseFps);
     let mut timed = points.iter().filter(|at| at.ratio().is_some() && fps(at).is_some());
@@ -102,9 +107,16 @@ fn speed(grid: &Grid<'_>, points: &[At<'_>]) -> Option<String> {
     if from <= 0.0 {
         return None;
     }
-    let share = |slope: f64| format!("{:+.1}\u{a0}%", slope / from * 100.0);
+    let percent = |share: f64| format!("{}\u{a0}%", signed(share * 100.0, 1));
+    let share = |slope: f64| percent(slope / from);
+    let noise = dense_noise(points).unwrap_or(f64::INFINITY);
+    let is_told = |change: f64| change.abs() > noise * from;
     let slopes = match steps(points, fps).as_slice() {
-        [first, .., last] => format!(
+        _ if !is_told(to - from) => format!(
+            "; they differ by less than the {:.1}\u{a0}% that drawing the same dense SH varies by, so no trend can be told",
+            noise * 100.0
+        ),
+        [first, .., last] if is_told(first.change) && is_told(last.change) => format!(
             "; a doubling of the ratio brings {} at first and {} at last",
             share(first.slope),
             share(last.slope)
@@ -123,8 +135,8 @@ fn speed(grid: &Grid<'_>, points: &[At<'_>]) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{point, results, scene};
-    use super::super::{Fps, Point};
+    use super::super::Point;
+    use super::super::testing::{fps, point, results, scene};
     use super::*;
 
     /// One scene whose ratio doubles from setting to setting.
@@ -134,7 +146,7 @@ mod tests {
         for (k, psnr) in psnr.into_iter().enumerate() {
             let power = f64::from(u8::try_from(k).unwrap());
             scene.points.push(Point {
-                fps: Some(Fps { dense: 10.0, sparse: 20.0 + power * power }),
+                fps: Some(fps(10.0, 20.0 + 3.0 * power * power)),
                 ..point(Setting::Tolerance(0.5 * (power + 1.0)), 16.0 / power.exp2(), Some(psnr))
             });
         }
@@ -148,12 +160,38 @@ mod tests {
         assert_eq!(
             text.replace('\u{a0}', " "),
             "3DGS. Along tolerances each doubling of the coefficient ratio costs 6.0 dB at first (tol 0.5 to tol 1) and costs \
-             2.0 dB at last (tol 1.5 to tol 2): the curve flattens. FPS on CPU are 20.0 at tol 0.5 and 29.0 at tol \
-             2, 10.0 from dense SH; a doubling of the ratio brings +5.0 % at first and +25.0 % at last."
+             2.0 dB at last (tol 1.5 to tol 2): the curve flattens. FPS on CPU are 20.0 at tol 0.5 and 47.0 at tol \
+             2, 10.0 from dense SH; a doubling of the ratio brings +15.0 % at first and +75.0 % at last."
         );
         assert!(saturation(&falling([50.0, 44.0, 40.0, 35.0]))[0].contains("keeps falling"));
         assert!(saturation(&falling([50.0, 44.0, 40.0, 20.0]))[0].contains("steeper"));
         assert!(saturation(&falling([50.0, 44.0, 40.0, 41.0]))[0].contains("gains 1.0"));
+    }
+
+    #[test]
+    fn a_difference_within_what_the_same_drawing_varies_by_is_no_trend() {
+        let told = |dense: [f64; 2]| {
+            let mut results = falling([50.0, 44.0, 40.0, 38.0]);
+            for (k, point) in results.scenes[0].points.iter_mut().enumerate() {
+                point.fps = Some(fps(dense[k % 2], [20.0, 20.2, 20.1, 21.9][k]));
+            }
+            saturation(&results).join("").replace('\u{a0}', " ")
+        };
+        // Rounds of one measurement vary by 5 % to each side.
+        let text = told([10.0, 10.0]);
+        assert!(text.ends_with(
+            "FPS on CPU are 20.0 at tol 0.5 and 21.9 at tol 2, 10.0 from dense SH; they differ by less than the 10.0 % that \
+             drawing the same dense SH varies by, so no trend can be told."
+        ), "{text}");
+        let mut results = falling([50.0, 44.0, 40.0, 38.0]);
+        // The first step is within that, so only the ends are told.
+        for (point, sparse) in results.scenes[0].points.iter_mut().zip([20.0, 20.2, 26.0, 40.0]) {
+            point.fps = Some(fps(10.0, sparse));
+        }
+        let text = saturation(&results).join("");
+        assert!(!text.contains("doubling of the ratio brings") && !text.contains("no trend"), "{text}");
+        // So do measurements of the same at different times.
+        assert!(told([10.0, 12.0]).contains("less than the 28.2 % that"), "{}", told([10.0, 12.0]));
     }
 
     #[test]

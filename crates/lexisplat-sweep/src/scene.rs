@@ -1,6 +1,6 @@
 //! One model of a sweep. Each part of its results is stored as soon as it is finished.
 
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use lexisplat::ply::ReadOptions;
@@ -10,10 +10,9 @@ use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
 use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    BenchOptions, Comparison, Error, Result, SceneFile, Scorer, bench_cpu, bench_gpu, draw_views, png,
-    score_views,
+    BenchOptions, Comparison, Error, FrameRate, Result, SceneFile, Scorer, bench_cpu_in_turn,
+    bench_gpu_in_turn, draw_views, png, score_views,
 };
-use lexisplat_render::gpu::ShPath;
 use lexisplat_render::{Camera, Image, Renderer, Scene};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -28,7 +27,7 @@ use super::results::{Fps, Point, SceneResult, Setting};
 /// Frames timed from each view on a GPU, as the 3DGS authors do (INRIA `gaussian-splatting` issue 351).
 const GPU_REPEAT: u32 = 100;
 /// Frames timed from each view on the processor: enough to show the spread.
-const CPU_REPEAT: u32 = 3;
+const CPU_REPEAT: u32 = 5;
 /// Frames drawn from each view before timing.
 const WARMUP: u32 = 1;
 /// What names of files call pictures of a model as trained.
@@ -110,6 +109,9 @@ pub(super) struct Evaluator<'a> {
 
 impl Evaluator<'_> {
     pub(super) fn scene(&mut self, entry: &Entry, place: usize) -> Part<(SceneResult, Vec<PictureFiles>)> {
+        if entry.model.is_dir() {
+            return Err(Failure::Scene(format!("{} is a folder, not a file", entry.model.display())));
+        }
         if !entry.model.is_file() {
             return Err(Failure::Scene(format!("{} does not exist", entry.model.display())));
         }
@@ -157,7 +159,7 @@ impl Evaluator<'_> {
             dataset: entry.dataset.clone(),
             name: entry.name.clone(),
             method: entry.method,
-            model: entry.model.display().to_string(),
+            model: shown_path(&entry.model),
             gaussians,
             sh_degree,
             ply_bytes: source_bytes,
@@ -194,7 +196,7 @@ impl Evaluator<'_> {
         let photos = paths.map(fingerprint).collect::<Result<Vec<_>>>()?;
         let o = self.options;
         Ok(format!(
-            "lexisplat {}; model {model}; cameras {cameras:?}; photos {photos:?}; metrics {:?} {}; 8bit {}; fps {}; \
+            "lexisplat {}; model {model}; cameras {cameras:?}; photos {photos:?}; metrics {:?} {}; 8bit {}; fps in turn {}; \
              background {:?}; device {}; {} {} seed {}",
             env!("CARGO_PKG_VERSION"),
             self.scorer.metrics(),
@@ -247,8 +249,8 @@ impl Evaluator<'_> {
                 }
             }
             let to_photos = this.score_photos(subject, photos, originals)?;
-            let fps = this.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-            Ok(Original { to_photos, fps })
+            let fps = this.fps(&[Scene::from(&subject.splats)], &subject.cameras)?;
+            Ok(Original { to_photos, fps: fps.first().map(|rate| rate.mean) })
         })
     }
 
@@ -265,9 +267,7 @@ impl Evaluator<'_> {
                 let apart = difference(&originals[view], &drawn[view]);
                 this.save(subject, view, &difference_of(&label), &apart)?;
             }
-            // Dense and sparse are timed one right after the other, so that other load on the machine slows both.
-            let dense = this.fps(&Scene::from(&subject.splats), &subject.cameras)?;
-            let fps = dense.zip(this.fps(&scene, &subject.cameras)?);
+            let fps = this.fps(&[Scene::from(&subject.splats), scene], &subject.cameras)?;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a file's bytes")]
             let sh_bytes = report.sh_bytes.round() as u64;
             Ok(Point {
@@ -280,9 +280,9 @@ impl Evaluator<'_> {
                 coefficient_ratio: report.coefficient_ratio,
                 max_residual: (report.layout != Layout::Packed).then_some(report.record.max_residual),
                 over_tolerance: report.record.over_tolerance,
-                to_original: score_views(this.scorer, &subject.cameras, originals, &drawn)?,
+                to_original: score_views(this.scorer, &subject.cameras, originals, &drawn, progress)?,
                 to_photos: this.score_photos(subject, photos, &drawn)?,
-                fps: fps.map(|(dense, sparse)| Fps { dense, sparse }),
+                fps: fps.first().zip(fps.get(1)).map(|(&dense, &sparse)| Fps { dense, sparse }),
                 seconds: report.look_seconds + report.pack_seconds,
             })
         })
@@ -303,7 +303,7 @@ impl Evaluator<'_> {
         photos: &[Image],
         pictures: &[Image],
     ) -> Result<Option<Comparison>> {
-        let score = || score_views(self.scorer, &subject.cameras, photos, pictures);
+        let score = || score_views(self.scorer, &subject.cameras, photos, pictures, self.progress);
         (!photos.is_empty()).then(score).transpose()
     }
 
@@ -311,18 +311,18 @@ impl Evaluator<'_> {
         draw_views(&mut self.renderer, scene, cameras, &self.options.drawing, self.progress)
     }
 
-    fn fps(&self, scene: &Scene<'_>, cameras: &[Camera]) -> Result<Option<f64>> {
+    /// Frames a second of `scenes`, drawn in turn; none if they are not asked for.
+    fn fps(&self, scenes: &[Scene<'_>], cameras: &[Camera]) -> Result<Vec<FrameRate>> {
         if !self.options.fps {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let repeat = if self.options.gpu.is_some() { GPU_REPEAT } else { CPU_REPEAT };
         let mut options = BenchOptions::new(WARMUP, repeat);
         options.background = self.options.drawing.background;
-        let times = match &self.options.gpu {
-            Some(gpu) => bench_gpu(gpu, scene, ShPath::of(scene), cameras, &options, self.progress)?,
-            None => bench_cpu(scene, cameras, &options, self.progress)?,
-        };
-        Ok(Some(times.fps))
+        match &self.options.gpu {
+            Some(gpu) => bench_gpu_in_turn(gpu, scenes, cameras, &options, self.progress),
+            None => bench_cpu_in_turn(scenes, cameras, &options, self.progress),
+        }
     }
 
     /// The path of a picture of a view.
@@ -349,6 +349,36 @@ impl Evaluator<'_> {
             setting: label,
         }
     }
+}
+
+/// `path` without folders of this machine: as given if it leads down from here, otherwise the file's name, with the folders
+/// of its training where that names all models alike.
+#[must_use]
+pub fn shown_path(path: &Path) -> String {
+    let is_down = |part: Component<'_>| matches!(part, Component::Normal(_) | Component::CurDir);
+    if path.components().all(is_down) {
+        return path.display().to_string();
+    }
+    let parts: Vec<_> = path.components().filter(|part| matches!(part, Component::Normal(_))).collect();
+    let is_alike = |part: &Component<'_>| {
+        let name = part.as_os_str().to_string_lossy();
+        name.starts_with("point_cloud") || name.starts_with("iteration_")
+    };
+    let alike = parts.iter().rev().take_while(|part| is_alike(part)).count();
+    let kept = if alike == 0 { 1 } else { alike + 1 };
+    parts.iter().skip(parts.len().saturating_sub(kept)).collect::<PathBuf>().display().to_string()
+}
+
+/// `reason` with the paths of `entry` as [`shown_path`] has them.
+pub(super) fn without_paths(reason: &str, entry: &Entry) -> String {
+    let paths = [Some(&entry.model), entry.cameras.as_ref(), entry.images.as_ref()];
+    paths
+        .into_iter()
+        .flatten()
+        .filter(|path| path.has_root() || path.starts_with(".."))
+        .fold(reason.to_owned(), |reason, path| {
+            reason.replace(&path.display().to_string(), &shown_path(path))
+        })
 }
 
 /// What names of files call the difference of pictures at the setting `label`.

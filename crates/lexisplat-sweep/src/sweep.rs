@@ -11,7 +11,7 @@ use super::manifest::Entry;
 use super::options::{SweepOptions, SweepProgress};
 use super::picture::PictureFiles;
 use super::results::{Results, Skipped};
-use super::scene::{Evaluator, Failure, file_start, settings};
+use super::scene::{Evaluator, Failure, file_start, settings, without_paths};
 
 /// Evaluates every entry. `folder` holds finished parts and pictures.
 ///
@@ -66,7 +66,7 @@ pub fn sweep(
                     dataset: entry.dataset.clone(),
                     name: entry.name.clone(),
                     method: entry.method,
-                    reason,
+                    reason: without_paths(&reason, entry),
                 });
             }
         }

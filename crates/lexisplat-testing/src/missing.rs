@@ -19,6 +19,10 @@ pub enum Need {
     Drivers,
     /// A display for windows, or Xvfb to make one.
     Display,
+    /// LaTeX with `booktabs`.
+    Latex,
+    /// OpenGL, if only in software.
+    OpenGl,
     /// The real models (see [`real_data_folder`]).
     Models,
     /// The right to mount a file system in a namespace of one's own (Linux's `unshare -rm`).
@@ -35,6 +39,8 @@ impl Need {
             Self::Gpu => "gpu",
             Self::Drivers => "drivers",
             Self::Display => "display",
+            Self::Latex => "latex",
+            Self::OpenGl => "opengl",
             Self::Models => "models",
             Self::Mounts => "mounts",
             Self::Repository => "repository",

@@ -20,8 +20,10 @@ pub enum Error {
     /// There is no display to open a window on.
     #[error("no display: neither DISPLAY nor WAYLAND_DISPLAY is set")]
     NoDisplay,
-    /// There is no graphics adapter to draw the window with.
-    #[error("no graphics adapter was found")]
+    /// There is nothing to draw the window with: no graphics adapter, and no OpenGL.
+    #[error(
+        "nothing was found to draw a window with: no graphics adapter of Vulkan, Metal or DX12, and no OpenGL"
+    )]
     NoAdapter,
     /// The system did not open the window or start a thread.
     #[error("cannot open a window: {0}")]

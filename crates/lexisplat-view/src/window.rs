@@ -9,6 +9,8 @@ use lexisplat_eval::choose_views;
 use lexisplat_render::gpu::{Gpu, rank};
 use lexisplat_render::{Camera, Device};
 
+use winit::event_loop::EventLoop;
+
 use crate::Options;
 use crate::app::App;
 use crate::error::{Error, Result};
@@ -23,19 +25,27 @@ const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 
 /// Opens the window and returns when it is closed.
 ///
+/// Where nothing can run the renderer's kernels, the processor draws, and OpenGL shows its pictures. OpenGL is also there
+/// without any GPU, in software.
+///
 /// # Errors
-/// [`Error::NoDisplay`] and [`Error::NoAdapter`] if there is no display or no graphics adapter; errors of reading
-/// the files named in `options`; and while a script runs, every other error.
-pub fn run(options: Options) -> Result<()> {
+/// [`Error::NoDisplay`] and [`Error::NoAdapter`] if there is no display or nothing that shows pictures on it; errors of
+/// reading the files named in `options`; and while a script runs, every other error.
+pub fn run(mut options: Options) -> Result<()> {
     let script = script::parse(&options.script)?;
     let given = given_cameras(&options)?;
     if !has_display() {
         return Err(Error::NoDisplay);
     }
-    let backends = wgpu::Backends::from_env().unwrap_or(BACKENDS);
+    let asked = wgpu::Backends::from_env();
+    let backends = asked.unwrap_or(BACKENDS);
     let count = adapters(backends);
-    if count == 0 {
-        return Err(Error::NoAdapter);
+    let by_opengl = count == 0;
+    if by_opengl {
+        if asked.is_some() || matches!(options.device, Device::Gpu | Device::Index(_)) {
+            return Err(Error::NoAdapter);
+        }
+        options.device = Device::Cpu;
     }
     let chosen = match options.device {
         Device::Index(index) if index >= count => {
@@ -45,15 +55,23 @@ pub fn run(options: Options) -> Result<()> {
         Device::Index(index) => Some(index),
         _ => None,
     };
-    let mut setup = egui_wgpu::WgpuSetupCreateNew::without_display_handle();
-    setup.instance_descriptor.backends = backends;
+    // OpenGL needs to know the display before there is a window.
+    let opened = by_opengl.then(|| EventLoop::<eframe::UserEvent>::with_user_event().build()).transpose();
+    let event_loop = opened.map_err(|error| Error::Window(error.to_string()))?;
+    let mut setup = match &event_loop {
+        Some(event_loop) => {
+            egui_wgpu::WgpuSetupCreateNew::from_display_handle(event_loop.owned_display_handle())
+        }
+        None => egui_wgpu::WgpuSetupCreateNew::without_display_handle(),
+    };
+    setup.instance_descriptor.backends = if by_opengl { wgpu::Backends::GL } else { backends };
     // The renderer's kernels compute the arguments of indirect dispatches and clamp them.
     setup.instance_descriptor.flags.remove(wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL);
     setup.native_adapter_selector = Some(Arc::new(move |adapters, surface| {
         best(adapters, surface, chosen)
             .ok_or_else(|| "none of the adapters can draw on this display".to_owned())
     }));
-    setup.device_descriptor = Arc::new(Gpu::descriptor);
+    setup.device_descriptor = if by_opengl { Arc::new(plain) } else { Arc::new(Gpu::descriptor) };
     let mut native = eframe::NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("lexisplat")
@@ -65,19 +83,28 @@ pub fn run(options: Options) -> Result<()> {
     };
     native.wgpu_options.wgpu_setup = setup.into();
     let (failures, failed) = channel();
-    let ran = eframe::run_native(
-        "lexisplat",
-        native,
-        Box::new(move |creation| {
-            creation.egui_ctx.set_theme(egui::Theme::Dark);
-            Ok(Box::new(App::new(creation, options, given, script, failures)?))
-        }),
-    );
+    let creator: eframe::AppCreator<'static> = Box::new(move |creation| {
+        creation.egui_ctx.set_theme(egui::Theme::Dark);
+        Ok(Box::new(App::new(creation, options, given, script, failures)?))
+    });
+    let ran = match event_loop {
+        None => eframe::run_native("lexisplat", native, creator).map_err(|error| error.to_string()),
+        Some(event_loop) => {
+            let mut app = eframe::create_native("lexisplat", native, creator, &event_loop);
+            event_loop.run_app(&mut app).map_err(|error| error.to_string())
+        }
+    };
     match (failed.try_recv(), ran) {
         (Ok(error), _) => Err(error),
         (_, Ok(())) => Ok(()),
-        (_, Err(error)) => Err(Error::Window(error.to_string())),
+        (_, Err(_)) if by_opengl => Err(Error::NoAdapter),
+        (_, Err(error)) => Err(Error::Window(error)),
     }
+}
+
+/// What a device needs that only shows pictures.
+fn plain(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..wgpu::DeviceDescriptor::default() }
 }
 
 /// Reads the camera file named in `options`, if there is one.

@@ -10,7 +10,7 @@ use lexisplat_eval::compression::choose_layout;
 use lexisplat_render::Device;
 
 use super::part::Part;
-use super::values::{length, preset, scene_kind, size, whole};
+use super::values::{length, preset, real, scene_kind, size, whole};
 
 /// Heading of the options that say how good or how small the file shall be.
 const TARGET: &str = "Target, at most one of";
@@ -35,17 +35,17 @@ pub(crate) struct Compress {
     pub(crate) preset: Option<Preset>,
     /// Make the smallest file that has at least this PSNR on average over the views that it is judged by, in dB,
     /// above 0.
-    #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
+    #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) psnr: Option<f64>,
     /// Make the smallest file that has at least this PSNR in each of the views that it is judged by, in dB, above 0.
     /// Other views may be worse.
-    #[arg(long, group = "goal", value_name = "DB", help_heading = TARGET)]
+    #[arg(long, group = "goal", value_name = "DB", value_parser = real::<f64>("40"), help_heading = TARGET)]
     pub(crate) min_psnr: Option<f64>,
     /// Make the best file of at most this size, such as 10MB or 800kB.
     #[arg(long, group = "goal", value_name = "BYTES", value_parser = size, help_heading = TARGET)]
     pub(crate) size: Option<u64>,
     /// Make the best file that is at least this many times smaller than the source, above 1.
-    #[arg(long, group = "goal", value_name = "R", help_heading = TARGET)]
+    #[arg(long, group = "goal", value_name = "R", value_parser = real::<f64>("20"), help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
     /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default:
     /// views like photographs, which are looked for].
@@ -73,12 +73,12 @@ pub(crate) struct Compress {
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
     /// Does nothing of its own: every packed file leaves out what hardly shows.
-    #[arg(long, value_name = "LEVELS", num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
+    #[arg(long, value_name = "LEVELS", value_parser = real::<f32>("1"), num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
     pub(crate) prune: Option<f32>,
     /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
     /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
     /// --layout packed everything else is quantised [default: 0.1 with exact geometry, otherwise none].
-    #[arg(long, value_name = "T")]
+    #[arg(long, value_name = "T", value_parser = real::<f64>("0.1"))]
     pub(crate) tol: Option<f64>,
     /// Most nonzeros in the code of one Gaussian. With it --tol is no longer guaranteed: the report counts the
     /// Gaussians whose error is larger [default: no cap].
@@ -130,6 +130,9 @@ pub(crate) struct Compress {
     /// recorded in the file.
     #[arg(long, default_value = "cpu", value_name = "auto|cpu|gpu|N")]
     pub(crate) device: Device,
+    /// Print the details too: what bytes, bits, codes and seconds went to.
+    #[arg(long)]
+    pub(crate) all: bool,
 }
 
 impl Compress {

@@ -7,7 +7,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::ShDegree;
 use lexisplat_formats::{Edits, Kind, WriteOptions};
 
-use super::values::{numbers, whole};
+use super::values::{numbers, real, whole};
 
 /// Heading of the options that change the scene.
 const CHANGES: &str = "Changes, made in this order";
@@ -47,7 +47,7 @@ pub(crate) struct Convert {
     #[arg(long, value_name = "X,Y,Z,R", value_parser = numbers::<4>, allow_hyphen_values = true, help_heading = CHANGES)]
     pub(crate) crop_sphere: Option<[f64; 4]>,
     /// Scale the scene by this factor, above 0.
-    #[arg(long, value_name = "FACTOR", help_heading = CHANGES)]
+    #[arg(long, value_name = "FACTOR", value_parser = real::<f64>("0.5"), help_heading = CHANGES)]
     pub(crate) scale: Option<f64>,
     /// Rotate the scene about the axes x, then y, then z of a PLY, through the origin, by these angles in degrees. SH
     /// rotate too.

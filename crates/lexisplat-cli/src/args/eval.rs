@@ -8,7 +8,7 @@ use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
 use lexisplat_sweep::Method;
 
-use super::values::{preset, whole};
+use super::values::{preset, real, whole};
 use super::views::{Photos, Views};
 
 /// What to measure.
@@ -74,7 +74,7 @@ pub(crate) struct Sweep {
     pub(crate) method: Method,
     /// Tolerances to compress with, each above 0, with commas between them [default: the paper's, 0.03,0.05,0.1,0.2; none
     /// if --max-nnz or --presets is given].
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = real::<f64>("0.1"))]
     pub(crate) tol: Vec<f64>,
     /// Caps on the nonzeros of a Gaussian to compress with, without a tolerance, with commas between them.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = whole::<u8>(0..=255))]
@@ -82,8 +82,9 @@ pub(crate) struct Sweep {
     /// Presets of packed files to compress with, with commas between them.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = preset())]
     pub(crate) presets: Vec<Preset>,
-    /// The pursuit that chooses atoms, with --tol and --max-nnz: `ols` needs fewer of them, `omp` is the paper's.
-    #[arg(long, value_name = "omp|ols", default_value = "ols")]
+    /// The pursuit that chooses atoms, with --tol and --max-nnz: `omp` is the paper's, whose numbers stand beside it; `ols`,
+    /// which `compress` uses, needs fewer of them.
+    #[arg(long, value_name = "omp|ols", default_value = "omp")]
     pub(crate) pursuit: Pursuit,
     /// Layout of the files, with --tol and --max-nnz.
     #[arg(long, value_name = "f32|f16|paper", default_value = "f16")]

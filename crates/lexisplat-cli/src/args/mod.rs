@@ -12,7 +12,7 @@ mod views;
 
 use std::path::PathBuf;
 
-use clap::error::{ContextKind, ContextValue};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
 use clap::{Args, CommandFactory, FromArgMatches, Parser, Subcommand};
 use lexisplat::Limits;
 
@@ -109,6 +109,9 @@ impl Command {
 pub(crate) struct Info {
     /// The file; `-` reads standard input.
     pub(crate) file: PathBuf,
+    /// Print everything: ranges of all attributes, histograms, and of a .lexi its parts, layers and atoms.
+    #[arg(long)]
+    pub(crate) all: bool,
     /// Leave out Gaussians with NaN or infinite values. Without this option such a file is refused. Sizes of zero (scales of
     /// -inf) and infinite opacities are always read.
     #[arg(long)]
@@ -146,7 +149,31 @@ pub(crate) struct Completions {
 
 /// Parses the command line of this process.
 pub(crate) fn parse() -> Result<Cli, clap::Error> {
-    Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice_on_numbers)?)
+    Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice)?)
+}
+
+/// Replaces advice of clap's that helps nobody.
+fn with_advice(error: clap::Error) -> clap::Error {
+    let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
+    with_advice_on_outputs(with_advice_on_numbers(error), words)
+}
+
+/// Tells how the command of the command line `words` names its output, where it has one file or `-o` too many.
+fn with_advice_on_outputs(mut error: clap::Error, mut words: impl Iterator<Item = String>) -> clap::Error {
+    let all = command();
+    let Some(ContextValue::String(extra)) = error.get(ContextKind::InvalidArg) else { return error };
+    let Some(command) = words.find_map(|word| all.find_subcommand(word)) else { return error };
+    let has = |id: &str| command.get_arguments().any(|arg| arg.get_id() == id);
+    let advice = match extra.as_str() {
+        _ if error.kind() != ErrorKind::UnknownArgument => return error,
+        "-o" | "--output" if has("files") => "the output is the last file, without -o".to_owned(),
+        extra if !extra.starts_with('-') && has("output") => {
+            format!("if this is the output, write -o {extra}")
+        }
+        _ => return error,
+    };
+    error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
+    error
 }
 
 /// Replaces the advice that clap gives on an unexpected negative number, which is to use it as the name of a file.
@@ -181,6 +208,21 @@ mod tests {
     #[test]
     fn the_definition_is_consistent() {
         command().debug_assert();
+    }
+
+    #[test]
+    fn a_file_too_many_is_advised_of_the_output() {
+        for (words, advice) in [
+            (&["decompress", "a.lexi", "b.ply"][..], "write -o b.ply"),
+            (&["convert", "a.ply", "-o", "b.spz"], "the output is the last file, without -o"),
+            (&["info", "a.ply", "b.ply"], ""),
+        ] {
+            let error = command().try_get_matches_from([&["lexisplat"], words].concat()).unwrap_err();
+            let error = with_advice_on_outputs(error, words.iter().map(ToString::to_string));
+            let text = error.render().to_string();
+            assert_eq!(text.contains("output"), !advice.is_empty(), "{text}");
+            assert!(text.contains(advice), "{text}");
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Values of options: names, numbers, sizes and colours.
 
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::packed::Preset;
@@ -49,6 +50,13 @@ pub(super) fn whole<T: TryFrom<u64>>(
     }
 }
 
+/// Returns the parser of a number. Its message shows one that fits, `example`.
+pub(super) fn real<T: FromStr>(
+    example: &'static str,
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| text.trim().parse().map_err(|_| format!("expected a number such as {example}"))
+}
+
 /// Parses a number of bytes: plain, or with kB, MB, GB (powers of 1000) or KiB, MiB, GiB (powers of 1024).
 pub(super) fn size(text: &str) -> Result<u64, String> {
     let digits = text.trim_end_matches(|c: char| c.is_ascii_alphabetic());
@@ -80,7 +88,7 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
     let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
     match <[f64; N]>::try_from(parts) {
         Ok(numbers) if text.split(',').count() == N && numbers.iter().all(|v| v.is_finite()) => Ok(numbers),
-        _ => Err(format!("expected {N} numbers with commas between them")),
+        _ => Err(format!("expected {N} numbers with commas between them, such as {}", ["0.5"; N].join(","))),
     }
 }
 
@@ -122,6 +130,15 @@ mod tests {
         assert_eq!(whole::<u64>(0..=u64::MAX)("-1"), Err("expected a whole number, at least 0".to_owned()));
         // The type has a range too.
         assert!(whole::<u8>(0..=u64::MAX)("256").is_err());
+    }
+
+    #[test]
+    fn a_number_that_is_none_is_told_what_one_looks_like() {
+        let tolerance = real::<f64>("0.1");
+        assert_eq!((tolerance("0.25"), tolerance(" -1e-3 ")), (Ok(0.25), Ok(-1e-3)));
+        for bad in ["", "x", "0,1", "4O", "1.2.3"] {
+            assert_eq!(tolerance(bad), Err("expected a number such as 0.1".to_owned()), "{bad}");
+        }
     }
 
     #[test]

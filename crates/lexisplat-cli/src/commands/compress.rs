@@ -19,6 +19,7 @@ use lexisplat_render::{Camera, ViewSet, read_views};
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
+use crate::exit::Misuse;
 use crate::files::{
     check_output, input, is_pipe, new_output, note, output_path, resolved, siblings, tell, warn, write_output,
 };
@@ -33,7 +34,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let start = Instant::now();
     let (first, others) = args.inputs.split_first().context("no input")?;
     if args.output.is_none() && !others.is_empty() {
-        return Err(Error::parameter("--output", "missing", "the file that several inputs become").into());
+        return Err(several(first, others).into());
     }
     let mut seen = HashSet::new();
     let mut is_new = |path: &PathBuf| seen.insert(resolved(path).unwrap_or_else(|| path.clone()));
@@ -110,13 +111,30 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if is_pipe(&output) {
         // Standard output carries the file.
         if !common.quiet {
-            text(&report, &output)?.lines().for_each(note);
+            text(&report, &output, args.all)?.lines().for_each(note);
         }
         return Ok(());
     }
     let mut json = serde_json::to_value(&report)?;
     json["output"] = output.display().to_string().into();
-    tell(common, json, || text(&report, &output))
+    tell(common, json, || text(&report, &output, args.all))
+}
+
+/// The error for several inputs without an output, which the last of them may have been meant for.
+fn several(first: &Path, others: &[PathBuf]) -> Misuse {
+    let count = others.len() + 1;
+    let last = others.last().filter(|_| others.len() == 1);
+    let output = last.filter(|path| path.extension().is_some_and(|end| end == "lexi") || !path.exists());
+    let help = match output {
+        Some(output) => format!(
+            "the output is named by -o: lexisplat compress {} -o {}",
+            first.display(),
+            output.with_extension("lexi").display()
+        ),
+        None => "name the one file that they become: -o scene.lexi. To make a file of each, run the command for each"
+            .to_owned(),
+    };
+    Misuse { problem: format!("{count} inputs and no output: several inputs become one file"), help }
 }
 
 /// The scene of `opened`, which messages call `name`, unless it is compressed already or has no Gaussians.
@@ -177,7 +195,40 @@ fn exact(args: &Compress, layout: Layout, limits: &Limits) -> Result<CompressOpt
     Ok(options)
 }
 
-fn text(report: &CompressionReport, output: &Path) -> Result<String> {
+/// Three lines for people, and the details if `all` are asked for.
+fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> {
+    let CompressionReport { gaussians, removed, .. } = report;
+    let mut out = String::new();
+    let count = format::count(*gaussians as u64);
+    let count = match removed {
+        0 => count,
+        _ => format!("{count} of {}", format::count(*gaussians as u64 + removed)),
+    };
+    writeln!(out, "wrote {}: {count} Gaussians, SH degree {}", output.display(), report.sh_degree)?;
+    let bytes = [report.file_bytes, report.source_bytes].map(format::bytes);
+    let ratio = format::ratio(report.source_bytes, report.file_bytes);
+    writeln!(out, "{} of {}: {ratio} smaller, in {:.1} s", bytes[0], bytes[1], report.total_seconds)?;
+    let quality = match report.reached.as_ref().filter(|_| report.record.tolerance.is_none()) {
+        Some(reached) => format!("pictures: {}", reached_line(reached)),
+        None if report.record.tolerance.is_some() => format!("SH error: {}", error_line(&report.record)),
+        None if report.importance == Some(SensitivitySource::Heuristic) => {
+            "pictures: not looked at; what shows was guessed from each Gaussian alone".to_owned()
+        }
+        None if report.in_parts => {
+            "pictures: looked at part by part, because the scene is larger than --memory".to_owned()
+        }
+        None => format!("SH error: {}", error_line(&report.record)),
+    };
+    writeln!(out, "{quality}")?;
+    if all {
+        writeln!(out)?;
+        out.push_str(&details(report)?);
+    }
+    Ok(out)
+}
+
+/// What bytes, bits, codes and seconds went to.
+fn details(report: &CompressionReport) -> Result<String> {
     let CompressionReport { gaussians, atoms, record, learn_seconds, code_seconds, .. } = report;
     let dim = report.nonzero_histogram.len().saturating_sub(1);
     let each = |bytes: f64| bytes / (*gaussians).max(1) as f64;
@@ -185,18 +236,7 @@ fn text(report: &CompressionReport, output: &Path) -> Result<String> {
     let whole = |number: f64| number.round() as u64;
     let mut out = String::new();
     let mut line = |label: &str, text: String| writeln!(out, "{label:<12} {text}");
-    let count = format::count(*gaussians as u64);
-    line("wrote", format!("{}: {count} Gaussians, SH degree {}", output.display(), report.sh_degree))?;
-    line(
-        "file bytes",
-        format!(
-            "{} of {}: {} smaller (whole file against the source), {:.2} bytes a Gaussian",
-            format::bytes(report.file_bytes),
-            format::bytes(report.source_bytes),
-            format::ratio(report.source_bytes, report.file_bytes),
-            each(report.file_bytes as f64)
-        ),
-    )?;
+    line("file bytes", format!("{:.2} a Gaussian", each(report.file_bytes as f64)))?;
     if dim > 0 {
         let (sh, dense) = (whole(report.sh_bytes), report.dense_sh_bytes);
         let ratio = format::ratio(dense, sh);
@@ -341,6 +381,20 @@ fn psnr_line(mean: f64, least: f64, views: impl Display, given: bool) -> String 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn inputs_without_an_output_are_told_of_it() {
+        let told = |others: &[&str]| {
+            let others: Vec<PathBuf> = others.iter().map(PathBuf::from).collect();
+            several(Path::new("a.ply"), &others)
+        };
+        let two = told(&["no such folder/b.ply"]);
+        assert!(two.problem.starts_with("2 inputs and no output"), "{}", two.problem);
+        assert!(two.help.ends_with("lexisplat compress a.ply -o no such folder/b.lexi"), "{}", two.help);
+        let there = std::env::current_exe().unwrap();
+        assert!(told(&[&there.display().to_string()]).help.contains("-o scene.lexi"));
+        assert!(told(&["b.ply", "c.ply"]).help.contains("-o scene.lexi"));
+    }
 
     #[test]
     fn a_preset_far_below_its_aim_is_warned_of() {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use lexisplat::Progress as _;
 use lexisplat_eval::views::{ChosenViews, View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
     Comparison, DrawOptions, SceneFile, Scorer, Whereabouts, draw_views, format, misfit, montage, png,
@@ -82,8 +83,8 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
     let found = find_views(&options, reference.scene().geometry())?;
     warn("views", &found.warnings);
     let cameras: Vec<Camera> = found.views.iter().map(|view| view.camera.clone()).collect();
-    let photos = photos(&found, args.views.background)?;
     let bars = Bars::new(common.quiet);
+    let photos = photos(&found, args.views.background, &bars)?;
     let originals = match &original {
         Some(original) => {
             warn_of(original);
@@ -104,7 +105,7 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         let drawn = draw_views(&mut renderer, &model.scene(), &cameras, &drawing, &bars)?;
         let against = |references: &[Image]| {
             let given = !references.is_empty();
-            given.then(|| score_views(&scorer, &cameras, references, &drawn)).transpose()
+            given.then(|| score_views(&scorer, &cameras, references, &drawn, &bars)).transpose()
         };
         let (to_photos, to_original) = (against(&photos)?, against(&originals)?);
         let misfits = misfit(&model.name, &drawn, drawing.background, to_photos.as_ref());
@@ -112,7 +113,8 @@ pub(crate) fn run(args: &Eval, common: &Common) -> Result<()> {
         warnings.extend(misfits);
         if let Some(folder) = &args.save_views {
             let references = if photos.is_empty() { &originals } else { &photos };
-            save(&folder.join(path.file_name().unwrap_or_default()), &cameras, references, &drawn, common)?;
+            let folder = folder.join(path.file_name().unwrap_or_default());
+            save(&folder, &cameras, references, &drawn, common, &bars)?;
         }
         let SceneFile { name, bytes, .. } = &model;
         let gaussians = model.scene().len();
@@ -148,9 +150,17 @@ pub(crate) fn scorer(measures: &Measures) -> Result<Scorer> {
 }
 
 /// Reads the photos of views, in order. There are none if the views have none.
-fn photos(found: &ChosenViews, background: [f32; 3]) -> Result<Vec<Image>> {
-    let with_photos = found.views.iter().filter(|view| view.photo.is_some());
-    Ok(with_photos.map(|view: &View| photo(view, background)).collect::<Result<_, _>>()?)
+fn photos(found: &ChosenViews, background: [f32; 3], bars: &Bars) -> Result<Vec<Image>> {
+    let with_photos: Vec<&View> = found.views.iter().filter(|view| view.photo.is_some()).collect();
+    bars.start("reading", "photos", with_photos.len() as u64);
+    let read = |view: &View| {
+        let photo = photo(view, background);
+        bars.advance(1);
+        photo
+    };
+    let photos = with_photos.into_iter().map(read).collect::<Result<_, _>>()?;
+    bars.end();
+    Ok(photos)
 }
 
 fn save(
@@ -159,14 +169,18 @@ fn save(
     references: &[Image],
     drawn: &[Image],
     common: &Common,
+    bars: &Bars,
 ) -> Result<()> {
     make_folder(folder)?;
+    bars.start("saving", "pictures", drawn.len() as u64);
     for (i, (camera, (a, b))) in cameras.iter().zip(references.iter().zip(drawn)).enumerate() {
         let path = folder.join(view_name(i, cameras.len(), &camera.name));
         check_free(&path, &[], common.overwrite)?;
         let (width, height, pixels) = montage::montage(a, b);
         write_bytes(&path, &png(width, height, &pixels)?, common.overwrite)?;
+        bars.advance(1);
     }
+    bars.end();
     Ok(())
 }
 

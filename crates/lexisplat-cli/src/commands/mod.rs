@@ -44,7 +44,7 @@ pub(crate) fn run(cli: Cli) -> Result<()> {
         .build_global()
         .context("cannot start the worker threads")?;
     if !common.quiet && !command.is_interactive() {
-        progress::start_lines();
+        progress::show();
     }
     simd.scope(|| match command {
         Command::Compress(args) => compress::run(&args, &common),

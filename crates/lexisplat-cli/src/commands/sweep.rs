@@ -5,10 +5,10 @@ use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
-use lexisplat::Progress;
+use lexisplat::{Progress, Stage};
 use lexisplat_eval::{Comparison, DrawOptions, Error, SplitFilter, format};
 use lexisplat_sweep::{
-    Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, sweep, write_report,
+    Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, shown_path, sweep, write_report,
 };
 use serde::Serialize;
 
@@ -16,7 +16,7 @@ use super::eval::scorer;
 use crate::args::{Common, Sweep};
 use crate::device::open_gpu;
 use crate::exit::OutputExists;
-use crate::files::{make_folder, outputs, tell};
+use crate::files::{make_folder, note, outputs, tell};
 use crate::progress::Bars;
 use crate::stop::{self, Work};
 
@@ -46,7 +46,7 @@ pub(crate) fn run(args: &Sweep, common: &Common) -> Result<()> {
     let progress =
         Shown { bars: Bars::new(common.quiet), reused: AtomicU64::new(0), made: AtomicU64::new(0) };
     let outcome = sweep(&entries, &options, &scorer, folder, &progress);
-    progress.bars.end();
+    progress.bars.end_parts();
     let (mut results, pictures) = outcome?;
     results.command = command();
     let files = write_report(folder, &results, &pictures, args.date.as_deref(), outputs())?;
@@ -114,13 +114,19 @@ fn options(args: &Sweep, common: &Common) -> Result<SweepOptions> {
     options.outputs = outputs().clone();
     for path in &args.measures.lpips {
         let bytes = std::fs::metadata(path).map_err(|e| lexisplat::Error::io(path, e))?.len();
-        write!(options.fingerprint, "{} {bytes}; ", path.display())?;
+        write!(options.fingerprint, "{} {bytes}; ", shown_path(path))?;
     }
     Ok(options)
 }
 
-/// The command line, for the report.
+/// The command line, for the report, without folders of this machine.
 fn command() -> String {
+    let shown = |word: String| match word.split_once('=') {
+        Some((option, value)) if option.starts_with("--") => {
+            format!("{option}={}", shown_path(Path::new(value)))
+        }
+        _ => shown_path(Path::new(&word)),
+    };
     let quote = |word: String| {
         let plain = |c: char| c.is_ascii_alphanumeric() || "-_.,/=+:@%".contains(c);
         if !word.is_empty() && word.chars().all(plain) {
@@ -129,7 +135,7 @@ fn command() -> String {
             format!("'{}'", word.replace('\'', r"'\''"))
         }
     };
-    let words: Vec<String> = std::env::args().skip(1).map(quote).collect();
+    let words: Vec<String> = std::env::args().skip(1).map(shown).map(quote).collect();
     format!("lexisplat {}", words.join(" "))
 }
 
@@ -142,11 +148,23 @@ struct Shown {
     made: AtomicU64,
 }
 
-impl Progress for Shown {}
+impl Progress for Shown {
+    fn begin(&self, stage: Stage, total: u64) {
+        self.bars.begin(stage, total);
+    }
+
+    fn advance(&self, units: u64) {
+        self.bars.advance(units);
+    }
+
+    fn end(&self) {
+        self.bars.end();
+    }
+}
 
 impl SweepProgress for Shown {
     fn start(&self, parts: u64) {
-        self.bars.start("sweeping", "parts", parts);
+        self.bars.start_parts("sweeping", "parts", parts);
     }
 
     fn part(&self, what: &str) {
@@ -156,11 +174,11 @@ impl SweepProgress for Shown {
     fn done(&self, reused: bool) {
         let count = if reused { &self.reused } else { &self.made };
         count.fetch_add(1, Ordering::Relaxed);
-        self.bars.advance(1);
+        self.bars.part_done();
     }
 
     fn warn(&self, model: &str, warning: &str) {
-        self.bars.aside(&format!("warning: {model}: {warning}"));
+        note(&format!("warning: {model}: {warning}"));
     }
 }
 
@@ -185,7 +203,7 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
         add("original", scene.ply_bytes, none(), &scene.to_photos, scene.fps);
         for point in &scene.points {
             let psnr = format::decibels(point.to_original.psnr.mean);
-            let fps = point.fps.map(|fps| fps.sparse);
+            let fps = point.fps.map(|fps| fps.sparse.mean);
             add(&point.setting.label(), point.file_bytes, psnr, &point.to_photos, fps);
         }
     }

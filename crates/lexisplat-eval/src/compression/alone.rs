@@ -5,17 +5,19 @@
 
 use lexisplat::packed::AppearanceChange;
 use lexisplat::sh::C0;
-use lexisplat::{Progress, Splats};
+use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene};
 
-use super::only_cancels::OnlyCancels;
+use super::only_cancels::OneStep;
 use super::solve::{ROW, kinds, solve};
 use crate::error::Result;
 
 /// Pictures are so many times less wide and high than those that the file is fitted to. A first layer alone has no finer
 /// detail, and fits in a quarter of the time.
 const SHRINKING: u32 = 2;
-/// Steps of the method of conjugate gradients, of each of three solutions.
+/// Solutions: of sizes, of opacities and of colours.
+const SOLUTIONS: usize = 3;
+/// Steps of the method of conjugate gradients, of each of them.
 const STEPS: usize = 3;
 /// The ridge, as a share of sums of rows and of the diagonal, and of their means.
 const RIDGE: f32 = 0.1;
@@ -26,7 +28,8 @@ const DIAGONAL: f32 = 2.0;
 const MOST_LOG_OPACITY: f32 = 1.0;
 const MOST_LOG_SCALE: f32 = 0.8;
 
-/// Changes with which pictures of `splats`, a first layer alone, are nearest to `targets`, one for each of `cameras`.
+/// Changes with which pictures of `splats`, a first layer alone, are nearest to `targets`, one for each of `cameras`. Reports
+/// [`Stage::Draw`], in views, to `progress`.
 ///
 /// # Errors
 /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -36,7 +39,9 @@ pub(super) fn alone(
     targets: &[Image],
     progress: &dyn Progress,
 ) -> Result<Vec<AppearanceChange>> {
-    let progress = &OnlyCancels(progress);
+    // The views are drawn once for the errors and once in each step.
+    progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
+    let parts = &OneStep(progress);
     let smaller = |camera: &Camera| {
         let [width, height] = [camera.width, camera.height].map(|side| (side / SHRINKING).max(1));
         camera.resized(width, height)
@@ -50,21 +55,22 @@ pub(super) fn alone(
         change.make(&mut splats.geometry, i);
         change
     };
-    let sizes = nearest::<5>(&splats, &cameras, &targets, progress)?;
+    let sizes = nearest::<5>(&splats, &cameras, &targets, parts)?;
     for (i, found) in sizes.iter().enumerate() {
         let log_scale = found[4].clamp(-MOST_LOG_SCALE, MOST_LOG_SCALE);
         changes[i] = make(&mut splats, i, AppearanceChange { log_scale, ..Default::default() });
     }
-    let opacities = nearest::<4>(&splats, &cameras, &targets, progress)?;
+    let opacities = nearest::<4>(&splats, &cameras, &targets, parts)?;
     for (i, found) in opacities.iter().enumerate() {
         let log_opacity = found[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
         let change = make(&mut splats, i, AppearanceChange { log_opacity, ..Default::default() });
         changes[i].log_opacity = change.log_opacity;
     }
-    let colours = nearest::<3>(&splats, &cameras, &targets, progress)?;
+    let colours = nearest::<3>(&splats, &cameras, &targets, parts)?;
     for (change, found) in changes.iter_mut().zip(&colours) {
         change.dc = found.map(|v| v / C0);
     }
+    progress.end();
     Ok(changes)
 }
 
@@ -73,7 +79,7 @@ fn nearest<const N: usize>(
     splats: &Splats,
     cameras: &[Camera],
     targets: &[Image],
-    progress: &OnlyCancels<'_>,
+    progress: &dyn Progress,
 ) -> Result<Vec<GaussianChange<N>>> {
     let mut adjoint = PictureAdjoint::new(Scene::from(splats), cameras)?;
     let found = adjoint.of_errors(targets, progress)?;

@@ -1,6 +1,6 @@
 //! Leaves out Gaussians until there are few enough.
 
-use lexisplat::{Progress, Sensitivity, Splats};
+use lexisplat::{Progress, Sensitivity, Splats, Stage};
 use lexisplat_render::{Renderer, Scene};
 
 use super::only_cancels::OnlyCancels;
@@ -27,17 +27,21 @@ pub(super) fn at_most(
     progress: &dyn Progress,
 ) -> Result<(Splats, Sensitivity)> {
     let (mut splats, mut sensitivity) = (splats.clone(), sensitivity);
-    let progress = &OnlyCancels(progress);
+    progress.begin(Stage::Look, (splats.len().saturating_sub(most)) as u64);
+    let parts = &OnlyCancels(progress);
     while splats.len() > most {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a number")]
         let share = (splats.len() as f64 * SHARE).ceil() as usize;
         let keep = all_but(share.min(splats.len() - most), &sensitivity.opacity);
+        let before = splats.len();
         splats.retain(&keep);
         sensitivity.retain(&keep);
-        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), progress)?;
+        let fitted = fit.appearances(Scene::from(&splats), &sensitivity.appearances(), parts)?;
         fitted.iter().enumerate().for_each(|(i, shown)| shown.give(&mut splats.geometry, i));
-        sensitivity = views.sensitivity(renderer, &splats, progress)?;
+        sensitivity = views.sensitivity(renderer, &splats, parts)?;
+        progress.advance((before - splats.len()) as u64);
     }
+    progress.end();
     Ok((splats, sensitivity))
 }
 

@@ -4,7 +4,7 @@
 //! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
 //! detail win.
 
-use lexisplat::{Progress, ShDegree, Splats};
+use lexisplat::{Progress, ShDegree, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
 
 use super::views::GENERATED_SIZE as SIZE;
@@ -36,7 +36,7 @@ pub(super) struct Found {
 }
 
 /// Finds as many views to measure and to judge by as `counts` says, or fewer in a scene of few Gaussians, among `more`
-/// and natural ones. `progress` can cancel.
+/// and natural ones. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
@@ -54,12 +54,15 @@ pub(super) fn find(
     let sketch = sketch(splats);
     let scene = renderer.prepare(Scene::from(&sketch))?;
     let mut seen = Vec::with_capacity(views.len());
+    progress.begin(Stage::Draw, views.len() as u64);
     for camera in views {
         progress.check()?;
         let small = camera.resized(SMALL[0], SMALL[1]);
         let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
         seen.push((detail(&picture), lit(&picture), camera));
+        progress.advance(1);
     }
+    progress.end();
     let mut shares: Vec<f64> = seen.iter().map(|view| view.1).collect();
     shares.sort_by(f64::total_cmp);
     let median = shares.get(shares.len() / 2).copied().unwrap_or(0.0);

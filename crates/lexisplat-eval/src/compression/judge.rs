@@ -1,6 +1,6 @@
 //! The score of a compressed scene over the judging views.
 
-use lexisplat::{Progress, Splats};
+use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
 
 use crate::error::Result;
@@ -19,7 +19,7 @@ pub struct Judge {
 
 impl Judge {
     /// Draws `splats` from the cameras `judging` with `renderer`, which will also draw the models. The cameras were
-    /// `given`, or else generated. `progress` can cancel.
+    /// `given`, or else generated. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
     ///
     /// # Errors
     /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
@@ -33,11 +33,14 @@ impl Judge {
     ) -> Result<Self> {
         let scene = renderer.prepare(Scene::from(splats))?;
         let mut drawn = Vec::with_capacity(judging.len());
+        progress.begin(Stage::Draw, judging.len() as u64);
         for &camera in judging {
             progress.check()?;
             let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
             drawn.push((camera.clone(), picture));
+            progress.advance(1);
         }
+        progress.end();
         drop(scene);
         Ok(Self { renderer, views: drawn, given })
     }
@@ -63,7 +66,7 @@ impl Judge {
         Self::new(self.renderer, splats, &cameras, self.given, progress)
     }
 
-    /// Scores a model or another scene. `progress` can cancel.
+    /// Scores a model or another scene. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
     ///
     /// # Errors
     /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene
@@ -71,11 +74,14 @@ impl Judge {
     pub fn score<'a>(&mut self, scene: impl Into<Scene<'a>>, progress: &dyn Progress) -> Result<Score> {
         let scene = self.renderer.prepare(scene.into())?;
         let mut all = Vec::with_capacity(self.views.len());
+        progress.begin(Stage::Draw, self.views.len() as u64);
         for (camera, original) in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
             all.push(psnr_of_drawn(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL));
+            progress.advance(1);
         }
+        progress.end();
         all.sort_by(f64::total_cmp);
         let mean = |views: &[f64]| views.iter().sum::<f64>() / views.len().max(1) as f64;
         // Photographs are as hard as the harder half of the generated views (docs/METHOD.md).

@@ -10,3 +10,16 @@ impl Progress for OnlyCancels<'_> {
         self.0.is_cancelled()
     }
 }
+
+/// Passes on what is done, but not where its steps begin and end: they are parts of a longer step.
+pub(super) struct OneStep<'a>(pub(super) &'a dyn Progress);
+
+impl Progress for OneStep<'_> {
+    fn advance(&self, units: u64) {
+        self.0.advance(units);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.0.is_cancelled()
+    }
+}

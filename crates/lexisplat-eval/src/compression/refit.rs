@@ -8,11 +8,11 @@ use std::borrow::Borrow;
 
 use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
-use lexisplat::{CompressReport, Geometry, Model, Progress, Splats};
+use lexisplat::{CompressReport, Geometry, Model, Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
 use super::alone::alone;
-use super::only_cancels::OnlyCancels;
+use super::only_cancels::{OneStep, OnlyCancels};
 use super::solve::{ROW, kinds, solve};
 use super::views::PackingViews;
 use crate::drawing::{DrawOptions, draw_views};
@@ -136,6 +136,8 @@ pub(super) fn appearances_of_part(
     weights: &[[f32; 2]],
     progress: &dyn Progress,
 ) -> Result<Vec<Appearance>> {
+    // The work around it counts Gaussians.
+    let progress = &OnlyCancels(progress);
     let fit = Fit::to(part, &PackingViews::of_part(part), progress)?;
     fit.appearances(Scene::from(model), weights, progress)
 }
@@ -148,7 +150,7 @@ impl Fit {
     pub(super) fn to(splats: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Self> {
         let cameras = views.fitting(splats);
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
-        let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, &OnlyCancels(progress))?;
+        let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
         Ok(Self { cameras, targets, given: views.are_given() })
     }
 
@@ -164,9 +166,12 @@ impl Fit {
         progress: &dyn Progress,
     ) -> Result<Vec<Appearance>> {
         let mut adjoint = PictureAdjoint::new(scene, &self.cameras)?;
-        let progress = &OnlyCancels(progress);
+        let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
+        // The views are drawn once for the errors and once in each step.
+        progress.begin(Stage::Draw, ((1 + steps) * self.cameras.len()) as u64);
+        let parts = &OneStep(progress);
         let PictureErrors { errors, row_sums, opacity_squares, .. } =
-            adjoint.of_errors(&self.targets, progress)?;
+            adjoint.of_errors(&self.targets, parts)?;
         // Sensitivities are averaged over three channels, and products with the adjoint are not.
         let ridge: Vec<GaussianChange<4>> =
             weights.iter().map(|w| kinds(w.map(|w| RIDGE * 3.0 * w))).collect();
@@ -175,8 +180,8 @@ impl Fit {
             let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
             diagonal.push(kinds(own));
         }
-        let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
-        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, progress)?;
+        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, parts)?;
+        progress.end();
         let geometry = scene.geometry();
         Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())
     }

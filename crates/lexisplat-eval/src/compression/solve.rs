@@ -1,8 +1,8 @@
 //! Changes of Gaussians with which pictures are nearest to others, by the method of conjugate gradients.
 
+use lexisplat::Progress;
 use lexisplat_render::{GaussianChange, PictureAdjoint};
 
-use super::only_cancels::OnlyCancels;
 use crate::error::Result;
 
 /// Share of the sums of rows in the preconditioner of colours. The diagonal of the matrix is smaller than those.
@@ -14,14 +14,15 @@ pub(super) fn kinds<const N: usize, const KINDS: usize>(of: [f32; KINDS]) -> Gau
 }
 
 /// The change with which the squared errors of pictures, and the ridge, are least: the solution by conjugate gradients, with a
-/// diagonal preconditioner. `errors` are the products of the adjoint with the errors of pictures.
+/// diagonal preconditioner. `errors` are the products of the adjoint with the errors of pictures. In each step `progress` is
+/// told of drawing all views.
 pub(super) fn solve<const N: usize>(
     adjoint: &mut PictureAdjoint<'_>,
     mut errors: Vec<GaussianChange<N>>,
     ridge: &[GaussianChange<N>],
     diagonal: &[GaussianChange<N>],
     steps: usize,
-    progress: &OnlyCancels<'_>,
+    progress: &dyn Progress,
 ) -> Result<Vec<GaussianChange<N>>> {
     let scaled = |rows: &[GaussianChange<N>]| -> Vec<GaussianChange<N>> {
         let divided = |(row, by): (&GaussianChange<N>, &GaussianChange<N>)| {

@@ -114,8 +114,8 @@ def _named(error: ParameterError, name: str, value: object) -> ParameterError:
 
 
 def _shown(value: object) -> str:
-    plain = (bytes, numbers.Number, os.PathLike, tuple, list, dict)
-    shown = value if isinstance(value, str) else repr(value) if isinstance(value, plain) else f"a {type(value).__name__}"
+    plain = (bytes, numbers.Number, tuple, list, dict)
+    shown = str(value) if isinstance(value, (str, os.PathLike)) else repr(value) if isinstance(value, plain) else f"a {type(value).__name__}"
     return shown if len(shown) <= _SHOWN else f"{shown[: _SHOWN - 3]}..."
 
 

@@ -1,6 +1,7 @@
-//! Charts of lines and points by `kuva`, as SVG and PNG.
+//! Charts of lines and points by `kuva`, as SVG, PNG and PDF.
 
 use kuva::backend::svg::SvgBackend;
+use kuva::plot::annotations::TextAnnotation;
 use kuva::plot::legend::{LegendEntry, LegendShape};
 use kuva::plot::{BandPlot, LinePlot, MarkerShape, ScatterPlot};
 use kuva::render::layout::{Layout, TickFormat};
@@ -9,6 +10,7 @@ use kuva::render::render::render_multiple;
 use kuva::{RasterBackend, Theme};
 
 use super::Figure;
+use super::pdf::pdf;
 use lexisplat_eval::{Error, Result};
 
 /// Size of the whole chart in SVG pixels.
@@ -20,6 +22,7 @@ const PNG_SCALE: f32 = 2.0;
 const TITLE_SIZE: u32 = 17;
 const LABEL_SIZE: u32 = 15;
 const TEXT_SIZE: u32 = 13;
+const POINT_SIZE: u32 = 11;
 /// Most characters in a line of a title.
 const TITLE_WRAP: usize = 78;
 /// Width of lines and radius of marks, in SVG pixels.
@@ -64,6 +67,27 @@ pub(super) struct Series {
     pub(super) points: Vec<(f64, f64)>,
     /// Lowest and highest value at each point; empty for none.
     pub(super) band: Vec<(f64, f64)>,
+    /// What is written above each point; empty for nothing.
+    pub(super) labels: Vec<String>,
+}
+
+impl Series {
+    /// Leaves out points for which `keep` is false, with what belongs to them.
+    fn retain(&mut self, keep: impl Fn(&(f64, f64)) -> bool) {
+        let kept: Vec<bool> = self.points.iter().map(keep).collect();
+        retain(&mut self.points, &kept);
+        retain(&mut self.band, &kept);
+        retain(&mut self.labels, &kept);
+    }
+}
+
+/// Leaves out the values that are not `kept`, and all if there is not one for each.
+fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
+    if values.len() != kept.len() {
+        values.clear();
+    }
+    let mut kept = kept.iter();
+    values.retain(|_| kept.next().is_some_and(|kept| *kept));
 }
 
 /// A group of a legend: title and entries.
@@ -145,14 +169,9 @@ impl Chart {
     pub(super) fn draw(mut self) -> Result<Option<Figure>> {
         for series in &mut self.series {
             // The axis cannot show other numbers.
-            let good = |&(x, y): &(f64, f64)| x >= LARGEST.recip() && x <= LARGEST && y.abs() <= LARGEST;
-            if series.band.len() == series.points.len() {
-                let both = series.points.iter().zip(&series.band).filter(|(point, _)| good(point));
-                (series.points, series.band) =
-                    both.map(|(point, band)| (*point, (band.0.max(-LARGEST), band.1.min(LARGEST)))).unzip();
-            } else {
-                series.band.clear();
-                series.points.retain(good);
+            series.retain(|&(x, y)| x >= LARGEST.recip() && x <= LARGEST && y.abs() <= LARGEST);
+            for band in &mut series.band {
+                *band = (band.0.max(-LARGEST), band.1.min(LARGEST));
             }
         }
         self.series.retain(|series| !series.points.is_empty());
@@ -164,7 +183,13 @@ impl Chart {
         let (Some(x), Some(y)) = (range(points().map(|point| point.0.log2())), range(values.clone())) else {
             return Ok(None);
         };
-        let layout = self.layout(x, y);
+        let mut layout = self.layout(x, y);
+        for series in &self.series {
+            for ((x, y), label) in series.points.iter().zip(&series.labels) {
+                let text = TextAnnotation::new(literal(label), x.log2(), *y).with_font_size(POINT_SIZE);
+                layout = layout.with_annotation(text);
+            }
+        }
         let mut plots: Vec<Plot> = Vec::new();
         let bands = self.series.iter().filter(|series| !series.band.is_empty());
         plots.extend(bands.map(|series| {
@@ -197,7 +222,8 @@ impl Chart {
         // With a view box the picture scales to the width of the page.
         let view_box = format!("<svg viewBox=\"0 0 {} {}\" ", scene.width, scene.height);
         let svg = svg.replacen("<svg ", &view_box, 1);
-        Ok(Some(Figure { name: self.name, title: self.title, caption: self.caption, svg, png }))
+        let pdf = pdf(&scene);
+        Ok(Some(Figure { name: self.name, title: self.title, caption: self.caption, svg, png, pdf }))
     }
 
     fn layout(&self, x: (f64, f64), y: (f64, f64)) -> Layout {

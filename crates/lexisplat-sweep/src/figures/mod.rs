@@ -1,12 +1,13 @@
-//! Figures of a sweep, each as SVG and PNG.
+//! Figures of a sweep, each as SVG, PNG and PDF.
 
 mod chart;
+mod pdf;
 
 use std::fmt::Write;
 
 use kuva::plot::legend::LegendEntry;
-use lexisplat_eval::Result;
 use lexisplat_eval::format::file_name;
+use lexisplat_eval::{FrameRate, Result};
 
 use chart::{Chart, DASHED, DOTTED, Legend, Mark, NEUTRAL, SOLID, Series, key};
 
@@ -14,7 +15,7 @@ use super::curve::{At, Kind, curve};
 use super::grid::Grid;
 use super::measure::Measure;
 use super::paper::{self, Quantity};
-use super::{Method, Results, Setting, unique};
+use super::{Fps, Method, Results, Setting, unique};
 
 /// A figure.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,12 +30,16 @@ pub(crate) struct Figure {
     pub(crate) svg: String,
     /// The same picture as a PNG file.
     pub(crate) png: Vec<u8>,
+    /// The same as a PDF of one page.
+    pub(crate) pdf: Vec<u8>,
 }
 
 /// Start of the ids in SVG by `kuva`; a number follows.
 const KUVA_ID: &str = "kuva-clip-";
 /// Most characters of a device's name on an axis. Captions have the whole name.
 const LONGEST_DEVICE: usize = 36;
+/// Explains the numbers at points, for captions.
+const TOLERANCES: &str = "Numbers at points are tolerances.";
 const PSNR: &str = "PSNR against the original, dB";
 
 /// The colour and mark of a method: colours of Okabe and Ito (2008), which colour-blind people can tell apart.
@@ -67,7 +72,29 @@ pub(super) fn colours() -> Vec<&'static str> {
 /// A line of one method.
 fn line(method: Method, dash: &'static str, points: Vec<(f64, f64)>) -> Series {
     let (colour, mark) = look(method);
-    Series { colour, dash, mark: Some(mark), joined: true, points, band: Vec::new() }
+    Series { colour, dash, mark: Some(mark), joined: true, points, band: Vec::new(), labels: Vec::new() }
+}
+
+/// What is written at the point of a setting: a tolerance is a number alone.
+fn point_label(setting: Setting) -> String {
+    match setting {
+        Setting::Tolerance(tolerance) => tolerance.to_string(),
+        other => other.label(),
+    }
+}
+
+/// A point, its band and its label.
+type Labelled = ((f64, f64), (f64, f64), String);
+
+/// A line of one method with the bands and labels of its points.
+fn labelled(method: Method, dash: &'static str, of: impl Iterator<Item = Labelled>) -> Series {
+    let mut series = line(method, dash, Vec::new());
+    for (point, band, label) in of {
+        series.points.push(point);
+        series.band.push(band);
+        series.labels.push(label);
+    }
+    series
 }
 
 /// PSNR over ratio. The band is from the lowest to the highest PSNR.
@@ -75,10 +102,10 @@ fn psnr_line(method: Method, dash: &'static str, points: &[At<'_>]) -> Series {
     let point = |at: &At<'_>| {
         let psnr = at.psnr();
         let mean = psnr.mean?;
-        Some(((at.ratio()?, mean), (psnr.min.unwrap_or(mean), psnr.max.unwrap_or(mean))))
+        let band = (psnr.min.unwrap_or(mean), psnr.max.unwrap_or(mean));
+        Some(((at.ratio()?, mean), band, point_label(at.setting)))
     };
-    let (points, band) = points.iter().filter_map(point).unzip();
-    Series { band, ..line(method, dash, points) }
+    labelled(method, dash, points.iter().filter_map(point))
 }
 
 /// The legend of methods that have a line.
@@ -108,6 +135,7 @@ pub(crate) fn figures(results: &Results) -> Result<Vec<Figure>> {
     let mut figures: Vec<Figure> = Vec::new();
     for chart in charts.into_iter().chain(saturation(&grid).into_iter().flatten()).chain(scenes) {
         let Some(mut figure) = chart.draw()? else { continue };
+        figure.caption = format!("{} {}", figure.caption, results.how()).trim_end().to_owned();
         // Scenes' names may differ only in letters that file names cannot have.
         figure.name = unique(&figure.name, |name| {
             figures.iter().any(|other| other.name.to_lowercase() == name.to_lowercase())
@@ -152,7 +180,9 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
         return Chart {
             name: format!("scene-{}", file_name(heading)),
             title: format!("{title}: {heading}"),
-            caption: format!("{heading} at each tolerance; the band is from the worst to the best view."),
+            caption: format!(
+                "{heading} at each tolerance; the band is from the worst to the best view. {TOLERANCES}"
+            ),
             ..Chart::over_ratio(PSNR, series, legends)
         };
     }
@@ -162,7 +192,8 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
             let mean = |quantity| paper::mean(paper::Experiment::Main, method, quantity);
             if let Some(point) = mean(Quantity::Ratio).zip(mean(Quantity::Psnr)) {
                 let mark = Some(Mark::Cross);
-                series.push(Series { mark, joined: false, ..line(method, SOLID, vec![point]) });
+                let labels = vec![paper::TOLERANCE.to_string()];
+                series.push(Series { mark, joined: false, labels, ..line(method, SOLID, vec![point]) });
                 keys.push(key(method.title(), look(method).0, SOLID, mark));
             }
         }
@@ -171,9 +202,10 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
     Chart {
         name: "psnr-ratio".to_owned(),
         title: title.to_owned(),
-        caption: "Means over scenes at each tolerance; the band is from the worst to the best scene. Crosses are the paper's means \
-                  over its 13 scenes at tol 0.1."
-            .to_owned(),
+        caption: format!(
+            "Means over scenes at each tolerance; the band is from the worst to the best scene. {TOLERANCES} Crosses are the \
+             paper's means over its 13 scenes at tol 0.1."
+        ),
         ..Chart::over_ratio(PSNR, series, legends)
     }
 }
@@ -184,11 +216,18 @@ fn fps_lines(grid: &Grid<'_>, kinds: &[Kind]) -> Vec<Series> {
     for &method in &grid.methods {
         for &kind in kinds {
             let points = curve(grid, method, kind, None);
-            let over_ratio =
-                |measure| points.iter().filter_map(|at| at.ratio().zip(at.mean(measure))).collect();
-            series.push(line(method, kind_look(kind).0, over_ratio(Measure::SparseFps)));
+            let over_ratio = |measure: Measure, rate: fn(&Fps) -> FrameRate| {
+                let point = move |at: &At<'_>| {
+                    let point = at.ratio().zip(at.mean(measure))?;
+                    Some((point, at.rounds(rate).unwrap_or((point.1, point.1)), point_label(at.setting)))
+                };
+                points.iter().filter_map(point)
+            };
+            let codes = over_ratio(Measure::SparseFps, |fps| fps.sparse);
+            series.push(labelled(method, kind_look(kind).0, codes));
             if kind == Kind::Tolerances {
-                series.push(Series { mark: None, ..line(method, DASHED, over_ratio(Measure::DenseFps)) });
+                let dense = labelled(method, DASHED, over_ratio(Measure::DenseFps, |fps| fps.dense));
+                series.push(Series { mark: None, labels: Vec::new(), ..dense });
             }
         }
     }
@@ -213,7 +252,8 @@ fn speed(grid: &Grid<'_>) -> Chart {
         name: "fps-ratio".to_owned(),
         title: "Speed against the paper's compression ratio".to_owned(),
         caption: format!(
-            "Means over scenes at each tolerance, drawn on {}. Dashed: the original from dense SH, measured beside it.",
+            "Means over scenes at each tolerance, drawn on {}. Dashed: the original from dense SH, drawn in turn with the \
+             codes. {TOLERANCES} Bands are from the slowest to the fastest round through all views.",
             grid.device()
         ),
         ..fps_chart(grid, &[Kind::Tolerances], ("Drawn from", keys))
@@ -228,8 +268,12 @@ fn bytes(grid: &Grid<'_>) -> Chart {
         let before = series.len();
         for &method in &grid.methods {
             let points = curve(grid, method, kind, None);
-            let points = points.iter().filter_map(|at| at.mean(Measure::BytesEach).zip(at.psnr().mean));
-            series.push(Series { mark: Some(mark), ..line(method, dash, points.collect()) });
+            let point = |at: &At<'_>| {
+                let (bytes, psnr) = at.mean(Measure::BytesEach).zip(at.psnr().mean)?;
+                Some(((bytes, psnr), (psnr, psnr), point_label(at.setting)))
+            };
+            let line = labelled(method, dash, points.iter().filter_map(point));
+            series.push(Series { mark: Some(mark), band: Vec::new(), ..line });
         }
         if series[before..].iter().any(|line| !line.points.is_empty()) {
             keys.push(key(name, NEUTRAL, dash, Some(mark)));
@@ -239,9 +283,10 @@ fn bytes(grid: &Grid<'_>) -> Chart {
     Chart {
         name: "bytes-psnr".to_owned(),
         title: "Quality against real size".to_owned(),
-        caption: "Whole files, every byte counted, over Gaussians; means over scenes. Tolerances and capped nonzeros keep all but SH \
-                  exact; packed presets quantise everything."
-            .to_owned(),
+        caption: format!(
+            "Whole files, every byte counted, over Gaussians; means over scenes. {TOLERANCES} Tolerances and capped nonzeros keep \
+             all but SH exact; packed presets quantise everything."
+        ),
         x: "Bytes a Gaussian, whole file (log scale)",
         x_unit: "",
         ..Chart::over_ratio(PSNR, series, legends)
@@ -285,14 +330,17 @@ fn saturation(grid: &Grid<'_>) -> Option<[Chart; 2]> {
     let quality = Chart {
         name: "levels-psnr".to_owned(),
         title: "Does quality level off?".to_owned(),
-        caption: "Means over scenes, as far as the settings go: down to one nonzero a Gaussian and to none, where measured.".to_owned(),
+        caption: format!(
+            "Means over scenes, as far as the settings go: down to one nonzero a Gaussian and to none, where measured. {TOLERANCES}"
+        ),
         ..Chart::over_ratio(PSNR, series, legends)
     };
     let speed = Chart {
         name: "levels-fps".to_owned(),
         title: "Does speed level off?".to_owned(),
         caption: format!(
-            "Means over scenes, drawn on {}. Dashed: the original from dense SH.",
+            "Means over scenes, drawn on {}. Dashed: the original from dense SH, drawn in turn with the codes. {TOLERANCES} Bands \
+             are from the slowest to the fastest round through all views.",
             grid.device()
         ),
         ..fps_chart(grid, &[Kind::Tolerances, Kind::Caps], keys(Some("dense SH")))
@@ -330,6 +378,15 @@ mod tests {
             let (width, height) =
                 image::load_from_memory(&figure.png).map(|p| (p.width(), p.height())).unwrap();
             assert!(width == 1720 && height >= 1000, "{width} {height}");
+            assert!(figure.pdf.starts_with(b"%PDF-1.4") && figure.pdf.ends_with(b"%%EOF\n"));
+            assert!(figure.caption.ends_with("Pursuit: OMP, the paper\u{2019}s (ours is OLS). Layout: f16."));
+            assert!(!figure.svg.contains(">-0<") && !figure.svg.contains("-0.0<"), "{}", figure.name);
+            // Every chart names its points, and no group of it is moved, which the PDF could not show.
+            assert!(
+                figure.svg.contains(">0.1</text>") && !figure.svg.contains("<g transform"),
+                "{}",
+                figure.name
+            );
             for method in ["3DGS", "MCMC"] {
                 let colour = look(if method == "MCMC" { Method::Mcmc } else { Method::Gs3d }).0;
                 let there = figure.svg.contains(&format!(">{method}</text>"));
@@ -388,7 +445,7 @@ mod tests {
                 point.coefficient_ratio = Some(odd);
                 point.to_original.psnr.mean = Some(odd);
                 point.to_original.psnr.max = Some(odd);
-                point.fps = Some(super::super::Fps { dense: odd, sparse: odd });
+                point.fps = Some(super::super::testing::fps(odd, odd));
             }
         }
         for figure in figures(&results).unwrap() {

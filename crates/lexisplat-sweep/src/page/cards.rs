@@ -6,8 +6,10 @@ use lexisplat_eval::metrics::Metric;
 use maud::{Markup, html};
 
 use super::{card, decibels};
+use crate::curve::{At, Kind, curve, dense_noise};
 use crate::grid::Grid;
 use crate::measure::Measure;
+use crate::table::signed;
 use crate::{SceneResult, Setting};
 
 /// The preset that has a card: the default of packed files.
@@ -43,12 +45,24 @@ pub(super) fn cards(grid: &Grid<'_>) -> Markup {
             cards.push(card(times(ratio), &what));
         }
         if let Summary { mean: Some(mean), min: Some(worst), .. } = over(Measure::PhotoChange) {
-            let what = format!("change of PSNR against photos at {label}; {worst:+.2} dB where it is worst");
-            cards.push(card(decibels(&format!("{mean:+.2}")), &what));
+            let what = format!(
+                "change of PSNR against photos at {label}; {} dB where it is worst",
+                signed(worst, 2)
+            );
+            cards.push(card(decibels(&signed(mean, 2)), &what));
         }
         if let Some(speedup) = over(Measure::Speedup).mean {
             let what = format!("the frames a second of dense SH, from codes at {label} on {}", grid.device());
-            cards.push(card(times(speedup), &what));
+            let points: Vec<At<'_>> = grid
+                .methods
+                .iter()
+                .flat_map(|&method| curve(grid, method, Kind::Tolerances, None))
+                .filter(|at| at.setting == setting)
+                .collect();
+            let noise = dense_noise(&points).unwrap_or(f64::INFINITY);
+            let within =
+                if (speedup - 1.0).abs() > noise { "" } else { "; no more than that itself varies by" };
+            cards.push(card(times(speedup), &format!("{what}{within}")));
         }
     }
     let packed = |measure| over_models(grid, Setting::Preset(PRESET), measure).mean;

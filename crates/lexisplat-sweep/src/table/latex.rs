@@ -11,8 +11,15 @@ const TEXT_WIDTH: f64 = 345.0;
 const CHARACTER: f64 = 5.2;
 /// Points between neighbouring columns: `\tabcolsep` is set to half of that.
 const COLUMN_GAP: f64 = 6.0;
+/// Width of a column in points: the `article` class at 10 pt in two columns.
+const COLUMN_WIDTH: f64 = 229.0;
+/// Most rows of a table that is on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, with captions of some lines.
+const MOST_ROWS: usize = 36;
+/// Sizes of text of long tables, and the width of characters beside `\\small`.
+const SIZES: [(&str, f64); 3] =
+    [("\\small", 1.0), ("\\footnotesize", 8.0 / 9.0), ("\\scriptsize", 7.0 / 9.0)];
 /// Smallest scale at which text stays readable. A table that needs a smaller one is split.
-const LEAST_SCALE: f64 = 0.7;
+const LEAST_SCALE: f64 = 7.0 / 9.0;
 
 /// Characters that LaTeX has words for. What this crate writes beyond ASCII needs no other engine so.
 const WORDS: [(char, &str); 13] = [
@@ -119,10 +126,9 @@ fn heading(table: &Table, column: usize) -> String {
     }
 }
 
-/// The `tabular` with some of the columns.
-fn tabular(table: &Table, columns: &[usize]) -> String {
-    let sides: String = columns.iter().map(|&column| if column < table.labels { 'l' } else { 'r' }).collect();
-    let mut out = format!("  \\begin{{tabular}}{{{sides}}}\n    \\toprule\n");
+/// The head of a table with some of the columns: groups and headings, with rules above and below.
+fn head(table: &Table, columns: &[usize]) -> String {
+    let mut out = "    \\toprule\n".to_owned();
     let runs = || columns.chunk_by(|&a, &b| table.columns[a].group == table.columns[b].group);
     let group = |run: &[usize]| table.columns[run[0]].group.as_str();
     if runs().any(|run| !group(run).is_empty()) {
@@ -140,37 +146,130 @@ fn tabular(table: &Table, columns: &[usize]) -> String {
     }
     let headings: Vec<String> = columns.iter().map(|&column| heading(table, column)).collect();
     let _ = writeln!(out, "    {} \\\\\n    \\midrule", headings.join(" & "));
+    out
+}
+
+/// The sides of columns: what names a row is on the left.
+fn sides(table: &Table, columns: &[usize]) -> String {
+    columns.iter().map(|&column| if column < table.labels { 'l' } else { 'r' }).collect()
+}
+
+/// The line of a row with some of the columns.
+fn line(row: &Row, columns: &[usize]) -> String {
+    let cells: Vec<String> = columns.iter().map(|&column| shown(row.cell(column), row.style)).collect();
+    format!("    {} \\\\\n", cells.join(" & "))
+}
+
+/// The `tabular` with some of the columns.
+fn tabular(table: &Table, columns: &[usize]) -> String {
+    let mut out = format!("  \\begin{{tabular}}{{{}}}\n{}", sides(table, columns), head(table, columns));
     for (i, row) in table.rows.iter().enumerate() {
         if row.rule && i > 0 {
             out.push_str("    \\midrule\n");
         }
-        let cell = |column: &usize| shown(Row::cell(row, *column), row.style);
-        let _ = writeln!(out, "    {} \\\\", columns.iter().map(cell).collect::<Vec<_>>().join(" & "));
+        out.push_str(&line(row, columns));
     }
     out.push_str("    \\bottomrule\n  \\end{tabular}");
     out
 }
 
-pub(super) fn write(table: &Table) -> String {
-    let tabulars = parts(table).into_iter().map(|columns| {
-        let tabular = tabular(table, &columns);
-        if width(table, &columns) <= TEXT_WIDTH {
-            return tabular;
-        }
-        format!("  \\resizebox{{\\textwidth}}{{!}}{{%\n{tabular}%\n  }}")
+/// A float of one page. It is never wider than its place: that of a column if it fits there, otherwise that of the text.
+fn float(table: &Table) -> String {
+    let parts = parts(table);
+    let is_narrow = parts.iter().all(|columns| width(table, columns) <= COLUMN_WIDTH);
+    let environment = if is_narrow { "table" } else { "table*" };
+    let tabulars = parts.iter().map(|columns| {
+        // Estimates may be wrong, so the width is that of the table unless there is less room.
+        let fitted = "\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi";
+        format!("  \\resizebox{{{fitted}}}{{!}}{{%\n{}%\n  }}", tabular(table, columns))
     });
     format!(
-        "\\begin{{table}}[t]\n  \\centering\n  \\small\n  \\caption{{{}}}\n  \\label{{tab:{}}}\n  \
-         \\setlength{{\\tabcolsep}}{{{}pt}}\n{}\n\\end{{table}}\n",
-        escape(format!("{}. {}", table.title, table.caption).trim()),
+        "\\begin{{{environment}}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  \\caption{{{}}}\n  \\label{{tab:{}}}\n  \
+         \\setlength{{\\tabcolsep}}{{{}pt}}\n{}\n\\end{{{environment}}}\n",
+        caption(table),
         table.name,
         COLUMN_GAP / 2.0,
         tabulars.collect::<Vec<_>>().join("\n  \\par\\medskip\n")
     )
 }
 
+fn caption(table: &Table) -> String {
+    escape(format!("{}. {}", table.title, table.caption).trim())
+}
+
+/// How many of the first labels of a long table are the same in every row of each block. They stand above the block.
+fn shared_labels(table: &Table) -> usize {
+    let most = table.labels.saturating_sub(1);
+    let mut blocks = table.rows.chunk_by(|_, next| !next.rule);
+    let is_shared =
+        |block: &[Row], column: usize| block.iter().all(|row| row.cell(column) == block[0].cell(column));
+    let shared = |block: &[Row]| (0..most).take_while(|&column| is_shared(block, column)).count();
+    let first = blocks.next().map_or(0, shared);
+    blocks.fold(first, |least, block| least.min(shared(block)))
+}
+
+/// Long tables of parts of the columns, over as many pages as they need. In a document of two columns they are set in one, for
+/// `longtable` cannot do otherwise.
+fn long(table: &Table) -> String {
+    let shared = shared_labels(table);
+    let rest = Table {
+        columns: table.columns[shared..].to_vec(),
+        labels: table.labels - shared,
+        rows: table
+            .rows
+            .iter()
+            .map(|row| Row { cells: row.cells.iter().skip(shared).cloned().collect(), ..row.clone() })
+            .collect(),
+        ..table.clone()
+    };
+    let mut out = "\\makeatletter\n\\let\\lexisplatback\\relax\n\\if@twocolumn\\onecolumn\\let\\lexisplatback\\twocolumn\\fi\n\
+                   \\makeatother\n\\begingroup\n\\setlength{\\LTcapwidth}{\\linewidth}\n\\setlength{\\emergencystretch}{3em}\n"
+        .to_owned();
+    let _ = writeln!(out, "\\setlength{{\\tabcolsep}}{{{}pt}}", COLUMN_GAP / 2.0);
+    for (part, columns) in parts(&rest).iter().enumerate() {
+        let natural = width(&rest, columns);
+        let fits = |scale: &&(&str, f64)| natural * scale.1 <= TEXT_WIDTH;
+        let (size, _) = SIZES.iter().find(fits).copied().unwrap_or(SIZES[SIZES.len() - 1]);
+        let _ = writeln!(out, "{size}\n\\begin{{longtable}}{{{}}}", sides(&rest, columns));
+        let (caption, head) = (caption(&rest), head(&rest, columns));
+        let label = if part == 0 { format!("\\label{{tab:{}}}", rest.name) } else { String::new() };
+        let count = columns.len();
+        let _ = write!(
+            out,
+            "  \\caption{{{caption}}}{label} \\\\\n{head}  \\endfirsthead\n{head}  \\endhead\n    \\midrule\n    \
+             \\multicolumn{{{count}}}{{r}}{{\\textit{{continued}}}} \\\\\n  \\endfoot\n    \\bottomrule\n  \\endlastfoot\n"
+        );
+        for (i, (row, whole)) in rest.rows.iter().zip(&table.rows).enumerate() {
+            let starts = i == 0 || row.rule;
+            if starts && i > 0 {
+                out.push_str("    \\midrule\n");
+            }
+            if starts && shared > 0 {
+                let names: Vec<String> =
+                    (0..shared).map(|column| escape(&whole.cell(column).shown())).collect();
+                // Not wider than the table, whatever names are.
+                let _ = writeln!(
+                    out,
+                    "    \\multicolumn{{{count}}}{{l}}{{\\makebox[0pt][l]{{\\textit{{{}}}}}}} \\\\*",
+                    names.join(", ")
+                );
+            }
+            out.push_str(&line(row, columns));
+        }
+        out.push_str("\\end{longtable}\n");
+    }
+    out.push_str("\\endgroup\n\\lexisplatback\n");
+    out
+}
+
+pub(super) fn write(table: &Table) -> String {
+    if table.rows.len() > MOST_ROWS { long(table) } else { float(table) }
+}
+
 #[cfg(test)]
 mod tests {
+    use lexisplat_testing::{Need, missing};
+
     use super::super::testing::odd;
     use super::*;
 
@@ -261,10 +360,11 @@ mod tests {
         for table in crate::tables::all(&results) {
             let latex = table.to_latex();
             let widths = widths(&latex);
-            let scaled = latex.matches("\\resizebox{\\textwidth}{!}{%").count();
-            assert_eq!(
-                widths.iter().filter(|width| **width > TEXT_WIDTH).count(),
-                scaled,
+            assert_eq!(latex.contains("\\begin{longtable}"), table.rows.len() > MOST_ROWS, "{}", table.name);
+            let environment =
+                if widths.iter().all(|width| *width <= COLUMN_WIDTH) { "table" } else { "table*" };
+            assert!(
+                widths.is_empty() || latex.starts_with(&format!("\\begin{{{environment}}}[t]")),
                 "{}: {widths:?}",
                 table.name
             );
@@ -279,11 +379,65 @@ mod tests {
             }
         }
         let bytes = crate::tables::bytes(&results);
-        assert!(widths(&bytes.to_latex()).len() >= 2, "18 columns do not fit at once");
+        assert!(bytes.to_latex().matches("\\begin{longtable}").count() >= 2, "18 columns do not fit at once");
         // Each part has all rows, and each column is in one part.
         let columns: Vec<usize> =
             parts(&bytes).iter().flat_map(|part| part[bytes.labels..].to_vec()).collect();
         assert_eq!(columns, (bytes.labels..bytes.columns.len()).collect::<Vec<_>>());
         assert_eq!(bytes.to_latex().matches("tol 0.05").count() % parts(&bytes).len(), 0);
+    }
+
+    #[test]
+    fn blocks_of_a_long_table_are_named_above_them() {
+        let mut results = crate::testing::results();
+        results.scenes = vec![results.scenes.swap_remove(0); 3];
+        let views = crate::tables::views(&results);
+        assert!(views.rows.len() > MOST_ROWS && shared_labels(&views) == 4);
+        let latex = views.to_latex();
+        assert!(latex.contains("\\makebox[0pt][l]{\\textit{bonsai, 3DGS, tol 0.1, photos}}"), "{latex}");
+        // The view, and its scores.
+        assert_eq!(latex.matches("\\begin{longtable}{lrrr}").count(), 1);
+        assert_eq!(latex.matches('{').count(), latex.matches('}').count());
+    }
+
+    /// Compiles a document with these options and every table; what LaTeX found too wide for its place.
+    fn too_wide(results: &crate::Results, options: &str) -> Option<Vec<String>> {
+        use std::fmt::Write as _;
+        let folder = tempfile::tempdir().unwrap();
+        let mut text = format!(
+            "\\documentclass[{options}]{{article}}\n\\usepackage{{booktabs,graphicx,longtable}}\n\\begin{{document}}\nText.\n"
+        );
+        for table in crate::tables::all(results) {
+            let name = format!("{}.tex", table.name);
+            std::fs::write(folder.path().join(&name), table.to_latex()).unwrap();
+            let _ = writeln!(text, "\\input{{{name}}}\\clearpage");
+        }
+        text.push_str("\\end{document}\n");
+        std::fs::write(folder.path().join("paper.tex"), text).unwrap();
+        let mut command = std::process::Command::new("pdflatex");
+        command.args(["-interaction=nonstopmode", "-halt-on-error", "-draftmode", "paper.tex"]);
+        let output = command.current_dir(folder.path()).output().ok()?;
+        let log = String::from_utf8_lossy(&output.stdout).into_owned();
+        if log.contains("`booktabs.sty' not found") {
+            return None;
+        }
+        assert!(output.status.success(), "{options}: {log}");
+        Some(log.lines().filter(|line| line.starts_with("Overfull \\hbox")).map(str::to_owned).collect())
+    }
+
+    #[test]
+    fn papers_of_one_and_two_columns_have_no_overfull_box() {
+        let mut results = crate::testing::results();
+        let mut scene = results.scenes[0].clone();
+        for k in 0..20 {
+            scene.name = format!("a scene with a long name {k}");
+            results.scenes.push(scene.clone());
+        }
+        for options in ["onecolumn", "twocolumn"] {
+            match too_wide(&results, options) {
+                Some(found) => assert!(found.is_empty(), "{options}: {found:#?}"),
+                None => missing(Need::Latex, "pdflatex or booktabs are not installed"),
+            }
+        }
     }
 }

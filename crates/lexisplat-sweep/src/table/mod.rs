@@ -67,14 +67,9 @@ impl Cell {
     pub(crate) fn shown(&self) -> String {
         match self {
             Self::Text(text) => one_line(text),
-            Self::Number { value, digits, signed: true } => format!("{value:+.digits$}"),
+            Self::Number { value, digits, signed: true } => signed(*value, *digits),
             Self::Number { value, digits, signed: false } => {
-                let text = format!("{value:.digits$}");
-                // A small negative number must not become "-0.00".
-                match text.strip_prefix('-') {
-                    Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
-                    _ => text,
-                }
+                without_sign_of_zero(format!("{value:.digits$}"))
             }
             Self::Count(count) => format::count(*count),
             Self::Missing => DASH.to_owned(),
@@ -85,10 +80,23 @@ impl Cell {
     fn in_full(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
-            Self::Number { value, .. } => value.to_string(),
+            Self::Number { value, .. } => without_sign_of_zero(value.to_string()),
             Self::Count(count) => count.to_string(),
             Self::Missing => String::new(),
         }
+    }
+}
+
+/// `value` with its sign and `digits` after the point. What is rounded to zero has no sign.
+pub(crate) fn signed(value: f64, digits: usize) -> String {
+    without_sign_of_zero(format!("{value:+.digits$}"))
+}
+
+/// `text` without the sign if it is a zero.
+fn without_sign_of_zero(text: String) -> String {
+    match text.strip_prefix(['-', '+']) {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        _ => text,
     }
 }
 
@@ -267,9 +275,10 @@ impl Table {
         csv_text(std::iter::once(header).chain(self.rows.iter().map(cells)))
     }
 
-    /// A `table` environment for a document that uses `booktabs` and `graphicx`. It is never wider than the text:
-    /// it is scaled down, and if that would make it too small to read, split into several parts. Letters beyond
-    /// what the document's fonts have need another engine, such as `XeLaTeX`.
+    /// A `table` environment for a document of one or two columns that uses `booktabs` and `graphicx`, or, if it has more rows
+    /// than a page, a `longtable` for one that uses `longtable` too. It is never wider than its place: it is scaled
+    /// down, and if that would make it too small to read, split into several parts. Letters beyond what the
+    /// document's fonts have need another engine, such as `XeLaTeX`.
     pub(crate) fn to_latex(&self) -> String {
         latex::write(self)
     }
@@ -340,6 +349,8 @@ mod tests {
         assert_eq!(Cell::number(Some(f64::INFINITY), 2), Cell::Missing);
         assert_eq!(Cell::change(Some(0.2), 1).shown(), "+0.2");
         assert_eq!(Cell::change(Some(-0.2), 1).shown(), "-0.2");
+        assert_eq!([-0.004, 0.004].map(|v| Cell::change(Some(v), 2).shown()), ["0.00", "0.00"]);
+        assert_eq!(Cell::number(Some(-0.0), 2).in_full(), "0");
         assert_eq!(Cell::Count(1234).shown(), "1,234");
         assert_eq!(Cell::Missing.shown(), "\u{2013}");
         assert_eq!(Cell::Count(3).value(), Some(3.0));

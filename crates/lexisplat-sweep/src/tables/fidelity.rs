@@ -32,10 +32,12 @@ pub(crate) fn main(results: &Results, tolerance: Option<f64>) -> Table {
     let mut measures = grid.scores(Measure::ToOriginal);
     measures.extend([Measure::CoefficientRatio, Measure::FileRatio, Measure::BytesEach]);
     if !device.is_empty() {
-        measures.extend([Measure::SparseFps, Measure::DenseFps]);
+        let rates = [Measure::SparseFps, Measure::SparseSpread, Measure::DenseFps, Measure::DenseSpread];
+        measures.extend(rates);
     }
     let caption = format!(
-        "Means over views. FPS(-Comp) is the original, drawn from dense SH. The paper's numbers stand below ours for \
+        "Means over views. FPS(-Comp) is the original, drawn from dense SH, a frame of each in turn; \u{b1} is half of the range \
+         of rounds through all views. The paper's numbers stand below ours for \
          scenes that are the paper's too; a mean is over the numbers in its row.{}",
         about_identical(&grid)
     );

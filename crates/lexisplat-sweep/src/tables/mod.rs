@@ -6,17 +6,49 @@ mod scenes;
 mod vs_paper;
 mod vs_photos;
 
-pub(crate) use bytes::bytes;
-pub(crate) use fidelity::{main, settings, views};
-pub(crate) use scenes::{models, skipped, summary};
-pub(crate) use vs_paper::{nonzeros, psnr};
-pub(crate) use vs_photos::{drops, vs_photos};
+pub(crate) use scenes::{models, skipped};
 
 use super::grid::Grid;
 use super::measure::Measure;
 use super::paper::{self, Experiment};
 use super::table::{Cell, Row, Style, Table};
 use super::{Method, Results, Setting};
+
+/// `table` with the pursuit and the layout of its points in its caption.
+fn told(table: Table, results: &Results) -> Table {
+    Table { caption: format!("{} {}", table.caption, results.how()).trim().to_owned(), ..table }
+}
+
+/// Tables of points, each with the pursuit and the layout in its caption.
+macro_rules! tables_of_points {
+    ($($(#[$doc:meta])* $name:ident from $module:ident;)*) => {
+        $($(#[$doc])* pub(crate) fn $name(results: &Results) -> Table { told($module::$name(results), results) })*
+    };
+}
+
+tables_of_points! {
+    /// As [`scenes::summary`].
+    summary from scenes;
+    /// As [`vs_photos::vs_photos`].
+    vs_photos from vs_photos;
+    /// As [`vs_photos::drops`].
+    drops from vs_photos;
+    /// As [`vs_paper::psnr`].
+    psnr from vs_paper;
+    /// As [`vs_paper::nonzeros`].
+    nonzeros from vs_paper;
+    /// As [`bytes::bytes`].
+    bytes from bytes;
+    /// As [`fidelity::settings`].
+    settings from fidelity;
+    /// As [`fidelity::views`].
+    views from fidelity;
+}
+
+/// As [`fidelity::main`], with the pursuit and the layout in its caption.
+pub(crate) fn main(results: &Results, tolerance: Option<f64>) -> Table {
+    told(fidelity::main(results, tolerance), results)
+}
 
 /// Every table that has rows, most important first.
 pub(crate) fn all(results: &Results) -> Vec<Table> {
@@ -55,7 +87,9 @@ fn beside_paper(
         let value = |column| paper::value(experiment, method, quantity, grid.name(column));
         let theirs = grid.across(|column| Cell::number(value(column), measure.digits()));
         if is_any(&theirs) {
-            rows.push(row(&format!("{name}, paper"), theirs).styled(Style::Paper));
+            // Models as trained know no pursuit.
+            let label = if setting.is_some() { grid.paper_label(name) } else { format!("{name}, paper") };
+            rows.push(row(&label, theirs).styled(Style::Paper));
         }
     }
     rows
@@ -96,6 +130,27 @@ mod tests {
             crate::report::testing::check_nesting(&table.to_html());
         }
         assert!(tables[1].columns.iter().any(|column| column.heading == ODD));
+        for table in tables.iter().filter(|table| !["models", "skipped"].contains(&table.name)) {
+            assert!(
+                table.caption.ends_with("Pursuit: OMP, the paper\u{2019}s (ours is OLS). Layout: f16."),
+                "{}: {}",
+                table.name,
+                table.caption
+            );
+        }
+    }
+
+    #[test]
+    fn beside_another_pursuit_the_papers_is_named() {
+        let names = |pursuit: &str| -> HashSet<String> {
+            let results = Results { pursuit: pursuit.to_owned(), ..results() };
+            let tables = [psnr(&results), main(&results, None)].into_iter();
+            let cells = tables.flat_map(|table| table.rows).flat_map(|row| row.cells.into_iter().take(2));
+            cells.map(|cell| cell.shown()).filter(|name| name.contains("paper")).collect()
+        };
+        assert!(names("omp").iter().all(|name| name.ends_with(", paper")), "{:?}", names("omp"));
+        assert!(names("ols").iter().all(|name| name.ends_with(", paper (OMP)")), "{:?}", names("ols"));
+        assert!(!names("omp").is_empty() && !names("ols").is_empty());
     }
 
     #[test]

@@ -34,7 +34,7 @@ pub(crate) fn psnr(results: &Results) -> Table {
             let value = |column| paper::value(experiment, method, Quantity::Psnr, grid.name(column));
             let cells = grid.across(|column| Cell::number(value(column), DIGITS));
             let all = paper::mean(experiment, method, Quantity::Psnr);
-            let labels = [&*label, &format!("{}, paper", method.title())];
+            let labels = [&*label, &grid.paper_label(method.title())];
             Row::new(labels, cells.into_iter().chain([Cell::number(all, DIGITS)])).styled(Style::Paper)
         });
         table.push_block(ours.chain(theirs));

@@ -48,6 +48,8 @@ pub enum Stage {
     Code,
     /// Writes a file, in bytes.
     Write,
+    /// Scores pictures, in views.
+    Score,
 }
 
 /// A [`Progress`] that ignores all reports and never cancels.

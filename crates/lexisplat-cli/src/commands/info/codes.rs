@@ -121,8 +121,9 @@ impl<'a> LexiFacts<'a> {
         value / self.gaussians.max(1) as f64
     }
 
-    pub(super) fn text(&self, out: &mut String) -> Result<()> {
-        let Self { version, layout, made, atoms, packed, escapes, .. } = self;
+    /// The line for people that says what kind of file this is.
+    pub(super) fn head(&self, out: &mut String) -> Result<()> {
+        let Self { version, layout, made, atoms, packed, .. } = self;
         let how = match (packed, made.pursuit) {
             (Some(packed), _) if packed.order_kept => ", order of the source kept".to_owned(),
             (Some(_), _) => ", order of the source not kept".to_owned(),
@@ -133,12 +134,27 @@ impl<'a> LexiFacts<'a> {
             out,
             ".lexi version {version}, layout {layout}, {atoms} atoms{how}, all checksums match{sums}"
         )?;
-        if let Some(line) = packed.as_ref().and_then(|packed| record_line(packed.reached, packed.promise)) {
-            writeln!(out, "pictures: {line}")?;
-        }
-        if let Some(packed) = packed.as_ref().filter(|packed| packed.removed > 0) {
-            writeln!(out, "left out: {}", removed_line(packed.removed))?;
-        }
+        Ok(())
+    }
+
+    /// What the file records of its quality, and how many Gaussians were left out for it.
+    pub(super) fn quality(&self) -> Option<String> {
+        let packed = self.packed.as_ref();
+        let left_out = packed.filter(|packed| packed.removed > 0).map(|packed| removed_line(packed.removed));
+        let pictures = packed.and_then(|packed| record_line(packed.reached, packed.promise));
+        let error =
+            (packed.is_none() && self.atoms > 0).then(|| format!("SH error: {}", error_line(self.record)));
+        let parts = [
+            pictures.map(|line| format!("pictures: {line}")).or(error),
+            left_out.map(|line| format!("left out: {line}")),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        (!parts.is_empty()).then(|| parts.join("; "))
+    }
+
+    /// Everything else.
+    pub(super) fn details(&self, out: &mut String) -> Result<()> {
+        let Self { atoms, packed, escapes, .. } = self;
         if let Some(packed) = packed.as_ref().filter(|packed| packed.device != CPU) {
             writeln!(out, "measured on: {}", format::escape(packed.device))?;
         }

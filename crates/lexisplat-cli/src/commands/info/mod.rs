@@ -38,7 +38,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         let parts = codes::parts(&lexi, &survey);
         let lexi_facts = LexiFacts::new(&lexi, &survey, &parts, file.1, args.verify);
         return Facts::new(file, &lexi.empty(), &survey.lint, Kind::Lexi { lexi: Box::new(lexi_facts) })
-            .print(common);
+            .print(args.all, common);
     }
     if args.verify {
         return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
         },
         _ => return Err(Error::malformed(&*name, "the format is not known").into()),
     };
-    Facts::new(file, &source.empty(), &lint, kind).print(common)
+    Facts::new(file, &source.empty(), &lint, kind).print(args.all, common)
 }
 
 /// The facts about a scene's file.
@@ -109,28 +109,23 @@ impl<'a> Facts<'a> {
         }
     }
 
-    fn print(&self, common: &Common) -> Result<()> {
+    fn print(&self, all: bool, common: &Common) -> Result<()> {
         if !common.json {
             warn(self.file, &self.statistics.warnings);
         }
-        tell(common, self, || self.text())
+        tell(common, self, || self.text(all))
     }
 
-    fn text(&self) -> Result<String> {
+    /// Three lines for people, and the details if `all` are asked for.
+    fn text(&self, all: bool) -> Result<String> {
         let mut out = String::new();
         let (bytes, count) = (format::bytes(self.file_bytes), format::count(self.gaussians));
         writeln!(out, "{}: {bytes}, {count} Gaussians, SH degree {}", self.file, self.sh_degree)?;
-        if self.antialiased {
-            writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
-        }
         if let Some(offset) = self.offset {
             writeln!(
                 out,
                 "offset {offset}: positions are relative to it, and decompress and convert put it back"
             )?;
-        }
-        for comment in self.comments {
-            writeln!(out, "comment: {}", format::escape(comment))?;
         }
         match &self.kind {
             Kind::Ply { ply, .. } => {
@@ -143,7 +138,7 @@ impl<'a> Facts<'a> {
                     "PLY, {format}, layout {dialect}, {properties} properties, {row_bytes} bytes a Gaussian"
                 )?;
             }
-            Kind::Lexi { lexi } => lexi.text(&mut out)?,
+            Kind::Lexi { lexi } => lexi.head(&mut out)?,
             Kind::Other { format, about, .. } => {
                 write!(out, "{format}")?;
                 for (name, value) in about {
@@ -151,6 +146,45 @@ impl<'a> Facts<'a> {
                 }
                 writeln!(out, ", axes turned to those of a PLY where they differ")?;
             }
+        }
+        let lexi = match &self.kind {
+            Kind::Lexi { lexi } => Some(lexi),
+            _ => None,
+        };
+        match lexi.and_then(|lexi| lexi.quality()) {
+            Some(quality) => writeln!(out, "{quality}")?,
+            None => writeln!(out, "{}", self.extent())?,
+        }
+        if all {
+            self.details(lexi.map(AsRef::as_ref), &mut out)?;
+        }
+        Ok(out)
+    }
+
+    /// Where the centres of Gaussians are.
+    fn extent(&self) -> String {
+        let axis = |name: &str| self.statistics.attributes.iter().find(|a| a.name == name);
+        match ["x", "y", "z"].map(axis) {
+            [Some(x), Some(y), Some(z)] if self.gaussians > 0 => {
+                let corner = |of: [f64; 3]| of.map(|v| format!("{v:.4}")).join(", ");
+                let (least, most) = (corner([x.min, y.min, z.min]), corner([x.max, y.max, z.max]));
+                format!("centres from {least} to {most}")
+            }
+            _ => "no centres".to_owned(),
+        }
+    }
+
+    /// Everything else.
+    fn details(&self, lexi: Option<&LexiFacts<'_>>, out: &mut String) -> Result<()> {
+        writeln!(out)?;
+        if self.antialiased {
+            writeln!(out, "trained with the anti-aliased dilation, and drawn with it")?;
+        }
+        for comment in self.comments {
+            writeln!(out, "comment: {}", format::escape(comment))?;
+        }
+        if let Some(lexi) = lexi {
+            lexi.details(out)?;
         }
         writeln!(out, "\n{:<12} {:>12} {:>12} {:>12}", "attribute", "minimum", "mean", "maximum")?;
         for a in &self.statistics.attributes {
@@ -167,9 +201,9 @@ impl<'a> Facts<'a> {
             let mean = self.statistics.mean_rest_norm;
             writeln!(out, "\nnorm of a Gaussian's SH without DC, mean {mean:.4}")?;
             let labels = NORM_BINS.iter().map(|from| format!("{from} and up")).collect::<Vec<_>>();
-            bars(&mut out, &labels, &self.statistics.rest_norms)?;
+            bars(out, &labels, &self.statistics.rest_norms)?;
         }
-        Ok(out)
+        Ok(())
     }
 }
 
