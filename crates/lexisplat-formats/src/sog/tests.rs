@@ -25,7 +25,7 @@ fn sample() -> Splats {
 pub(super) type Members = BTreeMap<String, Vec<u8>>;
 
 pub(super) fn members(splats: &Splats) -> Members {
-    let (bytes, _) = write(splats, &WriteOptions::default()).unwrap();
+    let (bytes, _) = write(splats, &WriteOptions::default(), &Silent).unwrap();
     let archive = Files::Archive(Archive::open("a", &bytes).unwrap());
     let names = ["means_l", "means_u", "quats", "scales", "sh0", "shN_centroids", "shN_labels"];
     let names = names.map(|name| format!("{name}.webp")).into_iter().chain([META.to_owned()]);
@@ -114,7 +114,7 @@ fn archives_and_folders_hold_the_scene_within_the_quantum() {
     for degree in 0..=3 {
         let mut splats = sample().with_degree_cut(ShDegree::new(degree).unwrap());
         splats.meta.antialiased = degree == 1;
-        let (bytes, _) = write(&splats, &WriteOptions::default()).unwrap();
+        let (bytes, _) = write(&splats, &WriteOptions::default(), &Silent).unwrap();
         let read = opened(&bytes).unwrap();
         assert_eq!((read.degree, read.meta.antialiased), (splats.degree, degree == 1));
         // The order is another: each written Gaussian is near one of the scene.
@@ -144,7 +144,7 @@ fn names_outside_of_the_archive_are_refused() {
     }
     let error = refused_meta(|meta| meta["means"]["files"][0] = "other.webp".into());
     assert!(error.to_string().contains("'other.webp' is missing"), "{error}");
-    let (bytes, _) = write(&sample(), &WriteOptions::default()).unwrap();
+    let (bytes, _) = write(&sample(), &WriteOptions::default(), &Silent).unwrap();
     let found = Archive::open("a", &bytes).unwrap();
     assert!(Files::Archive(found).get("none", &Limits::default()).is_err());
 }

@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn steps_that_are_coarse_far_away_are_told() {
         let near = scene(&SampleOptions::new(60, 1));
-        let lost = |splats: &Splats| write(splats, &crate::WriteOptions::default()).unwrap().1;
+        let lost = |splats: &Splats| write(splats, &WriteOptions::default()).unwrap().1;
         assert_eq!(lost(&near).coarse, [""; 0]);
         let mut far = near.clone();
         far.geometry.positions.iter_mut().for_each(|p| p[0] += 500_000.0);
