@@ -15,14 +15,18 @@ const COLUMN_GAP: f64 = 6.0;
 const COLUMN_WIDTH: f64 = 229.0;
 /// Most rows of a table that is on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, with captions of some lines.
 const MOST_ROWS: usize = 36;
-/// Sizes of text of long tables, and the width of characters beside `\\small`.
-const SIZES: [(&str, f64); 3] =
-    [("\\small", 1.0), ("\\footnotesize", 8.0 / 9.0), ("\\scriptsize", 7.0 / 9.0)];
+/// Sizes of text of long tables, and the width of characters beside `\\small`. Small letters of Computer Modern are wider
+/// than in proportion.
+const SIZES: [(&str, f64); 3] = [("\\small", 1.0), ("\\footnotesize", 0.95), ("\\scriptsize", LONG_SCALE)];
+/// [`SIZES`] of the smallest text.
+const LONG_SCALE: f64 = 0.9;
 /// Smallest scale at which text stays readable. A table that needs a smaller one is split.
 const LEAST_SCALE: f64 = 7.0 / 9.0;
 
 /// Characters that LaTeX has words for. What this crate writes beyond ASCII needs no other engine so.
-const WORDS: [(char, &str); 13] = [
+const WORDS: [(char, &str); 15] = [
+    ('\u{2019}', "'"),
+    ('\u{b1}', "$\\pm$"),
     ('\\', "\\textbackslash{}"),
     ('~', "\\textasciitilde{}"),
     ('^', "\\textasciicircum{}"),
@@ -80,8 +84,8 @@ fn width(table: &Table, columns: &[usize]) -> f64 {
 
 /// The columns of each part of a table that is too wide for one. Every part begins with the columns that name
 /// the rows. Columns of one group stay together where they can.
-fn parts(table: &Table) -> Vec<Vec<usize>> {
-    let room = TEXT_WIDTH / LEAST_SCALE;
+fn parts(table: &Table, scale: f64) -> Vec<Vec<usize>> {
+    let room = TEXT_WIDTH / scale;
     let labels: Vec<usize> = (0..table.labels.min(table.columns.len())).collect();
     let fits = |part: &[usize], more: &[usize]| width(table, &[part, more].concat()) <= room;
     let others: Vec<usize> = (labels.len()..table.columns.len()).collect();
@@ -175,7 +179,7 @@ fn tabular(table: &Table, columns: &[usize]) -> String {
 
 /// A float of one page. It is never wider than its place: that of a column if it fits there, otherwise that of the text.
 fn float(table: &Table) -> String {
-    let parts = parts(table);
+    let parts = parts(table, LEAST_SCALE);
     let is_narrow = parts.iter().all(|columns| width(table, columns) <= COLUMN_WIDTH);
     let environment = if is_narrow { "table" } else { "table*" };
     let tabulars = parts.iter().map(|columns| {
@@ -226,7 +230,7 @@ fn long(table: &Table) -> String {
                    \\makeatother\n\\begingroup\n\\setlength{\\LTcapwidth}{\\linewidth}\n\\setlength{\\emergencystretch}{3em}\n"
         .to_owned();
     let _ = writeln!(out, "\\setlength{{\\tabcolsep}}{{{}pt}}", COLUMN_GAP / 2.0);
-    for (part, columns) in parts(&rest).iter().enumerate() {
+    for (part, columns) in parts(&rest, LONG_SCALE).iter().enumerate() {
         let natural = width(&rest, columns);
         let fits = |scale: &&(&str, f64)| natural * scale.1 <= TEXT_WIDTH;
         let (size, _) = SIZES.iter().find(fits).copied().unwrap_or(SIZES[SIZES.len() - 1]);
@@ -382,9 +386,10 @@ mod tests {
         assert!(bytes.to_latex().matches("\\begin{longtable}").count() >= 2, "18 columns do not fit at once");
         // Each part has all rows, and each column is in one part.
         let columns: Vec<usize> =
-            parts(&bytes).iter().flat_map(|part| part[bytes.labels..].to_vec()).collect();
+            parts(&bytes, LONG_SCALE).iter().flat_map(|part| part[bytes.labels..].to_vec()).collect();
         assert_eq!(columns, (bytes.labels..bytes.columns.len()).collect::<Vec<_>>());
-        assert_eq!(bytes.to_latex().matches("tol 0.05").count() % parts(&bytes).len(), 0);
+        let latex = bytes.to_latex();
+        assert_eq!(latex.matches("tol 0.05").count() % latex.matches("\\begin{longtable}").count(), 0);
     }
 
     #[test]

@@ -50,8 +50,10 @@ fn colours_are_clipped_first() {
     assert!(a != clipped, "some values must lie outside 0..1");
     assert!(lpips.distance(&a, &clipped, Range::Standard).unwrap().abs() < 1e-300);
     let mut odd = a.clone();
-    odd.pixels[5] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    odd.pixels[5] = [0.0, f32::INFINITY, f32::NEG_INFINITY];
     assert!(lpips.distance(&a, &odd, Range::Inria).unwrap() > 0.0);
+    odd.pixels[5][0] = f32::NAN;
+    assert!(lpips.distance(&a, &odd, Range::Inria).is_err());
 }
 
 #[test]

@@ -324,7 +324,7 @@ mod tests {
             ("ply\nformat ascii 1.0\nformat ascii 1.0\nend_header\n", "second format"),
             ("ply\nformat ascii 1.0\nproperty float x\nend_header\n", "before any element"),
             ("ply\nformat ascii 1.0\nelement vertex -1\nend_header\n", "header line 3, 'element vertex -1'"),
-            ("ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n", "unknown type"),
+            ("ply\nformat ascii 1.0\nelement vertex 1\nproperty half x\nend_header\n", "floats of 16 bits"),
             ("ply\nformat ascii 1.0\nelement v 1\nproperty list float int x\nend_header\n", "integer type"),
             ("ply\nformat ascii 1.0\nelement v 1\nproperty float\nend_header\n", "one name"),
             (
