@@ -64,7 +64,7 @@ canvas:focus-visible { outline-offset: -3px; }
 .instead { display: grid; place-items: center; padding: 16px; pointer-events: none; }
 .instead > * { grid-area: 1 / 1; }
 .instead:has(.poster:not([hidden])) { background: var(--picture, #000); }
-.poster { position: absolute; left: 50%; top: 50%; height: 100cqmin; max-width: none; transform: translate(-50%, -50%); }
+.poster { position: absolute; grid-area: auto; left: 50%; top: 50%; height: 100cqmin; max-width: none; transform: translate(-50%, -50%); }
 .poster.tall { width: 100cqmin; height: auto; }
 .clean:not(.still) .instead:has(.poster:not([hidden])):has(.begin[hidden]) { place-items: end center; }
 .notice {
