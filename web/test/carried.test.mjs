@@ -85,9 +85,13 @@ describe('the page that the program carries', { skip: missing ? `${missing} not 
         page.setDefaultTimeout(PATIENCE);
         if (init) await page.addInitScript(init);
         await page.goto(pathToFileURL(path).href);
-        // The hint says that the scene is whole; without WebGPU there is a notice.
-        await page.locator(init ? '.notice' : '.hint').waitFor();
-        if (!init) await page.locator('canvas[aria-busy=false]').waitFor();
+        if (init) await page.locator('.notice').waitFor();
+        else {
+          await page.locator('.app.shown').waitFor();
+          // The thin bar is there while more of the scene comes.
+          await page.locator('progress.thin').waitFor({ state: 'hidden' });
+          await page.locator('canvas[aria-busy=false]').waitFor();
+        }
         await page.evaluate(() => {
           const { shadowRoot } = document.getElementById('viewer');
           for (const over of shadowRoot.querySelectorAll('.notice, .hint, .dock, .overlay')) over.hidden = true;
