@@ -89,6 +89,9 @@ pub(crate) fn device(py: Python<'_>, text: &str) -> PyResult<Device> {
     text.parse().map_err(|error: lexisplat_render::Error| raise(py, &error.into()))
 }
 
+/// Arrays of (height, width, 3).
+type Pictures<'py> = Vec<Bound<'py, PyArray3<f32>>>;
+
 /// Draws the scene as each camera sees it: arrays of (height, width, 3), and warnings.
 #[pyfunction]
 #[pyo3(signature = (scene, views, *, background, max_degree, device_name, drop_invalid, progress))]
@@ -102,7 +105,7 @@ pub(crate) fn render<'py>(
     device_name: &str,
     drop_invalid: bool,
     progress: Option<&Bound<'py, PyAny>>,
-) -> PyResult<(Vec<Bound<'py, PyArray3<f32>>>, Vec<String>)> {
+) -> PyResult<(Pictures<'py>, Vec<String>)> {
     let mut told = Vec::new();
     let device = device(py, device_name)?;
     let subject = Subject::dropping(scene, drop_invalid, &mut told)?;

@@ -230,7 +230,7 @@ fn collect(
         // This follows links. A link that leads nowhere is not a photo, nor is a pipe or a device.
         let Ok(metadata) = fs::metadata(&path) else { continue };
         let is_folder = metadata.is_dir() && depth < MAX_DEPTH;
-        if !is_folder && !(metadata.is_file() && is_photo(&path)) {
+        if !(is_folder || metadata.is_file() && is_photo(&path)) {
             continue;
         }
         // Only links lead out. Other files are not looked up once more, for there may be many.

@@ -15,7 +15,7 @@ pub const SURE_OPACITY: f32 = 100.0;
 
 /// Stands for a scale of minus infinity, the logarithm of a size of zero, which converters of 2D Gaussians write. e^-20 is
 /// 2e-9 units: no picture shows a size so small, since the rasteriser blurs by 0.3 squared pixels. It is the smallest
-/// logarithm that PlayCanvas' compressed PLY holds (`compressed-chunk.ts`). It does not depend on the scene, so parts of a
+/// logarithm that the compressed PLY of `PlayCanvas` holds (`compressed-chunk.ts`). It does not depend on the scene, so parts of a
 /// scene read the same as the whole.
 pub const FLAT_SCALE: f32 = -20.0;
 
