@@ -3,8 +3,8 @@
 
     python3 benches/tables.py FOLDER [--only NAME ...] [--list] [--binary LEXISPLAT]
 
-A table stands between `<!-- table NAME -->` and `<!-- end of table -->`. What is between the two is replaced. FOLDER has
-the models, as `shared/data`. Run it whenever a change alters the bytes of files or what they show.
+A table stands between `<!-- table NAME -->` and `<!-- end of table -->`, and is replaced there. The tables of
+docs/results/promise.md are in several sections, and are made by `benches/promise.py` alone. FOLDER has the models, as `shared/data`. Run it whenever a change alters the bytes of files or what they show.
 
 `presets` is README's table: the whole file of each preset over the PLY, and the mean PSNR that `lexisplat compare` gives
 over the test cameras, at most 1200 pixels wide, or over an orbit of 12 views of 480 pixels where a model has no cameras. `demo` is the
@@ -20,7 +20,7 @@ import tempfile
 from pathlib import Path
 
 sys.dont_write_bytecode = True  # no __pycache__ in the working tree
-from promise import PRESETS, cameras_of  # noqa: E402
+from promise import PRESETS, SMALL, cameras_of  # noqa: E402
 from rate_distortion import header  # noqa: E402
 from real_models import ROOT  # noqa: E402
 
@@ -49,7 +49,7 @@ def presets(binary, folder):
     models = []
     for model in sorted(folder.glob("*.ply")):
         found = header(model)
-        if found is not None and not (cameras_of(model) is None and found[1] >= 8000):
+        if found is not None and not (cameras_of(model) is None and found[1] >= SMALL):
             models.append((model, found[1]))
     rows = []
     for model, count in models:
@@ -77,14 +77,13 @@ def demo(binary, _):
 
 
 def script(*words):
-    """What a script of this folder prints."""
+    """The table that a script of this folder prints."""
     return lambda binary, folder: run(sys.executable, ROOT / "benches" / words[0], folder, *words[1:]).strip()
 
 
 TABLES = {
     "presets": (ROOT / "README.md", presets),
     "demo": (ROOT / "README.md", demo),
-    "promise": (ROOT / "docs/results/promise.md", script("promise.py", "--asked", "36", "40", "44", "--presets", "--guess")),
     "prefixes": (ROOT / "docs/results/prefixes.md", script("prefixes.py")),
 }
 

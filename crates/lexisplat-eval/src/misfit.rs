@@ -10,8 +10,8 @@ const ALMOST_NOTHING: f64 = 0.02;
 /// Largest mean PSNR against photos that warns, in dB. Published models reach 20 dB and more on their hardest
 /// scenes, and a plain grey picture 10 to 14 dB.
 const MISFIT_DB: f64 = 15.0;
-/// Share of what is before cameras that their near planes may hide without a warning. Of the models in docs/results they hide
-/// nothing.
+/// Share of the opacity before cameras that their near planes may hide without a warning. In the models of docs/results they
+/// hide nothing.
 const HIDDEN: f64 = 0.03;
 
 /// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show
@@ -43,7 +43,7 @@ pub fn misfit(
     warnings
 }
 
-/// Returns a warning if the near planes of `cameras` hide more than 3 % of what is before them, by opacity: a scene in small
+/// Returns a warning if the near planes of `cameras` hide more than 3 % of the opacity before them: a scene in small
 /// units, drawn with the trainer's near plane.
 #[must_use]
 pub(crate) fn near_plane_hides(geometry: &Geometry, cameras: &[Camera]) -> Option<String> {

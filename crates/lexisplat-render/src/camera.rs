@@ -38,7 +38,7 @@ pub struct Camera {
     /// Camera-to-world rotation, row by row. Its columns are the camera's right, down and forward
     /// directions in the world.
     pub rotation: [[f32; 3]; 3],
-    /// Distance of the near plane in world units, above 0. What is not beyond it is not drawn. It is
+    /// Distance of the near plane in world units, above 0. Gaussians that are not beyond it are not drawn. It is
     /// [`NEAR_Z`](crate::conventions::NEAR_Z), the trainer's, unless something else is chosen.
     pub near: f32,
     /// Which part of the data set it belongs to, where the file says so.
@@ -61,10 +61,10 @@ impl Camera {
         Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None }
     }
 
-    /// Returns this camera with another near plane, in world units.
+    /// Returns this camera with another near plane, in world units, or with its own for `None`.
     #[must_use]
-    pub fn with_near(self, near: f32) -> Self {
-        Self { near, ..self }
+    pub fn with_near(self, near: impl Into<Option<f32>>) -> Self {
+        Self { near: near.into().unwrap_or(self.near), ..self }
     }
 
     /// Returns this camera with pictures at most `width` pixels wide and the same field of view. A wider picture is

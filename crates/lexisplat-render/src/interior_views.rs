@@ -57,22 +57,22 @@ const PITCH: [f64; 3] = [0.0, -12.0, 8.0];
 /// of [`object`], and the places of [`interior_views`] see most of it.
 #[must_use]
 pub fn is_interior(geometry: &Geometry) -> bool {
-    let targets = targets(geometry);
+    let (targets, near) = (targets(geometry), f64::from(near_plane(geometry)));
     let around: Vec<DVec3> = object(geometry, TRIED_VIEWS, 1, 1)
         .iter()
         .map(|camera| DVec3::from_array(camera.position.map(f64::from)))
         .collect();
-    if seen(geometry, &around, &targets).is_none_or(|share| share >= FEW) {
+    if seen(geometry, &around, &targets, near).is_none_or(|share| share >= FEW) {
         return false;
     }
     let (_, radius) = bulk(geometry);
-    seen(geometry, &stands(geometry, radius), &targets).is_some_and(|share| share >= MANY)
+    seen(geometry, &stands(geometry, radius, near), &targets, near).is_some_and(|share| share >= MANY)
 }
 
-/// Returns the share of the lines from `places` to `targets` that are free; `None` if there are no lines.
-fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3]) -> Option<f64> {
+/// Returns the share of the lines from `places` to `targets` that are free beyond the distance `from`; `None` if there are no
+/// lines.
+fn seen(geometry: &Geometry, places: &[DVec3], targets: &[DVec3], from: f64) -> Option<f64> {
     let (_, radius) = subject(geometry);
-    let from = f64::from(near_plane(geometry));
     let mut lines = Vec::with_capacity(places.len() * targets.len());
     for &origin in places {
         lines.extend(targets.iter().map(|target| {
@@ -109,9 +109,10 @@ pub fn interior_views(geometry: &Geometry, count: usize, width: u32, height: u32
     let focal = f64::from(size[0].min(size[1])) / 2.0 / libm::tan((FIELD_OF_VIEW / 2.0).to_radians());
     let steps = u32::try_from(count).unwrap_or(u32::MAX);
     let (_, radius) = bulk(geometry);
-    let (stands, near) = (stands(geometry, radius), near_plane(geometry));
+    let near = near_plane(geometry);
+    let stands = stands(geometry, radius, f64::from(near));
     let looks: Vec<[DVec3; 3]> = (0..steps).map(|i| axes(look(i, steps), UP)).collect();
-    let light = free_ways(geometry, &stands, &looks, radius);
+    let light = free_ways(geometry, &stands, &looks, [f64::from(near), radius]);
     let light = |stand: usize, look: usize| light[stand * looks.len() + look];
     (0..steps)
         .zip(&looks)
@@ -134,8 +135,13 @@ fn look(i: u32, count: u32) -> DVec3 {
 }
 
 /// Returns the mean light left on the way along every look from every place, place by place.
-fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius: f64) -> Vec<f64> {
-    let from = f64::from(near_plane(geometry));
+/// The ways begin at the distance `from`.
+fn free_ways(
+    geometry: &Geometry,
+    places: &[DVec3],
+    looks: &[[DVec3; 3]],
+    [from, radius]: [f64; 2],
+) -> Vec<f64> {
     let mut rays = Vec::with_capacity(places.len() * looks.len() * BUNDLE.len());
     for &origin in places {
         for [right, down, forward] in looks {
@@ -150,7 +156,7 @@ fn free_ways(geometry: &Geometry, places: &[DVec3], looks: &[[DVec3; 3]], radius
 }
 
 /// Returns one to [`STANDS`] places: the freest, then those that are about as free and farthest from the others.
-fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
+fn stands(geometry: &Geometry, radius: f64, near: f64) -> Vec<DVec3> {
     let (centre, half) = middle(geometry, &opacity_weights(geometry), TRIM);
     let places: Vec<DVec3> = (0..PLACES)
         .map(|i| {
@@ -161,7 +167,7 @@ fn stands(geometry: &Geometry, radius: f64) -> Vec<DVec3> {
         })
         .collect();
     let looks: Vec<[DVec3; 3]> = (0..DIRECTIONS).map(|i| axes(look(i, DIRECTIONS), UP)).collect();
-    let light = free_ways(geometry, &places, &looks, radius);
+    let light = free_ways(geometry, &places, &looks, [near, radius]);
     let scores: Vec<f64> = light.chunks_exact(looks.len()).map(|ways| ways.iter().sum()).collect();
     let best = (0..places.len()).fold(0, |a, b| if scores[b] > scores[a] { b } else { a });
     let mut chosen = vec![places[best]];

@@ -5,8 +5,8 @@ use lexisplat::Geometry;
 use crate::camera::{Camera, single};
 use crate::object::subject;
 
-/// Distance of the near plane in radii of the subject. In six models with cameras of their own that is 0.02 to 0.3 units. What
-/// their cameras see begins beyond 1.9 units (99 % of it by area), so any smaller plane shows them the same.
+/// Distance of the near plane in radii of the subject. In six models with cameras of their own, `room-large` among them, that is
+/// 0.02 to 0.3 units. Of the area that their cameras see, 99 % is farther than 1.9 units, so smaller planes show the same.
 const NEAR_SHARE: f64 = 0.02;
 /// Most Gaussians that the subject is found by. Of a larger scene it is every second, third and so on.
 const MOST: usize = 1 << 16;
@@ -32,8 +32,8 @@ fn thinned(geometry: &Geometry, step: usize) -> Geometry {
     }
 }
 
-/// Returns the share, 0 to 1, of what is before `cameras` that their near planes hide: of the opacity of the Gaussians whose
-/// centres a picture would show, without any near plane. It is 0 if there are none.
+/// Returns the share, 0 to 1, of the opacity before `cameras` that their near planes hide. Gaussians count if pictures without a
+/// near plane would show their centres. The share is 0 if there are none.
 #[must_use]
 pub fn hidden_share(geometry: &Geometry, cameras: &[Camera]) -> f64 {
     let step = geometry.len().div_ceil(MOST).max(1);

@@ -27,7 +27,8 @@ pub struct SceneBounds {
 
 impl SceneBounds {
     /// Returns the bounds of a scene whose bulk, as [`lexisplat_render::bulk`] returns it, is the ball `(centre,
-    /// radius)`, with free views' `near` plane ([`lexisplat_render::near_plane`]). Up is that of the `given` cameras; generated ones, which say nothing about it, are not given.
+    /// radius)`, with the `near` plane of free views ([`lexisplat_render::near_plane`]). Up is that of the `given` cameras;
+    /// generated ones, which say nothing about it, are not given.
     #[must_use]
     pub fn new((centre, radius): ([f64; 3], f64), near: f32, given: &[Camera]) -> Self {
         Self { centre: DVec3::from_array(centre), radius, near, up: Self::up_of(given) }

@@ -51,7 +51,7 @@ pub(crate) struct Compress {
     /// views like photographs, which are looked for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
-    /// Distance of the near plane of --cameras, in the scene's units, above 0. What is not beyond it is not drawn
+    /// Distance of the near plane of --cameras, in the scene's units, above 0. Gaussians nearer than it are not drawn
     /// [default: the trainer's 0.2].
     #[arg(long, value_name = "UNITS", value_parser = length, requires = "cameras")]
     pub(crate) near: Option<f32>,

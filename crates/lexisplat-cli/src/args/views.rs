@@ -32,7 +32,7 @@ pub(crate) struct Views {
     /// Largest width of a picture, 1 to 16384 pixels. Wider pictures are drawn smaller.
     #[arg(long, default_value_t = lexisplat_eval::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
     pub(crate) width: u32,
-    /// Distance of the near plane, in the scene's units, above 0. What is not beyond it is not drawn [default: the
+    /// Distance of the near plane, in the scene's units, above 0. Gaussians nearer than it are not drawn [default: the
     /// trainer's 0.2 for --cameras, else by the scene's size].
     #[arg(long, value_name = "UNITS", value_parser = length)]
     pub(crate) near: Option<f32>,

@@ -15,7 +15,7 @@ use lexisplat::{
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
 use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
 use lexisplat_formats::{Opened, open};
-use lexisplat_render::{Camera, ViewSet, read_views};
+use lexisplat_render::{ViewSet, read_views};
 
 use crate::args::{Common, Compress};
 use crate::device::open_gpu;
@@ -55,7 +55,10 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         Some(_) => Work::Files(2),
     });
     let limits = common.limits()?;
-    let given = args.cameras.as_ref().map(|path| read_views(path, &mut |_| None)).transpose()?;
+    let mut given = args.cameras.as_ref().map(|path| read_views(path, &mut |_| None)).transpose()?;
+    if let (Some(set), Some(near)) = (&mut given, args.near) {
+        set.cameras.iter_mut().for_each(|camera| camera.near = near);
+    }
     warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
     let mut compression = compression(args, given.as_ref(), &limits)?;
     if args.prune.is_some() && !common.quiet {
@@ -172,11 +175,7 @@ fn compression(args: &Compress, given: Option<&ViewSet>, limits: &Limits) -> Res
         .with_max_gaussians(args.max_gaussians)
         .with_memory(args.memory);
     if let Some(set) = given {
-        let near = |camera: Camera| match args.near {
-            Some(near) => camera.with_near(near),
-            None => camera,
-        };
-        packing = packing.with_cameras(set.cameras.iter().cloned().map(near).collect());
+        packing = packing.with_cameras(set.cameras.clone());
     }
     Ok(packing.into())
 }

@@ -19,14 +19,15 @@ const CLOSE_SIZE: f64 = 0.01;
 const CLOSE_FIRST: f64 = 0.5;
 /// A preset may miss its aim by this much, in dB.
 const CLOSE_PRESET: f64 = 1.0;
-/// Gaussians of scenes of few Gaussians. Their quality varies by 0.7 dB with the rounding of their values alone, in other units
-/// for example, and a try takes a tenth of a second.
+/// Most Gaussians of a scene of few Gaussians. The quality of 400 Gaussians varies by 0.7 dB with the rounding of their values
+/// alone, in other units for example, and a try takes a tenth of a second.
 const FEW: usize = 8000;
-/// A preset's steps of such scenes are whole numbers of this part of an octave, of 1.1 dB, so that rounding seldom changes them. They
-/// are the next smaller ones, since falling short is worse.
+/// A preset's steps of such scenes are whole numbers of this part of an octave, of 1.1 dB, so that rounding seldom changes
+/// them. They are the next smaller ones, since falling short is worse.
 const STEPS_PER_OCTAVE: f64 = 4.0;
-/// [`CLOSE_PRESET`] of such scenes, in dB, and the number of packings tried to come as close.
+/// [`CLOSE_PRESET`] of such scenes, in dB.
 const CLOSE_FEW: f64 = 0.75;
+/// Packings of such scenes that are tried at most to come as close, after the first.
 const TRIES_FEW: usize = 4;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;

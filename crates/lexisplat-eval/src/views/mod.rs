@@ -129,10 +129,7 @@ pub fn find_views(options: &ViewOptions, geometry: &Geometry) -> Result<ChosenVi
     if !DIVISORS.contains(&divisor) {
         return Err(Error::parameter("resolution", divisor, "expected 1, 2, 4 or 8"));
     }
-    let near = |view: View| match options.near {
-        Some(near) => View { camera: view.camera.with_near(near), ..view },
-        None => view,
-    };
+    let near = |view: View| View { camera: view.camera.with_near(options.near), ..view };
     let Some(source) = &options.cameras else {
         let mut found = generated(options, divisor, geometry)?;
         found.views = found.views.into_iter().map(near).collect();

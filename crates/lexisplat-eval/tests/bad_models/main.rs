@@ -85,6 +85,17 @@ fn infinity_is_refused_by_name_or_dropped() {
     }
 }
 
+/// Asserts that `finite` has the pictures of `splats`, and stays like them in every step.
+fn is_drawn_like(finite: &Splats, splats: &Splats) {
+    for camera in cameras() {
+        let options = RenderOptions::default();
+        let image = render(&Scene::from(finite), &camera, &options).unwrap();
+        assert!(image == render(&Scene::from(splats), &camera, &options).unwrap());
+    }
+    let outcome = everything(finite);
+    assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
+}
+
 /// As 2DGS' Gaussians are: wherever they go, they look as if their thinnest axis had no size at all.
 #[test]
 fn sizes_of_zero_are_flat() {
@@ -99,13 +110,7 @@ fn sizes_of_zero_are_flat() {
     );
     let finite = read.splats;
     assert_eq!(finite.geometry.scales[3], [FLAT_SCALE; 3]);
-    for camera in cameras() {
-        let options = RenderOptions::default();
-        let image = render(&Scene::from(&finite), &camera, &options).unwrap();
-        assert!(image == render(&Scene::from(&splats), &camera, &options).unwrap());
-    }
-    let outcome = everything(&finite);
-    assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
+    is_drawn_like(&finite, &splats);
 }
 
 #[test]
@@ -120,13 +125,7 @@ fn infinite_opacities_are_opaque_or_invisible() {
     assert!(read.warnings.iter().any(|w| w.starts_with("40 opacities are infinite")), "{:?}", read.warnings);
     let finite = read.splats;
     assert_eq!(finite.geometry.opacities[..2], [100.0, -100.0]);
-    for camera in cameras() {
-        let options = RenderOptions::default();
-        let image = render(&Scene::from(&finite), &camera, &options).unwrap();
-        assert!(image == render(&Scene::from(&splats), &camera, &options).unwrap());
-    }
-    let outcome = everything(&finite);
-    assert!(outcome.packed_db.unwrap() > 35.0, "{:?}", outcome.packed_db);
+    is_drawn_like(&finite, &splats);
     // In memory, without a PLY, they are refused like any other infinity.
     let error = compress(splats, &CompressOptions::default(), &Silent).unwrap_err();
     assert!(error.to_string().starts_with("opacities = inf"), "{error}");

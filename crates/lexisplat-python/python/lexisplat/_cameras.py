@@ -43,7 +43,7 @@ class Camera:
     split : {"train", "test"}, optional
         Which part of a data set it belongs to.
     near : float
-        Distance of the near plane, in world units. What is not beyond it is not drawn. The default is the trainer's.
+        Distance of the near plane, in world units. Gaussians nearer than it are not drawn. The default is the trainer's.
         Cameras that :func:`orbit` and :func:`photographs` make have one of the scene's own size.
     """
 

@@ -352,15 +352,21 @@ mod tests {
             .collect()
     }
 
-    #[test]
-    fn wide_tables_fit_the_text() {
+    /// Results of many scenes with long names, each changed by `change`.
+    fn with_long_names(change: impl Fn(&mut crate::SceneResult)) -> crate::Results {
         let mut results = crate::testing::results();
         let mut scene = results.scenes[0].clone();
         for k in 0..20 {
             scene.name = format!("a scene with a long name {k}");
-            scene.ply_bytes = 123_456_789_012;
+            change(&mut scene);
             results.scenes.push(scene.clone());
         }
+        results
+    }
+
+    #[test]
+    fn wide_tables_fit_the_text() {
+        let results = with_long_names(|scene| scene.ply_bytes = 123_456_789_012);
         for table in crate::tables::all(&results) {
             let latex = table.to_latex();
             let widths = widths(&latex);
@@ -432,12 +438,7 @@ mod tests {
 
     #[test]
     fn papers_of_one_and_two_columns_have_no_overfull_box() {
-        let mut results = crate::testing::results();
-        let mut scene = results.scenes[0].clone();
-        for k in 0..20 {
-            scene.name = format!("a scene with a long name {k}");
-            results.scenes.push(scene.clone());
-        }
+        let results = with_long_names(|_| ());
         for options in ["onecolumn", "twocolumn"] {
             match too_wide(&results, options) {
                 Some(found) => assert!(found.is_empty(), "{options}: {found:#?}"),
