@@ -19,16 +19,6 @@ const CLOSE_SIZE: f64 = 0.01;
 const CLOSE_FIRST: f64 = 0.5;
 /// A preset may miss its aim by this much, in dB.
 const CLOSE_PRESET: f64 = 1.0;
-/// Most Gaussians of a scene of few Gaussians. The quality of 400 Gaussians varies by 0.7 dB with the rounding of their values
-/// alone, in other units for example, and a try takes a tenth of a second.
-const FEW: usize = 8000;
-/// A preset's steps of such scenes are whole numbers of this part of an octave, of 1.1 dB, so that rounding seldom changes
-/// them. They are the next smaller ones, since falling short is worse.
-const STEPS_PER_OCTAVE: f64 = 4.0;
-/// [`CLOSE_PRESET`] of such scenes, in dB.
-const CLOSE_FEW: f64 = 0.75;
-/// Packings of such scenes that are tried at most to come as close, after the first.
-const TRIES_FEW: usize = 4;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -161,7 +151,7 @@ struct Try {
 }
 
 /// Packs to the aim of `preset`. A first file, not refitted, says what step that takes. If the next misses the aim by more
-/// than 1 dB, it is packed once more; scenes of few Gaussians are packed until they are close. Returns the closest.
+/// than 1 dB, it is packed once more. Returns the closest.
 ///
 /// # Errors
 /// Errors of packing and drawing.
@@ -172,12 +162,7 @@ pub(super) fn pack_to_preset(
     progress: &dyn Progress,
 ) -> Result<(Packed, CompressReport, Score)> {
     let aim = preset.decibels();
-    // Of few Gaussians a hair of difference in a step changes the codes, and with them the quality.
-    let on_grid = |log_step: f64| match packer.len() <= FEW {
-        true => (log_step * STEPS_PER_OCTAVE).floor() / STEPS_PER_OCTAVE,
-        false => log_step,
-    };
-    let mut log_step = on_grid(libm::log2(packer.step_for(aim)));
+    let mut log_step = libm::log2(packer.step_for(aim));
     let (mut tries, mut slope) = (Vec::new(), -DB_PER_HALVING);
     let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     let first = judge.score(&file.0.unpack()?, progress)?;
@@ -186,34 +171,23 @@ pub(super) fn pack_to_preset(
         && let Some(next) = next_step(&[Try { log_step, value: expected }], aim, &mut slope)
     {
         tries.push(Try { log_step, value: expected });
-        log_step = on_grid(next);
+        log_step = next;
         (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
     let (packed, report) = packer.refit(&quantised, file, progress)?;
     drop(quantised);
     let is_first = tries.is_empty() && !packer.refits();
     let score = if is_first { first } else { judge.score(&packed.unpack()?, progress)? };
+    let off = (score.judged - aim).abs();
     tries.push(Try { log_step, value: score.judged });
-    let mut best = (packed, report, score);
-    let (close, more) = if packer.len() <= FEW { (CLOSE_FEW, TRIES_FEW) } else { (CLOSE_PRESET, 1) };
-    let off = |score: &Score| (score.judged - aim).abs();
-    for _ in 0..more {
-        if off(&best.2) <= close {
-            break;
-        }
-        progress.check()?;
-        let Some(next) = next_step(&tries, aim, &mut slope).map(on_grid) else { break };
-        if tries.iter().any(|t| (t.log_step - next).abs() < SAME_STEP) {
-            break;
-        }
-        let (packed, report) = packer.pack(libm::exp2(next), true, progress)?;
-        let score = judge.score(&packed.unpack()?, progress)?;
-        tries.push(Try { log_step: next, value: score.judged });
-        if off(&score) < off(&best.2) {
-            best = (packed, report, score);
-        }
+    let best = (packed, report, score);
+    if off <= CLOSE_PRESET {
+        return Ok(best);
     }
-    Ok(best)
+    let Some(next) = next_step(&tries, aim, &mut slope) else { return Ok(best) };
+    let (packed, report) = packer.pack(libm::exp2(next), true, progress)?;
+    let score = judge.score(&packed.unpack()?, progress)?;
+    Ok(if (score.judged - aim).abs() < off { (packed, report, score) } else { best })
 }
 
 /// A file that meets a target.
