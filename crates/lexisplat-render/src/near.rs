@@ -1,25 +1,36 @@
 //! The near plane of views of a scene that comes without cameras, in the scene's own size.
 
+use std::borrow::Cow;
+
 use lexisplat::Geometry;
 
 use crate::camera::{Camera, single};
 use crate::object::subject;
+use crate::orbit::size_at;
 
-/// Distance of the near plane in radii of the subject. In six models with cameras of their own, `room-large` among them, that is
-/// 0.02 to 0.3 units. Of the area that their cameras see, 99 % is farther than 1.9 units, so smaller planes show the same.
-const NEAR_SHARE: f64 = 0.02;
+/// Largest distance of the near plane in radii of the subject.
+const NEAR_RADII: f64 = 0.1;
+/// Largest distance of the near plane in standard deviations of the middle Gaussian along its longest axis. Natural views are 20
+/// and more of their own Gaussian away.
+const NEAR_SIGMAS: f64 = 3.5;
 /// Most Gaussians that the subject is found by. Of a larger scene it is every second, third and so on.
 const MOST: usize = 1 << 16;
 /// Most cameras that [`hidden_share`] asks, evenly spread.
 const MOST_CAMERAS: usize = 16;
 
 /// Returns the distance of the near plane, in world units, above 0, for views of `geometry` that were not given: it is in
-/// proportion to the radius of the scene's subject, so that a scene shows the same in all units.
+/// proportion to the radius of the scene's subject and to its Gaussians, so that a scene shows the same in all units.
+///
+/// In models with cameras of their own, `room-large` among them, it is 0.08 to 0.8 units, about the trainer's 0.2. Of the area
+/// that their cameras see, 99 % is farther than 1.9 units. With a fifth of it some views judge by single Gaussians just before
+/// the camera, and `--psnr 38` on the sample scene of 1,500 Gaussians reached 40.2 dB instead of 38.2.
 #[must_use]
 pub fn near_plane(geometry: &Geometry) -> f32 {
     let step = geometry.len().div_ceil(MOST).max(1);
-    let near = if step == 1 { subject(geometry).1 } else { subject(&thinned(geometry, step)).1 } * NEAR_SHARE;
-    single(near).clamp(f32::MIN_POSITIVE, f32::MAX)
+    let some = if step == 1 { Cow::Borrowed(geometry) } else { Cow::Owned(thinned(geometry, step)) };
+    let by_radius = NEAR_RADII * subject(&some).1;
+    let by_size = size_at(&some, 2).map_or(f64::INFINITY, |size| NEAR_SIGMAS * size);
+    single(by_radius.min(by_size)).clamp(f32::MIN_POSITIVE, f32::MAX)
 }
 
 /// Every `step`-th Gaussian of `geometry`, as far as [`subject`] looks at it.
@@ -81,7 +92,7 @@ mod tests {
     #[test]
     fn the_plane_is_in_proportion_to_the_scene() {
         let one = near_plane(&plane(5.0, 1.0));
-        assert!((0.005..0.05).contains(&one), "{one}");
+        assert!((0.05..0.2).contains(&one), "{one}");
         for factor in [1e-4, 1e-2, 1e4] {
             let other = near_plane(&plane(5.0 * factor, factor));
             assert!((other / (one * factor) - 1.0).abs() < 1e-3, "{factor}: {other}");
@@ -89,7 +100,7 @@ mod tests {
         // Gaussians at one place have the size of one.
         let mut pile = plane(5.0, 1.0);
         pile.positions.fill([1.0, 2.0, 3.0]);
-        assert!((0.002..0.01).contains(&near_plane(&pile)), "{}", near_plane(&pile));
+        assert!((0.01..0.05).contains(&near_plane(&pile)), "{}", near_plane(&pile));
         for nothing in [Geometry::default(), Geometry { scales: vec![[f32::NAN; 3]], ..Geometry::default() }]
         {
             assert!(near_plane(&nothing) > 0.0);
