@@ -70,7 +70,11 @@ fn wrong_headers_are_named() {
         (edited("float nx", "float x"), "vertex property 'x' is declared twice"),
         (edited("element vertex", "element vertices"), "no element 'vertex'; elements found: vertices"),
         (edited("end_header", "element vertex 1\nend_header"), "'vertex' is declared more than once"),
-        (edited("property float x", "property half x"), "header line 4, 'property half x': unknown type"),
+        (
+            edited("property float x", "property half x"),
+            "header line 4, 'property half x': floats of 16 bits are no type of a PLY",
+        ),
+        (edited("property float x\n", "property real x\n"), "header line 4, 'property real x': unknown type"),
         (
             edited("vertex 4", "vertex 4294967296"),
             "Gaussians in t.ply: 4294967296 is over the limit of 4294967294",
