@@ -16,6 +16,7 @@ const NOT_FOUND: i32 = 2;
 const INPUT_OUTPUT: i32 = 5;
 const PERMISSION_DENIED: i32 = 13;
 const ALREADY_EXISTS: i32 = 17;
+const IS_A_FOLDER: i32 = 21;
 const NO_SPACE: i32 = 28;
 
 /// The exception that `error` is in Python.
@@ -75,6 +76,7 @@ fn os_error(py: Python<'_>, source: &io::Error, file: &str) -> PyResult<PyErr> {
         io::ErrorKind::NotFound => NOT_FOUND,
         io::ErrorKind::PermissionDenied => PERMISSION_DENIED,
         io::ErrorKind::AlreadyExists => ALREADY_EXISTS,
+        io::ErrorKind::IsADirectory => IS_A_FOLDER,
         io::ErrorKind::StorageFull => NO_SPACE,
         _ => INPUT_OUTPUT,
     });

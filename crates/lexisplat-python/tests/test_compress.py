@@ -206,7 +206,7 @@ def test_sizes_are_told_in_many_ways(splats: lx.Splats, views: list[lx.Camera]) 
     assert made[0].nbytes <= 12_000 and all(scene == made[0] for scene in made)
     assert lx.load(made[0].to_bytes(), limit={"bytes": "1GB", "gaussians": 1e6}).degree == 3
     with pytest.raises(lx.LimitError):
-        lx.open(made[0].to_bytes(), limit={"bytes": "1kB"})
+        lx.load(made[0].to_bytes(), limit={"bytes": "1kB"})
 
 
 def test_scenes_are_copied_pickled_and_compared(packed: lx.Scene, splats: lx.Splats, tmp_path: Path) -> None:

@@ -49,6 +49,7 @@ def test_an_offset_is_kept_and_put_back(tmp_path: Path) -> None:
     assert lost["offset"] == read.offset.tolist()
     views = lx.orbit(read, 2, width=32, height=32)
     assert abs(views[0].position[0] - offset[0]) < 100
+    assert views[0].relative_to(read.offset).near == views[0].near != lx.Camera.near
     near = make(200)
     pictures = lx.render(near, [view.relative_to(read.offset) for view in views])
     for far, picture in zip(lx.render(read, views), pictures, strict=True):

@@ -18,7 +18,7 @@ from ._arguments import path as path_of
 from ._errors import LexisplatWarning, ParameterError
 from ._progress import Progress, reporter
 from ._scene import Scene
-from ._splats import Splats, floats
+from ._splats import Splats, floats, host
 
 #: A principal point farther than this from the centre, in pixels, is told, because it is not drawn.
 _CENTRE_SLACK = 0.5
@@ -105,7 +105,7 @@ class Camera:
     def relative_to(self, offset: Any) -> Camera:
         """The camera beside ``means`` that are relative to ``offset``, for other renderers; ``None`` changes nothing."""
         position = self.position if offset is None else self.position - np.asarray(host(offset), np.float64)
-        return Camera(self.width, self.height, self.fx, self.fy, position, self.rotation, self.name, self.split)
+        return Camera(self.width, self.height, self.fx, self.fy, position, self.rotation, self.name, self.split, self.near)
 
     def resized(self, width: int) -> Camera:
         """The camera with pictures of this width, of the same field of view."""

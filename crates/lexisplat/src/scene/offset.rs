@@ -26,7 +26,8 @@ impl Offset {
     /// [`Error::Parameter`] for numbers that are not finite.
     pub fn new(numbers: [f64; 3]) -> Result<Option<Self>> {
         if numbers.iter().any(|v| !v.is_finite()) {
-            return Err(Error::parameter("offset", format!("{numbers:?}"), "three finite numbers"));
+            // Formatting numbers would add 10 kB to the decoder of web pages.
+            return Err(Error::parameter("offset", "NaN or an infinity", "three finite numbers"));
         }
         Ok(numbers.iter().any(|v| *v != 0.0).then_some(Self(numbers)))
     }

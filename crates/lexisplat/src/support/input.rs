@@ -7,7 +7,7 @@
 //! Changed contents are harmless here, because every reader treats the bytes as untrusted and takes sizes from the
 //! header only once. Callers who cannot accept the risk build without the `mmap` feature, or pass bytes they own.
 
-use std::io::Read;
+use std::io::{self, Read};
 use std::ops::Deref;
 use std::path::Path;
 
@@ -31,7 +31,7 @@ impl Input {
     /// Maps `path` if it is a regular file, else reads it to its end.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`, [`Error::Format`] if it is a folder.
+    /// [`Error::Io`] that names `path`. A folder is one too.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Limits::default())
     }
@@ -39,13 +39,14 @@ impl Input {
     /// [`Self::open`] that reads at most [`Limits::bytes`] of a file that cannot be mapped.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`, [`Error::Format`] if it is a folder, [`Error::Limit`] if the file is longer.
+    /// [`Error::Io`] that names `path`, which also a folder is. [`Error::Limit`] if the file is longer.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self> {
         let name = path.display().to_string();
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;
         let kind = file.metadata().map_err(|e| Error::io(path, e))?;
         if kind.is_dir() {
-            return Err(Error::malformed(name, "it is a folder, and a file is needed: name the file in it"));
+            let text = "it is a folder, and a file is needed: name the file in it";
+            return Err(Error::io(path, io::Error::new(io::ErrorKind::IsADirectory, text)));
         }
         #[cfg(feature = "mmap")]
         {
