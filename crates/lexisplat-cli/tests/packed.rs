@@ -6,6 +6,8 @@ use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
 const SMALL: [&str; 6] = ["--scene", "object", "--orbit", "4", "--width", "160"];
+/// An orbit as README's table has it.
+const AROUND: [&str; 6] = ["--scene", "object", "--orbit", "12", "--width", "480"];
 
 fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is not a number"))
@@ -270,16 +272,17 @@ fn a_scene_in_other_units_is_packed_as_well() {
     let folder = Folder::new();
     let packed = |scene: &str| {
         let report = folder.json(&["compress", scene, "--overwrite", "-o", "scene.lexi"]);
-        let score = folder.json(&[&["compare", scene, "scene.lexi"], &SMALL[..]].concat());
+        let score = folder.json(&[&["compare", scene, "scene.lexi"], &AROUND[..]].concat());
         (number(&report["file_bytes"]), number(&report["gaussians"]), number(&score["psnr"]["mean"]))
     };
-    let whole = packed("scene.ply");
+    std::fs::write(folder.path("ring.ply"), include_bytes!("data/ring.ply")).unwrap();
+    let whole = packed("ring.ply");
     for scale in ["0.0001", "0.03", "10000"] {
-        folder.run(&["convert", "scene.ply", "other.ply", "--scale", scale, "--overwrite"]);
+        folder.run(&["convert", "ring.ply", "other.ply", "--scale", scale, "--overwrite"]);
         let other = packed("other.ply");
         assert!((other.0 / whole.0 - 1.0).abs() < 0.02, "{scale}: {other:?}, {whole:?}");
         assert!((other.1 / whole.1 - 1.0).abs() < 0.01, "{scale}: {other:?}, {whole:?}");
-        assert!((other.2 - whole.2).abs() < 0.5, "{scale}: {other:?}, {whole:?}");
+        assert!((other.2 - whole.2).abs() < 0.75, "{scale}: {other:?}, {whole:?}");
     }
 }
 
