@@ -83,7 +83,7 @@ impl From<Vec<u8>> for Input {
 
 #[cfg(feature = "mmap")]
 #[expect(unsafe_code, reason = "memory mapping; see the module's documentation")]
-fn map(file: &std::fs::File) -> std::io::Result<memmap2::Mmap> {
+fn map(file: &std::fs::File) -> io::Result<memmap2::Mmap> {
     // SAFETY: the mapping is private to this process and read-only, so nothing here can write through it. Another
     // process can still change the file. If it truncates the file, the system ends this process with SIGBUS and
     // never gives it wrong memory. If it writes to the file, bytes may change under a shared slice; no type can rule
