@@ -169,13 +169,13 @@ def spoil(path: Path, how: str) -> None:
     elif how == "nonsense":
         path.write_bytes(b"nonsense")
     elif how == "nan":
-        header, rows = path.read_bytes().split(b"end_header\n", 1)
-        path.write_bytes(header + b"end_header\n" + np.float32(np.nan).tobytes() + rows[4:])
+        header, end, rows = path.read_bytes().partition(b"end_header\n")
+        path.write_bytes(header + end + np.float32(np.nan).tobytes() + rows[4:])
     elif how == "degree":
         lx.save(path, make(500, degree=2))
     else:
-        header = path.read_bytes().split(b"end_header\n")[0]
-        path.write_bytes(header.replace(b"vertex 500", b"vertex 0") + b"end_header\n")
+        header, end, _ = path.read_bytes().partition(b"end_header\n")
+        path.write_bytes(header.replace(b"vertex 500", b"vertex 0") + end)
 
 
 BAD = ["missing", "truncated", "nonsense", "nan", "degree", "empty"]

@@ -10,9 +10,11 @@ use crate::orbit::size_at;
 
 /// Largest distance of the near plane in radii of the subject.
 const NEAR_RADII: f64 = 0.1;
-/// Largest distance of the near plane in standard deviations of the middle Gaussian along its longest axis. Natural views are 20
-/// and more of their own Gaussian away.
+/// Largest distance of the near plane in standard deviations of the middle Gaussian along its longest axis. A natural view is at
+/// least 20 standard deviations from the Gaussian that it was made for.
 const NEAR_SIGMAS: f64 = 3.5;
+/// One of this many Gaussians is smaller than the middle one.
+const MIDDLE_SHARE: usize = 2;
 /// Most Gaussians that the subject is found by. Of a larger scene it is every second, third and so on.
 const MOST: usize = 1 << 16;
 /// Most cameras that [`hidden_share`] asks, evenly spread.
@@ -29,7 +31,7 @@ pub fn near_plane(geometry: &Geometry) -> f32 {
     let step = geometry.len().div_ceil(MOST).max(1);
     let some = if step == 1 { Cow::Borrowed(geometry) } else { Cow::Owned(thinned(geometry, step)) };
     let by_radius = NEAR_RADII * subject(&some).1;
-    let by_size = size_at(&some, 2).map_or(f64::INFINITY, |size| NEAR_SIGMAS * size);
+    let by_size = size_at(&some, MIDDLE_SHARE).map_or(f64::INFINITY, |size| NEAR_SIGMAS * size);
     single(by_radius.min(by_size)).clamp(f32::MIN_POSITIVE, f32::MAX)
 }
 

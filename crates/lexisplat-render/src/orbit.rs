@@ -94,14 +94,17 @@ pub(crate) fn least_radius(geometry: &Geometry, centre: DVec3) -> f64 {
     (LEAST_SIGMAS * size).max(LEAST_SHARE * centre.length())
 }
 
-/// The largest standard deviation, in world units, of a Gaussian than which one of `share` is smaller. `None` if there is no
-/// finite one.
+/// The standard deviation along its longest axis, in world units, of the Gaussian than which one of `share` is smaller. `None` if
+/// no size is finite. `share` is 2 or more.
 pub(crate) fn size_at(geometry: &Geometry, share: usize) -> Option<f64> {
     let largest = |scales: &[f32; 3]| scales.iter().fold(f32::NEG_INFINITY, |a, &b| a.max(b));
     let mut sizes: Vec<f32> = geometry.scales.iter().map(largest).filter(|size| size.is_finite()).collect();
+    if sizes.is_empty() {
+        return None;
+    }
     let place = sizes.len() / share;
-    let size = sizes.get(place).is_some().then(|| *sizes.select_nth_unstable_by(place, f32::total_cmp).1)?;
-    Some(libm::exp(f64::from(size).clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE)))
+    let size = f64::from(*sizes.select_nth_unstable_by(place, f32::total_cmp).1);
+    Some(libm::exp(size.clamp(-MAX_LOG_SCALE, MAX_LOG_SCALE)))
 }
 
 /// Returns the opacities after the sigmoid.

@@ -31,7 +31,7 @@ impl Input {
     /// Maps `path` if it is a regular file, else reads it to its end.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`. A folder is one too.
+    /// [`Error::Io`] that names `path`, also if it is a folder.
     pub fn open(path: &Path) -> Result<Self> {
         Self::open_within(path, &Limits::default())
     }
@@ -39,7 +39,7 @@ impl Input {
     /// [`Self::open`] that reads at most [`Limits::bytes`] of a file that cannot be mapped.
     ///
     /// # Errors
-    /// [`Error::Io`] that names `path`, which also a folder is. [`Error::Limit`] if the file is longer.
+    /// [`Error::Io`] that names `path`, also if it is a folder. [`Error::Limit`] if the file is longer.
     pub fn open_within(path: &Path, limits: &Limits) -> Result<Self> {
         let name = path.display().to_string();
         let file = std::fs::File::open(path).map_err(|e| Error::io(path, e))?;

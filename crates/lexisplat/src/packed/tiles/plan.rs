@@ -219,8 +219,8 @@ impl Plan {
         (0..gaussians).step_by(BLOCK).map(move |start| start..gaussians.min(start + BLOCK))
     }
 
-    /// Which of `rows` of a tile each bucket has to read: runs of whole pieces of 4096 rows of which some are its own, by its
-    /// number. Reports the bytes of the rows to `progress`.
+    /// Returns the rows, of `rows` of a tile, that each bucket has to read, by the bucket's number: runs of whole pieces of `RUN`
+    /// rows of which some are its own. Reports the bytes of the rows to `progress`.
     ///
     /// # Errors
     /// As [`Survey::of`], and [`Error::Parameter`] if there is no such tile.
