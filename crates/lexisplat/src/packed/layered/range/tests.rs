@@ -26,6 +26,14 @@ fn scripts() -> impl Strategy<Value = (usize, Vec<Ask>)> {
     })
 }
 
+/// The script with one kind of number in each slot, as in files. With several kinds in one slot its table has tokens that are too
+/// large for some of them, which are read as the largest that are not.
+fn one_kind_a_slot(script: Vec<Ask>) -> Vec<Ask> {
+    let slots = Slot::all().count();
+    let kind = |slot: u8| u8::try_from(usize::from(slot) % slots % 5).unwrap();
+    script.into_iter().map(|a| Ask { kind: kind(a.slot), ..a }).collect()
+}
+
 /// A coded script.
 struct Coded {
     tables: Tables,
@@ -213,6 +221,7 @@ proptest! {
     /// Coding is one to one: other words are left over, or say something else.
     #[test]
     fn other_words_are_noticed((lanes, script) in scripts(), at in any::<prop::sample::Index>(), change in 1..=u8::MAX) {
+        let script = one_kind_a_slot(script);
         let Coded { tables, range, values, .. } = coded(lanes, &script);
         let mine = Some((values, true));
         let mut changed = range.clone();
