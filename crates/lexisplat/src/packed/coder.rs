@@ -162,7 +162,8 @@ impl ChunkCoder {
         let degree = view.splats.degree;
         let dim = degree.rest();
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
-        let (rows, classes) = view.scaled(sample, &self.parameters);
+        let parameters = self.parameters.for_learning();
+        let (rows, classes) = view.scaled(sample, &parameters);
         let pays = (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED);
         if options.atoms.is_none() && self.stop == StopRule::Balanced && pays < CHOICE * dim {
             let bits_of = |rows: &[f32], atoms: &[f32], costs: &Costs| {
@@ -173,7 +174,7 @@ impl ChunkCoder {
         let first = first_atoms(dim, atoms_to_learn(total, dim, options), &rows);
         let (learned, costs) = learn(dim, &rows, &classes, first, 0, self.stop, progress)?;
         let stride = view.len().div_ceil(ATOM_BITS_SAMPLE).max(1);
-        let (rows, classes) = view.scaled((0..view.len()).step_by(stride), &self.parameters);
+        let (rows, classes) = view.scaled((0..view.len()).step_by(stride), &parameters);
         let bits = self.choose_atom_bits(dim, &rows, &classes, &learned, &costs);
         Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
     }

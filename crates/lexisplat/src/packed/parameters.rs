@@ -17,6 +17,9 @@ const STEP_FEATURES: usize = 4;
 /// Number of the coarsest class of steps.
 pub(super) const LAST_CLASS: u8 = 15;
 
+/// Parts of an octave to one of which the step is rounded that a dictionary is learned with: it is off by at most 9 %.
+const PER_OCTAVE: f64 = 4.0;
+
 /// Largest steps. With larger ones a value is as good as unknown, and errors are no longer small.
 const MAX_LOG_STEP: f32 = 1.5;
 const MAX_ANGLE_STEP: f32 = 1.2;
@@ -108,6 +111,18 @@ impl Parameters {
     /// Step of the values of SH codes of colour class 0 where no error is promised.
     pub(super) fn free_value_step(&self) -> f32 {
         self.step(0, 0) * self.factors[1]
+    }
+
+    /// The parameters that a dictionary is learned with: the step of values of each class is the nearest of [`PER_OCTAVE`] parts of
+    /// an octave. Learning depends on the last bits of its rows, and these differ where a scene is in other units or a step differs
+    /// by a hair.
+    pub(super) fn for_learning(&self) -> Self {
+        let mut other = self.clone();
+        let octaves = libm::rint(libm::log2(f64::from(self.free_value_step())) * PER_OCTAVE) / PER_OCTAVE;
+        #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+        let step = libm::exp2(octaves) as f32;
+        (other.base[0], other.factors[1]) = (step, 1.0);
+        other
     }
 
     /// Step of the logarithm of the opacity.

@@ -164,6 +164,7 @@ impl Sample {
             let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
             let all_kept = sampled.map(kept).sum::<f64>().max(1.0);
             let (mut rows, mut all_classes) = (Vec::new(), Vec::new());
+            let parameters = steps.floor.parameters.for_learning();
             for part in parts {
                 let scene: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
                 let weights: Vec<[f32; 2]> = part.kept().map(|i| part.weights[i]).collect();
@@ -175,7 +176,7 @@ impl Sample {
                 let wanted = (SAMPLE as f64 * share).round() as usize;
                 let seed = plan.options.seed ^ SAMPLE_STREAM ^ part.bucket as u64;
                 let chosen = SplitMix64::new(seed).shuffled(scene.len()).take(wanted);
-                let (mut own, mut classes) = view.scaled(chosen, &steps.floor.parameters);
+                let (mut own, mut classes) = view.scaled(chosen, &parameters);
                 rows.append(&mut own);
                 all_classes.append(&mut classes);
             }
