@@ -93,8 +93,13 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     if !gpu(&folder) {
         return;
     }
+    folder.add_cameras();
     let compress = |out: &str, device: &str| {
-        folder.json(&["compress", "scene.ply", "-o", out, "--psnr", "38", "--device", device])
+        let cameras = ["--cameras", "cameras.json"];
+        folder.json(
+            &[&["compress", "scene.ply", "-o", out, "--psnr", "38", "--device", device][..], &cameras]
+                .concat(),
+        )
     };
     let told = compress("gpu.lexi", "gpu");
     let name = told["device"].as_str().unwrap().to_owned();
@@ -108,7 +113,17 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     let ratio = told["file_bytes"].as_f64().unwrap() / reference["file_bytes"].as_f64().unwrap();
     assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
     // The default is the processor, bit for bit.
-    folder.run(&["compress", "scene.ply", "-o", "default.lexi", "--psnr", "38", "-q"]);
+    folder.run(&[
+        "compress",
+        "scene.ply",
+        "-o",
+        "default.lexi",
+        "--psnr",
+        "38",
+        "--cameras",
+        "cameras.json",
+        "-q",
+    ]);
     let bytes = |file: &str| std::fs::read(folder.path(file)).unwrap();
     assert_eq!(bytes("default.lexi"), bytes("cpu.lexi"));
 }

@@ -20,7 +20,7 @@ fn mean_psnr(folder: &Folder, file: &str) -> f64 {
 
 #[test]
 fn presets_are_ordered_and_the_default_is_balanced() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     let (mut last_bytes, mut last_psnr) = (0, 0.0);
     for preset in ["small", "balanced", "high", "archive"] {
         let file = format!("{preset}.lexi");
@@ -44,7 +44,7 @@ fn presets_are_ordered_and_the_default_is_balanced() {
 
 #[test]
 fn a_quality_is_reached_and_recorded() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     for (option, key) in [("--psnr", "judged_psnr"), ("--min-psnr", "min_psnr")] {
         let report = folder.json(&["compress", "scene.ply", option, "38", "--overwrite"]);
         let promise = &report["promise"];
@@ -85,7 +85,7 @@ fn comparing_without_cameras_looks_from_where_compress_judged() {
 
 #[test]
 fn the_kind_of_scene_can_be_given() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     let file = |kind: &[&str]| {
         folder.json(&[&["compress", "scene.ply", "--overwrite", "--psnr", "38"], kind].concat());
         std::fs::read(folder.path("scene.lexi")).unwrap()
@@ -99,21 +99,31 @@ fn the_kind_of_scene_can_be_given() {
 
 #[test]
 fn a_size_is_never_exceeded() {
-    let folder = Folder::new();
-    for (option, most) in [("20kB", 20_000), ("40000", 40_000)] {
-        let report = folder.json(&["compress", "scene.ply", "--size", option, "--overwrite"]);
+    let folder = Folder::few();
+    for (option, most) in [("8kB", 8_000), ("14000", 14_000)] {
+        let report = folder.json(&[
+            "compress",
+            "scene.ply",
+            "--cameras",
+            "cameras.json",
+            "--size",
+            option,
+            "--overwrite",
+        ]);
         let bytes = folder.path("scene.lexi").metadata().unwrap().len();
         assert_eq!(report["file_bytes"], bytes);
         assert!(bytes <= most && bytes > most * 9 / 10, "{bytes} of {most}");
         assert!(number(&report["promise"]["mean_psnr"]) > 20.0);
     }
     let ply = folder.path("scene.ply").metadata().unwrap().len();
-    folder.run(&["compress", "scene.ply", "--ratio", "12", "--overwrite"]);
+    folder.run(&["compress", "scene.ply", "--cameras", "cameras.json", "--ratio", "12", "--overwrite"]);
     assert!(folder.path("scene.lexi").metadata().unwrap().len() <= ply / 12);
     let before = std::fs::read(folder.path("scene.lexi")).unwrap();
-    let error = folder.fail(&["compress", "scene.ply", "--size", "300", "--overwrite"], 5);
+    let error = folder
+        .fail(&["compress", "scene.ply", "--cameras", "cameras.json", "--size", "300", "--overwrite"], 5);
     assert!(error.contains("nothing smaller can be made"), "{error}");
-    let error = folder.fail(&["compress", "scene.ply", "--ratio", "1000", "--overwrite"], 5);
+    let error = folder
+        .fail(&["compress", "scene.ply", "--cameras", "cameras.json", "--ratio", "1000", "--overwrite"], 5);
     assert!(
         error.contains("ratio = 1000: at most") && !error.contains("bytes"),
         "a ratio for a ratio: {error}"
@@ -204,23 +214,29 @@ fn info_says_what_a_packed_file_is_made_of() {
 
 #[test]
 fn what_is_left_out_is_reported() {
-    let folder = Folder::new();
-    let report = folder.json(&["compress", "scene.ply", "--preset", "small"]);
+    let folder = Folder::few();
+    let report = folder.json(&["compress", "scene.ply", "--cameras", "cameras.json", "--preset", "small"]);
     let removed = number(&report["removed"]);
     assert!(removed > 0.0);
-    assert_eq!(number(&report["gaussians"]) + removed, folder::GAUSSIANS as f64);
+    assert_eq!(number(&report["gaussians"]) + removed, folder::FEW as f64);
     assert_eq!(folder.json(&["info", "scene.lexi"])["lexi"]["removed"], report["removed"]);
     assert!(folder.run(&["info", "scene.lexi"]).contains("left out"));
     for keep in ["--keep-all", "--keep-order"] {
-        let report = folder.json(&["compress", "scene.ply", "--preset", "small", keep, "--overwrite"]);
-        assert_eq!(
-            (number(&report["removed"]), number(&report["gaussians"])),
-            (0.0, folder::GAUSSIANS as f64)
-        );
+        let report = folder.json(&[
+            "compress",
+            "scene.ply",
+            "--cameras",
+            "cameras.json",
+            "--preset",
+            "small",
+            keep,
+            "--overwrite",
+        ]);
+        assert_eq!((number(&report["removed"]), number(&report["gaussians"])), (0.0, folder::FEW as f64));
         assert!(!folder.run(&["info", "scene.lexi"]).contains("left out"));
     }
     // An option of before is accepted, and told about.
-    let arguments = ["compress", "scene.ply", "--prune", "--overwrite"];
+    let arguments = ["compress", "scene.ply", "--cameras", "cameras.json", "--prune", "--overwrite"];
     let told = folder::lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
     assert!(told.status.success());
     assert!(String::from_utf8_lossy(&told.stderr).contains("--keep-all"));
@@ -228,23 +244,33 @@ fn what_is_left_out_is_reported() {
 
 #[test]
 fn a_limit_on_gaussians_is_kept() {
-    let folder = Folder::new();
-    let most = folder::GAUSSIANS / 4;
+    let folder = Folder::few();
+    let most = folder::FEW / 4;
     let limit = most.to_string();
-    let limited = ["compress", "scene.ply", "--preset", "small", "--max-gaussians", &limit];
+    let limited = [
+        "compress",
+        "scene.ply",
+        "--cameras",
+        "cameras.json",
+        "--preset",
+        "small",
+        "--max-gaussians",
+        &limit,
+    ];
     let report = folder.json(&limited);
     let gaussians = number(&report["gaussians"]);
     assert!(gaussians <= most as f64 && gaussians > 0.0, "{gaussians}");
-    assert_eq!(gaussians + number(&report["removed"]), folder::GAUSSIANS as f64);
+    assert_eq!(gaussians + number(&report["removed"]), folder::FEW as f64);
     let first = std::fs::read(folder.path("scene.lexi")).unwrap();
     folder.run(&[&limited[..], &["--overwrite"]].concat());
     assert!(std::fs::read(folder.path("scene.lexi")).unwrap() == first);
     // What is reached is told beside the original, and no preset promises more than the limit lets it.
     assert!(number(&report["reached"]["mean_psnr"]) < 35.0);
     // A limit that is kept anyway changes nothing.
-    let plain = ["compress", "scene.ply", "--preset", "small", "-o", "plain.lexi"];
+    let plain =
+        ["compress", "scene.ply", "--cameras", "cameras.json", "--preset", "small", "-o", "plain.lexi"];
     folder.run(&plain);
-    folder.run(&[&plain[..4], &["-o", "wide.lexi", "--max-gaussians", "1000000"]].concat());
+    folder.run(&[&plain[..6], &["-o", "wide.lexi", "--max-gaussians", "1000000"]].concat());
     let [plain, wide] = ["plain.lexi", "wide.lexi"].map(|name| std::fs::read(folder.path(name)).unwrap());
     assert!(plain == wide);
     for (option, code) in [("--keep-all", 2), ("--keep-order", 2), ("--guess", 2), ("--layout=f16", 5)] {

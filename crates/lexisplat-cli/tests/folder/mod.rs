@@ -11,6 +11,8 @@ use serde_json::Value;
 
 /// Gaussians of the test scene: enough to learn from, quick to draw.
 pub(crate) const GAUSSIANS: usize = 1500;
+/// Gaussians of the scene of tests that pack it again and again.
+pub(crate) const FEW: usize = 400;
 
 pub(crate) fn lexisplat() -> Command {
     Command::cargo_bin("lexisplat").unwrap()
@@ -21,9 +23,34 @@ pub(crate) struct Folder(pub(crate) tempfile::TempDir);
 
 impl Folder {
     pub(crate) fn new() -> Self {
-        let folder = Self(tempfile::tempdir().unwrap());
-        ply::write(&folder.path("scene.ply"), &scene(&SampleOptions::new(GAUSSIANS, 0))).unwrap();
+        Self::of(GAUSSIANS)
+    }
+
+    /// A folder with a scene of [`FEW`] Gaussians, and `cameras.json`: a few small views of it, by which a scene is packed much
+    /// sooner than by those that are looked for.
+    pub(crate) fn few() -> Self {
+        let folder = Self::of(FEW);
+        folder.add_cameras();
         folder
+    }
+
+    fn of(gaussians: usize) -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        ply::write(&folder.path("scene.ply"), &scene(&SampleOptions::new(gaussians, 0))).unwrap();
+        folder
+    }
+
+    /// Adds `cameras.json`, 12 views of 160 x 120 pixels around the scene.
+    pub(crate) fn add_cameras(&self) {
+        let cameras = lexisplat_render::orbit(&read(&self.path("scene.ply")).geometry, 12, 160, 120);
+        let cameras = cameras.into_iter().map(|camera| {
+            serde_json::json!({
+                "img_name": camera.name, "width": camera.width, "height": camera.height,
+                "fx": camera.fx, "fy": camera.fy, "position": camera.position, "rotation": camera.rotation,
+            })
+        });
+        let cameras = Value::from(cameras.collect::<Vec<_>>());
+        std::fs::write(self.path("cameras.json"), cameras.to_string()).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
