@@ -48,7 +48,7 @@ fn a_scene_goes_in_and_comes_back_within_the_promise() {
 
 #[test]
 fn codes_draw_as_the_decompressed_scene_does() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     folder.run(&["compress", "scene.ply", "--quiet"]);
     folder.run(&["decompress", "scene.lexi", "-o", "back.ply"]);
     let small = ["--orbit", "3", "--width", "120", "--scene", "object"];
@@ -118,7 +118,7 @@ fn pictures_sort_as_the_cameras_do() {
 
 #[test]
 fn pipes_carry_scenes() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     let scene = std::fs::read(folder.path("scene.ply")).unwrap();
     let small = lexisplat().args(["compress", "-", "-o", "-"]).write_stdin(scene).output().unwrap();
     assert!(small.status.success());
@@ -135,7 +135,7 @@ fn pipes_carry_scenes() {
 
 #[test]
 fn threads_do_not_change_the_file() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     for threads in ["1", "2"] {
         folder.run(&["compress", "scene.ply", "-o", &format!("{threads}.lexi"), "--threads", threads]);
     }
@@ -190,7 +190,7 @@ fn outputs_in_the_way_are_kept() {
     assert_eq!(std::fs::read(folder.path("scene.lexi")).unwrap(), b"precious");
     folder.fail(&["compress", "scene.ply", "-o", "scene.ply", "--overwrite"], 5);
     folder.fail(&["compress", "scene.ply", "-o", ".", "--overwrite"], 5);
-    folder.run(&["compress", "scene.ply", "--overwrite"]);
+    folder.run(&["compress", "scene.ply", "--guess", "--overwrite"]);
     assert_eq!(folder.names(), ["scene.lexi", "scene.ply"], "nothing temporary is left");
 }
 
@@ -207,7 +207,7 @@ fn each_blame_has_its_exit_code() {
     folder.fail(&["compress", "text.ply"], 4);
     folder.fail(&["compress", "scene.ply", "--tol", "0"], 5);
     folder.fail(&["compress", "scene.ply", "--atoms", "2000"], 5);
-    folder.run(&["compress", "scene.ply", "-q"]);
+    folder.run(&["compress", "scene.ply", "--guess", "-q"]);
     let mut bytes = std::fs::read(folder.path("scene.lexi")).unwrap();
     let middle = bytes.len() / 2;
     bytes[middle] ^= 1;
@@ -346,7 +346,7 @@ fn a_cap_on_nonzeros_lifts_the_promise() {
 
 #[test]
 fn quiet_is_silent_and_completions_are_not() {
-    let folder = Folder::new();
+    let folder = Folder::few();
     let output =
         lexisplat().current_dir(folder.0.path()).args(["compress", "scene.ply", "--quiet"]).output().unwrap();
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());

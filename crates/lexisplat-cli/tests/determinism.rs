@@ -4,7 +4,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::folder::{Folder, lexisplat};
+use crate::folder::{Folder, cameras, lexisplat};
 use assert_cmd::Command;
 use lexisplat::simd::Simd;
 use lexisplat::{ShDegree, ply};
@@ -46,14 +46,7 @@ fn made(simd: &str, threads: &str) -> BTreeMap<String, Vec<u8>> {
     ply::write(&folder.path("large.ply"), &large).unwrap();
     let few = scene(&SampleOptions::new(FEW, 2));
     ply::write(&folder.path("few.ply"), &few).unwrap();
-    let cameras = lexisplat_render::orbit(&few.geometry, 4, 160, 120).into_iter().map(|camera| {
-        serde_json::json!({
-            "img_name": camera.name, "width": camera.width, "height": camera.height,
-            "fx": camera.fx, "fy": camera.fy, "position": camera.position, "rotation": camera.rotation,
-        })
-    });
-    let cameras = serde_json::Value::from(cameras.collect::<Vec<_>>());
-    std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
+    std::fs::write(folder.path("cameras.json"), cameras(&few, 4)).unwrap();
     for command in COMMANDS {
         let mut run: Command = lexisplat();
         run.current_dir(folder.0.path()).env(VARIABLE, simd).args(command.split(' '));

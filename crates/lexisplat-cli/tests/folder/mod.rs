@@ -40,17 +40,10 @@ impl Folder {
         folder
     }
 
-    /// Adds `cameras.json`, 12 views of 160 x 120 pixels around the scene.
+    /// Adds `cameras.json`, 12 views around the scene.
     pub(crate) fn add_cameras(&self) {
-        let cameras = lexisplat_render::orbit(&read(&self.path("scene.ply")).geometry, 12, 160, 120);
-        let cameras = cameras.into_iter().map(|camera| {
-            serde_json::json!({
-                "img_name": camera.name, "width": camera.width, "height": camera.height,
-                "fx": camera.fx, "fy": camera.fy, "position": camera.position, "rotation": camera.rotation,
-            })
-        });
-        let cameras = Value::from(cameras.collect::<Vec<_>>());
-        std::fs::write(self.path("cameras.json"), cameras.to_string()).unwrap();
+        let splats = read(&self.path("scene.ply"));
+        std::fs::write(self.path("cameras.json"), cameras(&splats, 12)).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
@@ -103,6 +96,17 @@ impl Folder {
         }
         found
     }
+}
+
+/// The text of a `cameras.json` with `views` views of 160 x 120 pixels around `splats`.
+pub(crate) fn cameras(splats: &lexisplat::Splats, views: usize) -> String {
+    let views = lexisplat_render::orbit(&splats.geometry, views, 160, 120).into_iter().map(|camera| {
+        serde_json::json!({
+            "img_name": camera.name, "width": camera.width, "height": camera.height,
+            "fx": camera.fx, "fy": camera.fy, "position": camera.position, "rotation": camera.rotation,
+        })
+    });
+    Value::from(views.collect::<Vec<_>>()).to_string()
 }
 
 pub(crate) fn read(path: &Path) -> lexisplat::Splats {
