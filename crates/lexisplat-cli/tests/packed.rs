@@ -87,7 +87,7 @@ fn comparing_without_cameras_looks_from_where_compress_judged() {
 fn the_kind_of_scene_can_be_given() {
     let folder = Folder::few();
     let file = |kind: &[&str]| {
-        folder.json(&[&["compress", "scene.ply", "--overwrite", "--psnr", "38"], kind].concat());
+        folder.json(&[&["compress", "scene.ply", "--overwrite"], kind].concat());
         std::fs::read(folder.path("scene.lexi")).unwrap()
     };
     let auto = file(&[]);
