@@ -296,19 +296,23 @@ fn options_that_do_not_go_together_are_refused() {
 #[test]
 fn a_scene_in_other_units_is_packed_as_well() {
     let folder = Folder::new();
-    let packed = |scene: &str| {
-        let report = folder.json(&["compress", scene, "--overwrite", "-o", "scene.lexi"]);
+    let packed = |scene: &str, options: &[&str]| {
+        let report =
+            folder.json(&[&["compress", scene, "--overwrite", "-o", "scene.lexi"], options].concat());
         let score = folder.json(&[&["compare", scene, "scene.lexi"], &AROUND[..]].concat());
         (number(&report["file_bytes"]), number(&report["gaussians"]), number(&score["psnr"]["mean"]))
     };
     std::fs::write(folder.path("ring.ply"), include_bytes!("data/ring.ply")).unwrap();
-    let whole = packed("ring.ply");
-    for scale in ["0.0001", "0.03", "10000"] {
-        folder.run(&["convert", "ring.ply", "other.ply", "--scale", scale, "--overwrite"]);
-        let other = packed("other.ply");
-        assert!((other.0 / whole.0 - 1.0).abs() < 0.02, "{scale}: {other:?}, {whole:?}");
-        assert!((other.1 / whole.1 - 1.0).abs() < 0.01, "{scale}: {other:?}, {whole:?}");
-        assert!((other.2 - whole.2).abs() < 0.3, "{scale}: {other:?}, {whole:?}");
+    // As a whole, and as a scene is packed that is larger than memory.
+    for options in [&[][..], &["--memory", "100kB"]] {
+        let whole = packed("ring.ply", options);
+        for scale in ["0.0001", "0.03", "10000"] {
+            folder.run(&["convert", "ring.ply", "other.ply", "--scale", scale, "--overwrite"]);
+            let other = packed("other.ply", options);
+            assert!((other.0 / whole.0 - 1.0).abs() < 0.02, "{scale} {options:?}: {other:?}, {whole:?}");
+            assert!((other.1 / whole.1 - 1.0).abs() < 0.01, "{scale} {options:?}: {other:?}, {whole:?}");
+            assert!((other.2 - whole.2).abs() < 0.3, "{scale} {options:?}: {other:?}, {whole:?}");
+        }
     }
 }
 

@@ -204,3 +204,28 @@ pub(super) fn rotation_steps(steps: Vec3, scales: Vec3) -> [f32; 2] {
         _ => [(steps[0] * steps[1]).sqrt(), steps[2]],
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_hair_in_a_step_changes_nothing_that_is_learned() {
+        let of = |base: f32| Parameters {
+            base: [base, 1.0],
+            factors: [1.0, 1.3, 1.0, 1.0, 1.0, 1.0],
+            ..Parameters::default()
+        };
+        for base in [3e-4_f32, 0.7, 12.0] {
+            let (one, other) = (of(base), of(base * 1.00001));
+            assert_ne!(one.value_step(0).to_bits(), other.value_step(0).to_bits());
+            for class in 0..=LAST_CLASS {
+                let step = one.for_learning().value_step(class);
+                assert_eq!(step.to_bits(), other.for_learning().value_step(class).to_bits());
+                assert!((0.91..1.1).contains(&(step / one.value_step(class))), "{base}, {class}: {step}");
+            }
+        }
+        let promised = Parameters { promised: 0.02, ..of(0.7) };
+        assert_eq!(promised.for_learning().value_step(3), promised.value_step(3));
+    }
+}
