@@ -1,7 +1,7 @@
 //! Drawing on a GPU, as a user asks for it. Without an adapter these tests are skipped.
 
 use crate::folder;
-use crate::folder::{Folder, lexisplat};
+use crate::folder::{Folder, cameras, lexisplat, read};
 use lexisplat_testing::{Need, missing};
 use serde_json::Value;
 
@@ -93,9 +93,10 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     if !gpu(&folder) {
         return;
     }
-    folder.add_cameras();
+    let views = cameras(&read(&folder.path("scene.ply")), 6);
+    std::fs::write(folder.path("cameras.json"), views).unwrap();
     let compress = |out: &str, device: &str| {
-        let cameras = ["--cameras", "cameras.json"];
+        let given = ["--cameras", "cameras.json"];
         folder.json(
             &[&["compress", "scene.ply", "-o", out, "--psnr", "38", "--device", device][..], &cameras]
                 .concat(),

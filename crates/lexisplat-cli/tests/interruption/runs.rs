@@ -75,7 +75,7 @@ const CAMERAS: &str = r#"[
 pub(crate) fn ready() -> Folder {
     let folder = Folder::new();
     std::fs::write(folder.path("cameras.json"), CAMERAS).unwrap();
-    folder.run(&["compress", "scene.ply", "--memory", "100kB", "-o", "kept.lexi", "--quiet"]);
+    folder.run(&["compress", "scene.ply", "--guess", "-o", "kept.lexi", "--quiet"]);
     folder
 }
 
