@@ -98,8 +98,7 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     let compress = |out: &str, device: &str| {
         let given = ["--cameras", "cameras.json"];
         folder.json(
-            &[&["compress", "scene.ply", "-o", out, "--psnr", "38", "--device", device][..], &cameras]
-                .concat(),
+            &[&["compress", "scene.ply", "-o", out, "--psnr", "38", "--device", device][..], &given].concat(),
         )
     };
     let told = compress("gpu.lexi", "gpu");
