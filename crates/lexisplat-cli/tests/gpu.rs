@@ -1,7 +1,7 @@
 //! Drawing on a GPU, as a user asks for it. Without an adapter these tests are skipped.
 
 use crate::folder;
-use crate::folder::{Folder, cameras, lexisplat, read};
+use crate::folder::{Folder, lexisplat};
 use lexisplat_testing::{Need, missing};
 use serde_json::Value;
 
@@ -93,8 +93,7 @@ fn a_file_says_when_a_gpu_looked_at_the_scene() {
     if !gpu(&folder) {
         return;
     }
-    let views = cameras(&read(&folder.path("scene.ply")), 6);
-    std::fs::write(folder.path("cameras.json"), views).unwrap();
+    folder.add_cameras(6);
     let compress = |out: &str, device: &str| {
         let given = ["--cameras", "cameras.json"];
         folder.json(

@@ -6,6 +6,8 @@ use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
 const SMALL: [&str; 6] = ["--scene", "object", "--orbit", "4", "--width", "160"];
+/// Packs the scene of [`Folder::few`] by its cameras.
+const BY_CAMERAS: [&str; 4] = ["compress", "scene.ply", "--cameras", "cameras.json"];
 /// An orbit as README's table has it.
 const AROUND: [&str; 6] = ["--scene", "object", "--orbit", "12", "--width", "480"];
 
@@ -101,29 +103,19 @@ fn the_kind_of_scene_can_be_given() {
 fn a_size_is_never_exceeded() {
     let folder = Folder::few();
     for (option, most) in [("8kB", 8_000), ("14000", 14_000)] {
-        let report = folder.json(&[
-            "compress",
-            "scene.ply",
-            "--cameras",
-            "cameras.json",
-            "--size",
-            option,
-            "--overwrite",
-        ]);
+        let report = folder.json(&[&BY_CAMERAS[..], &["--size", option, "--overwrite"]].concat());
         let bytes = folder.path("scene.lexi").metadata().unwrap().len();
         assert_eq!(report["file_bytes"], bytes);
         assert!(bytes <= most && bytes > most * 9 / 10, "{bytes} of {most}");
         assert!(number(&report["promise"]["mean_psnr"]) > 20.0);
     }
     let ply = folder.path("scene.ply").metadata().unwrap().len();
-    folder.run(&["compress", "scene.ply", "--cameras", "cameras.json", "--ratio", "12", "--overwrite"]);
+    folder.run(&[&BY_CAMERAS[..], &["--ratio", "12", "--overwrite"]].concat());
     assert!(folder.path("scene.lexi").metadata().unwrap().len() <= ply / 12);
     let before = std::fs::read(folder.path("scene.lexi")).unwrap();
-    let error = folder
-        .fail(&["compress", "scene.ply", "--cameras", "cameras.json", "--size", "300", "--overwrite"], 5);
+    let error = folder.fail(&[&BY_CAMERAS[..], &["--size", "300", "--overwrite"]].concat(), 5);
     assert!(error.contains("nothing smaller can be made"), "{error}");
-    let error = folder
-        .fail(&["compress", "scene.ply", "--cameras", "cameras.json", "--ratio", "1000", "--overwrite"], 5);
+    let error = folder.fail(&[&BY_CAMERAS[..], &["--ratio", "1000", "--overwrite"]].concat(), 5);
     assert!(
         error.contains("ratio = 1000: at most") && !error.contains("bytes"),
         "a ratio for a ratio: {error}"
@@ -215,28 +207,19 @@ fn info_says_what_a_packed_file_is_made_of() {
 #[test]
 fn what_is_left_out_is_reported() {
     let folder = Folder::few();
-    let report = folder.json(&["compress", "scene.ply", "--cameras", "cameras.json", "--preset", "small"]);
+    let report = folder.json(&[&BY_CAMERAS[..], &["--preset", "small"]].concat());
     let removed = number(&report["removed"]);
     assert!(removed > 0.0);
     assert_eq!(number(&report["gaussians"]) + removed, folder::FEW as f64);
     assert_eq!(folder.json(&["info", "scene.lexi"])["lexi"]["removed"], report["removed"]);
     assert!(folder.run(&["info", "scene.lexi"]).contains("left out"));
     for keep in ["--keep-all", "--keep-order"] {
-        let report = folder.json(&[
-            "compress",
-            "scene.ply",
-            "--cameras",
-            "cameras.json",
-            "--preset",
-            "small",
-            keep,
-            "--overwrite",
-        ]);
+        let report = folder.json(&[&BY_CAMERAS[..], &["--preset", "small", keep, "--overwrite"]].concat());
         assert_eq!((number(&report["removed"]), number(&report["gaussians"])), (0.0, folder::FEW as f64));
         assert!(!folder.run(&["info", "scene.lexi"]).contains("left out"));
     }
     // An option of before is accepted, and told about.
-    let arguments = ["compress", "scene.ply", "--cameras", "cameras.json", "--prune", "--overwrite"];
+    let arguments = [&BY_CAMERAS[..], &["--prune", "--overwrite"]].concat();
     let told = folder::lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
     assert!(told.status.success());
     assert!(String::from_utf8_lossy(&told.stderr).contains("--keep-all"));
@@ -247,16 +230,7 @@ fn a_limit_on_gaussians_is_kept() {
     let folder = Folder::few();
     let most = folder::FEW / 4;
     let limit = most.to_string();
-    let limited = [
-        "compress",
-        "scene.ply",
-        "--cameras",
-        "cameras.json",
-        "--preset",
-        "small",
-        "--max-gaussians",
-        &limit,
-    ];
+    let limited = [&BY_CAMERAS[..], &["--preset", "small", "--max-gaussians", &limit]].concat();
     let report = folder.json(&limited);
     let gaussians = number(&report["gaussians"]);
     assert!(gaussians <= most as f64 && gaussians > 0.0, "{gaussians}");
@@ -267,8 +241,7 @@ fn a_limit_on_gaussians_is_kept() {
     // What is reached is told beside the original, and no preset promises more than the limit lets it.
     assert!(number(&report["reached"]["mean_psnr"]) < 35.0);
     // A limit that is kept anyway changes nothing.
-    let plain =
-        ["compress", "scene.ply", "--cameras", "cameras.json", "--preset", "small", "-o", "plain.lexi"];
+    let plain = [&BY_CAMERAS[..], &["--preset", "small", "-o", "plain.lexi"]].concat();
     folder.run(&plain);
     folder.run(&[&plain[..6], &["-o", "wide.lexi", "--max-gaussians", "1000000"]].concat());
     let [plain, wide] = ["plain.lexi", "wide.lexi"].map(|name| std::fs::read(folder.path(name)).unwrap());

@@ -26,11 +26,11 @@ impl Folder {
         Self::of(GAUSSIANS)
     }
 
-    /// A folder with a scene of [`FEW`] Gaussians, and `cameras.json`: a few small views of it, by which a scene is packed much
-    /// sooner than by those that are looked for.
+    /// A folder with a scene of [`FEW`] Gaussians, and `cameras.json`: a few small views of it. A scene is packed by them much
+    /// sooner than by views that are looked for.
     pub(crate) fn few() -> Self {
         let folder = Self::of(FEW);
-        folder.add_cameras();
+        folder.add_cameras(12);
         folder
     }
 
@@ -40,10 +40,10 @@ impl Folder {
         folder
     }
 
-    /// Adds `cameras.json`, 12 views around the scene.
-    pub(crate) fn add_cameras(&self) {
+    /// Adds `cameras.json`, `views` views around the scene.
+    pub(crate) fn add_cameras(&self, views: usize) {
         let splats = read(&self.path("scene.ply"));
-        std::fs::write(self.path("cameras.json"), cameras(&splats, 12)).unwrap();
+        std::fs::write(self.path("cameras.json"), cameras(&splats, views)).unwrap();
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

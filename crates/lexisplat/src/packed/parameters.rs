@@ -17,7 +17,7 @@ const STEP_FEATURES: usize = 4;
 /// Number of the coarsest class of steps.
 pub(super) const LAST_CLASS: u8 = 15;
 
-/// Parts of an octave to one of which the step is rounded that a dictionary is learned with: it is off by at most 9 %.
+/// Parts of an octave. The step that a dictionary is learned with is rounded to one of them, which moves it by at most 9 %.
 const PER_OCTAVE: f64 = 4.0;
 
 /// Largest steps. With larger ones a value is as good as unknown, and errors are no longer small.
