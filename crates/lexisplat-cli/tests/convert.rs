@@ -173,7 +173,7 @@ fn surveys_keep_their_places() {
     assert_eq!(folder.json(&["info", "packed.lexi"])["offset"], info["offset"]);
     folder.run(&["decompress", "packed.lexi", "-o", "packed.ply"]);
     assert!(worst(&folder.path("packed.ply"), &places) < PACKED);
-    folder.run(&["convert", "packed.ply", "a.glb"]);
+    folder.run(&["convert", "packed.lexi", "a.glb"]);
     folder.run(&["convert", "a.glb", "glb.ply"]);
     assert!(worst(&folder.path("glb.ply"), &places) < PACKED);
     let lost = folder.json(&["convert", "far.ply", "a.spz"]);

@@ -133,7 +133,7 @@ fn test_views(file: &str, geometry: &Geometry) -> Result<Vec<Camera>, Box<dyn Er
     if file == "orbit" {
         return Ok(orbit(geometry, ORBIT_VIEWS, WIDTH, ORBIT_HEIGHT));
     }
-    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, WIDTH, geometry)?)
+    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, WIDTH, geometry, None)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

@@ -15,6 +15,7 @@ use crate::Options;
 use crate::camera_controller::SceneBounds;
 use crate::command::{Command, Slot};
 use crate::error::{Error, Result};
+use crate::given_cameras::GivenCameras;
 use crate::keys;
 use crate::models::{FinishedJob, Job, Notifier, OpenModel, OrbitSize};
 use crate::panel;
@@ -45,7 +46,7 @@ pub(crate) struct App {
     pub(crate) options: Options,
     pub(crate) state: State,
     /// The cameras of a file, if one was read.
-    pub(crate) given: Option<Vec<Camera>>,
+    pub(crate) given: Option<GivenCameras>,
     pub(crate) models: [Option<Arc<OpenModel>>; 2],
     pub(crate) jobs: [Option<Job>; 2],
     /// Jobs with an id up to this one open files that the command line names. The program fails if they fail.
@@ -89,7 +90,7 @@ impl App {
     pub(crate) fn new(
         creation: &eframe::CreationContext<'_>,
         options: Options,
-        given: Option<Vec<Camera>>,
+        given: Option<GivenCameras>,
         script: Script,
         failures: Sender<Error>,
     ) -> Result<Self> {
@@ -196,13 +197,20 @@ impl App {
 
     /// Moves to the first camera of the camera file, or of an orbit around the first model.
     pub(crate) fn reset_cameras(&mut self) {
-        let Some(model) = self.models.iter().flatten().next() else { return };
-        let (cameras, given) = match &self.given {
-            Some(cameras) => (cameras.clone(), true),
-            None => (model.orbit.clone(), false),
+        let Some(model) = self.models.iter().flatten().next().cloned() else { return };
+        let (cameras, given) = match self.given_cameras(&model) {
+            Ok(Some(cameras)) => (cameras, true),
+            Ok(None) => (model.orbit.clone(), false),
+            Err(error) => return self.show_error(error),
         };
         let bounds = SceneBounds::new(model.bulk, model.near, if given { &cameras } else { &[] });
         self.state.set_cameras(cameras, given, bounds);
+    }
+
+    /// Returns the cameras of the camera file, if there is one, for `model`.
+    pub(crate) fn given_cameras(&mut self, model: &OpenModel) -> Result<Option<Vec<Camera>>> {
+        let offset = model.scene.scene().meta().offset;
+        self.given.as_mut().map(|given| Ok(given.relative_to(offset)?.to_vec())).transpose()
     }
 
     /// Handles finished jobs, events of the render thread and errors of the driver.

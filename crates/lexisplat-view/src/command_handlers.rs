@@ -4,12 +4,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lexisplat_render::read_cameras;
+use lexisplat_eval::SplitFilter;
 use serde_json::json;
 
+use crate::Options;
 use crate::app::App;
 use crate::command::{Command, Mode, Quality, Slot};
 use crate::error::{Error, Result};
+use crate::given_cameras::GivenCameras;
 use crate::models;
 use crate::render_thread::{RenderRequest, Score, View};
 
@@ -68,9 +70,8 @@ impl App {
             }
         }
         if let Some(path) = cameras.first() {
-            let width = self.options.max_width.max(1);
-            let cameras = read_cameras(path)?.iter().map(|c| c.with_max_width(width)).collect();
-            self.given = Some(cameras);
+            let Options { max_width, near, .. } = self.options;
+            self.given = Some(GivenCameras::read(path, SplitFilter::All, max_width, near)?);
             self.reset_cameras();
             self.show_message(format!("cameras of {}", path.display()));
         }
@@ -83,7 +84,7 @@ impl App {
             return Err(lexisplat::Error::parameter("compress", quality, expected).into());
         };
         let id = self.next_id();
-        let cameras = self.given.clone().filter(|cameras| cameras.len() > 1);
+        let cameras = self.given_cameras(&original)?.filter(|cameras| cameras.len() > 1);
         let size = self.orbit_size();
         let job = models::compress_to(id, original, quality, cameras, size, self.notifier.clone());
         self.jobs[Slot::Second.index()] = Some(job);

@@ -60,6 +60,8 @@ mod command_handlers;
 mod compose;
 mod error;
 mod gesture;
+#[cfg(feature = "window")]
+mod given_cameras;
 pub mod keys;
 mod link;
 #[cfg(feature = "window")]

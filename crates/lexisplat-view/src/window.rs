@@ -4,16 +4,15 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 
 use eframe::{egui, egui_wgpu};
-use lexisplat::Geometry;
-use lexisplat_eval::choose_views;
 use lexisplat_render::gpu::{Gpu, rank};
-use lexisplat_render::{Camera, Device};
+use lexisplat_render::Device;
 
 use winit::event_loop::EventLoop;
 
 use crate::Options;
 use crate::app::App;
 use crate::error::{Error, Result};
+use crate::given_cameras::GivenCameras;
 use crate::script;
 
 /// Initial size of the window, in points.
@@ -33,7 +32,9 @@ const BACKENDS: wgpu::Backends = wgpu::Backends::PRIMARY;
 /// reading the files named in `options`; and while a script runs, every other error.
 pub fn run(mut options: Options) -> Result<()> {
     let script = script::parse(&options.script)?;
-    let given = given_cameras(&options)?;
+    let file = options.cameras.as_ref();
+    let given = file.map(|file| GivenCameras::read(file, options.split, options.max_width, options.near));
+    let given = given.transpose()?;
     if !has_display() {
         return Err(Error::NoDisplay);
     }
@@ -105,20 +106,6 @@ pub fn run(mut options: Options) -> Result<()> {
 /// What a device needs that only shows pictures.
 fn plain(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
     wgpu::DeviceDescriptor { required_limits: adapter.limits(), ..wgpu::DeviceDescriptor::default() }
-}
-
-/// Reads the camera file named in `options`, if there is one.
-fn given_cameras(options: &Options) -> Result<Option<Vec<Camera>>> {
-    let Some(path) = &options.cameras else { return Ok(None) };
-    let nothing = Geometry::default();
-    let mut cameras = choose_views(Some(path), options.split, 0, options.max_width, &nothing)?;
-    if let Some(near) = options.near {
-        cameras.iter_mut().for_each(|camera| camera.near = near);
-    }
-    for camera in &cameras {
-        camera.validate()?;
-    }
-    Ok(Some(cameras))
 }
 
 /// Returns whether there may be a display. Systems without X11 and Wayland always have one.

@@ -1,0 +1,76 @@
+//! The cameras of a file that the user named.
+
+use std::path::{Path, PathBuf};
+
+use lexisplat::{Geometry, Offset};
+use lexisplat_eval::{SplitFilter, choose_views};
+use lexisplat_render::Camera;
+
+use crate::error::Result;
+
+/// The cameras of a file, in the world of the scene that they show.
+#[derive(Debug, Clone)]
+pub(crate) struct GivenCameras {
+    file: PathBuf,
+    split: SplitFilter,
+    max_width: u32,
+    /// Distance of the near plane, in world units; without it that of the file.
+    near: Option<f32>,
+    offset: Option<Offset>,
+    cameras: Vec<Camera>,
+}
+
+impl GivenCameras {
+    /// Reads the cameras of `file` that `split` lets through, at most `max_width` pixels wide, for a scene without an
+    /// offset.
+    pub(crate) fn read(file: &Path, split: SplitFilter, max_width: u32, near: Option<f32>) -> Result<Self> {
+        let file = file.to_path_buf();
+        let mut given = Self { file, split, max_width: max_width.max(1), near, offset: None, cameras: Vec::new() };
+        given.cameras = given.read_for(None)?;
+        Ok(given)
+    }
+
+    /// Returns the cameras for a scene whose positions are relative to `offset`. The file is read again where the offset
+    /// is another than before, because its positions are more precise than those of cameras.
+    pub(crate) fn relative_to(&mut self, offset: Option<Offset>) -> Result<&[Camera]> {
+        if offset != self.offset {
+            self.cameras = self.read_for(offset)?;
+            self.offset = offset;
+        }
+        Ok(&self.cameras)
+    }
+
+    fn read_for(&self, offset: Option<Offset>) -> Result<Vec<Camera>> {
+        let nothing = Geometry::default();
+        let cameras = choose_views(Some(&self.file), self.split, 0, self.max_width, &nothing, offset)?;
+        let cameras: Vec<Camera> = cameras.into_iter().map(|camera| camera.with_near(self.near)).collect();
+        for camera in &cameras {
+            camera.validate()?;
+        }
+        Ok(cameras)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The camera is 0.015625 beside the offset, which single precision cannot tell from it.
+    #[test]
+    fn cameras_follow_the_offset_of_the_scene() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("cameras.json");
+        let list = r#"[{"img_name": "a", "width": 8, "height": 8, "fx": 8, "fy": 8,
+            "position": [500000.015625, 0, 0], "rotation": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}]"#;
+        std::fs::write(&file, list).unwrap();
+        let mut given = GivenCameras::read(&file, SplitFilter::All, 64, Some(0.5)).unwrap();
+        let offset = Offset::new([500_000.0, 0.0, 0.0]).unwrap();
+        for (offset, x) in [(None, 500_000.0), (offset, 0.015_625), (None, 500_000.0)] {
+            let camera = &given.relative_to(offset).unwrap()[0];
+            assert_eq!((camera.position, camera.near), ([x, 0.0, 0.0], 0.5));
+        }
+        std::fs::remove_file(&file).unwrap();
+        assert!(given.relative_to(None).is_ok());
+        assert!(given.relative_to(offset).is_err());
+    }
+}
