@@ -2,6 +2,7 @@
 
 use crate::conventions::NEAR_Z;
 use crate::error::{Error, Result};
+use crate::tile_set::TileSet;
 
 /// Largest width or height of a picture, in pixels.
 pub const MAX_SIDE: u32 = 16_384;
@@ -43,6 +44,9 @@ pub struct Camera {
     pub near: f32,
     /// Which part of the data set it belongs to, where the file says so.
     pub split: Option<Split>,
+    /// The tiles that are drawn; all of the picture if there is none. On a GPU sensitivities are measured on the whole
+    /// picture all the same.
+    pub tiles: Option<TileSet>,
 }
 
 impl Camera {
@@ -58,7 +62,7 @@ impl Camera {
     ) -> Self {
         let [fx, fy] = focal.map(single);
         let (position, rotation) = (position.map(single), rotation.map(|row| row.map(single)));
-        Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None }
+        Self { name, width, height, fx, fy, position, rotation, near: NEAR_Z, split: None, tiles: None }
     }
 
     /// Returns this camera with another near plane, in world units, or with its own for `None`.
@@ -81,15 +85,34 @@ impl Camera {
         self.resized(width, u32::try_from(height).unwrap_or(self.height).max(1))
     }
 
-    /// Returns this camera with pictures of exactly this size and the same field of view. The aspect must be nearly
-    /// the same.
+    /// Returns this camera with pictures of exactly this size and the same field of view, without a tile set. The aspect must
+    /// be nearly the same.
     #[must_use]
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let scale = |focal: f32, new: u32, old: u32| {
             single(f64::from(focal) * (f64::from(new) / f64::from(old.max(1))))
         };
         let (fx, fy) = (scale(self.fx, width, self.width), scale(self.fy, height, self.height));
-        Self { width, height, fx, fy, ..self.clone() }
+        Self { width, height, fx, fy, tiles: None, ..self.clone() }
+    }
+
+    /// Returns this camera with the tiles that it draws.
+    #[must_use]
+    pub fn with_tiles(self, tiles: impl Into<Option<TileSet>>) -> Self {
+        Self { tiles: tiles.into(), ..self }
+    }
+
+    /// Number of pixels that it draws.
+    #[must_use]
+    pub fn drawn_pixels(&self) -> u64 {
+        let whole = u64::from(self.width) * u64::from(self.height);
+        self.tiles.as_ref().map_or(whole, TileSet::pixels)
+    }
+
+    /// Width and height of the picture that it draws. That of a tile set is as [`TileSet`] says.
+    #[must_use]
+    pub fn picture_size(&self) -> [u32; 2] {
+        self.tiles.as_ref().map_or([self.width, self.height], TileSet::picture_size)
     }
 
     /// Returns `point`, in world units, in this camera's view space: x right, y down, z forward.
@@ -116,6 +139,9 @@ impl Camera {
             if !(length.is_finite() && length > 0.0) {
                 return Err(Error::parameter(name, length, "a finite number above 0"));
             }
+        }
+        if let Some(tiles) = &self.tiles {
+            tiles.check(self.width, self.height)?;
         }
         if !self.position.iter().all(|v| v.is_finite()) {
             return Err(Error::parameter("position", format!("{:?}", self.position), "finite numbers"));
@@ -154,6 +180,7 @@ pub(crate) fn straight_ahead(width: u32, height: u32, focal: f32) -> Camera {
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         near: NEAR_Z,
         split: None,
+        tiles: None,
     }
 }
 

@@ -177,7 +177,11 @@ impl Renderer {
     ) -> Result<Image> {
         #[cfg(feature = "gpu")]
         if let (Some((_, renderer)), Some(scene)) = (&mut self.gpu, &prepared.gpu) {
-            return Ok(renderer.render_async(scene, camera, options).await?.0);
+            let whole = renderer.render_async(scene, camera, options).await?.0;
+            return Ok(match &camera.tiles {
+                Some(set) => set.cut(&whole, options.background),
+                None => whole,
+            });
         }
         // A picture drawn from another thread at the same time, or one that panicked, has memory of its own.
         let mut own = Workspace::default();

@@ -3,7 +3,9 @@
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use lexisplat::{Progress, Silent, Splats, Stage, sh};
-use lexisplat_render::{Camera, Error, Image, RenderOptions, Scene, render, sensitivity, surround};
+use lexisplat_render::{
+    Camera, Error, Image, RenderOptions, Scene, TileSet, orbit, render, sensitivity, surround,
+};
 use lexisplat_sample::{SampleOptions, scene};
 
 const GAUSSIANS: usize = 120;
@@ -172,6 +174,33 @@ fn removal_is_what_the_pictures_lose() {
         seen += usize::from(largest > 0.05);
     }
     assert!(seen > 20, "{seen}");
+}
+
+/// What two halves of the tiles measure is together what the whole picture measures.
+#[test]
+fn tiles_measure_their_share() {
+    let splats = scene(&SampleOptions::new(300, 5));
+    let [whole] = &orbit(&splats.geometry, 1, 100, 70)[..] else { panic!() };
+    let measured =
+        |camera: &Camera| sensitivity(&Scene::from(&splats), std::slice::from_ref(camera), &Silent).unwrap();
+    let all = measured(whole);
+    let half = |odd: u32| TileSet::new(100, 70, |column, row| (column + row) % 2 == odd);
+    let [a, b] = [0, 1].map(|odd| {
+        let camera = whole.clone().with_tiles(half(odd));
+        (camera.drawn_pixels() as f32 / 7000.0, measured(&camera))
+    });
+    let close = |whole: f32, [x, y]: [f32; 2]| {
+        let sum = a.0 * x + b.0 * y;
+        assert!((sum - whole).abs() <= 1e-4 * whole.abs() + 1e-12, "{sum} {whole}");
+    };
+    for i in 0..splats.len() {
+        close(all.colour[i], [a.1.colour[i], b.1.colour[i]]);
+        close(all.opacity[i], [a.1.opacity[i], b.1.opacity[i]]);
+        for k in 0..6 {
+            close(all.position[i][k], [a.1.position[i][k], b.1.position[i][k]]);
+        }
+        assert_eq!(all.removal[i], a.1.removal[i].max(b.1.removal[i]));
+    }
 }
 
 #[test]

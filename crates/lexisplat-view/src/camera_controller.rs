@@ -217,6 +217,7 @@ mod tests {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             near: 0.2,
             split: None,
+            tiles: None,
         };
         CameraController::at(&camera, BOUNDS)
     }

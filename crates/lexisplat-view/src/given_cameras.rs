@@ -25,7 +25,8 @@ impl GivenCameras {
     /// offset.
     pub(crate) fn read(file: &Path, split: SplitFilter, max_width: u32, near: Option<f32>) -> Result<Self> {
         let file = file.to_path_buf();
-        let mut given = Self { file, split, max_width: max_width.max(1), near, offset: None, cameras: Vec::new() };
+        let mut given =
+            Self { file, split, max_width: max_width.max(1), near, offset: None, cameras: Vec::new() };
         given.cameras = given.read_for(None)?;
         Ok(given)
     }

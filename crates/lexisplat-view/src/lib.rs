@@ -33,6 +33,7 @@
 //!     rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
 //!     near: 0.2,
 //!     split: None,
+//!     tiles: None,
 //! };
 //! let mut state = State::new([0.0; 3]);
 //! state.set_open([true, false]);

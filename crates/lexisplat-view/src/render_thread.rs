@@ -288,6 +288,7 @@ mod tests {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             near: 0.2,
             split: None,
+            tiles: None,
         };
         View { camera, options: RenderOptions::default(), models: [Some(1), None] }
     }

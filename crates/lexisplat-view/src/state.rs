@@ -269,6 +269,7 @@ mod tests {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             near: 0.2,
             split: None,
+            tiles: None,
         };
         vec![at(0.0), at(1.0), at(2.0)]
     }

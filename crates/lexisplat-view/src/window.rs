@@ -4,8 +4,8 @@ use std::sync::Arc;
 use std::sync::mpsc::channel;
 
 use eframe::{egui, egui_wgpu};
-use lexisplat_render::gpu::{Gpu, rank};
 use lexisplat_render::Device;
+use lexisplat_render::gpu::{Gpu, rank};
 
 use winit::event_loop::EventLoop;
 

@@ -95,6 +95,7 @@ mod tests {
             rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             near: 0.2,
             split: None,
+            tiles: None,
         };
         names.iter().map(camera).collect()
     }

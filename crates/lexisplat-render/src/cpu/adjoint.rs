@@ -85,7 +85,7 @@ impl<'a> PictureAdjoint<'a> {
             return Err(Error::parameter("targets", targets.len(), "one for each camera"));
         }
         for (camera, target) in self.cameras.iter().zip(targets) {
-            if (camera.width, camera.height) != (target.width, target.height) {
+            if camera.picture_size() != [target.width, target.height] {
                 let size = format!("{} x {}", target.width, target.height);
                 return Err(Error::parameter("target", size, "the size of its camera's pictures"));
             }
@@ -140,9 +140,9 @@ impl<'a> PictureAdjoint<'a> {
         for (view, camera) in self.cameras.iter().enumerate() {
             progress.check()?;
             let projection = Projection::new(camera, self.scene.meta().antialiased);
-            let [width, height] = projection.size();
-            #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
-            let share = 1.0 / (width as f32 * height as f32 * self.cameras.len() as f32);
+            let [_, drawn] = projection.pixel_counts();
+            #[expect(clippy::cast_precision_loss, reason = "a count of views, to single precision")]
+            let share = 1.0 / (drawn * self.cameras.len() as f32);
             let Workspace { visible, order, .. } = &mut self.workspace;
             visible.project(&mut order.keys, simd, self.scene.geometry(), &radiance, &projection);
             measure_tiles(
@@ -179,7 +179,7 @@ type Light<const N: usize> = [[[Lanes; N]; BLOCKS]; BLOCKS];
 fn errors(picture: &Canvas, target: &Image, tile: Tile) -> Light<4> {
     let mut light = [[[[0.0; LANES]; 4]; BLOCKS]; BLOCKS];
     let width = target.width as usize;
-    let [left, top] = tile.corner();
+    let [left, top] = tile.drawn();
     for (y, row) in target.pixels.chunks_exact(width.max(1)).skip(top).take(TILE).enumerate() {
         for (x, pixel) in row.iter().skip(left).take(TILE).enumerate() {
             let lane = y % SIDE * SIDE + x % SIDE;
@@ -416,6 +416,7 @@ mod tests {
     use super::*;
     use crate::cpu::{RenderOptions, render};
     use crate::orbit::orbit;
+    use crate::tile_set::TileSet;
 
     /// The opacity of every Gaussian of the test's scenes is moved to below this, so that none is cut off.
     const MOST_OPAQUE: f32 = 0.9;
@@ -555,5 +556,21 @@ mod tests {
             }
         }
         assert!(adjoint.of_errors::<4>(&targets[1..], &Silent).is_err());
+        // What two halves of the tiles carry back is together what whole pictures do.
+        let halves = [0, 1].map(|odd| {
+            let set = TileSet::new(70, 50, |column, row| (column + row) % 2 == odd);
+            let cameras: Vec<Camera> =
+                cameras.iter().map(|camera| camera.clone().with_tiles(set.clone())).collect();
+            let targets = drawn(&with(&splats, &changes, 0.5), &cameras);
+            let mut adjoint = PictureAdjoint::new(Scene::from(&splats), &cameras).unwrap();
+            let found = adjoint.of_errors::<5>(&targets, &Silent).unwrap();
+            (set.pixels() as f32 / (70.0 * 50.0), found.errors)
+        });
+        for (i, whole) in errors.iter().enumerate() {
+            for (k, &whole) in whole.iter().enumerate() {
+                let sum: f32 = halves.iter().map(|(share, errors)| share * errors[i][k]).sum();
+                assert!((sum - whole).abs() < 1e-5 * errors[i][k].abs() + 1e-9, "{sum} {whole}");
+            }
+        }
     }
 }

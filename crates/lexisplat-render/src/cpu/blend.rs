@@ -42,17 +42,26 @@ pub(super) struct Tile {
     corner: [usize; 2],
     /// Sides of the whole picture in pixels.
     size: [usize; 2],
+    /// Where its first pixel is in the picture that is drawn, as (column, row): where it is in the whole picture, unless
+    /// only some tiles are drawn.
+    drawn: [usize; 2],
 }
 
 impl Tile {
     /// The tile at `place`, as (column, row), of a picture of `size` pixels.
     pub(super) fn new(place: [usize; 2], size: [usize; 2]) -> Self {
-        Self { corner: place.map(|k| k * TILE), size }
+        let corner = place.map(|k| k * TILE);
+        Self { corner, size, drawn: corner }
     }
 
-    /// Its first pixel, as (column, row).
-    pub(super) fn corner(self) -> [usize; 2] {
-        self.corner
+    /// This tile as number `number` of a [`TileSet`](crate::TileSet).
+    pub(super) fn of_set(self, number: usize) -> Self {
+        Self { drawn: [0, number * TILE], ..self }
+    }
+
+    /// Where its first pixel is in the picture that is drawn, as (column, row).
+    pub(super) fn drawn(self) -> [usize; 2] {
+        self.drawn
     }
 
     /// The x of the pixels in each column of blocks, and the y of those in each row.

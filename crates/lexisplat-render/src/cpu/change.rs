@@ -24,10 +24,9 @@ pub(crate) fn carry(
     moments: &mut [Moments],
 ) {
     let simd = Simd::current();
-    let [width, height] = projection.size();
-    #[expect(clippy::cast_precision_loss, reason = "a count of pixels, to single precision")]
-    let [alone, share] =
-        [1, views].map(|views| 1.0 / (width as f32 * height as f32 * CHANNELS * views as f32));
+    let [whole, drawn] = projection.pixel_counts();
+    #[expect(clippy::cast_precision_loss, reason = "a count of views, to single precision")]
+    let [alone, share] = [(whole, 1), (drawn, views)].map(|(n, views)| 1.0 / (n * CHANNELS * views as f32));
     let Sensitivity { position, scale, rotation, opacity, colour, removal, removal_view, .. } = total;
     let tasks: Vec<Task<'_>> = moments
         .chunks_mut(GAUSSIANS_PER_TASK)

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use crate::conventions::TILE;
+use crate::tile_set::TileSet;
 
 use super::splat::PixelRect;
 
@@ -33,6 +34,54 @@ impl Grid {
     pub(super) fn tile(&self, axis: usize, place: f32) -> f32 {
         let place = if place > 0.0 { place } else { 0.0 };
         (if place < self.counts[axis] { place } else { self.counts[axis] }).floor()
+    }
+}
+
+/// The tiles of a picture that are drawn.
+#[derive(Debug, Clone)]
+pub(super) struct ChosenTiles {
+    /// Whether each tile is drawn, row by row.
+    wanted: Vec<bool>,
+    /// Columns and rows that hold all of them, in tiles.
+    bounds: [Range<usize>; 2],
+    columns: usize,
+}
+
+impl ChosenTiles {
+    pub(super) fn new(grid: Grid, set: &TileSet) -> Self {
+        let mut wanted = vec![false; grid.columns * grid.rows];
+        let (mut first, mut end) = ([usize::MAX; 2], [0; 2]);
+        for tile in set.tiles().iter().map(|&tile| tile as usize) {
+            wanted[tile] = true;
+            for (k, at) in [tile % grid.columns, tile / grid.columns].into_iter().enumerate() {
+                first[k] = first[k].min(at);
+                end[k] = end[k].max(at + 1);
+            }
+        }
+        let bounds = [0, 1].map(|k| first[k]..end[k]);
+        Self { wanted, bounds, columns: grid.columns }
+    }
+
+    /// Whether tile `tile` of the picture is drawn.
+    #[inline(always)]
+    pub(super) fn wants(&self, tile: usize) -> bool {
+        self.wanted[tile]
+    }
+
+    /// The part of `rect` in the columns and rows that hold all tiles that are drawn; `None` if no such tile is in it.
+    #[inline(always)]
+    pub(super) fn within(&self, rect: PixelRect) -> Option<PixelRect> {
+        let [columns, rows] = [rect.columns(), rect.rows()];
+        let [left, top] = [columns.start.max(self.bounds[0].start), rows.start.max(self.bounds[1].start)];
+        let [right, bottom] = [columns.end.min(self.bounds[0].end), rows.end.min(self.bounds[1].end)];
+        let row = |row: usize| &self.wanted[row * self.columns + left..row * self.columns + right];
+        let any = left < right && (top..bottom).any(|r| row(r).contains(&true));
+        // Tiles are counted within 16 bits' worth of pixels.
+        let pixel = |tile: usize| u16::try_from(tile * TILE).unwrap_or(u16::MAX);
+        any.then(|| PixelRect {
+            min: [rect.min[0].max(pixel(left)), rect.min[1].max(pixel(top))],
+            max: [rect.max[0].min(pixel(right)), rect.max[1].min(pixel(bottom))],
+        })
     }
 }
 

@@ -48,24 +48,23 @@ pub(super) fn measure_tiles<T: Send>(
     mut add: impl FnMut(usize, T),
 ) {
     let grid = projection.grid;
-    let size = projection.size();
     let Workspace { visible, order, lists } = workspace;
     order.sort(visible);
     for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
-        lists.fill(order, grid, &band);
-        let tiles = band.len() * grid.columns;
+        lists.fill(order, grid, projection.chosen.as_ref(), &band);
+        let tiles = projection.tiles(&band);
         let mut first = 0;
-        while first < tiles {
-            let mut entries = lists.len(first);
+        while first < tiles.len() {
+            let mut entries = lists.len(tiles[first].0);
             let mut end = first + 1;
-            while end < tiles && entries + lists.len(end) <= ENTRIES {
-                entries += lists.len(end);
+            while end < tiles.len() && entries + lists.len(tiles[end].0) <= ENTRIES {
+                entries += lists.len(tiles[end].0);
                 end += 1;
             }
             let parts: Vec<Vec<(u32, T)>> = (first..end)
                 .into_par_iter()
-                .map(|tile| {
-                    let place = Tile::new([tile % grid.columns, band.start + tile / grid.columns], size);
+                .map(|k| {
+                    let (tile, place) = tiles[k];
                     pool.with(|scratch| measure(&visible.slots, lists.of(tile), place, scratch))
                 })
                 .collect();

@@ -2,6 +2,8 @@
 //!
 //! All steps work on a group of Gaussians, in short loops without branches that become vector instructions.
 
+use std::ops::Range;
+
 use lexisplat::Geometry;
 
 use crate::camera::Camera;
@@ -10,7 +12,8 @@ use crate::conventions::{
     TAN_LIMIT, W_EPSILON,
 };
 
-use super::grid::{Grid, TILE_F32};
+use super::blend::Tile;
+use super::grid::{ChosenTiles, Grid, TILE_F32};
 use super::lanes::{LANES, Lanes, each};
 use super::math::{exp, ln, sigmoid};
 use super::splat::Root;
@@ -37,6 +40,8 @@ pub(crate) struct Projection {
     /// [`W_EPSILON`], in proportion to the near plane.
     w_epsilon: f32,
     pub(super) grid: Grid,
+    /// The tiles that are drawn; `None` for all.
+    pub(super) chosen: Option<ChosenTiles>,
     antialiased: bool,
     /// Whether to leave out what cannot reach [`ALPHA_MIN`]. It makes no difference to the picture; tests check
     /// that by drawing without it.
@@ -78,7 +83,7 @@ pub(super) struct Placed {
 impl Body {
     /// Returns these Gaussians, at most [`LANES`]. The rest of the lanes are zero.
     #[inline(always)]
-    pub(super) fn load(geometry: &Geometry, gaussians: std::ops::Range<usize>) -> Self {
+    pub(super) fn load(geometry: &Geometry, gaussians: Range<usize>) -> Self {
         let mut out = Self {
             position: [[0.0; LANES]; 3],
             scales: [[0.0; LANES]; 3],
@@ -114,12 +119,37 @@ impl Projection {
         let focal = [camera.fx, camera.fy];
         let tan = [size[0] / (2.0 * focal[0]), size[1] / (2.0 * focal[1])];
         let w_epsilon = W_EPSILON * (camera.near / NEAR_Z);
-        Self { camera: camera.clone(), tan, focal, size, w_epsilon, grid, antialiased, tighten: true }
+        let chosen = camera.tiles.as_ref().map(|set| ChosenTiles::new(grid, set));
+        let camera = camera.clone();
+        Self { camera, tan, focal, size, w_epsilon, grid, chosen, antialiased, tighten: true }
     }
 
     /// Width and height of the picture in pixels.
     pub(super) fn size(&self) -> [usize; 2] {
         [self.camera.width as usize, self.camera.height as usize]
+    }
+
+    /// Number of pixels of the whole picture, and of those that are drawn.
+    #[expect(clippy::cast_precision_loss, reason = "counts of pixels, to single precision")]
+    pub(super) fn pixel_counts(&self) -> [f32; 2] {
+        let whole = self.size[0] * self.size[1];
+        [whole, self.camera.tiles.as_ref().map_or(whole, |set| set.pixels() as f32)]
+    }
+
+    /// The tiles of the rows in `band` that are drawn: numbers within the band, and places in the picture.
+    pub(super) fn tiles(&self, band: &Range<usize>) -> Vec<(usize, Tile)> {
+        let (grid, size) = (self.grid, self.size());
+        let at = |tile: usize| Tile::new([tile % grid.columns, tile / grid.columns], size);
+        let first = band.start * grid.columns;
+        let within = first..band.end * grid.columns;
+        match &self.camera.tiles {
+            None => within.map(|tile| (tile - first, at(tile))).collect(),
+            Some(set) => {
+                let numbered = set.tiles().iter().map(|&tile| tile as usize).enumerate();
+                let own = numbered.filter(|(_, tile)| within.contains(tile));
+                own.map(|(number, tile)| (tile - first, at(tile).of_set(number))).collect()
+            }
+        }
     }
 
     /// This projection, without leaving anything out.

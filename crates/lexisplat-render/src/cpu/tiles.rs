@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::parallel::*;
 
-use super::grid::Grid;
+use super::grid::{ChosenTiles, Grid};
 use super::order::Order;
 use super::splat::PixelRect;
 
@@ -57,14 +57,29 @@ struct Piece {
 }
 
 impl TileLists {
-    /// Lists the splats over the rows of tiles in `band`, in place of the lists before.
-    pub(super) fn fill(&mut self, order: &Order, grid: Grid, band: &Range<usize>) {
+    /// Lists the splats over the rows of tiles in `band`, in place of the lists before. Lists of tiles that are not `chosen`
+    /// are empty.
+    pub(super) fn fill(
+        &mut self,
+        order: &Order,
+        grid: Grid,
+        chosen: Option<&ChosenTiles>,
+        band: &Range<usize>,
+    ) {
         let len = order.keys.len();
         let size = len.div_ceil(PIECES).max(1);
         self.pieces.resize_with(PIECES, Piece::default);
         self.pieces.par_chunks_mut(1).enumerate().for_each(|(k, piece)| {
             let range = (k * size).min(len)..((k + 1) * size).min(len);
-            piece.iter_mut().for_each(|piece| piece.fill(order, range.clone(), grid, band));
+            let first = band.start * grid.columns;
+            for piece in piece {
+                match chosen {
+                    None => piece.fill(order, range.clone(), grid, band, |_| true),
+                    Some(chosen) => {
+                        piece.fill(order, range.clone(), grid, band, |tile| chosen.wants(first + tile));
+                    }
+                }
+            }
         });
     }
 
@@ -95,13 +110,23 @@ impl<'a> Iterator for List<'a> {
 }
 
 impl Piece {
-    fn fill(&mut self, order: &Order, range: Range<usize>, grid: Grid, band: &Range<usize>) {
+    /// Lists the splats in `range` for the tiles of the band that are `wanted`.
+    fn fill(
+        &mut self,
+        order: &Order,
+        range: Range<usize>,
+        grid: Grid,
+        band: &Range<usize>,
+        wanted: impl Fn(usize) -> bool,
+    ) {
+        let wanted = &wanted;
         let tiles = |rect: PixelRect| {
             let (columns, rows) = (rect.columns(), rect.rows());
             let top = rows.start.max(band.start) - band.start;
             let bottom = rows.end.min(band.end).saturating_sub(band.start);
             (top..bottom)
                 .flat_map(move |row| row * grid.columns + columns.start..row * grid.columns + columns.end)
+                .filter(move |tile| wanted(*tile))
         };
         let Self { starts, entries } = self;
         // Tile t is counted at `t + 2`. After the sums its list begins at `starts[t + 1]`, and filling the list
@@ -145,7 +170,7 @@ mod tests {
         let order = Order::of((0..60).map(|slot| 100 - slot).collect(), &rects);
         let mut lists = TileLists::default();
         for band in [0..grid.rows, 1..3] {
-            lists.fill(&order, grid, &band);
+            lists.fill(&order, grid, None, &band);
             for row in band.clone() {
                 for column in 0..grid.columns {
                     let inside = |r: &PixelRect| {

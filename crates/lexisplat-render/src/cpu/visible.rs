@@ -96,11 +96,15 @@ impl Task<'_> {
                 if !(min[0] < max[0] && min[1] < max[1]) {
                     continue;
                 }
+                let mut pixels = PixelRect { min: min.map(whole), max: max.map(whole) };
+                if let Some(chosen) = &projection.chosen {
+                    let Some(within) = chosen.within(pixels) else { continue };
+                    pixels = within;
+                }
                 let colour = radiance.colour(i, placed.direction.map(|v| v[lane]));
                 if !colour.iter().all(|v| v.is_finite()) {
                     continue;
                 }
-                let pixels = PixelRect { min: min.map(whole), max: max.map(whole) };
                 rects[count] = pixels;
                 // Depths are positive, so their bits are in the order of the numbers. Gaussians are counted in u32.
                 let index = |i: usize| u32::try_from(i).unwrap_or(u32::MAX);

@@ -65,7 +65,7 @@ impl GpuRenderer {
             for (gaussian, moments) in gaussians.into_iter().zip(moments) {
                 sums[place(&places, gaussian)] = moments;
             }
-            let projection = Projection::new(camera, scene.antialiased);
+            let projection = Projection::new(&camera.clone().with_tiles(None), scene.antialiased);
             carry(&mut total, &projection, geometry, cameras.len(), &mut sums);
             progress.advance(1);
         }

@@ -46,6 +46,7 @@ pub(crate) fn straight(width: u32, height: u32, focal: f32) -> Camera {
         rotation: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
         near: 0.2,
         split: None,
+        tiles: None,
     }
 }
 

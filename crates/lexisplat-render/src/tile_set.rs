@@ -1,0 +1,120 @@
+//! Some of the tiles of a picture.
+
+use crate::conventions::TILE;
+use crate::error::{Error, Result};
+use crate::image::Image;
+
+/// Some of the tiles of a picture, in the order of rows and then of columns.
+///
+/// A camera with a tile set draws those tiles alone, with the same bits as in the whole picture. The picture that comes out is
+/// one tile wide. Its tiles lie below one another, and pixels beyond the border of the whole picture show the background.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TileSet {
+    /// Sides of the whole picture, in pixels.
+    size: [u32; 2],
+    /// Numbers of the tiles, in ascending order.
+    tiles: Vec<u32>,
+    /// Pixels of the tiles that are within the picture.
+    pixels: u64,
+}
+
+impl TileSet {
+    /// The tiles, as (column, row), that `wanted` chooses of a picture of `width` by `height` pixels.
+    #[must_use]
+    pub fn new(width: u32, height: u32, wanted: impl Fn(u32, u32) -> bool) -> Self {
+        let side = |pixels: u32| pixels.div_ceil(TILE_U32);
+        let (columns, rows) = (side(width), side(height));
+        let inside = |k: u32, pixels: u32| u64::from((pixels - k * TILE_U32).min(TILE_U32));
+        let (mut tiles, mut pixels) = (Vec::new(), 0);
+        for row in 0..rows {
+            for column in (0..columns).filter(|&column| wanted(column, row)) {
+                tiles.push(row * columns + column);
+                pixels += inside(column, width) * inside(row, height);
+            }
+        }
+        Self { size: [width, height], tiles, pixels }
+    }
+
+    /// Numbers of the tiles in the whole picture, counted row by row, in ascending order.
+    #[must_use]
+    pub fn tiles(&self) -> &[u32] {
+        &self.tiles
+    }
+
+    /// Number of pixels that are within the picture.
+    #[must_use]
+    pub fn pixels(&self) -> u64 {
+        self.pixels
+    }
+
+    /// The tiles of a picture of half the width and height in which one of these is.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let columns = self.size[0].div_ceil(TILE_U32).max(1);
+        let [width, height] = self.size.map(|side| (side / 2).max(1));
+        let mut places: Vec<[u32; 2]> =
+            self.tiles.iter().map(|tile| [tile / columns / 2, tile % columns / 2]).collect();
+        places.sort_unstable();
+        places.dedup();
+        Self::new(width, height, |column, row| places.binary_search(&[row, column]).is_ok())
+    }
+
+    /// Whether this is of pictures of `width` by `height` pixels, and not empty.
+    pub(crate) fn check(&self, width: u32, height: u32) -> Result<()> {
+        if self.size == [width, height] && !self.tiles.is_empty() {
+            return Ok(());
+        }
+        let [w, h] = self.size;
+        let given = format!("{} tiles of {w} x {h} pixels", self.tiles.len());
+        Err(Error::parameter("tiles", given, format!("at least one tile of {width} x {height} pixels")))
+    }
+
+    /// Width and height of the picture of these tiles.
+    pub(crate) fn picture_size(&self) -> [u32; 2] {
+        [TILE_U32, u32::try_from(self.tiles.len()).unwrap_or(u32::MAX).saturating_mul(TILE_U32)]
+    }
+
+    /// The picture of these tiles, cut out of the whole one over `background`.
+    #[cfg(any(test, feature = "gpu"))]
+    pub(crate) fn cut(&self, whole: &Image, background: [f32; 3]) -> Image {
+        let columns = whole.width.div_ceil(TILE_U32).max(1);
+        let [width, height] = self.picture_size();
+        let mut pixels = Vec::with_capacity(self.tiles.len() * TILE * TILE);
+        for tile in &self.tiles {
+            let [left, top] = [tile % columns, tile / columns].map(|k| k * TILE_U32);
+            for y in top..top + TILE_U32 {
+                for x in left..left + TILE_U32 {
+                    let inside = x < whole.width && y < whole.height;
+                    let at = y as usize * whole.width as usize + x as usize;
+                    pixels.push(if inside { whole.pixels[at] } else { background });
+                }
+            }
+        }
+        Image { width, height, pixels }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "16")]
+const TILE_U32: u32 = TILE as u32;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_within_the_picture_count() {
+        let all = TileSet::new(40, 20, |_, _| true);
+        assert_eq!((all.tiles(), all.pixels()), (&[0, 1, 2, 3, 4, 5][..], 800));
+        let last = TileSet::new(40, 20, |column, row| column == 2 && row == 1);
+        assert_eq!((last.tiles(), last.pixels(), last.picture_size()), (&[5][..], 32, [16, 16]));
+        assert!(last.check(40, 20).is_ok() && last.check(40, 21).is_err());
+        assert!(TileSet::new(40, 20, |_, _| false).check(40, 20).is_err());
+    }
+
+    #[test]
+    fn halves_hold_what_wholes_do() {
+        let set = TileSet::new(100, 67, |column, row| (column, row) == (3, 1) || column == 6);
+        // 50 by 33 pixels have 4 by 3 tiles.
+        assert_eq!(set.halved().tiles(), [1, 3, 7, 11]);
+    }
+}
