@@ -53,7 +53,7 @@ fn a_quality_is_reached_and_recorded() {
         assert_eq!((&promise["target"], &promise["asked"]), (&option[2..].into(), &38.0.into()));
         let reached = &report["reached"];
         assert!((38.0..38.6).contains(&number(&reached[key])), "{report}");
-        // Generated views are judged by the worse half of them.
+        // Generated views are judged by the worst quarter of them.
         assert!(number(&reached["judged_psnr"]) < number(&reached["mean_psnr"]), "{report}");
         for key in ["mean_psnr", "min_psnr", "views", "cameras"] {
             assert_eq!(promise[key], reached[key], "{key}");

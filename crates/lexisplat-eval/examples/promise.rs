@@ -1,8 +1,8 @@
 //! How far compressed scenes are from their original, over views that were not there when they were made.
 //!
-//! `promise ORIGINAL.ply CAMERAS.json|orbit FILE.lexi ...` prints one JSON object a file. Views are those marked
-//! `test`, else every 8th by name, 400 pixels wide; `orbit` is 12 views from around the scene. Each kind of views off
-//! the path is made of these: at half and at a quarter of the distance, four times as far, from above, and turned back.
+//! `promise ORIGINAL.ply CAMERAS.json|orbit WIDTH[,WIDTH ...] FILE.lexi ...` prints one JSON object a file. Views are those
+//! marked `test`, else every 8th by name; `orbit` is 12 views from around the scene. They are at most WIDTH pixels wide. The
+//! first width counts for all; at others there are views on the path alone. Each kind of views off the path is made of these: at half and at a quarter of the distance, four times as far, from above, and turned back.
 //! Views that the original covers by less than 5 % do not count. A view's PSNR is at most 60 dB. Tiles are whole
 //! squares of 32 pixels.
 
@@ -15,9 +15,7 @@ use lexisplat_eval::{SceneFile, SplitFilter, choose_views};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, orbit};
 use serde_json::{Map, Value, json};
 
-const WIDTH: u32 = 400;
 const ORBIT_VIEWS: usize = 12;
-const ORBIT_HEIGHT: u32 = 300;
 const TILE: usize = 32;
 /// Largest PSNR of a view, in dB.
 const MOST: f64 = 60.0;
@@ -129,27 +127,30 @@ fn scores(a: &Image, b: &Image) -> (f64, f64) {
     (decibels(all, 3 * a.pixels.len()), worst)
 }
 
-fn test_views(file: &str, geometry: &Geometry) -> Result<Vec<Camera>, Box<dyn Error>> {
+fn test_views(file: &str, width: u32, geometry: &Geometry) -> Result<Vec<Camera>, Box<dyn Error>> {
     if file == "orbit" {
-        return Ok(orbit(geometry, ORBIT_VIEWS, WIDTH, ORBIT_HEIGHT));
+        return Ok(orbit(geometry, ORBIT_VIEWS, width, width / 4 * 3));
     }
-    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, WIDTH, geometry, None)?)
+    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, width, geometry, None)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [original, cameras, files @ ..] = arguments.as_slice() else {
-        return Err("ORIGINAL.ply CAMERAS.json|orbit FILE ...".into());
+    let [original, cameras, widths, files @ ..] = arguments.as_slice() else {
+        return Err("ORIGINAL.ply CAMERAS.json|orbit WIDTH[,WIDTH ...] FILE ...".into());
     };
+    let widths: Vec<u32> = widths.split(',').map(str::parse).collect::<Result<_, _>>()?;
     let original = SceneFile::read(Path::new(original), &ReadOptions::default())?;
     let geometry = original.scene().geometry();
-    let views = test_views(cameras, geometry)?;
-    let distances: Vec<f64> = views.iter().map(|view| distance(view, geometry)).collect();
     let mut renderer = Renderer::cpu();
     let options = RenderOptions::default();
-    let mut references: Vec<(&str, Vec<(Camera, Image)>)> = Vec::new();
+    let mut references: Vec<(String, Vec<(Camera, Image)>)> = Vec::new();
     let prepared = renderer.prepare(original.scene())?;
-    for (name, kind) in KINDS {
+    let all = KINDS.map(|(name, kind)| (name.to_owned(), widths[0], kind));
+    let others = widths[1..].iter().map(|&width| (format!("path_{width}"), width, Kind::Path));
+    for (name, width, kind) in all.into_iter().chain(others) {
+        let views = test_views(cameras, width, geometry)?;
+        let distances: Vec<f64> = views.iter().map(|view| distance(view, geometry)).collect();
         let mut drawn = Vec::new();
         for (view, distance) in views.iter().zip(&distances) {
             let camera = moved(view, kind, *distance);
@@ -177,7 +178,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let mean = all.iter().sum::<f64>() / all.len().max(1) as f64;
             let worst = all.iter().copied().fold(MOST, f64::min);
             let of = json!({"views": all.len(), "mean": mean, "worst": worst, "worst_tile": worst_tile});
-            out.insert((*name).into(), if all.is_empty() { Value::Null } else { of });
+            out.insert(name.clone(), if all.is_empty() { Value::Null } else { of });
         }
         println!("{}", Value::Object(out));
     }

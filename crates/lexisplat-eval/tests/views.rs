@@ -102,8 +102,7 @@ fn a_scene_that_is_turned_scaled_and_moved_keeps_its_quality() {
     let quality = |splats: &Splats, cameras: &[Camera]| {
         let (file, _) = run(Packing::new(Target::MeanPsnr(40.0)), splats);
         let model = lexi::read_bytes("scene.lexi", &file, &Limits::default()).unwrap();
-        let judging: Vec<&Camera> = cameras.iter().collect();
-        let mut judge = Judge::new(Renderer::cpu(), splats, &judging, true, &Silent).unwrap();
+        let mut judge = Judge::new(Renderer::cpu(), splats, cameras, true, &Silent).unwrap();
         judge.score(&model, &Silent).unwrap().mean
     };
     let (here, there) = (quality(&splats, &cameras), quality(&turned, &moved));

@@ -115,6 +115,30 @@ impl Camera {
         self.tiles.as_ref().map_or([self.width, self.height], TileSet::picture_size)
     }
 
+    /// Where pixel number `drawn` of the picture that it draws, counted row by row, is in the whole picture, as (column, row);
+    /// `None` if it is beyond the border.
+    #[must_use]
+    pub fn place_of_drawn(&self, drawn: usize) -> Option<[usize; 2]> {
+        let [width, height] = [self.width, self.height].map(|side| side as usize);
+        let place = match &self.tiles {
+            None => [drawn % width, drawn / width],
+            Some(set) => set.place_of_drawn(drawn)?,
+        };
+        (place[0] < width && place[1] < height).then_some(place)
+    }
+
+    /// The number of the pixel at `place`, as (column, row) of the whole picture, in the picture that it draws; `None` if it is
+    /// not drawn.
+    #[must_use]
+    pub fn drawn_at(&self, [column, row]: [usize; 2]) -> Option<usize> {
+        let [width, height] = [self.width, self.height].map(|side| side as usize);
+        match &self.tiles {
+            _ if column >= width || row >= height => None,
+            None => Some(row * width + column),
+            Some(set) => set.drawn_at([column, row]),
+        }
+    }
+
     /// Returns `point`, in world units, in this camera's view space: x right, y down, z forward.
     #[must_use]
     #[inline]

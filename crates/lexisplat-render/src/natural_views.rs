@@ -13,8 +13,9 @@ use crate::surround::PLASTIC;
 use crate::transmittance::unit_rotation;
 
 /// Logarithm of a Gaussian's distance from the nearest and the farthest camera in its largest standard deviations. The
-/// mean of the Gaussians in a photograph is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md).
-const DISTANCES: [f64; 2] = [3.0, 5.5];
+/// mean of the Gaussians in a photograph of 400 pixels is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md). In
+/// one of three times as many pixels it is 1.1 more.
+const DISTANCES: [f64; 2] = [3.0, 6.6];
 /// Focal lengths in picture widths, in turn: fields of view of 84, 67, 56 and 42 degrees.
 const FOCALS: [f64; 4] = [0.55, 0.75, 0.95, 1.3];
 /// A direction whose y is larger than this needs another up than the world's.
@@ -95,7 +96,7 @@ mod tests {
                 let size = f64::from(g.scales[i][2].max(g.scales[i][0]));
                 (z > 0.0 && x.hypot(y) < 1e-3 * z).then(|| z.ln() - size)
             });
-            assert!(seen.into_iter().any(|d| (2.99..5.51).contains(&d)), "{camera:?}");
+            assert!(seen.into_iter().any(|d| (2.99..6.61).contains(&d)), "{camera:?}");
         }
     }
 

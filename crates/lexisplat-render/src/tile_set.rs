@@ -59,6 +59,23 @@ impl TileSet {
         Self::new(width, height, |column, row| places.binary_search(&[row, column]).is_ok())
     }
 
+    /// Where pixel number `drawn` of the picture of these tiles is in the whole one, as (column, row), within the border or
+    /// beyond it; `None` if there is no such pixel.
+    pub(crate) fn place_of_drawn(&self, drawn: usize) -> Option<[usize; 2]> {
+        let columns = self.size[0].div_ceil(TILE_U32).max(1);
+        let tile = *self.tiles.get(drawn / (TILE * TILE))?;
+        let corner = [tile % columns, tile / columns].map(|k| k as usize * TILE);
+        Some([corner[0] + drawn % TILE, corner[1] + drawn / TILE % TILE])
+    }
+
+    /// The number of the pixel at `place` of the whole picture in the picture of these tiles; `None` if it is in none of them.
+    pub(crate) fn drawn_at(&self, [column, row]: [usize; 2]) -> Option<usize> {
+        let columns = self.size[0].div_ceil(TILE_U32).max(1) as usize;
+        let tile = u32::try_from(row / TILE * columns + column / TILE).ok()?;
+        let number = self.tiles.binary_search(&tile).ok()?;
+        Some(number * TILE * TILE + row % TILE * TILE + column % TILE)
+    }
+
     /// Whether this is of pictures of `width` by `height` pixels, and not empty.
     pub(crate) fn check(&self, width: u32, height: u32) -> Result<()> {
         if self.size == [width, height] && !self.tiles.is_empty() {
@@ -77,19 +94,13 @@ impl TileSet {
     /// The picture of these tiles, cut out of the whole one over `background`.
     #[cfg(any(test, feature = "gpu"))]
     pub(crate) fn cut(&self, whole: &Image, background: [f32; 3]) -> Image {
-        let columns = whole.width.div_ceil(TILE_U32).max(1);
         let [width, height] = self.picture_size();
-        let mut pixels = Vec::with_capacity(self.tiles.len() * TILE * TILE);
-        for tile in &self.tiles {
-            let [left, top] = [tile % columns, tile / columns].map(|k| k * TILE_U32);
-            for y in top..top + TILE_U32 {
-                for x in left..left + TILE_U32 {
-                    let inside = x < whole.width && y < whole.height;
-                    let at = y as usize * whole.width as usize + x as usize;
-                    pixels.push(if inside { whole.pixels[at] } else { background });
-                }
-            }
-        }
+        let places = (0..self.tiles.len() * TILE * TILE).filter_map(|drawn| self.place_of_drawn(drawn));
+        let pixel = |[x, y]: [usize; 2]| {
+            let inside = x < whole.width as usize && y < whole.height as usize;
+            if inside { whole.pixels[y * whole.width as usize + x] } else { background }
+        };
+        let pixels = places.map(pixel).collect();
         Image { width, height, pixels }
     }
 }
@@ -109,6 +120,8 @@ mod tests {
         assert_eq!((last.tiles(), last.pixels(), last.picture_size()), (&[5][..], 32, [16, 16]));
         assert!(last.check(40, 20).is_ok() && last.check(40, 21).is_err());
         assert!(TileSet::new(40, 20, |_, _| false).check(40, 20).is_err());
+        assert_eq!((last.place_of_drawn(17), last.place_of_drawn(256)), (Some([33, 17]), None));
+        assert_eq!((last.drawn_at([33, 17]), last.drawn_at([31, 17])), (Some(17), None));
     }
 
     #[test]

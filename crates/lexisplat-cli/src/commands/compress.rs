@@ -319,7 +319,7 @@ pub(crate) fn error_line(record: &Record) -> String {
 fn uncertain(reached: &ReachedRecord) -> Option<String> {
     uncertain_by(reached).map(|below| {
         format!(
-            "one of the views that judged is {below:.0} dB worse than the harder half of them: what photographs show is \
+            "one of the views that judged is {below:.0} dB worse than the hardest quarter of them: what photographs show is \
              not certain. Give --cameras if you have them"
         )
     })

@@ -6,7 +6,7 @@
 use lexisplat::packed::AppearanceChange;
 use lexisplat::sh::C0;
 use lexisplat::{Progress, Splats, Stage};
-use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene};
+use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene, TileSet};
 
 use super::only_cancels::OneStep;
 use super::solve::{ROW, kinds, solve};
@@ -42,13 +42,10 @@ pub(super) fn alone(
     // The views are drawn once for the errors and once in each step.
     progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
     let parts = &OneStep(progress);
-    let smaller = |camera: &Camera| {
-        let [width, height] = [camera.width, camera.height].map(|side| (side / SHRINKING).max(1));
-        camera.resized(width, height)
-    };
-    let cameras: Vec<Camera> = cameras.iter().map(smaller).collect();
-    let targets: Vec<Image> =
-        targets.iter().zip(&cameras).map(|(target, c)| shrunk(target, [c.width, c.height])).collect();
+    let smaller: Vec<Camera> = cameras.iter().map(shrunk_camera).collect();
+    let shrink = |((target, camera), smaller): ((&Image, &Camera), &Camera)| shrunk(target, camera, smaller);
+    let targets: Vec<Image> = targets.iter().zip(cameras).zip(&smaller).map(shrink).collect();
+    let cameras = smaller;
     let mut changes = vec![AppearanceChange::default(); splats.len()];
     let make = |splats: &mut Splats, i: usize, change: AppearanceChange| -> AppearanceChange {
         let change = change.rounded();
@@ -97,26 +94,32 @@ fn nearest<const N: usize>(
     solve(&mut adjoint, errors, &ridge, &diagonal, STEPS, progress)
 }
 
-/// `image` with fewer pixels: the means of those that each covers.
-fn shrunk(image: &Image, [width, height]: [u32; 2]) -> Image {
-    let covered = |k: u32, of: u32, from: u32| {
-        // Sides are at most 2^14.
-        let place = |k: u32| (k * from).div_ceil(of.max(1)) as usize;
+/// `camera` with fewer pixels, in the same part of the picture.
+fn shrunk_camera(camera: &Camera) -> Camera {
+    let [width, height] = [camera.width, camera.height].map(|side| (side / SHRINKING).max(1));
+    camera.resized(width, height).with_tiles(camera.tiles.as_ref().map(TileSet::halved))
+}
+
+/// `image`, which `camera` draws, as `smaller` would: each pixel is the mean of those that it covers and that are there.
+fn shrunk(image: &Image, camera: &Camera, smaller: &Camera) -> Image {
+    let covered = |k: usize, of: u32, from: u32| {
+        let place = |k: usize| (k * from as usize).div_ceil(of.max(1) as usize);
         place(k)..place(k + 1)
     };
+    let [width, height] = smaller.picture_size();
     let mut pixels = Vec::with_capacity(width as usize * height as usize);
-    for y in 0..height {
-        for x in 0..width {
-            let mut sums = [0.0_f32; 4];
-            for row in covered(y, height, image.height) {
-                for column in covered(x, width, image.width) {
-                    let pixel = image.pixels[row * image.width as usize + column];
-                    (0..3).for_each(|c| sums[c] += pixel[c]);
+    for drawn in 0..width as usize * height as usize {
+        let mut sums = [0.0_f32; 4];
+        if let Some([x, y]) = smaller.place_of_drawn(drawn) {
+            for row in covered(y, smaller.height, camera.height) {
+                for column in covered(x, smaller.width, camera.width) {
+                    let Some(at) = camera.drawn_at([column, row]) else { continue };
+                    (0..3).for_each(|c| sums[c] += image.pixels[at][c]);
                     sums[3] += 1.0;
                 }
             }
-            pixels.push([0, 1, 2].map(|c| sums[c] / sums[3]));
         }
+        pixels.push([0, 1, 2].map(|c| sums[c] / sums[3].max(1.0)));
     }
     Image { width, height, pixels }
 }
@@ -158,7 +161,7 @@ mod tests {
             assert_eq!([log_opacity, log_scale], [change.log_opacity, change.log_scale]);
             change.make(&mut fitted.geometry, i);
         }
-        let judging: Vec<Camera> = views.some_judging(12).into_iter().cloned().collect();
+        let judging: Vec<Camera> = views.some_judging(12);
         let targets = drawn(&splats, &judging);
         let mut squares = |splats: &Splats| -> f64 {
             let pictures = drawn(splats, &judging);
@@ -173,9 +176,34 @@ mod tests {
     fn shrunk_pixels_are_means_of_those_they_cover() {
         let pixels = (0..15).map(|k| [k as f32, 0.0, 1.0]).collect();
         let image = Image { width: 5, height: 3, pixels };
-        let small = shrunk(&image, [2, 1]);
+        let camera = view(5, 3);
+        let small = shrunk(&image, &camera, &camera.resized(2, 1));
         // Columns 0 to 2, and 3 and 4, of all rows.
         assert_eq!(small.pixels, [[6.0, 0.0, 1.0], [8.5, 0.0, 1.0]]);
-        assert_eq!(shrunk(&image, [5, 3]), image);
+        assert_eq!(shrunk(&image, &camera, &camera), image);
+    }
+
+    fn view(width: u32, height: u32) -> Camera {
+        let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        Camera::rounded("view".into(), [width, height], [50.0; 2], [0.0; 3], rotation)
+    }
+
+    /// The picture that `camera` draws, cut out of `whole`.
+    fn cut(whole: &Image, camera: &Camera) -> Image {
+        let [width, height] = camera.picture_size();
+        let at = |[x, y]: [usize; 2]| whole.pixels[y * whole.width as usize + x];
+        let pixel = |drawn: u32| camera.place_of_drawn(drawn as usize).map_or([0.0; 3], at);
+        Image { width, height, pixels: (0..width * height).map(pixel).collect() }
+    }
+
+    #[test]
+    fn some_squares_shrink_as_in_the_whole_picture() {
+        let camera = view(104, 72);
+        let pixels = (0..104 * 72).map(|k| [k as f32 / 7488.0, (k % 13) as f32 / 13.0, 0.5]).collect();
+        let whole = Image { width: 104, height: 72, pixels };
+        let small = shrunk(&whole, &camera, &shrunk_camera(&camera));
+        let some = camera.with_tiles(TileSet::new(104, 72, |x, y| (x / 2 + y / 2) % 2 == 1));
+        let smaller = shrunk_camera(&some);
+        assert_eq!(shrunk(&cut(&whole, &some), &some, &smaller), cut(&small, &smaller));
     }
 }

@@ -4,16 +4,20 @@
 //! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
 //! detail win.
 
-use lexisplat::{Progress, ShDegree, Splats, Stage};
+use lexisplat::{Geometry, Progress, ShDegree, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
 
+use super::natural_width::natural_width;
+use super::size_spread::Sizes;
 use super::views::GENERATED_SIZE as SIZE;
 use crate::error::Result;
 
 /// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
 const TRIED: std::ops::RangeInclusive<usize> = 96..=640;
+/// Natural views made for each that is tried: those of the least spread of sizes are tried.
+const CHOICE: usize = 4;
 /// Gaussians drawn in all tried views together, about.
-const GAUSSIANS_DRAWN: usize = 22_000_000;
+const GAUSSIANS_DRAWN: usize = 128_000_000;
 /// Width and height of the small pictures, in pixels.
 const SMALL: [u32; 2] = [96, 64];
 /// Gaussians of less opacity than this, 5 %, before the sigmoid, are not in the small pictures.
@@ -49,7 +53,7 @@ pub(super) fn find(
     progress: &dyn Progress,
 ) -> Result<Found> {
     let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
-    let mut views = natural_views(&splats.geometry, tried, SIZE);
+    let mut views = likely(&splats.geometry, natural_views(&splats.geometry, CHOICE * tried, SIZE), tried);
     views.extend(more);
     let sketch = sketch(splats);
     let scene = renderer.prepare(Scene::from(&sketch))?;
@@ -81,7 +85,24 @@ pub(super) fn find(
     if median < BARE {
         judges = object(&splats.geometry, judging, SIZE[0], SIZE[1]);
     }
+    let width = natural_width(&splats.geometry, &judges);
+    let height = (width * SIZE[1] / SIZE[0]).max(1);
+    for camera in best.iter_mut().chain(&mut judges) {
+        *camera = camera.resized(width, height);
+    }
     Ok(Found { best, judges })
+}
+
+/// The `most` of `views`, in their order, from where the Gaussians look most alike in size.
+fn likely(geometry: &Geometry, views: Vec<Camera>, most: usize) -> Vec<Camera> {
+    let sizes = Sizes::of(geometry);
+    let spreads: Vec<f64> = views.iter().map(|view| sizes.spread(view.position)).collect();
+    let mut order: Vec<usize> = (0..views.len()).collect();
+    order.sort_by(|&a, &b| spreads[a].total_cmp(&spreads[b]));
+    order.truncate(most);
+    let mut keep = vec![false; views.len()];
+    order.into_iter().for_each(|k| keep[k] = true);
+    views.into_iter().zip(keep).filter_map(|(view, keep)| keep.then_some(view)).collect()
 }
 
 /// A copy of `splats` that is faster to draw: without view-dependent colour, and without what is hardly visible.
@@ -153,7 +174,10 @@ mod tests {
         splats.retain(&near);
         splats.geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s.min(-4.5)));
         let Found { judges, .. } = found(&splats, [10, 6]);
-        assert_eq!(judges, object(&splats.geometry, 6, SIZE[0], SIZE[1]));
+        let [width, height] = [judges[0].width, judges[0].height];
+        let ring = object(&splats.geometry, 6, SIZE[0], SIZE[1]);
+        let ring: Vec<Camera> = ring.iter().map(|camera| camera.resized(width, height)).collect();
+        assert_eq!(judges, ring);
     }
 
     #[test]

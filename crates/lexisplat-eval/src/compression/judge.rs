@@ -1,13 +1,15 @@
 //! The score of a compressed scene over the judging views.
 
 use lexisplat::{Progress, Splats, Stage};
-use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_error};
 
 use crate::error::Result;
-use crate::metrics::psnr_of_drawn;
 
 /// PSNR that identical pictures count as, in dB, so that means are finite.
 const IDENTICAL: f64 = 100.0;
+
+/// Photographs are about as hard as the hardest of this many parts of generated views (docs/METHOD.md, "The judging views").
+const HARD_PARTS: usize = 4;
 
 /// Scores models of one scene against the scene itself.
 #[derive(Debug)]
@@ -27,14 +29,14 @@ impl Judge {
     pub fn new(
         mut renderer: Renderer,
         splats: &Splats,
-        judging: &[&Camera],
+        judging: &[Camera],
         given: bool,
         progress: &dyn Progress,
     ) -> Result<Self> {
         let scene = renderer.prepare(Scene::from(splats))?;
         let mut drawn = Vec::with_capacity(judging.len());
         progress.begin(Stage::Draw, judging.len() as u64);
-        for &camera in judging {
+        for camera in judging {
             progress.check()?;
             let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
             drawn.push((camera.clone(), picture));
@@ -62,7 +64,7 @@ impl Judge {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn against(self, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
-        let cameras: Vec<&Camera> = self.views.iter().map(|view| &view.0).collect();
+        let cameras: Vec<Camera> = self.views.iter().map(|view| view.0.clone()).collect();
         Self::new(self.renderer, splats, &cameras, self.given, progress)
     }
 
@@ -78,14 +80,15 @@ impl Judge {
         for (camera, original) in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
-            all.push(psnr_of_drawn(original, &picture)?.unwrap_or(IDENTICAL).min(IDENTICAL));
+            let squares = squared_error(original, &picture)?;
+            let mean = squares / (camera.drawn_pixels() * 3) as f64;
+            all.push(if mean > 0.0 { (-10.0 * libm::log10(mean)).min(IDENTICAL) } else { IDENTICAL });
             progress.advance(1);
         }
         progress.end();
         all.sort_by(f64::total_cmp);
         let mean = |views: &[f64]| views.iter().sum::<f64>() / views.len().max(1) as f64;
-        // Photographs are as hard as the harder half of the generated views (docs/METHOD.md).
-        let hard = if self.given { all.len() } else { all.len().div_ceil(2) };
+        let hard = if self.given { all.len() } else { all.len().div_ceil(HARD_PARTS) };
         let least = all.first().copied().unwrap_or(IDENTICAL);
         Ok(Score { judged: mean(&all[..hard]), mean: mean(&all), least })
     }
@@ -94,7 +97,7 @@ impl Judge {
 /// PSNR over the judging views, in dB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Score {
-    /// What photographs are expected to show on average: the mean of given views, or that of the worse half of
+    /// What photographs are expected to show on average: the mean of given views, or that of the worst quarter of
     /// generated ones.
     pub judged: f64,
     /// The mean of all views.

@@ -30,8 +30,8 @@ const OPACITY_DIAGONAL: f32 = 4.0;
 /// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small ones.
 const MOST_LOG_OPACITY: f32 = 0.5;
 /// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
-const GAIN_GIVEN: f64 = 2.4;
-const GAIN_FOUND: f64 = 0.5;
+const GAIN_GIVEN: f64 = 4.0;
+const GAIN_FOUND: f64 = 0.8;
 
 /// A packer whose files are refitted, if that is allowed.
 pub(super) struct Refitting<S> {
@@ -74,21 +74,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         self.packer.step_for(decibels - self.gain())
     }
 
-    /// Packs with an overall step, with or without a `floor` under what is visible.
-    ///
-    /// # Errors
-    /// Errors of packing and drawing.
-    pub(super) fn pack(
-        &self,
-        step: f64,
-        floor: bool,
-        progress: &dyn Progress,
-    ) -> Result<(Packed, CompressReport)> {
-        let (quantised, first) = self.quantise(step, floor, progress)?;
-        self.refit(&quantised, first, progress)
-    }
-
-    /// Packs as [`Self::pack`] does, and does not refit.
+    /// Packs with an overall step, with or without a `floor` under what is visible, and does not refit.
     ///
     /// # Errors
     /// Errors of packing.
@@ -103,7 +89,7 @@ impl<S: Borrow<Splats>> Refitting<S> {
         Ok((quantised, first))
     }
 
-    /// Refits a file of `quantised`, if that is allowed.
+    /// Refits a file of `quantised`, if that is allowed. Its first layer alone is not fitted yet.
     ///
     /// # Errors
     /// Errors of packing and drawing.
@@ -112,18 +98,55 @@ impl<S: Borrow<Splats>> Refitting<S> {
         quantised: &Quantised<'_>,
         file: (Packed, CompressReport),
         progress: &dyn Progress,
-    ) -> Result<(Packed, CompressReport)> {
-        let Some(fit) = &self.fit else { return Ok(file) };
+    ) -> Result<Refitted> {
+        let Some(fit) = &self.fit else { return Ok(Refitted { shown: None, file }) };
         let model = file.0.unpack()?;
         drop(file);
-        let fitted = fit.appearances(Scene::from(&model), quantised.weights(), progress)?;
+        let shown = fit.appearances(Scene::from(&model), quantised.weights(), progress)?;
         drop(model);
-        let file = quantised.finish(Some(&fitted), None, progress)?;
+        let file = quantised.finish(Some(&shown), None, progress)?;
+        Ok(Refitted { shown: Some(shown), file })
+    }
+
+    /// Fits the first layer alone of a file of `quantised`, if there is one. The whole scene stays as it is.
+    ///
+    /// # Errors
+    /// Errors of packing and drawing.
+    pub(super) fn complete(
+        &self,
+        quantised: &Quantised<'_>,
+        refitted: Refitted,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
+        let Refitted { shown, file } = refitted;
+        let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
         let Some(first) = file.0.first_layer()? else { return Ok(file) };
         drop(file);
         let changes = alone(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
-        Ok(quantised.finish(Some(&fitted), Some(&changes), progress)?)
+        Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
     }
+
+    /// Packs with an overall step: [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
+    ///
+    /// # Errors
+    /// Errors of packing and drawing.
+    pub(super) fn pack(
+        &self,
+        step: f64,
+        floor: bool,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
+        let (quantised, first) = self.quantise(step, floor, progress)?;
+        let refitted = self.refit(&quantised, first, progress)?;
+        self.complete(&quantised, refitted, progress)
+    }
+}
+
+/// A file with refitted base colours and opacities.
+pub(super) struct Refitted {
+    /// Those colours and opacities; `None` if nothing may change.
+    shown: Option<Vec<Appearance>>,
+    pub(super) file: (Packed, CompressReport),
 }
 
 /// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone.
@@ -226,10 +249,10 @@ mod tests {
 
     #[test]
     fn base_colours_and_opacities_make_up_for_errors() {
-        let splats = scene(&SampleOptions::new(800, 1));
+        let splats = scene(&SampleOptions::new(1200, 1));
         let (kept, all) = made(&splats, &PackOptions::default().with_keep_all(true));
         let (refitted, some) = made(&splats, &PackOptions::default());
-        assert_eq!(all.len(), 800);
+        assert_eq!(all.len(), 1200);
         assert!(some.len() < all.len() && some.len() > all.len() / 4, "{}", some.len());
         assert!(refitted > kept + 0.5, "{refitted} {kept}");
         let Geometry { dc, opacities, .. } = &some.geometry;

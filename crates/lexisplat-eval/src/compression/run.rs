@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
 
 /// Views that judge a preset, at most.
-const PRESET_JUDGES: usize = 12;
+const PRESET_JUDGES: usize = 48;
 
 impl Compression {
     /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once. Such a source is best

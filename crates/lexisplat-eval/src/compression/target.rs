@@ -12,7 +12,7 @@ use super::report::reached;
 use crate::error::{Error, Result};
 
 /// A quality may exceed the target by this much, in dB.
-const CLOSE_DB: f64 = 0.06;
+const CLOSE_DB: f64 = 0.1;
 /// A size may fall short of the target by this share.
 const CLOSE_SIZE: f64 = 0.01;
 /// The file that says what step a preset takes may miss its aim by this much, in dB.
@@ -22,6 +22,11 @@ const CLOSE_PRESET: f64 = 0.5;
 /// Steps in an octave that presets take. A scene in other units has scores that differ in the last digits, and takes the same
 /// step. At another step errors fall differently, which changes what few Gaussians show by half a decibel.
 const STEPS_PER_OCTAVE: f64 = 16.0;
+/// The first file that is refitted may be expected to miss the target by this much, in dB or in the binary logarithm of bytes.
+const NEAR_DB: f64 = 0.7;
+const NEAR_LOG_BYTES: f64 = 0.1;
+/// Share of that once it is known what refitting gains.
+const NEAR_AGAIN: f64 = 0.2;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 9;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -175,22 +180,27 @@ pub(super) fn pack_to_preset(
     {
         tries.push(Try { log_step, value: expected });
         log_step = on_grid(next);
+        drop(file);
         (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
-    let (packed, report) = packer.refit(&quantised, file, progress)?;
-    drop(quantised);
+    let refitted = packer.refit(&quantised, file, progress)?;
     let is_first = tries.is_empty() && !packer.refits();
-    let score = if is_first { first } else { judge.score(&packed.unpack()?, progress)? };
+    let score = if is_first { first } else { judge.score(&refitted.file.0.unpack()?, progress)? };
     let off = (score.judged - aim).abs();
     tries.push(Try { log_step, value: score.judged });
-    let best = (packed, report, score);
-    if off <= CLOSE_PRESET {
-        return Ok(best);
-    }
-    let Some(next) = next_step(&tries, aim, &mut slope) else { return Ok(best) };
+    let next = if off <= CLOSE_PRESET { None } else { next_step(&tries, aim, &mut slope) };
+    let Some(next) = next else {
+        let (packed, report) = packer.complete(&quantised, refitted, progress)?;
+        return Ok((packed, report, score));
+    };
+    drop((quantised, refitted));
     let (packed, report) = packer.pack(libm::exp2(on_grid(next)), true, progress)?;
-    let score = judge.score(&packed.unpack()?, progress)?;
-    Ok(if (score.judged - aim).abs() < off { (packed, report, score) } else { best })
+    let last = judge.score(&packed.unpack()?, progress)?;
+    if (last.judged - aim).abs() < off {
+        return Ok((packed, report, last));
+    }
+    let (packed, report) = packer.pack(libm::exp2(log_step), true, progress)?;
+    Ok((packed, report, score))
 }
 
 /// The nearest of [`STEPS_PER_OCTAVE`] binary logarithms of a step in an octave.
@@ -206,6 +216,8 @@ struct Found {
     report: CompressReport,
     /// `None` if the target is a size.
     reached: Option<Score>,
+    /// Whether it is complete ([`Refitting::complete`]).
+    complete: bool,
 }
 
 /// What is searched for, and where the search begins.
@@ -216,6 +228,8 @@ struct Search {
     wanted: f64,
     /// By how much `wanted` may be exceeded.
     close: f64,
+    /// How far a file that is not refitted may be from where it is expected to be, for the first one that is.
+    near: f64,
     log_step: f64,
     slope: f64,
 }
@@ -243,11 +257,15 @@ impl Search {
             false if asked > MOST_DB => limits[0],
             false => libm::log2(packer.step_for(wanted)),
         };
-        Self { target, is_size, wanted, close, log_step: log_step.clamp(limits[0], limits[1]), slope }
+        let near = if is_size { NEAR_LOG_BYTES } else { NEAR_DB };
+        Self { target, is_size, wanted, close, near, log_step: log_step.clamp(limits[0], limits[1]), slope }
     }
 
     /// Packs until the target is met closely, with or without a `floor` under what is visible. Returns the value
     /// nearest to the target if none meets it.
+    ///
+    /// Refitting takes longer than the rest, and gains about as much at one step as at the next. So files that are not refitted
+    /// say where to refit one, and its gain says where the next must be.
     fn run(
         &self,
         packer: &Refitting<impl Borrow<Splats>>,
@@ -256,36 +274,87 @@ impl Search {
         progress: &dyn Progress,
     ) -> Result<std::result::Result<Found, f64>> {
         let (mut log_step, mut slope) = (self.log_step, self.slope);
+        let mut gain = if self.is_size { 0.0 } else { packer.gain() };
+        let mut is_measured = !packer.refits();
         let mut tries: Vec<Try> = Vec::new();
         let mut best: Option<Found> = None;
+        let (mut nearest, mut margin) = (f64::NEG_INFINITY, 0.5 * self.close);
         for _ in 0..MAX_TRIES {
             progress.check()?;
-            let step = libm::exp2(log_step);
-            let (packed, report) = packer.pack(step, floor, progress)?;
-            let file_bytes = LexiWriter::packed(&packed).file_bytes();
-            let reached = if self.is_size { None } else { Some(judge.score(&packed.unpack()?, progress)?) };
-            let value = match (reached, self.target) {
-                (None, _) => -libm::log2((file_bytes + RECORD_BYTES) as f64),
-                (Some(score), Target::MinPsnr(_)) => score.least,
-                (Some(score), _) => score.judged,
+            let (quantised, file) = packer.quantise(libm::exp2(log_step), floor, progress)?;
+            let (plain, score) = self.value(&file.0, judge, progress)?;
+            tries.push(Try { log_step, value: plain });
+            let off = plain + gain - self.wanted;
+            let is_near = off.abs() < self.near * if is_measured { NEAR_AGAIN } else { 1.0 };
+            if let Some(next) = next_step(&tries, self.wanted - gain + margin, &mut slope)
+                && !is_near
+            {
+                log_step = next;
+                continue;
+            }
+            let refitted = packer.refit(&quantised, file, progress)?;
+            // The bytes of a first layer's changes count, and its pictures do not.
+            let (refitted, complete) = match self.is_size {
+                true => (Err(packer.complete(&quantised, refitted, progress)?), true),
+                false => (Ok(refitted), false),
             };
-            tries.push(Try { log_step, value });
+            let packed = match &refitted {
+                Ok(refitted) => &refitted.file.0,
+                Err(file) => &file.0,
+            };
+            let (value, score) =
+                if packer.refits() { self.value(packed, judge, progress)? } else { (plain, score) };
+            (gain, is_measured) = (value - plain, true);
+            nearest = nearest.max(value);
+            // Values do not change evenly with the step: one that misses by a hair may do so again.
+            margin += (self.wanted - value).clamp(0.0, self.close);
             let met = value >= self.wanted;
+            let is_close = met && value - self.wanted <= self.close;
+            let file_bytes = LexiWriter::packed(packed).file_bytes();
             // Of those that reach a quality the smallest file is the best, and of those that reach a size the one of
             // the smallest step.
             let is_better = |best: &Found| {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
             if met && best.as_ref().is_none_or(is_better) {
-                best = Some(Found { log_step, file_bytes, packed, report, reached });
+                let ((packed, report), complete) = match refitted {
+                    Ok(refitted) if is_close => (packer.complete(&quantised, refitted, progress)?, true),
+                    Ok(refitted) => (refitted.file, complete),
+                    Err(file) => (file, complete),
+                };
+                best = Some(Found { log_step, file_bytes, packed, report, reached: score, complete });
             }
-            if met && value - self.wanted <= self.close {
+            if is_close {
                 break;
             }
-            let Some(next) = next_step(&tries, self.wanted + 0.5 * self.close, &mut slope) else { break };
+            let Some(next) = next_step(&tries, self.wanted - gain + margin, &mut slope) else { break };
             log_step = next;
         }
-        Ok(best.ok_or_else(|| tries.iter().map(|t| t.value).fold(f64::NEG_INFINITY, f64::max)))
+        let Some(best) = best else {
+            let expected = tries.iter().map(|t| t.value + gain);
+            return Ok(Err(if nearest.is_finite() { nearest } else { expected.fold(nearest, f64::max) }));
+        };
+        if best.complete {
+            return Ok(Ok(best));
+        }
+        let (packed, report) = packer.pack(libm::exp2(best.log_step), floor, progress)?;
+        Ok(Ok(Found { packed, report, ..best }))
+    }
+
+    /// The value of a file, and its score if the target is a quality.
+    fn value(
+        &self,
+        packed: &Packed,
+        judge: &mut Judge,
+        progress: &dyn Progress,
+    ) -> Result<(f64, Option<Score>)> {
+        if self.is_size {
+            let bytes = LexiWriter::packed(packed).file_bytes() + RECORD_BYTES;
+            return Ok((-libm::log2(bytes as f64), None));
+        }
+        let score = judge.score(&packed.unpack()?, progress)?;
+        let value = if matches!(self.target, Target::MinPsnr(_)) { score.least } else { score.judged };
+        Ok((value, Some(score)))
     }
 }
 

@@ -4,22 +4,40 @@ use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
 use super::found::{Found, find};
+use super::sharp_views::sampled;
 use crate::error::{Error, Result};
-use crate::views::SceneKind;
+use crate::views::{DEFAULT_MAX_WIDTH, SceneKind};
 
 /// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
 /// fewer, for a view of so many Gaussians takes long.
 const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
 /// Gaussians drawn in all generated views together, about.
 const GAUSSIANS_DRAWN: usize = 48_000_000;
+/// Number of views that are found and measure: one for [`GAUSSIANS_OF_A_VIEW`], within these. Scenes of more than
+/// [`GAUSSIANS_MEASURED`] over the larger number have fewer, for a view takes longer the more Gaussians there are.
+const FOUND_VIEWS: std::ops::RangeInclusive<usize> = 48..=192;
+const GAUSSIANS_OF_A_VIEW: usize = 256;
+/// Gaussians before all found views together, about.
+const GAUSSIANS_MEASURED: usize = 96_000_000;
+/// Number of views that are found and judge: one of this many that measure, within these.
+const FOUND_JUDGES: std::ops::RangeInclusive<usize> = 24..=48;
+const FOUND_JUDGE_SHARE: usize = 4;
 /// Width and height of generated views, in pixels.
 pub(super) const GENERATED_SIZE: [u32; 2] = [384, 256];
 /// Distances of generated views that measure, in radii of the scene's detail.
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
 /// Number of generated views that judge.
 const JUDGES: usize = 24;
-/// Largest width of a given camera's picture, in pixels. Sharper pictures give the same sensitivity.
-const MAX_WIDTH: u32 = 480;
+/// Pixels that measure, that judge, and that base colours and opacities are fitted to, in all views together. Of sharper
+/// pictures some squares are drawn ([`sampled`]).
+const MEASURED_PIXELS: u64 = 20_000_000;
+const JUDGED_PIXELS: u64 = 8_000_000;
+const FITTED_PIXELS: u64 = 12_000_000;
+/// One of this many views that measure is drawn at half its size too, and one of this many that are fitted to is at half its
+/// size. Otherwise errors that are even over many pixels count for too little, and show when pictures are drawn smaller
+/// (docs/METHOD.md, "How sharp").
+const MEASURED_HALVED: usize = 2;
+const FITTED_HALVED: usize = 3;
 /// Number of given cameras that are used at most, evenly spread.
 const MAX_VIEWS: usize = 150;
 /// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
@@ -29,15 +47,11 @@ const JUDGE_SHARE: usize = 2;
 /// (docs/METHOD.md).
 const ASIDE: usize = 20;
 /// Most views that base colours and opacities are fitted to, of views that were found.
-const FITTED_FOUND: usize = 32;
+const FITTED_FOUND: usize = 64;
 /// Most given cameras that base colours and opacities are fitted to.
 const FITTED_GIVEN: usize = 40;
 /// Views from all around that they are fitted to beside given cameras.
 const FITTED_AROUND: usize = 8;
-/// If there are more given cameras to fit to than this, their pictures are narrower, so that more of them take as long.
-const FITTED_WHOLE: usize = 24;
-/// Largest width of those pictures, in pixels.
-const FITTED_WIDTH: u32 = 340;
 /// Share of the views whose positions are nearest to the one in their middle, which viewpoints are chosen from.
 const USUAL_VIEWS: f32 = 0.67;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
@@ -94,6 +108,20 @@ fn around(splats: &Splats) -> Vec<Camera> {
     surround(&splats.geometry, views, GENERATED_SIZE, GENERATED_DISTANCES)
 }
 
+/// The numbers of found views of `splats` that measure and that judge.
+fn found_views(splats: &Splats) -> [usize; 2] {
+    let most = GAUSSIANS_MEASURED / splats.len().max(1);
+    let views = (splats.len() / GAUSSIANS_OF_A_VIEW).min(most);
+    let measuring = views.clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
+    [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
+}
+
+/// `camera` with half the width and height.
+fn halved(camera: &Camera) -> Camera {
+    let [width, height] = [camera.width, camera.height].map(|side| (side / 2).max(1));
+    camera.resized(width, height)
+}
+
 /// The views that packing draws.
 #[derive(Debug, Clone)]
 pub struct PackingViews {
@@ -111,7 +139,7 @@ impl PackingViews {
     pub fn found(renderer: &mut Renderer, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
         let around = around(splats);
         let every_second = |first| around.iter().skip(first).step_by(2).cloned();
-        let counts = [around.len() / 2, JUDGES];
+        let counts = found_views(splats);
         let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
         let measuring = every_second(0).chain(best).collect();
         Ok(Self { measuring, judging: judges, given: false })
@@ -170,8 +198,8 @@ impl PackingViews {
             return Err(Error::parameter("cameras", used.len(), "at least two training cameras"));
         }
         let stride = used.len().div_ceil(MAX_VIEWS);
-        let measuring: Vec<Camera> =
-            used.into_iter().step_by(stride).map(|camera| camera.with_max_width(MAX_WIDTH)).collect();
+        let sharp = |camera: &Camera| camera.with_max_width(DEFAULT_MAX_WIDTH);
+        let measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
         let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
         Ok(Self { measuring, judging, given: true })
     }
@@ -194,10 +222,11 @@ impl PackingViews {
         &self.judging
     }
 
-    /// At most `most` of the views that judge, evenly spread.
+    /// At most `most` of the views that judge, evenly spread. Of sharp pictures they draw some squares.
     #[must_use]
-    pub fn some_judging(&self, most: usize) -> Vec<&Camera> {
-        self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1)).collect()
+    pub fn some_judging(&self, most: usize) -> Vec<Camera> {
+        let some = self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1));
+        sampled(some.cloned().collect(), JUDGED_PIXELS)
     }
 
     /// Up to `most` points that stand for the positions of the views like photographs: first points far from each other, and
@@ -238,12 +267,11 @@ impl PackingViews {
         let free: Vec<&Camera> =
             self.measuring.iter().filter(|camera| !self.judging.contains(camera)).collect();
         let [most, around] = if self.given { [FITTED_GIVEN, FITTED_AROUND] } else { [FITTED_FOUND, 0] };
-        let width = if self.given && free.len() > FITTED_WHOLE { FITTED_WIDTH } else { u32::MAX };
         let stride = free.len().div_ceil(most).max(1);
-        let some = free.into_iter().step_by(stride);
-        let mut views: Vec<Camera> = some.map(|camera| camera.with_max_width(width)).collect();
+        let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
         views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
-        views
+        views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = halved(camera));
+        sampled(views, FITTED_PIXELS)
     }
 
     /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
@@ -262,6 +290,9 @@ impl PackingViews {
         if self.given {
             cameras.extend(aside(&splats.geometry, &self.measuring, ASIDE));
         }
+        let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(halved).collect();
+        cameras.extend(smaller);
+        let cameras = sampled(cameras, MEASURED_PIXELS);
         let mut measured = renderer.sensitivity(&Scene::from(splats), &cameras, progress)?;
         measured.blend_with_prior(&splats.geometry, PRIOR_SHARE);
         Ok(measured)

@@ -12,7 +12,6 @@ pub use flip::flip;
 pub use lpips::Lpips;
 pub use metric::Metric;
 pub use psnr::psnr;
-pub(crate) use psnr::psnr_of_drawn;
 pub use ssim::{ssim, ssim_inner};
 
 use lexisplat_render::Image;
