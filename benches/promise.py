@@ -14,7 +14,8 @@ quality is measured in the same way, and a last table has our bytes over those o
 by the same lines. Where a peer's curve begins above a quality, its smallest file counts.
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
-and tiles are. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or
+and tiles are. Pictures are as wide as the cameras' own, which the model was trained at, 1,600 pixels at most, unless
+TRAINED says otherwise; on the path they are drawn at half that width too, and 400 pixels wide. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or
 of a guess over bytes without cameras, by the straight line between the logarithms of the bytes of neighbouring files.
 """
 
@@ -33,6 +34,11 @@ from real_models import ROOT  # noqa: E402
 
 SMALL = 8000  # Gaussians; below that an orbit judges where there are no cameras
 PRESETS = {"small": 35, "balanced": 40, "high": 45, "archive": 54}
+WIDEST = 1600  # pixels; the trainer scales wider photos down
+ORBIT = 400  # pixels, where there are no cameras
+SMALL_WIDTH = 400  # pixels
+# Widths of models whose cameras state another: those of the photos at full size.
+TRAINED = {"flowers-c3dgs-int8": 400}
 KINDS = ("half", "quarter", "far", "above", "back")
 
 
@@ -51,6 +57,13 @@ def training(cameras, folder):
     file = Path(folder) / "training.cameras.json"
     file.write_text(json.dumps([{k: v for k, v in view.items() if k != "split"} for view in kept]))
     return file
+
+
+def widths_of(model, cameras):
+    """The width that the model was trained at, half of it, and a small one."""
+    own = min(WIDEST, max(v["width"] for v in json.loads(cameras.read_text()))) if cameras else ORBIT
+    own = TRAINED.get(model.stem, own)
+    return [own, own // 2] + ([SMALL_WIDTH] if own // 2 > SMALL_WIDTH else [])
 
 
 def bytes_at(points, decibels):
@@ -94,16 +107,19 @@ def measure(binary, scorer, model, count, args):
             jobs.append(("peer", name, None, []))
             files.append(decoded)
             sizes.append(encoded.stat().st_size)
-        scored = subprocess.check_output([scorer, model, cameras or "orbit", *files], text=True).splitlines()
+        widths = widths_of(model, cameras)
+        at = ",".join(map(str, widths))
+        scored = subprocess.check_output([scorer, model, cameras or "orbit", at, *files], text=True).splitlines()
         for (way, name, aim, _), size, line in zip(jobs, sizes, scored):
-            row = {"scene": model.stem, "gaussians": count, "cameras": way, "asked": name, "aim": aim}
+            row = {"scene": model.stem, "widths": widths, "gaussians": count, "cameras": way, "asked": name, "aim": aim}
             rows.append(row | json.loads(line) | {"bytes": size})
     return rows
 
 
 def table(rows):
-    print("| scene | cameras | asked | reached | off | worst view | worst tile | " + " | ".join(KINDS) + " | bytes each | ratio |")
-    print("|" + "---|" * (9 + len(KINDS)))
+    print("| scene | width | cameras | asked | reached | off | worst view | worst tile | at half the width | at 400 | "
+          + " | ".join(KINDS) + " | bytes each | ratio |")
+    print("|" + "---|" * (12 + len(KINDS)))
     points = {}
     for r in rows:
         if r["asked"].startswith("psnr"):
@@ -116,8 +132,9 @@ def table(rows):
         if beside in points:
             other = bytes_at(points[beside], path["mean"])
             ratio = f"{r['bytes'] / other:.2f}" if other else ""
-        print(f"| {r['scene']} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
-              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} |", flush=True)
+        smaller = [f"{r[f'path_{w}']['mean']:.2f}" for w in r["widths"][1:]] + ["-"]
+        print(f"| {r['scene']} | {r['widths'][0]} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
+              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} |", flush=True)
 
 
 def beside_peers(rows, asked):

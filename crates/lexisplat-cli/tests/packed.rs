@@ -1,7 +1,7 @@
 //! Packed files as a user makes and reads them.
 
 use crate::folder;
-use crate::folder::{Folder, read};
+use crate::folder::{Folder, lexisplat, read};
 use serde_json::Value;
 
 /// Few views, small: enough to tell qualities apart.
@@ -48,7 +48,7 @@ fn presets_are_ordered_and_the_default_is_balanced() {
 fn a_quality_is_reached_and_recorded() {
     let folder = Folder::few();
     for (option, key) in [("--psnr", "judged_psnr"), ("--min-psnr", "min_psnr")] {
-        let report = folder.json(&["compress", "scene.ply", option, "38", "--overwrite"]);
+        let report = folder.json(&["compress", "scene.ply", "--no-cameras", option, "38", "--overwrite"]);
         let promise = &report["promise"];
         assert_eq!((&promise["target"], &promise["asked"]), (&option[2..].into(), &38.0.into()));
         let reached = &report["reached"];
@@ -92,11 +92,43 @@ fn the_kind_of_scene_can_be_given() {
         folder.json(&[&["compress", "scene.ply", "--overwrite"], kind].concat());
         std::fs::read(folder.path("scene.lexi")).unwrap()
     };
-    let auto = file(&[]);
+    let auto = file(&["--no-cameras"]);
     assert!(auto == file(&["--scene", "auto"]));
     assert!(auto != file(&["--scene", "room"]));
     folder.fail(&["compress", "scene.ply", "--scene", "room", "--cameras", "cameras.json"], 2);
     folder.fail(&["compress", "scene.ply", "--scene", "room", "--guess"], 2);
+}
+
+#[test]
+fn cameras_that_lie_beside_a_scene_are_used() {
+    let folder = Folder::few();
+    let compress = |more: &[&str]| {
+        let arguments = [&["compress", "scene.ply", "--json", "--overwrite"], more].concat();
+        let output = lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
+        let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+        (report["reached"]["cameras"].clone(), String::from_utf8(output.stderr).unwrap())
+    };
+    let file = || std::fs::read(folder.path("scene.lexi")).unwrap();
+    let (used, said) = compress(&[]);
+    assert!(used == true && said.contains("by the 12 cameras of cameras.json; --no-cameras"), "{said}");
+    let found = file();
+    let (used, said) = compress(&["--cameras", "cameras.json"]);
+    assert!(used == true && !said.contains("note:"), "{said}");
+    assert!(file() == found);
+    // Cameras of the scene in other units do not belong to it.
+    let mut cameras: Value =
+        serde_json::from_slice(&std::fs::read(folder.path("cameras.json")).unwrap()).unwrap();
+    for camera in cameras.as_array_mut().unwrap() {
+        for k in 0..3 {
+            camera["position"][k] = (20.0 * number(&camera["position"][k])).into();
+        }
+    }
+    std::fs::write(folder.path("cameras.json"), cameras.to_string()).unwrap();
+    let (used, said) = compress(&[]);
+    assert!(used == false && said.contains("do not seem to belong"), "{said}");
+    let alone = file();
+    let (_, said) = compress(&["--no-cameras"]);
+    assert!(file() == alone && !said.contains("note:"), "{said}");
 }
 
 #[test]

@@ -83,7 +83,7 @@ pub use scorer::Scorer;
 pub use scores::{Comparison, Summary, ViewScore};
 pub use views::{
     ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SceneKind, SplitFilter, View,
-    ViewOptions, choose_views, find_views, photo,
+    ViewOptions, cameras_beside, choose_views, find_views, photo,
 };
 
 #[cfg(test)]

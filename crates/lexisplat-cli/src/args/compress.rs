@@ -47,10 +47,14 @@ pub(crate) struct Compress {
     /// Make the best file that is at least this many times smaller than the source, above 1.
     #[arg(long, group = "goal", value_name = "R", value_parser = real::<f64>("20"), help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
-    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default:
-    /// views like photographs, which are looked for].
+    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default: those that lie
+    /// beside the scene or one folder above, or where INRIA's trainer leaves them; else views like photographs, which are looked
+    /// for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
+    /// Use no cameras that lie beside the scene.
+    #[arg(long, conflicts_with = "cameras")]
+    pub(crate) no_cameras: bool,
     /// Distance of the near plane of --cameras, in the scene's units, above 0. Gaussians nearer than it are not drawn
     /// [default: the trainer's 0.2].
     #[arg(long, value_name = "UNITS", value_parser = length, requires = "cameras")]
@@ -163,6 +167,12 @@ impl Compress {
             ("--max-gaussians", self.max_gaussians.is_some()),
             ("--prune", self.prune.is_some()),
         ]
+    }
+
+    /// Whether cameras that lie beside the scene are used.
+    pub(crate) fn looks_beside(&self) -> bool {
+        let other = self.cameras.is_some() || self.no_cameras || self.scene.is_some() || self.guess;
+        !other && self.inputs.len() == 1
     }
 
     /// Returns the layout that is given, or the one that the other options need.

@@ -24,7 +24,7 @@ pub(crate) struct Render {
 }
 
 /// Draw two scenes from the same cameras and score the second against the first. Without --cameras and --scene views
-/// like photographs are looked for, of 384 x 256 pixels, as `compress` does.
+/// like photographs are looked for, as sharp as the scene, as `compress` does.
 #[derive(Debug, Args)]
 pub(crate) struct Compare {
     /// The original, of any format.

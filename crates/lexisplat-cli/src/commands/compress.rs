@@ -13,7 +13,7 @@ use lexisplat::{
     SplatSource, lexi,
 };
 use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
-use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, format};
+use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, cameras_beside, format};
 use lexisplat_formats::{Opened, open};
 use lexisplat_render::{ViewSet, read_views};
 
@@ -60,6 +60,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         set.cameras.iter_mut().for_each(|camera| camera.near = near);
     }
     warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
+    let beside = if args.looks_beside() { beside(first) } else { None };
     let mut compression = compression(args, given.as_ref(), &limits)?;
     if args.prune.is_some() && !common.quiet {
         note(
@@ -93,6 +94,10 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     if let (Some(set), Some(offset)) = (given, source.empty().meta.offset) {
         compression = compression.with_cameras(set.relative_to(Some(offset)).cameras);
     }
+    if let Some((_, set)) = &beside {
+        let set = set.clone().relative_to(source.empty().meta.offset);
+        compression = compression.with_likely_cameras(set.cameras);
+    }
     let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
         compression.run(source, sink, &bars).map_err(|error| match error {
@@ -105,6 +110,19 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
     report.read_seconds += open_seconds;
     report.total_seconds = start.elapsed().as_secs_f64();
+    if let (Some((path, set)), Some(reached), false) = (&beside, &report.reached, common.quiet) {
+        note(&match reached.cameras {
+            true => format!(
+                "note: drawn and judged by the {} cameras of {}; --no-cameras ignores them",
+                set.cameras.len(),
+                path.display()
+            ),
+            false => format!(
+                "note: the cameras of {} do not seem to belong to the scene and were not used; --cameras uses them all the same",
+                path.display()
+            ),
+        });
+    }
     warn(&name, report.reached.as_ref().and_then(uncertain).as_slice());
     warn(&name, report.target.as_ref().and_then(costly).as_slice());
     if report.target.is_none() && args.max_gaussians.is_none() {
@@ -121,6 +139,13 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let mut json = serde_json::to_value(&report)?;
     json["output"] = output.display().to_string().into();
     tell(common, json, || text(&report, &output, args.all))
+}
+
+/// The cameras that lie beside `scene` and can be read, and where.
+fn beside(scene: &Path) -> Option<(PathBuf, ViewSet)> {
+    let path = if is_pipe(scene) { None } else { cameras_beside(scene) }?;
+    let set = read_views(&path, &mut |_| None).ok()?;
+    Some((path, set))
 }
 
 /// The error for several inputs without an output, which the last of them may have been meant for.

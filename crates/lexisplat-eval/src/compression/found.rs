@@ -106,7 +106,7 @@ fn likely(geometry: &Geometry, views: Vec<Camera>, most: usize) -> Vec<Camera> {
 }
 
 /// A copy of `splats` that is faster to draw: without view-dependent colour, and without what is hardly visible.
-fn sketch(splats: &Splats) -> Splats {
+pub(super) fn sketch(splats: &Splats) -> Splats {
     let mut sketch = splats.with_degree_cut(ShDegree::ZERO);
     let keep: Vec<bool> = splats.geometry.opacities.iter().map(|&opacity| opacity > FAINT).collect();
     sketch.retain(&keep);
@@ -120,7 +120,7 @@ fn lit(picture: &Image) -> f64 {
 }
 
 /// Mean difference of neighbouring pixels.
-fn detail(picture: &Image) -> f64 {
+pub(super) fn detail(picture: &Image) -> f64 {
     let width = picture.width as usize;
     let difference = |a: &[f32; 3], b: &[f32; 3]| -> f64 {
         let channel = |k: usize| f64::from((a[k].clamp(0.0, 1.0) - b[k].clamp(0.0, 1.0)).abs());

@@ -20,6 +20,7 @@
 //! ```
 
 mod alone;
+mod belonging;
 mod facts;
 mod fewer;
 mod found;

@@ -63,7 +63,7 @@ mod tests {
 
     fn small_ones() -> Geometry {
         let mut geometry = scene(&SampleOptions::new(4000, 3)).geometry;
-        geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s - 1.0));
+        geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s - 1.5));
         geometry
     }
 

@@ -33,6 +33,16 @@ pub enum Compression {
 }
 
 impl Compression {
+    /// The same with these cameras if they seem to belong to the scene ([`Packing::with_likely_cameras`]), if it is one that
+    /// draws.
+    #[must_use]
+    pub fn with_likely_cameras(self, cameras: Vec<Camera>) -> Self {
+        match self {
+            Self::Packed(packing) => Self::Packed(packing.with_likely_cameras(cameras)),
+            other => other,
+        }
+    }
+
     /// The same with these cameras ([`Packing::with_cameras`]), if it is one that draws.
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
@@ -85,6 +95,7 @@ pub struct Packing {
     pub(super) quality: Quality,
     pub(super) options: PackOptions,
     pub(super) cameras: Option<Vec<Camera>>,
+    pub(super) likely_cameras: Option<Vec<Camera>>,
     pub(super) kind: SceneKind,
     pub(super) gpu: Option<Gpu>,
     pub(super) looked: Option<Arc<Looked>>,
@@ -106,6 +117,7 @@ impl Packing {
             quality: quality.into(),
             options: PackOptions::default(),
             cameras: None,
+            likely_cameras: None,
             kind: SceneKind::Auto,
             gpu: None,
             looked: None,
@@ -126,6 +138,14 @@ impl Packing {
     #[must_use]
     pub fn with_cameras(self, cameras: Vec<Camera>) -> Self {
         Self { cameras: Some(cameras), ..self }
+    }
+
+    /// Measures and judges by these cameras if they seem to belong to the scene, as [`Self::with_cameras`] does, and otherwise
+    /// as if there were none. Nothing but the default kind of scene goes with them, and a scene that is packed part by part does
+    /// without. The report says whether they were used: [`ReachedRecord::cameras`](lexisplat::packed::ReachedRecord::cameras).
+    #[must_use]
+    pub fn with_likely_cameras(self, cameras: Vec<Camera>) -> Self {
+        Self { likely_cameras: Some(cameras), ..self }
     }
 
     /// Measures and judges by views around an object or inside a room. By default views like photographs are looked

@@ -4,8 +4,9 @@ use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, Preset};
 use lexisplat::stream::{self, Importance};
 use lexisplat::{Layout, Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
-use lexisplat_render::Renderer;
+use lexisplat_render::{Camera, Renderer};
 
+use super::belonging::belong;
 use super::fewer::at_most;
 use super::judge::Judge;
 use super::only_cancels::OnlyCancels;
@@ -17,6 +18,7 @@ use super::tiles;
 use super::views::{Looked, PackingViews};
 use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
+use crate::views::SceneKind;
 
 /// Views that judge a preset, at most.
 const PRESET_JUDGES: usize = 48;
@@ -138,6 +140,21 @@ impl Packing {
         }
     }
 
+    /// The cameras that were given, or those that are likely and seem to belong to `splats`.
+    fn cameras_of(
+        &self,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Option<&[Camera]>> {
+        if let (None, SceneKind::Auto, Some(likely)) = (&self.cameras, self.kind, &self.likely_cameras)
+            && belong(renderer, splats, likely, progress)?
+        {
+            return Ok(Some(likely));
+        }
+        Ok(self.cameras.as_deref())
+    }
+
     fn whole(
         &self,
         source: &dyn SplatSource,
@@ -153,7 +170,10 @@ impl Packing {
         let device = gpu(&renderer);
         let Looked { views, sensitivity } = match &self.looked {
             Some(looked) => Looked::clone(looked),
-            None => Looked::at(&mut renderer, &splats, self.cameras.as_deref(), self.kind, progress)?,
+            None => {
+                let cameras = self.cameras_of(&mut renderer, &splats, progress)?;
+                Looked::at(&mut renderer, &splats, cameras, self.kind, progress)?
+            }
         };
         let look_seconds = clock.seconds();
 

@@ -28,7 +28,7 @@ const NEAR_LOG_BYTES: f64 = 0.1;
 /// Share of that once it is known what refitting gains.
 const NEAR_AGAIN: f64 = 0.2;
 /// Number of packings tried at most.
-const MAX_TRIES: usize = 9;
+const MAX_TRIES: usize = 14;
 /// First estimate of the decibels that pictures gain when the step is halved.
 const DB_PER_HALVING: f64 = 4.5;
 /// Quality that [`FIRST_BYTES`] is for, in dB.
@@ -278,6 +278,8 @@ impl Search {
         let mut is_measured = !packer.refits();
         let mut tries: Vec<Try> = Vec::new();
         let mut best: Option<Found> = None;
+        // Files in a row that were too far from the target to refit them. Values jump, so that no step may be near enough.
+        let mut passed = 0;
         let (mut nearest, mut margin) = (f64::NEG_INFINITY, 0.5 * self.close);
         for _ in 0..MAX_TRIES {
             progress.check()?;
@@ -285,13 +287,16 @@ impl Search {
             let (plain, score) = self.value(&file.0, judge, progress)?;
             tries.push(Try { log_step, value: plain });
             let off = plain + gain - self.wanted;
-            let is_near = off.abs() < self.near * if is_measured { NEAR_AGAIN } else { 1.0 };
+            let (near, most_passed) = if is_measured { (NEAR_AGAIN * self.near, 1) } else { (self.near, 3) };
+            let is_near = off.abs() < near || passed >= most_passed;
             if let Some(next) = next_step(&tries, self.wanted - gain + margin, &mut slope)
                 && !is_near
             {
                 log_step = next;
+                passed += 1;
                 continue;
             }
+            passed = 0;
             let refitted = packer.refit(&quantised, file, progress)?;
             // The bytes of a first layer's changes count, and its pictures do not.
             let (refitted, complete) = match self.is_size {

@@ -1,5 +1,6 @@
 //! The views to draw, and the photos that belong to them.
 
+mod beside;
 mod fit;
 mod folder;
 mod photo;
@@ -15,6 +16,7 @@ use lexisplat_render::{Camera, ViewSet, interior_views, is_interior, object, orb
 
 use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
+pub use beside::cameras_beside;
 use folder::PhotoFolder;
 pub use photo::photo;
 pub use split::{DEFAULT_HOLD, SplitFilter};
