@@ -58,12 +58,17 @@ fn views_from_beside_given_cameras_measure_and_do_not_judge() {
     let around = fitted.iter().filter(|camera| camera.name.starts_with("surround")).count();
     assert_eq!((fitted.len(), around), (6 + 8, 8));
     assert!(fitted.iter().all(|camera| !views.judging().contains(camera)));
-    // Of many cameras more are fitted to, in smaller pictures.
-    let cameras = orbit(&splats.geometry, 70, 480, 320);
+    // Of many cameras more are fitted to, every third in half its size, and of large pictures some squares.
+    let cameras = orbit(&splats.geometry, 70, 1200, 800);
     let fitted = PackingViews::given(&cameras).unwrap().fitting(&splats);
     let given: Vec<&Camera> = fitted.iter().filter(|camera| camera.name.starts_with("orbit")).collect();
     assert!((25..=40).contains(&given.len()), "{}", given.len());
-    assert!(given.iter().all(|camera| camera.width == 340));
+    let sizes =
+        given.iter().enumerate().all(|(k, camera)| camera.width == if k % 3 == 1 { 600 } else { 1200 });
+    assert!(sizes && given.iter().all(|camera| camera.tiles.is_some()));
+    let share = |camera: &&Camera| camera.drawn_pixels() as f64 / f64::from(camera.width * camera.height);
+    let shares: f64 = given.iter().map(share).sum();
+    assert!((0.2..0.7).contains(&(shares / given.len() as f64)), "{shares}");
 }
 
 /// A turn of 0.9 radians about an axis that is none of the world's, and a scale and a shift.

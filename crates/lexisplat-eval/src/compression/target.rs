@@ -27,6 +27,8 @@ const NEAR_DB: f64 = 0.7;
 const NEAR_LOG_BYTES: f64 = 0.1;
 /// Share of that once it is known what refitting gains.
 const NEAR_AGAIN: f64 = 0.2;
+/// Share of what a target may be exceeded by that is aimed for, at most.
+const MOST_MARGIN: f64 = 0.75;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 14;
 /// First estimate of the decibels that pictures gain when the step is halved.
@@ -171,24 +173,24 @@ pub(super) fn pack_to_preset(
 ) -> Result<(Packed, CompressReport, Score)> {
     let aim = preset.decibels();
     let mut log_step = on_grid(libm::log2(packer.step_for(aim)));
-    let (mut tries, mut slope) = (Vec::new(), -DB_PER_HALVING);
+    // Files before and after refitting are not on one line, so each step is found from the one before and the usual slope.
+    let after = |log_step: f64, value: f64| next_step(&[Try { log_step, value }], aim, &mut -DB_PER_HALVING);
     let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     let first = judge.score(&file.0.unpack()?, progress)?;
     let expected = first.judged + packer.gain();
+    let mut is_first = !packer.refits();
     if (expected - aim).abs() > CLOSE_FIRST
-        && let Some(next) = next_step(&[Try { log_step, value: expected }], aim, &mut slope)
+        && let Some(next) = after(log_step, expected)
     {
-        tries.push(Try { log_step, value: expected });
+        is_first = false;
         log_step = on_grid(next);
         drop(file);
         (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
     let refitted = packer.refit(&quantised, file, progress)?;
-    let is_first = tries.is_empty() && !packer.refits();
     let score = if is_first { first } else { judge.score(&refitted.file.0.unpack()?, progress)? };
     let off = (score.judged - aim).abs();
-    tries.push(Try { log_step, value: score.judged });
-    let next = if off <= CLOSE_PRESET { None } else { next_step(&tries, aim, &mut slope) };
+    let next = if off <= CLOSE_PRESET { None } else { after(log_step, score.judged) };
     let Some(next) = next else {
         let (packed, report) = packer.complete(&quantised, refitted, progress)?;
         return Ok((packed, report, score));
@@ -312,7 +314,7 @@ impl Search {
             (gain, is_measured) = (value - plain, true);
             nearest = nearest.max(value);
             // Values do not change evenly with the step: one that misses by a hair may do so again.
-            margin += (self.wanted - value).clamp(0.0, self.close);
+            margin = (margin + (self.wanted - value).max(0.0)).min(MOST_MARGIN * self.close);
             let met = value >= self.wanted;
             let is_close = met && value - self.wanted <= self.close;
             let file_bytes = LexiWriter::packed(packed).file_bytes();
