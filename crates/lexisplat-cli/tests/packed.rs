@@ -252,7 +252,7 @@ fn what_is_left_out_is_reported() {
     }
     // An option of before is accepted, and told about.
     let arguments = [&BY_CAMERAS[..], &["--prune", "--overwrite"]].concat();
-    let told = folder::lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
+    let told = lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
     assert!(told.status.success());
     assert!(String::from_utf8_lossy(&told.stderr).contains("--keep-all"));
 }
