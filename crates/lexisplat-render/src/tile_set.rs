@@ -2,6 +2,7 @@
 
 use crate::conventions::TILE;
 use crate::error::{Error, Result};
+#[cfg(any(test, feature = "gpu"))]
 use crate::image::Image;
 
 /// Some of the tiles of a picture, in the order of rows and then of columns.

@@ -144,9 +144,16 @@ impl<S: Borrow<Splats>> Refitting<S> {
 
 /// A file with refitted base colours and opacities.
 pub(super) struct Refitted {
-    /// Those colours and opacities; `None` if nothing may change.
+    /// Those colours and opacities; `None` if nothing is left to fit.
     shown: Option<Vec<Appearance>>,
     pub(super) file: (Packed, CompressReport),
+}
+
+impl Refitted {
+    /// A file of which nothing is left to fit.
+    pub(super) fn complete(file: (Packed, CompressReport)) -> Self {
+        Self { shown: None, file }
+    }
 }
 
 /// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone.

@@ -7,7 +7,7 @@ use lexisplat::packed::{Packed, Preset, ReachedRecord, TargetRecord};
 use lexisplat::{CompressReport, Progress, Splats};
 
 use super::judge::{Judge, Score};
-use super::refit::Refitting;
+use super::refit::{Refitted, Refitting};
 use super::report::reached;
 use crate::error::{Error, Result};
 
@@ -299,16 +299,12 @@ impl Search {
                 continue;
             }
             passed = 0;
-            let refitted = packer.refit(&quantised, file, progress)?;
-            // The bytes of a first layer's changes count, and its pictures do not.
-            let (refitted, complete) = match self.is_size {
-                true => (Err(packer.complete(&quantised, refitted, progress)?), true),
-                false => (Ok(refitted), false),
-            };
-            let packed = match &refitted {
-                Ok(refitted) => &refitted.file.0,
-                Err(file) => &file.0,
-            };
+            let mut refitted = packer.refit(&quantised, file, progress)?;
+            if self.is_size {
+                // The bytes of a first layer's changes count, and its pictures do not.
+                refitted = Refitted::complete(packer.complete(&quantised, refitted, progress)?);
+            }
+            let packed = &refitted.file.0;
             let (value, score) =
                 if packer.refits() { self.value(packed, judge, progress)? } else { (plain, score) };
             (gain, is_measured) = (value - plain, true);
@@ -324,10 +320,10 @@ impl Search {
                 if self.is_size { log_step < best.log_step } else { file_bytes < best.file_bytes }
             };
             if met && best.as_ref().is_none_or(is_better) {
-                let ((packed, report), complete) = match refitted {
-                    Ok(refitted) if is_close => (packer.complete(&quantised, refitted, progress)?, true),
-                    Ok(refitted) => (refitted.file, complete),
-                    Err(file) => (file, complete),
+                let complete = self.is_size || is_close;
+                let (packed, report) = match complete {
+                    true => packer.complete(&quantised, refitted, progress)?,
+                    false => refitted.file,
                 };
                 best = Some(Found { log_step, file_bytes, packed, report, reached: score, complete });
             }
