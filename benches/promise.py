@@ -15,8 +15,9 @@ by the same lines. Where a peer's curve begins above a quality, its smallest fil
 
 The example `promise` of lexisplat-eval then scores each file against the original; see there for what views, pictures
 and tiles are. Pictures are as wide as the cameras' own, which the model was trained at, 1,600 pixels at most, unless
-TRAINED says otherwise; on the path they are drawn at half that width too, and 400 pixels wide. The last columns compare sizes at equal reached quality: bytes without cameras over bytes with, or
-of a guess over bytes without cameras, by the straight line between the logarithms of the bytes of neighbouring files.
+TRAINED says otherwise; on the path they are drawn at half that width too, and 400 pixels wide. The last columns compare
+sizes at equal reached quality: bytes without cameras over bytes with, or of a guess over bytes without cameras, by the
+straight line between the logarithms of the bytes of neighbouring files.
 """
 
 import argparse
@@ -37,7 +38,7 @@ PRESETS = {"small": 35, "balanced": 40, "high": 45, "archive": 54}
 WIDEST = 1600  # pixels; the trainer scales wider photos down
 ORBIT = 400  # pixels, where there are no cameras
 SMALL_WIDTH = 400  # pixels
-# Widths of models whose cameras state another: those of the photos at full size.
+# Widths of models whose cameras state the size of photos before training scaled them.
 TRAINED = {"flowers-c3dgs-int8": 400}
 KINDS = ("half", "quarter", "far", "above", "back")
 

@@ -131,7 +131,7 @@ fn test_views(file: &str, width: u32, geometry: &Geometry) -> Result<Vec<Camera>
     if file == "orbit" {
         return Ok(orbit(geometry, ORBIT_VIEWS, width, width / 4 * 3));
     }
-    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, width, geometry, None)?)
+    Ok(choose_views(Some(Path::new(file)), SplitFilter::Test, 0, width, geometry)?)
 }
 
 fn main() -> Result<(), Box<dyn Error>> {

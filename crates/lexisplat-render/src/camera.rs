@@ -96,6 +96,13 @@ impl Camera {
         Self { width, height, fx, fy, tiles: None, ..self.clone() }
     }
 
+    /// Returns this camera with half the width and height, of which it draws the same part.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let [width, height] = [self.width, self.height].map(|side| (side / 2).max(1));
+        self.resized(width, height).with_tiles(self.tiles.as_ref().map(TileSet::halved))
+    }
+
     /// Returns this camera with the tiles that it draws.
     #[must_use]
     pub fn with_tiles(self, tiles: impl Into<Option<TileSet>>) -> Self {

@@ -91,7 +91,7 @@ pub use read_views::{read_view_files, read_views_bytes};
 pub use renderer::{Device, Prepared, Renderer};
 pub use scene::Scene;
 pub use squared_error::squared_error;
-pub use surround::surround;
+pub use surround::{PLASTIC, surround};
 pub use tile_set::TileSet;
 pub use transforms::read_transforms_bytes;
 pub use view_files::{MAX_CAMERAS_BYTES, ReadSeek, ViewFile, ViewFiles};

@@ -13,8 +13,8 @@ use crate::surround::PLASTIC;
 use crate::transmittance::unit_rotation;
 
 /// Logarithm of a Gaussian's distance from the nearest and the farthest camera in its largest standard deviations. The
-/// mean of the Gaussians in a photograph of 400 pixels is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md). In
-/// one of three times as many pixels it is 1.1 more.
+/// mean of the Gaussians in a photograph of 400 pixels is 2.6 to 5.1 (20 to 173 views each of six scenes; docs/METHOD.md). A model
+/// trained at three times that width has Gaussians of a third of the size, so that the logarithm is ln 3 = 1.1 larger.
 const DISTANCES: [f64; 2] = [3.0, 6.6];
 /// Focal lengths in picture widths, in turn: fields of view of 84, 67, 56 and 42 degrees.
 const FOCALS: [f64; 4] = [0.55, 0.75, 0.95, 1.3];

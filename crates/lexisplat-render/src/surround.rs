@@ -13,7 +13,7 @@ const TRIM: f64 = 0.2;
 const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
 /// Steps of the low-discrepancy sequences that spread distances and the points looked at. They are powers of the
 /// reciprocal plastic number (Roberts, "The Unreasonable Effectiveness of Quasirandom Sequences").
-pub(crate) const PLASTIC: [f64; 4] =
+pub const PLASTIC: [f64; 4] =
     [0.754_877_666_246_692_7, 0.569_840_290_998_053_2, 0.430_159_709_001_946_8, 0.324_717_957_244_746];
 /// Focal length in picture widths: a field of view of 53 degrees.
 const FOCAL: f64 = 1.0;

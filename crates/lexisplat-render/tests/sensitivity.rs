@@ -176,7 +176,7 @@ fn removal_is_what_the_pictures_lose() {
     assert!(seen > 20, "{seen}");
 }
 
-/// What two halves of the tiles measure is together what the whole picture measures.
+/// Two halves of the tiles measure together as much as the whole picture.
 #[test]
 fn tiles_measure_their_share() {
     let splats = scene(&SampleOptions::new(300, 5));

@@ -1,9 +1,9 @@
 //! The cameras of a file that the user named.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use lexisplat::{Geometry, Offset};
-use lexisplat_eval::{SplitFilter, choose_views};
+use lexisplat_eval::{SplitFilter, ViewOptions, find_views};
 use lexisplat_render::Camera;
 
 use crate::error::Result;
@@ -11,45 +11,38 @@ use crate::error::Result;
 /// The cameras of a file, in the world of the scene that they show.
 #[derive(Debug, Clone)]
 pub(crate) struct GivenCameras {
-    file: PathBuf,
-    split: SplitFilter,
-    max_width: u32,
-    /// Distance of the near plane, in world units; without it that of the file.
-    near: Option<f32>,
-    offset: Option<Offset>,
+    options: ViewOptions,
     cameras: Vec<Camera>,
 }
 
 impl GivenCameras {
-    /// Reads the cameras of `file` that `split` lets through, at most `max_width` pixels wide, for a scene without an
-    /// offset.
+    /// Reads the cameras of `file` that `split` lets through, at most `max_width` pixels wide, with the near plane `near` or that
+    /// of the file, for a scene without an offset.
     pub(crate) fn read(file: &Path, split: SplitFilter, max_width: u32, near: Option<f32>) -> Result<Self> {
-        let file = file.to_path_buf();
-        let mut given =
-            Self { file, split, max_width: max_width.max(1), near, offset: None, cameras: Vec::new() };
-        given.cameras = given.read_for(None)?;
-        Ok(given)
+        let (cameras, max_width) = (Some(file.to_path_buf()), max_width.max(1));
+        let options = ViewOptions { cameras, split, max_width, near, ..ViewOptions::default() };
+        let cameras = read(&options)?;
+        Ok(Self { options, cameras })
     }
 
     /// Returns the cameras for a scene whose positions are relative to `offset`. The file is read again where the offset
     /// is another than before, because its positions are more precise than those of cameras.
     pub(crate) fn relative_to(&mut self, offset: Option<Offset>) -> Result<&[Camera]> {
-        if offset != self.offset {
-            self.cameras = self.read_for(offset)?;
-            self.offset = offset;
+        if offset != self.options.offset {
+            let options = ViewOptions { offset, ..self.options.clone() };
+            *self = Self { cameras: read(&options)?, options };
         }
         Ok(&self.cameras)
     }
+}
 
-    fn read_for(&self, offset: Option<Offset>) -> Result<Vec<Camera>> {
-        let nothing = Geometry::default();
-        let cameras = choose_views(Some(&self.file), self.split, 0, self.max_width, &nothing, offset)?;
-        let cameras: Vec<Camera> = cameras.into_iter().map(|camera| camera.with_near(self.near)).collect();
-        for camera in &cameras {
-            camera.validate()?;
-        }
-        Ok(cameras)
+fn read(options: &ViewOptions) -> Result<Vec<Camera>> {
+    let found = find_views(options, &Geometry::default())?.views;
+    let cameras: Vec<Camera> = found.into_iter().map(|view| view.camera).collect();
+    for camera in &cameras {
+        camera.validate()?;
     }
+    Ok(cameras)
 }
 
 #[cfg(test)]

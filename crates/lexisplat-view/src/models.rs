@@ -51,7 +51,7 @@ pub(crate) struct OrbitSize {
 impl OpenModel {
     fn new(id: u64, scene: SceneFile, path: Option<PathBuf>, size: OrbitSize) -> Result<Self> {
         let geometry = scene.scene().geometry();
-        let mut orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry, None)?;
+        let mut orbit = choose_views(None, SplitFilter::All, size.views, size.max_width, geometry)?;
         let (bulk, near) = (bulk(geometry), size.near.unwrap_or_else(|| near_plane(geometry)));
         orbit.iter_mut().for_each(|camera| camera.near = near);
         let (layout, guarantee) = match &scene.loaded {

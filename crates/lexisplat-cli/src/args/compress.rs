@@ -47,9 +47,9 @@ pub(crate) struct Compress {
     /// Make the best file that is at least this many times smaller than the source, above 1.
     #[arg(long, group = "goal", value_name = "R", value_parser = real::<f64>("20"), help_heading = TARGET)]
     pub(crate) ratio: Option<f64>,
-    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default: those that lie
-    /// beside the scene or one folder above, or where INRIA's trainer leaves them; else views like photographs, which are looked
-    /// for].
+    /// Cameras to draw and judge the scene from: a cameras.json, a transforms.json or a COLMAP folder [default: cameras that
+    /// lie beside the scene or one folder above, or where INRIA's trainer leaves them; else views like photographs, which are
+    /// looked for].
     #[arg(long, value_name = "PATH")]
     pub(crate) cameras: Option<PathBuf>,
     /// Use no cameras that lie beside the scene.
@@ -171,7 +171,7 @@ impl Compress {
 
     /// Whether cameras that lie beside the scene are used.
     pub(crate) fn looks_beside(&self) -> bool {
-        let other = self.cameras.is_some() || self.no_cameras || self.scene.is_some() || self.guess;
+        let other = self.cameras.is_some() || self.no_cameras || self.scene.is_some();
         !other && self.inputs.len() == 1
     }
 

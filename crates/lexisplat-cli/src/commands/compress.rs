@@ -60,7 +60,6 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         set.cameras.iter_mut().for_each(|camera| camera.near = near);
     }
     warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
-    let beside = if args.looks_beside() { beside(first) } else { None };
     let mut compression = compression(args, given.as_ref(), &limits)?;
     if args.prune.is_some() && !common.quiet {
         note(
@@ -75,6 +74,8 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
     let whole = compression.holds_whole(files.iter().map(|(_, bytes)| bytes.len() as u64).sum());
+    // Only a scene that is packed whole is drawn from cameras.
+    let beside = if whole && args.looks_beside() { beside(first) } else { None };
     let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     for ((name, _), opened) in files.iter().zip(&opened) {

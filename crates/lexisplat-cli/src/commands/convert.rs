@@ -9,7 +9,7 @@ use lexisplat::ply::ReadOptions;
 use lexisplat::{Input, Splats, unite};
 use lexisplat_eval::compression::judging_views;
 use lexisplat_eval::{Compression, DrawOptions, Packing, SceneFile, Whereabouts, compare, format};
-use lexisplat_formats::{Kind, Lost, Opened, merge, open, write};
+use lexisplat_formats::{Kind, Lost, merge, open, write};
 use lexisplat_render::{Device, Scene};
 use serde_json::{Value, json};
 
@@ -122,12 +122,7 @@ fn read_all(
         bytes_in += bytes.len() as u64;
         let opened = open(&name, &bytes, siblings(&name), &options, true, bars)?;
         warn(&name, opened.source().warnings());
-        let source = opened.some(&name)?;
-        let mut next = match &opened {
-            // Parts of the file are in its own order.
-            Opened::Lexi(lexi) if lexi.order_kept() => lexi.model()?.into_splats(),
-            _ => source.whole()?.into_owned(),
-        };
+        let mut next = opened.some(&name)?.whole()?.into_owned();
         match &mut all {
             None => all = Some(next),
             Some(all) => {

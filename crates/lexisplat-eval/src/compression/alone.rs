@@ -6,15 +6,12 @@
 use lexisplat::packed::AppearanceChange;
 use lexisplat::sh::C0;
 use lexisplat::{Progress, Splats, Stage};
-use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene, TileSet};
+use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Scene};
 
 use super::only_cancels::OneStep;
 use super::solve::{ROW, kinds, solve};
 use crate::error::Result;
 
-/// Pictures are so many times less wide and high than those that the file is fitted to. A first layer alone has no finer
-/// detail, and fits in a quarter of the time.
-const SHRINKING: u32 = 2;
 /// Solutions: of sizes, of opacities and of colours.
 const SOLUTIONS: usize = 3;
 /// Steps of the method of conjugate gradients, of each of them.
@@ -42,7 +39,8 @@ pub(super) fn alone(
     // The views are drawn once for the errors and once in each step.
     progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
     let parts = &OneStep(progress);
-    let smaller: Vec<Camera> = cameras.iter().map(shrunk_camera).collect();
+    // A first layer alone has no finer detail, and is fitted in a quarter of the time.
+    let smaller: Vec<Camera> = cameras.iter().map(Camera::halved).collect();
     let shrink = |((target, camera), smaller): ((&Image, &Camera), &Camera)| shrunk(target, camera, smaller);
     let targets: Vec<Image> = targets.iter().zip(cameras).zip(&smaller).map(shrink).collect();
     let cameras = smaller;
@@ -94,13 +92,7 @@ fn nearest<const N: usize>(
     solve(&mut adjoint, errors, &ridge, &diagonal, STEPS, progress)
 }
 
-/// `camera` with fewer pixels, in the same part of the picture.
-fn shrunk_camera(camera: &Camera) -> Camera {
-    let [width, height] = [camera.width, camera.height].map(|side| (side / SHRINKING).max(1));
-    camera.resized(width, height).with_tiles(camera.tiles.as_ref().map(TileSet::halved))
-}
-
-/// `image`, which `camera` draws, as `smaller` would: each pixel is the mean of those that it covers and that are there.
+/// `image`, which `camera` draws, as `smaller` would. Each pixel is the mean of the drawn pixels that it covers.
 fn shrunk(image: &Image, camera: &Camera, smaller: &Camera) -> Image {
     let covered = |k: usize, of: u32, from: u32| {
         let place = |k: usize| (k * from as usize).div_ceil(of.max(1) as usize);
@@ -128,7 +120,7 @@ fn shrunk(image: &Image, camera: &Camera, smaller: &Camera) -> Image {
 mod tests {
     use lexisplat::Silent;
     use lexisplat::packed::{PackOptions, Packer};
-    use lexisplat_render::Renderer;
+    use lexisplat_render::{Renderer, TileSet};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -201,9 +193,9 @@ mod tests {
         let camera = view(104, 72);
         let pixels = (0..104 * 72).map(|k| [k as f32 / 7488.0, (k % 13) as f32 / 13.0, 0.5]).collect();
         let whole = Image { width: 104, height: 72, pixels };
-        let small = shrunk(&whole, &camera, &shrunk_camera(&camera));
+        let small = shrunk(&whole, &camera, &camera.halved());
         let some = camera.with_tiles(TileSet::new(104, 72, |x, y| (x / 2 + y / 2) % 2 == 1));
-        let smaller = shrunk_camera(&some);
+        let smaller = some.halved();
         assert_eq!(shrunk(&cut(&whole, &some), &some, &smaller), cut(&small, &smaller));
     }
 }

@@ -15,7 +15,7 @@ const DRAWN_WIDTH: u32 = 96;
 const LEAST_DETAIL: f64 = 1.15;
 
 /// Whether photographs of `splats` may have been taken by `cameras`. Most of them show something of it, and about as much detail
-/// as [`natural_views`]. Cameras of another scene fail that, or those that are in other coordinates.
+/// as [`natural_views`]. Cameras of another scene, or in other coordinates, fail.
 ///
 /// # Errors
 /// As [`Renderer::render`]; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].

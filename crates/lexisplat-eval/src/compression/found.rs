@@ -53,7 +53,7 @@ pub(super) fn find(
     progress: &dyn Progress,
 ) -> Result<Found> {
     let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
-    let mut views = likely(&splats.geometry, natural_views(&splats.geometry, CHOICE * tried, SIZE), tried);
+    let mut views = likely(&splats.geometry, &natural_views(&splats.geometry, CHOICE * tried, SIZE), tried);
     views.extend(more);
     let sketch = sketch(splats);
     let scene = renderer.prepare(Scene::from(&sketch))?;
@@ -94,15 +94,14 @@ pub(super) fn find(
 }
 
 /// The `most` of `views`, in their order, from where the Gaussians look most alike in size.
-fn likely(geometry: &Geometry, views: Vec<Camera>, most: usize) -> Vec<Camera> {
+fn likely(geometry: &Geometry, views: &[Camera], most: usize) -> Vec<Camera> {
     let sizes = Sizes::of(geometry);
     let spreads: Vec<f64> = views.iter().map(|view| sizes.spread(view.position)).collect();
     let mut order: Vec<usize> = (0..views.len()).collect();
     order.sort_by(|&a, &b| spreads[a].total_cmp(&spreads[b]));
     order.truncate(most);
-    let mut keep = vec![false; views.len()];
-    order.into_iter().for_each(|k| keep[k] = true);
-    views.into_iter().zip(keep).filter_map(|(view, keep)| keep.then_some(view)).collect()
+    order.sort_unstable();
+    order.into_iter().map(|k| views[k].clone()).collect()
 }
 
 /// A copy of `splats` that is faster to draw: without view-dependent colour, and without what is hardly visible.

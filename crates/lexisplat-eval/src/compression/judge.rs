@@ -4,6 +4,7 @@ use lexisplat::{Progress, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, squared_error};
 
 use crate::error::Result;
+use crate::metrics::decibels;
 
 /// PSNR that identical pictures count as, in dB, so that means are finite.
 const IDENTICAL: f64 = 100.0;
@@ -80,9 +81,8 @@ impl Judge {
         for (camera, original) in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
-            let squares = squared_error(original, &picture)?;
-            let mean = squares / (camera.drawn_pixels() * 3) as f64;
-            all.push(if mean > 0.0 { (-10.0 * libm::log10(mean)).min(IDENTICAL) } else { IDENTICAL });
+            let found = decibels(squared_error(original, &picture)?, camera.drawn_pixels());
+            all.push(found.map_or(IDENTICAL, |decibels| decibels.min(IDENTICAL)));
             progress.advance(1);
         }
         progress.end();

@@ -6,16 +6,13 @@
 //! average over all places, that of whole pictures.
 
 use lexisplat_render::conventions::TILE;
-use lexisplat_render::{Camera, TileSet};
+use lexisplat_render::{Camera, PLASTIC, TileSet};
 
 /// Side of a square, in tiles. Half the picture's size has whole tiles too.
 const SQUARE: u32 = 2;
 /// Side of a tile, in pixels.
 #[expect(clippy::cast_possible_truncation, reason = "16")]
 const TILE_PIXELS: u32 = TILE as u32;
-/// The shares of the R2 sequence, which is even in two dimensions: reciprocals of the powers of the plastic number 1.3247...
-/// (M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018).
-const R2: [f64; 2] = [0.754_877_666_246_692_8, 0.569_840_290_998_053_3];
 /// The golden ratio less 1: the step from one view's places to those of the next.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
@@ -32,7 +29,7 @@ pub(super) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
 /// `camera`, the `k`-th, which draws this share of its squares.
 fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
     let begin = (k as f64 * GOLDEN).fract();
-    let place = |x: u32, y: u32| (begin + f64::from(x) * R2[0] + f64::from(y) * R2[1]).fract();
+    let place = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
     let chosen =
         |limit: f64| TileSet::new(camera.width, camera.height, |x, y| place(x / SQUARE, y / SQUARE) <= limit);
     let mut set = chosen(share);

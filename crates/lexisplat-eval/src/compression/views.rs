@@ -116,12 +116,6 @@ fn found_views(splats: &Splats) -> [usize; 2] {
     [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
 }
 
-/// `camera` with half the width and height.
-fn halved(camera: &Camera) -> Camera {
-    let [width, height] = [camera.width, camera.height].map(|side| (side / 2).max(1));
-    camera.resized(width, height)
-}
-
 /// The views that packing draws.
 #[derive(Debug, Clone)]
 pub struct PackingViews {
@@ -270,7 +264,7 @@ impl PackingViews {
         let stride = free.len().div_ceil(most).max(1);
         let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
         views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
-        views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = halved(camera));
+        views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = camera.halved());
         sampled(views, FITTED_PIXELS)
     }
 
@@ -290,7 +284,7 @@ impl PackingViews {
         if self.given {
             cameras.extend(aside(&splats.geometry, &self.measuring, ASIDE));
         }
-        let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(halved).collect();
+        let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(Camera::halved).collect();
         cameras.extend(smaller);
         let cameras = sampled(cameras, MEASURED_PIXELS);
         let mut measured = renderer.sensitivity(&Scene::from(splats), &cameras, progress)?;

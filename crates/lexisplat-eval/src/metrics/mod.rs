@@ -11,18 +11,13 @@ mod ssim;
 pub use flip::flip;
 pub use lpips::Lpips;
 pub use metric::Metric;
+pub(crate) use psnr::decibels;
 pub use psnr::psnr;
 pub use ssim::{ssim, ssim_inner};
 
 use lexisplat_render::Image;
 
 use crate::error::{Error, Result};
-
-/// Returns a colour value within 0..1, in `f64`.
-#[inline]
-fn clipped(value: f32) -> f64 {
-    f64::from(clip(value))
-}
 
 /// The least and largest value of `image`, if one of them is outside of 0..1: metrics clip such values. Pictures of scenes
 /// may have some; values up to 255 mean that the picture should be divided by 255.

@@ -1,8 +1,8 @@
 //! Peak signal-to-noise ratio.
 
-use lexisplat_render::Image;
+use lexisplat_render::{Image, squared_error};
 
-use super::{clipped, comparable};
+use super::comparable;
 use crate::error::Result;
 
 /// Returns the PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
@@ -12,18 +12,13 @@ use crate::error::Result;
 /// [`crate::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
 pub fn psnr(a: &Image, b: &Image) -> Result<Option<f64>> {
     comparable(a, b)?;
-    let squares: f64 = a
-        .pixels
-        .iter()
-        .flatten()
-        .zip(b.pixels.iter().flatten())
-        .map(|(&x, &y)| {
-            let difference = clipped(x) - clipped(y);
-            difference * difference
-        })
-        .sum();
-    let mean = squares / (a.pixels.len() * 3) as f64;
-    Ok((mean > 0.0).then(|| -10.0 * libm::log10(mean)))
+    Ok(decibels(squared_error(a, b)?, a.pixels.len() as u64))
+}
+
+/// The PSNR in dB of a sum of squared errors over all channels of so many pixels; `None` if there are no errors.
+pub(crate) fn decibels(squares: f64, pixels: u64) -> Option<f64> {
+    let mean = squares / (pixels * 3) as f64;
+    (mean > 0.0).then(|| -10.0 * libm::log10(mean))
 }
 
 #[cfg(test)]
@@ -48,6 +43,8 @@ mod tests {
     #[test]
     fn clipping_comes_first_and_identity_is_none() {
         assert_eq!(psnr(&flat(1.5), &flat(1.0)).unwrap(), None);
+        // Colours of a finite scene may overflow where it is drawn.
+        assert_eq!(decibels(squared_error(&flat(-3.0), &flat(f32::NAN)).unwrap(), 8), None);
         assert_eq!(psnr(&flat(f32::INFINITY), &flat(1.0)).unwrap(), None);
         let a = picture(20, 10, 1);
         assert_eq!(psnr(&a, &a).unwrap(), None);

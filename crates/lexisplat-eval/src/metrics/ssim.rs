@@ -148,7 +148,6 @@ fn window() -> [f64; WINDOW] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::metrics::clipped;
     use crate::metrics::testing::picture;
 
     /// The definition: a full 2-D window at every pixel at least `cut` from the border.
@@ -169,7 +168,7 @@ mod tests {
                                 continue;
                             }
                             let i = usize::try_from(v * width + u).unwrap();
-                            let (p, q) = (clipped(a.pixels[i][c]), clipped(b.pixels[i][c]));
+                            let (p, q) = (f64::from(clip(a.pixels[i][c])), f64::from(clip(b.pixels[i][c])));
                             let w = weight(dx) * weight(dy) / (norm * norm);
                             for (s, value) in sums.iter_mut().zip([p, q, p * p, q * q, p * q]) {
                                 *s += w * value;

@@ -22,7 +22,7 @@ pub(super) fn to_photo(camera: &Camera, (width, height): (u32, u32), photo: &Pat
         );
         return Err(Error::format(photo, problem));
     }
-    Ok(resized(camera, width, height))
+    Ok(camera.resized(width, height))
 }
 
 /// Returns `camera` with sides smaller by `divisor`, rounded half to even as in Python.
@@ -33,20 +33,7 @@ pub(super) fn divided(camera: &Camera, divisor: u32) -> Camera {
         reason = "no larger than the side it was"
     )]
     let side = |side: u32| ((f64::from(side) / f64::from(divisor)).round_ties_even() as u32).max(1);
-    resized(camera, side(camera.width), side(camera.height))
-}
-
-fn resized(camera: &Camera, width: u32, height: u32) -> Camera {
-    #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
-    let scaled =
-        |focal: f32, new: u32, old: u32| (f64::from(focal) * (f64::from(new) / f64::from(old))) as f32;
-    Camera {
-        width,
-        height,
-        fx: scaled(camera.fx, width, camera.width),
-        fy: scaled(camera.fy, height, camera.height),
-        ..camera.clone()
-    }
+    camera.resized(side(camera.width), side(camera.height))
 }
 
 #[cfg(test)]

@@ -205,8 +205,7 @@ fn capped(views: Vec<View>, max_width: u32) -> Vec<View> {
 }
 
 /// Reads cameras of any kind that [`read_views`] reads, or generates an [`orbit`] of `orbit_views` around all of
-/// `geometry`. If no camera is marked with a split, every [`DEFAULT_HOLD`]th is a test view. The `offset` of the scene's
-/// positions is subtracted from cameras that are read.
+/// `geometry`. If no camera is marked with a split, every [`DEFAULT_HOLD`]th is a test view.
 ///
 /// # Errors
 /// [`Error::Parameter`] if the filter leaves no camera. Errors of [`read_views`].
@@ -216,10 +215,9 @@ pub fn choose_views(
     orbit_views: u16,
     max_width: u32,
     geometry: &Geometry,
-    offset: Option<Offset>,
 ) -> Result<Vec<Camera>> {
     let found = match cameras {
-        Some(source) => split::filter(read(source, None)?.relative_to(offset).cameras, filter, DEFAULT_HOLD)?,
+        Some(source) => split::filter(read(source, None)?.cameras, filter, DEFAULT_HOLD)?,
         None => split::unmarked(orbit(geometry, orbit_views.into(), ORBIT_SIZE.0, ORBIT_SIZE.1), filter)?,
     };
     Ok(found.iter().map(|camera| camera.with_max_width(max_width)).collect())

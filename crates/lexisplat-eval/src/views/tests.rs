@@ -269,7 +269,7 @@ fn splits_come_before_photos_and_sizes_from_photos() {
     photos(root, &["images/08.png", "images/09.png", "images/16.png"], (32, 24));
     let with_photos = ViewOptions { images: Some(root.join("images")), ..test };
     assert_eq!(tested(&with_photos), ["08.png", "16.png"]);
-    let chosen = choose_views(Some(root), SplitFilter::Test, 0, 16, &Geometry::default(), None).unwrap();
+    let chosen = choose_views(Some(root), SplitFilter::Test, 0, 16, &Geometry::default()).unwrap();
     assert_eq!(chosen.iter().map(|c| (c.width, c.height)).collect::<Vec<_>>(), [(16, 12); 3]);
 
     // A NeRF folder says nothing about sizes.
@@ -319,9 +319,9 @@ fn generated_views_are_of_the_kind_asked_for() {
     assert_eq!((room.views.len(), room.views[4].camera.name.as_str()), (5, "room_004"));
     let wanted: Vec<Camera> = orbit(&geometry, 5, 960, 640).iter().map(|c| c.with_max_width(480)).collect();
     assert_eq!(object.views.into_iter().map(|v| v.camera).collect::<Vec<_>>(), wanted);
-    assert_eq!(choose_views(None, SplitFilter::All, 5, 480, &geometry, None).unwrap(), wanted);
-    assert!(choose_views(None, SplitFilter::Test, 5, 480, &geometry, None).is_err());
-    assert!(choose_views(None, SplitFilter::All, 0, 480, &geometry, None).is_err());
+    assert_eq!(choose_views(None, SplitFilter::All, 5, 480, &geometry).unwrap(), wanted);
+    assert!(choose_views(None, SplitFilter::Test, 5, 480, &geometry).is_err());
+    assert!(choose_views(None, SplitFilter::All, 0, 480, &geometry).is_err());
     let none = ViewOptions { count: 0, ..ViewOptions::default() };
     assert!(find_views(&none, &geometry).is_err());
 }

@@ -556,7 +556,7 @@ mod tests {
             }
         }
         assert!(adjoint.of_errors::<4>(&targets[1..], &Silent).is_err());
-        // What two halves of the tiles carry back is together what whole pictures do.
+        // Two halves of the tiles carry back together as much as whole pictures.
         let halves = [0, 1].map(|odd| {
             let set = TileSet::new(70, 50, |column, row| (column + row) % 2 == odd);
             let cameras: Vec<Camera> =

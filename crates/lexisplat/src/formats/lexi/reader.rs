@@ -1,5 +1,6 @@
 //! Reading .lexi files of every layout, whole or a part at a time.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::path::Path;
 
@@ -423,6 +424,16 @@ impl SplatSource for LexiReader<'_> {
     fn row_bytes(&self) -> u64 {
         let bytes: u64 = self.attribute_bytes.iter().map(|a| a.1).sum();
         bytes / LexiReader::len(self).max(1) as u64
+    }
+
+    /// In the order of its source, if the file holds it; parts are in the order of the file.
+    fn whole(&self) -> Result<Cow<'_, Splats>> {
+        if self.order_kept() {
+            return Ok(Cow::Owned(self.model()?.into_splats()));
+        }
+        let mut splats = self.empty();
+        self.read(0..LexiReader::len(self), &mut splats)?;
+        Ok(Cow::Owned(splats))
     }
 
     fn read(&self, range: Range<usize>, part: &mut Splats) -> Result<()> {
