@@ -120,7 +120,14 @@ fn pictures_sort_as_the_cameras_do() {
 fn pipes_carry_scenes() {
     let folder = Folder::few();
     let scene = std::fs::read(folder.path("scene.ply")).unwrap();
-    let small = lexisplat().args(["compress", "-", "-o", "-"]).write_stdin(scene).output().unwrap();
+    // A pipe has no folder in which cameras could lie.
+    let cameras = folder.path("cameras.json");
+    let small = lexisplat()
+        .args(["compress", "-", "-o", "-", "--cameras"])
+        .arg(&cameras)
+        .write_stdin(scene)
+        .output()
+        .unwrap();
     assert!(small.status.success());
     folder.run(&["compress", "scene.ply", "-q"]);
     assert!(small.stdout == std::fs::read(folder.path("scene.lexi")).unwrap(), "a pipe gives the same bytes");
