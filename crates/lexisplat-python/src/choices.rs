@@ -1,5 +1,6 @@
 //! Compression, with its choices by name.
 
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use lexisplat::packed::{PackOptions, Preset};
@@ -8,8 +9,10 @@ use lexisplat::{
     lexi,
 };
 use lexisplat_eval::compression::choose_layout;
-use lexisplat_eval::{Compression, Error, Packing, Quality, SceneKind, Target};
-use lexisplat_render::Device;
+use lexisplat_eval::{
+    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, cameras_beside,
+};
+use lexisplat_render::{Device, ViewSet, read_views};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -40,6 +43,8 @@ pub(crate) struct Choices {
     sample: Option<usize>,
     seed: u64,
     cameras: Option<Vec<CameraTuple>>,
+    /// The scene's file, if cameras that lie beside it are used.
+    beside: Option<PathBuf>,
     views: Option<String>,
     keep_order: bool,
     keep_all: bool,
@@ -243,36 +248,62 @@ pub(crate) fn compress(
         Ok(file) => Source::File(file),
         Err(_) => Source::Splats(Box::new(finite_from_python(source, drop_invalid, &mut told)?)),
     };
-    let (bytes, report) = without_gil(py, progress, move |watch| {
+    let (bytes, report, unused) = without_gil(py, progress, move |watch| {
         let views = choices.cameras.clone();
+        let beside = choices.beside.clone();
         let compression = choices.compression(device, dictionary)?;
-        match source {
-            Source::Splats(splats) => run(&compression, views, &*splats, watch),
+        let beside =
+            beside.filter(|_| matches!(compression, Compression::Packed(_))).as_deref().and_then(beside_of);
+        let (bytes, report) = match source {
+            Source::Splats(splats) => run(&compression, views, beside.as_ref(), &*splats, watch)?,
             Source::File(given) => {
                 let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes));
                 with_source(given, &name, &options, whole, watch, &mut |source| {
-                    run(&compression, views.clone(), source, watch)
-                })
+                    run(&compression, views.clone(), beside.as_ref(), source, watch)
+                })?
             }
-        }
+        };
+        let unused = beside.filter(|_| report.reached.as_ref().is_some_and(|reached| !reached.cameras));
+        Ok((bytes, report, unused.map(|beside| beside.path)))
     })?;
+    told.extend(unused.map(|path| {
+        let path = path.display();
+        format!("the cameras of {path} do not seem to belong to the scene and were not used; cameras=\"{path}\" uses them all the same")
+    }));
     let report = json(py, &report)?;
     let scene = Scene::new(MADE.to_owned(), Bytes::Own(Arc::new(bytes)), options.limits, Some(report));
     Ok((scene, told))
 }
 
-/// Compresses `source`. The cameras `views`, which `compression` has too, are in the world.
+/// Cameras that lie beside a scene.
+struct Beside {
+    path: PathBuf,
+    set: ViewSet,
+}
+
+/// The cameras that lie beside the file `scene`, if they can be read.
+fn beside_of(scene: &Path) -> Option<Beside> {
+    let path = cameras_beside(scene)?;
+    let set = read_views(&path, &mut |_| None).ok()?;
+    Some(Beside { path, set })
+}
+
+/// Compresses `source`. The cameras `views`, which `compression` has too, and those beside the scene are in the world.
 fn run(
     compression: &Compression,
     views: Option<Vec<CameraTuple>>,
+    beside: Option<&Beside>,
     source: &dyn SplatSource,
     watch: &Watch,
-) -> Result<(Vec<u8>, lexisplat_eval::CompressionReport)> {
+) -> Result<(Vec<u8>, CompressionReport)> {
     let mut file = Vec::new();
-    if let (Some(views), offset @ Some(_)) = (views, source.empty().meta.offset) {
-        let compression = compression.clone().with_cameras(cameras(views, offset));
-        let report = compression.run(source, &mut file, watch)?;
-        return Ok((file, report));
+    let mut compression = compression.clone();
+    let offset = source.empty().meta.offset;
+    if let (Some(views), offset @ Some(_)) = (views, offset) {
+        compression = compression.with_cameras(cameras(views, offset));
+    }
+    if let Some(beside) = beside {
+        compression = compression.with_likely_cameras(beside.set.clone().relative_to(offset).cameras);
     }
     let report = compression.run(source, &mut file, watch)?;
     Ok((file, report))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import json
 import os
 import pickle
@@ -103,6 +104,26 @@ def test_chunks_are_the_scene(tmp_path: Path) -> None:
     threads = threading.active_count()
     next(scene.chunks())
     assert threading.active_count() == threads
+
+
+def test_cameras_beside_a_file_are_used(views: list[lx.Camera], program: str, tmp_path: Path) -> None:
+    path, made = tmp_path / "scene.ply", tmp_path / "by-program.lexi"
+    lx.save(path, make(1000))
+    file = tmp_path / "cameras.json"
+    file.write_text(json.dumps([of_inria(view) for view in views]))
+    given, without = (lx.compress(path, cameras=cameras).to_bytes() for cameras in (file, None))
+    assert given != without
+    assert lx.compress(path).to_bytes() == lx.compress(str(path), cameras="auto").to_bytes() == given
+    subprocess.run([program, "compress", path, "-o", made, "--quiet"], check=True)
+    assert made.read_bytes() == given
+    # Nothing lies beside arrays and bytes.
+    assert lx.compress(lx.load(path)).to_bytes() == lx.compress(path.read_bytes()).to_bytes() == without
+    assert lx.compress(path, views="object").to_bytes() not in (given, without)
+    # Cameras from which nothing shows are not those of the scene.
+    away = [dataclasses.replace(view, position=view.position * 40) for view in views]
+    file.write_text(json.dumps([of_inria(view) for view in away]))
+    with pytest.warns(lx.LexisplatWarning, match="do not seem to belong to the scene"):
+        assert lx.compress(path).to_bytes() == without
 
 
 def test_the_order_is_kept_if_asked(splats: lx.Splats, views: list[lx.Camera]) -> None:

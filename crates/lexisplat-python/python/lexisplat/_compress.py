@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Union
+from typing import Any, Literal, TypeGuard, Union
 
 import numpy as np
 
@@ -66,7 +66,7 @@ def compress(
     size: int | float | str | None = None,
     ratio: float | None = None,
     tol: float | None = None,
-    cameras: Cameras | None = None,
+    cameras: Cameras | None = "auto",
     views: Literal["auto", "object", "room"] | None = None,
     layout: Layout | None = None,
     atoms: int | None = None,
@@ -104,8 +104,10 @@ def compress(
     tol : float, optional
         Largest L2 norm (not squared) of the error of a Gaussian's SH vector, verified for every Gaussian. Geometry is
         then kept exactly, unless ``layout="packed"``.
-    cameras : sequence of Camera, or path, optional
-        What pictures are judged from. Otherwise views like photographs are looked for.
+    cameras : "auto", sequence of Camera, or path, optional
+        What pictures are judged from. With ``"auto"``, the cameras that lie beside the scene's file or one folder above, or
+        where INRIA's trainer leaves them, if they seem to belong to it: ``cameras.json``, ``transforms.json`` or COLMAP's
+        ``sparse/0``. Otherwise, and with ``None``, views like photographs are looked for.
     views : {"auto", "object", "room"}, optional
         Where generated views are taken from.
     layout : {"packed", "f16", "f32", "paper"}, optional
@@ -148,7 +150,8 @@ def compress(
     choices["device"] = device = device_of(device)
     kept = {name: flag(name, given[name]) for name in ("drop_invalid", "drop_extras")}
     allowed, report = limits(limit), reporter(progress)
-    choices["cameras"] = None if cameras is None else as_tuples(views_of(cameras))
+    choices["cameras"] = None if cameras is None or _is_auto(cameras) else as_tuples(views_of(cameras))
+    choices["beside"] = os.fsdecode(scene) if _is_auto(cameras) and views is None and _is_path(scene) else None
     source, name = opened("scene", scene) if is_source(scene) else (_splats(scene), "the scene")
     atoms_of = opened("dictionary", dictionary)[0] if is_source(dictionary) else _atoms(dictionary)
     with quiet(device):
@@ -156,6 +159,14 @@ def compress(
     result = Scene(made, allowed)
     warn([*told, *(result.report or {})["warnings"]], shown(scene, name))
     return result
+
+
+def _is_auto(cameras: object) -> bool:
+    return isinstance(cameras, str) and cameras == "auto"
+
+
+def _is_path(scene: object) -> TypeGuard[str | os.PathLike[str]]:
+    return isinstance(scene, (str, os.PathLike))
 
 
 def _splats(scene: object) -> object:
