@@ -186,7 +186,9 @@ impl Renderer {
         // A picture drawn from another thread at the same time, or one that panicked, has memory of its own.
         let mut own = Workspace::default();
         let mut shared = prepared.workspace.try_lock().ok();
-        Ok(render_with(shared.as_deref_mut().unwrap_or(&mut own), &prepared.scene, camera, options)?.image)
+        let workspace = shared.as_deref_mut().unwrap_or(&mut own);
+        workspace.cluster_again(prepared.scene.geometry());
+        Ok(render_with(workspace, &prepared.scene, camera, options)?.image)
     }
 
     /// Returns how much the pictures of `scene` from `cameras` change with each value of each Gaussian: see

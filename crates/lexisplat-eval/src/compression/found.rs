@@ -4,6 +4,7 @@
 //! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
 //! detail win.
 
+use lexisplat::packed::curve_order;
 use lexisplat::{Geometry, Progress, ShDegree, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
 
@@ -104,12 +105,13 @@ fn likely(geometry: &Geometry, views: &[Camera], most: usize) -> Vec<Camera> {
     order.into_iter().map(|k| views[k].clone()).collect()
 }
 
-/// A copy of `splats` that is faster to draw: without view-dependent colour, and without what is hardly visible.
+/// A copy of `splats` that is faster to draw: without view-dependent colour, without what is hardly visible, and with
+/// neighbours side by side.
 pub(super) fn sketch(splats: &Splats) -> Splats {
     let mut sketch = splats.with_degree_cut(ShDegree::ZERO);
     let keep: Vec<bool> = splats.geometry.opacities.iter().map(|&opacity| opacity > FAINT).collect();
     sketch.retain(&keep);
-    sketch
+    sketch.gathered(&curve_order(&sketch.geometry))
 }
 
 /// The share of pixels that show something.

@@ -1,5 +1,6 @@
 //! The views that packing draws: some measure the sensitivity, some judge the result.
 
+use lexisplat::packed::curve_order;
 use lexisplat::{Geometry, Progress, Sensitivity, Splats};
 use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
 
@@ -287,7 +288,14 @@ impl PackingViews {
         let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(Camera::halved).collect();
         cameras.extend(smaller);
         let cameras = sampled(cameras, MEASURED_PIXELS);
-        let mut measured = renderer.sensitivity(&Scene::from(splats), &cameras, progress)?;
+        let mut measured = match renderer.is_gpu() {
+            true => renderer.sensitivity(&Scene::from(splats), &cameras, progress)?,
+            false => {
+                let order = curve_order(&splats.geometry);
+                let ordered = splats.gathered(&order);
+                renderer.sensitivity(&Scene::from(&ordered), &cameras, progress)?.scattered(&order)
+            }
+        };
         measured.blend_with_prior(&splats.geometry, PRIOR_SHARE);
         Ok(measured)
     }

@@ -65,7 +65,8 @@ impl<'a> PictureAdjoint<'a> {
     pub fn new(scene: Scene<'a>, cameras: &'a [Camera]) -> Result<Self> {
         scene.validate()?;
         cameras.iter().try_for_each(Camera::validate)?;
-        Ok(Self { scene, cameras, workspace: Workspace::default(), pool: Pool::default() })
+        let workspace = Workspace::of_scene(scene.geometry());
+        Ok(Self { scene, cameras, workspace, pool: Pool::default() })
     }
 
     /// Returns the adjoint of J times the errors of the pictures: what `targets`, one for each camera, have more than
@@ -143,8 +144,7 @@ impl<'a> PictureAdjoint<'a> {
             let [_, drawn] = projection.pixel_counts();
             #[expect(clippy::cast_precision_loss, reason = "a count of views, to single precision")]
             let share = 1.0 / (drawn * self.cameras.len() as f32);
-            let Workspace { visible, order, .. } = &mut self.workspace;
-            visible.project(&mut order.keys, simd, self.scene.geometry(), &radiance, &projection);
+            self.workspace.project(&self.scene, &radiance, &projection);
             measure_tiles(
                 &mut self.workspace,
                 &self.pool,

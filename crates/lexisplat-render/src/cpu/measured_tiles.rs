@@ -48,7 +48,7 @@ pub(super) fn measure_tiles<T: Send>(
     mut add: impl FnMut(usize, T),
 ) {
     let grid = projection.grid;
-    let Workspace { visible, order, lists } = workspace;
+    let Workspace { visible, order, lists, .. } = workspace;
     order.sort(visible);
     for band in tiles::bands(order, grid, tiles::MAX_ENTRIES) {
         lists.fill(order, grid, projection.chosen.as_ref(), &band);

@@ -10,6 +10,7 @@
 mod adjoint;
 mod blend;
 mod change;
+mod clusters;
 mod grid;
 mod lanes;
 mod math;
@@ -152,10 +153,10 @@ fn draw(
     let (camera, grid) = (&projection.camera, projection.grid);
     let [width, height] = camera.picture_size();
     let side = width as usize;
-    let Workspace { visible, order, lists } = workspace;
     let mut pixels = vec![options.background; side * height as usize];
     let radiance = Radiance::new(scene).up_to(options.max_degree);
-    visible.project(&mut order.keys, simd, scene.geometry(), &radiance, projection);
+    workspace.project(scene, &radiance, projection);
+    let Workspace { visible, order, lists, .. } = workspace;
     stages.end("project");
     order.sort(visible);
     stages.end("sort");
@@ -188,10 +189,12 @@ fn draw(
 #[cfg(test)]
 mod tests {
     use lexisplat::{Geometry, SceneMeta, ShDegree, Splats};
+    use lexisplat_sample::{SampleOptions, scene};
     use proptest::prelude::*;
 
     use super::*;
     use crate::camera::straight_ahead;
+    use crate::orbit::orbit;
     use crate::tile_set::TileSet;
 
     type Gaussian = ([f32; 3], [f32; 3], [f32; 4], f32);
@@ -206,12 +209,33 @@ mod tests {
         let position = [within(-3.0, 3.0), within(-3.0, 3.0), within(0.1, 8.0)];
         let scale = prop::array::uniform3(within(-9.0, 2.5));
         let one = (position, scale, prop::array::uniform4(within(-1.0, 1.0)), within(-6.0, 9.0));
-        prop::collection::vec(one, 0..120)
+        prop::collection::vec(one, 0..200)
+    }
+
+    /// Pictures from inside and outside, some of them of some tiles, and Gaussians of equal depth.
+    #[test]
+    fn clusters_change_nothing() {
+        let mut splats = scene(&SampleOptions::new(3000, 2));
+        splats.append(splats.clone());
+        let mut views = orbit(&splats.geometry, 5, 300, 200);
+        for (k, view) in (0..).zip(views.clone()) {
+            let mut inside = view.clone();
+            inside.position = inside.position.map(|v| 0.2 * v);
+            let set = TileSet::new(300, 200, |column, row| (column + row + k).is_multiple_of(5));
+            views.extend([inside.clone(), inside.with_tiles(set.clone()), view.with_tiles(set)]);
+        }
+        let options = RenderOptions::default();
+        let mut clustered = Workspace::of_scene(&splats.geometry);
+        for view in &views {
+            let plain = render(&Scene::from(&splats), view, &options).unwrap();
+            let drawn = render_with(&mut clustered, &Scene::from(&splats), view, &options).unwrap().image;
+            assert!(plain == drawn, "{view:?}");
+        }
     }
 
     proptest! {
         /// Leaving out what cannot reach the least opacity changes not one bit: it is no rule of its own.
-        /// Nor does drawing every row of tiles by itself.
+        /// Nor does drawing every row of tiles by itself, or projecting clusters.
         #[test]
         fn tightening_changes_nothing(
             gaussians in gaussians(),
@@ -232,8 +256,12 @@ mod tests {
             let options = RenderOptions { background: [0.3, 0.6, 0.9], ..RenderOptions::default() };
             let projection = Projection::new(&straight_ahead(width, height, focal), antialiased);
             let mut workspace = Workspace::default();
+            let mut clustered = Workspace::of_scene(&splats.geometry);
             let mut draw = |projection: &Projection, max_entries| {
-                draw(&mut workspace, &Scene::from(&splats), projection, &options, max_entries)
+                let drawn = draw(&mut workspace, &Scene::from(&splats), projection, &options, max_entries);
+                let again = draw(&mut clustered, &Scene::from(&splats), projection, &options, max_entries);
+                assert_eq!((&again.image, again.gaussians), (&drawn.image, drawn.gaussians), "by clusters");
+                drawn
             };
             let tight = draw(&projection, tiles::MAX_ENTRIES);
             let plain = draw(&projection.clone().untightened(), 1);

@@ -13,10 +13,11 @@ use crate::conventions::{
 };
 
 use super::blend::Tile;
+use super::clusters::Sphere;
 use super::grid::{ChosenTiles, Grid, TILE_F32};
 use super::lanes::{LANES, Lanes, each};
-use super::math::{exp, ln, sigmoid};
-use super::splat::Root;
+use super::math::{exp, ln, sigmoid, whole};
+use super::splat::{PixelRect, Root};
 
 /// Bound on the relative rounding error of each term of a power, and of the distances in it. It is 16 units in
 /// the last place; at most six roundings happen.
@@ -29,6 +30,13 @@ const CONIC_ERROR: f32 = 2e-6;
 const MAX_CONIC_ERROR: f32 = 0.5;
 /// Bound on the relative rounding error of the reach itself: 80 units in the last place.
 const REACH_ERROR: f32 = 5e-6;
+/// Bound on the rounding of positions in view space, as a share of the distance.
+const VIEW_ERROR: f32 = 1e-5;
+/// Factor of lengths in view space, since rotations of cameras need not be quite orthonormal.
+const VIEW_FACTOR: f32 = 1.02;
+/// Pixels by which a Gaussian may reach beyond its centre that do not depend on its size: INRIA's tiles, the dilation, the
+/// floor of its eigenvalues, and rounding.
+const PIXEL_MARGIN: f32 = TILE_F32 + 6.0;
 
 /// The values that all Gaussians of a picture are projected with.
 #[derive(Debug, Clone)]
@@ -156,6 +164,52 @@ impl Projection {
     #[cfg(test)]
     pub(super) fn untightened(self) -> Self {
         Self { tighten: false, ..self }
+    }
+
+    /// Whether a Gaussian with its centre in `sphere` and no larger scale than that of the sphere may touch a pixel that is
+    /// drawn. `false` is sure.
+    pub(super) fn may_see(&self, sphere: &Sphere) -> bool {
+        let view = self.camera.to_view(sphere.centre);
+        let length = (view[0] * view[0] + view[1] * view[1] + view[2] * view[2]).sqrt();
+        let radius = VIEW_FACTOR * sphere.radius + VIEW_ERROR * length;
+        let z = view[2];
+        if z + radius <= self.camera.near {
+            return false;
+        }
+        // INRIA's radius is that many deviations of an ellipse whose variances add up to at most the square of this, over the
+        // depth, and the margin.
+        let limits = self.tan.map(|tan| 1.0 + (TAN_LIMIT * tan).powi(2));
+        let stretch = (self.focal[0].powi(2) * limits[0] + self.focal[1].powi(2) * limits[1]).sqrt();
+        let reach = VIEW_FACTOR * RADIUS_SIGMAS * stretch * sphere.scale;
+        // A centre at x in view space is `reach / z + PIXEL_MARGIN` pixels outside where x > tangent * z + beside.
+        let is_outside = |k: usize| {
+            let tangent = self.tan[k] + PIXEL_MARGIN / self.focal[k];
+            let beside = reach / self.focal[k];
+            view[k].abs() - tangent * z > beside + radius * (1.0 + tangent * tangent).sqrt()
+        };
+        if is_outside(0) | is_outside(1) {
+            return false;
+        }
+        let nearest = z - radius;
+        let Some(chosen) = self.chosen.as_ref().filter(|_| nearest > self.camera.near) else { return true };
+        // The pixels that centres may have, and as many around them as a Gaussian reaches.
+        let around = reach / nearest + PIXEL_MARGIN;
+        let pixels = |k: usize| {
+            let [low, high] = [view[k] - radius, view[k] + radius];
+            let low = if low < 0.0 { low / nearest } else { low / (z + radius) };
+            let high = if high > 0.0 { high / nearest } else { high / (z + radius) };
+            let middle = 0.5 * self.size[k];
+            [middle + self.focal[k] * low - around, middle + self.focal[k] * high + around]
+        };
+        let [columns, rows] = [pixels(0), pixels(1)];
+        let corner = |places: [f32; 2]| -> [u16; 2] {
+            std::array::from_fn(|k| whole(greater(lesser(places[k], self.size[k]), 0.0)))
+        };
+        let rect = PixelRect {
+            min: corner([columns[0].floor(), rows[0].floor()]),
+            max: corner([columns[1].ceil(), rows[1].ceil()]),
+        };
+        chosen.within(rect).is_some()
     }
 
     /// Projects a group of Gaussians.
@@ -469,7 +523,7 @@ mod tests {
         let projection = Projection::new(&camera, antialiased);
         let (mut visible, mut keys) = (Visible::default(), Vec::new());
         let radiance = Radiance::new(&Scene::from(splats));
-        visible.project(&mut keys, Simd::current(), &splats.geometry, &radiance, &projection);
+        visible.project(&mut keys, Simd::current(), &splats.geometry, None, &radiance, &projection);
         keys.first().map(|&(depth, slot)| (visible.slots[slot as usize], depth))
     }
 

@@ -28,7 +28,7 @@ pub fn sensitivity(scene: &Scene<'_>, cameras: &[Camera], progress: &dyn Progres
     scene.validate()?;
     cameras.iter().try_for_each(Camera::validate)?;
     let mut total = Sensitivity::zeros(scene.len());
-    let (mut workspace, pool) = (Workspace::default(), Pool::default());
+    let (mut workspace, pool) = (Workspace::of_scene(scene.geometry()), Pool::default());
     let mut sums = vec![Moments::default(); scene.len()];
     let radiance = Radiance::new(scene);
     progress.begin(Stage::Draw, cameras.len() as u64);
@@ -53,7 +53,7 @@ fn measure(
     projection: &Projection,
 ) {
     let simd = Simd::current();
-    workspace.visible.project(&mut workspace.order.keys, simd, scene.geometry(), radiance, projection);
+    workspace.project(scene, radiance, projection);
     measure_tiles(
         workspace,
         pool,

@@ -32,8 +32,9 @@ const CUTOFF: f32 = -80.0;
 /// Returns what INRIA's rules draw, with the nearest first.
 pub(crate) fn seen(scene: &Scene<'_>, camera: &Camera) -> Vec<Seen> {
     let projection = Projection::new(camera, scene.meta().antialiased).untightened();
-    let Workspace { mut visible, mut order, .. } = Workspace::default();
-    visible.project(&mut order.keys, Simd::current(), scene.geometry(), &Radiance::new(scene), &projection);
+    let mut workspace = Workspace::default();
+    workspace.project(scene, &Radiance::new(scene), &projection);
+    let Workspace { visible, mut order, .. } = workspace;
     order.sort(&visible);
     order
         .keys

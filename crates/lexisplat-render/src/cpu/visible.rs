@@ -6,6 +6,7 @@ use lexisplat::simd::Simd;
 use crate::parallel::*;
 use crate::radiance::Radiance;
 
+use super::clusters::Clusters;
 use super::lanes::LANES;
 use super::math::whole;
 use super::project::{Body, Projection};
@@ -25,13 +26,14 @@ pub(super) struct Visible {
 }
 
 impl Visible {
-    /// Projects all Gaussians, in place of those of the picture before. Replaces `keys` by (depth, slot) of those that
-    /// may be visible, in order of index.
+    /// Projects all Gaussians, in place of those of the picture before. Of `clusters`, if there are some, it leaves out those
+    /// that the picture cannot show. Replaces `keys` by (depth, slot) of those that may be visible, in order of index.
     pub(super) fn project(
         &mut self,
         keys: &mut Vec<(u32, u32)>,
         simd: Simd,
         geometry: &Geometry,
+        clusters: Option<&Clusters>,
         radiance: &Radiance<'_>,
         projection: &Projection,
     ) {
@@ -48,7 +50,7 @@ impl Visible {
                 let mut task = Task { first: task * GAUSSIANS_PER_TASK, slots, rects, keys };
                 simd.dispatch(
                     #[inline(always)]
-                    || task.project(geometry, radiance, projection),
+                    || task.project(geometry, clusters, radiance, projection),
                 )
             })
             .collect();
@@ -79,7 +81,13 @@ struct Task<'a> {
 impl Task<'_> {
     /// Projects as many Gaussians as there are slots. Returns how many slots were filled.
     #[inline(always)]
-    fn project(&mut self, geometry: &Geometry, radiance: &Radiance<'_>, projection: &Projection) -> usize {
+    fn project(
+        &mut self,
+        geometry: &Geometry,
+        clusters: Option<&Clusters>,
+        radiance: &Radiance<'_>,
+        projection: &Projection,
+    ) -> usize {
         let Self { first, slots, rects, keys } = self;
         let first = *first;
         let end = first + slots.len();
@@ -87,7 +95,11 @@ impl Task<'_> {
         for start in (first..end).step_by(LANES) {
             let group = start..end.min(start + LANES);
             let in_front = |p: &[f32; 3]| projection.camera.to_view(*p)[2] > projection.camera.near;
-            if !geometry.positions[group.clone()].iter().any(in_front) {
+            let shows = match clusters.and_then(|clusters| clusters.at(start)) {
+                Some(sphere) => projection.may_see(sphere),
+                None => geometry.positions[group.clone()].iter().any(in_front),
+            };
+            if !shows {
                 continue;
             }
             let placed = projection.place(&Body::load(geometry, group.clone()));

@@ -15,6 +15,7 @@ mod canonical;
 mod chunks;
 mod codebook;
 mod coder;
+mod curve;
 mod decoder;
 mod encoding;
 mod fit;
@@ -51,6 +52,7 @@ pub(crate) use scene::{Coding, Flat, SpilledPacked};
 pub(crate) use stream::BitCounts;
 
 pub use appearance::{Appearance, AppearanceChange};
+pub use curve::curve_order;
 pub use outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
 pub use pack::{PackOptions, Packer};
 pub use preset::Preset;

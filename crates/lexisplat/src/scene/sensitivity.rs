@@ -105,6 +105,28 @@ impl Sensitivity {
         filter(&mut self.removal_view, keep);
     }
 
+    /// The sensitivity of a scene of which [`Splats::gathered`](crate::Splats::gathered) made this one: entry `k` becomes entry
+    /// `order[k]`.
+    ///
+    /// # Panics
+    /// If `order` is not a permutation of the Gaussians.
+    #[must_use]
+    pub fn scattered(&self, order: &[u32]) -> Self {
+        assert_eq!(self.len(), order.len(), "one entry a Gaussian");
+        let mut out = Self::zeros(order.len());
+        for (k, &to) in order.iter().enumerate() {
+            let to = to as usize;
+            out.colour[to] = self.colour[k];
+            out.opacity[to] = self.opacity[k];
+            out.position[to] = self.position[k];
+            out.scale[to] = self.scale[k];
+            out.rotation[to] = self.rotation[k];
+            out.removal[to] = self.removal[k];
+            out.removal_view[to] = self.removal_view[k];
+        }
+        out
+    }
+
     /// Scales the sensitivity to pictures of which only `share` show these Gaussians.
     pub(crate) fn share(&mut self, share: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();

@@ -265,6 +265,34 @@ impl Splats {
         self.sh_rest.shrink_to_fit();
     }
 
+    /// A copy of the Gaussians at the indices `order`, in this order.
+    ///
+    /// # Panics
+    /// If an index is out of range.
+    #[must_use]
+    pub fn gathered(&self, order: &[u32]) -> Self {
+        let from = || order.iter().map(|&i| i as usize);
+        let g = &self.geometry;
+        let extras = g.extras.iter().map(|extra| {
+            let mut extra = Extra { name: extra.name.clone(), values: extra.values.clone() };
+            for_extra!(&mut extra.values, v => *v = from().map(|i| v[i]).collect());
+            extra
+        });
+        let geometry = Geometry {
+            positions: from().map(|i| g.positions[i]).collect(),
+            normals: if g.normals.is_empty() { Vec::new() } else { from().map(|i| g.normals[i]).collect() },
+            dc: from().map(|i| g.dc[i]).collect(),
+            opacities: from().map(|i| g.opacities[i]).collect(),
+            scales: from().map(|i| g.scales[i]).collect(),
+            rotations: from().map(|i| g.rotations[i]).collect(),
+            extras: extras.collect(),
+        };
+        let dim = self.degree.rest();
+        let mut sh_rest = Vec::with_capacity(order.len() * dim);
+        from().for_each(|i| sh_rest.extend_from_slice(&self.sh_rest[i * dim..(i + 1) * dim]));
+        Self { geometry, degree: self.degree, sh_rest, meta: self.meta.clone() }
+    }
+
     /// Keeps only the Gaussians for which `keep` is true, in order. `keep` has one entry a Gaussian.
     pub fn retain(&mut self, keep: &[bool]) {
         self.geometry.retain(keep);
