@@ -14,6 +14,8 @@ use crate::error::Result;
 
 /// Solutions: of sizes, of opacities and of colours.
 const SOLUTIONS: usize = 3;
+/// One of this many views is fitted to. With all of them prefixes were not better (docs/METHOD.md, "Layers").
+const VIEW_SHARE: usize = 4;
 /// Steps of the method of conjugate gradients, of each of them.
 const STEPS: usize = 3;
 /// The ridge, as a share of sums of rows and of the diagonal, and of their means.
@@ -36,14 +38,16 @@ pub(super) fn alone(
     targets: &[Image],
     progress: &dyn Progress,
 ) -> Result<Vec<AppearanceChange>> {
+    // A first layer alone has no finer detail, and is fitted in a quarter of the time.
+    let shrink = |(target, camera): (&Image, &Camera)| {
+        let smaller = camera.halved();
+        (shrunk(target, camera, &smaller), smaller)
+    };
+    let some = targets.iter().zip(cameras).step_by(VIEW_SHARE);
+    let (targets, cameras): (Vec<Image>, Vec<Camera>) = some.map(shrink).unzip();
     // The views are drawn once for the errors and once in each step.
     progress.begin(Stage::Draw, (SOLUTIONS * (1 + STEPS) * cameras.len()) as u64);
     let parts = &OneStep(progress);
-    // A first layer alone has no finer detail, and is fitted in a quarter of the time.
-    let smaller: Vec<Camera> = cameras.iter().map(Camera::halved).collect();
-    let shrink = |((target, camera), smaller): ((&Image, &Camera), &Camera)| shrunk(target, camera, smaller);
-    let targets: Vec<Image> = targets.iter().zip(cameras).zip(&smaller).map(shrink).collect();
-    let cameras = smaller;
     let mut changes = vec![AppearanceChange::default(); splats.len()];
     let make = |splats: &mut Splats, i: usize, change: AppearanceChange| -> AppearanceChange {
         let change = change.rounded();

@@ -29,11 +29,14 @@ pub(super) const GENERATED_SIZE: [u32; 2] = [384, 256];
 const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
 /// Number of generated views that judge.
 const JUDGES: usize = 24;
-/// Pixels that measure, that judge, and that base colours and opacities are fitted to, in all views together. Of sharper
-/// pictures some squares are drawn ([`sampled`]).
-const MEASURED_PIXELS: u64 = 20_000_000;
+/// Pixels that measure, in all views together: so many, and so many more for each Gaussian, but no more than the last. Of
+/// sharper pictures some squares are drawn ([`sampled`]). Half as many gave files that were 16 % larger at equal quality on the
+/// large room, and about the same on scenes of up to 90,000 Gaussians (docs/METHOD.md, "How sharp").
+const MEASURED_PIXELS: Pixels = Pixels { always: 8_000_000, each: 30, most: 40_000_000 };
+/// Those that judge.
 const JUDGED_PIXELS: u64 = 8_000_000;
-const FITTED_PIXELS: u64 = 12_000_000;
+/// Those that base colours and opacities are fitted to.
+const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000_000 };
 /// One of this many views that measure is drawn at half its size too, and one of this many that are fitted to is at half its
 /// size. Otherwise errors that are even over many pixels count for too little, and show when pictures are drawn smaller
 /// (docs/METHOD.md, "How sharp").
@@ -57,6 +60,20 @@ const FITTED_AROUND: usize = 8;
 const USUAL_VIEWS: f32 = 0.67;
 /// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
 const PRIOR_SHARE: f32 = 0.3;
+
+/// A number of pixels that grows with a scene.
+struct Pixels {
+    always: u64,
+    /// For each Gaussian.
+    each: u64,
+    most: u64,
+}
+
+impl Pixels {
+    fn of(&self, splats: &Splats) -> u64 {
+        (self.always + self.each * splats.len() as u64).min(self.most)
+    }
+}
 
 /// What looking at a scene gave, for several files of it.
 #[derive(Debug, Clone)]
@@ -266,7 +283,7 @@ impl PackingViews {
         let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
         views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
         views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = camera.halved());
-        sampled(views, FITTED_PIXELS)
+        sampled(views, FITTED_PIXELS.of(splats))
     }
 
     /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
@@ -287,7 +304,7 @@ impl PackingViews {
         }
         let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(Camera::halved).collect();
         cameras.extend(smaller);
-        let cameras = sampled(cameras, MEASURED_PIXELS);
+        let cameras = sampled(cameras, MEASURED_PIXELS.of(splats));
         let mut measured = match renderer.is_gpu() {
             true => renderer.sensitivity(&Scene::from(splats), &cameras, progress)?,
             false => {
