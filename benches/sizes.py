@@ -22,7 +22,7 @@ sys.dont_write_bytecode = True  # no __pycache__ in the working tree
 from real_models import ROOT  # noqa: E402
 
 #: What packs a scene whole, or in parts, whatever its size: bytes of memory.
-MEMORY = {"whole": "1TB", "in parts": "1MB"}
+MEMORY = {"whole": "1000GB", "in parts": "1MB"}
 RAY = """
 import json, sys, ray, lexisplat.ray
 ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use lexisplat::packed::tiles::{
-    Assembly, Bucket, BucketReader, Coded, Coding, Counts, Findings, Lesson, LookStatistics, Looked, Plan,
-    Sample, SampleStatistics, Steps, Survey, Tables,
+    Assembly, Bucket, BucketReader, Coded, Coding, Counts, LookStatistics, Looked, Plan, Sample,
+    SampleStatistics, Steps, Survey, Tables,
 };
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::ply::ReadOptions;
@@ -357,72 +357,26 @@ impl TileSample {
     }
 
     /// Sums over the sample.
-    fn statistics(&mut self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
+    fn statistics(&self, py: Python<'_>, steps: PyBackedBytes) -> PyResult<Py<PyBytes>> {
         let bytes = without_gil(py, None, |_| {
             Ok(self.sample.statistics(&self.plan, &Steps::from_bytes(&steps)?)?.to_bytes())
         })?;
         Ok(made(py, bytes))
     }
-
-    /// What the sample says of the atoms of a round.
-    fn find(&mut self, py: Python<'_>, steps: PyBackedBytes, lesson: PyBackedBytes) -> PyResult<Py<PyBytes>> {
-        let bytes = without_gil(py, None, |_| {
-            let (steps, lesson) = (Steps::from_bytes(&steps)?, Lesson::from_bytes(&lesson)?);
-            Ok(self.sample.find(&self.plan, &steps, &lesson)?.to_bytes())
-        })?;
-        Ok(made(py, bytes))
-    }
 }
 
-/// The first atoms and the number of rounds to come, if there is anything to learn.
-#[pyfunction]
-pub(crate) fn tile_lesson(
-    py: Python<'_>,
-    plan: PyBackedBytes,
-    steps: PyBackedBytes,
-    groups: Vec<PyBackedBytes>,
-) -> PyResult<Option<(Py<PyBytes>, usize)>> {
-    let lesson = without_gil(py, None, move |_| {
-        let groups = all(&groups, SampleStatistics::from_bytes)?;
-        let lesson = Lesson::new(&Plan::from_bytes(&plan)?, &Steps::from_bytes(&steps)?, &groups)?;
-        Ok(lesson.map(|lesson| (lesson.to_bytes(), lesson.left())))
-    })?;
-    Ok(lesson.map(|(bytes, left)| (made(py, bytes), left)))
-}
-
-/// Better atoms, and the number of rounds to come.
-#[pyfunction]
-pub(crate) fn tile_advance(
-    py: Python<'_>,
-    lesson: PyBackedBytes,
-    groups: Vec<PyBackedBytes>,
-) -> PyResult<(Py<PyBytes>, usize)> {
-    let (bytes, left) = without_gil(py, None, move |_| {
-        let mut lesson = Lesson::from_bytes(&lesson)?;
-        lesson.advance(&all(&groups, Findings::from_bytes)?)?;
-        Ok((lesson.to_bytes(), lesson.left()))
-    })?;
-    Ok((made(py, bytes), left))
-}
-
-/// Everything that buckets are coded with. `learned` is the lesson that is over and what all groups found on its atoms.
+/// Everything that buckets are coded with.
 #[pyfunction]
 pub(crate) fn tile_coding(
     py: Python<'_>,
     plan: PyBackedBytes,
     steps: PyBackedBytes,
     groups: Vec<PyBackedBytes>,
-    learned: Option<(PyBackedBytes, Vec<PyBackedBytes>)>,
 ) -> PyResult<Py<PyBytes>> {
-    let bytes = without_gil(py, None, move |_| {
+    let bytes = without_gil(py, None, move |watch| {
         let (plan, steps) = (Plan::from_bytes(&plan)?, Steps::from_bytes(&steps)?);
         let groups = all(&groups, SampleStatistics::from_bytes)?;
-        let learned = match learned {
-            None => None,
-            Some((lesson, found)) => Some((Lesson::from_bytes(&lesson)?, all(&found, Findings::from_bytes)?)),
-        };
-        let learned = learned.as_ref().map(|(lesson, found)| (lesson, found.as_slice()));
-        Ok(Coding::new(&plan, &steps, &groups, learned)?.to_bytes())
+        Ok(Coding::new(&plan, &steps, &groups, watch)?.to_bytes())
     })?;
     Ok(made(py, bytes))
 }

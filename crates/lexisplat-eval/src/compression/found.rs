@@ -14,7 +14,7 @@ use super::views::GENERATED_SIZE as SIZE;
 use crate::error::Result;
 
 /// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
-const TRIED: std::ops::RangeInclusive<usize> = 96..=640;
+const TRIED: std::ops::RangeInclusive<usize> = 320..=640;
 /// Natural views made for each that is tried: those of the least spread of sizes are tried.
 const CHOICE: usize = 4;
 /// Gaussians drawn in all tried views together, about.

@@ -14,12 +14,12 @@ use crate::views::{DEFAULT_MAX_WIDTH, SceneKind};
 const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
 /// Gaussians drawn in all generated views together, about.
 const GAUSSIANS_DRAWN: usize = 48_000_000;
-/// Number of views that are found and measure: one for [`GAUSSIANS_OF_A_VIEW`], within these. Scenes of more than
-/// [`GAUSSIANS_MEASURED`] over the larger number have fewer, for a view takes longer the more Gaussians there are.
+/// Number of views that are found and measure: one for [`GAUSSIANS_OF_A_VIEW`], within these, and in scenes of many Gaussians
+/// one for [`GAUSSIANS_OF_A_LARGE_VIEW`], up to the last.
 const FOUND_VIEWS: std::ops::RangeInclusive<usize> = 48..=192;
 const GAUSSIANS_OF_A_VIEW: usize = 256;
-/// Gaussians before all found views together, about.
-const GAUSSIANS_MEASURED: usize = 96_000_000;
+const GAUSSIANS_OF_A_LARGE_VIEW: usize = 2048;
+const MOST_FOUND_VIEWS: usize = 256;
 /// Number of views that are found and judge: one of this many that measure, within these.
 const FOUND_JUDGES: std::ops::RangeInclusive<usize> = 24..=48;
 const FOUND_JUDGE_SHARE: usize = 4;
@@ -128,9 +128,8 @@ fn around(splats: &Splats) -> Vec<Camera> {
 
 /// The numbers of found views of `splats` that measure and that judge.
 fn found_views(splats: &Splats) -> [usize; 2] {
-    let most = GAUSSIANS_MEASURED / splats.len().max(1);
-    let views = (splats.len() / GAUSSIANS_OF_A_VIEW).min(most);
-    let measuring = views.clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
+    let views = (splats.len() / GAUSSIANS_OF_A_VIEW).clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
+    let measuring = views.max(splats.len() / GAUSSIANS_OF_A_LARGE_VIEW).min(MOST_FOUND_VIEWS);
     [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
 }
 

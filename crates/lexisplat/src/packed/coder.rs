@@ -10,6 +10,7 @@ use super::layered::{MeanView, Target, WholeAtoms, seen_row};
 use super::morton;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
+use crate::scene::sh::ShDegree;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;
 use crate::sparse::dictionary::Dictionary;
@@ -31,7 +32,7 @@ const MAX_LEARNED: usize = 256;
 /// Scenes that pay for fewer atoms than this many times the coefficients of a row choose among several numbers of them.
 const CHOICE: usize = 2;
 /// Place of the step of values among the factors of parameters.
-const VALUES: usize = 1;
+pub(super) const VALUES: usize = 1;
 /// Rounding steps of a coefficient of an atom, for each step of an average value.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
@@ -113,10 +114,9 @@ pub(super) struct ChunkCoder {
 }
 
 impl ChunkCoder {
-    /// Learns from the Gaussians of `view` how to code the `total` of a scene. Returns also the atoms.
+    /// Learns from the Gaussians of `view`, a whole scene, how to code them. Returns also the atoms.
     pub(super) fn new(
         view: View<'_>,
-        total: usize,
         mut parameters: Parameters,
         mean_view: MeanView,
         options: &PackOptions,
@@ -126,86 +126,13 @@ impl ChunkCoder {
         if Parameters::from_list(&parameters.to_list()).is_none() {
             return Err(too_large());
         }
-        let degree = view.splats.degree;
-        let dim = degree.rest();
-        let mut coder = Self {
-            parameters,
-            dictionary: Dictionary::empty(),
-            mean_view,
-            book: None,
-            stop,
-            tolerance: options.tolerance,
-        };
-        let atoms = if dim > 0 && view.len() > 0 {
-            let Choice { atoms, costs, step } = coder.learn(view, total, options, progress)?;
-            coder.parameters.factors[VALUES] *= step;
-            coder.book = Some(Codebook::new(dim, atoms.rows(), costs));
-            atoms
-        } else {
-            // A scene without Gaussians still needs one atom to be valid.
-            let first: Vec<f32> = unit_axis(dim, 0).collect();
-            WholeAtoms::new(degree, &first, 0, false)
-        };
-        if dim > 0 {
-            coder.dictionary = Dictionary::new(degree, atoms.rows())?;
-        }
-        Ok((coder, atoms))
-    }
-
-    fn learn(
-        &self,
-        view: View<'_>,
-        total: usize,
-        options: &PackOptions,
-        progress: &dyn Progress,
-    ) -> Result<Choice> {
-        let degree = view.splats.degree;
-        let dim = degree.rest();
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
-        let parameters = self.parameters.for_learning();
-        let (rows, classes) = view.scaled(sample, &parameters);
-        let pays = (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED);
-        if options.atoms.is_none() && self.stop == StopRule::Balanced && pays < CHOICE * dim {
-            let bits_of = |rows: &[f32], atoms: &[f32], costs: &Costs| {
-                self.choose_atom_bits(dim, rows, &classes, atoms, costs)
-            };
-            return choose(degree, &rows, &classes, pays, bits_of, progress);
-        }
-        let first = first_atoms(dim, atoms_to_learn(total, dim, options), &rows);
-        let (learned, costs) = learn(dim, &rows, &classes, first, 0, self.stop, progress)?;
-        let stride = view.len().div_ceil(ATOM_BITS_SAMPLE).max(1);
-        let (rows, classes) = view.scaled((0..view.len()).step_by(stride), &parameters);
-        let bits = self.choose_atom_bits(dim, &rows, &classes, &learned, &costs);
-        Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
-    }
-
-    /// Chooses how finely atoms are rounded that code these rows. Errors of atoms show more with larger values.
-    fn choose_atom_bits(
-        &self,
-        dim: usize,
-        rows: &[f32],
-        classes: &[u8],
-        atoms: &[f32],
-        costs: &Costs,
-    ) -> u32 {
-        let book = Codebook::new(dim, atoms.to_vec(), costs.clone());
-        let codes = book.encode(rows, classes, self.stop);
-        let (mut sum, mut count) = (0.0_f64, 1.0_f64);
-        for i in 0..classes.len() {
-            for &(_, value) in codes.row(i) {
-                sum += f64::from(value) * f64::from(value);
-                count += 1.0;
-            }
-        }
-        Self::atom_bits(sum / count)
-    }
-
-    /// How finely atoms are rounded whose values have this mean square.
-    pub(super) fn atom_bits(square: f64) -> u32 {
-        let wanted = libm::log2(ATOM_STEPS_PER_VALUE * (1.0 + square).sqrt());
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-        let bits = wanted.round().clamp(4.0, f64::from(MAX_ATOM_BITS)) as u32;
-        bits
+        let (rows, classes) = view.scaled(sample, &parameters.for_learning());
+        let learning = Learning { degree: view.splats.degree, total: view.len(), stop, options };
+        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
+        parameters.factors[VALUES] *= step;
+        let coder = Self::learned(parameters, mean_view, &atoms, costs, stop, options.tolerance)?;
+        Ok((coder, atoms))
     }
 
     /// A coder that has learned these atoms, and what symbols cost.
@@ -213,14 +140,14 @@ impl ChunkCoder {
         parameters: Parameters,
         mean_view: MeanView,
         atoms: &WholeAtoms,
-        costs: Option<Costs>,
+        costs: Costs,
         stop: StopRule,
         tolerance: Option<f64>,
     ) -> Result<Self> {
         let degree = atoms.degree();
         let dim = degree.rest();
         let rows = atoms.rows();
-        let book = costs.map(|costs| Codebook::new(dim, rows.clone(), costs));
+        let book = (dim > 0).then(|| Codebook::new(dim, rows.clone(), costs));
         let dictionary = if dim > 0 { Dictionary::new(degree, rows)? } else { Dictionary::empty() };
         Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
     }
@@ -286,6 +213,60 @@ impl ChunkCoder {
     }
 }
 
+/// What a dictionary is learned for.
+pub(super) struct Learning<'a> {
+    pub(super) degree: ShDegree,
+    /// Number of Gaussians that will be coded.
+    pub(super) total: usize,
+    pub(super) stop: StopRule,
+    pub(super) options: &'a PackOptions,
+}
+
+impl Learning<'_> {
+    /// Learns from a sample of rows, in units of their value steps and in random order, and their colour classes.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` cancels.
+    pub(super) fn dictionary(&self, rows: &[f32], classes: &[u8], progress: &dyn Progress) -> Result<Choice> {
+        let Self { degree, total, stop, options } = *self;
+        let dim = degree.rest();
+        if dim == 0 || rows.is_empty() {
+            // A file has at least one atom.
+            let first: Vec<f32> = unit_axis(dim, 0).collect();
+            let atoms = WholeAtoms::new(degree, &first, 0, false);
+            return Ok(Choice { atoms, costs: Costs::initial(1, dim), step: 1.0 });
+        }
+        let pays = (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED);
+        if options.atoms.is_none() && stop == StopRule::Balanced && pays < CHOICE * dim {
+            let bits_of =
+                |rows: &[f32], atoms: &[f32], costs: &Costs| self.atom_bits(rows, classes, atoms, costs);
+            return choose(degree, rows, classes, pays, bits_of, progress);
+        }
+        let first = first_atoms(dim, atoms_to_learn(total, dim, options), rows);
+        let (learned, costs) = learn(dim, rows, classes, first, 0, stop, progress)?;
+        let some = classes.len().min(ATOM_BITS_SAMPLE);
+        let bits = self.atom_bits(&rows[..some * dim], &classes[..some], &learned, &costs);
+        Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
+    }
+
+    /// How finely atoms are rounded that code these rows. Errors of atoms show more with larger values.
+    fn atom_bits(&self, rows: &[f32], classes: &[u8], atoms: &[f32], costs: &Costs) -> u32 {
+        let book = Codebook::new(self.degree.rest(), atoms.to_vec(), costs.clone());
+        let codes = book.encode(rows, classes, self.stop);
+        let (mut sum, mut count) = (0.0_f64, 1.0_f64);
+        for i in 0..classes.len() {
+            for &(_, value) in codes.row(i) {
+                sum += f64::from(value) * f64::from(value);
+                count += 1.0;
+            }
+        }
+        let wanted = libm::log2(ATOM_STEPS_PER_VALUE * (1.0 + sum / count).sqrt());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let bits = wanted.round().clamp(4.0, f64::from(MAX_ATOM_BITS)) as u32;
+        bits
+    }
+}
+
 /// Sets the step of values that keeps a promised `tolerance`. Returns when a code is good enough.
 pub(super) fn promise(parameters: &mut Parameters, tolerance: Option<f64>) -> StopRule {
     let Some(tol) = tolerance else { return StopRule::Balanced };
@@ -300,7 +281,7 @@ pub(super) fn promise(parameters: &mut Parameters, tolerance: Option<f64>) -> St
 }
 
 /// Number of atoms that a scene of `total` Gaussians learns, if it does not choose among several.
-pub(super) fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
+fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
     // More atoms take fewer bits than exact rows to keep a promised tolerance.
     let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
     options.atoms.unwrap_or_else(|| (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED).max(fewest))

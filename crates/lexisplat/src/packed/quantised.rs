@@ -92,7 +92,7 @@ impl<'a> Quantised<'a> {
         let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
         let view = View::new(splats, &gaussians.scene, &gaussians.classes);
         let clock = Stopwatch::start();
-        let coder = ChunkCoder::new(view, n, parameters, mean_view, options, progress)?;
+        let coder = ChunkCoder::new(view, parameters, mean_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
         progress.check()?;
         progress.begin(Stage::Code, n as u64);

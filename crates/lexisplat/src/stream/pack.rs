@@ -3,9 +3,7 @@
 use super::importance::Importance;
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
-use crate::packed::tiles::{
-    Assembly, BUCKET, Coded, Coding, Findings, Lesson, Looked, Plan, SHOWN, Sample, Steps, Tables,
-};
+use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
 use crate::packed::{PackOptions, PackedHead, Packer};
 use crate::scene::sensitivity::{Sensitivity, heuristic_total};
 use crate::scene::source::SplatSource;
@@ -145,7 +143,9 @@ fn in_buckets<E: From<Error>>(
     }
     progress.end();
     let before = clock.seconds();
-    let coding = learn(&plan, &Steps::new(&plan, &statistics)?, samples, progress)?;
+    let steps = Steps::new(&plan, &statistics)?;
+    let sampled = samples.into_iter().map(|sample| sample.statistics(&plan, &steps));
+    let coding = Coding::new(&plan, &steps, &sampled.collect::<Result<Vec<_>>>()?, progress)?;
     drop(statistics);
     let learn_seconds = clock.seconds() - before;
 
@@ -173,27 +173,6 @@ fn in_buckets<E: From<Error>>(
     done.report.learn_seconds = learn_seconds;
     done.report.code_seconds = clock.seconds() - before - learn_seconds;
     Ok(done)
-}
-
-/// Everything that buckets are coded with, learned from the samples of all groups.
-fn learn(plan: &Plan, steps: &Steps, mut samples: Vec<Sample>, progress: &dyn Progress) -> Result<Coding> {
-    let groups =
-        samples.iter_mut().map(|sample| sample.statistics(plan, steps)).collect::<Result<Vec<_>>>()?;
-    let Some(mut lesson) = Lesson::new(plan, steps, &groups)? else {
-        return Coding::new(plan, steps, &groups, None);
-    };
-    progress.begin(Stage::Learn, lesson.left() as u64);
-    loop {
-        progress.check()?;
-        let found = samples.iter_mut().map(|sample| sample.find(plan, steps, &lesson));
-        let found = found.collect::<Result<Vec<Findings>>>()?;
-        if lesson.is_over() {
-            progress.end();
-            return Coding::new(plan, steps, &groups, Some((&lesson, &found)));
-        }
-        lesson.advance(&found)?;
-        progress.advance(1);
-    }
 }
 
 /// A message of each bucket, in a temporary file.

@@ -294,19 +294,8 @@ class _Scene:
         both = list(zip(actors, draws))
         found = [work.get(ref) for ref in [actor.statistics.remote(draw, shared) for actor, draw in both]]
         work.traffic["statistics"] += sum(map(len, found))
-        begun = _native.tile_lesson(plan, steps, found)
-        if begun is None:
-            return _native.tile_coding(plan, steps, found, None)
-        lesson, rounds = begun
-        left = rounds
-        while True:
-            work.tell("learn", rounds - left, rounds)
-            ref = work.shared(lesson)
-            findings = [work.get(own) for own in [actor.find.remote(draw, shared, ref) for actor, draw in both]]
-            work.traffic["statistics"] += sum(map(len, findings))
-            if left == 0:
-                return _native.tile_coding(plan, steps, found, (lesson, findings))
-            lesson, left = _native.tile_advance(lesson, findings)
+        work.tell("learn", 0, 1)
+        return _native.tile_coding(plan, steps, found)
 
 
 def _write(path: str, file: bytes, overwrite: bool) -> None:

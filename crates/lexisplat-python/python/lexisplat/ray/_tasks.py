@@ -104,9 +104,6 @@ class Group:
     def statistics(self, draw: Draw, steps: bytes) -> bytes:
         return self._drawn(draw).statistics(steps)
 
-    def find(self, draw: Draw, steps: bytes, lesson: bytes) -> bytes:
-        return self._drawn(draw).find(steps, lesson)
-
 
 def code(
     context: Context, plan: bytes, coding: bytes, bucket: int, pieces: Pieces, looked: bytes

@@ -23,7 +23,7 @@ pub(crate) struct Costs {
 
 impl Costs {
     /// Costs before any code is known.
-    pub(super) fn initial(atoms: usize, dim: usize) -> Self {
+    pub(in crate::packed) fn initial(atoms: usize, dim: usize) -> Self {
         #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
         let bits = |x: f64| x as f32;
         let value = |k: usize| bits(1.0 + 2.0 * libm::log2((k + 1) as f64) + 1.0);
@@ -78,13 +78,6 @@ pub(super) struct Usage {
 }
 
 impl Usage {
-    /// Adds the uses of other codes.
-    pub(super) fn merge(&mut self, other: &Self) {
-        let own = self.atoms.iter_mut().chain(&mut self.values).chain(self.counts.iter_mut().flatten());
-        let more = other.atoms.iter().chain(&other.values).chain(other.counts.iter().flatten());
-        own.zip(more).for_each(|(sum, more)| *sum += more);
-    }
-
     pub(super) fn of(codes: &Codes, classes: &[u8], atoms: usize, dim: usize) -> Self {
         let mut usage = Self {
             atoms: vec![0.0; atoms],

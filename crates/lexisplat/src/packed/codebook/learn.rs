@@ -7,14 +7,14 @@ use crate::support::error::Result;
 use crate::support::progress::{Progress, Stage};
 
 /// Rounds of coding and refitting.
-pub(super) const ROUNDS: usize = 14;
+const ROUNDS: usize = 14;
 /// An atom with fewer users is replaced. The exact codec replaces atoms with fewer than 4 users, and the less used of
 /// two similar atoms. Files depend on both rules.
-pub(super) const MIN_USERS: f64 = 3.0;
+const MIN_USERS: f64 = 3.0;
 /// In this many last rounds no atoms are replaced.
-pub(super) const SETTLING: usize = 4;
+const SETTLING: usize = 4;
 /// Shortest sum that gives an atom a new direction.
-pub(super) const MIN_NORM: f64 = 0.0;
+const MIN_NORM: f64 = 0.0;
 
 /// Learns unit-norm atoms from `rows`, beginning with the atoms `first`, of which the last `fixed` stay as they are. Returns
 /// the others most used first, without unused ones, and then the fixed ones, and the costs at which all were used.
@@ -69,7 +69,7 @@ pub(crate) fn learn(
 
 /// The first `learned` of `atoms` most used first, without unused ones, and then the others; and the costs at this `usage`.
 /// `before` are those at which they were used.
-pub(super) fn most_used_first(
+fn most_used_first(
     dim: usize,
     atoms: &[f32],
     learned: usize,
@@ -143,7 +143,7 @@ pub(crate) fn first_atoms(dim: usize, atoms: usize, rows: &[f32]) -> Vec<f32> {
 }
 
 /// [`first_atoms`] from principal axes and some rows.
-pub(super) fn first_atoms_of(dim: usize, atoms: usize, axes: &[Vec<f64>], rows: &[f32]) -> Vec<f32> {
+fn first_atoms_of(dim: usize, atoms: usize, axes: &[Vec<f64>], rows: &[f32]) -> Vec<f32> {
     let mut out = Vec::with_capacity(atoms * dim);
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]
     for axis in axes.iter().take(atoms / 2) {

@@ -11,7 +11,6 @@
 mod choice;
 mod costs;
 mod learn;
-mod lesson;
 
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +21,6 @@ use crate::support::simd::Simd;
 pub(super) use choice::{Choice, choose};
 pub(super) use costs::Costs;
 pub(super) use learn::{first_atoms, learn};
-pub(super) use lesson::{Findings, Lesson};
 
 /// Squared error, in squared steps, that one bit is worth. At high rates a quantiser's error falls by
 /// 2 ln 2 / 12 = 0.116 squared steps a bit. Dead zones and short codes make a higher price pay.

@@ -6,11 +6,11 @@ use super::bucket::Bucket;
 use super::look::Looked;
 use super::message::messages;
 use super::plan::Plan;
-use super::sample::{Findings, Lesson, SampleStatistics};
+use super::sample::SampleStatistics;
 use super::steps::Steps;
 use crate::packed::canonical::MortonKey;
-use crate::packed::codebook::Costs;
-use crate::packed::coder::{ChunkCoder, too_large};
+use crate::packed::codebook::{Choice, Costs};
+use crate::packed::coder::{ChunkCoder, Learning, VALUES, too_large};
 use crate::packed::encoding::{self, Encoding, Written};
 use crate::packed::floor::Floor;
 use crate::packed::layered::{self, Lookup, MeanView, WholeAtoms};
@@ -19,7 +19,6 @@ use crate::packed::parameters::Parameters;
 use crate::packed::quantised::{Gaussians, Quantised, Refit};
 use crate::scene::extra::Extra;
 use crate::scene::splats::filter;
-use crate::sparse::learn::unit_axis;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
@@ -33,8 +32,10 @@ pub struct Coding {
     floor: Floor,
     most_dc: f64,
     atoms: WholeAtoms,
-    /// What symbols cost; `None` without SH-rest.
-    costs: Option<Costs>,
+    /// What symbols cost.
+    costs: Costs,
+    /// The step of values, as a share of the usual one.
+    value_step: f32,
 }
 
 /// The coded Gaussians of a bucket.
@@ -74,42 +75,31 @@ pub struct Tables {
 messages!(Coding => "coding", Coded => "coded bucket", Counts => "counts", Tables => "tables");
 
 impl Coding {
-    /// Everything that buckets are coded with. `groups` are the statistics of all, in order, and `learned` the lesson that is over and
-    /// what all groups found on its atoms, in order, if there is one.
+    /// Everything that buckets are coded with. `groups` are the statistics of all, in order. Learns the dictionary, and reports it
+    /// to `progress`.
     ///
     /// # Errors
-    /// [`Error::Parameter`] if they are not those of all groups, and if values are so large that sums of them leave f32.
+    /// [`Error::Parameter`] if they are not those of all groups, and if values are so large that sums of them leave f32;
+    /// [`Error::Cancelled`].
     pub fn new(
         plan: &Plan,
         steps: &Steps,
         groups: &[SampleStatistics],
-        learned: Option<(&Lesson, &[Findings])>,
+        progress: &dyn Progress,
     ) -> Result<Self> {
         plan.check("steps", [steps.scene], None)?;
         let all = SampleStatistics::sum(plan, groups)?;
-        let degree = plan.like.degree;
         let mut floor = steps.floor.clone().within(all.over);
         all.predictors.solve(&mut floor.parameters);
         if Parameters::from_list(&floor.parameters.to_list()).is_none() {
             return Err(too_large());
         }
-        let (atoms, costs) = match learned.filter(|_| degree.rest() > 0) {
-            None => {
-                let first: Vec<f32> = unit_axis(degree.rest(), 0).collect();
-                (WholeAtoms::new(degree, &first, 0, false), None)
-            }
-            Some((lesson, findings)) => {
-                plan.check("lesson", [lesson.scene], None)?;
-                let found = lesson.lesson.finish(&lesson.found(findings)?).filter(|_| lesson.is_over());
-                let wrong =
-                    || Error::parameter("findings", findings.len(), "those of all groups, at the end");
-                let (rows, costs, squares) = found.ok_or_else(wrong)?;
-                let bits = ChunkCoder::atom_bits(squares);
-                (WholeAtoms::new(degree, &rows, bits, false), Some(costs))
-            }
-        };
+        let (rows, classes) = all.shuffled(plan);
+        let (degree, stop) = (plan.like.degree, steps.stop);
+        let learning = Learning { degree, total: steps.kept(), stop, options: &plan.options };
+        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
         let most_dc = f64::from(all.dc.quantile(USUAL_DC));
-        Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs })
+        Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
     }
 
     /// Number of Gaussians that are coded.
@@ -124,7 +114,8 @@ impl Coding {
         let clock = Stopwatch::start();
         let mean_view = MeanView::new(&plan.options.viewpoints);
         let (floor, stop) = (&self.floor, self.steps.stop);
-        let parameters = floor.parameters.clone();
+        let mut parameters = floor.parameters.clone();
+        parameters.factors[VALUES] *= self.value_step;
         let coder = ChunkCoder::learned(
             parameters,
             mean_view,

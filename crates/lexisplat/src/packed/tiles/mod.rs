@@ -13,10 +13,7 @@
 //! | [`Steps::new`] | scene | all statistics | steps of values |
 //! | [`Sample::add`] | bucket of a group | its Gaussians, [`Looked`] | some of them, which stay where they are |
 //! | [`Sample::statistics`] | group | the sample | [`SampleStatistics`] |
-//! | [`Lesson::new`] | scene | all statistics | the first atoms |
-//! | [`Sample::find`] | group, in each round | the atoms | [`Findings`] |
-//! | [`Lesson::advance`] | scene, in each round | all findings | better atoms |
-//! | [`Coding::new`] | scene | the statistics, the last findings | all that buckets are coded with |
+//! | [`Coding::new`] | scene | all statistics | the dictionary, and all else that buckets are coded with |
 //! | [`Coding::code`] | bucket | its Gaussians, [`Looked`] | [`Counts`], and [`Coded`] |
 //! | [`Tables::new`] | scene | all counts | one set of tables |
 //! | [`Coded::with_tables`] | bucket | the tables | [`Coded`] with these tables |
@@ -44,7 +41,7 @@ pub use coding::{Coded, Coding, Counts, Tables};
 pub(crate) use look::SHOWN;
 pub use look::{LookStatistics, Looked};
 pub use plan::Plan;
-pub use sample::{Findings, Lesson, Sample, SampleStatistics};
+pub use sample::{Sample, SampleStatistics};
 pub use steps::Steps;
 pub use survey::{BLOCK, Survey};
 

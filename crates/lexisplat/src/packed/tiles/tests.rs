@@ -77,18 +77,7 @@ fn by_workers(tiles: &[Splats], one_each: bool) -> Vec<Vec<u8>> {
     };
     let groups = of_groups(&|group| sample(group).statistics(&plan, &steps).unwrap().to_bytes());
     let groups: Vec<_> = groups.iter().map(|bytes| SampleStatistics::from_bytes(bytes).unwrap()).collect();
-    let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
-    let found = loop {
-        lesson = Lesson::from_bytes(&lesson.to_bytes()).unwrap();
-        // Every worker is a new one, which draws the sample again.
-        let found = of_groups(&|group| sample(group).find(&plan, &steps, &lesson).unwrap().to_bytes());
-        let found: Vec<_> = found.iter().map(|bytes| Findings::from_bytes(bytes).unwrap()).collect();
-        if lesson.is_over() {
-            break found;
-        }
-        lesson.advance(&found).unwrap();
-    };
-    let coding = Coding::new(&plan, &steps, &groups, Some((&lesson, &found))).unwrap();
+    let coding = Coding::new(&plan, &steps, &groups, &Silent).unwrap();
     let coding = Coding::from_bytes(&coding.to_bytes()).unwrap();
     let mut coded: Vec<(Vec<u8>, Vec<u8>)> = backwards(plan.buckets())
         .map(|number| {
@@ -233,12 +222,7 @@ fn coded() -> (Plan, Coding, Counts, Coded) {
     let mut sample = Sample::new();
     sample.add(&plan, &bucket, &looked).unwrap();
     let groups = [sample.statistics(&plan, &steps).unwrap()];
-    let mut lesson = Lesson::new(&plan, &steps, &groups).unwrap().unwrap();
-    while !lesson.is_over() {
-        lesson.advance(&[sample.find(&plan, &steps, &lesson).unwrap()]).unwrap();
-    }
-    let found = [sample.find(&plan, &steps, &lesson).unwrap()];
-    let coding = Coding::new(&plan, &steps, &groups, Some((&lesson, &found))).unwrap();
+    let coding = Coding::new(&plan, &steps, &groups, &Silent).unwrap();
     let none = None::<&mut crate::packed::Refit<'_>>;
     let (counts, coded) = coding.code(&plan, &bucket, &looked, none, &Silent).unwrap();
     (plan, coding, counts, coded)
