@@ -29,6 +29,7 @@ mod layout;
 mod natural_width;
 mod only_cancels;
 mod packing;
+mod pilot;
 mod refit;
 mod report;
 mod run;

@@ -1,5 +1,7 @@
 //! The steps from a source of splats to a written file and its report.
 
+use std::cell::RefCell;
+
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, Preset};
 use lexisplat::stream::{self, Importance};
@@ -91,17 +93,27 @@ pub fn in_parts(
     let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
         appearances_of_part(part, model, weights, progress)
     };
-    let mut measure;
-    let importance = match &mut renderer {
+    let (mut measure, mut correct);
+    // Looks and pilots take turns with the renderer.
+    let shared = renderer.as_mut().map(RefCell::new);
+    let importance = match &shared {
         None => Importance::Heuristic,
         Some(renderer) => {
             measure = |part: &Splats| -> Result<Sensitivity> {
                 let clock = Stopwatch::start();
-                let sensitivity = look_at_part(renderer, part, progress);
+                let sensitivity = look_at_part(&mut renderer.borrow_mut(), part, progress);
                 look_seconds += clock.seconds();
                 sensitivity
             };
-            Importance::Judge { judge: &mut measure, refit: Some(&mut refit), device }
+            correct = |part: &Splats| -> Result<f64> {
+                tiles::step_factor(&mut renderer.borrow_mut(), part, options, preset, progress)
+            };
+            Importance::Judge {
+                judge: &mut measure,
+                correct: Some(&mut correct),
+                refit: Some(&mut refit),
+                device,
+            }
         }
     };
     let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;

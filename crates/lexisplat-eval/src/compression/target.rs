@@ -32,7 +32,7 @@ const MOST_MARGIN: f64 = 0.75;
 /// Number of packings tried at most.
 const MAX_TRIES: usize = 14;
 /// First estimate of the decibels that pictures gain when the step is halved.
-const DB_PER_HALVING: f64 = 4.5;
+pub(super) const DB_PER_HALVING: f64 = 4.5;
 /// Quality that [`FIRST_BYTES`] is for, in dB.
 const FIRST_DB: f64 = 40.0;
 /// First estimate of the bytes of a Gaussian at [`FIRST_DB`].
@@ -206,7 +206,7 @@ pub(super) fn pack_to_preset(
 }
 
 /// The nearest of [`STEPS_PER_OCTAVE`] binary logarithms of a step in an octave.
-fn on_grid(log_step: f64) -> f64 {
+pub(super) fn on_grid(log_step: f64) -> f64 {
     (log_step * STEPS_PER_OCTAVE).round() / STEPS_PER_OCTAVE
 }
 

@@ -1,15 +1,35 @@
 //! The steps of [`lexisplat::packed::tiles`] that draw.
 
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
+use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::stream::PackedFile;
 use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
+use super::pilot;
 use super::refit::appearances_of_part;
 use super::report::{CompressionReport, SensitivitySource};
 pub use super::run::in_parts;
 use super::run::look_at_part;
 use crate::error::Result;
+
+/// The factor of the usual step with which `part` of a scene, packed as a scene of its own, has the quality that `preset` aims at;
+/// 1 if there is nothing to look at.
+///
+/// # Errors
+/// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+pub fn step_factor(
+    renderer: &mut Renderer,
+    part: &Splats,
+    options: &PackOptions,
+    preset: Preset,
+    progress: &dyn Progress,
+) -> Result<f64> {
+    match part.is_empty() {
+        true => Ok(1.0),
+        false => pilot::step_factor(renderer, part, options, preset.decibels(), progress),
+    }
+}
 
 /// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.
 ///

@@ -5,6 +5,9 @@ use crate::scene::sensitivity::Sensitivity;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 
+/// Finds a factor of the usual step for a part of a scene.
+pub type Correct<'a, E = Error> = dyn FnMut(&Splats) -> Result<f64, E> + 'a;
+
 /// How the sensitivity to a part of a scene is found. A part holds about 262,144 Gaussians near each other.
 pub enum Importance<'a, E = Error> {
     /// From each Gaussian alone ([`Sensitivity::heuristic`]).
@@ -13,6 +16,9 @@ pub enum Importance<'a, E = Error> {
     Judge {
         /// Measures how pictures of a part depend on its values. It is called once for each part, in order.
         judge: &'a mut dyn FnMut(&Splats) -> Result<Sensitivity, E>,
+        /// Finds the factor of the usual step with which a part, packed as a scene of its own, is as good as asked. It is called
+        /// for some parts, before any is measured. Without it the usual step stays.
+        correct: Option<&'a mut Correct<'a, E>>,
         /// Fits base colours and opacities to pictures of a part, if the options let them change. The parts are those that `judge`
         /// takes.
         refit: Option<&'a mut Refit<'a, E>>,
@@ -44,6 +50,14 @@ impl<'a, E> Importance<'a, E> {
         match self {
             Self::Heuristic => None,
             Self::Judge { refit, .. } => refit.as_deref_mut(),
+        }
+    }
+
+    /// The factor of the usual step for `part`, if something finds it.
+    pub(super) fn correction(&mut self, part: &Splats) -> Result<Option<f64>, E> {
+        match self {
+            Self::Judge { correct: Some(correct), .. } => correct(part).map(Some),
+            Self::Heuristic | Self::Judge { .. } => Ok(None),
         }
     }
 

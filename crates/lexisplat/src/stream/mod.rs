@@ -38,7 +38,7 @@ mod survey;
 
 pub use compress::{Compressed, compress};
 pub use decompress::decompress;
-pub use importance::Importance;
+pub use importance::{Correct, Importance};
 #[cfg(test)]
 pub(crate) use pack::run as pack_in_buckets;
 pub use pack::{PackedFile, pack};

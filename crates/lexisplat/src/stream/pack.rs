@@ -86,13 +86,14 @@ fn whole<E: From<Error>>(
 ) -> Result<PackedFile, E> {
     let splats = source.whole()?;
     progress.begin(Stage::Look, splats.len() as u64);
+    let factor = importance.correction(&splats)?.unwrap_or(1.0);
     let sensitivity = importance.of(&splats)?.unwrap_or_else(|| {
         let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
         Sensitivity::heuristic_part(&splats.geometry, total)
     });
     progress.end();
     let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
-    let quantised = packer.quantise(packer.step_for(decibels), true, progress)?;
+    let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
     let device = importance.device().map(str::to_owned);
     let appearances = quantised.refitted(importance.refit(), progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
@@ -121,12 +122,18 @@ fn in_buckets<E: From<Error>>(
     };
     begin_reading(&tiles, progress);
     let surveys = survey(&tiles, options.seed, progress)?;
-    let plan = Plan::with_bucket(&surveys, options, decibels, false, bucket)?;
+    let mut plan = Plan::with_bucket(&surveys, options, decibels, false, bucket)?;
     drop(surveys);
     let mut ordered = Ordered::new(&plan, &tiles, &folder, progress)?;
     progress.end();
 
     progress.begin(Stage::Look, plan.len() as u64);
+    let mut factors = Vec::new();
+    for number in plan.pilots() {
+        progress.check()?;
+        factors.extend(importance.correction(ordered.bucket(&plan, number, false)?.splats())?);
+    }
+    plan = plan.corrected(&factors)?;
     let (mut statistics, mut all_looked) = (Vec::new(), Messages::new(to)?);
     let groups: Vec<Vec<usize>> = (0..plan.groups()).map(|group| plan.group(group)).collect();
     let mut samples: Vec<Sample> = groups.iter().map(|_| Sample::new()).collect();

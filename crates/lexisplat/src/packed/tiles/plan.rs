@@ -26,13 +26,17 @@ const GROUPS: usize = 2;
 /// Most buckets that are sampled, evenly spread, so that drawing samples takes as long in any scene.
 const SAMPLED: usize = 32;
 
+/// Buckets for one on which the step is found, and most of these.
+const BUCKETS_PER_PILOT: usize = 4;
+const MOST_PILOTS: usize = 3;
+
 /// Rows of a piece of a tile that a bucket reads whole if one of them is its own.
 const RUN: usize = 4096;
 
 /// What is settled of a scene before any of it is looked at.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Plan {
-    /// What tells the plan from others: a checksum of all else.
+    /// What tells the plan from others: a checksum of all else, with the usual step.
     scene: u32,
     pub(super) options: PackOptions,
     /// The overall step.
@@ -129,6 +133,27 @@ impl Plan {
         let bytes = plan.to_bytes();
         plan.scene = crc32::hash(bytes.split_last_chunk::<{ message::CHECKSUM }>().map_or(&[], |b| b.0));
         Ok(plan)
+    }
+
+    /// The buckets on which the step is found: evenly spread, one of few and more of many. Empty ones say nothing.
+    #[must_use]
+    pub fn pilots(&self) -> Vec<usize> {
+        let buckets = self.buckets();
+        let count = buckets.div_ceil(BUCKETS_PER_PILOT).min(MOST_PILOTS);
+        (0..count).map(|k| (2 * k + 1) * buckets / (2 * count)).collect()
+    }
+
+    /// The same plan with another step: `factors` of the usual one, of which the geometric mean counts. None change nothing.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a factor that is not finite and above 0.
+    pub fn corrected(self, factors: &[f64]) -> Result<Self> {
+        if let Some(wrong) = factors.iter().find(|factor| !(factor.is_finite() && **factor > 0.0)) {
+            return Err(Error::parameter("step factor", wrong, "a finite number above 0"));
+        }
+        let logs: f64 = factors.iter().map(|&factor| libm::log2(factor)).sum();
+        let step = self.step * libm::exp2(logs / factors.len().max(1) as f64);
+        Ok(Self { step, ..self })
     }
 
     /// What tells the plan from others. What is made by it holds this.

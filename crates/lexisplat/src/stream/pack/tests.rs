@@ -50,10 +50,13 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
             Ok(Sensitivity::heuristic_part(&part.geometry, total))
         };
         assert!(
-            streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, BUCKET)
-                .unwrap()
-                .0
-                == found,
+            streamed(
+                &splats,
+                Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None },
+                BUCKET
+            )
+            .unwrap()
+            .0 == found,
             "{count}"
         );
         let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
@@ -90,14 +93,14 @@ fn what_is_not_worth_its_bits_is_left_out() {
     let mut expected = Vec::new();
     LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
     let mut judge = |part: &Splats| Ok(shown(part, total));
-    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
     let (found, done) = streamed_with(&splats, importance, &options, BUCKET).unwrap();
     assert!(found == expected);
     assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
     // Chunks are filled from several buckets, and rows stay together.
     let small = 9000;
     let mut judge = |part: &Splats| Ok(shown(part, total));
-    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
     let (found, done) = streamed_with(&splats, importance, &options, small).unwrap();
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
     let geometry = model.geometry();
@@ -131,7 +134,8 @@ fn appearances_are_fitted_part_by_part() {
             assert_eq!(model.len(), weights.len());
             Ok(others(model))
         };
-        let importance = Importance::Judge { judge: &mut judge, refit: Some(&mut refit), device: None };
+        let importance =
+            Importance::Judge { judge: &mut judge, correct: None, refit: Some(&mut refit), device: None };
         streamed_with(&splats, importance, options, bucket).unwrap().0
     };
     let sensitivity = shown(&splats, total);
@@ -168,7 +172,7 @@ fn one_gaussian_stays() {
         none.opacity.fill(0.0);
         Ok(none)
     };
-    let importance = Importance::Judge { judge: &mut judge, refit: None, device: None };
+    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
     let (found, _) = streamed_with(&splats, importance, &options, small).unwrap();
     assert_eq!(lexi::read_bytes("t", &found, &Limits::default()).unwrap().len(), 1);
 }
@@ -203,8 +207,12 @@ fn every_gaussian_is_judged_once_beside_its_neighbours() {
         parts += 1;
         Ok(Sensitivity::heuristic(&part.geometry))
     };
-    let (found, _) =
-        streamed(&splats, Importance::Judge { judge: &mut judge, refit: None, device: None }, small).unwrap();
+    let (found, _) = streamed(
+        &splats,
+        Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None },
+        small,
+    )
+    .unwrap();
     assert_eq!(parts, 4);
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
     assert_eq!(model.geometry().extras, splats.geometry.extras);
@@ -216,7 +224,7 @@ fn every_gaussian_is_judged_once_beside_its_neighbours() {
 fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
     let splats = scene(700);
     let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
-        streamed(&splats, Importance::Judge { judge, refit: None, device: None }, BUCKET)
+        streamed(&splats, Importance::Judge { judge, correct: None, refit: None, device: None }, BUCKET)
             .unwrap_err()
             .to_string()
     };
