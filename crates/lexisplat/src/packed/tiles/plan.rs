@@ -143,7 +143,8 @@ impl Plan {
         (0..count).map(|k| (2 * k + 1) * buckets / (2 * count)).collect()
     }
 
-    /// The same plan with another step: `factors` of the usual one, of which the geometric mean counts. None change nothing.
+    /// The same plan with another step: by `factors` of the usual one, of which the smallest counts, so that no part falls short by
+    /// what another exceeds. None change nothing.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a factor that is not finite and above 0.
@@ -151,9 +152,8 @@ impl Plan {
         if let Some(wrong) = factors.iter().find(|factor| !(factor.is_finite() && **factor > 0.0)) {
             return Err(Error::parameter("step factor", wrong, "a finite number above 0"));
         }
-        let logs: f64 = factors.iter().map(|&factor| libm::log2(factor)).sum();
-        let step = self.step * libm::exp2(logs / factors.len().max(1) as f64);
-        Ok(Self { step, ..self })
+        let factor = factors.iter().copied().reduce(f64::min).unwrap_or(1.0);
+        Ok(Self { step: factor * self.step, ..self })
     }
 
     /// What tells the plan from others. What is made by it holds this.
