@@ -27,7 +27,9 @@ fn a_scene_larger_than_memory_is_packed_in_parts() {
     assert_eq!(after.len(), GAUSSIANS);
     let far = |(a, b): (&[f32; 3], &[f32; 3])| (0..3).any(|k| (a[k] - b[k]).abs() > 0.1);
     assert!(!before.geometry.positions.iter().zip(&after.geometry.positions).any(far), "out of order");
-    let text = folder.run(&[&["compress", "scene.ply", "--overwrite", "--all"], &LITTLE[..]].concat());
+    let text = folder.run(
+        &[&["compress", "scene.ply", "--preset", "small", "--overwrite", "--all"], &LITTLE[..]].concat(),
+    );
     assert!(text.contains("part by part") && text.contains("left out"), "{text}");
     let info = folder.json(&["info", "scene.lexi"]);
     assert_eq!(

@@ -7,12 +7,14 @@ use lexisplat_render::Renderer;
 use super::judge::Judge;
 use super::only_cancels::OnlyCancels;
 use super::refit::{Fit, Refitting};
-use super::target::{DB_PER_HALVING, on_grid};
+use super::target::DB_PER_HALVING;
 use super::views::PackingViews;
 use crate::error::Result;
 
 /// Views that judge a part.
 const JUDGES: usize = 24;
+/// Steps in an octave. Scores of one scene in two units differ by 0.1 dB, and finer ones would often give them different steps.
+const STEPS_PER_OCTAVE: f64 = 4.0;
 /// Largest change of the step's binary logarithm by one file.
 const MOST_MOVE: f64 = 2.0;
 
@@ -42,7 +44,7 @@ pub(super) fn step_factor(
     let refitting = Refitting::new(packer, fit);
     // A GPU that looks need not judge too.
     let mut judge = Judge::new(Renderer::cpu(), part, &views.some_judging(JUDGES), false, progress)?;
-    let mut log_step = usual;
+    let mut log_step = on_grid(usual);
     for is_last in [false, true] {
         let (quantised, file) = refitting.quantise(libm::exp2(log_step), true, progress)?;
         let (file, gain) = match is_last {
@@ -50,9 +52,13 @@ pub(super) fn step_factor(
             false => (file, refitting.gain()),
         };
         let reached = judge.score(&file.0.unpack()?, progress)?.judged + gain;
-        log_step += ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
+        log_step = on_grid(log_step + ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE));
     }
-    Ok(libm::exp2(on_grid(log_step - usual)))
+    Ok(libm::exp2(log_step - usual))
+}
+
+fn on_grid(log_step: f64) -> f64 {
+    (log_step * STEPS_PER_OCTAVE).round() / STEPS_PER_OCTAVE
 }
 
 #[cfg(test)]

@@ -206,7 +206,7 @@ pub(super) fn pack_to_preset(
 }
 
 /// The nearest of [`STEPS_PER_OCTAVE`] binary logarithms of a step in an octave.
-pub(super) fn on_grid(log_step: f64) -> f64 {
+fn on_grid(log_step: f64) -> f64 {
     (log_step * STEPS_PER_OCTAVE).round() / STEPS_PER_OCTAVE
 }
 
