@@ -7,7 +7,7 @@ use lexisplat_render::Renderer;
 use super::judge::Judge;
 use super::only_cancels::OnlyCancels;
 use super::refit::{Fit, Refitting};
-use super::target::DB_PER_HALVING;
+use super::target::{DB_PER_HALVING, on_grid};
 use super::views::PackingViews;
 use crate::error::Result;
 
@@ -44,7 +44,7 @@ pub(super) fn step_factor(
     let refitting = Refitting::new(packer, fit);
     // A GPU that looks need not judge too.
     let mut judge = Judge::new(Renderer::cpu(), part, &views.some_judging(JUDGES), false, progress)?;
-    let mut log_step = on_grid(usual);
+    let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
     for is_last in [false, true] {
         let (quantised, file) = refitting.quantise(libm::exp2(log_step), true, progress)?;
         let (file, gain) = match is_last {
@@ -52,13 +52,10 @@ pub(super) fn step_factor(
             false => (file, refitting.gain()),
         };
         let reached = judge.score(&file.0.unpack()?, progress)?.judged + gain;
-        log_step = on_grid(log_step + ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE));
+        let by = ((reached - decibels) / DB_PER_HALVING).clamp(-MOST_MOVE, MOST_MOVE);
+        log_step = on_grid(log_step + by, STEPS_PER_OCTAVE);
     }
     Ok(libm::exp2(log_step - usual))
-}
-
-fn on_grid(log_step: f64) -> f64 {
-    (log_step * STEPS_PER_OCTAVE).round() / STEPS_PER_OCTAVE
 }
 
 #[cfg(test)]

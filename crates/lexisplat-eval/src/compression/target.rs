@@ -172,7 +172,7 @@ pub(super) fn pack_to_preset(
     progress: &dyn Progress,
 ) -> Result<(Packed, CompressReport, Score)> {
     let aim = preset.decibels();
-    let mut log_step = on_grid(libm::log2(packer.step_for(aim)));
+    let mut log_step = on_grid(libm::log2(packer.step_for(aim)), STEPS_PER_OCTAVE);
     // Files before and after refitting are not on one line, so each step is found from the one before and the usual slope.
     let after = |log_step: f64, value: f64| next_step(&[Try { log_step, value }], aim, &mut -DB_PER_HALVING);
     let (mut quantised, mut file) = packer.quantise(libm::exp2(log_step), true, progress)?;
@@ -183,7 +183,7 @@ pub(super) fn pack_to_preset(
         && let Some(next) = after(log_step, expected)
     {
         is_first = false;
-        log_step = on_grid(next);
+        log_step = on_grid(next, STEPS_PER_OCTAVE);
         drop(file);
         (quantised, file) = packer.quantise(libm::exp2(log_step), true, progress)?;
     }
@@ -196,7 +196,7 @@ pub(super) fn pack_to_preset(
         return Ok((packed, report, score));
     };
     drop((quantised, refitted));
-    let (packed, report) = packer.pack(libm::exp2(on_grid(next)), true, progress)?;
+    let (packed, report) = packer.pack(libm::exp2(on_grid(next, STEPS_PER_OCTAVE)), true, progress)?;
     let last = judge.score(&packed.unpack()?, progress)?;
     if (last.judged - aim).abs() < off {
         return Ok((packed, report, last));
@@ -205,9 +205,9 @@ pub(super) fn pack_to_preset(
     Ok((packed, report, score))
 }
 
-/// The nearest of [`STEPS_PER_OCTAVE`] binary logarithms of a step in an octave.
-fn on_grid(log_step: f64) -> f64 {
-    (log_step * STEPS_PER_OCTAVE).round() / STEPS_PER_OCTAVE
+/// The nearest binary logarithm of a step, of so many in an octave.
+pub(super) fn on_grid(log_step: f64, per_octave: f64) -> f64 {
+    (log_step * per_octave).round() / per_octave
 }
 
 /// A file that meets a target.
