@@ -23,6 +23,7 @@ straight line between the logarithms of the bytes of neighbouring files.
 import argparse
 import json
 import math
+import resource
 import shlex
 import subprocess
 import sys
@@ -83,19 +84,26 @@ def measure(binary, scorer, model, count, args):
     cameras = cameras_of(model)
     rows = []
     with tempfile.TemporaryDirectory() as folder:
-        ways = [("none", [])] + ([("given", ["--cameras", training(cameras, folder)])] if cameras else [])
+        ways = [("none", ["--no-cameras"])] + ([("given", ["--cameras", training(cameras, folder)])] if cameras else [])
         jobs = [(way, f"psnr {a:g}", a, [*extra, "--psnr", f"{a:g}"]) for way, extra in ways for a in args.asked]
         if args.presets:
             jobs += [(way, name, aim, [*extra, "--preset", name]) for way, extra in ways for name, aim in PRESETS.items()]
         if args.guess:
             jobs += [("guess", name, aim, ["--guess", "--preset", name]) for name, aim in PRESETS.items()]
-        files = []
-        for number, (_, _, _, options) in enumerate(jobs):
+        files, made, seconds = [], [], []
+        for number, job in enumerate(jobs):
             file = Path(folder) / f"{number}.lexi"
-            done = subprocess.run([binary, "compress", "--quiet", model, "-o", file, *options], capture_output=True, text=True)
+            before = processor_seconds()
+            done = subprocess.run([binary, "compress", "--quiet", model, "-o", file, *job[3]], capture_output=True, text=True)
             if done.returncode:
-                raise SystemExit(f"{model.name} {options}: {done.stderr}")
+                # The other files of a run of an hour still count.
+                print(f"{model.name} {job[3]}: {done.stderr.strip()}", file=sys.stderr, flush=True)
+                args.failed = True
+                continue
             files.append(file)
+            made.append(job)
+            seconds.append(processor_seconds() - before)
+        jobs = made
         sizes = [file.stat().st_size for file in files]
         for peer in args.peer if cameras else []:
             name, command = peer.split("=", 1)
@@ -103,24 +111,31 @@ def measure(binary, scorer, model, count, args):
             places = {"model": model, "encoded": encoded, "decoded": decoded}
             done = subprocess.run([word.format(**places) for word in shlex.split(command)], capture_output=True, text=True)
             if done.returncode:
-                print(f"{model.name}: {name}: {done.stderr.strip()[-200:]}", file=sys.stderr)
+                print(f"{model.name}: {name}: {done.stderr.strip()[-200:]}", file=sys.stderr, flush=True)
                 continue
+            seconds.append(None)
             jobs.append(("peer", name, None, []))
             files.append(decoded)
             sizes.append(encoded.stat().st_size)
         widths = widths_of(model, cameras)
         at = ",".join(map(str, widths))
         scored = subprocess.check_output([scorer, model, cameras or "orbit", at, *files], text=True).splitlines()
-        for (way, name, aim, _), size, line in zip(jobs, sizes, scored):
+        for (way, name, aim, _), size, cpu, line in zip(jobs, sizes, seconds, scored):
             row = {"scene": model.stem, "widths": widths, "gaussians": count, "cameras": way, "asked": name, "aim": aim}
-            rows.append(row | json.loads(line) | {"bytes": size})
+            rows.append(row | json.loads(line) | {"bytes": size, "cpu_seconds": cpu})
     return rows
+
+
+def processor_seconds():
+    """Those of all programs that were waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def table(rows):
     print("| scene | width | cameras | asked | reached | off | worst view | worst tile | at half the width | at 400 | "
-          + " | ".join(KINDS) + " | bytes each | ratio |")
-    print("|" + "---|" * (12 + len(KINDS)))
+          + " | ".join(KINDS) + " | bytes each | ratio | CPU s |")
+    print("|" + "---|" * (13 + len(KINDS)))
     points = {}
     for r in rows:
         if r["asked"].startswith("psnr"):
@@ -135,7 +150,7 @@ def table(rows):
             ratio = f"{r['bytes'] / other:.2f}" if other else ""
         smaller = [f"{r[f'path_{w}']['mean']:.2f}" for w in r["widths"][1:]] + ["-"]
         print(f"| {r['scene']} | {r['widths'][0]} | {r['cameras']} | {r['asked']} | {path['mean']:.2f} | {path['mean'] - r['aim']:+.2f} | "
-              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} |", flush=True)
+              f"{path['worst']:.1f} | {path['worst_tile']:.1f} | {smaller[0]} | {smaller[1]} | {' | '.join(off)} | {r['bytes'] / r['gaussians']:.2f} | {ratio} | {r['cpu_seconds']:.0f} |", flush=True)
 
 
 def beside_peers(rows, asked):
@@ -172,6 +187,7 @@ def main():
     parser.add_argument("--binary", type=Path)
     parser.add_argument("--peer", action="append", default=[])
     parser.add_argument("--json", type=Path)
+    parser.set_defaults(failed=False)
     args = parser.parse_args()
     build = ["cargo", "build", "--release", "-q", "-p", "lexisplat-eval", "--example", "promise"]
     subprocess.run(build, cwd=ROOT, check=True)
@@ -188,11 +204,12 @@ def main():
         if cameras_of(model) is None and count >= SMALL:
             continue
         rows += measure(args.binary or target / "lexisplat", target / "examples" / "promise", model, count, args)
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1))
+        if args.json:
+            args.json.write_text(json.dumps(rows, indent=1))
     table([r for r in rows if r["cameras"] != "peer"])
     if args.peer:
         beside_peers(rows, args.asked)
+    sys.exit(args.failed)
 
 
 if __name__ == "__main__":
