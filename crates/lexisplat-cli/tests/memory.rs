@@ -58,7 +58,8 @@ fn what_shows_can_be_guessed_whatever_the_memory() {
 #[test]
 fn what_needs_the_whole_scene_is_refused_before_any_work() {
     let folder = Folder::new();
-    for option in [&["--psnr", "40"][..], &["--size", "10kB"], &["--ratio", "12"], &["--max-gaussians", "9"]]
+    for option in
+        [&["--min-psnr", "40"][..], &["--size", "10kB"], &["--ratio", "12"], &["--max-gaussians", "9"]]
     {
         let error = folder.fail(&[&["compress", "scene.ply"], option, &LITTLE[..]].concat(), 5);
         assert!(error.contains(&option[0][2..]) && error.contains("memory = 100000"), "{error}");

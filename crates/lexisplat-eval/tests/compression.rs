@@ -99,11 +99,13 @@ fn memory_decides_between_whole_and_part_by_part() {
     let (parts, report) = run(Packing::new(Preset::Small).with_memory(1000), &splats);
     assert!(report.in_parts && report.importance == Some(SensitivitySource::Views));
     assert!(whole != parts);
+    let (_, report) = run(Packing::new(Target::MeanPsnr(33.0)).with_memory(1000), &splats);
+    assert!(report.in_parts && report.importance == Some(SensitivitySource::Views));
     let (_, report) = run(Compression::Heuristic(Preset::Small, PackOptions::default()), &splats);
     assert!(report.in_parts && report.importance == Some(SensitivitySource::Heuristic));
     let cameras = PackingViews::generated(&splats).measuring().to_vec();
     for (packing, name) in [
-        (Packing::new(Target::MeanPsnr(40.0)), "psnr"),
+        (Packing::new(Target::MinPsnr(40.0)), "min-psnr"),
         (Packing::new(Target::Ratio(9.0)), "ratio"),
         (Packing::default().with_cameras(cameras), "cameras"),
         (Packing::default().with_scene_kind(SceneKind::Room), "scene"),

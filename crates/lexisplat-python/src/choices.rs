@@ -257,7 +257,7 @@ pub(crate) fn compress(
         let (bytes, report) = match source {
             Source::Splats(splats) => run(&compression, views, beside.as_ref(), &*splats, watch)?,
             Source::File(given) => {
-                let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes));
+                let (name, whole) = (given.name(), |bytes| compression.holds_whole(bytes, beside.is_some()));
                 with_source(given, &name, &options, whole, watch, &mut |source| {
                     run(&compression, views.clone(), beside.as_ref(), source, watch)
                 })?

@@ -529,7 +529,8 @@ pub(crate) fn tile_whole(
         let mut file = Vec::new();
         let renderer = choices.renderer(device)?;
         let (options, preset) = (choices.options(), choices.preset()?);
-        let mut report = tiles::in_parts(&options, preset, renderer, &joined, (&mut file).into(), watch)?;
+        let mut report =
+            tiles::in_parts(&options, preset.decibels(), renderer, &joined, (&mut file).into(), watch)?;
         report.source_bytes = bytes;
         Ok((file, report))
     })?;

@@ -169,7 +169,7 @@ fn packing_keeps_every_gaussian_and_comes_out_as_if_read_whole() {
             let mut packed = Vec::new();
             let done = stream::pack(
                 &chunks,
-                stream::Importance::<lexisplat::Error>::Heuristic,
+                None::<&mut dyn stream::Observer>,
                 &options,
                 36.0,
                 &mut packed,

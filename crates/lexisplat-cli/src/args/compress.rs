@@ -125,9 +125,10 @@ pub(crate) struct Compress {
     #[arg(long, conflicts_with_all = ["psnr", "min_psnr", "size", "ratio", "cameras", "scene"])]
     pub(crate) guess: bool,
     /// Approximate memory that packing a whole scene may take, such as 500MB. A scene that needs more is packed in
-    /// parts, each drawn on its own, and the only target is then --preset. Packing in parts takes up to 1.5 GiB,
-    /// however small BYTES is. Files of the other layouts do not depend on it.
-    #[arg(long, default_value = "2GiB", value_name = "BYTES", value_parser = size)]
+    /// parts, each drawn on its own, and so is one of more than 786,432 Gaussians without cameras. The only targets are
+    /// then --preset and --psnr. Packing in parts takes up to 1.5 GiB, however small BYTES is. Files of the other
+    /// layouts do not depend on it.
+    #[arg(long, default_value = "4GiB", value_name = "BYTES", value_parser = size)]
     pub(crate) memory: u64,
     /// The device that draws the scene: `cpu`, `gpu`, `auto` (a GPU if there is one) or a number from `lexisplat
     /// devices`. With `cpu` the same input gives the same file on every machine. A GPU is faster, and its name is

@@ -73,9 +73,11 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
         .with_drop_extras(args.drop_extras)
         .with_limits(limits);
     let bars = Bars::new(common.quiet);
-    let whole = compression.holds_whole(files.iter().map(|(_, bytes)| bytes.len() as u64).sum());
+    let all_bytes = files.iter().map(|(_, bytes)| bytes.len() as u64).sum();
     // Only a scene that is packed whole is drawn from cameras.
-    let beside = if whole && args.looks_beside() { beside(first) } else { None };
+    let may_look = args.looks_beside() && compression.holds_whole(all_bytes, true);
+    let beside = if may_look { beside(first) } else { None };
+    let whole = compression.holds_whole(all_bytes, beside.is_some());
     let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
     for ((name, _), opened) in files.iter().zip(&opened) {
@@ -239,9 +241,7 @@ fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> 
         None if report.importance == Some(SensitivitySource::Heuristic) => {
             "pictures: not looked at; what shows was guessed from each Gaussian alone".to_owned()
         }
-        None if report.in_parts => {
-            "pictures: looked at part by part, because the scene is larger than --memory".to_owned()
-        }
+        None if report.in_parts => "pictures: looked at part by part, because the scene is large".to_owned(),
         None => format!("SH error: {}", error_line(&report.record)),
     };
     writeln!(out, "{quality}")?;
@@ -312,7 +312,7 @@ fn details(report: &CompressionReport) -> Result<String> {
     if report.importance == Some(SensitivitySource::Heuristic) {
         line("scene", "what shows was guessed from each Gaussian alone".to_owned())?;
     } else if report.in_parts {
-        line("scene", "larger than --memory, so it was measured and packed part by part".to_owned())?;
+        line("scene", "large, so it was measured and packed part by part".to_owned())?;
     }
     line(
         "seconds",

@@ -76,7 +76,7 @@ mod tests {
         let mut cpu = Renderer::cpu();
         let Looked { views, sensitivity } =
             Looked::at(&mut cpu, &all, None, SceneKind::Auto, &Silent).unwrap();
-        let fit = Fit::to(&all, &views, &Silent).unwrap();
+        let fit = Fit::to(&all, views.fitting(&all), views.are_given(), &Silent).unwrap();
         let made = at_most(400, &all, sensitivity, &views, &mut cpu, &fit, &Silent).unwrap();
         assert_eq!((made.0.len(), made.1.len()), (400, 400));
         let mut guessed = all.clone();

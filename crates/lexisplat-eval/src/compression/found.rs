@@ -5,18 +5,22 @@
 //! detail win.
 
 use lexisplat::packed::curve_order;
-use lexisplat::{Geometry, Progress, ShDegree, Splats, Stage};
+use lexisplat::{Progress, ShDegree, Splats, Stage};
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
 
 use super::natural_width::natural_width;
-use super::size_spread::Sizes;
+use super::observed_directions::ObservedDirections;
+use super::photo_views::{likelihood, turned};
+use super::size_spread::{Sizes, SizesSeen};
 use super::views::GENERATED_SIZE as SIZE;
 use crate::error::Result;
 
 /// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
 const TRIED: std::ops::RangeInclusive<usize> = 320..=640;
-/// Natural views made for each that is tried: those of the least spread of sizes are tried.
+/// Natural views made for each that is tried.
 const CHOICE: usize = 4;
+/// One of this many tried views is from where photographs were likely taken. Others show what such views do not.
+const PHOTO_SHARE: usize = 2;
 /// Gaussians drawn in all tried views together, about.
 const GAUSSIANS_DRAWN: usize = 128_000_000;
 /// Width and height of the small pictures, in pixels.
@@ -54,29 +58,42 @@ pub(super) fn find(
     progress: &dyn Progress,
 ) -> Result<Found> {
     let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
-    let mut views = likely(&splats.geometry, &natural_views(&splats.geometry, CHOICE * tried, SIZE), tried);
-    views.extend(more);
+    let (photo, mut others) = likely(splats, tried);
+    others.extend(more);
     let sketch = sketch(splats);
     let scene = renderer.prepare(Scene::from(&sketch))?;
-    let mut seen = Vec::with_capacity(views.len());
-    progress.begin(Stage::Draw, views.len() as u64);
-    for camera in views {
-        progress.check()?;
-        let small = camera.resized(SMALL[0], SMALL[1]);
-        let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
-        seen.push((detail(&picture), lit(&picture), camera));
-        progress.advance(1);
+    let mut seen = Vec::with_capacity(photo.len() + others.len());
+    progress.begin(Stage::Draw, (photo.len() + others.len()) as u64);
+    for views in [photo, others] {
+        let mut of_kind = Vec::with_capacity(views.len());
+        for camera in views {
+            progress.check()?;
+            let small = camera.resized(SMALL[0], SMALL[1]);
+            let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
+            of_kind.push((detail(&picture), lit(&picture), camera));
+            progress.advance(1);
+        }
+        // The sort is stable, so that equal views stay in their order.
+        of_kind.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let count = of_kind.len() as f64;
+        let ranked = of_kind.into_iter().enumerate();
+        // The kinds are not compared by their detail: views through what no photograph shows have most.
+        seen.extend(ranked.map(|(rank, (_, lit, camera))| Seen {
+            rank: (rank as f64 + 0.5) / count,
+            lit,
+            camera,
+        }));
     }
     progress.end();
-    let mut shares: Vec<f64> = seen.iter().map(|view| view.1).collect();
+    let mut shares: Vec<f64> = seen.iter().map(|view| view.lit).collect();
     shares.sort_by(f64::total_cmp);
     let median = shares.get(shares.len() / 2).copied().unwrap_or(0.0);
-    let clear = |view: &(f64, f64, Camera)| view.1 >= LEAST_LIT * median;
-    // The sort is stable, so that equal views stay in their order. Views past the scene come last.
-    seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(b.0.total_cmp(&a.0)));
+    let clear = |view: &Seen| view.lit >= LEAST_LIT * median;
+    // Views past the scene come last.
+    seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(a.rank.total_cmp(&b.rank)));
     // The best take turns to judge and to measure, as long as judges are needed.
     let (mut best, mut judges) = (Vec::new(), Vec::new());
-    for (rank, (_, _, camera)) in seen.into_iter().enumerate() {
+    for (rank, Seen { camera, .. }) in seen.into_iter().enumerate() {
         if rank.is_multiple_of(2) && judges.len() < judging {
             judges.push(camera);
         } else if best.len() < measuring {
@@ -94,15 +111,40 @@ pub(super) fn find(
     Ok(Found { best, judges })
 }
 
-/// The `most` of `views`, in their order, from where the Gaussians look most alike in size.
-fn likely(geometry: &Geometry, views: &[Camera], most: usize) -> Vec<Camera> {
-    let sizes = Sizes::of(geometry);
-    let spreads: Vec<f64> = views.iter().map(|view| sizes.spread(view.position)).collect();
-    let mut order: Vec<usize> = (0..views.len()).collect();
-    order.sort_by(|&a, &b| spreads[a].total_cmp(&spreads[b]));
-    order.truncate(most);
-    order.sort_unstable();
-    order.into_iter().map(|k| views[k].clone()).collect()
+/// A view that was tried.
+struct Seen {
+    /// Its rank by detail among those of its kind, as a share of their number.
+    rank: f64,
+    /// The share of pixels that show something.
+    lit: f64,
+    camera: Camera,
+}
+
+/// `count` natural views of `splats` to try: some from where photographs were likely taken, and others from where Gaussians look
+/// most alike in size. The former are none if no colour depends on the view.
+fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
+    let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
+    let sizes = Sizes::of(&splats.geometry);
+    let sizes: Vec<SizesSeen> = views.iter().map(|view| sizes.seen_from(view.position)).collect();
+    let best = |cost: &dyn Fn(usize) -> f64, count: usize| {
+        let mut order: Vec<usize> = (0..views.len()).collect();
+        order.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+        order.truncate(count);
+        order
+    };
+    let mut others = best(&|k| sizes[k].spread, count);
+    others.sort_unstable();
+    let observed = ObservedDirections::of(splats);
+    let mut photo = Vec::new();
+    if !observed.is_empty() {
+        let likelihoods: Vec<f64> =
+            (0..views.len()).map(|k| likelihood(&observed, views[k].position, &sizes[k])).collect();
+        let chosen = best(&|k| -likelihoods[k], count / PHOTO_SHARE);
+        photo = chosen.iter().enumerate().map(|(n, &k)| turned(&views[k], n, &observed)).collect();
+        // As many fewer, evenly spread.
+        others = others.into_iter().step_by(PHOTO_SHARE).collect();
+    }
+    (photo, others.into_iter().map(|k| views[k].clone()).collect())
 }
 
 /// A copy of `splats` that is faster to draw: without view-dependent colour, without what is hardly visible, and with

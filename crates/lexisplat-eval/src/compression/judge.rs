@@ -16,8 +16,17 @@ const HARD_PARTS: usize = 4;
 #[derive(Debug)]
 pub struct Judge {
     renderer: Renderer,
-    views: Vec<(Camera, Image)>,
+    views: Vec<View>,
     given: bool,
+}
+
+/// A view that judges.
+#[derive(Debug)]
+struct View {
+    camera: Camera,
+    original: Image,
+    /// Number of pixels that the squared error is divided by.
+    pixels: u64,
 }
 
 impl Judge {
@@ -40,12 +49,33 @@ impl Judge {
         for camera in judging {
             progress.check()?;
             let picture = renderer.render(&scene, camera, &RenderOptions::default())?;
-            drawn.push((camera.clone(), picture));
+            drawn.push(View { camera: camera.clone(), original: picture, pixels: camera.drawn_pixels() });
             progress.advance(1);
         }
         progress.end();
         drop(scene);
         Ok(Self { renderer, views: drawn, given })
+    }
+
+    /// Judges `part` of a scene. Only the pixels that it covers count, for others of the scene are in all of them.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub(super) fn of_part(
+        renderer: Renderer,
+        part: &Splats,
+        judging: &[Camera],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let mut judge = Self::new(renderer, part, judging, false, progress)?;
+        let scene = judge.renderer.prepare(Scene::from(part))?;
+        let white = RenderOptions::default().with_background([1.0; 3]);
+        for View { camera, original, pixels } in &mut judge.views {
+            progress.check()?;
+            *pixels = covered(camera, original, &judge.renderer.render(&scene, camera, &white)?);
+        }
+        drop(scene);
+        Ok(judge)
     }
 
     /// Number of views that judge.
@@ -65,7 +95,7 @@ impl Judge {
     /// # Errors
     /// As [`Self::new`].
     pub(super) fn against(self, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
-        let cameras: Vec<Camera> = self.views.iter().map(|view| view.0.clone()).collect();
+        let cameras: Vec<Camera> = self.views.iter().map(|view| view.camera.clone()).collect();
         Self::new(self.renderer, splats, &cameras, self.given, progress)
     }
 
@@ -78,10 +108,10 @@ impl Judge {
         let scene = self.renderer.prepare(scene.into())?;
         let mut all = Vec::with_capacity(self.views.len());
         progress.begin(Stage::Draw, self.views.len() as u64);
-        for (camera, original) in &self.views {
+        for View { camera, original, pixels } in &self.views {
             progress.check()?;
             let picture = self.renderer.render(&scene, camera, &RenderOptions::default())?;
-            let found = decibels(squared_error(original, &picture)?, camera.drawn_pixels());
+            let found = decibels(squared_error(original, &picture)?, *pixels);
             all.push(found.map_or(IDENTICAL, |decibels| decibels.min(IDENTICAL)));
             progress.advance(1);
         }
@@ -92,6 +122,17 @@ impl Judge {
         let least = all.first().copied().unwrap_or(IDENTICAL);
         Ok(Score { judged: mean(&all[..hard]), mean: mean(&all), least })
     }
+}
+
+/// Number of pixels of `camera` that a scene covers, which is drawn over black and over white.
+fn covered(camera: &Camera, black: &Image, white: &Image) -> u64 {
+    let pairs = black.pixels.iter().zip(&white.pixels).enumerate();
+    let within = pairs.filter(|(drawn, _)| camera.place_of_drawn(*drawn).is_some());
+    // What is seen of the background, in each channel alike.
+    let open: f64 = within.map(|(_, (black, white))| f64::from(white[0] - black[0]).clamp(0.0, 1.0)).sum();
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "0 to the number of pixels")]
+    let covered = (camera.drawn_pixels() as f64 - open).max(0.0).round() as u64;
+    covered
 }
 
 /// PSNR over the judging views, in dB.

@@ -12,8 +12,15 @@ use super::views::Looked;
 use crate::error::{Error, Result};
 use crate::views::SceneKind;
 
-/// Bytes of memory that packing a whole scene takes for each byte of its source. 1.85 was measured.
-const MEMORY_PER_BYTE: u64 = 2;
+/// Bytes of memory that packing a whole scene takes: so many, and tenths of a byte for each byte of its source. A PLY of 99 MB
+/// took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself (docs/results/sizes.md).
+const MEMORY: u64 = 320_000_000;
+const MEMORY_PER_TEN_BYTES: u64 = 26;
+/// Most Gaussians of a scene that is packed whole though it could be packed in parts. A larger one is looked at too little as a whole: one of
+/// 3.2 million was 2.7 dB worse than in parts, and one of 0.4 million 0.4 dB better (docs/results/sizes.md).
+const MOST_WHOLE: u64 = 786_432;
+/// Bytes of a Gaussian in a PLY at SH degree 3.
+const PLY_ROW: u64 = 248;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
 const MAX_GAUSSIANS: &str = "max-gaussians";
@@ -88,8 +95,8 @@ impl From<Target> for Quality {
 
 /// How to pack a scene by what shows in views of it.
 ///
-/// A scene that needs more than the memory allowed is packed part by part, each part by its own views. Only
-/// presets without cameras and kind of scene can be had so.
+/// A large scene, and one that needs more than the memory allowed, is packed part by part, each part by its own views, if no
+/// choice needs the whole scene: cameras, a kind of scene, a limit of Gaussians, and targets other than a mean PSNR do.
 #[derive(Debug, Clone)]
 pub struct Packing {
     pub(super) quality: Quality,
@@ -163,7 +170,7 @@ impl Packing {
     }
 
     /// Allows about `bytes` bytes of memory for packing a whole scene. A scene that needs more is packed part by
-    /// part, which takes up to 1.5 GiB however small `bytes` is: 0.3 GB was measured for a million Gaussians.
+    /// part, which takes up to 1.5 GiB however small `bytes` is.
     #[must_use]
     pub fn with_memory(self, bytes: u64) -> Self {
         Self { memory: bytes, ..self }
@@ -205,27 +212,70 @@ impl Packing {
         }
     }
 
-    /// Whether a scene of `source_bytes` bytes is packed whole. Otherwise it is packed part by part.
+    /// Whether a scene of `source_bytes` bytes is packed whole, with or without cameras that belong to it. Otherwise it is packed
+    /// part by part.
     ///
     /// # Errors
     /// [`Error::Memory`] if the memory allowed is too small for the whole scene and a choice needs it.
-    pub(super) fn is_whole(&self, source_bytes: u64) -> Result<bool> {
-        let needed = source_bytes.saturating_mul(MEMORY_PER_BYTE);
+    pub(super) fn is_whole(&self, source_bytes: u64, cameras: bool) -> Result<bool> {
+        let grows = u128::from(source_bytes) * u128::from(MEMORY_PER_TEN_BYTES) / 10;
+        let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(MEMORY);
+        let fits = needed <= self.memory;
         match self.needs_whole() {
-            _ if needed <= self.memory => Ok(true),
-            Some(choice) => Err(Error::Memory { choice, needed, allowed: self.memory }),
-            None => Ok(false),
+            Some(choice) if !fits => Err(Error::Memory { choice, needed, allowed: self.memory }),
+            Some(_) => Ok(true),
+            None => Ok(fits && (cameras || source_bytes <= MOST_WHOLE * PLY_ROW)),
+        }
+    }
+
+    /// The quality that is asked for, in dB.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for other targets than a mean PSNR.
+    pub(super) fn decibels(&self) -> Result<f64> {
+        match self.quality {
+            Quality::Preset(preset) => Ok(preset.decibels()),
+            Quality::Target(Target::MeanPsnr(decibels)) => Ok(decibels),
+            Quality::Target(target) => {
+                Err(Error::parameter(target.name(), "a scene in parts", "the whole scene"))
+            }
         }
     }
 
     /// The first choice that needs the whole scene in memory.
     fn needs_whole(&self) -> Option<&'static str> {
         match self.quality {
-            Quality::Target(target) => Some(target.name()),
-            Quality::Preset(_) if self.cameras.is_some() => Some("cameras"),
-            Quality::Preset(_) if self.kind != SceneKind::Auto => Some("scene"),
-            Quality::Preset(_) if self.max_gaussians.is_some() => Some(MAX_GAUSSIANS),
-            Quality::Preset(_) => self.looked.as_ref().map(|_| "looked"),
+            Quality::Target(target) if !matches!(target, Target::MeanPsnr(_)) => Some(target.name()),
+            _ if self.cameras.is_some() => Some("cameras"),
+            _ if self.kind != SceneKind::Auto => Some("scene"),
+            _ if self.max_gaussians.is_some() => Some(MAX_GAUSSIANS),
+            _ => self.looked.as_ref().map(|_| "looked"),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn large_scenes_are_packed_in_parts_unless_there_are_cameras() {
+        let large = MOST_WHOLE * PLY_ROW + 1;
+        let psnr = Packing::new(Target::MeanPsnr(40.0));
+        for packing in [Packing::default(), psnr] {
+            assert!(packing.is_whole(large - 1, false).unwrap());
+            assert!(!packing.is_whole(large, false).unwrap());
+            assert!(packing.is_whole(large, true).unwrap());
+            assert!(!packing.with_memory(large).is_whole(large, true).unwrap());
+        }
+        for packing in [
+            Packing::new(Target::Size(1_000_000)),
+            Packing::default().with_cameras(Vec::new()),
+            Packing::default().with_max_gaussians(5),
+        ] {
+            assert!(packing.is_whole(large, false).unwrap());
+            assert!(matches!(packing.with_memory(large).is_whole(large, false), Err(Error::Memory { .. })));
+        }
+        assert!(matches!(Packing::default().is_whole(u64::MAX, true), Ok(true)));
     }
 }

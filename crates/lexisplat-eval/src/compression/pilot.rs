@@ -1,14 +1,14 @@
 //! The step of a scene that is packed in parts, found on some of its parts.
 
 use lexisplat::packed::{PackOptions, Packer};
+use lexisplat::stream::Observed;
 use lexisplat::{Progress, Splats};
 use lexisplat_render::Renderer;
 
 use super::judge::Judge;
-use super::only_cancels::OnlyCancels;
+use super::memo::views_of;
 use super::refit::{Fit, Refitting};
 use super::target::{DB_PER_HALVING, on_grid};
-use super::views::PackingViews;
 use crate::error::Result;
 
 /// Views that judge a part.
@@ -24,26 +24,23 @@ const MOST_MOVE: f64 = 2.0;
 /// # Errors
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
 pub(super) fn step_factor(
-    renderer: &mut Renderer,
     part: &Splats,
+    observed: &Observed,
     options: &PackOptions,
     decibels: f64,
     progress: &dyn Progress,
 ) -> Result<f64> {
-    // The work around it counts Gaussians.
-    let progress = &OnlyCancels(progress);
-    let views = PackingViews::found(renderer, part, progress)?;
-    let sensitivity = views.sensitivity(renderer, part, progress)?;
-    let packer = Packer::new(part, &sensitivity, options)?;
-    drop(sensitivity);
+    let views = views_of(&observed.memo)?;
+    let packer = Packer::new(part, &observed.sensitivity, options)?;
     let usual = libm::log2(packer.step_for(decibels));
-    let fit = match options.may_change() {
-        true => Some(Fit::to(part, &PackingViews::of_part(part), progress)?),
-        false => None,
+    let fit = if options.may_change() {
+        Some(Fit::to(part, views.fitting_part(part), false, progress)?)
+    } else {
+        None
     };
     let refitting = Refitting::new(packer, fit);
     // A GPU that looks need not judge too.
-    let mut judge = Judge::new(Renderer::cpu(), part, &views.some_judging(JUDGES), false, progress)?;
+    let mut judge = Judge::of_part(Renderer::cpu(), part, &views.some_judging(JUDGES), progress)?;
     let mut log_step = on_grid(usual, STEPS_PER_OCTAVE);
     for is_last in [false, true] {
         let (quantised, file) = refitting.quantise(libm::exp2(log_step), true, progress)?;
@@ -64,12 +61,14 @@ mod tests {
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
+    use crate::compression::parts::observe;
 
     #[test]
     fn the_step_is_smaller_where_more_is_asked_and_may_change_less() {
         let part = scene(&SampleOptions::new(1500, 3));
+        let observed = observe(&mut Renderer::cpu(), &part, &Silent).unwrap();
         let factor = |options: PackOptions, decibels: f64| {
-            step_factor(&mut Renderer::cpu(), &part, &options, decibels, &Silent).unwrap()
+            step_factor(&part, &observed, &options, decibels, &Silent).unwrap()
         };
         let usual = factor(PackOptions::default(), 40.0);
         assert!(usual > 0.02 && usual < 50.0, "{usual}");

@@ -8,13 +8,12 @@ use std::borrow::Borrow;
 
 use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
 use lexisplat::sh::C0;
-use lexisplat::{CompressReport, Geometry, Model, Progress, Splats, Stage};
+use lexisplat::{CompressReport, Geometry, Progress, Splats, Stage};
 use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
 
 use super::alone::alone;
-use super::only_cancels::{OneStep, OnlyCancels};
+use super::only_cancels::OneStep;
 use super::solve::{ROW, kinds, solve};
-use super::views::PackingViews;
 use crate::drawing::{DrawOptions, draw_views};
 use crate::error::Result;
 
@@ -156,32 +155,21 @@ impl Refitted {
     }
 }
 
-/// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone.
-///
-/// # Errors
-/// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub(super) fn appearances_of_part(
-    part: &Splats,
-    model: &Model,
-    weights: &[[f32; 2]],
-    progress: &dyn Progress,
-) -> Result<Vec<Appearance>> {
-    // The work around it counts Gaussians.
-    let progress = &OnlyCancels(progress);
-    let fit = Fit::to(part, &PackingViews::of_part(part), progress)?;
-    fit.appearances(Scene::from(model), weights, progress)
-}
-
 impl Fit {
-    /// Pictures of `splats` to fit to. The processor draws them, for it fits too.
+    /// Pictures of `splats` from `cameras` to fit to. The cameras were `given`, or else found. The processor draws them, for it fits
+    /// too.
     ///
     /// # Errors
     /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-    pub(super) fn to(splats: &Splats, views: &PackingViews, progress: &dyn Progress) -> Result<Self> {
-        let cameras = views.fitting(splats);
+    pub(super) fn to(
+        splats: &Splats,
+        cameras: Vec<Camera>,
+        given: bool,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
         let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
-        Ok(Self { cameras, targets, given: views.are_given() })
+        Ok(Self { cameras, targets, given })
     }
 
     /// Base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` are the
@@ -243,7 +231,8 @@ mod tests {
         let Looked { views, sensitivity } =
             Looked::at(&mut cpu, splats, None, SceneKind::Auto, &Silent).unwrap();
         let packer = Packer::new(splats.clone(), &sensitivity, options).unwrap();
-        let fit = options.may_change().then(|| Fit::to(splats, &views, &Silent).unwrap());
+        let fit =
+            options.may_change().then(|| Fit::to(splats, views.fitting(splats), false, &Silent).unwrap());
         let refitting = Refitting::new(packer, fit);
         let step = refitting.packer.step_for(34.0);
         let (packed, _) = refitting.pack(step, true, &Silent).unwrap();

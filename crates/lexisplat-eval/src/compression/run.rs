@@ -1,23 +1,19 @@
 //! The steps from a source of splats to a written file and its report.
 
-use std::cell::RefCell;
-
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{PackOptions, Packer, Preset};
-use lexisplat::stream::{self, Importance};
-use lexisplat::{Layout, Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
+use lexisplat::packed::Packer;
+use lexisplat::{Layout, Progress, Sink, SplatSource, Splats, Stopwatch, stream};
 use lexisplat_render::{Camera, Renderer};
 
 use super::belonging::belong;
 use super::fewer::at_most;
 use super::judge::Judge;
-use super::only_cancels::OnlyCancels;
 use super::packing::{Compression, Packing, Quality};
-use super::refit::{Fit, Refitting, appearances_of_part};
+use super::parts::in_parts;
+use super::refit::{Fit, Refitting};
 use super::report::{CompressionReport, SensitivitySource, reached};
 use super::target::{pack_to_preset, pack_to_target};
-use super::tiles;
-use super::views::{Looked, PackingViews};
+use super::views::Looked;
 use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
 use crate::views::SceneKind;
@@ -26,11 +22,13 @@ use crate::views::SceneKind;
 const PRESET_JUDGES: usize = 48;
 
 impl Compression {
-    /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once. Such a source is best
-    /// opened with [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
+    /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once, with or without
+    /// [likely cameras](Self::with_likely_cameras). Such a source is best opened with
+    /// [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
     #[must_use]
-    pub fn holds_whole(&self, source_bytes: u64) -> bool {
-        matches!(self, Self::Packed(packing) if packing.is_whole(source_bytes).is_ok_and(|whole| whole))
+    pub fn holds_whole(&self, source_bytes: u64, likely_cameras: bool) -> bool {
+        let is_whole = |packing: &Packing| packing.is_whole(source_bytes, likely_cameras);
+        matches!(self, Self::Packed(packing) if is_whole(packing).is_ok_and(|whole| whole))
     }
 
     /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. `progress` is told
@@ -64,7 +62,9 @@ impl Compression {
                 let done = stream::compress(source, options, *codes, sink, progress)?;
                 CompressionReport::exact(done, Layout::of(*codes, options.values))
             }
-            Self::Heuristic(preset, options) => in_parts(options, *preset, None, source, sink, progress)?,
+            Self::Heuristic(preset, options) => {
+                in_parts(options, preset.decibels(), None, source, sink, progress)?
+            }
             Self::Packed(packing) => packing.run(source, sink, progress)?,
         };
         report.source_bytes = source.source_bytes();
@@ -72,64 +72,6 @@ impl Compression {
         report.total_seconds = clock.seconds();
         Ok(report)
     }
-}
-
-/// Packs part by part, or as a whole a scene that is one part. `renderer` measures the parts. Without one the heuristic does.
-///
-/// # Errors
-/// As [`stream::pack`], and errors of drawing.
-pub fn in_parts(
-    options: &PackOptions,
-    preset: Preset,
-    mut renderer: Option<Renderer>,
-    source: &dyn SplatSource,
-    sink: Sink<'_>,
-    progress: &dyn Progress,
-) -> Result<CompressionReport> {
-    let clock = Stopwatch::start();
-    let device = renderer.as_ref().and_then(gpu);
-    let guessed = renderer.is_none();
-    let mut look_seconds = 0.0;
-    let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-        appearances_of_part(part, model, weights, progress)
-    };
-    let (mut measure, mut correct);
-    // Looks and pilots take turns with the renderer.
-    let shared = renderer.as_mut().map(RefCell::new);
-    let importance = match &shared {
-        None => Importance::Heuristic,
-        Some(renderer) => {
-            measure = |part: &Splats| -> Result<Sensitivity> {
-                let clock = Stopwatch::start();
-                let sensitivity = look_at_part(&mut renderer.borrow_mut(), part, progress);
-                look_seconds += clock.seconds();
-                sensitivity
-            };
-            correct = |part: &Splats| -> Result<f64> {
-                tiles::step_factor(&mut renderer.borrow_mut(), part, options, preset, progress)
-            };
-            Importance::Judge {
-                judge: &mut measure,
-                correct: Some(&mut correct),
-                refit: Some(&mut refit),
-                device,
-            }
-        }
-    };
-    let done = stream::pack(source, importance, options, preset.decibels(), sink, progress)?;
-    let pack_seconds = clock.seconds() - look_seconds;
-    Ok(CompressionReport { look_seconds, pack_seconds, ..tiles::report(&done, guessed) })
-}
-
-/// The sensitivity to a part of a scene, from views like photographs of it and from all around. With the latter alone files of
-/// the same size were 1.7 dB worse (docs/results/scale.md).
-pub(super) fn look_at_part(
-    renderer: &mut Renderer,
-    part: &Splats,
-    progress: &dyn Progress,
-) -> Result<Sensitivity> {
-    let progress = &OnlyCancels(progress);
-    PackingViews::found(renderer, part, progress)?.sensitivity(renderer, part, progress)
 }
 
 /// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md, "Layers").
@@ -143,13 +85,19 @@ impl Packing {
         progress: &dyn Progress,
     ) -> Result<CompressionReport> {
         self.check()?;
-        let whole = self.is_whole(source.source_bytes())?;
-        match self.quality {
-            Quality::Preset(preset) if !whole => {
-                in_parts(&self.options, preset, Some(self.renderer()?), source, sink, progress)
-            }
-            _ => self.whole(source, sink, progress),
+        match self.is_whole(source.source_bytes(), self.likely_cameras.is_some())? {
+            true => self.whole(source, sink, progress),
+            false => self.in_parts(source, sink, progress),
         }
+    }
+
+    fn in_parts(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        in_parts(&self.options, self.decibels()?, Some(self.renderer()?), source, sink, progress)
     }
 
     /// The cameras that were given, or those that are likely and seem to belong to `splats`.
@@ -184,14 +132,21 @@ impl Packing {
             Some(looked) => Looked::clone(looked),
             None => {
                 let cameras = self.cameras_of(&mut renderer, &splats, progress)?;
+                if !self.is_whole(source.source_bytes(), cameras.is_some())? {
+                    drop(splats);
+                    return self.in_parts(source, sink, progress);
+                }
                 Looked::at(&mut renderer, &splats, cameras, self.kind, progress)?
             }
         };
         let look_seconds = clock.seconds();
 
         let clock = Stopwatch::start();
-        let fit = if self.options.may_change() { Some(Fit::to(&splats, &views, progress)?) } else { None };
         let given = views.are_given();
+        let fit = match self.options.may_change() {
+            true => Some(Fit::to(&splats, views.fitting(&splats), given, progress)?),
+            false => None,
+        };
         let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
         let most = self.max_gaussians.filter(|&most| most < splats.len());
         let (fewer, sensitivity) = match (most, &fit) {

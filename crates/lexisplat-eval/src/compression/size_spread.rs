@@ -25,9 +25,8 @@ impl Sizes {
         Self(all.filter(|(place, size)| size.is_finite() && place.iter().all(|v| v.is_finite())).collect())
     }
 
-    /// How much sizes differ as seen from `position`: the distance between the quartiles of their natural logarithms; infinite
-    /// if there are none.
-    pub(super) fn spread(&self, position: [f32; 3]) -> f64 {
+    /// The sizes as seen from `position`.
+    pub(super) fn seen_from(&self, position: [f32; 3]) -> SizesSeen {
         let position = position.map(f64::from);
         let mut sizes: Vec<f64> = (self.0.iter())
             .map(|(place, size)| {
@@ -39,8 +38,17 @@ impl Sizes {
             let place = sizes.len() * share / 4;
             (place < sizes.len()).then(|| *sizes.select_nth_unstable_by(place, f64::total_cmp).1)
         };
-        at(3).zip(at(1)).map_or(f64::INFINITY, |(upper, lower)| upper - lower)
+        let [lower, median, upper] = [1, 2, 3].map(|share| at(share).unwrap_or(f64::NAN));
+        let spread = upper - lower;
+        SizesSeen { spread: if spread.is_nan() { f64::INFINITY } else { spread }, median }
     }
+}
+
+/// The natural logarithms of sizes over distances, as seen from one place.
+pub(super) struct SizesSeen {
+    /// The distance between their quartiles; infinite if there are none.
+    pub(super) spread: f64,
+    pub(super) median: f64,
 }
 
 #[cfg(test)]
@@ -63,14 +71,15 @@ mod tests {
             geometry.rotations.push([1.0, 0.0, 0.0, 0.0]);
         }
         let sizes = Sizes::of(&geometry);
-        let here = sizes.spread(camera);
+        let here = sizes.seen_from(camera).spread;
         for k in 0..3 {
             for step in [-1.5, 1.5] {
                 let mut beside = camera;
                 beside[k] += step;
-                assert!(sizes.spread(beside) > 1.2 * here, "{here} {}", sizes.spread(beside));
+                let there = sizes.seen_from(beside).spread;
+                assert!(there > 1.2 * here, "{here} {there}");
             }
         }
-        assert_eq!(Sizes::of(&Geometry::default()).spread(camera), f64::INFINITY);
+        assert_eq!(Sizes::of(&Geometry::default()).seen_from(camera).spread, f64::INFINITY);
     }
 }

@@ -6,11 +6,9 @@ use lexisplat::stream::PackedFile;
 use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
-use super::pilot;
-use super::refit::appearances_of_part;
+use super::parts;
+pub use super::parts::in_parts;
 use super::report::{CompressionReport, SensitivitySource};
-pub use super::run::in_parts;
-use super::run::look_at_part;
 use crate::error::Result;
 
 /// The factor of the usual step with which `part` of a scene, packed as a scene of its own, has the quality that `preset` aims at;
@@ -25,10 +23,8 @@ pub fn step_factor(
     preset: Preset,
     progress: &dyn Progress,
 ) -> Result<f64> {
-    match part.is_empty() {
-        true => Ok(1.0),
-        false => pilot::step_factor(renderer, part, options, preset.decibels(), progress),
-    }
+    let observed = parts::observe(renderer, part, progress)?;
+    parts::step_factor(part, &observed, options, preset.decibels(), progress)
 }
 
 /// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.
@@ -41,14 +37,9 @@ pub fn look(
     renderer: Option<&mut Renderer>,
     progress: &dyn Progress,
 ) -> Result<(LookStatistics, Looked)> {
-    let found = match renderer {
-        // There is nothing to look at.
-        Some(renderer) if !bucket.splats().is_empty() => {
-            Some(look_at_part(renderer, bucket.splats(), progress)?)
-        }
-        _ => None,
-    };
-    Ok(bucket.look(plan, found)?)
+    let observed =
+        renderer.map(|renderer| parts::observe(renderer, bucket.splats(), progress)).transpose()?;
+    Ok(bucket.look(plan, observed)?)
 }
 
 /// Codes a bucket. What it shows is fitted to pictures if it was looked at and not `guessed`.
@@ -64,7 +55,7 @@ pub fn code(
     progress: &dyn Progress,
 ) -> Result<(Counts, Coded)> {
     let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
-        appearances_of_part(part, model, weights, progress)
+        parts::refit(part, model, weights, looked.memo(), progress).map(Some)
     };
     coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
 }

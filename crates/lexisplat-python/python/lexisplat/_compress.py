@@ -25,8 +25,8 @@ Layout = Literal["packed", "f16", "f32", "paper"]
 #: Cameras, or the path of a file or folder that :func:`lexisplat.cameras` reads.
 Cameras = Union[Sequence[Camera], str, "os.PathLike[str]"]
 
-#: Memory that packing a whole scene may take before it is packed in parts, as the program's default (2 GiB).
-DEFAULT_MEMORY = 2 << 30
+#: Memory that packing a whole scene may take before it is packed in parts, as the program's default (4 GiB).
+DEFAULT_MEMORY = 4 << 30
 
 
 def _seed(name: str, value: object) -> int:

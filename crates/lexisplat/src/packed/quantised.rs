@@ -27,7 +27,8 @@ use crate::support::stopwatch::Stopwatch;
 /// Fits base colours and opacities of a part of a scene. Takes all Gaussians of the part, what a file has of them, and for
 /// each that the file has its sensitivities to the colour and to the logarithm of the opacity. Returns what fits, for each
 /// that the file has.
-pub type Refit<'a, E = Error> = dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Vec<Appearance>, E> + 'a;
+pub type Refit<'a, E = Error> =
+    dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 
 /// Gaussians that a file has, all in the same order.
 #[derive(Debug, Default)]
@@ -297,7 +298,7 @@ impl<'a> Quantised<'a> {
             return Ok(None);
         };
         let model = self.finish(None, None, progress)?.0.unpack()?;
-        refit(self.splats, &model, self.weights()).map(Some)
+        refit(self.splats, &model, self.weights())
     }
 }
 

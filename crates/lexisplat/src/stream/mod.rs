@@ -29,7 +29,7 @@
 mod buckets;
 mod compress;
 mod decompress;
-mod importance;
+mod observer;
 mod order;
 mod pack;
 mod rows;
@@ -38,7 +38,7 @@ mod survey;
 
 pub use compress::{Compressed, compress};
 pub use decompress::decompress;
-pub use importance::{Correct, Importance};
+pub use observer::{Observed, Observer};
 #[cfg(test)]
 pub(crate) use pack::run as pack_in_buckets;
 pub use pack::{PackedFile, pack};

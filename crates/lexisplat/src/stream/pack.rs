@@ -1,12 +1,16 @@
 //! Layout packed: scenes of one bucket as a whole, others bucket by bucket.
 
-use super::importance::Importance;
+use std::collections::BTreeMap;
+
+use super::observer::{Observed, Observer};
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
 use crate::packed::tiles::{Assembly, BUCKET, Coded, Coding, Looked, Plan, SHOWN, Sample, Steps, Tables};
-use crate::packed::{PackOptions, PackedHead, Packer};
+use crate::packed::{PackOptions, PackedHead, Packer, Refit};
 use crate::scene::sensitivity::{Sensitivity, heuristic_total};
 use crate::scene::source::SplatSource;
+use crate::scene::splats::Splats;
+use crate::sparse::model::Model;
 use crate::sparse::tally::CompressReport;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
@@ -38,30 +42,30 @@ impl PackedFile {
 /// Packs the scene of `source` so that pictures are about `decibels` good, and writes it to `sink`.
 ///
 /// A scene of at most [`BUCKET`] Gaussians is packed as a whole, as by [`Packer`]. Others are packed
-/// [bucket by bucket](crate::packed::tiles): `importance` measures the sensitivity of each bucket, and steps, predictors and
-/// dictionary are found from sums over all of them. The bytes are the same on any number of threads, and those that other
+/// [bucket by bucket](crate::packed::tiles): `observer` draws each bucket, and steps, predictors and dictionary are found from
+/// sums over all of them. Without an observer, what shows is guessed from each Gaussian alone. The bytes are the same on any number of threads, and those that other
 /// processes make of the same tiles: the [parts](SplatSource::parts) of `source`. Peak of anonymous memory is below 1.5 GiB at SH
 /// degree 3.
 ///
 /// # Errors
 /// [`Error::Parameter`] for options out of range, values so large that sums of them leave f32, and
 /// sensitivities that do not fit their part or are not finite; [`Error::Io`] for `sink` and for temporary
-/// files; [`Error::Cancelled`]; and what `importance` returns.
+/// files; [`Error::Cancelled`]; and what `observer` returns.
 pub fn pack<'a, E: From<Error>>(
     source: &dyn SplatSource,
-    importance: Importance<'_, E>,
+    observer: Option<&mut dyn Observer<E>>,
     options: &PackOptions,
     decibels: f64,
     sink: impl Into<Sink<'a>>,
     progress: &dyn Progress,
 ) -> Result<PackedFile, E> {
-    run(source, importance, options, decibels, sink.into(), BUCKET, progress)
+    run(source, observer, options, decibels, sink.into(), BUCKET, progress)
 }
 
 /// [`pack`] with buckets of about `bucket` Gaussians.
 pub(crate) fn run<E: From<Error>>(
     source: &dyn SplatSource,
-    importance: Importance<'_, E>,
+    observer: Option<&mut dyn Observer<E>>,
     options: &PackOptions,
     decibels: f64,
     sink: Sink<'_>,
@@ -71,14 +75,14 @@ pub(crate) fn run<E: From<Error>>(
     Limits::check("Gaussians", source.len() as u64, MAX_GAUSSIANS)?;
     options.check()?;
     match source.len() <= bucket {
-        true => whole(source, importance, options, decibels, sink, progress),
-        false => in_buckets(source, importance, options, decibels, sink, bucket, progress),
+        true => whole(source, observer, options, decibels, sink, progress),
+        false => in_buckets(source, observer, options, decibels, sink, bucket, progress),
     }
 }
 
 fn whole<E: From<Error>>(
     source: &dyn SplatSource,
-    mut importance: Importance<'_, E>,
+    mut observer: Option<&mut dyn Observer<E>>,
     options: &PackOptions,
     decibels: f64,
     sink: Sink<'_>,
@@ -86,16 +90,27 @@ fn whole<E: From<Error>>(
 ) -> Result<PackedFile, E> {
     let splats = source.whole()?;
     progress.begin(Stage::Look, splats.len() as u64);
-    let factor = importance.correction(&splats)?.unwrap_or(1.0);
-    let sensitivity = importance.of(&splats)?.unwrap_or_else(|| {
-        let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-        Sensitivity::heuristic_part(&splats.geometry, total)
-    });
+    let (observed, factor) = match &mut observer {
+        Some(observer) => {
+            let observed = observer.observe(&splats)?;
+            let factor = observer.step_factor(&splats, &observed)?;
+            (observed, factor)
+        }
+        None => {
+            let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
+            (Sensitivity::heuristic_part(&splats.geometry, total).into(), 1.0)
+        }
+    };
     progress.end();
+    let Observed { sensitivity, memo } = observed;
     let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
+    drop(sensitivity);
     let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
-    let device = importance.device().map(str::to_owned);
-    let appearances = quantised.refitted(importance.refit(), progress)?;
+    let device = observer.as_ref().and_then(|observer| observer.device());
+    let mut refit = observer.map(|observer| {
+        |part: &Splats, model: &Model, weights: &[[f32; 2]]| observer.refit(part, model, weights, &memo)
+    });
+    let appearances = quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
     let (packed, report) = quantised.finish(appearances.as_deref(), None, progress)?;
     let packed = packed.with_device(device);
     let writer = LexiWriter::packed(&packed);
@@ -106,7 +121,7 @@ fn whole<E: From<Error>>(
 
 fn in_buckets<E: From<Error>>(
     source: &dyn SplatSource,
-    mut importance: Importance<'_, E>,
+    mut observer: Option<&mut dyn Observer<E>>,
     options: &PackOptions,
     decibels: f64,
     sink: Sink<'_>,
@@ -128,19 +143,28 @@ fn in_buckets<E: From<Error>>(
     progress.end();
 
     progress.begin(Stage::Look, plan.len() as u64);
-    let mut factors = Vec::new();
-    for number in plan.pilots() {
-        progress.check()?;
-        factors.extend(importance.correction(ordered.bucket(&plan, number, false)?.splats())?);
+    let (mut factors, mut observed_before) = (Vec::new(), BTreeMap::new());
+    if let Some(observer) = &mut observer {
+        for number in plan.pilots() {
+            progress.check()?;
+            let bucket = ordered.bucket(&plan, number, false)?;
+            let observed = observer.observe(bucket.splats())?;
+            factors.push(observer.step_factor(bucket.splats(), &observed)?);
+            observed_before.insert(number, observed);
+        }
+        plan = plan.corrected(&factors)?;
     }
-    plan = plan.corrected(&factors)?;
     let (mut statistics, mut all_looked) = (Vec::new(), Messages::new(to)?);
     let groups: Vec<Vec<usize>> = (0..plan.groups()).map(|group| plan.group(group)).collect();
     let mut samples: Vec<Sample> = groups.iter().map(|_| Sample::new()).collect();
     for number in 0..plan.buckets() {
         progress.check()?;
         let bucket = ordered.bucket(&plan, number, false)?;
-        let (own, looked) = bucket.look(&plan, importance.of(bucket.splats())?)?;
+        let observed = match (observed_before.remove(&number), &mut observer) {
+            (None, Some(observer)) => Some(observer.observe(bucket.splats())?),
+            (before, _) => before,
+        };
+        let (own, looked) = bucket.look(&plan, observed)?;
         for (sample, _) in samples.iter_mut().zip(&groups).filter(|(_, group)| group.contains(&number)) {
             sample.add(&plan, &bucket, &looked)?;
         }
@@ -162,7 +186,13 @@ fn in_buckets<E: From<Error>>(
         progress.check()?;
         let bucket = ordered.bucket(&plan, number, true)?;
         let looked = Looked::from_bytes(&all_looked.read(number)?)?;
-        let (own, coded) = coding.code(&plan, &bucket, &looked, importance.refit(), progress)?;
+        let mut refit = observer.as_mut().map(|observer| {
+            |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+                observer.refit(part, model, weights, looked.memo())
+            }
+        });
+        let refit = refit.as_mut().map(|refit| refit as &mut Refit<'_, E>);
+        let (own, coded) = coding.code(&plan, &bucket, &looked, refit, progress)?;
         counts.push(own);
         all_coded.push(&coded.to_bytes())?;
     }
@@ -175,7 +205,7 @@ fn in_buckets<E: From<Error>>(
         let coded = Coded::from_bytes(&all_coded.read(number)?)?;
         assembly.push(coded.with_tables(&plan, &coding, &tables)?)?;
     }
-    let device = importance.device().map(str::to_owned);
+    let device = observer.and_then(|observer| observer.device());
     let mut done = assembly.finish(&counts, device, sink, progress)?;
     done.report.learn_seconds = learn_seconds;
     done.report.code_seconds = clock.seconds() - before - learn_seconds;

@@ -10,7 +10,7 @@ use crate::packed::reorder::{gather, gather_geometry};
 use crate::scene::sensitivity::Sensitivity;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
-use crate::stream::RowLayout;
+use crate::stream::{Observed, RowLayout};
 use crate::support::error::{Error, Result};
 use crate::support::progress::Progress;
 
@@ -125,21 +125,21 @@ impl Bucket {
         &self.splats
     }
 
-    /// Sums up what `sensitivity` says of the bucket's Gaussians, as if these were the whole scene. Without one it is guessed from
-    /// each Gaussian alone.
+    /// Sums up what was `observed` of the bucket's Gaussians. Without it, what shows is guessed from each Gaussian alone.
     ///
     /// # Errors
     /// [`crate::Error::Parameter`] for a sensitivity of another length or with values that are not finite.
-    pub fn look(&self, plan: &Plan, sensitivity: Option<Sensitivity>) -> Result<(LookStatistics, Looked)> {
-        let found = match sensitivity {
-            None => Sensitivity::heuristic_part(&self.splats.geometry, plan.heuristic_total / SHOWN),
-            Some(mut found) => {
+    pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
+        let Observed { sensitivity, memo } = match observed {
+            None => Sensitivity::heuristic_part(&self.splats.geometry, plan.heuristic_total / SHOWN).into(),
+            Some(mut observed) => {
                 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-                found.share((self.splats.len() as f64 / plan.len().max(1) as f64) as f32);
-                found
+                observed.sensitivity.share((self.splats.len() as f64 / plan.len().max(1) as f64) as f32);
+                observed
             }
         };
-        check(&self.splats, &found)?;
-        Ok(LookStatistics::of(self, &found, plan))
+        check(&self.splats, &sensitivity)?;
+        let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
+        Ok((statistics, looked.with_memo(memo)))
     }
 }

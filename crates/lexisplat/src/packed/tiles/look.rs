@@ -17,7 +17,8 @@ use crate::support::error::{Error, Result};
 /// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;
 
-/// What is remembered of each Gaussian of a bucket: its weights, rounded to eighths of an octave, and whether it stays.
+/// What is remembered of a bucket: of each Gaussian its weights, rounded to eighths of an octave, and whether it stays; and the
+/// observer's memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
     scene: u32,
@@ -25,6 +26,7 @@ pub struct Looked {
     pairs: Pairs,
     /// One bit a Gaussian, the lowest first.
     stays: Vec<u8>,
+    memo: Vec<u8>,
 }
 
 /// Sums over the Gaussians of a bucket.
@@ -90,7 +92,17 @@ impl Looked {
         for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
             bits[i / 8] |= 1_u8 << (i % 8);
         }
-        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits }
+        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits, memo: Vec::new() }
+    }
+
+    pub(super) fn with_memo(self, memo: Vec<u8>) -> Self {
+        Self { memo, ..self }
+    }
+
+    /// The memo of [`Observed`](crate::stream::Observed).
+    #[must_use]
+    pub fn memo(&self) -> &[u8] {
+        &self.memo
     }
 
     /// The weights of each Gaussian, and whether it stays. The first does in any case if `first_stays`.

@@ -4,7 +4,7 @@ use super::*;
 use crate::packed::PackOptions;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
-use crate::stream::{self, Importance};
+use crate::stream;
 use crate::support::sink::Sink;
 use crate::{Error, Extra, ExtraValues, Limits, Offset, Result, ShDegree, Silent, lexi};
 
@@ -128,7 +128,7 @@ fn in_one_process(tiles: &[Splats]) -> Vec<u8> {
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.lexi");
     let sink = Sink::from(&output);
-    let none = Importance::<Error>::Heuristic;
+    let none = None::<&mut dyn stream::Observer<Error>>;
     stream::pack_in_buckets(&joined, none, &options(), 38.0, sink, SMALL, &Silent).unwrap();
     std::fs::read(output).unwrap()
 }

@@ -16,13 +16,54 @@ fn options() -> PackOptions {
     PackOptions { keep_order: true, atoms: Some(12), ..PackOptions::default() }
 }
 
-fn streamed(splats: &Splats, importance: Importance<'_>, bucket: usize) -> Result<(Vec<u8>, PackedFile)> {
-    streamed_with(splats, importance, &options(), bucket)
+/// Draws nothing: says what its functions say.
+struct Told<J, R = fn(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>>> {
+    judge: J,
+    refit: Option<R>,
+}
+
+impl<J: FnMut(&Splats) -> Result<Sensitivity>> Told<J> {
+    fn by(judge: J) -> Self {
+        Self { judge, refit: None }
+    }
+}
+
+impl<J, R> Observer for Told<J, R>
+where
+    J: FnMut(&Splats) -> Result<Sensitivity>,
+    R: FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>>,
+{
+    fn observe(&mut self, part: &Splats) -> Result<Observed> {
+        let memo = u64::try_from(part.len()).unwrap().to_le_bytes().to_vec();
+        Ok(Observed { sensitivity: (self.judge)(part)?, memo })
+    }
+
+    fn refit(
+        &mut self,
+        part: &Splats,
+        model: &Model,
+        weights: &[[f32; 2]],
+        memo: &[u8],
+    ) -> Result<Option<Vec<Appearance>>> {
+        assert_eq!(memo, u64::try_from(part.len()).unwrap().to_le_bytes());
+        match &mut self.refit {
+            Some(refit) => refit(part, model, weights),
+            None => Ok(None),
+        }
+    }
+}
+
+fn streamed(
+    splats: &Splats,
+    observer: Option<&mut dyn Observer>,
+    bucket: usize,
+) -> Result<(Vec<u8>, PackedFile)> {
+    streamed_with(splats, observer, &options(), bucket)
 }
 
 fn streamed_with(
     splats: &Splats,
-    importance: Importance<'_>,
+    observer: Option<&mut dyn Observer>,
     options: &PackOptions,
     bucket: usize,
 ) -> Result<(Vec<u8>, PackedFile)> {
@@ -31,7 +72,7 @@ fn streamed_with(
     let chunks = ply::PlySource::open("t.ply", &bytes, &ply::ReadOptions::default(), &Silent).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let output = folder.path().join("out.lexi");
-    let done = run(&chunks, importance, options, 38.0, Sink::from(&output), bucket, &Silent);
+    let done = run(&chunks, observer, options, 38.0, Sink::from(&output), bucket, &Silent);
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), usize::from(done.is_ok()));
     done.map(|done| (std::fs::read(output).unwrap(), done))
 }
@@ -43,22 +84,13 @@ fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
         let splats = scene(count);
         let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
         let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
-        let (found, done) = streamed(&splats, Importance::Heuristic, BUCKET).unwrap();
+        let (found, done) = streamed(&splats, None, BUCKET).unwrap();
         // A judge that says of each Gaussian what the guess says.
-        let mut judge = |part: &Splats| {
+        let mut told = Told::by(|part: &Splats| {
             assert_eq!(part.len(), splats.len());
             Ok(Sensitivity::heuristic_part(&part.geometry, total))
-        };
-        assert!(
-            streamed(
-                &splats,
-                Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None },
-                BUCKET
-            )
-            .unwrap()
-            .0 == found,
-            "{count}"
-        );
+        });
+        assert!(streamed(&splats, Some(&mut told), BUCKET).unwrap().0 == found, "{count}");
         let packer = Packer::new(&splats, &sensitivity, &options()).unwrap();
         let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
         let mut expected = Vec::new();
@@ -92,16 +124,14 @@ fn what_is_not_worth_its_bits_is_left_out() {
     let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
     let mut expected = Vec::new();
     LexiWriter::packed(&packed).write(&mut expected, &Silent).unwrap();
-    let mut judge = |part: &Splats| Ok(shown(part, total));
-    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
-    let (found, done) = streamed_with(&splats, importance, &options, BUCKET).unwrap();
+    let mut told = Told::by(|part: &Splats| Ok(shown(part, total)));
+    let (found, done) = streamed_with(&splats, Some(&mut told), &options, BUCKET).unwrap();
     assert!(found == expected);
     assert!(done.head.removed >= (splats.len() / 5) as u64, "{}", done.head.removed);
     // Chunks are filled from several buckets, and rows stay together.
     let small = 9000;
-    let mut judge = |part: &Splats| Ok(shown(part, total));
-    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
-    let (found, done) = streamed_with(&splats, importance, &options, small).unwrap();
+    let mut told = Told::by(|part: &Splats| Ok(shown(part, total)));
+    let (found, done) = streamed_with(&splats, Some(&mut told), &options, small).unwrap();
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
     let geometry = model.geometry();
     assert_eq!((geometry.len(), done.head.gaussians), (model.len(), model.len()));
@@ -127,16 +157,14 @@ fn appearances_are_fitted_part_by_part() {
         (0..model.len()).map(moved).collect()
     };
     let fitted = |options: &PackOptions, bucket: usize| {
-        let mut judge = |part: &Splats| Ok(shown(part, total));
-        let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+        let refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
             // The part has what the file leaves out, and the rest is in order.
             assert!(part.len() > model.len() || options.keep_order);
             assert_eq!(model.len(), weights.len());
-            Ok(others(model))
+            Ok(Some(others(model)))
         };
-        let importance =
-            Importance::Judge { judge: &mut judge, correct: None, refit: Some(&mut refit), device: None };
-        streamed_with(&splats, importance, options, bucket).unwrap().0
+        let mut told = Told { judge: |part: &Splats| Ok(shown(part, total)), refit: Some(refit) };
+        streamed_with(&splats, Some(&mut told), options, bucket).unwrap().0
     };
     let sensitivity = shown(&splats, total);
     let file = |options: &PackOptions, fitted: bool| {
@@ -166,14 +194,13 @@ fn one_gaussian_stays() {
     let options = PackOptions { keep_order: false, ..options() };
     let splats = scene(9000);
     let small = 3000;
-    let mut judge = |part: &Splats| {
+    let mut told = Told::by(|part: &Splats| {
         let mut none = Sensitivity::heuristic(&part.geometry);
         none.removal.fill(0.5);
         none.opacity.fill(0.0);
         Ok(none)
-    };
-    let importance = Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None };
-    let (found, _) = streamed_with(&splats, importance, &options, small).unwrap();
+    });
+    let (found, _) = streamed_with(&splats, Some(&mut told), &options, small).unwrap();
     assert_eq!(lexi::read_bytes("t", &found, &Limits::default()).unwrap().len(), 1);
 }
 
@@ -181,8 +208,8 @@ fn one_gaussian_stays() {
 fn buckets_make_a_file_that_is_as_good() {
     let splats = scene(4 * CHUNK + 2000);
     let small = CHUNK;
-    let (found, done) = streamed(&splats, Importance::Heuristic, small).unwrap();
-    let (whole, _) = streamed(&splats, Importance::Heuristic, BUCKET).unwrap();
+    let (found, done) = streamed(&splats, None, small).unwrap();
+    let (whole, _) = streamed(&splats, None, BUCKET).unwrap();
     let ratio = found.len() as f64 / whole.len() as f64;
     assert!((0.97..1.03).contains(&ratio), "{ratio}");
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
@@ -201,18 +228,13 @@ fn every_gaussian_is_judged_once_beside_its_neighbours() {
     let small = 3000;
     let mut seen = Vec::new();
     let mut parts = 0;
-    let mut judge = |part: &Splats| {
+    let mut told = Told::by(|part: &Splats| {
         let ExtraValues::U32(numbers) = &part.geometry.extras[0].values else { panic!("not u32") };
         seen.extend_from_slice(numbers);
         parts += 1;
         Ok(Sensitivity::heuristic(&part.geometry))
-    };
-    let (found, _) = streamed(
-        &splats,
-        Importance::Judge { judge: &mut judge, correct: None, refit: None, device: None },
-        small,
-    )
-    .unwrap();
+    });
+    let (found, _) = streamed(&splats, Some(&mut told), small).unwrap();
     assert_eq!(parts, 4);
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
     assert_eq!(model.geometry().extras, splats.geometry.extras);
@@ -224,9 +246,7 @@ fn every_gaussian_is_judged_once_beside_its_neighbours() {
 fn what_a_judge_says_is_checked_and_its_errors_are_handed_on() {
     let splats = scene(700);
     let refused = |judge: &mut dyn FnMut(&Splats) -> Result<Sensitivity>| {
-        streamed(&splats, Importance::Judge { judge, correct: None, refit: None, device: None }, BUCKET)
-            .unwrap_err()
-            .to_string()
+        streamed(&splats, Some(&mut Told::by(judge)), BUCKET).unwrap_err().to_string()
     };
     let error = refused(&mut |part| Ok(Sensitivity::zeros(part.len() - 1)));
     assert!(error.contains("699") && error.contains("700"), "{error}");
@@ -241,7 +261,7 @@ fn gaussians_in_one_place_do_not_make_one_bucket_of_all() {
     let mut splats = scene(5000);
     splats.geometry.positions.fill([1.0; 3]);
     let small = 700;
-    let (found, _) = streamed(&splats, Importance::Heuristic, small).unwrap();
+    let (found, _) = streamed(&splats, None, small).unwrap();
     let model = lexi::read_bytes("t", &found, &Limits::default()).unwrap();
     assert_eq!(model.geometry().extras, splats.geometry.extras);
 }

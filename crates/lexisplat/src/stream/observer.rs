@@ -1,0 +1,61 @@
+//! What draws the parts of a scene that is too large to be drawn as a whole.
+
+use crate::packed::Appearance;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::Splats;
+use crate::sparse::model::Model;
+use crate::support::error::{Error, Result};
+
+/// Draws the parts of a scene. A part holds about 262,144 Gaussians near each other, and is drawn as if it were the whole scene.
+pub trait Observer<E = Error> {
+    /// Measures how pictures of `part` depend on its values.
+    ///
+    /// # Errors
+    /// Those of drawing.
+    fn observe(&mut self, part: &Splats) -> Result<Observed, E>;
+
+    /// The factor of the usual step with which `part`, packed as a scene of its own, is as good as asked. It is called for some
+    /// parts, after they were observed.
+    ///
+    /// # Errors
+    /// Those of drawing and packing.
+    fn step_factor(&mut self, _part: &Splats, _observed: &Observed) -> Result<f64, E> {
+        Ok(1.0)
+    }
+
+    /// Base colours and opacities with which pictures of `model` are nearest to those of `part`; `None` to leave them. `model` is
+    /// what a file has of the part, `weights` are the sensitivities of its Gaussians to the colour and to the logarithm of the
+    /// opacity, and `memo` is that of [`Observed`]. It is called for each part, if the options let these values change.
+    ///
+    /// # Errors
+    /// Those of drawing.
+    fn refit(
+        &mut self,
+        _part: &Splats,
+        _model: &Model,
+        _weights: &[[f32; 2]],
+        _memo: &[u8],
+    ) -> Result<Option<Vec<Appearance>>, E> {
+        Ok(None)
+    }
+
+    /// Name of the GPU that draws, which the file records; `None` for the CPU renderer.
+    fn device(&self) -> Option<String> {
+        None
+    }
+}
+
+/// What an [`Observer`] found in pictures of a part of a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Observed {
+    /// How pictures depend on the values of the part, as if it were the whole scene.
+    pub sensitivity: Sensitivity,
+    /// What the observer wants to know again when it refits the part, such as the views that it drew. Other processes may refit.
+    pub memo: Vec<u8>,
+}
+
+impl From<Sensitivity> for Observed {
+    fn from(sensitivity: Sensitivity) -> Self {
+        Self { sensitivity, memo: Vec::new() }
+    }
+}
