@@ -140,7 +140,7 @@ fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
         let likelihoods: Vec<f64> =
             (0..views.len()).map(|k| likelihood(&observed, views[k].position, &sizes[k])).collect();
         let chosen = best(&|k| -likelihoods[k], count / PHOTO_SHARE);
-        photo = chosen.iter().enumerate().map(|(n, &k)| turned(&views[k], n, &observed)).collect();
+        photo = chosen.iter().map(|&k| turned(&views[k], k, &observed)).collect();
         // As many fewer, evenly spread.
         others = others.into_iter().step_by(PHOTO_SHARE).collect();
     }
