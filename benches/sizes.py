@@ -15,14 +15,15 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from pathlib import Path
 
 sys.dont_write_bytecode = True  # no __pycache__ in the working tree
 from real_models import ROOT  # noqa: E402
 
-#: What packs a scene whole, or in parts, whatever its size: bytes of memory.
-MEMORY = {"whole": "1000GB", "in parts": "1MB"}
+#: Options with which a scene is packed as the program does, whole or in parts by its size, and in parts whatever its size.
+WAYS = {"default": [], "in parts": ["--memory", "1MB"]}
 RAY = """
 import json, sys, ray, lexisplat.ray
 ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False, logging_level="error")
@@ -31,12 +32,15 @@ lexisplat.ray.compress([sys.argv[1]], sys.argv[2], overwrite=True)
 
 
 def run(command):
-    """The seconds on the clock and of the processor, and the most bytes of resident memory."""
-    clock, process = time.monotonic(), subprocess.Popen([str(part) for part in command], stdout=subprocess.DEVNULL)
-    _, status, usage = os.wait4(process.pid, 0)
-    if status:
-        sys.exit(f"failed: {' '.join(map(str, command))}")
-    return time.monotonic() - clock, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
+    """What a command prints, the seconds on the clock and of the processor, and the most bytes of resident memory."""
+    with tempfile.TemporaryFile("w+") as told:
+        clock, process = time.monotonic(), subprocess.Popen([str(part) for part in command], stdout=told)
+        _, status, usage = os.wait4(process.pid, 0)
+        if status:
+            sys.exit(f"failed: {' '.join(map(str, command))}")
+        told.seek(0)
+        printed = told.read()
+    return printed, time.monotonic() - clock, usage.ru_utime + usage.ru_stime, usage.ru_maxrss * 1024
 
 
 def quality(binary, scene, packed, cameras):
@@ -64,17 +68,21 @@ def main():
             subprocess.run([sys.executable, ROOT / "benches/tile.py", args.model, str(copies), scene], check=True)
         size = scene.stat().st_size
         made = {}
-        for how, memory in MEMORY.items():
-            made[how] = packed = args.folder / f"{scene.stem}-{how.replace(' ', '-')}.lexi"
-            options = ["--overwrite", "-q", "--no-cameras", "--memory", memory, *args.options]
-            clock, cpu, resident = run([args.binary, "compress", scene, "-o", packed, *options])
+        for how, way in WAYS.items():
+            if how in made:
+                continue
+            packed = args.folder / f"{scene.stem}-{how.replace(' ', '-')}.lexi"
+            options = ["--overwrite", "-q", "--json", "--no-cameras", *way, *args.options]
+            report, clock, cpu, resident = run([args.binary, "compress", scene, "-o", packed, *options])
+            how = "in parts" if json.loads(report)["in_parts"] else "whole"
+            made[how] = packed
             told = subprocess.run([args.binary, "info", packed, "--json"], check=True, capture_output=True, text=True).stdout
             count = size_of(told)
             mean, worst = quality(args.binary, scene, packed, args.cameras)
             print(f"| {count:,} | {how} | {clock:.0f} | {cpu:.0f}, {cpu / count * 1e6:.0f} | {resident / size:.2f} | {packed.stat().st_size / count:.2f} | {mean:.2f} ({worst:.1f}) |", flush=True)
         if args.ray:
             packed = args.folder / f"{scene.stem}-ray.lexi"
-            clock, _, _ = run([args.ray, "-c", RAY, scene, packed])
+            _, clock, _, _ = run([args.ray, "-c", RAY, scene, packed])
             same = "the same bytes as in parts" if packed.read_bytes() == made["in parts"].read_bytes() else "OTHER BYTES"
             print(f"| {count:,} | Ray, 2 workers | {clock:.0f} | | | {packed.stat().st_size / count:.2f} | {same} |", flush=True)
 

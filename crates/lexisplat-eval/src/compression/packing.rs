@@ -16,9 +16,9 @@ use crate::views::SceneKind;
 /// took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself (docs/results/sizes.md).
 const MEMORY: u64 = 320_000_000;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
-/// Most Gaussians of a scene that is packed whole though it could be packed in parts. A larger one is looked at too little as a whole: one of
-/// 3.2 million was 2.7 dB worse than in parts, and one of 0.4 million 0.4 dB better (docs/results/sizes.md).
-const MOST_WHOLE: u64 = 786_432;
+/// Most Gaussians of a scene without cameras that is packed whole, at SH degree 3. A larger one is looked at too little as a whole:
+/// of 1.2 million Gaussians files in parts are larger at equal quality, and of 3.2 million smaller (docs/results/sizes.md).
+const MOST_WHOLE: u64 = 1_572_864;
 /// Bytes of a Gaussian in a PLY at SH degree 3.
 const PLY_ROW: u64 = 248;
 

@@ -4,10 +4,16 @@ use std::ops::Range;
 
 use crate::packed::tiles::Survey;
 use crate::scene::offset::{Offset, shift};
+use crate::scene::rounding::Rounding;
 use crate::scene::source::{SplatSource, check_range};
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
+
+/// What rounds when tiles become one scene.
+const UNITED: &str = "32-bit floats, relative to one offset for all tiles,";
+/// Gaussians of a tile that are looked at for how far rounding moves them: the first ones. How far depends on the offsets.
+const ROUNDED: usize = 4096;
 
 /// A scene of several tiles, one after the other.
 pub struct Joined<'a> {
@@ -26,11 +32,11 @@ impl std::fmt::Debug for Joined<'_> {
 
 impl<'a> Joined<'a> {
     /// Joins `tiles`, each with its name. Comments are those of all, without repetitions, and positions are relative to one
-    /// offset ([`Offset::shared`]).
+    /// offset ([`Offset::shared`]). A warning names each tile whose positions that rounds coarsely.
     ///
     /// # Errors
     /// [`Error::Format`] that names a tile without Gaussians or with another degree, other extras or another mark than the first,
-    /// [`Error::Parameter`] for no tiles, [`Error::Limit`] for too many Gaussians.
+    /// [`Error::Parameter`] for no tiles, [`Error::Limit`] for too many Gaussians, and errors of reading a tile.
     pub fn new(tiles: &[(String, &'a dyn SplatSource)]) -> Result<Self> {
         let mut firsts = vec![0_usize];
         let mut empty: Option<Splats> = None;
@@ -46,8 +52,24 @@ impl<'a> Joined<'a> {
         let mut empty = empty.ok_or_else(|| Error::parameter("tiles", 0, "at least one"))?;
         empty.meta.offset = Offset::shared(&offsets);
         Limits::check("Gaussians", firsts.last().copied().unwrap_or(0) as u64, MAX_GAUSSIANS)?;
+        for (name, tile) in tiles {
+            let coarse = rounding(*tile, empty.meta.offset)?.and_then(|found| found.warning(UNITED));
+            warnings.extend(coarse.map(|told| format!("{name}: {told}")));
+        }
         Ok(Self { tiles: tiles.iter().map(|tile| tile.1).collect(), firsts, empty, warnings })
     }
+}
+
+/// How far positions of `tile` move when they become relative to `offset`; `None` if they are so already.
+fn rounding(tile: &dyn SplatSource, offset: Option<Offset>) -> Result<Option<Rounding>> {
+    let mut some = tile.empty();
+    if some.meta.offset == offset {
+        return Ok(None);
+    }
+    tile.read(0..tile.len().min(ROUNDED), &mut some)?;
+    let sizes = some.geometry.scales.iter().map(|scales| Rounding::size_of(*scales)).collect();
+    let error = shift(&mut some.geometry.positions, some.meta.offset, offset);
+    Ok(Some(Rounding { error, size: Rounding::median(sizes) }))
 }
 
 impl SplatSource for Joined<'_> {
@@ -102,6 +124,25 @@ impl SplatSource for Joined<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tiles_that_one_offset_rounds_coarsely_are_named() {
+        let mut tiles = [1, 2].map(|seed| crate::support::testing::scene(40, seed));
+        let mut warnings = |far: f64| {
+            tiles[0].meta.offset = Offset::new([5e5, 0.0, 4e6]).unwrap();
+            tiles[1].meta.offset = Offset::new([5e5 + far, 0.0, 4e6]).unwrap();
+            let named: Vec<(String, &dyn SplatSource)> = ["a.ply", "b.ply"]
+                .iter()
+                .zip(&tiles)
+                .map(|(name, tile)| (name.to_string(), tile as _))
+                .collect();
+            Joined::new(&named).unwrap().warnings().to_vec()
+        };
+        assert!(warnings(64.0).is_empty());
+        let told = warnings(3e5);
+        assert!(told.len() == 1 && told[0].starts_with("a.ply: 32-bit floats"), "{told:?}");
+        assert!(told[0].contains("move positions by up to"), "{told:?}");
+    }
 
     /// However much is read at a time.
     #[test]
