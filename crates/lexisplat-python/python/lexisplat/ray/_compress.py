@@ -218,7 +218,6 @@ class _Scene:
         gpu = next((own[2] for own in found if own[2] is not None), None)
         steps = _native.tile_steps(plan, [own[0] for own in found])
         coding = self._learned(plan, steps, groups, pieces, looked)
-        work.end_actors()
         shared = work.shared(coding)
         codes = [
             work.start(tasks.code, self._plan, shared, bucket, own, looked[bucket], returns=2)
@@ -289,13 +288,8 @@ class _Scene:
     ) -> bytes:
         work = self._work
         shared = work.shared(steps)
-        actors = work.actors(tasks.Group, len(groups))
-        draws = [
-            tasks.Draw(work.context, self._plan, own, [pieces[b] for b in own], [looked[b] for b in own])
-            for own in groups
-        ]
-        both = list(zip(actors, draws))
-        found = [work.get(ref) for ref in [actor.statistics.remote(draw, shared) for actor, draw in both]]
+        draws = [tasks.Draw(own, [pieces[b] for b in own], [looked[b] for b in own]) for own in groups]
+        found = [work.get(ref) for ref in [work.start(tasks.sample, self._plan, shared, draw) for draw in draws]]
         work.traffic["statistics"] += sum(map(len, found))
         work.tell("learn", 0, 1)
         return _native.tile_coding(plan, steps, found)

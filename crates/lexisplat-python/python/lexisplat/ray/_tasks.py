@@ -1,4 +1,4 @@
-"""What Ray runs: each step of the library as a task, and a sample as an actor. What they take and give are bytes."""
+"""What Ray runs: each step of the library as a task. What they take and give are bytes."""
 
 from __future__ import annotations
 
@@ -82,34 +82,20 @@ def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[tu
 
 
 class Draw(NamedTuple):
-    """What a sample is drawn from: references to the context and the plan, and of each bucket its pieces and a reference to what is
-    remembered of it."""
+    """What a sample is drawn from: of each bucket its pieces, and a reference to what is remembered of it."""
 
-    context: Any
-    plan: Any
     buckets: Sequence[int]
     pieces: Sequence[Pieces]
     looked: Sequence[Any]
 
 
-class Group:
-    """The sample of a group of buckets, which stays in this process. One that Ray starts again draws it again."""
-
-    def __init__(self) -> None:
-        self._sample: _native.TileSample | None = None
-
-    def _drawn(self, draw: Draw) -> _native.TileSample:
-        if self._sample is None:
-            context, plan = ray.get([draw.context, draw.plan])
-            context.begin()
-            sample = _native.TileSample(plan)
-            for bucket, own, ref in zip(draw.buckets, draw.pieces, draw.looked):
-                sample.add(bucket, _pieces(own), ray.get(ref), context.choices, context.limit)
-            self._sample = sample
-        return self._sample
-
-    def statistics(self, draw: Draw, steps: bytes) -> bytes:
-        return self._drawn(draw).statistics(steps)
+def sample(context: Context, plan: bytes, steps: bytes, draw: Draw) -> bytes:
+    """Sums over the sample of a group of buckets, which are read one after the other."""
+    context.begin()
+    drawn = _native.TileSample(plan)
+    for bucket, own, ref in zip(draw.buckets, draw.pieces, draw.looked):
+        drawn.add(bucket, _pieces(own), ray.get(ref), context.choices, context.limit)
+    return drawn.statistics(steps)
 
 
 def code(

@@ -24,7 +24,6 @@ class Work:
         self._threads = context.threads
         self._progress = progress
         self._pending: set[Any] = set()
-        self._actors: list[Any] = []
         self._remotes: dict[Callable[..., Any], Any] = {}
         #: Bytes that passed between processes: statistics and what all tasks take, what is remembered of each Gaussian, scattered
         #: rows, and coded buckets.
@@ -53,18 +52,6 @@ class Work:
         if self._threads == 1:
             return {}
         return {"runtime_env": {"env_vars": {"RAYON_NUM_THREADS": str(self._threads)}}}
-
-    def actors(self, kind: type, count: int) -> list[Any]:
-        """Starts actors. They take no processors of their own, since all others are idle while they work."""
-        remote = ray.remote(num_cpus=0, max_restarts=RETRIES, max_task_retries=RETRIES)(kind)
-        self._actors = [remote.remote() for _ in range(count)]
-        return self._actors
-
-    def end_actors(self) -> None:
-        """Ends the actors, and what they hold."""
-        for actor in self._actors:
-            ray.kill(actor)
-        self._actors = []
 
     def results(self, stage: str, refs: Sequence[Any]) -> list[Any]:
         """What all of ``refs`` give, in order. The first failure ends the wait."""
@@ -102,8 +89,7 @@ class Work:
         self._since = now
 
     def cancel(self) -> None:
-        """Cancels what was started and not waited for, and ends the actors."""
-        self.end_actors()
+        """Cancels what was started and not waited for."""
         for ref in self._pending:
             try:
                 ray.cancel(ref)
