@@ -5,7 +5,7 @@
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::ply::{PlySource, ReadOptions};
-use lexisplat::stream::Importance;
+use lexisplat::stream::Observer;
 use lexisplat::{
     CodeLayout, CompressOptions, Error, Layout, Pursuit, Sensitivity, ShDegree, Silent, Splats, compress,
     lexi, ply, stats, stream,
@@ -132,7 +132,7 @@ fn packed_in_parts(splats: &Splats, options: &PackOptions, decibels: f64) {
     let file = as_ply(splats);
     let parts = PlySource::open("scene.ply", &file, &ReadOptions::default(), &Silent).expect("just written");
     let mut bytes = Vec::new();
-    match stream::pack(&parts, Importance::<Error>::Heuristic, options, decibels, &mut bytes, &Silent) {
+    match stream::pack(&parts, None::<&mut dyn Observer<Error>>, options, decibels, &mut bytes, &Silent) {
         Ok(done) => assert_eq!(done.file_bytes(), bytes.len() as u64),
         Err(Error::Parameter { .. }) => return,
         Err(error) => panic!("{error}"),
