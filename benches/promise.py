@@ -127,7 +127,7 @@ def measure(binary, scorer, model, count, args):
 
 
 def processor_seconds():
-    """Those of all programs that were waited for."""
+    """CPU seconds of all programs that were waited for."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 

@@ -32,7 +32,7 @@ lexisplat.ray.compress([sys.argv[1]], sys.argv[2], overwrite=True)
 
 
 def run(command):
-    """What a command prints, the seconds on the clock and of the processor, and the most bytes of resident memory."""
+    """The output of a command, the seconds on the clock and of the processor, and the most bytes of resident memory."""
     with tempfile.TemporaryFile("w+") as told:
         clock, process = time.monotonic(), subprocess.Popen([str(part) for part in command], stdout=told)
         _, status, usage = os.wait4(process.pid, 0)

@@ -43,7 +43,7 @@ pub enum Error {
         /// What would have been accepted.
         expected: String,
     },
-    /// A choice needs the whole scene in memory, and memory does not allow it. Allow more, or choose a preset,
+    /// A choice needs the whole scene in memory, and memory does not allow it. Allow more, or choose a preset or a mean PSNR,
     /// which needs only parts.
     #[error("memory = {allowed}: at least {needed} bytes, because {choice} needs the whole scene at once")]
     Memory {

@@ -241,7 +241,10 @@ fn text(report: &CompressionReport, output: &Path, all: bool) -> Result<String> 
         None if report.importance == Some(SensitivitySource::Heuristic) => {
             "pictures: not looked at; what shows was guessed from each Gaussian alone".to_owned()
         }
-        None if report.in_parts => "pictures: looked at part by part, because the scene is large".to_owned(),
+        None if report.in_parts => {
+            "pictures: looked at part by part, for the scene is large; the finished file was not judged"
+                .to_owned()
+        }
         None => format!("SH error: {}", error_line(&report.record)),
     };
     writeln!(out, "{quality}")?;

@@ -19,7 +19,7 @@ use crate::error::Result;
 const TRIED: std::ops::RangeInclusive<usize> = 320..=640;
 /// Natural views made for each that is tried.
 const CHOICE: usize = 4;
-/// One of this many tried views is from where photographs were likely taken. Others show what such views do not.
+/// One of this many tried views is from where photographs were likely taken. The others cover the rest of the scene.
 const PHOTO_SHARE: usize = 2;
 /// Gaussians drawn in all tried views together, about.
 const GAUSSIANS_DRAWN: usize = 128_000_000;
@@ -77,7 +77,7 @@ pub(super) fn find(
         of_kind.sort_by(|a, b| b.0.total_cmp(&a.0));
         let count = of_kind.len() as f64;
         let ranked = of_kind.into_iter().enumerate();
-        // The kinds are not compared by their detail: views through what no photograph shows have most.
+        // Views through clutter have the most detail, so each kind is ranked on its own.
         seen.extend(ranked.map(|(rank, (_, lit, camera))| Seen {
             rank: (rank as f64 + 0.5) / count,
             lit,

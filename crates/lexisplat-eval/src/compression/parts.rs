@@ -14,8 +14,8 @@ use super::tiles;
 use super::views::PackingViews;
 use crate::error::{Error, Result};
 
-/// Packs to about `decibels` part by part, or as a whole a scene that is one part. `renderer` draws the parts. Without one, what
-/// shows is guessed.
+/// Packs to about `decibels` part by part, or as a whole a scene that is one part. `renderer` draws the parts. Without one, the
+/// weights of Gaussians are guessed.
 ///
 /// # Errors
 /// As [`stream::pack`], and errors of drawing.
@@ -56,7 +56,7 @@ impl Observer<Error> for Parts<'_> {
     }
 
     fn step_factor(&mut self, part: &Splats, observed: &Observed) -> Result<f64> {
-        step_factor(part, observed, self.options, self.decibels, self.progress)
+        pilot::step_factor(part, observed, self.options, self.decibels, self.progress)
     }
 
     fn refit(
@@ -75,33 +75,18 @@ impl Observer<Error> for Parts<'_> {
 }
 
 /// The sensitivity of pictures of a part of a scene, from views like photographs of it and from all around. With the latter alone
-/// files of the same size were 1.7 dB worse (docs/results/scale.md). The memo is the views.
+/// files of the same size were 1.7 dB worse (docs/results/scale.md). The memo is the views. A part without Gaussians has neither.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`Error::Codec`]; on a GPU [`Error::Render`] if the part does not fit.
 pub(super) fn observe(renderer: &mut Renderer, part: &Splats, progress: &dyn Progress) -> Result<Observed> {
+    if part.is_empty() {
+        return Ok(Observed::default());
+    }
     // The work around it counts Gaussians.
     let progress = &OnlyCancels(progress);
     let views = PackingViews::found(renderer, part, progress)?;
     Ok(Observed { sensitivity: views.sensitivity(renderer, part, progress)?, memo: memo_of(&views) })
-}
-
-/// The factor of the usual step with which `part`, which was `observed`, has about `decibels` as a scene of its own; 1 if there is
-/// nothing to look at.
-///
-/// # Errors
-/// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`Error::Codec`].
-pub(super) fn step_factor(
-    part: &Splats,
-    observed: &Observed,
-    options: &PackOptions,
-    decibels: f64,
-    progress: &dyn Progress,
-) -> Result<f64> {
-    match part.is_empty() {
-        true => Ok(1.0),
-        false => pilot::step_factor(part, observed, options, decibels, &OnlyCancels(progress)),
-    }
 }
 
 /// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone. `memo` is that

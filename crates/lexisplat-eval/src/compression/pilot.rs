@@ -7,6 +7,7 @@ use lexisplat_render::Renderer;
 
 use super::judge::Judge;
 use super::memo::views_of;
+use super::only_cancels::OnlyCancels;
 use super::refit::{Fit, Refitting};
 use super::target::{DB_PER_HALVING, on_grid};
 use crate::error::Result;
@@ -19,7 +20,7 @@ const STEPS_PER_OCTAVE: f64 = 4.0;
 const MOST_MOVE: f64 = 2.0;
 
 /// The factor of the usual step with which pictures of `part`, packed as a scene of its own, have about `decibels`. A first file
-/// that is not refitted says where a second is, and that one what is left to correct.
+/// that is not refitted says where a second is, and the second says by how much to correct. The factor of a part without Gaussians is 1.
 ///
 /// # Errors
 /// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
@@ -30,6 +31,11 @@ pub(super) fn step_factor(
     decibels: f64,
     progress: &dyn Progress,
 ) -> Result<f64> {
+    if part.is_empty() {
+        return Ok(1.0);
+    }
+    // The work around it counts Gaussians.
+    let progress = &OnlyCancels(progress);
     let views = views_of(&observed.memo)?;
     let packer = Packer::new(part, &observed.sensitivity, options)?;
     let usual = libm::log2(packer.step_for(decibels));

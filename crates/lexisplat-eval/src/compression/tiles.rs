@@ -8,6 +8,7 @@ use lexisplat_render::Renderer;
 
 use super::parts;
 pub use super::parts::in_parts;
+use super::pilot;
 use super::report::{CompressionReport, SensitivitySource};
 use crate::error::Result;
 
@@ -24,7 +25,7 @@ pub fn step_factor(
     progress: &dyn Progress,
 ) -> Result<f64> {
     let observed = parts::observe(renderer, part, progress)?;
-    parts::step_factor(part, &observed, options, preset.decibels(), progress)
+    pilot::step_factor(part, &observed, options, preset.decibels(), progress)
 }
 
 /// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.

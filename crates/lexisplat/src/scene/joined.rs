@@ -10,7 +10,7 @@ use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_GAUSSIANS};
 
-/// What rounds when tiles become one scene.
+/// Subject of the warning that rounding is coarse.
 const UNITED: &str = "32-bit floats, relative to one offset for all tiles,";
 /// Gaussians of a tile that are looked at for how far rounding moves them: the first ones. How far depends on the offsets.
 const ROUNDED: usize = 4096;

@@ -1,4 +1,4 @@
-//! What draws the parts of a scene that is too large to be drawn as a whole.
+//! Drawing of a scene part by part, if it is too large to be drawn as a whole.
 
 use crate::packed::Appearance;
 use crate::scene::sensitivity::Sensitivity;
@@ -45,12 +45,12 @@ pub trait Observer<E = Error> {
     }
 }
 
-/// What an [`Observer`] found in pictures of a part of a scene.
+/// The findings of an [`Observer`] in pictures of a part of a scene.
 #[derive(Debug, Clone, Default)]
 pub struct Observed {
     /// How pictures depend on the values of the part, as if it were the whole scene.
     pub sensitivity: Sensitivity,
-    /// What the observer wants to know again when it refits the part, such as the views that it drew. Other processes may refit.
+    /// Bytes that the observer is given again when it refits the part, such as the views that it drew. Another process may refit.
     pub memo: Vec<u8>,
 }
 

@@ -82,7 +82,7 @@ def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[tu
 
 
 class Draw(NamedTuple):
-    """What a sample is drawn from: of each bucket its pieces, and a reference to what is remembered of it."""
+    """The buckets that a sample is drawn from: of each its pieces, and a reference to what is remembered of it."""
 
     buckets: Sequence[int]
     pieces: Sequence[Pieces]
