@@ -44,9 +44,8 @@ mod _native {
     use crate::scene::{Scene, open_scene};
     #[pymodule_export]
     use crate::tiles::{
-        TileSample, tile_assemble, tile_check, tile_choices, tile_code, tile_coding, tile_corrected,
-        tile_finish, tile_look, tile_open, tile_pilot, tile_plan, tile_runs, tile_scatter, tile_steps,
-        tile_survey, tile_tables, tile_whole,
+        TileSample, tile_assemble, tile_check, tile_choices, tile_code, tile_coding, tile_finish, tile_look,
+        tile_open, tile_plan, tile_runs, tile_scatter, tile_steps, tile_survey, tile_tables, tile_whole,
     };
     use pyo3::prelude::*;
 

@@ -227,18 +227,17 @@ pub(crate) fn tile_plan(
     surveys: Vec<(String, Vec<PyBackedBytes>)>,
     choices: Choices,
     one_each: bool,
-) -> PyResult<(Py<PyBytes>, usize, Vec<usize>, Vec<Vec<usize>>, Vec<(usize, usize)>)> {
-    let (bytes, gaussians, pilots, groups, files) = without_gil(py, None, move |_| {
+) -> PyResult<(Py<PyBytes>, usize, Vec<Vec<usize>>, Vec<(usize, usize)>)> {
+    let (bytes, gaussians, groups, files) = without_gil(py, None, move |_| {
         let read =
             |(name, blocks): (String, Vec<PyBackedBytes>)| Ok((name, all(&blocks, Survey::from_bytes)?));
         let surveys = surveys.into_iter().map(read).collect::<Result<Vec<_>>>()?;
         let plan = Plan::new(&surveys, &choices.options(), choices.preset()?.decibels(), one_each)?;
         let groups = (0..plan.groups()).map(|group| plan.group(group)).collect();
         let files = plan.files().into_iter().map(|file| (file.start, file.end)).collect();
-        let pilots = if choices.guess { Vec::new() } else { plan.pilots() };
-        Ok((plan.to_bytes(), plan.len(), pilots, groups, files))
+        Ok((plan.to_bytes(), plan.len(), groups, files))
     })?;
-    Ok((made(py, bytes), gaussians, pilots, groups, files))
+    Ok((made(py, bytes), gaussians, groups, files))
 }
 
 /// Of each bucket the runs of rows that it reads.
@@ -302,7 +301,8 @@ pub(crate) fn tile_look(
         let plan = Plan::from_bytes(&plan)?;
         let bucket = from.bucket(&plan, bucket, &options)?;
         let mut renderer = choices.renderer(device)?;
-        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), watch)?;
+        let preset = choices.preset()?;
+        let (statistics, looked) = tiles::look(&plan, &bucket, renderer.as_mut(), preset, watch)?;
         let gpu = renderer.filter(Renderer::is_gpu).map(|renderer| renderer.name().to_owned());
         Ok((statistics.to_bytes(), looked.to_bytes(), gpu))
     })?;
@@ -320,38 +320,6 @@ pub(crate) fn tile_steps(
         let statistics = all(&buckets, LookStatistics::from_bytes)?;
         Ok(Steps::new(&Plan::from_bytes(&plan)?, &statistics)?.to_bytes())
     })?;
-    Ok(made(py, bytes))
-}
-
-/// The factor of the usual step that a bucket asks for.
-#[pyfunction]
-#[pyo3(signature = (plan, bucket, pieces, choices, limit))]
-pub(crate) fn tile_pilot(
-    py: Python<'_>,
-    plan: PyBackedBytes,
-    bucket: usize,
-    pieces: Pieces<'_>,
-    choices: Choices,
-    limit: Option<&Bound<'_, PyDict>>,
-) -> PyResult<f64> {
-    let device = device(py, &choices.device)?;
-    let options = choices.reading(py, limit)?;
-    let from = From::of(pieces)?;
-    without_gil(py, None, |watch| {
-        let bucket = from.bucket(&Plan::from_bytes(&plan)?, bucket, &options)?;
-        let mut renderer = Renderer::open(device)?;
-        tiles::step_factor(&mut renderer, bucket.splats(), &choices.options(), choices.preset()?, watch)
-    })
-}
-
-/// The plan with the step that these factors ask for.
-#[pyfunction]
-pub(crate) fn tile_corrected(
-    py: Python<'_>,
-    plan: PyBackedBytes,
-    factors: Vec<f64>,
-) -> PyResult<Py<PyBytes>> {
-    let bytes = without_gil(py, None, move |_| Ok(Plan::from_bytes(&plan)?.corrected(&factors)?.to_bytes()))?;
     Ok(made(py, bytes))
 }
 

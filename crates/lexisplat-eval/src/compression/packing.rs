@@ -16,11 +16,9 @@ use crate::views::SceneKind;
 /// took 540 MB, one of 793 MB 2,320 MB, without the pages of the file itself (docs/results/sizes.md).
 const MEMORY: u64 = 320_000_000;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
-/// Most Gaussians of a scene without cameras that is packed whole, at SH degree 3. A larger one is looked at too little as a whole:
-/// of 1.2 million Gaussians files in parts are larger at equal quality, and of 3.2 million smaller (docs/results/sizes.md).
-const MOST_WHOLE: u64 = 1_572_864;
-/// Bytes of a Gaussian in a PLY at SH degree 3.
-const PLY_ROW: u64 = 248;
+/// Most Gaussians of a scene without cameras that is packed whole. A larger one is looked at too little as a whole: files in
+/// parts are 1 % larger at equal quality for 0.4 million Gaussians, and 9 % smaller for 1.2 million (docs/results/sizes.md).
+const MOST_WHOLE: u64 = 786_432;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
 const MAX_GAUSSIANS: &str = "max-gaussians";
@@ -212,19 +210,19 @@ impl Packing {
         }
     }
 
-    /// Whether a scene of `source_bytes` bytes is packed whole, with or without cameras that belong to it. Otherwise it is packed
-    /// part by part.
+    /// Whether a scene of `gaussians` Gaussians, which are `bytes` bytes without compression, is packed whole, with or without
+    /// cameras that belong to it. Otherwise it is packed part by part.
     ///
     /// # Errors
     /// [`Error::Memory`] if the memory allowed is too small for the whole scene and a choice needs it.
-    pub(super) fn is_whole(&self, source_bytes: u64, cameras: bool) -> Result<bool> {
-        let grows = u128::from(source_bytes) * u128::from(MEMORY_PER_TEN_BYTES) / 10;
+    pub(super) fn is_whole(&self, gaussians: u64, bytes: u64, cameras: bool) -> Result<bool> {
+        let grows = u128::from(bytes) * u128::from(MEMORY_PER_TEN_BYTES) / 10;
         let needed = u64::try_from(grows).unwrap_or(u64::MAX).saturating_add(MEMORY);
         let fits = needed <= self.memory;
         match self.needs_whole() {
             Some(choice) if !fits => Err(Error::Memory { choice, needed, allowed: self.memory }),
             Some(_) => Ok(true),
-            None => Ok(fits && (cameras || source_bytes <= MOST_WHOLE * PLY_ROW)),
+            None => Ok(fits && (cameras || gaussians <= MOST_WHOLE)),
         }
     }
 
@@ -260,22 +258,24 @@ mod tests {
 
     #[test]
     fn large_scenes_are_packed_in_parts_unless_there_are_cameras() {
-        let large = MOST_WHOLE * PLY_ROW + 1;
+        let large = MOST_WHOLE + 1;
+        let bytes = 248 * large;
         let psnr = Packing::new(Target::MeanPsnr(40.0));
         for packing in [Packing::default(), psnr] {
-            assert!(packing.is_whole(large - 1, false).unwrap());
-            assert!(!packing.is_whole(large, false).unwrap());
-            assert!(packing.is_whole(large, true).unwrap());
-            assert!(!packing.with_memory(large).is_whole(large, true).unwrap());
+            assert!(packing.is_whole(large - 1, bytes, false).unwrap());
+            assert!(!packing.is_whole(large, bytes, false).unwrap());
+            assert!(packing.is_whole(large, bytes, true).unwrap());
+            assert!(!packing.with_memory(bytes).is_whole(large, bytes, true).unwrap());
         }
         for packing in [
             Packing::new(Target::Size(1_000_000)),
             Packing::default().with_cameras(Vec::new()),
             Packing::default().with_max_gaussians(5),
         ] {
-            assert!(packing.is_whole(large, false).unwrap());
-            assert!(matches!(packing.with_memory(large).is_whole(large, false), Err(Error::Memory { .. })));
+            assert!(packing.is_whole(large, bytes, false).unwrap());
+            let packing = packing.with_memory(bytes);
+            assert!(matches!(packing.is_whole(large, bytes, false), Err(Error::Memory { .. })));
         }
-        assert!(matches!(Packing::default().is_whole(u64::MAX, true), Ok(true)));
+        assert!(matches!(Packing::default().is_whole(u64::MAX, u64::MAX, true), Ok(true)));
     }
 }

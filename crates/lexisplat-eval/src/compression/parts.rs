@@ -2,12 +2,12 @@
 
 use lexisplat::packed::{Appearance, PackOptions};
 use lexisplat::stream::{self, Observed, Observer};
-use lexisplat::{Model, Progress, Sink, SplatSource, Splats, Stopwatch};
+use lexisplat::{Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
 use lexisplat_render::{Renderer, Scene};
 
 use super::memo::{memo_of, views_of};
 use super::only_cancels::OnlyCancels;
-use super::pilot;
+use super::part_step::step_factor;
 use super::refit::Fit;
 use super::report::CompressionReport;
 use super::tiles;
@@ -50,13 +50,9 @@ struct Parts<'a> {
 impl Observer<Error> for Parts<'_> {
     fn observe(&mut self, part: &Splats) -> Result<Observed> {
         let clock = Stopwatch::start();
-        let observed = observe(&mut self.renderer, part, self.progress);
+        let observed = observe(&mut self.renderer, part, self.options, self.decibels, self.progress);
         self.look_seconds += clock.seconds();
         observed
-    }
-
-    fn step_factor(&mut self, part: &Splats, observed: &Observed) -> Result<f64> {
-        pilot::step_factor(part, observed, self.options, self.decibels, self.progress)
     }
 
     fn refit(
@@ -74,19 +70,27 @@ impl Observer<Error> for Parts<'_> {
     }
 }
 
-/// The sensitivity of pictures of a part of a scene, from views like photographs of it and from all around. With the latter alone
+/// The sensitivity of pictures of a part of a scene and the step with which it has about `decibels`, from views like photographs of it and from all around. With the latter alone
 /// files of the same size were 1.7 dB worse (docs/results/scale.md). The memo is the views. A part without Gaussians has neither.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`Error::Codec`]; on a GPU [`Error::Render`] if the part does not fit.
-pub(super) fn observe(renderer: &mut Renderer, part: &Splats, progress: &dyn Progress) -> Result<Observed> {
+pub(super) fn observe(
+    renderer: &mut Renderer,
+    part: &Splats,
+    options: &PackOptions,
+    decibels: f64,
+    progress: &dyn Progress,
+) -> Result<Observed> {
     if part.is_empty() {
-        return Ok(Observed::default());
+        return Ok(Sensitivity::default().into());
     }
     // The work around it counts Gaussians.
     let progress = &OnlyCancels(progress);
     let views = PackingViews::found(renderer, part, progress)?;
-    Ok(Observed { sensitivity: views.sensitivity(renderer, part, progress)?, memo: memo_of(&views) })
+    let sensitivity = views.sensitivity(renderer, part, progress)?;
+    let step_factor = step_factor(part, &views, &sensitivity, options, decibels, progress)?;
+    Ok(Observed { sensitivity, step_factor, memo: memo_of(&views) })
 }
 
 /// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone. `memo` is that

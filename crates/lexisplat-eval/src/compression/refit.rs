@@ -30,7 +30,7 @@ const OPACITY_DIAGONAL: f32 = 4.0;
 const MOST_LOG_OPACITY: f32 = 0.5;
 /// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
 const GAIN_GIVEN: f64 = 4.0;
-const GAIN_FOUND: f64 = 0.8;
+pub(super) const GAIN_FOUND: f64 = 0.8;
 
 /// A packer whose files are refitted, if that is allowed.
 pub(super) struct Refitting<S> {

@@ -18,16 +18,18 @@ use crate::error::{Error, Result};
 use crate::misfit::near_plane_hides;
 use crate::views::SceneKind;
 
+/// Bytes of a Gaussian in a PLY at SH degree 3.
+const PLY_ROW: u64 = 248;
 /// Views that judge a preset, at most.
 const PRESET_JUDGES: usize = 48;
 
 impl Compression {
-    /// Whether [`Self::run`] holds all Gaussians of a source of `source_bytes` bytes at once, with or without
+    /// Whether [`Self::run`] holds all Gaussians of a PLY of `bytes` bytes and SH degree 3 at once, with or without
     /// [likely cameras](Self::with_likely_cameras). Such a source is best opened with
     /// [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
     #[must_use]
-    pub fn holds_whole(&self, source_bytes: u64, likely_cameras: bool) -> bool {
-        let is_whole = |packing: &Packing| packing.is_whole(source_bytes, likely_cameras);
+    pub fn holds_whole(&self, bytes: u64, likely_cameras: bool) -> bool {
+        let is_whole = |packing: &Packing| packing.is_whole(bytes / PLY_ROW, bytes, likely_cameras);
         matches!(self, Self::Packed(packing) if is_whole(packing).is_ok_and(|whole| whole))
     }
 
@@ -85,10 +87,24 @@ impl Packing {
         progress: &dyn Progress,
     ) -> Result<CompressionReport> {
         self.check()?;
-        match self.is_whole(source.source_bytes(), self.likely_cameras.is_some())? {
+        match self.holds(source, self.likely_cameras.is_some())? {
             true => self.whole(source, sink, progress),
             false => self.in_parts(source, sink, progress),
         }
+    }
+
+    /// Whether `source` is packed whole, with or without cameras that belong to it. Compressed sources count with the bytes of
+    /// their Gaussians.
+    ///
+    /// # Errors
+    /// As [`Self::is_whole`].
+    fn holds(&self, source: &dyn SplatSource, cameras: bool) -> Result<bool> {
+        let gaussians = source.len() as u64;
+        self.is_whole(
+            gaussians,
+            source.source_bytes().max(gaussians.saturating_mul(source.row_bytes())),
+            cameras,
+        )
     }
 
     fn in_parts(
@@ -132,7 +148,7 @@ impl Packing {
             Some(looked) => Looked::clone(looked),
             None => {
                 let cameras = self.cameras_of(&mut renderer, &splats, progress)?;
-                if !self.is_whole(source.source_bytes(), cameras.is_some())? {
+                if !self.holds(source, cameras.is_some())? {
                     drop(splats);
                     return self.in_parts(source, sink, progress);
                 }

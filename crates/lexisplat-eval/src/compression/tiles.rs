@@ -1,34 +1,17 @@
 //! The steps of [`lexisplat::packed::tiles`] that draw.
 
+use lexisplat::packed::Preset;
 use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
-use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::stream::PackedFile;
 use lexisplat::{Model, Progress, Splats};
 use lexisplat_render::Renderer;
 
 use super::parts;
 pub use super::parts::in_parts;
-use super::pilot;
 use super::report::{CompressionReport, SensitivitySource};
 use crate::error::Result;
 
-/// The factor of the usual step with which `part` of a scene, packed as a scene of its own, has the quality that `preset` aims at;
-/// 1 if there is nothing to look at.
-///
-/// # Errors
-/// Errors of packing and drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
-pub fn step_factor(
-    renderer: &mut Renderer,
-    part: &Splats,
-    options: &PackOptions,
-    preset: Preset,
-    progress: &dyn Progress,
-) -> Result<f64> {
-    let observed = parts::observe(renderer, part, progress)?;
-    pilot::step_factor(part, &observed, options, preset.decibels(), progress)
-}
-
-/// Looks at a bucket with `renderer`, or guesses what shows from each Gaussian alone.
+/// Looks at a bucket with `renderer`, for the quality that `preset` aims at, or guesses what shows from each Gaussian alone.
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not fit.
@@ -36,10 +19,12 @@ pub fn look(
     plan: &Plan,
     bucket: &Bucket,
     renderer: Option<&mut Renderer>,
+    preset: Preset,
     progress: &dyn Progress,
 ) -> Result<(LookStatistics, Looked)> {
-    let observed =
-        renderer.map(|renderer| parts::observe(renderer, bucket.splats(), progress)).transpose()?;
+    let (part, options) = (bucket.splats(), plan.options());
+    let observe = |renderer| parts::observe(renderer, part, options, preset.decibels(), progress);
+    let observed = renderer.map(observe).transpose()?;
     Ok(bucket.look(plan, observed)?)
 }
 

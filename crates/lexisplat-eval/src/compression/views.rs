@@ -33,13 +33,16 @@ const JUDGES: usize = 24;
 /// sharper pictures some squares are drawn ([`sampled`]). Half as many gave files that were 16 % larger at equal quality on the
 /// large room, and about the same on scenes of up to 90,000 Gaussians (docs/METHOD.md, "How sharp").
 const MEASURED_PIXELS: Pixels = Pixels { always: 8_000_000, each: 30, most: 40_000_000 };
-/// Those that judge.
+/// Those that judge a whole scene, and a part of a large one.
 const JUDGED_PIXELS: u64 = 8_000_000;
+const PART_JUDGED_PIXELS: u64 = 2_000_000;
+/// Number of views that judge a part.
+const PART_JUDGES: usize = 24;
 /// Those that base colours and opacities are fitted to.
 const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000_000 };
-/// Share of them that a part of a large scene is fitted to. With all of them the large room in two parts has 0.4 dB more, in 1.5
-/// times the time.
-const PART_FITTED_SHARE: u64 = 2;
+/// Share of them that a part of a large scene is fitted to. With twice as many, three copies of room-large have 0.14 dB more, in
+/// 1.2 times the time.
+const PART_FITTED_SHARE: u64 = 4;
 /// One of this many views that measure is drawn at half its size too, and one of this many that are fitted to is at half its
 /// size. Otherwise errors that are even over many pixels count for too little, and show when pictures are drawn smaller
 /// (docs/METHOD.md, "How sharp").
@@ -235,8 +238,17 @@ impl PackingViews {
     /// At most `most` of the views that judge, evenly spread. Of sharp pictures they draw some squares.
     #[must_use]
     pub fn some_judging(&self, most: usize) -> Vec<Camera> {
+        self.judging_by(most, JUDGED_PIXELS)
+    }
+
+    /// [`Self::some_judging`] of a part of a scene, which draw fewer pixels.
+    pub(super) fn judging_part(&self) -> Vec<Camera> {
+        self.judging_by(PART_JUDGES, PART_JUDGED_PIXELS)
+    }
+
+    fn judging_by(&self, most: usize, pixels: u64) -> Vec<Camera> {
         let some = self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1));
-        sampled(some.cloned().collect(), JUDGED_PIXELS)
+        sampled(some.cloned().collect(), pixels)
     }
 
     /// Up to `most` points that stand for the positions of the views like photographs: first points far from each other, and

@@ -127,12 +127,13 @@ impl Sensitivity {
         out
     }
 
-    /// Scales the sensitivity to pictures of which only `share` show these Gaussians.
-    pub(crate) fn share(&mut self, share: f32) {
+    /// Multiplies the sensitivity by `factor`: pictures of which only one in ten shows these Gaussians depend on them by a tenth. The
+    /// largest change of one picture stays.
+    pub(crate) fn scale(&mut self, factor: f32) {
         let shapes = self.position.as_flattened_mut().iter_mut();
         let shapes = shapes.chain(self.scale.as_flattened_mut()).chain(self.rotation.as_flattened_mut());
         let whole = self.colour.iter_mut().chain(&mut self.opacity).chain(&mut self.removal_view);
-        whole.chain(shapes).for_each(|v| *v *= share);
+        whole.chain(shapes).for_each(|v| *v *= factor);
     }
 
     /// An estimate from the Gaussians alone: opaque and large ones weigh most. It does not know which

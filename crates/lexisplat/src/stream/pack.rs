@@ -1,7 +1,5 @@
 //! Layout packed: scenes of one bucket as a whole, others bucket by bucket.
 
-use std::collections::BTreeMap;
-
 use super::observer::{Observed, Observer};
 use super::order::{Ordered, begin_reading, survey};
 use crate::formats::lexi::LexiWriter;
@@ -90,19 +88,16 @@ fn whole<E: From<Error>>(
 ) -> Result<PackedFile, E> {
     let splats = source.whole()?;
     progress.begin(Stage::Look, splats.len() as u64);
-    let (observed, factor) = match &mut observer {
-        Some(observer) => {
-            let observed = observer.observe(&splats)?;
-            let factor = observer.step_factor(&splats, &observed)?;
-            (observed, factor)
-        }
+    let observed = match &mut observer {
+        Some(observer) => observer.observe(&splats)?,
         None => {
             let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
-            (Sensitivity::heuristic_part(&splats.geometry, total).into(), 1.0)
+            Sensitivity::heuristic_part(&splats.geometry, total).into()
         }
     };
     progress.end();
-    let Observed { sensitivity, memo } = observed;
+    observed.check()?;
+    let Observed { sensitivity, step_factor: factor, memo } = observed;
     let packer = Packer::new(splats.as_ref(), &sensitivity, options)?;
     drop(sensitivity);
     let quantised = packer.quantise(factor * packer.step_for(decibels), true, progress)?;
@@ -137,33 +132,19 @@ fn in_buckets<E: From<Error>>(
     };
     begin_reading(&tiles, progress);
     let surveys = survey(&tiles, options.seed, progress)?;
-    let mut plan = Plan::with_bucket(&surveys, options, decibels, false, bucket)?;
+    let plan = Plan::with_bucket(&surveys, options, decibels, false, bucket)?;
     drop(surveys);
     let mut ordered = Ordered::new(&plan, &tiles, &folder, progress)?;
     progress.end();
 
     progress.begin(Stage::Look, plan.len() as u64);
-    let (mut factors, mut observed_before) = (Vec::new(), BTreeMap::new());
-    if let Some(observer) = &mut observer {
-        for number in plan.pilots() {
-            progress.check()?;
-            let bucket = ordered.bucket(&plan, number, false)?;
-            let observed = observer.observe(bucket.splats())?;
-            factors.push(observer.step_factor(bucket.splats(), &observed)?);
-            observed_before.insert(number, observed);
-        }
-        plan = plan.corrected(&factors)?;
-    }
     let (mut statistics, mut all_looked) = (Vec::new(), Messages::new(to)?);
     let groups: Vec<Vec<usize>> = (0..plan.groups()).map(|group| plan.group(group)).collect();
     let mut samples: Vec<Sample> = groups.iter().map(|_| Sample::new()).collect();
     for number in 0..plan.buckets() {
         progress.check()?;
         let bucket = ordered.bucket(&plan, number, false)?;
-        let observed = match (observed_before.remove(&number), &mut observer) {
-            (None, Some(observer)) => Some(observer.observe(bucket.splats())?),
-            (before, _) => before,
-        };
+        let observed = observer.as_mut().map(|observer| observer.observe(bucket.splats())).transpose()?;
         let (own, looked) = bucket.look(&plan, observed)?;
         for (sample, _) in samples.iter_mut().zip(&groups).filter(|(_, group)| group.contains(&number)) {
             sample.add(&plan, &bucket, &looked)?;

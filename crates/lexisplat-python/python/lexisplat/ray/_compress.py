@@ -199,14 +199,11 @@ class _Scene:
             work.traffic["results"] += len(file)
             _write(wanted[0], file, overwrite)
             return {**json.loads(report), "output": wanted[0]}
-        plan, gaussians, pilots, groups, files = _native.tile_plan(self._surveys, self._choices, self._one_each)
+        plan, gaussians, groups, files = _native.tile_plan(self._surveys, self._choices, self._one_each)
         self._surveys = []
         self._plan = work.shared(plan)
         buckets = files[-1][1]
         pieces = self._read_by(buckets, gaussians)
-        started = [work.start(tasks.pilot, self._plan, bucket, pieces[bucket], **self._drawing) for bucket in pilots]
-        plan = _native.tile_corrected(plan, work.results("pilot", started))
-        self._plan = work.shared(plan)
         looks = [
             work.start(tasks.look, self._plan, bucket, own, returns=2, **self._drawing)
             for bucket, own in enumerate(pieces)

@@ -66,13 +66,6 @@ def scatter(context: Context, plan: bytes, number: int, tile: Tile, rows: Rows, 
     return pieces[0] if buckets == 1 else pieces
 
 
-def pilot(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> float:
-    """The factor of the usual step that the bucket asks for."""
-    context.begin()
-    with quiet(context.choices["device"]):
-        return _native.tile_pilot(plan, bucket, _pieces(pieces), context.choices, context.limit)
-
-
 def look(context: Context, plan: bytes, bucket: int, pieces: Pieces) -> tuple[tuple[bytes, int, str | None], bytes]:
     """Statistics, the length of what is remembered, and the GPU that looked; what is remembered."""
     context.begin()

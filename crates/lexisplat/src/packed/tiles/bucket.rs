@@ -130,16 +130,23 @@ impl Bucket {
     /// # Errors
     /// [`crate::Error::Parameter`] for a sensitivity of another length or with values that are not finite.
     pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
-        let Observed { sensitivity, memo } = match observed {
-            None => Sensitivity::heuristic_part(&self.splats.geometry, plan.heuristic_total / SHOWN).into(),
+        let (Observed { sensitivity, memo, .. }, scale) = match observed {
+            None => {
+                let total = plan.heuristic_total / SHOWN;
+                (Sensitivity::heuristic_part(&self.splats.geometry, total).into(), 1.0)
+            }
             Some(mut observed) => {
+                observed.check()?;
+                let share = self.splats.len() as f64 / plan.len().max(1) as f64;
+                // All parts have one overall step. A part that asks for half of it weighs four times as much.
                 #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
-                observed.sensitivity.share((self.splats.len() as f64 / plan.len().max(1) as f64) as f32);
-                observed
+                let scale = (share / observed.step_factor.powi(2)) as f32;
+                observed.sensitivity.scale(scale);
+                (observed, scale)
             }
         };
         check(&self.splats, &sensitivity)?;
         let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
-        Ok((statistics, looked.with_memo(memo)))
+        Ok((statistics, looked.with_observer(scale, memo)))
     }
 }

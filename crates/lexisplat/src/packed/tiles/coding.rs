@@ -18,7 +18,9 @@ use crate::packed::pack::USUAL_DC;
 use crate::packed::parameters::Parameters;
 use crate::packed::quantised::{Gaussians, Quantised, Refit};
 use crate::scene::extra::Extra;
+use crate::scene::splats::Splats;
 use crate::scene::splats::filter;
+use crate::sparse::model::Model;
 use crate::support::error::{Error, Result};
 use crate::support::parallel::map_vec;
 use crate::support::progress::Progress;
@@ -152,7 +154,11 @@ impl Coding {
         let gaussians = Gaussians { scene, classes, weights };
         let options = &plan.options;
         let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
-        let appearances = quantised.refitted(refit, progress)?;
+        let mut refit = refit.map(|refit| {
+            |part: &Splats, model: &Model, weights: &[[f32; 2]]| refit(part, model, &looked.observed(weights))
+        });
+        let appearances =
+            quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
         let tables = layered::Tables::of(&counts)?;
         let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));

@@ -17,8 +17,8 @@ use crate::support::error::{Error, Result};
 /// better than asked (leica-brush, fruit-drops, snowmiku-mcmc), which is 1.7 halvings of the step.
 pub(crate) const SHOWN: f64 = 0.1;
 
-/// What is remembered of a bucket: of each Gaussian its weights, rounded to eighths of an octave, and whether it stays; and the
-/// observer's memo.
+/// What is remembered of a bucket: of each Gaussian its weights, rounded to eighths of an octave, and whether it stays; by how much
+/// weights are larger than the observer's; and the observer's memo.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Looked {
     scene: u32,
@@ -26,6 +26,7 @@ pub struct Looked {
     pairs: Pairs,
     /// One bit a Gaussian, the lowest first.
     stays: Vec<u8>,
+    scale: f32,
     memo: Vec<u8>,
 }
 
@@ -92,11 +93,16 @@ impl Looked {
         for (i, _) in stays.iter().enumerate().filter(|(_, stays)| **stays) {
             bits[i / 8] |= 1_u8 << (i % 8);
         }
-        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits, memo: Vec::new() }
+        Self { scene, bucket, pairs: Pairs::of(weights), stays: bits, scale: 1.0, memo: Vec::new() }
     }
 
-    pub(super) fn with_memo(self, memo: Vec<u8>) -> Self {
-        Self { memo, ..self }
+    pub(super) fn with_observer(self, scale: f32, memo: Vec<u8>) -> Self {
+        Self { scale, memo, ..self }
+    }
+
+    /// The weights of an observer, from those that the scene has.
+    pub(super) fn observed(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
+        weights.iter().map(|own| own.map(|weight| weight / self.scale)).collect()
     }
 
     /// The memo of [`Observed`](crate::stream::Observed).

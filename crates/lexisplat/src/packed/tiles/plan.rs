@@ -26,10 +26,6 @@ const GROUPS: usize = 2;
 /// Most buckets that are sampled, evenly spread, so that drawing samples takes as long in any scene.
 const SAMPLED: usize = 32;
 
-/// Buckets for one on which the step is found, and most of these.
-const BUCKETS_PER_PILOT: usize = 4;
-const MOST_PILOTS: usize = 3;
-
 /// Rows of a piece of a tile that a bucket reads whole if one of them is its own.
 const RUN: usize = 4096;
 
@@ -135,25 +131,10 @@ impl Plan {
         Ok(plan)
     }
 
-    /// The buckets on which the step is found: evenly spread, one of few and more of many. Empty ones say nothing.
+    /// How the scene is packed.
     #[must_use]
-    pub fn pilots(&self) -> Vec<usize> {
-        let buckets = self.buckets();
-        let count = buckets.div_ceil(BUCKETS_PER_PILOT).min(MOST_PILOTS);
-        (0..count).map(|k| (2 * k + 1) * buckets / (2 * count)).collect()
-    }
-
-    /// The same plan with another step: by `factors` of the usual one, of which the smallest counts, so that no part falls short by
-    /// what another exceeds. None change nothing.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] for a factor that is not finite and above 0.
-    pub fn corrected(self, factors: &[f64]) -> Result<Self> {
-        if let Some(wrong) = factors.iter().find(|factor| !(factor.is_finite() && **factor > 0.0)) {
-            return Err(Error::parameter("step factor", wrong, "a finite number above 0"));
-        }
-        let factor = factors.iter().copied().reduce(f64::min).unwrap_or(1.0);
-        Ok(Self { step: factor * self.step, ..self })
+    pub fn options(&self) -> &PackOptions {
+        &self.options
     }
 
     /// What tells the plan from others. What is made by it holds this.

@@ -4,9 +4,9 @@ use super::*;
 use crate::packed::PackOptions;
 use crate::scene::source::SplatSource;
 use crate::scene::splats::Splats;
-use crate::stream;
+use crate::stream::{self, Observed};
 use crate::support::sink::Sink;
-use crate::{Error, Extra, ExtraValues, Limits, Offset, Result, ShDegree, Silent, lexi};
+use crate::{Error, Extra, ExtraValues, Limits, Offset, Result, Sensitivity, ShDegree, Silent, lexi};
 
 /// Gaussians of a bucket of these tests.
 const SMALL: usize = 9000;
@@ -208,6 +208,37 @@ fn damaged_messages_and_those_of_other_scenes_are_refused() {
     let part = bucket(&tiles[..1]).unwrap();
     assert!(Sample::new().add(&plan, &part, &looked).is_err());
     assert!(Steps::new(&plan, &[statistics.clone(), statistics]).is_err());
+}
+
+#[test]
+fn a_bucket_that_asks_for_half_the_step_weighs_four_times_as_much() {
+    let tiles = [scene(3000, 4), scene(1000, 5)];
+    let plan = Plan::with_bucket(&surveys(&tiles), &options(), 38.0, true, SMALL).unwrap();
+    let mut reader = BucketReader::new(&plan, 0);
+    reader.add(0, &tiles[0], 0..3000, &Silent).unwrap();
+    let bucket = reader.finish();
+    let own = Sensitivity::heuristic(&bucket.splats().geometry);
+    let looked = |step_factor: f64| {
+        bucket.look(&plan, Some(Observed { step_factor, ..own.clone().into() })).map(|pair| pair.1)
+    };
+    let weights = |looked: &Looked| looked.of_each(&plan, &bucket, false).unwrap().0;
+    let (usual, half) = (looked(1.0).unwrap(), looked(0.5).unwrap());
+    for ((own, usual), half) in own.appearances().iter().zip(weights(&usual)).zip(weights(&half)) {
+        // Weights are remembered to an eighth of an octave.
+        let is_about = |a: f32, b: f32| (a / b).log2().abs() < 0.07;
+        assert!(
+            is_about(usual[0], 0.75 * own[0]) && is_about(half[0], 4.0 * usual[0]),
+            "{own:?} {usual:?} {half:?}"
+        );
+    }
+    // The observer is given its own weights again.
+    let again = [half.observed(&weights(&half)), usual.observed(&weights(&usual))];
+    for (a, b) in again[0].iter().zip(&again[1]) {
+        assert!((a[1] / b[1]).log2().abs() < 0.07, "{a:?} {b:?}");
+    }
+    for wrong in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        assert!(looked(wrong).unwrap_err().to_string().contains("step factor"));
+    }
 }
 
 /// A bucket of its own plan, coded, and what it was coded with.

@@ -35,7 +35,7 @@ where
 {
     fn observe(&mut self, part: &Splats) -> Result<Observed> {
         let memo = u64::try_from(part.len()).unwrap().to_le_bytes().to_vec();
-        Ok(Observed { sensitivity: (self.judge)(part)?, memo })
+        Ok(Observed { memo, ..(self.judge)(part)?.into() })
     }
 
     fn refit(
