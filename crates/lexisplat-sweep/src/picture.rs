@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lexisplat_eval::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// One view of a model at one setting: PNG pictures of one size, given as `T`.
 #[derive(Debug, Clone, PartialEq, Eq)]

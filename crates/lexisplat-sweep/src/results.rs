@@ -7,7 +7,8 @@ use lexisplat::packed::Preset;
 use serde::{Deserialize, Serialize};
 
 use super::paper::same_tolerance;
-use lexisplat_eval::{Comparison, Error, FrameRate, Result};
+use lexisplat_compress::{Error, Result};
+use lexisplat_eval::{Comparison, FrameRate};
 
 /// Who trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
-use lexisplat_eval::SceneKind;
-use lexisplat_eval::compression::choose_layout;
+use lexisplat_compress::SceneKind;
+use lexisplat_compress::choose_layout;
 use lexisplat_render::Device;
 
 use super::part::Part;
@@ -180,7 +180,7 @@ impl Compress {
     ///
     /// # Errors
     /// A layout and an option that do not go together.
-    pub(crate) fn chosen_layout(&self) -> lexisplat_eval::Result<Layout> {
+    pub(crate) fn chosen_layout(&self) -> lexisplat_compress::Result<Layout> {
         let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
         let (exact, packed) = (given(&self.exact_only()), given(&self.packed_only()));
         choose_layout(self.layout, self.tol.is_some(), exact, packed)

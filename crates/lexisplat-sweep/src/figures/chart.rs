@@ -11,7 +11,7 @@ use kuva::{RasterBackend, Theme};
 
 use super::Figure;
 use super::pdf::pdf;
-use lexisplat_eval::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Size of the whole chart in SVG pixels.
 const WIDTH: f64 = 860.0;

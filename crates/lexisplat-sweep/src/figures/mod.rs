@@ -6,8 +6,9 @@ mod pdf;
 use std::fmt::Write;
 
 use kuva::plot::legend::LegendEntry;
+use lexisplat_compress::Result;
+use lexisplat_eval::FrameRate;
 use lexisplat_eval::format::file_name;
-use lexisplat_eval::{FrameRate, Result};
 
 use chart::{Chart, DASHED, DOTTED, Legend, Mark, NEUTRAL, SOLID, Series, key};
 
@@ -127,7 +128,7 @@ fn dash_key(text: &str, dash: &'static str) -> LegendEntry {
 /// Every figure that has something to show.
 ///
 /// # Errors
-/// [`Error::Parameter`](lexisplat_eval::Error::Parameter) if a chart cannot be drawn.
+/// [`Error::Parameter`](lexisplat_compress::Error::Parameter) if a chart cannot be drawn.
 pub(crate) fn figures(results: &Results) -> Result<Vec<Figure>> {
     let grid = Grid::new(results);
     let charts = [quality(&grid, None), speed(&grid), bytes(&grid)];

@@ -13,7 +13,8 @@ mod text;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use lexisplat::Model;
-use lexisplat_eval::{Comparison, Error, Result};
+use lexisplat_compress::{Error, Result};
+use lexisplat_eval::Comparison;
 use lexisplat_render::Image;
 use maud::html;
 

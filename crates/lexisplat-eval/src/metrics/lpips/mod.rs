@@ -17,7 +17,7 @@ pub use self::network::Network;
 use self::network::{COLOURS, Pool, STAGES};
 use super::rows::sum_rows;
 use super::{clip, comparable};
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Term added to the length of a pixel's features before the division by it (`lpips.normalize_tensor`).
 const EPSILON: f64 = 1e-10;

@@ -34,7 +34,8 @@ const CHUNKS_AT_ONCE: usize = 16;
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be opened, [`crate::Error::Format`] if it is damaged,
 /// [`crate::Error::Limit`] if it asks for more than `limits` allow.
-pub fn read(path: &Path, limits: &Limits) -> Result<Model> {
+pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Model> {
+    let path = path.as_ref();
     let bytes = Input::open_within(path, limits)?;
     read_bytes(&path.display().to_string(), &bytes, limits)
 }
