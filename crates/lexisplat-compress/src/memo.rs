@@ -68,7 +68,7 @@ pub(crate) fn views_of(memo: &[u8]) -> Result<PackingViews> {
 #[cfg(test)]
 mod tests {
     use lexisplat::Silent;
-    use lexisplat_render::Renderer;
+    use lexisplat_render::{Renderer, orbit};
     use lexisplat_sample::{SampleOptions, scene};
 
     use super::*;
@@ -89,8 +89,8 @@ mod tests {
             assert!(matches!(views_of(bytes), Err(Error::Parameter { .. })));
         }
         let splats = scene(&SampleOptions::new(300, 3));
-        let mut views = PackingViews::generated(&splats);
-        views = PackingViews::of_found(vec![Camera { fx: -1.0, ..views.measuring()[0].clone() }], Vec::new());
+        let camera = orbit(&splats.geometry, 1, 64, 48).swap_remove(0);
+        let views = PackingViews::of_found(vec![Camera { fx: -1.0, ..camera }], Vec::new());
         assert!(views_of(&memo_of(&views)).is_err());
     }
 }

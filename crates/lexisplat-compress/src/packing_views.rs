@@ -186,14 +186,6 @@ impl PackingViews {
         Ok(Self { measuring, judging, given: false })
     }
 
-    /// Generates views from all around `splats`, without drawing any. A quarter of them judges too.
-    #[must_use]
-    pub fn generated(splats: &Splats) -> Self {
-        let measuring = around(splats);
-        let judging = measuring.iter().step_by(measuring.len().div_ceil(JUDGES)).cloned().collect();
-        Self { measuring, judging, given: false }
-    }
-
     /// Views that were found before.
     pub(crate) fn of_found(measuring: Vec<Camera>, judging: Vec<Camera>) -> Self {
         Self { measuring, judging, given: false }

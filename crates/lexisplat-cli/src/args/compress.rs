@@ -76,9 +76,6 @@ pub(crate) struct Compress {
     /// limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
-    /// Does nothing of its own: every packed file leaves out what hardly shows.
-    #[arg(long, value_name = "LEVELS", value_parser = real::<f32>("1"), num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
-    pub(crate) prune: Option<f32>,
     /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
     /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
     /// --layout packed everything else is quantised [default: 0.1 with exact geometry, otherwise none].
@@ -153,7 +150,7 @@ impl Compress {
     }
 
     /// The options that only packed files have, and whether they are given.
-    fn packed_only(&self) -> [(&'static str, bool); 12] {
+    fn packed_only(&self) -> [(&'static str, bool); 11] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -166,7 +163,6 @@ impl Compress {
             ("--keep-order", self.keep_order),
             ("--keep-all", self.keep_all),
             ("--max-gaussians", self.max_gaussians.is_some()),
-            ("--prune", self.prune.is_some()),
         ]
     }
 

@@ -62,11 +62,6 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
     warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
     let mut compression = compression(args, given.as_ref(), &limits)?;
-    if args.prune.is_some() && !common.quiet {
-        note(
-            "note: --prune does nothing of its own: packed files leave out what hardly shows (--keep-all keeps it)",
-        );
-    }
 
     let files = args.inputs.iter().map(|path| input(path, common)).collect::<Result<Vec<_>>>()?;
     let read = ReadOptions::default()

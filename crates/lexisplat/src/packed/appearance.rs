@@ -7,7 +7,7 @@ use crate::support::error::{Error, Result};
 use crate::support::maths::{log_sigmoid, logit_of_log};
 
 /// Largest logarithm of an opacity. Its exponential, 0.9999, counts as opaque.
-pub(super) const MAX_LOG_OPACITY: f32 = -1e-4;
+const MAX_LOG_OPACITY: f32 = -1e-4;
 
 /// The base colour and the opacity of a Gaussian.
 #[derive(Debug, Clone, Copy, PartialEq)]

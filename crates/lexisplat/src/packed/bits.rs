@@ -29,7 +29,7 @@ impl BitWriter {
     }
 }
 
-/// Reads what a [`BitWriter`] wrote. Bits beyond the end are 0, and [`Self::overrun`] reports them.
+/// Reads what a [`BitWriter`] wrote. Bits beyond the end are 0, and it is never [`Self::exhausted`] then.
 #[derive(Debug, Clone)]
 pub(super) struct BitReader<'a> {
     bytes: &'a [u8],
@@ -37,6 +37,7 @@ pub(super) struct BitReader<'a> {
     at: usize,
     held: u64,
     count: u32,
+    /// Whether bits beyond the end were taken.
     missing: bool,
 }
 
@@ -65,12 +66,7 @@ impl<'a> BitReader<'a> {
         value
     }
 
-    /// Whether bits beyond the end were taken.
-    pub(super) fn overrun(&self) -> bool {
-        self.missing
-    }
-
-    /// Whether all bits were taken, except less than a byte of zeros.
+    /// Whether all bits were taken, except less than a byte of zeros, and none beyond the end.
     pub(super) fn exhausted(&self) -> bool {
         !self.missing && self.at == self.bytes.len() && self.held == 0
     }
@@ -96,7 +92,7 @@ mod tests {
             }
             prop_assert!(reader.exhausted());
             reader.take(9);
-            prop_assert!(reader.overrun());
+            prop_assert!(!reader.exhausted());
         }
     }
 }

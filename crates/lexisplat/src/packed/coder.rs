@@ -3,7 +3,6 @@
 use half::f16;
 
 use super::appearance::{Appearance, AppearanceChange};
-use super::atoms::{MAX_ATOM_BITS, resident};
 use super::canonical::{MortonKey, canonical};
 use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
 use super::layered::{MeanView, Target, WholeAtoms, seen_row};
@@ -33,6 +32,8 @@ const MAX_LEARNED: usize = 256;
 const CHOICE: usize = 2;
 /// Place of the step of values among the factors of parameters.
 pub(super) const VALUES: usize = 1;
+/// Steps of atoms' coefficients are 2^-k for k up to this.
+const MAX_ATOM_BITS: u32 = 14;
 /// Rounding steps of a coefficient of an atom, for each step of an average value.
 const ATOM_STEPS_PER_VALUE: f64 = 10.0;
 /// Step of SH values as a share of a promised tolerance.
@@ -123,7 +124,7 @@ impl ChunkCoder {
         progress: &dyn Progress,
     ) -> Result<(Self, WholeAtoms)> {
         let stop = promise(&mut parameters, options.tolerance);
-        if Parameters::from_list(&parameters.to_list()).is_none() {
+        if !parameters.are_usable() {
             return Err(too_large());
         }
         let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
@@ -285,6 +286,14 @@ fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
     // More atoms take fewer bits than exact rows to keep a promised tolerance.
     let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
     options.atoms.unwrap_or_else(|| (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED).max(fewest))
+}
+
+/// A code as it is kept in memory: by ascending atom, values in f16.
+fn resident(code: &[(u16, i32)], step: f32, out: &mut Vec<(u16, f16)>) {
+    out.clear();
+    #[expect(clippy::cast_precision_loss, reason = "f16 keeps less")]
+    out.extend(code.iter().map(|&(atom, value)| (atom, f16::from_f32(value as f32 * step))));
+    out.sort_by_key(|p| p.0);
 }
 
 pub(super) fn too_large() -> Error {

@@ -1,122 +1,91 @@
-//! Decoding the chunks of a packed scene of any version, each without the others.
+//! Decoding the chunks of a packed scene, each without the others.
 
 use std::ops::Range;
 
-use super::chunks::{LayeredChunks, check, decoded};
-use super::flat::{self, FlatDecoder};
 use super::held::{Data, Wish};
-use super::layered::{self, Index};
+use super::layered::{Index, LayeredDecoder};
 use super::outline::Outline;
-use super::place::{Piece, Place};
-use super::scene::{Coding, PackedHead};
-use super::stream::{BitCounts, StreamBits};
+use super::place::{Piece, Place, indices, places};
+use super::scene::PackedHead;
+use super::stream::BitCounts;
 use crate::scene::splats::Geometry;
-use crate::sparse::codes::SparseCodes;
+use crate::sparse::codes::{SparseCodes, Values};
 use crate::sparse::dictionary::Dictionary;
-use crate::support::error::Result;
+use crate::support::error::{Error, Result};
 use crate::support::memory_budget::MemoryBudget;
 
 /// What all chunks of a packed scene are decoded with, and where they are.
 #[derive(Debug)]
-pub(crate) enum Decoder {
-    /// Version 2: the decoder, and the Gaussians of each chunk.
-    Flat(Box<FlatDecoder>, Vec<Range<usize>>),
-    /// Version 3.
-    Layered(LayeredChunks),
+pub(crate) struct Decoder {
+    file: String,
+    /// The chunks that are there, and the Gaussians of each.
+    chunks: Vec<usize>,
+    spans: Vec<Range<usize>>,
+    /// What is made of chunks.
+    pub(crate) wish: Wish,
+    decoder: Box<LayeredDecoder>,
 }
 
 impl Decoder {
-    /// Reads what all chunks need from `head`, and in version 2 from the start of `data`.
-    pub(crate) fn new(head: &PackedHead, data: &[u8]) -> Result<Self> {
-        match &head.coding {
-            Coding::Flat(flat) => {
-                check(head, head.gaussians)?;
-                let decoder = FlatDecoder::new(head, flat, data)?;
-                let spans = decoder.spans();
-                Ok(Self::Flat(Box::new(decoder), spans))
+    /// Reads what all chunks need from `head`, for data of `whole` bytes of which any ranges will be there.
+    pub(crate) fn new(head: &PackedHead, whole: u64) -> Result<Self> {
+        Self::of_prefix(head, whole, whole)
+    }
+
+    /// The same for data of which only the first `there` bytes are there. Chunks whose base is not are left out.
+    pub(crate) fn of_prefix(head: &PackedHead, there: u64, whole: u64) -> Result<Self> {
+        let decoder = LayeredDecoder::new(head)?;
+        if decoder.index().data_bytes() != whole {
+            let text = "packed ranges do not cover the data: no encoder writes it";
+            return Err(Error::malformed(&head.file, text));
+        }
+        let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);
+        for (c, chunk) in decoder.index().chunks.iter().enumerate() {
+            if chunk.ranges.first().is_some_and(|range| range.end() <= there) {
+                chunks.push(c);
+                spans.push(first..first + chunk.gaussians);
+                first += chunk.gaussians;
             }
-            Coding::Layered(bytes) => LayeredChunks::new(head, bytes, data.len() as u64).map(Self::Layered),
         }
+        head.limits.check_gaussians(&head.file, first as u64)?;
+        head.limits.check_atoms(&head.file, head.atoms as u64)?;
+        let (file, wish) = (head.file.clone(), Wish::default());
+        Ok(Self { file, chunks, spans, wish, decoder: Box::new(decoder) })
     }
 
-    /// Reads what all chunks need from `head`, for data of `whole` bytes of which only a first part, `data`, is there. Chunks
-    /// of which nothing is there are left out. `None` for version 2.
-    pub(crate) fn of_prefix(head: &PackedHead, data: &[u8], whole: u64) -> Result<Option<Self>> {
-        let Coding::Layered(bytes) = &head.coding else { return Ok(None) };
-        LayeredChunks::of_prefix(head, bytes, data.len() as u64, whole)
-            .map(|chunks| Some(Self::Layered(chunks)))
-    }
-
-    fn layered(&self) -> Option<&LayeredChunks> {
-        match self {
-            Self::Flat(..) => None,
-            Self::Layered(chunks) => Some(chunks),
-        }
-    }
-
-    /// What is made of chunks of version 3 from here on; `None` for version 2.
-    pub(crate) fn wish(&mut self) -> Option<&mut Wish> {
-        match self {
-            Self::Flat(..) => None,
-            Self::Layered(chunks) => Some(&mut chunks.wish),
-        }
-    }
-
-    /// Layers, chunks and ranges of a scene of version 3 whose data start at `data_start` of the file.
-    pub(crate) fn outline(&self, data_start: u64) -> Option<Outline> {
-        self.layered().map(|chunks| chunks.outline(data_start))
+    /// Layers, chunks and ranges of a scene whose data start at `data_start` of the file.
+    pub(crate) fn outline(&self, data_start: u64) -> Outline {
+        Outline::new(self.index(), data_start)
     }
 
     /// The same without interim changes but of scales.
-    pub(crate) fn growing_only(mut self) -> Self {
-        if let Self::Layered(chunks) = &mut self {
-            chunks.grow_only();
-        }
+    pub(super) fn growing_only(mut self) -> Self {
+        self.decoder.grow_only();
         self
     }
 
-    /// The layers, chunks and ranges of a file of version 3.
-    pub(super) fn index(&self) -> Option<&Index> {
-        self.layered().map(LayeredChunks::index)
+    /// The layers, chunks and ranges of the whole scene.
+    pub(super) fn index(&self) -> &Index {
+        self.decoder.index()
+    }
+
+    /// The chunks of the next layer around chunk `c` that change what is made of it while they are missing.
+    pub(crate) fn around(&self, c: usize) -> Range<usize> {
+        self.index().around(c)
     }
 
     /// The Gaussians of each chunk.
     pub(crate) fn spans(&self) -> &[Range<usize>] {
-        match self {
-            Self::Flat(_, spans) => spans,
-            Self::Layered(chunks) => chunks.spans(),
-        }
+        &self.spans
     }
 
     pub(crate) fn dictionary(&self) -> &Dictionary {
-        match self {
-            Self::Flat(decoder, _) => &decoder.dictionary,
-            Self::Layered(chunks) => chunks.dictionary(),
-        }
-    }
-
-    /// The file, as the caller named it.
-    fn file(&self) -> &str {
-        match self {
-            Self::Flat(decoder, _) => &decoder.file,
-            Self::Layered(chunks) => chunks.file(),
-        }
+        self.decoder.dictionary()
     }
 
     /// Bits that the dictionary took.
     pub(crate) fn dictionary_bits(&self) -> &BitCounts {
-        match self {
-            Self::Flat(decoder, _) => &decoder.dictionary_bits,
-            Self::Layered(chunks) => chunks.dictionary_bits(),
-        }
-    }
-
-    /// Counted bits with the names of the streams.
-    pub(crate) fn named(&self, bits: &BitCounts) -> Vec<StreamBits> {
-        match self {
-            Self::Flat(..) => bits.named(flat::Stream::names()),
-            Self::Layered(_) => bits.named(layered::Stream::names()),
-        }
+        &self.decoder.dictionary_bits
     }
 
     /// Decodes chunk `c` of those that are there without extras. Escapes are numbered from its start. `budget` already holds
@@ -128,10 +97,15 @@ impl Decoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<(Geometry, SparseCodes, BitCounts)> {
-        let span = self.spans().get(c).cloned().unwrap_or_default();
-        decoded(self.file(), self.dictionary(), span, &mut |place| {
-            self.piece(data, c, 0, place, budget, count_bits)
-        })
+        let span = self.spans.get(c).cloned().unwrap_or_default();
+        let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
+        let own = 0..span.len();
+        let mut place = places(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
+        let piece = self.piece(data, c, 0, &mut place, budget, count_bits)?;
+        let (indices, values) = (indices(self.dictionary(), piece.atoms), Values::F16(piece.values));
+        let codes = SparseCodes::part(self.dictionary(), span.start, counts, indices, values, piece.escapes)
+            .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
+        Ok((g, codes, piece.bit_counts))
     }
 
     /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
@@ -144,9 +118,7 @@ impl Decoder {
         budget: &MemoryBudget<'_>,
         count_bits: bool,
     ) -> Result<Piece> {
-        match self {
-            Self::Flat(decoder, _) => decoder.piece(data.first(), c, first, place, budget, count_bits),
-            Self::Layered(chunks) => chunks.piece(data, c, first, place, budget, count_bits),
-        }
+        let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
+        self.decoder.piece(data, c, first, self.wish, place, budget, count_bits)
     }
 }

@@ -10,7 +10,7 @@ use super::layered::{
 };
 use super::layering::Layering;
 use super::pack::PackOptions;
-use super::scene::{Coding, PackedHead, UNNAMED};
+use super::scene::{PackedHead, UNNAMED};
 use super::stream::BitCounts;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;
@@ -33,7 +33,7 @@ impl Counts {
     /// The counts of one chunk or of the dictionary.
     pub(super) fn of<'r>(tally: Tally, ranges: impl IntoIterator<Item = &'r Recorder>) -> Self {
         let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
-        let mut raw_bits = BitCounts::zeros(Stream::ALL.len());
+        let mut raw_bits = BitCounts::zeros();
         for range in ranges {
             range.each(
                 |context, symbol| histograms[context].add(symbol),
@@ -183,7 +183,7 @@ impl Encoding {
         ranges: Ranges,
     ) -> Result<Finished> {
         let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
-        let stream_bits = counts.bits(tables).named(Stream::names());
+        let stream_bits = counts.bits(tables).named();
         let parts = head.rest.least.len();
         let forms = layering.forms(parts);
         let Ranges { spill, mut chunks, .. } = ranges;
@@ -215,7 +215,7 @@ impl Encoding {
             target: None,
             reached: None,
             device: None,
-            coding: Coding::Layered(head.write()),
+            bytes: head.write(),
             limits: Limits::default(),
         };
         Ok(Finished { head, data, report })

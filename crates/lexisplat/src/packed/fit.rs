@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::canonical::{Canonical, Grid, MortonKey, canonical};
 use super::layered::rounded_axes;
-use super::neighbours::{AVERAGES, Neighbours};
+use super::neighbours::Neighbours;
 use super::octaves::Histogram;
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
 use crate::scene::sensitivity::Sensitivity;
@@ -361,9 +361,7 @@ impl Predictors {
                     equations.add(features.map(f64::from), f64::from(values[t]));
                 }
             }
-            let mut pushed = [0.0; AVERAGES];
-            pushed[..TARGETS].copy_from_slice(&values);
-            neighbours.push(g.position, pushed);
+            neighbours.push(g.position, values);
         }
     }
 

@@ -116,11 +116,11 @@ fn coarsest(parameters: &Parameters, geometry: &Geometry, placed: MortonKey) -> 
     if g.log_opacity < VISIBLE {
         return [f32::from(LAST_CLASS); 2];
     }
-    let steps = rotation_steps(parameters.free_rotation_steps(0, g.scales), g.scales);
+    let steps = rotation_steps(parameters.rotation_steps(g.scales), g.scales);
     let [a, b] = if least_axis(g.scales) == 0 { [1, 2] } else { [0, 1] };
     let longness = [g.scales[0] - g.scales[2], g.scales[a] - g.scales[b]];
     let turns = (0..2).map(|k| steps[k] * longness[k].min(1.0)).fold(0.0, f32::max) / ANGLE_STEP;
-    let steps = parameters.free_position_steps(0, g.scales);
+    let steps = parameters.position_steps(g.scales);
     let positions = (0..3).map(|k| steps[k] / exp(g.scales[k.min(1)])).fold(0.0, f32::max) / POSITION_STEP;
     let shape = logs_over(parameters).max(turns).max(positions);
     [colour_over(parameters), shape].map(|over| (EXACT - log2(over)).floor())

@@ -5,7 +5,7 @@
 pub(crate) enum Data<'d> {
     /// All of it, or a first part.
     First(&'d [u8]),
-    /// Some ranges of a scene of version 3.
+    /// Some ranges.
     Ranges(&'d dyn Held),
 }
 
@@ -42,17 +42,9 @@ impl<'d> Data<'d> {
     pub(super) fn is_verified(self) -> bool {
         matches!(self, Self::Ranges(_))
     }
-
-    /// The first part, if this is one.
-    pub(super) fn first(self) -> &'d [u8] {
-        match self {
-            Self::First(data) => data,
-            Self::Ranges(_) => &[],
-        }
-    }
 }
 
-/// What is made of a chunk of version 3.
+/// What is made of a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Wish {
     /// Parts of nonzeros that are decoded, at most.

@@ -16,7 +16,7 @@ const FACTOR_STEPS: usize = 60;
 /// Least and most Gaussians of a chunk, and a layer's number of chunks of a size between. Small ones arrive soon, and large
 /// ones take fewer bytes.
 const LEAST_CHUNK: usize = 8192;
-const MOST_CHUNK: usize = 32_768;
+pub(crate) const MOST_CHUNK: usize = 32_768;
 const CHUNKS: usize = 6;
 /// A rest of up to a chunk over this is part of the one before.
 const REST: usize = 2;

@@ -1,4 +1,4 @@
-//! Predicts a Gaussian from those decoded just before it.
+//! Averages of the Gaussians just before one, on which predictors are fitted.
 
 use super::parameters::TARGETS;
 use crate::support::maths::Vec3;
@@ -6,14 +6,12 @@ use crate::support::maths::Vec3;
 /// Gaussians remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
 /// space.
 const WINDOW: usize = 16;
-/// Values averaged: those that are predicted, the two classes and the number of nonzeros.
-pub(super) const AVERAGES: usize = TARGETS + 3;
 
-/// The last few Gaussians of a chunk.
+/// The last few Gaussians.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Neighbours {
     positions: [Vec3; WINDOW],
-    values: [[f32; AVERAGES]; WINDOW],
+    values: [[f32; TARGETS]; WINDOW],
     /// Number seen so far.
     seen: usize,
 }
@@ -21,13 +19,13 @@ pub(super) struct Neighbours {
 impl Neighbours {
     /// Averages around `centre`, weighted by the inverse squared distance, which is taken to be at least
     /// `near`. `None` before the first Gaussian.
-    pub(super) fn average(&self, centre: Vec3, near: f32) -> Option<[f32; AVERAGES]> {
+    pub(super) fn average(&self, centre: Vec3, near: f32) -> Option<[f32; TARGETS]> {
         let known = self.seen.min(WINDOW);
         if known == 0 {
             return None;
         }
         let floor = near * near;
-        let mut sums = [0.0_f32; AVERAGES];
+        let mut sums = [0.0_f32; TARGETS];
         let mut total = 0.0_f32;
         for (position, values) in self.positions.iter().zip(&self.values).take(known) {
             let d: Vec3 = std::array::from_fn(|k| position[k] - centre[k]);
@@ -42,7 +40,7 @@ impl Neighbours {
         average.iter().all(|v| v.is_finite()).then_some(average)
     }
 
-    pub(super) fn push(&mut self, position: Vec3, values: [f32; AVERAGES]) {
+    pub(super) fn push(&mut self, position: Vec3, values: [f32; TARGETS]) {
         let at = self.seen % WINDOW;
         self.positions[at] = position;
         self.values[at] = values;

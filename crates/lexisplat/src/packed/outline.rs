@@ -1,4 +1,4 @@
-//! What a packed file of version 3 is made of: layers, chunks and ranges.
+//! What a packed file is made of: layers, chunks and ranges.
 
 use std::ops::Range;
 

@@ -1,10 +1,8 @@
-//! The parameters of a file: steps, predictors, the grid. They are a fixed list of f32.
-
-use std::slice::from_mut;
+//! The parameters of a file as they are fitted: steps, predictors, the grid.
 
 use serde::{Deserialize, Serialize};
 
-use crate::support::maths::{Vec3, exp, exp2};
+use crate::support::maths::{Vec3, exp2};
 
 /// Values of a Gaussian that are predicted from its neighbours and its own earlier values: three scales,
 /// the opacity, three base colours.
@@ -19,12 +17,6 @@ pub(super) const LAST_CLASS: u8 = 15;
 
 /// Parts of an octave. The step that a dictionary is learned with is rounded to one of them, which moves it by at most 9 %.
 const PER_OCTAVE: f64 = 4.0;
-
-/// Largest steps. With larger ones a value is as good as unknown, and errors are no longer small.
-const MAX_LOG_STEP: f32 = 1.5;
-const MAX_ANGLE_STEP: f32 = 1.2;
-/// The same for positions, in standard deviations along the longest axis.
-const MAX_POSITION_STEP: f32 = 2.0;
 
 /// Steps and predictors of a file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
@@ -54,63 +46,43 @@ pub(super) struct Parameters {
 }
 
 impl Parameters {
-    /// All values in the order of the list.
-    fn fields(&mut self) -> [&mut [f32]; 11] {
-        [
-            &mut self.origin,
-            from_mut(&mut self.cell),
-            &mut self.base,
-            &mut self.factors,
-            from_mut(&mut self.promised),
-            self.rotation.as_flattened_mut(),
-            self.position.as_flattened_mut(),
-            &mut self.dc_mean,
-            self.dc_axes.as_flattened_mut(),
-            &mut self.means,
-            self.predictors.as_flattened_mut(),
-        ]
+    /// Whether all values are finite, and steps and their factors above 0.
+    pub(super) fn are_usable(&self) -> bool {
+        let steps = [&[self.cell], &self.base[..], &self.factors];
+        let others = [
+            &self.origin[..],
+            &[self.promised],
+            self.rotation.as_flattened(),
+            self.position.as_flattened(),
+            &self.dc_mean,
+            self.dc_axes.as_flattened(),
+            &self.means,
+            self.predictors.as_flattened(),
+        ];
+        let is_finite = |values: &&[f32]| values.iter().all(|v| v.is_finite());
+        steps.iter().chain(&others).all(is_finite)
+            && steps.concat().iter().all(|&v| v > 0.0)
+            && self.promised >= 0.0
     }
 
-    /// All values in order.
-    pub(super) fn to_list(&self) -> Vec<f32> {
-        self.clone().fields().concat()
-    }
-
-    /// Inverse of [`Self::to_list`]; `None` if the length differs or a value is not finite.
-    pub(super) fn from_list(list: &[f32]) -> Option<Self> {
-        let mut parameters = Self::default();
-        let mut rest = list;
-        for field in parameters.fields() {
-            let (values, tail) = rest.split_at_checked(field.len())?;
-            field.copy_from_slice(values);
-            rest = tail;
-        }
-        if !rest.is_empty() || list.iter().any(|v| !v.is_finite()) {
-            return None;
-        }
-        let steps = [parameters.base[0], parameters.base[1], parameters.cell];
-        let valid = steps.iter().chain(&parameters.factors).all(|&v| v > 0.0) && parameters.promised >= 0.0;
-        valid.then_some(parameters)
-    }
-
-    fn step(&self, kind: usize, class: u8) -> f32 {
+    fn colour_step(&self, class: u8) -> f32 {
         // 2 to the power of the class, which is at most 15.
-        self.base[kind] * f32::from_bits((127 + u32::from(class)) << 23)
+        self.base[0] * f32::from_bits((127 + u32::from(class)) << 23)
     }
 
     /// Step of the base colour's three coordinates.
     pub(super) fn dc_step(&self, colour: u8) -> f32 {
-        self.step(0, colour) * self.factors[0]
+        self.colour_step(colour) * self.factors[0]
     }
 
     /// Step of the values of SH codes.
     pub(super) fn value_step(&self, colour: u8) -> f32 {
-        if self.promised > 0.0 { self.promised } else { self.step(0, colour) * self.factors[1] }
+        if self.promised > 0.0 { self.promised } else { self.colour_step(colour) * self.factors[1] }
     }
 
     /// Step of the values of SH codes of colour class 0 where no error is promised.
     pub(super) fn free_value_step(&self) -> f32 {
-        self.step(0, 0) * self.factors[1]
+        self.colour_step(0) * self.factors[1]
     }
 
     /// The parameters that a dictionary is learned with: the step of values of each class is the nearest of [`PER_OCTAVE`] parts of
@@ -125,50 +97,14 @@ impl Parameters {
         other
     }
 
-    /// Step of the logarithm of the opacity.
-    pub(super) fn opacity_step(&self, shape: u8) -> f32 {
-        (self.step(1, shape) * self.factors[2]).min(MAX_LOG_STEP)
+    /// Steps of turns about each of the Gaussian's axes, in radians, of shape class 0.
+    pub(super) fn rotation_steps(&self, scales: Vec3) -> Vec3 {
+        self.rotation.map(|row| self.base[1] * exp2(linear(row, scales)))
     }
 
-    /// Step of the logarithm of the standard deviation along axis `k`.
-    pub(super) fn scale_step(&self, k: usize, shape: u8) -> f32 {
-        (self.step(1, shape) * self.factors[3 + k]).min(MAX_LOG_STEP)
-    }
-
-    /// Steps of turns about each of the Gaussian's axes, in radians.
-    pub(super) fn rotation_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        self.free_rotation_steps(shape, scales).map(|step| step.min(MAX_ANGLE_STEP))
-    }
-
-    /// Steps of the position along each of the Gaussian's axes, in world units.
-    pub(super) fn position_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        let most = MAX_POSITION_STEP * exp(scales[0].clamp(-60.0, 60.0));
-        self.free_position_steps(shape, scales).map(|step| step.min(most).max(f32::MIN_POSITIVE))
-    }
-
-    /// [`Self::rotation_steps`] before they are limited.
-    pub(super) fn free_rotation_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        let step = self.step(1, shape);
-        self.rotation.map(|row| step * exp2(linear(row, scales)))
-    }
-
-    /// [`Self::position_steps`] before they are limited.
-    pub(super) fn free_position_steps(&self, shape: u8, scales: Vec3) -> Vec3 {
-        let step = self.step(1, shape);
-        self.position.map(|row| step * exp2(linear(row, scales)))
-    }
-
-    /// Predicts `target`.
-    pub(super) fn predict(&self, target: usize, features: &[f32; FEATURES]) -> f32 {
-        self.predictors[target].iter().zip(features).fold(0.0, |sum, (p, f)| sum + p * f)
-    }
-
-    /// A base colour from its coordinates.
-    pub(super) fn dc_of(&self, coordinates: Vec3) -> Vec3 {
-        let a = &self.dc_axes;
-        std::array::from_fn(|c| {
-            self.dc_mean[c] + coordinates[0] * a[0][c] + coordinates[1] * a[1][c] + coordinates[2] * a[2][c]
-        })
+    /// Steps of the position along each of the Gaussian's axes, in world units, of shape class 0.
+    pub(super) fn position_steps(&self, scales: Vec3) -> Vec3 {
+        self.position.map(|row| self.base[1] * exp2(linear(row, scales)))
     }
 
     /// The coordinates of a base colour.

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::layered::Stream;
+
 /// Size of one stream.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
@@ -19,9 +21,9 @@ pub struct StreamBits {
 pub(crate) struct BitCounts(pub(super) Vec<f64>);
 
 impl BitCounts {
-    /// No bits yet of as many streams.
-    pub(super) fn zeros(streams: usize) -> Self {
-        Self(vec![0.0; streams])
+    /// No bits yet.
+    pub(super) fn zeros() -> Self {
+        Self(vec![0.0; Stream::ALL.len()])
     }
 
     pub(crate) fn add(&mut self, more: &Self) {
@@ -32,8 +34,11 @@ impl BitCounts {
     }
 
     /// With the names and attributes of the streams.
-    pub(super) fn named(&self, streams: impl Iterator<Item = (String, &'static str)>) -> Vec<StreamBits> {
+    pub(crate) fn named(&self) -> Vec<StreamBits> {
         let counts = self.0.iter().copied().chain(std::iter::repeat(0.0));
-        streams.zip(counts).map(|((name, attribute), bits)| StreamBits { name, attribute, bits }).collect()
+        Stream::names()
+            .zip(counts)
+            .map(|((name, attribute), bits)| StreamBits { name, attribute, bits })
+            .collect()
     }
 }

@@ -2,7 +2,6 @@
 
 use super::decoder::Decoder;
 use super::held::Data;
-use super::layered::Index;
 use super::place::{indices, places};
 use super::scene::Packed;
 use super::stream::{BitCounts, StreamBits};
@@ -21,7 +20,11 @@ impl Packed {
     /// [`crate::Error::Format`] naming the damaged part, [`crate::Error::Limit`] for a scene larger than the
     /// limits of its reader.
     pub fn unpack(&self) -> Result<Model> {
-        self.unpack_with(&Decoder::new(self.head(), self.data())?)
+        self.unpack_with(&self.decoder()?)
+    }
+
+    fn decoder(&self) -> Result<Decoder> {
+        Decoder::new(self.head(), self.data().len() as u64)
     }
 
     /// [`Self::unpack`] with a decoder of this scene, which may leave some of it out.
@@ -38,9 +41,8 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn stream_bits(&self) -> Result<Vec<StreamBits>> {
-        let decoder = Decoder::new(self.head(), self.data())?;
-        let (_, bits) = self.decode_with(&decoder, self.data(), true)?;
-        Ok(decoder.named(&bits))
+        let (_, bits) = self.decode_with(&self.decoder()?, self.data(), true)?;
+        Ok(bits.named())
     }
 
     /// The dictionary alone.
@@ -48,17 +50,16 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn unpack_dictionary(&self) -> Result<Dictionary> {
-        Ok(Decoder::new(self.head(), self.data())?.dictionary().clone())
+        Ok(self.decoder()?.dictionary().clone())
     }
 
     /// What the limits leave for the codes after `self` and the geometry of the scene.
     fn budget(&self) -> Result<MemoryBudget<'_>> {
         let head = self.head();
-        let (words, bytes) = head.coding.sizes();
-        let words = words + self.order().map_or(0, <[u32]>::len);
+        let words = self.order().map_or(0, <[u32]>::len);
         let extras = self.extras().iter().map(|e| e.values.width()).sum::<usize>();
         let n = self.len();
-        let sizes = [(words, size_of::<u32>()), (bytes, 1), (self.data().len(), 1), (n, extras)];
+        let sizes = [(words, size_of::<u32>()), (head.bytes.len(), 1), (self.data().len(), 1), (n, extras)];
         let own = sizes.iter().map(|&(count, each)| (count as u64).saturating_mul(each as u64));
         let budget = MemoryBudget::new(&head.limits, &head.file, own.fold(0, u64::saturating_add));
         for (count, each) in sizes {
@@ -74,11 +75,10 @@ impl Packed {
     /// # Errors
     /// As [`Self::unpack`].
     pub fn first_layer(&self) -> Result<Option<Model>> {
-        let whole = Decoder::new(self.head(), self.data())?;
-        let Some(end) = whole.index().and_then(Index::first_layer_end) else { return Ok(None) };
+        let Some(end) = self.decoder()?.index().first_layer_end() else { return Ok(None) };
         let data = usize::try_from(end).ok().and_then(|end| self.data().get(..end)).unwrap_or_default();
-        let decoder = Decoder::of_prefix(self.head(), data, self.data().len() as u64)?;
-        let Some(decoder) = decoder.map(Decoder::growing_only) else { return Ok(None) };
+        let (there, whole) = (data.len() as u64, self.data().len() as u64);
+        let decoder = Decoder::of_prefix(self.head(), there, whole)?.growing_only();
         Ok(Some(self.decode_with(&decoder, data, false)?.0))
     }
 

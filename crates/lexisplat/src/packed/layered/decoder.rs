@@ -1,4 +1,4 @@
-//! Decoding the chunks of a file of version 3.
+//! Decoding the chunks of a file.
 
 use super::atoms::WholeAtoms;
 use super::chunk::Want;
@@ -31,11 +31,11 @@ pub(in crate::packed) struct LayeredDecoder {
 }
 
 impl LayeredDecoder {
-    /// Reads the head, which is `bytes`.
-    pub(in crate::packed) fn new(packed: &PackedHead, bytes: &[u8]) -> Result<Self> {
+    /// Reads the head.
+    pub(in crate::packed) fn new(packed: &PackedHead) -> Result<Self> {
         let file = packed.file.clone();
         let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
-        let head = Head::read(bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
+        let head = Head::read(&packed.bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
         if head.index.gaussians() != packed.gaussians || head.rest.atoms != packed.atoms {
             return Err(bad("head does not fit the metadata"));
         }
@@ -155,7 +155,7 @@ fn dictionary(head: &Head, degree: ShDegree) -> Option<(Dictionary, BitCounts)> 
     }
     let learned = head.rest.atoms.checked_sub(if head.with_axes { degree.rest() } else { 0 })?;
     let atoms = WholeAtoms::read(&head.dictionary, degree, learned, head.with_axes)?;
-    let mut bits = BitCounts::zeros(Stream::ALL.len());
+    let mut bits = BitCounts::zeros();
     bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
     Some((Dictionary::decoded(degree, atoms.rows())?, bits))
 }

@@ -1,4 +1,4 @@
-//! The entropy coder of version 3 by itself, for the fuzz targets. No part of the crate's interface.
+//! The entropy coder by itself, for the fuzz targets. No part of the crate's interface.
 
 use super::head::Head;
 use super::index::Place;
@@ -8,7 +8,6 @@ use super::script::{Ask, ask, tables_of};
 use super::symbols::LANES;
 use super::tables::{Lookup, Tables};
 use crate::packed::Packed;
-use crate::packed::scene::Coding;
 use crate::scene::sh::ShDegree;
 
 /// Bytes of an entry of a script of [`decode`].
@@ -66,11 +65,12 @@ pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
     decoded == coded && player.exhausted()
 }
 
-/// The input of [`decode`]: the tables and the first range of a packed scene of version 3, empty if there are none.
+/// The input of [`decode`]: the tables and the first range of a packed scene, empty if there are none.
 #[must_use]
 pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
-    let Coding::Layered(bytes) = &packed.head().coding else { return Default::default() };
-    let Some(head) = Head::read(bytes, packed.head().degree.rest()) else { return Default::default() };
+    let Some(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
+        return Default::default();
+    };
     let length = head.index.order.first().and_then(|place| {
         let chunk = head.index.chunks.get(place.chunk as usize)?;
         Some(chunk.ranges.get(usize::from(place.kind))?.length as usize)

@@ -31,7 +31,7 @@ pub(crate) fn layered_atoms(head: &[u8]) -> Option<u64> {
     ByteReader(head).number()
 }
 
-/// The head of a file of version 3.
+/// The head of a file.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Head {
     /// Whether atoms that are the same in all files follow the learned ones.

@@ -1,4 +1,4 @@
-//! Version 3 of packed files: layers of chunks that are decoded coarse to fine.
+//! The format of packed files: layers of chunks that are decoded coarse to fine.
 
 #![expect(
     clippy::cast_possible_truncation,

@@ -2,7 +2,7 @@
 
 use super::range::{LEAST, MOST_BITS, length_bytes};
 use super::shifts::{power, right_unsigned};
-use super::streams::{CONTEXTS, Slot, Stream};
+use super::streams::{CONTEXTS, Slot};
 use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::packed::stream::BitCounts;
@@ -41,7 +41,7 @@ impl<'a> Player<'a> {
             ends: [2; LANES],
             simd: Simd::current().narrow(),
             damaged: false,
-            bit_counts: count_bits.then(|| BitCounts::zeros(Stream::ALL.len())),
+            bit_counts: count_bits.then(BitCounts::zeros),
         };
         let mut end = 0_u32;
         for l in 0..lanes {

@@ -17,7 +17,6 @@ use super::tables::{Lookup, Tables};
 use super::walk::{Group, Walk};
 use super::{Head, lanes};
 use crate::lexi::LexiReader;
-use crate::packed::scene::Coding;
 use crate::support::limits::Limits;
 
 /// One step of the first lane: a symbol of a stream in a context, or raw bits.
@@ -140,8 +139,7 @@ fn trace(name: &str, shown: usize) -> String {
         [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect();
     let reader = LexiReader::open(name, std::fs::read(path).unwrap(), &Limits::default()).unwrap();
     let packed = reader.packed().unwrap().unwrap();
-    let Coding::Layered(bytes) = &packed.head().coding else { panic!("another version") };
-    let head = Head::read(bytes, packed.head().degree.rest()).unwrap();
+    let head = Head::read(&packed.head().bytes, packed.head().degree.rest()).unwrap();
     let (tables, form) = (Tables::read(&head.tables).unwrap(), head.form());
     let lookup = Lookup::new(&tables);
     let chunk = &head.index.chunks[0];

@@ -15,7 +15,6 @@ use crate::packed::encoding::{self, Encoding, Written};
 use crate::packed::floor::Floor;
 use crate::packed::layered::{self, Lookup, MeanView, WholeAtoms};
 use crate::packed::pack::USUAL_DC;
-use crate::packed::parameters::Parameters;
 use crate::packed::quantised::{Gaussians, Quantised, Refit};
 use crate::scene::extra::Extra;
 use crate::scene::splats::Splats;
@@ -93,7 +92,7 @@ impl Coding {
         let all = SampleStatistics::sum(plan, groups)?;
         let mut floor = steps.floor.clone().within(all.over);
         all.predictors.solve(&mut floor.parameters);
-        if Parameters::from_list(&floor.parameters.to_list()).is_none() {
+        if !floor.parameters.are_usable() {
             return Err(too_large());
         }
         let (rows, classes) = all.shuffled(plan);

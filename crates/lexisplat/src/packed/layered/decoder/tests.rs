@@ -3,7 +3,6 @@
 use super::*;
 use crate::packed::layered::LayerForm;
 use crate::packed::place::places;
-use crate::packed::scene::Coding;
 use crate::packed::{PackOptions, Packed, Packer};
 use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};
@@ -22,8 +21,7 @@ fn packed(row: Option<f32>, viewpoints: Vec<[f32; 3]>) -> Packed {
 }
 
 fn decoder(packed: &Packed) -> LayeredDecoder {
-    let Coding::Layered(bytes) = &packed.head().coding else { panic!("another version") };
-    LayeredDecoder::new(packed.head(), bytes).unwrap()
+    LayeredDecoder::new(packed.head()).unwrap()
 }
 
 /// A decoded chunk.

@@ -1,4 +1,4 @@
-//! Ways to change a packed file of version 3 that leave its container and the checksums of its ranges whole.
+//! Ways to change a packed file that leave its container and the checksums of its ranges whole.
 
 use lexisplat_testing::Random;
 use serde_json::Value;
