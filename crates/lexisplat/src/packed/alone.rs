@@ -4,8 +4,8 @@
 //! their colours too.
 
 use super::appearance::AppearanceChange;
+use super::bitstream::{CHANGES, KINDS};
 use super::canonical::MortonKey;
-use super::layered::{CHANGES, KINDS};
 use super::parameters::Parameters;
 use crate::scene::splats::Geometry;
 use crate::support::maths::log_sigmoid;

@@ -3,9 +3,9 @@
 use half::f16;
 
 use super::appearance::{Appearance, AppearanceChange};
+use super::bitstream::{MeanView, Target, WholeAtoms, seen_row};
 use super::canonical::{MortonKey, canonical};
 use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
-use super::layered::{MeanView, Target, WholeAtoms, seen_row};
 use super::morton;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
@@ -48,7 +48,7 @@ pub(super) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
 
 /// Gaussians in the order of a packed file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View<'a> {
+pub(super) struct OrderedGaussians<'a> {
     pub(super) splats: &'a Splats,
     /// For each Gaussian its index in `splats` and its cell.
     pub(super) scene: &'a [MortonKey],
@@ -60,7 +60,7 @@ pub(super) struct View<'a> {
     pub(super) changes: Option<&'a [AppearanceChange]>,
 }
 
-impl<'a> View<'a> {
+impl<'a> OrderedGaussians<'a> {
     /// Gaussians that show what they are.
     pub(super) fn new(splats: &'a Splats, scene: &'a [MortonKey], classes: &'a [[u8; 2]]) -> Self {
         Self { splats, scene, classes, appearances: None, changes: None }
@@ -117,7 +117,7 @@ pub(super) struct ChunkCoder {
 impl ChunkCoder {
     /// Learns from the Gaussians of `view`, a whole scene, how to code them. Returns also the atoms.
     pub(super) fn new(
-        view: View<'_>,
+        view: OrderedGaussians<'_>,
         mut parameters: Parameters,
         mean_view: MeanView,
         options: &PackOptions,
@@ -154,7 +154,7 @@ impl ChunkCoder {
     }
 
     /// The codes of all of `view`; none for scenes without SH-rest.
-    pub(super) fn codes(&self, view: View<'_>) -> Codes {
+    pub(super) fn codes(&self, view: OrderedGaussians<'_>) -> Codes {
         let Some(book) = &self.book else { return Codes::default() };
         let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
         book.encode(&rows, &classes, self.stop)
@@ -163,7 +163,7 @@ impl ChunkCoder {
     /// What is to be coded of all of `view`, and its counts. Base colours are in units of `dc_unit`.
     pub(super) fn targets(
         &self,
-        view: View<'_>,
+        view: OrderedGaussians<'_>,
         codes: &Codes,
         dc_unit: f64,
     ) -> Result<(Tally, Vec<Target>)> {

@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use super::held::{Data, Wish};
-use super::layered::{Index, LayeredDecoder};
+use super::available_ranges::{Data, DecodeOptions};
+use super::bitstream::{BitstreamDecoder, Index};
 use super::outline::Outline;
 use super::place::{Piece, Place, indices, places};
 use super::scene::PackedHead;
@@ -22,8 +22,8 @@ pub(crate) struct Decoder {
     chunks: Vec<usize>,
     spans: Vec<Range<usize>>,
     /// What is made of chunks.
-    pub(crate) wish: Wish,
-    decoder: Box<LayeredDecoder>,
+    pub(crate) wish: DecodeOptions,
+    decoder: Box<BitstreamDecoder>,
 }
 
 impl Decoder {
@@ -34,7 +34,7 @@ impl Decoder {
 
     /// The same for data of which only the first `there` bytes are there. Chunks whose base is not are left out.
     pub(crate) fn of_prefix(head: &PackedHead, there: u64, whole: u64) -> Result<Self> {
-        let decoder = LayeredDecoder::new(head)?;
+        let decoder = BitstreamDecoder::new(head)?;
         if decoder.index().data_bytes() != whole {
             let text = "packed ranges do not cover the data: no encoder writes it";
             return Err(Error::malformed(&head.file, text));
@@ -49,7 +49,7 @@ impl Decoder {
         }
         head.limits.check_gaussians(&head.file, first as u64)?;
         head.limits.check_atoms(&head.file, head.atoms as u64)?;
-        let (file, wish) = (head.file.clone(), Wish::default());
+        let (file, wish) = (head.file.clone(), DecodeOptions::default());
         Ok(Self { file, chunks, spans, wish, decoder: Box::new(decoder) })
     }
 

@@ -3,11 +3,11 @@
 use serde::{Deserialize, Serialize};
 
 use super::alone;
-use super::coder::ChunkCoder;
-use super::layered::{
-    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, LayerForm, Lookup, Place, Range, Recorder,
-    Stream, Tables, WholeAtoms, lanes, stream_of,
+use super::bitstream::{
+    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, LayerForm, Lookup, Place, Range, Stream,
+    SymbolRecorder, Tables, WholeAtoms, lanes, stream_of,
 };
+use super::coder::ChunkCoder;
 use super::layering::Layering;
 use super::pack::PackOptions;
 use super::scene::{PackedHead, UNNAMED};
@@ -31,7 +31,7 @@ pub(crate) struct Counts {
 
 impl Counts {
     /// The counts of one chunk or of the dictionary.
-    pub(super) fn of<'r>(tally: Tally, ranges: impl IntoIterator<Item = &'r Recorder>) -> Self {
+    pub(super) fn of<'r>(tally: Tally, ranges: impl IntoIterator<Item = &'r SymbolRecorder>) -> Self {
         let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
         let mut raw_bits = BitCounts::zeros();
         for range in ranges {

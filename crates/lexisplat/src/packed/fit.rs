@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::bitstream::rounded_axes;
 use super::canonical::{Canonical, Grid, MortonKey, canonical};
-use super::layered::rounded_axes;
 use super::neighbours::Neighbours;
 use super::octaves::Histogram;
 use super::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};

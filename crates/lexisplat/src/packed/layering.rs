@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::layered::{Chunk, LayerForm, Place, RestForm, layer_forms};
+use super::bitstream::{Chunk, LayerForm, Place, RestForm, layer_forms};
 
 /// Scenes of fewer Gaussians have one layer by default. Their files are small.
 pub(super) const LEAST_LAYERED: usize = 8000;
@@ -22,7 +22,7 @@ const CHUNKS: usize = 6;
 const REST: usize = 2;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
-/// Levels of refinement of each layer.
+/// LogProbabilities of refinement of each layer.
 const LEVELS: [u8; LAYERS] = [2, 1];
 /// Number of layers, where there are several.
 const LAYERS: usize = SHARES.len() + 1;
@@ -171,7 +171,7 @@ impl Layering {
 struct Order {
     parts: usize,
     order: Vec<Place>,
-    /// Levels of refinement of each chunk so far.
+    /// LogProbabilities of refinement of each chunk so far.
     finer: Vec<usize>,
 }
 

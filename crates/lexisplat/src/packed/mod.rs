@@ -4,12 +4,14 @@
 //! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
 //! the mathematics, docs/FORMAT.md the bytes.
 //!
-//! `encoding.rs` packs a scene whole or in parts. `layered/` holds the format that is written, of which
-//! `layered/walk.rs` goes over the Gaussians of a chunk; encoder and decoder share it.
+//! `encoding.rs` packs a scene whole or in parts. `bitstream/` holds the format that is written, of which
+//! `bitstream/geometry_syntax.rs` goes over the Gaussians of a chunk; encoder and decoder share it.
 
 mod alone;
 mod appearance;
+mod available_ranges;
 mod bits;
+mod bitstream;
 mod canonical;
 mod codebook;
 mod coder;
@@ -18,8 +20,6 @@ mod decoder;
 mod encoding;
 mod fit;
 mod floor;
-mod held;
-mod layered;
 mod layering;
 mod morton;
 mod neighbours;
@@ -37,20 +37,20 @@ mod stream;
 pub mod tiles;
 mod unpack;
 
+pub(crate) use available_ranges::{AvailableRanges, Data, DecodeOptions};
+pub(crate) use bitstream::atoms_of_head;
 pub(crate) use canonical::MortonKey;
 pub(crate) use decoder::Decoder;
-pub(crate) use held::{Data, Held, Wish};
-pub(crate) use layered::layered_atoms;
 #[cfg(test)]
 pub(crate) use layering::MOST_CHUNK;
 pub(crate) use scene::SpilledPacked;
 pub(crate) use stream::BitCounts;
 
 pub use appearance::{Appearance, AppearanceChange};
-pub use curve::curve_order;
 #[cfg(feature = "fuzzing")]
 #[doc(hidden)]
-pub use layered::fuzzing;
+pub use bitstream::fuzzing;
+pub use curve::curve_order;
 pub use outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
 pub use pack::{PackOptions, Packer};
 pub use preset::Preset;

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::layered::{Index, LayerForm};
+use super::bitstream::{Index, LayerForm};
 
 /// The layers, chunks and ranges of a packed file.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -24,7 +24,7 @@ pub struct LayerOutline {
     pub gaussians: u64,
     /// Its chunks.
     pub chunks: Range<usize>,
-    /// Levels of refinement of its chunks.
+    /// LogProbabilities of refinement of its chunks.
     pub levels: usize,
     /// Parts of the nonzeros of SH-rest of its chunks.
     pub sh_parts: usize,
@@ -104,7 +104,7 @@ impl Outline {
             let (first, gaussians, bounds) = (chunk.first, chunk.gaussians, chunk.bounds);
             chunks.push(ChunkOutline { layer: chunk.layer, first, gaussians, bounds });
         }
-        let range = |place: &super::layered::Place| {
+        let range = |place: &super::bitstream::Place| {
             let (chunk, kind) = (place.chunk as usize, usize::from(place.kind));
             let found = index.chunks.get(chunk)?;
             let range = found.ranges.get(kind)?;

@@ -4,10 +4,10 @@ use std::borrow::Borrow;
 
 use serde::{Deserialize, Serialize};
 
+use super::bitstream::MeanView;
 use super::canonical::{Grid, MortonKey};
 use super::fit::Fit;
 use super::floor::Floor;
-use super::layered::MeanView;
 use super::layering::LEAST_LAYERED;
 use super::parameters::Parameters;
 use super::quantised::{Fitted, Gaussians, Quantised};

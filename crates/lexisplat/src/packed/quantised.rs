@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use super::alone::Alone;
 use super::appearance::{Appearance, AppearanceChange};
+use super::bitstream::{CodedChunk, MeanView, Tables, Target};
 use super::canonical::MortonKey;
 use super::codebook::Codes;
-use super::coder::{ChunkCoder, View, too_large};
+use super::coder::{ChunkCoder, OrderedGaussians, too_large};
 use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
-use super::layered::{CodedChunk, MeanView, Tables, Target};
 use super::layering::Layering;
 use super::pack::PackOptions;
 use super::parameters::Parameters;
@@ -91,7 +91,7 @@ impl<'a> Quantised<'a> {
     ) -> Result<Self> {
         let n = gaussians.scene.len();
         let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
-        let view = View::new(splats, &gaussians.scene, &gaussians.classes);
+        let view = OrderedGaussians::new(splats, &gaussians.scene, &gaussians.classes);
         let clock = Stopwatch::start();
         let coder = ChunkCoder::new(view, parameters, mean_view, options, progress)?;
         let encoding = Encoding::new(coder, layering, most_dc, clock);
@@ -169,7 +169,7 @@ impl<'a> Quantised<'a> {
         progress: &dyn Progress,
     ) -> Result<(Packed, CompressReport)> {
         let n = self.len();
-        let view = View { changes, ..self.view(appearances)? };
+        let view = OrderedGaussians { changes, ..self.view(appearances)? };
         changes.unwrap_or_default().iter().try_for_each(AppearanceChange::check)?;
         let mut encoding = self.encoding.clone();
         // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
@@ -214,7 +214,7 @@ impl<'a> Quantised<'a> {
     }
 
     /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
-    pub(super) fn view<'v>(&'v self, appearances: Option<&'v [Appearance]>) -> Result<View<'v>> {
+    pub(super) fn view<'v>(&'v self, appearances: Option<&'v [Appearance]>) -> Result<OrderedGaussians<'v>> {
         let n = self.len();
         if let Some(all) = appearances {
             if all.len() != n {
@@ -223,13 +223,13 @@ impl<'a> Quantised<'a> {
             all.iter().try_for_each(Appearance::check)?;
         }
         let Gaussians { scene, classes, .. } = &self.gaussians;
-        Ok(View { appearances, ..View::new(self.splats, scene, classes) })
+        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, scene, classes) })
     }
 
     /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
     fn each_chunk<T: Send>(
         &self,
-        view: View<'_>,
+        view: OrderedGaussians<'_>,
         progress: &dyn Progress,
         with: impl Fn(usize, Tally, CodedChunk) -> T + Sync,
     ) -> Vec<Result<T>> {
@@ -245,7 +245,7 @@ impl<'a> Quantised<'a> {
     /// What `with` makes of the layer, the counts and the targets of each chunk of `view`.
     pub(super) fn each_target<T: Send>(
         &self,
-        view: View<'_>,
+        view: OrderedGaussians<'_>,
         progress: &dyn Progress,
         with: impl Fn(usize, Tally, Vec<Target>) -> Result<T> + Sync,
     ) -> Vec<Result<T>> {

@@ -36,7 +36,7 @@ pub struct PackedHead {
     /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
     /// everywhere.
     pub device: Option<String>,
-    /// What it is decoded with, and where its chunks are, as a file holds it; see `layered/head.rs`.
+    /// What it is decoded with, and where its chunks are, as a file holds it; see `bitstream/head.rs`.
     pub(crate) bytes: Vec<u8>,
     /// What may be made of it: the limits of the reader, or the default ones.
     pub(crate) limits: Limits,

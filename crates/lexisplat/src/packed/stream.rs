@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::layered::Stream;
+use super::bitstream::Stream;
 
 /// Size of one stream.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,7 +1,7 @@
 //! Decoding a packed scene as a whole.
 
+use super::available_ranges::Data;
 use super::decoder::Decoder;
-use super::held::Data;
 use super::place::{indices, places};
 use super::scene::Packed;
 use super::stream::{BitCounts, StreamBits};

@@ -256,7 +256,7 @@ impl<'a> Checked<'a> {
         (*self.bytes).as_ref()
     }
 
-    pub(super) fn view(&self, name: &str) -> Result<View<'_>> {
+    pub(super) fn view(&self, name: &str) -> Result<TensorView<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
         let TensorInfo { dtype, shape, data_offsets: (start, end) } =
             self.header.info(name).ok_or_else(missing)?;
@@ -265,7 +265,7 @@ impl<'a> Checked<'a> {
             let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
             Error::format(&self.file, FormatError::Truncated { what, expected: end as u64, found })
         })?;
-        Ok(View { dtype: *dtype, shape, data })
+        Ok(TensorView { dtype: *dtype, shape, data })
     }
 
     /// The length of the tensor `name`, which must have one dimension.
@@ -354,7 +354,7 @@ fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
 
 /// One tensor of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View<'a> {
+pub(super) struct TensorView<'a> {
     pub(super) dtype: Dtype,
     pub(super) shape: &'a [usize],
     pub(super) data: &'a [u8],

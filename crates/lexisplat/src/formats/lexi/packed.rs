@@ -8,7 +8,7 @@ use super::checked::Checked;
 use super::fields::{check_extra_names, column, degree, extras, meta, record};
 use super::json::Json;
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{Packed, PackedHead, ReachedRecord, TargetRecord, layered_atoms};
+use crate::packed::{Packed, PackedHead, ReachedRecord, TargetRecord, atoms_of_head};
 use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
@@ -73,7 +73,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
     }
     let (_, bytes) = checked.sealed_head()?;
-    let atoms = layered_atoms(bytes).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?;
+    let atoms = atoms_of_head(bytes).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?;
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
     let known = |name: &str| name.starts_with(EXTRA_PREFIX) || PACKED.contains(&name);

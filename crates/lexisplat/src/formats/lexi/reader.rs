@@ -9,7 +9,7 @@ use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
 use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor};
-use crate::packed::{Data, Decoder, Outline, Packed, PackedHead, StreamBits, Wish};
+use crate::packed::{Data, DecodeOptions, Decoder, Outline, Packed, PackedHead, StreamBits};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -153,7 +153,7 @@ impl<'a> LexiReader<'a> {
     }
 
     /// What is made of chunks of a packed file. `name` and `value` are what is asked of it.
-    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut Wish> {
+    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut DecodeOptions> {
         match &mut self.kind {
             Kind::Packed(packed) => Ok(&mut packed.decoder.wish),
             Kind::Exact(_) => Err(Error::parameter(name, value, "only for packed .lexi files")),

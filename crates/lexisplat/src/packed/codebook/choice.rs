@@ -2,7 +2,7 @@
 
 use super::costs::Costs;
 use super::{Codebook, PRICE, StopRule, first_atoms, learn};
-use crate::packed::layered::{WholeAtoms, axes};
+use crate::packed::bitstream::{WholeAtoms, axes};
 use crate::scene::sh::ShDegree;
 use crate::sparse::learn::unit_axis;
 use crate::support::error::{Error, Result};
@@ -71,7 +71,8 @@ pub(in crate::packed) fn choose(
         };
         for bits in (fewest..=usual).rev() {
             let atoms = WholeAtoms::new(degree, own, bits, with_axes);
-            let (error, bits) = Codebook::new(dim, atoms.rows(), costs.clone()).spent(&scaled, classes);
+            let (error, bits) =
+                Codebook::new(dim, atoms.rows(), costs.clone()).rate_and_distortion(&scaled, classes);
             let error = error * f64::from(step) * f64::from(step);
             if best.is_none() {
                 usual_error = error;

@@ -130,7 +130,7 @@ impl Codebook {
     }
 
     /// The squared errors of the codes of all rows, and their bits.
-    fn spent(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
+    fn rate_and_distortion(&self, rows: &[f32], classes: &[u8]) -> (f64, f64) {
         let codes = self.encode(rows, classes, StopRule::Balanced);
         let (mut error, mut bits) = (0.0, 0.0);
         for (i, (row, &class)) in rows.chunks_exact(self.dim).zip(classes).enumerate() {

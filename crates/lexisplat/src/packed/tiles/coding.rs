@@ -8,12 +8,12 @@ use super::message::messages;
 use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
+use crate::packed::bitstream::{self, Lookup, MeanView, WholeAtoms};
 use crate::packed::canonical::MortonKey;
 use crate::packed::codebook::{Choice, Costs};
 use crate::packed::coder::{ChunkCoder, Learning, VALUES, too_large};
 use crate::packed::encoding::{self, Encoding, Written};
 use crate::packed::floor::Floor;
-use crate::packed::layered::{self, Lookup, MeanView, WholeAtoms};
 use crate::packed::pack::USUAL_DC;
 use crate::packed::quantised::{Gaussians, Quantised, Refit};
 use crate::scene::extra::Extra;
@@ -159,7 +159,7 @@ impl Coding {
         let appearances =
             quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
-        let tables = layered::Tables::of(&counts)?;
+        let tables = bitstream::Tables::of(&counts)?;
         let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));
         let first = plan.first_of_file(bucket.number);
         let mut start = 0;
@@ -189,12 +189,12 @@ impl Tables {
     pub fn new(counts: &[Counts]) -> Result<Self> {
         let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
         let all = Counts::sum(counts).ok_or_else(wrong)?;
-        Ok(Self { scene: all.scene, bytes: layered::Tables::of(&all.counts)?.write() })
+        Ok(Self { scene: all.scene, bytes: bitstream::Tables::of(&all.counts)?.write() })
     }
 
-    pub(super) fn read(&self, plan: &Plan) -> Result<layered::Tables> {
+    pub(super) fn read(&self, plan: &Plan) -> Result<bitstream::Tables> {
         plan.check("tables", [self.scene], None)?;
-        layered::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+        bitstream::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
     }
 }
 
@@ -217,7 +217,7 @@ impl Coded {
         plan.check("coded bucket", [self.scene], None)?;
         let wrong =
             || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
-        let own = layered::Tables::read(&self.tables).ok_or_else(wrong)?;
+        let own = bitstream::Tables::read(&self.tables).ok_or_else(wrong)?;
         let (lookup, common) = (Lookup::new(&own), tables.read(plan)?);
         let encoding = coding.encoding(plan)?;
         let forms = encoding.layering.forms(encoding.head.rest.least.len());

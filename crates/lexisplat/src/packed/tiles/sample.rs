@@ -8,10 +8,10 @@ use super::look::Looked;
 use super::message::messages;
 use super::plan::Plan;
 use super::steps::Steps;
+use crate::packed::bitstream::MeanView;
 use crate::packed::canonical::MortonKey;
-use crate::packed::coder::{SAMPLE, SAMPLE_STREAM, View};
+use crate::packed::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
 use crate::packed::fit::Predictors;
-use crate::packed::layered::MeanView;
 use crate::packed::octaves::Histogram;
 use crate::scene::splats::Splats;
 use crate::support::error::{Error, Result};
@@ -127,7 +127,7 @@ impl Sample {
             let weights: Vec<[f32; 2]> = part.kept().map(|i| part.weights[i]).collect();
             let free = steps.steps.classes_of(&weights);
             let classes = steps.floor.classes(&free, &part.splats.geometry, &scene);
-            let view = View::new(&part.splats, &scene, &classes);
+            let view = OrderedGaussians::new(&part.splats, &scene, &classes);
             let share = kept(part.bucket) / all_kept;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
             let wanted = (SAMPLE as f64 * share).round() as usize;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::FeedOptions;
 use super::run::Run;
-use crate::packed::{Decoder, Held, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::packed::{AvailableRanges, Decoder, Outline, PackedHead, RangeKind, RangeOutline};
 use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 
@@ -236,7 +236,7 @@ impl Ranges {
     }
 }
 
-impl Held for Ranges {
+impl AvailableRanges for Ranges {
     fn bytes(&self, start: u64) -> Option<&[u8]> {
         match self.state_at(start) {
             Some(State::Whole(run)) => run.whole(),
