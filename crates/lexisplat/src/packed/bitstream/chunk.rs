@@ -11,7 +11,7 @@ use super::symbols::{LANES, Lanes, has};
 use super::tables::Lookup;
 use super::target::Target;
 use super::unpack::{Drawn, Frame};
-use crate::packed::stream::BitCounts;
+use crate::packed::bitstream::stream::BitCounts;
 use crate::support::crc32;
 
 /// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.

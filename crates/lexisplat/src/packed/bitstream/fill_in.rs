@@ -6,7 +6,7 @@
 use super::geometry_syntax::{DC, Group, OPACITY};
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each};
-use crate::packed::parameters::TARGETS;
+use crate::packed::bitstream::parameters::TARGETS;
 
 /// Values that change: all scales alike, the opacity, and the coordinates of the base colour.
 pub(in crate::packed) const CHANGES: usize = 5;

@@ -10,8 +10,8 @@ use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::target::Target;
 use super::values::{MAX_LOG_OPACITY, rotations};
-use crate::packed::morton;
-use crate::packed::parameters::{LAST_CLASS, TARGETS};
+use crate::packed::bitstream::morton;
+use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
 
 /// Streams of the targets of predictions.
 const TARGET_STREAMS: [Stream; TARGETS] =

@@ -4,8 +4,8 @@
 //! ones. Floating point only makes values of decoded integers.
 
 use super::symbols::{LANES, Lanes, each};
-use crate::packed::bits::{BitReader, BitWriter};
-use crate::packed::parameters::{LAST_CLASS, Parameters, TARGETS};
+use crate::packed::bitstream::bits::{BitReader, BitWriter};
+use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
 
 /// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
 pub(super) const VALUE_BITS: u32 = 20;

@@ -2,7 +2,7 @@
 
 use super::shifts::{power, right};
 use super::symbols::{LANES, Lanes, each};
-use crate::packed::parameters::TARGETS;
+use crate::packed::bitstream::parameters::TARGETS;
 
 /// Gaussians that are remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
 /// space.

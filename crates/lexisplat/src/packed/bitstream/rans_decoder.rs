@@ -5,7 +5,7 @@ use super::shifts::{power, right_unsigned};
 use super::streams::{CONTEXTS, Slot};
 use super::symbols::{LANES, Lanes, Symbols, each, has};
 use super::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
-use crate::packed::stream::BitCounts;
+use crate::packed::bitstream::stream::BitCounts;
 use crate::support::simd::Simd;
 
 /// The decoder of a range.

@@ -4,7 +4,7 @@ use super::geometry_syntax::{DC, FACTOR, Group, REFINED, coarsened, dropped, fac
 use super::shifts::power;
 use super::streams::Stream;
 use super::symbols::{LANES, Lanes, Symbols, each};
-use crate::packed::parameters::TARGETS;
+use crate::packed::bitstream::parameters::TARGETS;
 
 /// Contexts by the number of coarse steps: none, one, more.
 const BY_COUNT: u32 = 3;

@@ -3,8 +3,8 @@
 use super::fill_in::CHANGES;
 use super::integer_model::VALUE_BITS;
 use super::values::across;
-use crate::packed::canonical::Canonical;
-use crate::packed::parameters::{Parameters, TARGETS};
+use crate::packed::bitstream::parameters::{Parameters, TARGETS};
+use crate::packed::encode::canonical::Canonical;
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 
 /// Smallest logarithm of an opacity, of 2^-23. No picture shows less.

@@ -6,7 +6,7 @@ use proptest::prelude::*;
 
 use super::bytes::ByteReader;
 use super::*;
-use crate::packed::parameters::Parameters;
+use crate::packed::bitstream::parameters::Parameters;
 use crate::scene::sh::ShDegree;
 
 /// Most Gaussians of a chunk.

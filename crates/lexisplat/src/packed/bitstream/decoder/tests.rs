@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::packed::bitstream::LayerForm;
-use crate::packed::place::places;
+use crate::packed::decode::place::places;
 use crate::packed::{PackOptions, Packed, Packer};
 use crate::scene::splats::Geometry;
 use crate::{Sensitivity, Silent};

@@ -5,9 +5,9 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::packed::bitstream::parameters::Parameters;
 use crate::packed::bitstream::target::Target;
-use crate::packed::canonical::Canonical;
-use crate::packed::parameters::Parameters;
+use crate::packed::encode::canonical::Canonical;
 
 /// Product of two quaternions w, x, y, z.
 fn turned([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
