@@ -10,6 +10,7 @@
 mod bitstream;
 mod decode;
 mod encode;
+mod entropy;
 mod scene;
 
 pub(crate) use bitstream::atoms_of_head;
@@ -21,9 +22,6 @@ pub(crate) use encode::canonical::MortonKey;
 pub(crate) use encode::layering::MOST_CHUNK;
 pub(crate) use scene::SpilledPacked;
 
-#[cfg(feature = "fuzzing")]
-#[doc(hidden)]
-pub use bitstream::fuzzing;
 pub use bitstream::stream::StreamBits;
 pub use decode::outline::{ChunkOutline, LayerOutline, Outline, RangeKind, RangeOutline};
 pub use encode::appearance::{Appearance, AppearanceChange};
@@ -32,4 +30,7 @@ pub use encode::pack::{PackOptions, Packer};
 pub use encode::preset::Preset;
 pub use encode::quantised::{Quantised, Refit};
 pub use encode::tiles;
+#[cfg(feature = "fuzzing")]
+#[doc(hidden)]
+pub use entropy::fuzzing;
 pub use scene::{Packed, PackedHead, ReachedRecord, TargetRecord};

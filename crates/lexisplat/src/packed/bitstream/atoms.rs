@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 
 use serde::{Deserialize, Serialize};
 
-use super::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
+use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, Bits, SignedBitModel};
 use crate::scene::sh::{CHANNELS, ShDegree};
 
 /// Grey, red against blue, and green against both: an orthonormal basis of colours.
@@ -83,7 +83,7 @@ impl WholeAtoms {
     }
 
     /// Whether the atoms that are the same in all files follow.
-    pub(super) fn with_axes(&self) -> bool {
+    pub(in crate::packed) fn with_axes(&self) -> bool {
         self.with_axes
     }
 

@@ -6,7 +6,7 @@ use crate::support::maths::Vec3;
 const MOST: f64 = i16::MAX as f64;
 
 /// The turn nearest to orthonormal `axes`, of which the third one may be reversed: a quaternion w, x, y, z of any length.
-pub(super) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
+pub(in crate::packed) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
     let mut m = axes.map(|axis| axis.map(f64::from));
     let [a, b, _] = m;
     m[2] = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
@@ -33,7 +33,7 @@ pub(super) fn turn_of(axes: &[Vec3; 3]) -> [i16; 4] {
 }
 
 /// The axes of a turn. Every number is a whole one before one division. `None` for a turn of zeros.
-pub(super) fn axes_of(turn: [i16; 4]) -> Option<[Vec3; 3]> {
+pub(in crate::packed) fn axes_of(turn: [i16; 4]) -> Option<[Vec3; 3]> {
     let [w, x, y, z] = turn.map(f64::from);
     let length = w * w + x * x + y * y + z * z;
     #[expect(clippy::cast_possible_truncation, reason = "rounding to f32 is meant")]

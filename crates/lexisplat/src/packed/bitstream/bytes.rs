@@ -2,10 +2,10 @@
 
 /// Takes numbers from the start of bytes. Every method returns `None` where too few bytes are left.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ByteReader<'a>(pub(super) &'a [u8]);
+pub(in crate::packed) struct ByteReader<'a>(pub(in crate::packed) &'a [u8]);
 
 impl<'a> ByteReader<'a> {
-    pub(super) fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+    pub(in crate::packed) fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
         let (taken, rest) = self.0.split_at_checked(count)?;
         self.0 = rest;
         Some(taken)
@@ -17,20 +17,20 @@ impl<'a> ByteReader<'a> {
         Some(*taken)
     }
 
-    pub(super) fn u8(&mut self) -> Option<u8> {
+    pub(in crate::packed) fn u8(&mut self) -> Option<u8> {
         self.array().map(u8::from_le_bytes)
     }
 
-    pub(super) fn u16(&mut self) -> Option<u16> {
+    pub(in crate::packed) fn u16(&mut self) -> Option<u16> {
         self.array().map(u16::from_le_bytes)
     }
 
-    pub(super) fn u32(&mut self) -> Option<u32> {
+    pub(in crate::packed) fn u32(&mut self) -> Option<u32> {
         self.array().map(u32::from_le_bytes)
     }
 
     /// What [`put_number`] wrote.
-    pub(super) fn number(&mut self) -> Option<u64> {
+    pub(in crate::packed) fn number(&mut self) -> Option<u64> {
         let mut number = 0_u64;
         for shift in (0..).step_by(7) {
             let byte = self.u8()?;
@@ -46,24 +46,24 @@ impl<'a> ByteReader<'a> {
     }
 
     /// A [number](Self::number) of 32 bits.
-    pub(super) fn number32(&mut self) -> Option<u32> {
+    pub(in crate::packed) fn number32(&mut self) -> Option<u32> {
         self.number().and_then(|number| u32::try_from(number).ok())
     }
 
     /// A finite number of the `N` high bytes of an f32.
-    pub(super) fn short<const N: usize>(&mut self) -> Option<f32> {
+    pub(in crate::packed) fn short<const N: usize>(&mut self) -> Option<f32> {
         let mut bytes = [0; 4];
         bytes.get_mut(4 - N..)?.copy_from_slice(&self.array::<N>()?);
         Some(f32::from_le_bytes(bytes)).filter(|x| x.is_finite())
     }
 
     /// A finite number.
-    pub(super) fn f32(&mut self) -> Option<f32> {
+    pub(in crate::packed) fn f32(&mut self) -> Option<f32> {
         self.array().map(f32::from_le_bytes).filter(|x| x.is_finite())
     }
 
     /// Whole numbers of 16 bits.
-    pub(super) fn i16s<const N: usize>(&mut self) -> Option<[i16; N]> {
+    pub(in crate::packed) fn i16s<const N: usize>(&mut self) -> Option<[i16; N]> {
         let mut out = [0; N];
         for value in &mut out {
             *value = self.array().map(i16::from_le_bytes)?;
@@ -72,7 +72,7 @@ impl<'a> ByteReader<'a> {
     }
 
     /// Finite numbers.
-    pub(super) fn f32s<const N: usize>(&mut self) -> Option<[f32; N]> {
+    pub(in crate::packed) fn f32s<const N: usize>(&mut self) -> Option<[f32; N]> {
         let mut out = [0.0; N];
         for value in &mut out {
             *value = self.f32()?;
@@ -82,7 +82,7 @@ impl<'a> ByteReader<'a> {
 }
 
 /// Writes a whole number in groups of 7 bits, low ones first. All bytes but the last have their highest bit set.
-pub(super) fn put_number(out: &mut Vec<u8>, mut number: u64) {
+pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
     while number >= 0x80 {
         out.push(number.to_le_bytes()[0] | 0x80);
         number >>= 7;
@@ -91,12 +91,12 @@ pub(super) fn put_number(out: &mut Vec<u8>, mut number: u64) {
 }
 
 /// Writes the `N` high bytes of `x`, which is a [short](shortened) number.
-pub(super) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
+pub(in crate::packed) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
     out.extend(x.to_le_bytes().iter().skip(4 - N));
 }
 
 /// The number nearest to `x` of which all but the `N` high bytes are zero. It is finite if `x` is.
-pub(super) fn shortened<const N: usize>(x: f32) -> f32 {
+pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
     let low = u32::BITS - 8 * N as u32;
     let cut = |bits: u32| f32::from_bits(bits >> low << low);
     let near = cut(x.to_bits().wrapping_add(1 << (low - 1)));

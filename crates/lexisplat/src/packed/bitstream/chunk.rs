@@ -3,15 +3,15 @@
 use super::fill_in::{CHANGES, interim};
 use super::geometry_syntax::{GeometrySyntax, Group};
 use super::integer_model::Steering;
-use super::rans_decoder::SymbolDecoder;
-use super::rans_encoder::SymbolRecorder;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
-use super::symbols::{LANES, Lanes, has};
-use super::tables::Lookup;
-use super::target::Target;
-use super::unpack::{Drawn, Frame};
 use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::decode::chunk_unpack::{Drawn, Frame};
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::symbols::{LANES, Lanes, has};
+use crate::packed::entropy::tables::Lookup;
 use crate::support::crc32;
 
 /// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
@@ -24,7 +24,7 @@ pub(in crate::packed) fn lanes(gaussians: usize) -> usize {
 
 /// First Gaussian of each lane of a chunk, and the number of Gaussians. The first lanes have one more than the others
 /// where the number does not divide.
-pub(super) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
+pub(in crate::packed) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
     std::array::from_fn(|l| {
         let l = l.min(lanes);
         gaussians / lanes * l + (gaussians % lanes).min(l)
@@ -32,14 +32,14 @@ pub(super) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
 }
 
 /// The sets of lanes that have a first, second, ... Gaussian.
-pub(super) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
+pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
     let whole = (1 << lanes) - 1;
     let last = (1 << (gaussians % lanes)) - 1;
     std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
 }
 
 /// Takes what a chunk decodes to. A trait and not closures, since closures are not inlined into vector code.
-pub(super) trait Sink {
+pub(in crate::packed) trait Sink {
     /// Takes one Gaussian of each lane in `set`: of each lane the one with this number, which is number `in_block` of its
     /// block. `levels` are those of the chunk, and those that are missing. Returns `None` for what no encoder writes.
     fn group(
@@ -147,7 +147,7 @@ impl Form {
     /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that
     /// is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
     #[inline(always)]
-    pub(super) fn decode(
+    pub(in crate::packed) fn decode(
         &self,
         layer: LayerForm,
         gaussians: usize,

@@ -5,15 +5,15 @@
 
 use super::geometry_syntax::{DC, Group, OPACITY};
 use super::streams::Stream;
-use super::symbols::{LANES, Lanes, Symbols, each};
 use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
 /// Values that change: all scales alike, the opacity, and the coordinates of the base colour.
 pub(in crate::packed) const CHANGES: usize = 5;
 /// Kinds of changes, which have a step each: of scales, opacities and base colours.
 pub(in crate::packed) const KINDS: usize = 3;
 /// Largest step. Values have limits that are less than two of them apart.
-pub(super) const MOST_STEP: u32 = 1 << 26;
+pub(in crate::packed) const MOST_STEP: u32 = 1 << 26;
 /// Classes of a context.
 const CLASS_WIDTH: u32 = 2;
 const CLASSES: u32 = 8;
@@ -29,7 +29,12 @@ fn kind(change: usize) -> usize {
 /// Codes the changes of a group. `wanted` are those that the encoder codes.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn interim<S: Symbols>(s: &mut S, set: u32, group: &mut Group, wanted: &[Lanes; CHANGES]) {
+pub(in crate::packed) fn interim<S: Symbols>(
+    s: &mut S,
+    set: u32,
+    group: &mut Group,
+    wanted: &[Lanes; CHANGES],
+) {
     let (shape, colour) = (&group.shape, &group.colour);
     let class = |l: usize, classes: &Lanes<u32>| (classes[l] / CLASS_WIDTH).min(CLASSES - 1);
     let context = each(|l| class(l, shape));
@@ -45,7 +50,7 @@ pub(super) fn interim<S: Symbols>(s: &mut S, set: u32, group: &mut Group, wanted
 
 /// Adds the changes to values where `alone`.
 #[inline(always)]
-pub(super) fn change(
+pub(in crate::packed) fn change(
     values: &mut [Lanes; TARGETS],
     interim: &[Lanes; CHANGES],
     steps: &[u32; KINDS],

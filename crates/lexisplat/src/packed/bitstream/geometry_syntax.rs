@@ -7,11 +7,11 @@ use super::fill_in::CHANGES;
 use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
 use super::neighbour_context::{AVERAGED, NeighbourContext};
 use super::streams::Stream;
-use super::symbols::{LANES, Lanes, Symbols, each, has};
-use super::target::Target;
 use super::values::{MAX_LOG_OPACITY, rotations};
 use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
 
 /// Streams of the targets of predictions.
 const TARGET_STREAMS: [Stream; TARGETS] =
@@ -20,59 +20,59 @@ const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Str
 /// Gaps with at least this many bits share a context.
 const GAP_CONTEXTS: u32 = 23;
 /// Places of the opacity and of the first base colour among the targets.
-pub(super) const OPACITY: usize = 3;
-pub(super) const DC: usize = 4;
+pub(in crate::packed) const OPACITY: usize = 3;
+pub(in crate::packed) const DC: usize = 4;
 /// Averages that are not predicted: the colour class, and the shape class above it.
 const COLOUR: usize = TARGETS;
 const SHAPE: usize = TARGETS + 1;
 /// Most levels of refinement.
 pub(in crate::packed) const MAX_LEVELS: usize = 2;
 /// Bits that codes of rotations lack where this many levels are missing.
-pub(super) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
+pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
 /// Values that finer levels refine: those of the targets and three moves.
-pub(super) const REFINED: usize = TARGETS + 3;
+pub(in crate::packed) const REFINED: usize = TARGETS + 3;
 /// Coarse steps over fine ones at one level.
-pub(super) const FACTOR: i32 = 3;
+pub(in crate::packed) const FACTOR: i32 = 3;
 
 /// Coarse steps over the finest ones where this many levels are missing.
-pub(super) fn factor(levels: usize) -> i32 {
+pub(in crate::packed) fn factor(levels: usize) -> i32 {
     FACTOR.pow(levels as u32)
 }
 
 /// One Gaussian of each lane as integers.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Group {
+pub(in crate::packed) struct Group {
     /// Number of the cell on the Morton curve, and its coordinates.
-    pub(super) number: Lanes<u64>,
-    pub(super) cell: [Lanes; 3],
-    pub(super) colour: Lanes<u32>,
-    pub(super) shape: Lanes<u32>,
+    pub(in crate::packed) number: Lanes<u64>,
+    pub(in crate::packed) cell: [Lanes; 3],
+    pub(in crate::packed) colour: Lanes<u32>,
+    pub(in crate::packed) shape: Lanes<u32>,
     /// Values of the targets by coarse steps.
-    pub(super) coarse: [Lanes; TARGETS],
+    pub(in crate::packed) coarse: [Lanes; TARGETS],
     /// Steps of the targets.
-    pub(super) steps: [Lanes; TARGETS],
+    pub(in crate::packed) steps: [Lanes; TARGETS],
     /// Coarse steps of each value, of the targets and then of the moves, as the base has them.
-    pub(super) base: [Lanes; REFINED],
+    pub(in crate::packed) base: [Lanes; REFINED],
     /// The same, refined as far as it is known.
-    pub(super) counts: [Lanes; REFINED],
+    pub(in crate::packed) counts: [Lanes; REFINED],
     /// The codes of the rotation as far as they are known, and the bits of their coordinates and of the turn in full.
-    pub(super) rotation: [Lanes<u32>; 3],
-    pub(super) axis_bits: [Lanes<u32>; 2],
-    pub(super) needle: Lanes<bool>,
+    pub(in crate::packed) rotation: [Lanes<u32>; 3],
+    pub(in crate::packed) axis_bits: [Lanes<u32>; 2],
+    pub(in crate::packed) needle: Lanes<bool>,
     /// Logarithms of the steps of moves.
-    pub(super) moves: [Lanes; 3],
+    pub(in crate::packed) moves: [Lanes; 3],
     /// Contexts of moves.
-    pub(super) fineness: [Lanes<u32>; 3],
+    pub(in crate::packed) fineness: [Lanes<u32>; 3],
     /// What the encoder codes in the end: whole numbers of finest steps, and codes of rotations in full.
-    pub(super) wanted: [Lanes; REFINED],
-    pub(super) wanted_rotation: [Lanes<u32>; 3],
+    pub(in crate::packed) wanted: [Lanes; REFINED],
+    pub(in crate::packed) wanted_rotation: [Lanes<u32>; 3],
     /// Steps of the changes while the next layer is not there: of the scales, the opacity and the base colour.
-    pub(super) interim: [Lanes; CHANGES],
+    pub(in crate::packed) interim: [Lanes; CHANGES],
 }
 
 /// The state of the walk over a chunk.
 #[derive(Debug)]
-pub(super) struct GeometrySyntax<'a> {
+pub(in crate::packed) struct GeometrySyntax<'a> {
     steering: &'a Steering,
     /// LogProbabilities of refinement.
     levels: usize,
@@ -82,7 +82,7 @@ pub(super) struct GeometrySyntax<'a> {
 }
 
 impl<'a> GeometrySyntax<'a> {
-    pub(super) fn new(steering: &'a Steering, levels: usize) -> Self {
+    pub(in crate::packed) fn new(steering: &'a Steering, levels: usize) -> Self {
         Self { steering, levels, around: NeighbourContext::default(), cell: [0; LANES], gap_bits: [0; LANES] }
     }
 
@@ -90,7 +90,7 @@ impl<'a> GeometrySyntax<'a> {
     /// for impossible values, which only damaged files hold. Decoders pass no targets.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn base<S: Symbols>(
+    pub(in crate::packed) fn base<S: Symbols>(
         &mut self,
         s: &mut S,
         set: u32,
@@ -232,7 +232,7 @@ impl<'a> GeometrySyntax<'a> {
 /// Bits that a code of `bits` bits lacks where `levels` levels are missing. One bit stays, so that every Gaussian takes
 /// some.
 #[inline(always)]
-pub(super) fn dropped(bits: u32, levels: usize) -> u32 {
+pub(in crate::packed) fn dropped(bits: u32, levels: usize) -> u32 {
     DROPPED[levels].min(bits.saturating_sub(1))
 }
 
@@ -281,13 +281,13 @@ const MAX_STEPS: f64 = 1e9;
 
 /// The whole number of steps that stands for `steps`.
 #[expect(clippy::cast_possible_truncation, reason = "clamped")]
-pub(super) fn nearest(steps: f64) -> i32 {
+pub(in crate::packed) fn nearest(steps: f64) -> i32 {
     let whole = (steps.abs().min(MAX_STEPS) + 0.5 - DEAD_ZONE).floor() as i32;
     if steps < 0.0 { -whole } else { whole }
 }
 
 /// The number of steps `coarse` times as large that is nearest to `whole` steps. `coarse` is odd.
 #[inline(always)]
-pub(super) fn coarsened(whole: i32, coarse: i32) -> i32 {
+pub(in crate::packed) fn coarsened(whole: i32, coarse: i32) -> i32 {
     (whole + coarse / 2).div_euclid(coarse)
 }

@@ -16,7 +16,7 @@ const SIGN: u32 = 1 << 31;
 
 /// `x` rounded to half precision, to the even number in the middle between two.
 #[inline(always)]
-pub(super) fn halved(x: f32) -> f16 {
+pub(in crate::packed) fn halved(x: f32) -> f16 {
     let (sign, size) = (x.to_bits() & SIGN, x.to_bits() & !SIGN);
     if !(LEAST..BEYOND).contains(&size) {
         return halved_by_library(x);
@@ -27,7 +27,7 @@ pub(super) fn halved(x: f32) -> f16 {
 
 /// A number of half precision as an f32.
 #[inline(always)]
-pub(super) fn doubled(x: f16) -> f32 {
+pub(in crate::packed) fn doubled(x: f16) -> f32 {
     let bits = u32::from(x.to_bits());
     let (sign, size) = (bits << 16 & SIGN, (bits & 0x7fff) << CUT);
     if !(LEAST - REBIAS..INFINITE).contains(&size) {

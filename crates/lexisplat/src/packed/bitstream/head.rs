@@ -10,9 +10,9 @@ use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
 use super::mean_view::{MAX_POINTS, MeanView};
 use super::sh_codes::RestForm;
 use super::streams::REST_PARTS;
-use super::unpack::Frame;
 use crate::packed::bitstream::bits::{BitReader, BitWriter};
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters};
+use crate::packed::decode::chunk_unpack::Frame;
 use crate::support::limits::MAX_ATOMS;
 
 /// Largest binary logarithm of the unit of base colours.

@@ -162,7 +162,7 @@ impl Index {
         self.order.is_sorted_by_key(|place| (place.chunk, place.kind))
     }
 
-    pub(super) fn write(&self, out: &mut Vec<u8>) {
+    pub(in crate::packed) fn write(&self, out: &mut Vec<u8>) {
         let is_sorted = self.is_sorted();
         out.push(self.layers.len() as u8 | u8::from(is_sorted) << LAYERS_BITS);
         out.extend(self.layers.iter().map(|layer| layer.levels as u8));
@@ -190,7 +190,7 @@ impl Index {
 
     /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros, and with interim changes in all layers but
     /// the last if there are any; `None` for anything else.
-    pub(super) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
+    pub(in crate::packed) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
         let layers = from.u8()?;
         let (is_sorted, layers) =
             (layers >> LAYERS_BITS == 1, usize::from(layers & ((1 << LAYERS_BITS) - 1)));

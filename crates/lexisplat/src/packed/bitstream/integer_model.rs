@@ -3,16 +3,16 @@
 //! No product and no sum of these leaves the range of an `i32`, whatever a file holds, so every language computes the same
 //! ones. Floating point only makes values of decoded integers.
 
-use super::symbols::{LANES, Lanes, each};
 use crate::packed::bitstream::bits::{BitReader, BitWriter};
 use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
+use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
 /// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
-pub(super) const VALUE_BITS: u32 = 20;
+pub(in crate::packed) const VALUE_BITS: u32 = 20;
 /// Features of predictions are multiples of 2^-9, and so are logarithms of steps, in octaves.
-pub(super) const FEATURE_BITS: u32 = 9;
+pub(in crate::packed) const FEATURE_BITS: u32 = 9;
 /// Coefficients are multiples of 2^-12.
-pub(super) const COEFFICIENT_BITS: u32 = 12;
+pub(in crate::packed) const COEFFICIENT_BITS: u32 = 12;
 /// Bits by which products of coefficients and features are shifted before they are summed.
 const PRODUCT_SHIFT: u32 = 4;
 /// Largest absolute value of a feature.
@@ -41,20 +41,20 @@ const FINENESS: i32 = 1152;
 /// The context of the widest cells.
 const LAST_FINENESS: i32 = 23;
 /// A value of 1 as a feature.
-pub(super) const ONE: i32 = 1 << FEATURE_BITS;
+pub(in crate::packed) const ONE: i32 = 1 << FEATURE_BITS;
 
 /// Coefficients of a prediction: a constant, and those of the average, the two classes and the scales.
-pub(super) const COEFFICIENTS: usize = 7;
+pub(in crate::packed) const COEFFICIENTS: usize = 7;
 /// Coefficients of a prediction that are not of scales: of the first scale there are no others.
 const BEFORE_SCALES: usize = 3;
 /// Coefficients of the logarithm of a step: a constant and those of the scales.
-pub(super) const SLOPES: usize = 4;
+pub(in crate::packed) const SLOPES: usize = 4;
 
 /// A step of class 0: a mantissa below 2^16, times 2 to the power of minus `shift`, as a multiple of 2^-20.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Step {
-    pub(super) mantissa: u16,
-    pub(super) shift: i8,
+pub(in crate::packed) struct Step {
+    pub(in crate::packed) mantissa: u16,
+    pub(in crate::packed) shift: i8,
 }
 
 /// A mantissa is shifted up by at most as many bits: it is then above the largest step.
@@ -62,7 +62,7 @@ const MOST_SHIFT: i32 = 6;
 
 impl Step {
     /// Smallest and largest shift.
-    pub(super) const SHIFTS: std::ops::RangeInclusive<i8> = -6..=31;
+    pub(in crate::packed) const SHIFTS: std::ops::RangeInclusive<i8> = -6..=31;
 
     /// The step nearest to `x`.
     fn of(x: f64) -> Self {
@@ -115,15 +115,15 @@ fn coefficient(x: f64) -> i16 {
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::packed) struct Integers {
     /// Logarithm of the side of a cell.
-    pub(super) cell: i16,
+    pub(in crate::packed) cell: i16,
     /// Steps of class 0 of the three scales, the opacity and the base colour.
-    pub(super) steps: [Step; 5],
+    pub(in crate::packed) steps: [Step; 5],
     /// Logarithms of the steps of turns and moves at shape class 0.
-    pub(super) turns: [[i16; SLOPES]; 3],
-    pub(super) moves: [[i16; SLOPES]; 3],
+    pub(in crate::packed) turns: [[i16; SLOPES]; 3],
+    pub(in crate::packed) moves: [[i16; SLOPES]; 3],
     /// Averages where there are no neighbours, as features.
-    pub(super) means: [i16; TARGETS],
-    pub(super) predictors: [[i16; COEFFICIENTS]; TARGETS],
+    pub(in crate::packed) means: [i16; TARGETS],
+    pub(in crate::packed) predictors: [[i16; COEFFICIENTS]; TARGETS],
 }
 
 impl Integers {
@@ -194,7 +194,7 @@ impl Integers {
     }
 
     /// Writes all but the steps.
-    pub(super) fn write(&self, out: &mut BitWriter) {
+    pub(in crate::packed) fn write(&self, out: &mut BitWriter) {
         for (group, zeros) in self.clone().groups() {
             let numbers: Vec<i16> = group.into_iter().map(|number| *number >> zeros).collect();
             let width = numbers.iter().copied().map(width).max().unwrap_or(0);
@@ -206,7 +206,7 @@ impl Integers {
     }
 
     /// Reads what [`Self::write`] wrote; `None` for anything else.
-    pub(super) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
+    pub(in crate::packed) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
         for (group, zeros) in self.groups() {
             let most = from.take(WIDTH_BITS) as u32;
             if most + zeros > i16::BITS {
@@ -241,7 +241,7 @@ pub(in crate::packed) struct Steering {
     steps: [[u32; LAST_CLASS as usize + 1]; 5],
     turns: [[i32; SLOPES]; 3],
     moves: [[i32; SLOPES]; 3],
-    pub(super) means: [i32; TARGETS],
+    pub(in crate::packed) means: [i32; TARGETS],
     predictors: [[i32; COEFFICIENTS]; TARGETS],
 }
 
@@ -259,14 +259,14 @@ impl Steering {
 
     /// The steps of target `t` at classes from 0 to 15.
     #[inline(always)]
-    pub(super) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
+    pub(in crate::packed) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
         let steps = &self.steps[t.min(4)];
         each(|l| steps[(class[l] & u32::from(LAST_CLASS)) as usize].cast_signed())
     }
 
     /// Predictions of target `t`, as values. The features are the average, the two classes and the scales.
     #[inline(always)]
-    pub(super) fn predict(&self, t: usize, features: &[Lanes; COEFFICIENTS - 1]) -> Lanes {
+    pub(in crate::packed) fn predict(&self, t: usize, features: &[Lanes; COEFFICIENTS - 1]) -> Lanes {
         let row = &self.predictors[t];
         let mut sums = [row[0] << (COEFFICIENT_BITS - PRODUCT_SHIFT); LANES];
         for (p, feature) in row[1..].iter().zip(features) {
@@ -293,7 +293,7 @@ impl Steering {
 
     /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
     #[inline(always)]
-    pub(super) fn axis_bits(
+    pub(in crate::packed) fn axis_bits(
         &self,
         class: &Lanes<u32>,
         scales: &[Lanes; 3],
@@ -317,7 +317,7 @@ impl Steering {
 
     /// Logarithms of the steps of the position along each axis.
     #[inline(always)]
-    pub(super) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
+    pub(in crate::packed) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
         let most = each(|l| MOST_MOVE + ((scales[0][l] * OCTAVES_PER_E) >> FEATURE_BITS));
         let log = |row: &[i32; SLOPES]| {
             let logs = Self::logarithms(row, class, scales);
@@ -329,7 +329,7 @@ impl Steering {
 
     /// The context of a step of the position.
     #[inline(always)]
-    pub(super) fn fineness(&self, log: i32) -> u32 {
+    pub(in crate::packed) fn fineness(&self, log: i32) -> u32 {
         ((self.cell - log + FINENESS) >> (FEATURE_BITS - 1)).clamp(0, LAST_FINENESS).cast_unsigned()
     }
 }
@@ -342,7 +342,7 @@ fn bits_for(log: i32) -> u32 {
 
 /// A value as a feature.
 #[inline(always)]
-pub(super) fn feature(value: i32) -> i32 {
+pub(in crate::packed) fn feature(value: i32) -> i32 {
     (value >> (VALUE_BITS - FEATURE_BITS)).clamp(-MOST_FEATURE, MOST_FEATURE)
 }
 

@@ -6,8 +6,8 @@
 
 use super::bytes::shortened;
 use super::halves::doubled;
-use super::symbols::{LANES, Lanes};
-use super::unpack::Nonzero;
+use crate::packed::decode::chunk_unpack::Nonzero;
+use crate::packed::entropy::symbols::{LANES, Lanes};
 use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
 use crate::scene::splats::Splats;
 use crate::sparse::dictionary::Dictionary;
@@ -15,9 +15,9 @@ use crate::support::maths::{Vec3, at_share};
 use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
 
 /// Most points of view.
-pub(super) const MAX_POINTS: usize = 15;
+pub(in crate::packed) const MAX_POINTS: usize = 15;
 /// Longest row of one channel.
-pub(super) const MOST: usize = MAX_COEFFICIENTS - 1;
+pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
 
 /// The points of view of a file; none if base colours are those of the source.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -86,7 +86,12 @@ impl MeanView {
     // WebAssembly has few registers, and is slower where it keeps values of several such functions in them.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn lanes(&self, degree: ShDegree, positions: &[Lanes<f32>; 3], out: &mut [Lanes<f32>; MOST]) {
+    pub(in crate::packed) fn lanes(
+        &self,
+        degree: ShDegree,
+        positions: &[Lanes<f32>; 3],
+        out: &mut [Lanes<f32>; MOST],
+    ) {
         // Where the degree is a constant, all lanes are computed at once.
         match degree.rest_per_channel() {
             ..=3 => self.lanes_of::<3>(ShDegree::ONE, positions, out),
@@ -155,7 +160,7 @@ impl SeenAtoms {
     ///
     /// It is called and not inlined: where the last number is known to be unused, three are computed one by one.
     #[inline(never)]
-    pub(super) fn seen(
+    pub(in crate::packed) fn seen(
         &self,
         code: &[Nonzero],
         weights: &[Lanes<f32>; MOST],

@@ -1,8 +1,8 @@
 //! Averages of the Gaussians that a lane decoded last.
 
-use super::shifts::{power, right};
-use super::symbols::{LANES, Lanes, each};
 use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::shifts::{power, right};
+use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
 /// Gaussians that are remembered. More of them gain little, since neighbours on the Morton curve are neighbours in
 /// space.
@@ -12,11 +12,11 @@ const FARTHEST: u32 = 1023;
 /// Bits of the largest weight, and one.
 const WEIGHT_BITS: u32 = 12;
 /// Values that are averaged: those that are predicted, and the two classes.
-pub(super) const AVERAGED: usize = TARGETS + 2;
+pub(in crate::packed) const AVERAGED: usize = TARGETS + 2;
 
 /// The Gaussians that each lane decoded last.
 #[derive(Debug, Clone, Default)]
-pub(super) struct NeighbourContext {
+pub(in crate::packed) struct NeighbourContext {
     cells: [[Lanes; 3]; WINDOW],
     features: [[Lanes; AVERAGED]; WINDOW],
     /// Number seen so far.
@@ -25,14 +25,14 @@ pub(super) struct NeighbourContext {
 
 impl NeighbourContext {
     /// Whether there are any.
-    pub(super) fn is_known(&self) -> bool {
+    pub(in crate::packed) fn is_known(&self) -> bool {
         self.seen > 0
     }
 
     /// Averages of the features of the neighbours of `cell`, weighted by about the inverse squared distance.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn average(&self, cell: &[Lanes; 3]) -> [Lanes; AVERAGED] {
+    pub(in crate::packed) fn average(&self, cell: &[Lanes; 3]) -> [Lanes; AVERAGED] {
         let mut total = [0_i32; LANES];
         let mut sums = [[0_i32; LANES]; AVERAGED];
         for (other, features) in self.cells.iter().zip(&self.features).take(self.seen.min(WINDOW)) {
@@ -62,7 +62,7 @@ impl NeighbourContext {
     }
 
     #[inline(always)]
-    pub(super) fn push(&mut self, cell: [Lanes; 3], features: [Lanes; AVERAGED]) {
+    pub(in crate::packed) fn push(&mut self, cell: [Lanes; 3], features: [Lanes; AVERAGED]) {
         let at = self.seen % WINDOW;
         (self.cells[at], self.features[at]) = (cell, features);
         self.seen += 1;

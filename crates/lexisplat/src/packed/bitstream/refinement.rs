@@ -1,10 +1,10 @@
 //! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
 
 use super::geometry_syntax::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
-use super::shifts::power;
 use super::streams::Stream;
-use super::symbols::{LANES, Lanes, Symbols, each};
 use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::shifts::power;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
 /// Contexts by the number of coarse steps: none, one, more.
 const BY_COUNT: u32 = 3;
@@ -17,7 +17,12 @@ const FINENESS_WIDTH: u32 = 3;
 /// Codes the refinement of a group from `level` missing levels to one less. Returns `None` for impossible values.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn refine<S: Symbols>(s: &mut S, set: u32, group: &mut Group, level: usize) -> Option<()> {
+pub(in crate::packed) fn refine<S: Symbols>(
+    s: &mut S,
+    set: u32,
+    group: &mut Group,
+    level: usize,
+) -> Option<()> {
     let mut beyond = false;
     let finer = factor(level - 1);
     for k in DC..REFINED {
@@ -64,11 +69,11 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::packed::bitstream::rans_decoder::SymbolDecoder;
-    use crate::packed::bitstream::rans_encoder::SymbolRecorder;
-    use crate::packed::bitstream::script::tables_of;
-    use crate::packed::bitstream::symbols::has;
-    use crate::packed::bitstream::tables::Lookup;
+    use crate::packed::entropy::rans_decoder::SymbolDecoder;
+    use crate::packed::entropy::rans_encoder::SymbolRecorder;
+    use crate::packed::entropy::script::tables_of;
+    use crate::packed::entropy::symbols::has;
+    use crate::packed::entropy::tables::Lookup;
 
     fn of<const N: usize, T: Copy>(values: &[T], first: usize) -> [Lanes<T>; N] {
         std::array::from_fn(|k| each_of(values, first + 7 * k))

@@ -1,8 +1,8 @@
 //! SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
 
 use super::streams::{REST_PARTS, Stream};
-use super::symbols::{LANES, Lanes, Symbols, each};
-use super::target::Target;
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
 
 /// Colour classes that numbers of nonzeros are told apart by.
 const COUNT_CLASSES: u32 = 12;
@@ -18,7 +18,7 @@ const LATER_CONTEXTS: u32 = 16;
 pub(in crate::packed) const PAGE: u32 = 256;
 /// Gaussians of each lane of which the numbers of nonzeros come first, and then the nonzeros. Lanes have numbers of their
 /// own, which differ less over many Gaussians, so that nearly all lanes are busy.
-pub(super) const BLOCK: usize = 64;
+pub(in crate::packed) const BLOCK: usize = 64;
 /// Signs that are coded at once.
 const SIGNS: usize = 16;
 /// Marks a nonzero that is not the first one of its Gaussian and part.
@@ -38,7 +38,7 @@ pub(in crate::packed) struct RestForm {
 
 /// The SH-rest of up to [`BLOCK`] Gaussians of each lane.
 #[derive(Debug, Default)]
-pub(super) struct Rest {
+pub(in crate::packed) struct Rest {
     /// Of each Gaussian: the lanes that have one, and their colour classes.
     sets: Vec<u32>,
     colours: Vec<Lanes<u32>>,
@@ -65,14 +65,14 @@ struct Part {
 
 /// Places in the nonzeros of a lane.
 #[derive(Debug, Default, Clone, Copy)]
-pub(super) struct Cursor {
+pub(in crate::packed) struct Cursor {
     next: [usize; REST_PARTS],
     row: usize,
 }
 
 /// The SH-rest of one Gaussian of a part of a block.
 #[derive(Debug)]
-pub(super) enum Coded<'r> {
+pub(in crate::packed) enum Coded<'r> {
     Exact(&'r [f32]),
     /// First nonzero and number of nonzeros.
     Code(usize, usize),
@@ -80,25 +80,25 @@ pub(super) enum Coded<'r> {
 
 impl Rest {
     /// Number of Gaussians of each lane so far.
-    pub(super) fn len(&self) -> usize {
+    pub(in crate::packed) fn len(&self) -> usize {
         self.sets.len()
     }
 
     /// The lanes that have Gaussian `i` of the block, and their colour classes.
     #[inline(always)]
-    pub(super) fn of(&self, i: usize) -> (u32, &Lanes<u32>) {
+    pub(in crate::packed) fn of(&self, i: usize) -> (u32, &Lanes<u32>) {
         (self.sets[i], &self.colours[i])
     }
 
     /// Adds a Gaussian of each lane in `set`, of these colour classes.
     #[inline(always)]
-    pub(super) fn push(&mut self, set: u32, colours: Lanes<u32>) {
+    pub(in crate::packed) fn push(&mut self, set: u32, colours: Lanes<u32>) {
         self.sets.push(set);
         self.colours.push(colours);
     }
 
     /// Begins the next block.
-    pub(super) fn clear(&mut self) {
+    pub(in crate::packed) fn clear(&mut self) {
         self.sets.clear();
         self.colours.clear();
         for part in &mut self.parts {
@@ -111,7 +111,7 @@ impl Rest {
     }
 
     /// Numbers of nonzeros and of exact rows of the block.
-    pub(super) fn sizes(&self, form: &RestForm) -> (usize, usize) {
+    pub(in crate::packed) fn sizes(&self, form: &RestForm) -> (usize, usize) {
         let nonzeros =
             self.parts.iter().map(|part| part.totals.iter().map(|&n| n as usize).sum::<usize>()).sum();
         let rows = self.rows.iter().map(Vec::len).sum::<usize>() / form.dim.max(1);
@@ -120,7 +120,7 @@ impl Rest {
 
     /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
     #[inline(always)]
-    pub(super) fn coded(
+    pub(in crate::packed) fn coded(
         &self,
         form: &RestForm,
         part: usize,
@@ -141,7 +141,7 @@ impl Rest {
 
     /// The `count` nonzeros of lane `l` of a part from the one with number `from` on: atoms and values in steps.
     #[inline(always)]
-    pub(super) fn nonzeros(
+    pub(in crate::packed) fn nonzeros(
         &self,
         part: usize,
         from: usize,
@@ -155,7 +155,7 @@ impl Rest {
     }
 
     /// Number of nonzeros of lane `l`.
-    pub(super) fn total(&self, l: usize) -> usize {
+    pub(in crate::packed) fn total(&self, l: usize) -> usize {
         self.parts.iter().map(|part| part.totals[l] as usize).sum()
     }
 
@@ -163,7 +163,7 @@ impl Rest {
     /// impossible values.
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn part<S: Symbols>(
+    pub(in crate::packed) fn part<S: Symbols>(
         &mut self,
         s: &mut S,
         targets: Option<&Lanes<Vec<&Target>>>,

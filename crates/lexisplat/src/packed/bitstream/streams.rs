@@ -77,15 +77,15 @@ impl Stream {
         Self::ALL.into_iter().map(|stream| (format!("{stream:?}"), stream.attribute()))
     }
 
-    pub(super) const COUNTS: [Self; REST_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
-    pub(super) const ATOMS: [Self; REST_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
-    pub(super) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
+    pub(in crate::packed) const COUNTS: [Self; REST_PARTS] = [Self::Count0, Self::Count1, Self::Count2];
+    pub(in crate::packed) const ATOMS: [Self; REST_PARTS] = [Self::Atom0, Self::Atom1, Self::Atom2];
+    pub(in crate::packed) const VALUES: [Self; REST_PARTS] = [Self::Value0, Self::Value1, Self::Value2];
 }
 
 impl Stream {
     /// Bits of its probabilities. There are hundreds of atoms, and a probability is at least one unit.
     #[inline(always)]
-    pub(super) const fn precision(self) -> u32 {
+    pub(in crate::packed) const fn precision(self) -> u32 {
         match self {
             Self::Atom0 | Self::Atom1 | Self::Atom2 => 12,
             _ => 10,
@@ -103,19 +103,19 @@ pub(in crate::packed) const SLOTS: usize =
 
 /// A stream, and the number of its set of contexts among all.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Slot {
-    pub(super) stream: Stream,
-    pub(super) number: usize,
+pub(in crate::packed) struct Slot {
+    pub(in crate::packed) stream: Stream,
+    pub(in crate::packed) number: usize,
 }
 
 impl Slot {
     /// All sets of contexts in the order of their tables.
-    pub(super) fn all() -> impl Iterator<Item = Self> {
+    pub(in crate::packed) fn all() -> impl Iterator<Item = Self> {
         (0..SLOTS).map(|number| Self { stream: stream_of(number * CONTEXTS), number })
     }
 
     /// The stream of a context, counted over all.
-    pub(super) fn stream_of(context: usize) -> Stream {
+    pub(in crate::packed) fn stream_of(context: usize) -> Stream {
         stream_of(context)
     }
 }
@@ -123,7 +123,7 @@ impl Slot {
 impl Slot {
     /// Number of the context `context` among all contexts.
     #[inline(always)]
-    pub(super) fn place(self, context: u32) -> usize {
+    pub(in crate::packed) fn place(self, context: u32) -> usize {
         self.number * CONTEXTS + (context as usize).min(CONTEXTS - 1)
     }
 }
@@ -131,7 +131,7 @@ impl Slot {
 impl Stream {
     /// The contexts of the stream where this many levels are missing.
     #[inline(always)]
-    pub(super) fn at(self, levels: usize) -> Slot {
+    pub(in crate::packed) fn at(self, levels: usize) -> Slot {
         let number = match self as usize {
             stream if stream < OF_GEOMETRY => levels.min(MAX_LEVELS) * OF_GEOMETRY + stream,
             stream => (BY_LEVELS - 1) * OF_GEOMETRY + stream,

@@ -8,15 +8,15 @@ use std::path::PathBuf;
 use super::chunk::{LayerForm, starts};
 use super::fill_in::{CHANGES, interim};
 use super::geometry_syntax::{GeometrySyntax, Group};
-use super::rans_decoder::SymbolDecoder;
-use super::rans_encoder::MOST_BITS;
 use super::refinement::refine;
 use super::sh_codes::{BLOCK, Coded, Cursor, Rest};
 use super::streams::{Slot, Stream};
-use super::symbols::{LANES, Lanes, Symbols, has, low_bits};
-use super::tables::{Lookup, Tables};
 use super::{Head, lanes};
 use crate::lexi::LexiReader;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::MOST_BITS;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has, low_bits};
+use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::support::limits::Limits;
 
 /// One step of the first lane: a symbol of a stream in a context, or raw bits.

@@ -5,19 +5,19 @@
 //! how far values may differ.
 
 use super::integer_model::VALUE_BITS;
-use super::symbols::{LANES, Lanes, each};
+use crate::packed::entropy::symbols::{LANES, Lanes, each};
 
 /// A unit of integer values.
 const UNIT: f32 = 1.0 / (1_u32 << VALUE_BITS) as f32;
 /// Largest logarithm of an opacity, as an integer value. Its exponential, 0.9999, counts as opaque.
-pub(super) const MAX_LOG_OPACITY: i32 = -105;
+pub(in crate::packed) const MAX_LOG_OPACITY: i32 = -105;
 
 /// Three numbers of each lane.
-pub(super) type Lanes3 = [Lanes<f32>; 3];
+pub(in crate::packed) type Lanes3 = [Lanes<f32>; 3];
 
 /// Integer values as numbers.
 #[inline(always)]
-pub(super) fn numbers(values: &Lanes) -> Lanes<f32> {
+pub(in crate::packed) fn numbers(values: &Lanes) -> Lanes<f32> {
     each(|l| values[l] as f32 * UNIT)
 }
 
@@ -68,7 +68,7 @@ fn ln(x: f64) -> f64 {
 /// What trainers store of opacities: their logits, from logarithms as integer values.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
+pub(in crate::packed) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
     each(|l| {
         let log = f64::from(log_opacity[l].min(MAX_LOG_OPACITY)) / f64::from(1_u32 << VALUE_BITS);
         let opacity = exp2(log * std::f64::consts::LOG2_E);
@@ -78,11 +78,11 @@ pub(super) fn logits(log_opacity: &Lanes) -> Lanes<f32> {
 
 /// Axes and quaternions of rotations.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Turned {
+pub(in crate::packed) struct Turned {
     /// The axes of the three scales.
-    pub(super) axes: [Lanes3; 3],
+    pub(in crate::packed) axes: [Lanes3; 3],
     /// w, x, y, z.
-    pub(super) quaternions: [Lanes<f32>; 4],
+    pub(in crate::packed) quaternions: [Lanes<f32>; 4],
 }
 
 /// Sine and cosine of `x` from 0 to half of pi.
@@ -108,7 +108,7 @@ fn share(code: u32, bits: u32) -> f32 {
 
 /// The main axis of the point (s, t) of the square of axes, both from 0 to 1.
 #[inline(always)]
-pub(super) fn main_axis(s: f32, t: f32) -> [f32; 3] {
+pub(in crate::packed) fn main_axis(s: f32, t: f32) -> [f32; 3] {
     let (s, t) = (s * 2.0 - 1.0, t * 2.0 - 1.0);
     let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
     let z = 1.0 - x.abs() - y.abs();
@@ -120,7 +120,7 @@ pub(super) fn main_axis(s: f32, t: f32) -> [f32; 3] {
 
 /// The two axes across a main axis with z >= 0 that the shortest turn from (0, 0, 1) to it gives.
 #[inline(always)]
-pub(super) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
+pub(in crate::packed) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
     let a = 1.0 / (1.0 + z);
     let b = -(x * y * a);
     [[1.0 - x * x * a, b, -x], [b, 1.0 - y * y * a, -y]]
@@ -129,7 +129,11 @@ pub(super) fn across([x, y, z]: [f32; 3]) -> [[f32; 3]; 2] {
 /// Rotations of their codes: two coordinates of the main axis and a turn, of `bits` bits each.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle: &Lanes<bool>) -> Turned {
+pub(in crate::packed) fn rotations(
+    codes: &[Lanes<u32>; 3],
+    bits: &[Lanes<u32>; 2],
+    needle: &Lanes<bool>,
+) -> Turned {
     let mut out = Turned { axes: [[[0.0; LANES]; 3]; 3], quaternions: [[0.0; LANES]; 4] };
     for l in 0..LANES {
         let u = main_axis(share(codes[0][l], bits[0][l]), share(codes[1][l], bits[0][l]));
@@ -166,7 +170,7 @@ pub(super) fn rotations(codes: &[Lanes<u32>; 3], bits: &[Lanes<u32>; 2], needle:
 /// Powers of two of logarithms in 512ths of an octave.
 #[cfg_attr(target_arch = "wasm32", inline(never))]
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn powers(logs: &Lanes) -> Lanes<f64> {
+pub(in crate::packed) fn powers(logs: &Lanes) -> Lanes<f64> {
     each(|l| exp2(f64::from(logs[l]) / 512.0))
 }
 

@@ -8,7 +8,8 @@ use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_at
 use super::pack::PackOptions;
 use crate::packed::bitstream::morton;
 use crate::packed::bitstream::parameters::Parameters;
-use crate::packed::bitstream::{MeanView, Target, WholeAtoms, seen_row};
+use crate::packed::bitstream::{MeanView, WholeAtoms, seen_row};
+use crate::packed::encode::target::Target;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::Splats;
 use crate::sparse::codes::reconstruct;

@@ -8,9 +8,10 @@ use super::layering::Layering;
 use super::pack::PackOptions;
 use crate::packed::bitstream::stream::BitCounts;
 use crate::packed::bitstream::{
-    ALL_CONTEXTS, Chunk, CodedChunk, Form, Head, Histogram, Index, LayerForm, Lookup, Place, Range, Stream,
-    SymbolRecorder, Tables, WholeAtoms, lanes, stream_of,
+    Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, Stream, WholeAtoms, lanes, stream_of,
 };
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
 use crate::packed::scene::{PackedHead, UNNAMED};
 use crate::scene::splats::SceneMeta;
 use crate::sparse::model::Record;

@@ -16,4 +16,6 @@ pub(in crate::packed) mod pack;
 pub(in crate::packed) mod preset;
 pub(in crate::packed) mod quantised;
 pub(in crate::packed) mod removal;
+pub(in crate::packed) mod target;
 pub mod tiles;
+pub(in crate::packed) mod transcribe;

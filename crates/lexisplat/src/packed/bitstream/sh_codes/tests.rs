@@ -3,10 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::packed::bitstream::rans_decoder::SymbolDecoder;
-use crate::packed::bitstream::rans_encoder::SymbolRecorder;
-use crate::packed::bitstream::script::tables_of;
-use crate::packed::bitstream::tables::{Lookup, Tables};
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::script::tables_of;
+use crate::packed::entropy::tables::{Lookup, Tables};
 
 /// The Gaussians of each lane, none more than the first lane has.
 type Scene = Lanes<Vec<Target>>;

@@ -6,8 +6,8 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::packed::bitstream::parameters::Parameters;
-use crate::packed::bitstream::target::Target;
 use crate::packed::encode::canonical::Canonical;
+use crate::packed::encode::target::Target;
 
 /// Product of two quaternions w, x, y, z.
 fn turned([w, x, y, z]: [f64; 4], v: [f64; 3]) -> [f64; 3] {

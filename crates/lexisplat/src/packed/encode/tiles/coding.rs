@@ -8,7 +8,7 @@ use super::message::messages;
 use super::plan::Plan;
 use super::sample::SampleStatistics;
 use super::steps::Steps;
-use crate::packed::bitstream::{self, Lookup, MeanView, WholeAtoms};
+use crate::packed::bitstream::{MeanView, WholeAtoms};
 use crate::packed::encode::canonical::MortonKey;
 use crate::packed::encode::codebook::{Choice, Costs};
 use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
@@ -16,6 +16,8 @@ use crate::packed::encode::encoding::{self, Encoding, Written};
 use crate::packed::encode::floor::Floor;
 use crate::packed::encode::pack::USUAL_DC;
 use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
+use crate::packed::entropy::tables;
+use crate::packed::entropy::tables::Lookup;
 use crate::scene::extra::Extra;
 use crate::scene::splats::Splats;
 use crate::scene::splats::filter;
@@ -159,7 +161,7 @@ impl Coding {
         let appearances =
             quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
         let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
-        let tables = bitstream::Tables::of(&counts)?;
+        let tables = tables::Tables::of(&counts)?;
         let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));
         let first = plan.first_of_file(bucket.number);
         let mut start = 0;
@@ -189,12 +191,12 @@ impl Tables {
     pub fn new(counts: &[Counts]) -> Result<Self> {
         let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
         let all = Counts::sum(counts).ok_or_else(wrong)?;
-        Ok(Self { scene: all.scene, bytes: bitstream::Tables::of(&all.counts)?.write() })
+        Ok(Self { scene: all.scene, bytes: tables::Tables::of(&all.counts)?.write() })
     }
 
-    pub(super) fn read(&self, plan: &Plan) -> Result<bitstream::Tables> {
+    pub(super) fn read(&self, plan: &Plan) -> Result<tables::Tables> {
         plan.check("tables", [self.scene], None)?;
-        bitstream::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+        tables::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
     }
 }
 
@@ -217,7 +219,7 @@ impl Coded {
         plan.check("coded bucket", [self.scene], None)?;
         let wrong =
             || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
-        let own = bitstream::Tables::read(&self.tables).ok_or_else(wrong)?;
+        let own = tables::Tables::read(&self.tables).ok_or_else(wrong)?;
         let (lookup, common) = (Lookup::new(&own), tables.read(plan)?);
         let encoding = coding.encoding(plan)?;
         let forms = encoding.layering.forms(encoding.head.rest.least.len());

@@ -1,13 +1,13 @@
 //! The entropy coder by itself, for the fuzz targets. No part of the crate's interface.
 
-use super::head::Head;
-use super::index::Place;
-use super::rans_decoder::SymbolDecoder;
-use super::rans_encoder::SymbolRecorder;
-use super::script::{Ask, ask, tables_of};
-use super::symbols::LANES;
-use super::tables::{Lookup, Tables};
 use crate::packed::Packed;
+use crate::packed::bitstream::head::Head;
+use crate::packed::bitstream::index::Place;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::script::{Ask, ask, tables_of};
+use crate::packed::entropy::symbols::LANES;
+use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::scene::sh::ShDegree;
 
 /// Bytes of an entry of a script of [`decode`].

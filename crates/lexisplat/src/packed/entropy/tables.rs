@@ -2,9 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
-use super::log_probabilities::{Kind, LevelBitModels, LogProbabilities, MAX_SYMBOLS};
-use super::streams::{CONTEXTS, SLOTS, Slot};
+use crate::packed::bitstream::streams::{CONTEXTS, SLOTS, Slot};
+use crate::packed::entropy::adaptive_bits::{BitDecoder, BitEncoder, BitModel, Bits};
+use crate::packed::entropy::log_probabilities::{Kind, LevelBitModels, LogProbabilities, MAX_SYMBOLS};
 
 /// About the bits of a table and of each of its symbols, by which contexts are joined first.
 const TABLE_COST: f64 = 8.0;
@@ -61,9 +61,9 @@ impl Histogram {
 
 /// Where a symbol's share of the states lies.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Model {
-    pub(super) start: u32,
-    pub(super) share: u32,
+pub(in crate::packed) struct Model {
+    pub(in crate::packed) start: u32,
+    pub(in crate::packed) share: u32,
 }
 
 /// One table.
@@ -145,12 +145,12 @@ impl Tables {
     }
 
     /// The model of a symbol, which was counted when the tables were made.
-    pub(super) fn model(&self, context: usize, symbol: u8) -> Model {
+    pub(in crate::packed) fn model(&self, context: usize, symbol: u8) -> Model {
         self.share(context, symbol).unwrap_or(Model { start: 0, share: 1 })
     }
 
     /// The same, if the symbol has a share in the context.
-    pub(super) fn share(&self, context: usize, symbol: u8) -> Option<Model> {
+    pub(in crate::packed) fn share(&self, context: usize, symbol: u8) -> Option<Model> {
         let model = self.table(context)?.models.get(usize::from(symbol))?;
         (model.share > 0).then_some(*model)
     }
@@ -318,7 +318,7 @@ const MOST_PRECISION: u32 = 12;
 /// Places of the contexts of a set. It is a power of two, so that a masked number is one of them.
 const PLACES: usize = CONTEXTS.next_power_of_two();
 /// The context of lanes that take no symbol. They get 0, and their states stay.
-pub(super) const IDLE: u32 = CONTEXTS as u32;
+pub(in crate::packed) const IDLE: u32 = CONTEXTS as u32;
 
 /// The tables as a decoder looks symbols up: for each value of a state's low bits the symbol, its share less 1, and how
 /// far the value lies above the symbol's start.
@@ -368,7 +368,7 @@ impl Lookup {
 
     /// The tables of a set of contexts; `None` if there are none.
     #[inline(always)]
-    pub(super) fn set(&self, number: usize) -> Option<Set<'_>> {
+    pub(in crate::packed) fn set(&self, number: usize) -> Option<Set<'_>> {
         let starts = self.sets.get(number)?;
         (starts[0] != 0).then_some(Set { starts, entries: &self.entries })
     }
@@ -376,18 +376,18 @@ impl Lookup {
 
 /// The tables of a set of contexts.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Set<'l> {
+pub(in crate::packed) struct Set<'l> {
     starts: &'l [u32; PLACES],
     entries: &'l [Entry],
 }
 
 /// What a table says of a state's low bits.
-pub(super) type Entry = u32;
+pub(in crate::packed) type Entry = u32;
 
 impl Set<'_> {
     /// What the table of `context`, which is below [`CONTEXTS`] or [`IDLE`], says of `low`.
     #[inline(always)]
-    pub(super) fn entry(&self, context: u32, low: u32) -> Entry {
+    pub(in crate::packed) fn entry(&self, context: u32, low: u32) -> Entry {
         let start = self.starts[context as usize % PLACES];
         self.entries.get((start + low) as usize).copied().unwrap_or(0)
     }
@@ -395,19 +395,19 @@ impl Set<'_> {
 
 /// The symbol.
 #[inline(always)]
-pub(super) fn symbol(entry: Entry) -> u32 {
+pub(in crate::packed) fn symbol(entry: Entry) -> u32 {
     entry & 0xff
 }
 
 /// Its share less 1.
 #[inline(always)]
-pub(super) fn less_share(entry: Entry) -> u32 {
+pub(in crate::packed) fn less_share(entry: Entry) -> u32 {
     entry >> 8 & ((1 << MOST_PRECISION) - 1)
 }
 
 /// How far the low bits lie above its start.
 #[inline(always)]
-pub(super) fn over(entry: Entry) -> u32 {
+pub(in crate::packed) fn over(entry: Entry) -> u32 {
     entry >> (8 + MOST_PRECISION)
 }
 

@@ -3,10 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::packed::bitstream::rans_decoder::SymbolDecoder;
-use crate::packed::bitstream::script::{Ask, ask, tables_of};
 use crate::packed::bitstream::streams::{CONTEXTS, Slot, Stream};
-use crate::packed::bitstream::tables::{ALL_CONTEXTS, Histogram, Lookup};
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::script::{Ask, ask, tables_of};
+use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup};
 
 /// What a script codes, in how many lanes.
 fn scripts() -> impl Strategy<Value = (usize, Vec<Ask>)> {

@@ -3,10 +3,10 @@
 //! WebAssembly shifts all lanes of a vector by the same number, and the compiler takes vectors apart for anything else. There
 //! a power of two is made as the exponent of a float, and a shift is a product with it. All ways give the same bits.
 
-use super::symbols::{Lanes, each};
+use crate::packed::entropy::symbols::{Lanes, each};
 
 /// Largest shift.
-pub(super) const MOST_SHIFT: u32 = 16;
+pub(in crate::packed) const MOST_SHIFT: u32 = 16;
 /// Adding this number, 2^23, leaves a smaller whole number as the mantissa.
 const WHOLE: f32 = 8_388_608.0;
 
@@ -14,7 +14,7 @@ const NONE_IN_VECTORS: bool = cfg!(target_arch = "wasm32");
 
 /// 2^n for n up to [`MOST_SHIFT`].
 #[inline(always)]
-pub(super) fn power(n: u32) -> u32 {
+pub(in crate::packed) fn power(n: u32) -> u32 {
     if NONE_IN_VECTORS { power_of_float(n) } else { 1 << n }
 }
 
@@ -25,7 +25,7 @@ fn power_of_float(n: u32) -> u32 {
 
 /// Each number shifted to the right by up to [`MOST_SHIFT`], rounded down.
 #[inline(always)]
-pub(super) fn right(numbers: &Lanes, n: &Lanes<u32>) -> Lanes {
+pub(in crate::packed) fn right(numbers: &Lanes, n: &Lanes<u32>) -> Lanes {
     if NONE_IN_VECTORS { right_by_product(numbers, n) } else { each(|l| numbers[l] >> n[l]) }
 }
 
@@ -37,7 +37,7 @@ fn right_by_product(numbers: &Lanes, n: &Lanes<u32>) -> Lanes {
 
 /// [`right`] of numbers without sign.
 #[inline(always)]
-pub(super) fn right_unsigned(numbers: &Lanes<u32>, n: &Lanes<u32>) -> Lanes<u32> {
+pub(in crate::packed) fn right_unsigned(numbers: &Lanes<u32>, n: &Lanes<u32>) -> Lanes<u32> {
     if NONE_IN_VECTORS { right_unsigned_by_product(numbers, n) } else { each(|l| numbers[l] >> n[l]) }
 }
 
@@ -50,7 +50,7 @@ fn right_unsigned_by_product(numbers: &Lanes<u32>, n: &Lanes<u32>) -> Lanes<u32>
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::bitstream::symbols::LANES;
+    use crate::packed::entropy::symbols::LANES;
     use crate::support::rng::SplitMix64;
 
     #[test]

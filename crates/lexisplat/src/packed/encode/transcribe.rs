@@ -1,15 +1,15 @@
 //! Ranges of a chunk that are coded anew, with other tables.
 
-use super::chunk::{Form, LayerForm, lanes, sets};
-use super::fill_in::{CHANGES, interim};
-use super::geometry_syntax::{GeometrySyntax, Group};
-use super::rans_decoder::SymbolDecoder;
-use super::rans_encoder::SymbolRecorder;
-use super::refinement::refine;
-use super::sh_codes::{BLOCK, Rest};
-use super::streams::Slot;
-use super::symbols::{LANES, Lanes, Symbols};
-use super::tables::Lookup;
+use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
+use crate::packed::bitstream::fill_in::{CHANGES, interim};
+use crate::packed::bitstream::geometry_syntax::{GeometrySyntax, Group};
+use crate::packed::bitstream::refinement::refine;
+use crate::packed::bitstream::sh_codes::{BLOCK, Rest};
+use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols};
+use crate::packed::entropy::tables::Lookup;
 
 /// A decoder that records what it decodes.
 struct Transcriber<'l> {

@@ -1,7 +1,7 @@
 //! The form of a table of probabilities in a file: logarithms of the probabilities, of which the differences are coded.
 
-use super::adaptive_bits::{BitModel, Bits, SignedBitModel};
-use super::streams::Stream;
+use crate::packed::bitstream::streams::Stream;
+use crate::packed::entropy::adaptive_bits::{BitModel, Bits, SignedBitModel};
 
 /// Binary logarithms of the numbers of levels an octave that a table may have.
 const GRAINS: std::ops::RangeInclusive<u32> = 0..=3;
@@ -12,7 +12,7 @@ const WEIGHTS: [u32; 1 << FINEST] = [32, 35, 38, 41, 45, 49, 54, 59];
 const DIRECT: usize = 16;
 const FIRST_OF_MANY: u32 = 3;
 /// Largest number of symbols of a table, and bits of that number, and one.
-pub(super) const MAX_SYMBOLS: usize = 256;
+pub(in crate::packed) const MAX_SYMBOLS: usize = 256;
 const COUNT_BITS: usize = 9;
 /// Bits of the first level at one level an octave.
 const FIRST_BITS: u32 = 4;
@@ -21,7 +21,7 @@ const MOST_DELTA: usize = 24;
 
 /// What the symbols of a stream stand for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(in crate::packed) enum Kind {
     Names,
     Whole,
     Signed,
@@ -29,7 +29,7 @@ pub(super) enum Kind {
 }
 
 impl Kind {
-    pub(super) fn of(stream: Stream) -> Self {
+    pub(in crate::packed) fn of(stream: Stream) -> Self {
         use Stream::{
             Atom0, Atom1, Atom2, AtomPage, Cell, ColourClass, Count0, Count1, Count2, Value0, Value1, Value2,
         };
@@ -54,7 +54,7 @@ impl Kind {
 
 /// A table: minus the binary logarithms of the probabilities, in levels.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct LogProbabilities {
+pub(in crate::packed) struct LogProbabilities {
     /// Binary logarithm of the number of levels an octave.
     grain: u32,
     /// Of each symbol the level, and whether it occurs. The last one occurs. One that does not has the level that is
@@ -64,7 +64,7 @@ pub(super) struct LogProbabilities {
 
 /// The odds of what tables consist of.
 #[derive(Debug, Default)]
-pub(super) struct LevelBitModels {
+pub(in crate::packed) struct LevelBitModels {
     counts: [[BitModel; COUNT_BITS + 1]; 4],
     grain: [BitModel; 4],
     occurs: [[[BitModel; 2]; 2]; 4],
@@ -74,7 +74,7 @@ pub(super) struct LevelBitModels {
 impl LogProbabilities {
     /// Codes a table of probabilities of `precision` bits. The decoder gives an empty one. `None` for what no encoder
     /// writes.
-    pub(super) fn code(
+    pub(in crate::packed) fn code(
         &self,
         bits: &mut dyn Bits,
         odds: &mut LevelBitModels,
@@ -123,7 +123,7 @@ impl LogProbabilities {
     }
 
     /// The weights of the symbols, below 2^19, of a table of probabilities of `precision` bits.
-    pub(super) fn weights(&self, precision: u32) -> Vec<u32> {
+    pub(in crate::packed) fn weights(&self, precision: u32) -> Vec<u32> {
         let weight = |level: u32| {
             let up = (precision << FINEST) - (level << (FINEST - self.grain)).min(precision << FINEST);
             WEIGHTS[(up & ((1 << FINEST) - 1)) as usize] << (up >> FINEST)
@@ -132,7 +132,7 @@ impl LogProbabilities {
     }
 
     /// The table with which `counts` and the table take the fewest bits, and about how many. The last count is not zero.
-    pub(super) fn fit(
+    pub(in crate::packed) fn fit(
         counts: &[u32],
         kind: Kind,
         precision: u32,
@@ -144,7 +144,7 @@ impl LogProbabilities {
     }
 
     /// The grains worth trying for `counts`.
-    pub(super) fn grains(counts: &[u32]) -> std::ops::RangeInclusive<u32> {
+    pub(in crate::packed) fn grains(counts: &[u32]) -> std::ops::RangeInclusive<u32> {
         let used = counts.iter().filter(|&&count| count > 0).count().max(1);
         let each = counts.iter().map(|&count| u64::from(count)).sum::<u64>() / used as u64;
         let finest = match each {

@@ -1,28 +1,28 @@
 //! Scripts of what is coded one after the other, for tests and fuzz targets of the entropy coder.
 
-use super::rans_encoder::SymbolRecorder;
-use super::streams::Slot;
-use super::symbols::{LANES, Symbols, each};
-use super::tables::{ALL_CONTEXTS, Histogram, Tables};
+use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::symbols::{LANES, Symbols, each};
+use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Tables};
 
 /// One thing that a script codes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Ask {
+pub(in crate::packed) struct Ask {
     /// What is coded: modelled bytes, raw bits, whole numbers, numbers with a sign, wide numbers.
-    pub(super) kind: u8,
-    pub(super) slot: u8,
+    pub(in crate::packed) kind: u8,
+    pub(in crate::packed) slot: u8,
     /// The contexts of all lanes follow from it, and numbers of raw bits.
-    pub(super) context: u8,
+    pub(in crate::packed) context: u8,
     /// The lanes that are coded.
-    pub(super) set: u32,
+    pub(in crate::packed) set: u32,
     /// The values of all lanes follow from it.
-    pub(super) value: u64,
+    pub(in crate::packed) value: u64,
 }
 
 /// Codes what a script asks for next. Returns what an encoder coded or a decoder found, with numbers below 2^32 for signed
 /// ones.
 #[expect(clippy::cast_possible_truncation, reason = "lanes are few, and values are cut to their bits")]
-pub(super) fn ask<S: Symbols>(s: &mut S, ask: &Ask) -> [u64; LANES] {
+pub(in crate::packed) fn ask<S: Symbols>(s: &mut S, ask: &Ask) -> [u64; LANES] {
     let slots: Vec<Slot> = Slot::all().collect();
     let slot = slots[usize::from(ask.slot) % slots.len()];
     // Lanes differ, but less than values.
@@ -43,7 +43,7 @@ pub(super) fn ask<S: Symbols>(s: &mut S, ask: &Ask) -> [u64; LANES] {
 }
 
 /// How often each symbol was recorded in each context, and tables of that.
-pub(super) fn tables_of(recorder: &SymbolRecorder) -> Option<(Vec<Histogram>, Tables)> {
+pub(in crate::packed) fn tables_of(recorder: &SymbolRecorder) -> Option<(Vec<Histogram>, Tables)> {
     let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
     recorder.each(|context, symbol| histograms[context].add(symbol), |_, _| ());
     let tables = Tables::new(&histograms)?;

@@ -1,17 +1,17 @@
 //! Decoding the chunks of a file.
 
-use super::atoms::WholeAtoms;
-use super::chunk::Want;
-use super::head::Head;
-use super::index::{Chunk, Index};
-use super::mean_view::SeenAtoms;
-use super::streams::Stream;
-use super::tables::{Lookup, Tables};
-use super::unpack::{Refusal, Unpacker};
+use crate::packed::bitstream::atoms::WholeAtoms;
+use crate::packed::bitstream::chunk::Want;
+use crate::packed::bitstream::head::Head;
+use crate::packed::bitstream::index::{Chunk, Index};
+use crate::packed::bitstream::mean_view::SeenAtoms;
 use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::bitstream::streams::Stream;
 use crate::packed::decode::available_ranges::{Data, DecodeOptions};
+use crate::packed::decode::chunk_unpack::{Refusal, Unpacker};
 use crate::packed::decode::outline::RangeKind;
 use crate::packed::decode::place::{Piece, Place};
+use crate::packed::entropy::tables::{Lookup, Tables};
 use crate::packed::scene::PackedHead;
 use crate::scene::sh::ShDegree;
 use crate::sparse::dictionary::Dictionary;

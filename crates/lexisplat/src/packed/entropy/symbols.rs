@@ -1,6 +1,6 @@
 //! Runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
 
-use super::streams::Slot;
+use crate::packed::bitstream::streams::Slot;
 
 /// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A symbol of a lane depends on
 /// the one before it, so a CPU is busy only with many lanes. Two vector registers of 256 bits hold one number of each.
@@ -11,7 +11,7 @@ pub(in crate::packed) type Lanes<T = i32> = [T; LANES];
 
 /// What `of` says of each lane. It is always inlined into vector code, which the methods of arrays are not.
 #[inline(always)]
-pub(super) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
+pub(in crate::packed) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
     let mut out = [T::default(); LANES];
     for (l, out) in out.iter_mut().enumerate() {
         *out = of(l);
@@ -21,7 +21,7 @@ pub(super) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
 
 /// Whether `lane` is in `set`.
 #[inline(always)]
-pub(super) fn has(set: u32, lane: usize) -> bool {
+pub(in crate::packed) fn has(set: u32, lane: usize) -> bool {
     set & 1 << lane != 0
 }
 
@@ -29,7 +29,7 @@ pub(super) fn has(set: u32, lane: usize) -> bool {
 /// decoder returns what the range holds and never calls the closures. So one walk serves both.
 ///
 /// Only lanes in `set` are coded. The others get 0.
-pub(super) trait Symbols {
+pub(in crate::packed) trait Symbols {
     /// Bytes that are modelled in `context`, one for each lane.
     fn symbols(
         &mut self,
@@ -107,7 +107,7 @@ const DIRECT: u32 = 16;
 const DIRECT_BITS: u32 = 4;
 
 /// The token of a whole number: itself, or its bit length and the bit after the leading one.
-pub(super) fn token(value: u64) -> u32 {
+pub(in crate::packed) fn token(value: u64) -> u32 {
     if value < u64::from(DIRECT) {
         return low_half(value);
     }
@@ -117,18 +117,18 @@ pub(super) fn token(value: u64) -> u32 {
 
 /// Number of bits that follow `token`.
 #[inline(always)]
-pub(super) fn low_bits(token: u32) -> u32 {
+pub(in crate::packed) fn low_bits(token: u32) -> u32 {
     if token < DIRECT { 0 } else { (token - DIRECT) / 2 + DIRECT_BITS - 1 }
 }
 
 /// Maps signed numbers to unsigned ones by magnitude: 0, -1, 1, -2, ...
 #[inline(always)]
-pub(super) fn zigzag(value: i32) -> u32 {
+pub(in crate::packed) fn zigzag(value: i32) -> u32 {
     ((value << 1) ^ (value >> 31)).cast_unsigned()
 }
 
 /// Inverse of [`zigzag`].
 #[inline(always)]
-pub(super) fn unzigzag(value: u32) -> i32 {
+pub(in crate::packed) fn unzigzag(value: u32) -> i32 {
     (value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg()
 }

@@ -2,19 +2,19 @@
 //!
 //! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
 
-use super::streams::Slot;
-use super::symbols::{LANES, Lanes, Symbols, has};
-use super::tables::{Model, Tables};
+use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has};
+use crate::packed::entropy::tables::{Model, Tables};
 
 /// Least state between symbols. A lane begins and, decoded, ends with it.
-pub(super) const LEAST: u32 = 1 << 16;
+pub(in crate::packed) const LEAST: u32 = 1 << 16;
 /// Most raw bits that a state gives at once.
-pub(super) const MOST_BITS: u32 = 16;
+pub(in crate::packed) const MOST_BITS: u32 = 16;
 /// Ranges of fewer bytes have lanes of which 16 bits count the words.
 const LEAST_LONG: usize = 1 << 17;
 
 /// Bytes of the number of words of a lane in a range of this many bytes. As many or more remain if numbers get longer.
-pub(super) fn length_bytes(range: usize) -> usize {
+pub(in crate::packed) fn length_bytes(range: usize) -> usize {
     if range < LEAST_LONG { 2 } else { 4 }
 }
 

@@ -4,18 +4,18 @@ use std::ops::Range;
 
 use half::f16;
 
-use super::chunk::{Form, LayerForm, Sink, Want, starts};
-use super::fill_in::{KINDS, change};
-use super::geometry_syntax::{DC, Group, OPACITY, dropped, factor};
-use super::halves::halved;
-use super::integer_model::VALUE_BITS;
-use super::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
-use super::sh_codes::{BLOCK, Coded, Cursor, Rest};
-use super::symbols::{LANES, Lanes, each, has};
-use super::tables::Lookup;
-use super::values::{logits, numbers, powers, rotations};
+use crate::packed::bitstream::chunk::{Form, LayerForm, Sink, Want, starts};
+use crate::packed::bitstream::fill_in::{KINDS, change};
+use crate::packed::bitstream::geometry_syntax::{DC, Group, OPACITY, dropped, factor};
+use crate::packed::bitstream::halves::halved;
+use crate::packed::bitstream::integer_model::VALUE_BITS;
+use crate::packed::bitstream::mean_view::{MOST, MeanView, SeenAtoms, seen_row};
 use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
+use crate::packed::bitstream::sh_codes::{BLOCK, Coded, Cursor, Rest};
+use crate::packed::bitstream::values::{logits, numbers, powers, rotations};
 use crate::packed::decode::place::{Piece, Place, indices};
+use crate::packed::entropy::symbols::{LANES, Lanes, each, has};
+use crate::packed::entropy::tables::Lookup;
 use crate::sparse::codes::Escapes;
 use crate::sparse::dictionary::Dictionary;
 use crate::support::maths::Vec3;
@@ -106,7 +106,7 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
     fn call(self) -> Self::Output {
         let Self { with, layer, cell, alone, ranges, want, place, budget } = self;
         let n = place.counts.len();
-        let starts = starts(n, super::chunk::lanes(n));
+        let starts = starts(n, crate::packed::bitstream::chunk::lanes(n));
         let blank = [[0.0; LANES]; 3];
         let positions = if with.mean_view.points.is_empty() { Vec::new() } else { vec![blank; BLOCK] };
         let mut out = Out {
@@ -148,9 +148,9 @@ impl pulp::NullaryFnOnce for Job<'_, '_, '_> {
 
 /// A nonzero of a code.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Nonzero {
-    pub(super) atom: u16,
-    pub(super) value: f16,
+pub(in crate::packed) struct Nonzero {
+    pub(in crate::packed) atom: u16,
+    pub(in crate::packed) value: f16,
 }
 
 /// Where a decoded chunk goes.
@@ -283,8 +283,8 @@ impl Sink for Out<'_, '_> {
 }
 
 /// One Gaussian of each lane as numbers.
-pub(super) struct Drawn {
-    pub(super) position: [Lanes<f32>; 3],
+pub(in crate::packed) struct Drawn {
+    pub(in crate::packed) position: [Lanes<f32>; 3],
     scales: [Lanes<f32>; 3],
     opacity: Lanes<f32>,
     rotation: [Lanes<f32>; 4],
@@ -296,7 +296,7 @@ pub(super) struct Drawn {
 impl Drawn {
     #[cfg_attr(target_arch = "wasm32", inline(never))]
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub(super) fn new(
+    pub(in crate::packed) fn new(
         frame: &Frame,
         group: &Group,
         [levels, missing]: [usize; 2],
@@ -363,7 +363,7 @@ impl Drawn {
 
     /// Whether the values of all lanes in `set` are within limits and finite.
     #[inline(always)]
-    pub(super) fn can_be(&self, set: u32) -> bool {
+    pub(in crate::packed) fn can_be(&self, set: u32) -> bool {
         let all = self.position.iter().chain(&self.dc);
         let mut good = self.within;
         for values in all {

@@ -1,9 +1,9 @@
 //! What the encoder is to code of a Gaussian.
 
-use super::fill_in::CHANGES;
-use super::integer_model::VALUE_BITS;
-use super::values::across;
+use crate::packed::bitstream::fill_in::CHANGES;
+use crate::packed::bitstream::integer_model::VALUE_BITS;
 use crate::packed::bitstream::parameters::{Parameters, TARGETS};
+use crate::packed::bitstream::values::across;
 use crate::packed::encode::canonical::Canonical;
 use crate::support::maths::{Vec3, atan2, dot, square_of_axis};
 
@@ -16,14 +16,14 @@ const MOST_VALUE: f64 = (1_u32 << 26) as f64;
 #[derive(Debug, Clone, Default)]
 pub(in crate::packed) struct Target {
     /// Number of its cell on the Morton curve. It is not below that of the Gaussian before it in its lane.
-    pub(super) cell: u64,
+    pub(in crate::packed) cell: u64,
     /// Colour and shape class.
     pub(in crate::packed) classes: [u8; 2],
     /// Logarithms of the scales, that of the opacity, and the coordinates of the base colour, as values.
-    pub(super) values: [i32; TARGETS],
+    pub(in crate::packed) values: [i32; TARGETS],
     axes: [Vec3; 3],
     /// Position from the centre of its cell.
-    pub(super) offset: [f64; 3],
+    pub(in crate::packed) offset: [f64; 3],
     /// Pairs (atom, value in steps) with values that are not zero, largest first.
     pub(in crate::packed) code: Vec<(u16, i32)>,
     /// The change of pictures without it.
@@ -68,7 +68,7 @@ impl Target {
     }
 
     /// The codes of its rotation in full.
-    pub(super) fn rotation_codes(&self, [direction, turn]: [u32; 2], needle: bool) -> [u32; 3] {
+    pub(in crate::packed) fn rotation_codes(&self, [direction, turn]: [u32; 2], needle: bool) -> [u32; 3] {
         let (main, other) = if needle { (0, 1) } else { (2, 0) };
         let cell = |x: f32, bits: u32| -> u32 {
             let size = (1_u32 << bits) as f32;
@@ -78,7 +78,10 @@ impl Target {
         };
         let middle = |code: u32, bits: u32| (code as f32 + 0.5) / (1_u32 << bits) as f32;
         let codes = square_of_axis(self.axes[main]).map(|x| cell((x + 1.0) * 0.5, direction));
-        let u = super::values::main_axis(middle(codes[0], direction), middle(codes[1], direction));
+        let u = crate::packed::bitstream::values::main_axis(
+            middle(codes[0], direction),
+            middle(codes[1], direction),
+        );
         let [first, second] = across(u);
         let angle = atan2(dot(self.axes[other], second), dot(self.axes[other], first));
         let half_turn = std::f32::consts::PI;

@@ -1,34 +1,39 @@
 //! The entropy decoder of a range.
 
-use super::rans_encoder::{LEAST, MOST_BITS, length_bytes};
-use super::shifts::{power, right_unsigned};
-use super::streams::{CONTEXTS, Slot};
-use super::symbols::{LANES, Lanes, Symbols, each, has};
-use super::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::bitstream::streams::{CONTEXTS, Slot};
+use crate::packed::entropy::rans_encoder::{LEAST, MOST_BITS, length_bytes};
+use crate::packed::entropy::shifts::{power, right_unsigned};
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
+use crate::packed::entropy::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
 use crate::support::simd::Simd;
 
 /// The decoder of a range.
 #[derive(Debug)]
 pub(in crate::packed) struct SymbolDecoder<'a> {
-    pub(super) lookup: &'a Lookup,
+    pub(in crate::packed) lookup: &'a Lookup,
     /// Words of 16 bits, at least two.
-    pub(super) words: &'a [[u8; 2]],
-    pub(super) states: Lanes<u32>,
+    pub(in crate::packed) words: &'a [[u8; 2]],
+    pub(in crate::packed) states: Lanes<u32>,
     /// Next word of each lane, and the end of its words.
-    pub(super) next: Lanes<u32>,
+    pub(in crate::packed) next: Lanes<u32>,
     ends: Lanes<u32>,
     /// Vector instructions of the look-ups.
     simd: Simd,
     /// Whether something was asked for that no encoder writes.
-    pub(super) damaged: bool,
+    pub(in crate::packed) damaged: bool,
     /// Bits of each stream, if they are counted.
-    pub(super) bit_counts: Option<BitCounts>,
+    pub(in crate::packed) bit_counts: Option<BitCounts>,
 }
 
 impl<'a> SymbolDecoder<'a> {
     /// `None` if `bytes` cannot be a range of this many lanes. Bits of streams are counted if `count_bits`.
-    pub(super) fn new(lookup: &'a Lookup, bytes: &'a [u8], lanes: usize, count_bits: bool) -> Option<Self> {
+    pub(in crate::packed) fn new(
+        lookup: &'a Lookup,
+        bytes: &'a [u8],
+        lanes: usize,
+        count_bits: bool,
+    ) -> Option<Self> {
         let width = length_bytes(bytes.len());
         let (lengths, words) = bytes.split_at_checked(width * lanes.checked_sub(1)?)?;
         let (words, []) = words.as_chunks::<2>() else { return None };
@@ -63,7 +68,7 @@ impl<'a> SymbolDecoder<'a> {
     }
 
     /// Whether nothing was asked for that no encoder writes, and no lane was read beyond its end.
-    pub(super) fn good(&self) -> bool {
+    pub(in crate::packed) fn good(&self) -> bool {
         !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
     }
 

@@ -16,7 +16,7 @@ const HALF: u16 = 1 << (PRECISION - 1);
 
 /// The probability that a bit is 0, and how many bits it has seen.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct BitModel {
+pub(in crate::packed) struct BitModel {
     /// By how much the probability is above a half.
     above: i16,
     /// It counts to 255. As wide as the other one it leaves no gap, so that many odds are cleared at once.
@@ -38,7 +38,7 @@ impl BitModel {
 }
 
 /// The encoder or the decoder of bits. The encoder writes what it is given. The decoder ignores it. Both return the bit.
-pub(super) trait Bits {
+pub(in crate::packed) trait Bits {
     /// A bit below a threshold of the range.
     fn split(&mut self, zero: u16, bit: bool) -> bool;
 
@@ -83,7 +83,7 @@ const SIZE_BITS: usize = 16;
 
 /// The odds of numbers with a sign.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct SignedBitModel {
+pub(in crate::packed) struct SignedBitModel {
     nonzero: BitModel,
     negative: BitModel,
     size: [BitModel; SIZE_BITS],
@@ -91,7 +91,7 @@ pub(super) struct SignedBitModel {
 
 /// Writes bits.
 #[derive(Debug)]
-pub(super) struct BitEncoder {
+pub(in crate::packed) struct BitEncoder {
     bytes: Vec<u8>,
     low: u64,
     range: u32,
@@ -124,7 +124,7 @@ impl BitEncoder {
     }
 
     /// The bytes, without zeros at the end.
-    pub(super) fn finish(mut self) -> Vec<u8> {
+    pub(in crate::packed) fn finish(mut self) -> Vec<u8> {
         // The number within the range that ends with the most zeros.
         let end = self.low + u64::from(self.range);
         let zeros =
@@ -157,7 +157,7 @@ impl Bits for BitEncoder {
 
 /// Reads what a [`BitEncoder`] wrote. Beyond the end there are zeros.
 #[derive(Debug)]
-pub(super) struct BitDecoder<'a> {
+pub(in crate::packed) struct BitDecoder<'a> {
     bytes: &'a [u8],
     next: usize,
     code: u32,
@@ -165,7 +165,7 @@ pub(super) struct BitDecoder<'a> {
 }
 
 impl<'a> BitDecoder<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
+    pub(in crate::packed) fn new(bytes: &'a [u8]) -> Self {
         let mut decoder = Self { bytes, next: 0, code: 0, range: u32::MAX };
         (0..4).for_each(|_| decoder.shift());
         decoder
