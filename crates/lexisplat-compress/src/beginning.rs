@@ -76,7 +76,6 @@ impl<'a> From<&'a dyn SplatSource> for Source<'a> {
 /// assert_eq!(report.file_bytes, file.len() as u64);
 /// # Ok::<(), lexisplat_compress::Error>(())
 /// ```
-#[must_use]
 pub fn compress<'a>(source: impl Into<Source<'a>>) -> Compress<'a> {
     Compress {
         source: source.into(),

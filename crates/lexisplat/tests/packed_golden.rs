@@ -30,7 +30,7 @@ fn opened(name: &str) -> Packed {
 }
 
 fn decoded(name: &str) -> Model {
-    lexi::read(&golden(name, "lexi"), &Limits::default()).unwrap()
+    lexi::read(golden(name, "lexi"), &Limits::default()).unwrap()
 }
 
 fn ply_bytes(splats: &Splats) -> Vec<u8> {

@@ -4,8 +4,9 @@
 //! [`Packed::unpack`] gives back a [`Model`](crate::Model) whose SH stay sparse codes. docs/METHOD.md has
 //! the mathematics, docs/FORMAT.md the bytes.
 //!
-//! `encoding.rs` packs a scene whole or in parts. `bitstream/` holds the format that is written, of which
-//! `bitstream/geometry_syntax.rs` goes over the Gaussians of a chunk; encoder and decoder share it.
+//! `bitstream/` is what both sides share, `entropy/` the coder of its symbols. `encode/` and `decode/` are the two sides. An
+//! encoder and a decoder of the syntax are one function, such as `bitstream/geometry_syntax.rs`, over something that writes symbols
+//! or reads them.
 
 mod bitstream;
 mod decode;

@@ -65,7 +65,7 @@ pub(in crate::packed) struct Form {
 /// How the chunks of a layer are coded.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::packed) struct LayerForm {
-    /// LogProbabilities of refinement.
+    /// Levels of refinement.
     pub(in crate::packed) levels: usize,
     /// Parts of nonzeros.
     pub(in crate::packed) parts: usize,

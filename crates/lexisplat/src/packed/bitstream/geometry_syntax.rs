@@ -74,7 +74,7 @@ pub(in crate::packed) struct Group {
 #[derive(Debug)]
 pub(in crate::packed) struct GeometrySyntax<'a> {
     steering: &'a Steering,
-    /// LogProbabilities of refinement.
+    /// Levels of refinement.
     levels: usize,
     around: NeighbourContext,
     cell: Lanes<u64>,

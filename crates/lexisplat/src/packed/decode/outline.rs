@@ -24,7 +24,7 @@ pub struct LayerOutline {
     pub gaussians: u64,
     /// Its chunks.
     pub chunks: Range<usize>,
-    /// LogProbabilities of refinement of its chunks.
+    /// Levels of refinement of its chunks.
     pub levels: usize,
     /// Parts of the nonzeros of SH-rest of its chunks.
     pub sh_parts: usize,

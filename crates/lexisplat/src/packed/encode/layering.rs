@@ -22,7 +22,7 @@ const CHUNKS: usize = 6;
 const REST: usize = 2;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];
-/// LogProbabilities of refinement of each layer.
+/// Levels of refinement of each layer.
 const LEVELS: [u8; LAYERS] = [2, 1];
 /// Number of layers, where there are several.
 const LAYERS: usize = SHARES.len() + 1;
@@ -171,7 +171,7 @@ impl Layering {
 struct Order {
     parts: usize,
     order: Vec<Place>,
-    /// LogProbabilities of refinement of each chunk so far.
+    /// Levels of refinement of each chunk so far.
     finer: Vec<usize>,
 }
 

@@ -20,7 +20,7 @@ impl Preset {
     /// All of them, smallest files first.
     pub const ALL: [Self; 4] = [Self::Small, Self::Balanced, Self::High, Self::Archive];
 
-    /// The expected average PSNR in dB, for [`Packer::step_for`](super::Packer::step_for).
+    /// The expected average PSNR in dB, for [`Packer::step_for`](crate::packed::Packer::step_for).
     #[must_use]
     pub fn decibels(self) -> f64 {
         match self {

@@ -1,10 +1,6 @@
 //! Entropy coding: rANS in lanes for symbols with tables of probabilities, and adaptive bits for what is written once a file.
 
-#![expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "a chunk has at most 65,536 Gaussians, and values are within limits that are checked or clamped"
-)]
+#![expect(clippy::cast_possible_truncation, reason = "states, words and frequencies are within limits")]
 #![expect(
     clippy::needless_range_loop,
     reason = "loops over lanes are written out, since iterators over several arrays do not become vector code"

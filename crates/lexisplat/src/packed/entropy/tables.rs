@@ -9,7 +9,7 @@ use crate::packed::entropy::log_probabilities::{Kind, LevelBitModels, LogProbabi
 /// About the bits of a table and of each of its symbols, by which contexts are joined first.
 const TABLE_COST: f64 = 8.0;
 const SYMBOL_COST: f64 = 1.0;
-/// LogProbabilities an octave, as a binary logarithm, at which joined tables are compared.
+/// Levels an octave, as a binary logarithm, at which joined tables are compared.
 const JOINING_GRAIN: u32 = 1;
 /// The table of contexts that are never used.
 const NONE: u8 = u8::MAX;
