@@ -15,7 +15,7 @@ use crate::report::reached;
 const CLOSE_DB: f64 = 0.1;
 /// A size may fall short of the target by this share.
 const CLOSE_SIZE: f64 = 0.01;
-/// The file that says what step a preset takes may miss its aim by this much, in dB.
+/// Largest miss of a preset's first file, in dB, after which the step is taken from that file without another trial.
 const CLOSE_FIRST: f64 = 0.5;
 /// A preset may miss its aim by this much, in dB.
 const CLOSE_PRESET: f64 = 0.5;

@@ -71,9 +71,8 @@ pub(crate) struct Compress {
     /// and opacities make up for them and for errors. --keep-order and --tol leave none out either.
     #[arg(long)]
     pub(crate) keep_all: bool,
-    /// Make the best scene of at most this many Gaussians, 1 or more, for viewers with a limit. --preset is then the
-    /// quality of the file beside that scene, while --psnr and --min-psnr compare it with the original [default: no
-    /// limit].
+    /// Leave out Gaussians that show least until at most N stay, for viewers with a limit. --preset is then the quality of the
+    /// file beside the smaller scene. --psnr and --min-psnr compare it with the original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
     /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder

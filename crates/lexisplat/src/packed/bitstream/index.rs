@@ -75,8 +75,8 @@ pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool)
 }
 
 impl Index {
-    /// Numbers the Gaussians and places the ranges of all chunks. `None` if there are more than memory counts, or if the
-    /// order names a range that is not there. Makes bounds those that are written.
+    /// Numbers the Gaussians, places the ranges of all chunks, and widens bounds of chunks to those that are written. `None` if
+    /// there are more Gaussians or bytes than memory counts, or if the order names a range that is not there.
     pub(in crate::packed) fn place(&mut self) -> Option<()> {
         let mut first = 0_usize;
         let is_one = self.chunks.len() == 1;

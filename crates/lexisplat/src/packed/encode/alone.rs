@@ -91,8 +91,8 @@ pub(in crate::packed) fn steps(x: f64, step: f64) -> i32 {
     libm::rint(x / step).clamp(-MOST_STEPS, MOST_STEPS) as i32
 }
 
-/// What of opacity times area the Gaussians from `first` on have around each of those before, over what that has. Each counts
-/// for the nearest one.
+/// Returns for each Gaussian before `first` the ratio `sum / own`. `own` is its opacity times its area. `sum` is that of the
+/// Gaussians from `first` on that are nearer to it than to any other before `first`.
 fn missing(g: &Geometry, places: &[MortonKey], first: usize) -> Vec<f64> {
     let area = |place: &MortonKey| {
         let mut scales = g.scales[place.index()];

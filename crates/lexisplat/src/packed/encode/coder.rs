@@ -26,8 +26,8 @@ pub(in crate::packed) const SAMPLE: usize = 24_576;
 const ATOM_BITS_SAMPLE: usize = 2048;
 /// Gaussians that pay for one more atom.
 const GAUSSIANS_PER_ATOM: usize = 64;
-/// Largest number of atoms that are learned by default: as many as one byte counts. Where the atoms that are the same in
-/// all files do not follow there are at least as many as coefficients in a row, since fewer do not span the rows.
+/// Largest number of atoms that are learned by default: as many as one byte counts. Files without the fixed atoms have at least
+/// as many learned atoms as a row has coefficients, since fewer do not span the rows.
 const MAX_LEARNED: usize = 256;
 /// Scenes that pay for fewer atoms than this many times the coefficients of a row choose among several numbers of them.
 const CHOICE: usize = 2;

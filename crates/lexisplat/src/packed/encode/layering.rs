@@ -18,7 +18,7 @@ const FACTOR_STEPS: usize = 60;
 const LEAST_CHUNK: usize = 8192;
 pub(crate) const MOST_CHUNK: usize = 32_768;
 const CHUNKS: usize = 6;
-/// A rest of up to a chunk over this is part of the one before.
+/// The last Gaussians of a layer join the chunk before them if they are at most its number over this.
 const REST: usize = 2;
 /// Sizes of nonzeros at which their parts end, where there are layers.
 const PARTS: [u32; 3] = [12, 6, 1];

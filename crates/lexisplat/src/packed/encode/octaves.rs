@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 /// Parts of an octave. A weight that is rounded to one of them is off by at most 4.4 %.
 const PER_OCTAVE: f64 = 8.0;
-/// The number of weights that are 0.
+/// The code of a weight of 0.
 const NONE: i16 = i16::MIN;
 
-/// The number of a weight that is not below 0.
+/// The code of a weight that is not below 0: its binary logarithm in parts of an octave.
 pub(in crate::packed) fn octaves(weight: f32) -> i16 {
     if weight <= 0.0 || !weight.is_finite() {
         return NONE;

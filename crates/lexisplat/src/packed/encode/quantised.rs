@@ -26,9 +26,11 @@ use crate::support::progress::{Progress, Stage};
 use crate::support::spill::SpillTo;
 use crate::support::stopwatch::Stopwatch;
 
-/// Fits base colours and opacities of a part of a scene. Takes all Gaussians of the part, what a file has of them, and for
-/// each that the file has its sensitivities to the colour and to the logarithm of the opacity. Returns what fits, for each
-/// that the file has.
+/// Fits base colours and opacities of a part of a scene to pictures of it.
+///
+/// The arguments are the part, the model that a file has of it, and for each Gaussian of the model how pictures depend on its
+/// colour and on the logarithm of its opacity. The result has one appearance for each Gaussian of the model, or is `None` if
+/// nothing is fitted.
 pub type Refit<'a, E = Error> =
     dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>, E> + 'a;
 

@@ -9,8 +9,9 @@ use crate::support::maths::log_sigmoid;
 /// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
 /// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
 const REMOVAL: f64 = 10.0;
-/// Share of the mean squared change of the picture that changes most, over the usual excess of that over the mean of all
-/// pictures. It counts where it is larger than that mean. Found by trial (docs/METHOD.md).
+/// Removal of a Gaussian changes pictures by `max(mean, WORST_SHARE / excess * worst)`. `mean` is the mean squared change of all
+/// pictures, `worst` that of the picture that changes most, and `excess` the median of `worst / mean` over Gaussians. Found by
+/// trial (docs/METHOD.md).
 const WORST_SHARE: f32 = 0.8;
 /// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
 const NEVER_DRAWN: f32 = -5.541_264;

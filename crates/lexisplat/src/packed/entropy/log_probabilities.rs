@@ -57,8 +57,8 @@ impl Kind {
 pub(in crate::packed) struct LogProbabilities {
     /// Binary logarithm of the number of levels an octave.
     grain: u32,
-    /// Of each symbol the level, and whether it occurs. The last one occurs. One that does not has the level that is
-    /// predicted, so that others are predicted from it.
+    /// The level of each symbol, and whether the symbol occurs. The last symbol occurs. A symbol that does not occur has the level
+    /// that is predicted for it, since levels of later symbols are predicted from it.
     symbols: Vec<(u32, bool)>,
 }
 

@@ -12,10 +12,10 @@ use crate::support::progress::Progress;
 const PARTS: [usize; 3] = [4, 2, 1];
 /// Steps of values that are tried, as shares of the usual one. With few atoms errors are larger at the same step.
 const STEPS: [f32; 5] = [1.0, 0.9, 0.8, 0.7, 0.6];
-/// Bits may be saved by an error above that with as many learned atoms as coefficients, at this times the usual price of
-/// an error. A smaller error than that saves none, so that pictures stay as good.
+/// Price of an error above that of the reference, as a multiple of the usual price. The reference is a dictionary with as many
+/// learned atoms as coefficients. An error below that of the reference earns nothing, so that pictures stay as good.
 const EXCESS: f64 = 2.0;
-/// By how many bits fewer than usual atoms are rounded at most.
+/// Most bits by which atoms are rounded more coarsely than usual.
 const FEWER_BITS: u32 = 3;
 /// Least bits of atoms.
 const LEAST_BITS: u32 = 2;

@@ -8,7 +8,7 @@ use crate::support::error::{Error, Result};
 
 /// Bytes of the checksum at the end.
 pub(super) const CHECKSUM: usize = 4;
-/// What bytes are of one version: those of another may mean something else.
+/// The version of this crate, which every message states. Bytes of another version may mean something else, and are refused.
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// Writes `message`, which is called `kind`.
