@@ -17,7 +17,7 @@ use crate::views::SceneKind;
 const MEMORY: u64 = 320_000_000;
 const MEMORY_PER_TEN_BYTES: u64 = 26;
 /// Most Gaussians of a scene without cameras that is packed whole. A larger one is looked at too little as a whole: files in
-/// parts are 1 % larger at equal quality for 0.4 million Gaussians, and 9 % smaller for 1.2 million (docs/results/sizes.md).
+/// parts are 4 % larger at equal quality for 0.4 million Gaussians, and 9 % smaller for 1.2 million (docs/results/sizes.md).
 const MOST_WHOLE: u64 = 786_432;
 
 /// Name of [`Packing::with_max_gaussians`] in errors.
