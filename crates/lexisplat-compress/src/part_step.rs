@@ -11,7 +11,7 @@ use crate::refit::GAIN_FOUND;
 use crate::target::{DB_PER_HALVING, on_grid};
 
 /// Steps in an octave. Scores of one scene in two units differ by 0.1 dB, and finer ones would often give them different steps.
-const STEPS_PER_OCTAVE: f64 = 4.0;
+const STEPS_PER_OCTAVE: f64 = 2.0;
 /// Number of files that are made.
 const FILES: usize = 2;
 /// Largest change of the step's binary logarithm by one file.
