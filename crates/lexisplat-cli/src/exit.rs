@@ -93,7 +93,7 @@ fn classify(error: &anyhow::Error) -> Blame {
         return view(e);
     }
     if let Some(e) = error.downcast_ref::<lexisplat_compress::Error>() {
-        return eval(e);
+        return compression(e);
     }
     if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
         return render(e);
@@ -107,7 +107,7 @@ fn view(error: &lexisplat_view::Error) -> Blame {
     let advice = match error {
         Error::Codec(e) => return codec(e),
         Error::Render(e) => return render(e),
-        Error::Eval(e) => return eval(e),
+        Error::Eval(e) => return compression(e),
         Error::Exists(_) => return (Kind::Exists, Some(OVERWRITE.into())),
         Error::NoDisplay => {
             "a window needs X11 or Wayland (over ssh: `ssh -X`; without a display: `xvfb-run`); `lexisplat render` needs neither"
@@ -124,7 +124,7 @@ fn view(error: &lexisplat_view::Error) -> Blame {
     (Kind::Graphics, Some(advice.into()))
 }
 
-fn eval(error: &lexisplat_compress::Error) -> Blame {
+fn compression(error: &lexisplat_compress::Error) -> Blame {
     use lexisplat_compress::Error;
     match error {
         Error::Codec(e) => codec(e),

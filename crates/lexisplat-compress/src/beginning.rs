@@ -11,12 +11,12 @@ use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, ViewSet};
 
 use crate::error::{Error, Result};
-use crate::packing::{Compression, Packing, Quality};
+use crate::packing::{Compression, DEFAULT_MEMORY, Packing, Quality};
 use crate::report::CompressionReport;
 use crate::target::Target;
 use crate::views::read_beside;
 
-/// What is compressed.
+/// The scene to compress.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Source<'a> {
@@ -114,7 +114,7 @@ impl<'a> Compress<'a> {
         self.quality(preset)
     }
 
-    /// A mean PSNR over views of the scene, in dB: 40 is hard to tell from the original, 35 is visible side by side.
+    /// A mean PSNR over views of the scene, in dB.
     pub fn psnr(self, decibels: f64) -> Self {
         self.quality(Target::MeanPsnr(decibels))
     }
@@ -185,7 +185,7 @@ impl<'a> Compress<'a> {
     }
 
     fn compression(&self) -> Compression {
-        Packing::new(self.quality).with_gpu(self.gpu.clone()).into()
+        Packing::new(self.quality).with_gpu(self.gpu.clone()).with_memory(DEFAULT_MEMORY).into()
     }
 
     fn run_source(

@@ -65,7 +65,7 @@ pub use error::{Error, Result};
 pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
 pub use judge::{Judge, Score};
 pub use layout::choose_layout;
-pub use packing::{Compression, Packing, Quality};
+pub use packing::{Compression, DEFAULT_MEMORY, Packing, Quality};
 pub use packing_views::{Looked, PackingViews, judging_views};
 pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
 pub use signs::shows_almost_nothing;

@@ -70,8 +70,9 @@ impl Observer<Error> for Parts<'_> {
     }
 }
 
-/// The sensitivity of pictures of a part of a scene and the step with which it has about `decibels`, from views like photographs of it and from all around. With the latter alone
-/// files of the same size were 1.7 dB worse (docs/results/scale.md). The memo is the views. A part without Gaussians has neither.
+/// Draws `part` of a scene from views like photographs of it and from all around. The result has the sensitivity of these pictures,
+/// the step with which the part has about `decibels`, and the views as the memo. A part without Gaussians has no views. With views
+/// from all around alone, files of the same size were 1.7 dB worse (docs/results/scale.md).
 ///
 /// # Errors
 /// [`lexisplat::Error::Cancelled`] within [`Error::Codec`]; on a GPU [`Error::Render`] if the part does not fit.

@@ -6,8 +6,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::{CompressOptions, Layout, Limits, Progress, Silent, Splats, Stage, lexi, ply};
-use lexisplat_compress::{Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target};
-use lexisplat_compress::{Looked, SensitivitySource};
+use lexisplat_compress::{
+    Compression, CompressionReport, Error, Looked, Packing, Quality, SceneKind, SensitivitySource, Target,
+};
 use lexisplat_render::{Renderer, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 

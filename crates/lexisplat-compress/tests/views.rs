@@ -5,9 +5,7 @@ use glam::{DQuat, DVec3};
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::Preset;
 use lexisplat::{Limits, ShDegree, Silent, Splats, lexi};
-use lexisplat_compress::Compression;
-use lexisplat_compress::{CompressionReport, Packing, SceneKind, Target};
-use lexisplat_compress::{Judge, PackingViews};
+use lexisplat_compress::{Compression, CompressionReport, Judge, Packing, PackingViews, SceneKind, Target};
 use lexisplat_render::{Camera, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 

@@ -5,8 +5,7 @@ use lexisplat_render::{Camera, Image, Renderer, Scene};
 
 use crate::scorer::Scorer;
 use crate::scores::{Comparison, ViewScore};
-use lexisplat_compress::DrawOptions;
-use lexisplat_compress::{Error, Result};
+use lexisplat_compress::{DrawOptions, Error, Result};
 
 /// Draws `a` and `b` with `renderer` from every camera and scores `b` against `a` by PSNR and SSIM.
 ///

@@ -8,9 +8,8 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Dictionary, Layout, Limits, Pursuit, ShDegree, SplatSource, Splats,
     lexi,
 };
-use lexisplat_compress::choose_layout;
 use lexisplat_compress::{
-    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, read_beside,
+    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, choose_layout, read_beside,
 };
 use lexisplat_render::{Device, ViewSet};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};

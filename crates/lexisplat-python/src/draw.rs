@@ -4,8 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use lexisplat::{Model, Offset, ShDegree, Splats};
-use lexisplat_compress::judging_views;
-use lexisplat_compress::{DEFAULT_MAX_WIDTH, DrawOptions, draw_views};
+use lexisplat_compress::{DEFAULT_MAX_WIDTH, DrawOptions, draw_views, judging_views};
 use lexisplat_eval::{Comparison, compare as compare_scenes};
 use lexisplat_render::{Device, Image, Renderer, Scene as Drawable};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};

@@ -212,6 +212,13 @@ mod tests {
     }
 
     #[test]
+    fn the_program_allows_as_much_memory_as_the_library() {
+        let Cli { command, .. } = Cli::try_parse_from(["lexisplat", "compress", "a.ply"]).unwrap();
+        let Command::Compress(args) = command else { panic!("another command") };
+        assert_eq!(args.memory, lexisplat_compress::DEFAULT_MEMORY);
+    }
+
+    #[test]
     fn every_option_and_command_has_a_help() {
         let every = command();
         for command in every.get_subcommands() {

@@ -4,8 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::{Model, Progress};
-use lexisplat_compress::judging_views;
-use lexisplat_compress::{DrawOptions, SceneKind};
+use lexisplat_compress::{DrawOptions, SceneKind, judging_views};
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, Loaded, SceneFile, Whereabouts, compare, format, montage, png};
 use lexisplat_render::{Camera, Renderer};

@@ -12,8 +12,10 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Joined, Layout, Limits, Record,
     SplatSource, lexi,
 };
-use lexisplat_compress::{Compression, CompressionReport, Packing, Quality, Target, read_beside};
-use lexisplat_compress::{SensitivitySource, overshoot, uncertain_by};
+use lexisplat_compress::{
+    Compression, CompressionReport, Packing, Quality, SensitivitySource, Target, overshoot, read_beside,
+    uncertain_by,
+};
 use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
 use lexisplat_render::{ViewSet, read_views};

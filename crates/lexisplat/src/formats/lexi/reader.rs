@@ -138,7 +138,7 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// [`Error::Parameter`] for a file that is not packed, whose nonzeros have no parts.
     pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
-        self.wish("sh_parts", parts)?.sh_parts = parts;
+        self.decode_options("sh_parts", parts)?.sh_parts = parts;
         Ok(self)
     }
 
@@ -148,14 +148,14 @@ impl<'a> LexiReader<'a> {
     /// # Errors
     /// [`Error::Parameter`] for a file that is not packed, which has none.
     pub fn with_integers_verified(mut self) -> Result<Self> {
-        self.wish("verify", true)?.verify = true;
+        self.decode_options("verify", true)?.verify = true;
         Ok(self)
     }
 
-    /// What is made of chunks of a packed file. `name` and `value` are what is asked of it.
-    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut DecodeOptions> {
+    /// The choices of decoding chunks of a packed file. Errors call the choice that is made `name` and `value`.
+    fn decode_options(&mut self, name: &'static str, value: impl ToString) -> Result<&mut DecodeOptions> {
         match &mut self.kind {
-            Kind::Packed(packed) => Ok(&mut packed.decoder.wish),
+            Kind::Packed(packed) => Ok(&mut packed.decoder.options),
             Kind::Exact(_) => Err(Error::parameter(name, value, "only for packed .lexi files")),
         }
     }

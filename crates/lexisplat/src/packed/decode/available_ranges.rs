@@ -44,7 +44,7 @@ impl<'d> Data<'d> {
     }
 }
 
-/// What is made of a chunk.
+/// Choices of decoding a chunk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct DecodeOptions {
     /// Parts of nonzeros that are decoded, at most.

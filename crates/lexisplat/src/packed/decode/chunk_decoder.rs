@@ -76,7 +76,7 @@ impl BitstreamDecoder {
         data: Data<'_>,
         c: usize,
         first: usize,
-        wish: DecodeOptions,
+        options: DecodeOptions,
         place: &mut Place<'_>,
         budget: &MemoryBudget<'_>,
         count_bits: bool,
@@ -87,16 +87,17 @@ impl BitstreamDecoder {
         let chunk = index.chunks.get(c).ok_or_else(damaged)?;
         let form = index.layer(chunk.layer);
         let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
-        let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= wish.sh_parts);
+        let is_wanted =
+            |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= options.sh_parts);
         let mut ranges = self.checked(data, c, chunk, is_wanted)?;
         if alone.is_empty()
             && !count_bits
-            && !wish.verify
+            && !options.verify
             && let Some(interim) = ranges.get_mut(form.interim_range())
         {
             *interim = None;
         }
-        let want = Want { sums: wish.verify, bits: count_bits };
+        let want = Want { sums: options.verify, bits: count_bits };
         let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
         let (mut piece, sums) = piece.map_err(|refusal| match refusal {
             Refusal::Damaged => damaged(),

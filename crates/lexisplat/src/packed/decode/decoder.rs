@@ -23,7 +23,7 @@ pub(crate) struct Decoder {
     chunks: Vec<usize>,
     spans: Vec<Range<usize>>,
     /// What is made of chunks.
-    pub(crate) wish: DecodeOptions,
+    pub(crate) options: DecodeOptions,
     decoder: Box<BitstreamDecoder>,
 }
 
@@ -50,8 +50,8 @@ impl Decoder {
         }
         head.limits.check_gaussians(&head.file, first as u64)?;
         head.limits.check_atoms(&head.file, head.atoms as u64)?;
-        let (file, wish) = (head.file.clone(), DecodeOptions::default());
-        Ok(Self { file, chunks, spans, wish, decoder: Box::new(decoder) })
+        let (file, options) = (head.file.clone(), DecodeOptions::default());
+        Ok(Self { file, chunks, spans, options, decoder: Box::new(decoder) })
     }
 
     /// Layers, chunks and ranges of a scene whose data start at `data_start` of the file.
@@ -120,6 +120,6 @@ impl Decoder {
         count_bits: bool,
     ) -> Result<Piece> {
         let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
-        self.decoder.piece(data, c, first, self.wish, place, budget, count_bits)
+        self.decoder.piece(data, c, first, self.options, place, budget, count_bits)
     }
 }

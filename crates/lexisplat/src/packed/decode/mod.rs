@@ -1,6 +1,7 @@
 //! The decoder: from bytes that are there, in any order of ranges, to what is drawn.
 //!
-//! With `bitstream/` it is all that reads packed files. It shares no code with the encoder.
+//! With `bitstream/` and `entropy/` it is all that reads packed files. Of `encode/` these folders use `target.rs` and
+//! `canonical.rs`, since an encoder and a decoder of the syntax are one function.
 
 pub(in crate::packed) mod available_ranges;
 pub(in crate::packed) mod chunk_decoder;

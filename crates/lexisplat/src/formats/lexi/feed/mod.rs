@@ -254,8 +254,8 @@ impl LexiFeed {
         let head = super::packed::head(&checked, &self.limits)?;
         let (data_start, data_bytes) = super::packed::data_place(&checked);
         let mut decoder = Decoder::new(&head, data_bytes)?;
-        decoder.wish.sh_parts = self.options.sh_parts;
-        decoder.wish.verify = self.options.verify_integers;
+        decoder.options.sh_parts = self.options.sh_parts;
+        decoder.options.verify = self.options.verify_integers;
         let outline = decoder.outline(data_start);
         if let Some(range) = outline.ranges.iter().find(|range| range.bytes.is_empty()) {
             let text =
