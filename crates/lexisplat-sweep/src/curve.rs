@@ -44,24 +44,6 @@ impl At<'_> {
     }
 }
 
-/// By how much the same drawing of dense SH varied over all rounds beside all of `points`: the range over the mean, of the
-/// model where it is largest. `None` if frames were not timed.
-pub(super) fn dense_noise(points: &[At<'_>]) -> Option<f64> {
-    let rates: Vec<(&SceneResult, FrameRate)> = points
-        .iter()
-        .flat_map(|at| &at.models)
-        .filter_map(|(scene, point)| Some((*scene, point.fps?.dense)))
-        .collect();
-    let noise = rates.iter().filter_map(|(scene, _)| {
-        let own = || rates.iter().filter(|(other, _)| std::ptr::eq(*scene, *other)).map(|(_, rate)| rate);
-        let mean = Summary::of(own().map(|rate| rate.mean)).mean?;
-        let least = own().map(|rate| rate.least).reduce(f64::min)?;
-        let most = own().map(|rate| rate.most).reduce(f64::max)?;
-        (mean > 0.0).then(|| (most - least) / mean)
-    });
-    noise.reduce(f64::max)
-}
-
 /// Kinds of settings. Each makes a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Kind {
@@ -73,7 +55,7 @@ pub(super) enum Kind {
 impl Kind {
     pub(super) const ALL: [Self; 3] = [Self::Tolerances, Self::Caps, Self::Presets];
 
-    fn of(setting: Setting) -> Self {
+    pub(super) fn of(setting: Setting) -> Self {
         match setting {
             Setting::Tolerance(_) => Self::Tolerances,
             Setting::MaxNonzeros(_) => Self::Caps,
@@ -84,11 +66,10 @@ impl Kind {
 
 /// The settings of a kind, closest to the original first. Over all scenes, or for that of one column.
 pub(super) fn curve<'a>(grid: &Grid<'a>, method: Method, kind: Kind, column: Option<usize>) -> Vec<At<'a>> {
+    let scenes = grid.models(method, column);
     let of_setting = |&setting: &Setting| {
-        let models: Vec<_> = match column {
-            Some(column) => grid.point(method, column, setting).into_iter().collect(),
-            None => grid.points(method, setting).collect(),
-        };
+        let models: Vec<_> =
+            scenes.iter().filter_map(|scene| Some((*scene, scene.point(setting)?))).collect();
         (!models.is_empty()).then_some(At { setting, models, one_scene: column.is_some() })
     };
     grid.settings.iter().filter(|&&setting| Kind::of(setting) == kind).filter_map(of_setting).collect()

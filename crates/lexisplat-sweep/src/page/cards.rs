@@ -6,10 +6,9 @@ use lexisplat_eval::metrics::Metric;
 use maud::{Markup, html};
 
 use super::{card, decibels};
-use crate::curve::{At, Kind, curve, dense_noise};
 use crate::grid::Grid;
 use crate::measure::Measure;
-use crate::table::signed;
+use crate::numbers::signed;
 use crate::{SceneResult, Setting};
 
 /// The preset that has a card: the default of packed files.
@@ -32,38 +31,34 @@ pub(super) fn cards(grid: &Grid<'_>) -> Markup {
     if let Some(setting) = grid.main_setting() {
         let label = setting.label();
         let over = |measure| over_models(grid, setting, measure);
-        if let Some(psnr) = over(psnr).mean {
-            let what = format!("mean PSNR against the original\u{2019}s pictures at {label}; more is closer");
-            cards.push(card(decibels(&format!("{psnr:.1}")), &what));
-        }
-        if let Some(ratio) = over(Measure::FileRatio).mean {
-            let what = format!("smaller at {label}: whole files, every byte counted, geometry exact");
-            cards.push(card(times(ratio), &what));
-        }
-        if let Some(ratio) = over(Measure::CoefficientRatio).mean {
-            let what = format!("fewer coefficients at {label}: the paper\u{2019}s way of counting");
-            cards.push(card(times(ratio), &what));
-        }
-        if let Summary { mean: Some(mean), min: Some(worst), .. } = over(Measure::PhotoChange) {
-            let what = format!(
-                "change of PSNR against photos at {label}; {} dB where it is worst",
-                signed(worst, 2)
-            );
-            cards.push(card(decibels(&signed(mean, 2)), &what));
-        }
-        if let Some(speedup) = over(Measure::Speedup).mean {
-            let what = format!("the frames a second of dense SH, from codes at {label} on {}", grid.device());
-            let points: Vec<At<'_>> = grid
-                .methods
-                .iter()
-                .flat_map(|&method| curve(grid, method, Kind::Tolerances, None))
-                .filter(|at| at.setting == setting)
-                .collect();
-            let noise = dense_noise(&points).unwrap_or(f64::INFINITY);
-            let within =
-                if (speedup - 1.0).abs() > noise { "" } else { "; no more than that itself varies by" };
-            cards.push(card(times(speedup), &format!("{what}{within}")));
-        }
+        let mut add = |value: Option<Markup>, what: &str| cards.extend(value.map(|value| card(value, what)));
+        let decibels_of = |value: f64| decibels(&format!("{value:.1}"));
+        add(
+            over(psnr).mean.map(decibels_of),
+            &format!("mean PSNR against the original\u{2019}s pictures at {label}; more is closer"),
+        );
+        add(
+            over(Measure::FileRatio).mean.map(times),
+            &format!("smaller at {label}: whole files, every byte counted, geometry exact"),
+        );
+        add(
+            over(Measure::CoefficientRatio).mean.map(times),
+            &format!("fewer coefficients at {label}: the paper\u{2019}s way of counting"),
+        );
+        let change = over(Measure::PhotoChange);
+        let worst = signed(change.min.unwrap_or_default(), 2);
+        add(
+            change.mean.map(|mean| decibels(&signed(mean, 2))),
+            &format!("change of PSNR against photos at {label}; {worst} dB where it is worst"),
+        );
+        let speedup = over(Measure::Speedup).mean;
+        let noise = dense_noise(grid, setting).unwrap_or(f64::INFINITY);
+        let is_told = speedup.is_none_or(|speedup| (speedup - 1.0).abs() > noise);
+        let within = if is_told { "" } else { "; no more than that itself varies by" };
+        add(
+            speedup.map(times),
+            &format!("the frames a second of dense SH, from codes at {label} on {}{within}", grid.device()),
+        );
     }
     let packed = |measure| over_models(grid, Setting::Preset(PRESET), measure).mean;
     if let (Some(ratio), Some(psnr)) = (packed(Measure::FileRatio), packed(psnr)) {
@@ -72,4 +67,14 @@ pub(super) fn cards(grid: &Grid<'_>) -> Markup {
         cards.push(card(times(ratio), &what));
     }
     html! { dl class="cards" { @for card in cards { (card) } } }
+}
+
+/// By how much the same drawing of dense SH varied over the rounds beside a setting: the range over the mean, of the model
+/// where it is largest. `None` if frames were not timed.
+fn dense_noise(grid: &Grid<'_>, setting: Setting) -> Option<f64> {
+    let noise = grid.scenes().filter_map(|(_, scene)| {
+        let dense = scene.point(setting)?.fps?.dense;
+        (dense.mean > 0.0).then(|| (dense.most - dense.least) / dense.mean)
+    });
+    noise.reduce(f64::max)
 }

@@ -2,22 +2,17 @@
 
 use lexisplat_eval::format;
 use lexisplat_eval::montage::AMPLIFICATION;
-use maud::{Markup, PreEscaped, html};
+use maud::{Markup, html};
 
 use super::cards::cards;
 use super::{image, scores, section};
 use crate::grid::Grid;
 use crate::measure::Measure;
-use crate::saturation::saturation as paragraphs;
 use crate::table::Table;
 use crate::{Figure, NOTES, Results, SweepPicture, tables};
 
-/// Most rows of the table of single views on the page.
-const MOST_VIEW_ROWS: usize = 1500;
 /// Tables with more rows than this scroll by themselves.
 const TALL: usize = 24;
-/// Figures that show whether quality levels off.
-const SATURATION: [&str; 2] = ["levels-psnr", "levels-fps"];
 /// Start of the names of figures of single scenes.
 const SCENE: &str = "scene-";
 
@@ -108,12 +103,9 @@ pub(super) fn pictures(results: &Results, pictures: &[SweepPicture]) -> Markup {
 
 /// A figure as SVG within the page, which follows the theme.
 fn figure(figure: &Figure) -> Markup {
-    let label = html! { (figure.title) }.into_string();
-    let svg = figure.svg.replacen(" xmlns=\"http://www.w3.org/2000/svg\"", "", 1);
-    let svg = svg.replacen("<svg ", &format!("<svg class=\"plot\" role=\"img\" aria-label=\"{label}\" "), 1);
     html! {
         figure class="panel chart" id={ "figure-" (figure.name) } {
-            div class="scroll" { (PreEscaped(svg)) }
+            div class="scroll" { (figure.svg()) }
             figcaption { (figure.caption) }
         }
         "\n"
@@ -122,91 +114,52 @@ fn figure(figure: &Figure) -> Markup {
 
 /// Figures over all scenes.
 pub(super) fn figures(figures: &[Figure]) -> Markup {
-    let over_all = |f: &&Figure| !SATURATION.contains(&f.name.as_str()) && !f.name.starts_with(SCENE);
-    if !figures.iter().any(|f| over_all(&f)) {
+    let over_all: Vec<&Figure> = figures.iter().filter(|f| !f.name.starts_with(SCENE)).collect();
+    if over_all.is_empty() {
         return html! {};
     }
-    section("figures", "At a glance", &html! { @for f in figures.iter().filter(over_all) { (figure(f)) } })
-}
-
-pub(super) fn saturation(results: &Results, figures: &[Figure]) -> Markup {
-    let paragraphs = paragraphs(results);
-    let drawn: Vec<&Figure> = figures.iter().filter(|f| SATURATION.contains(&f.name.as_str())).collect();
-    if paragraphs.is_empty() && drawn.is_empty() {
-        return html! {};
-    }
-    let content = html! {
-        @for paragraph in paragraphs { p { (paragraph) } "\n" }
-        @for f in drawn { (figure(f)) }
-    };
-    section("levels", "Does quality level off?", &content)
+    section("figures", "At a glance", &html! { @for f in over_all { (figure(f)) } })
 }
 
 /// A table with its title and caption. A large one scrolls by itself.
 fn table(table: &Table) -> Markup {
     let id = format!("table-{}", table.name);
     let class = if table.rows.len() > TALL { "panel scroll grid tall" } else { "panel scroll grid" };
-    let bare = Table { caption: String::new(), ..table.clone() };
     html! {
-        @if !table.is_empty() {
+        @if !table.rows.is_empty() {
             h3 id=(id) { (table.title) }
             @if !table.caption.is_empty() { p class="note" { (table.caption) } }
-            div class=(class) tabindex="0" role="region" aria-labelledby=(id) { (PreEscaped(bare.to_html())) }
+            div class=(class) tabindex="0" role="region" aria-labelledby=(id) { (table.to_html()) }
             "\n"
         }
     }
 }
 
-pub(super) fn tables(results: &Results) -> Markup {
-    if results.scenes.is_empty() {
-        return html! {};
-    }
-    let all = [
-        tables::summary(results),
-        tables::main(results, None),
-        tables::vs_photos(results),
-        tables::drops(results),
-        tables::bytes(results),
-    ];
-    section("tables", "In numbers", &html! { @for one in &all { (table(one)) } })
-}
-
-/// Our numbers beside the paper's, and what to know before comparing.
-pub(super) fn paper(results: &Results) -> Markup {
-    if results.scenes.is_empty() {
-        return html! {};
-    }
+/// The means, beside the paper's, and what to know before comparing.
+pub(super) fn means(results: &Results) -> Markup {
     let content = html! {
-        p { "The paper is arXiv 2605.30396v1. Its numbers are as printed, its means recomputed from its columns." }
-        (table(&tables::psnr(results)))
-        (table(&tables::nonzeros(results)))
+        (table(&tables::means(results)))
         h3 { "How things are counted" }
+        p { "The paper is arXiv 2605.30396v1. Its numbers are as printed, its means recomputed from its columns." }
         dl class="notes" { @for note in NOTES.iter() { dt { (note.title) } dd { (note.text) } } }
     };
-    section("paper", "Beside the paper", &content)
+    section("tables", "In numbers", &content)
 }
 
 pub(super) fn details(results: &Results, figures: &[Figure]) -> Markup {
-    let skipped = tables::skipped(results);
     let scenes: Vec<&Figure> = figures.iter().filter(|f| f.name.starts_with(SCENE)).collect();
-    let (settings, views) = (tables::settings(results), tables::views(results));
     let fold = |title: &str, content: &Markup| html! { details { summary { (title) } "\n" (content) } "\n" };
     let content = html! {
         (fold("Models", &table(&tables::models(results))))
-        @if !scenes.is_empty() { (fold("Scene by scene", &html! { @for f in scenes { (figure(f)) } })) }
-        @if !settings.is_empty() { (fold("Every setting", &table(&settings))) }
-        @if views.rows.len() > MOST_VIEW_ROWS {
-            p class="note" {
-                "The table of single views has " (format::count(views.rows.len() as u64))
-                " rows, too long for this page. It is among the CSV files."
-            }
-        } @else if !views.is_empty() {
-            (fold("View by view", &table(&views)))
-        }
+        @if !scenes.is_empty() { (fold("Charts of each scene", &html! { @for f in scenes { (figure(f)) } })) }
+        (fold("Scene by scene", &table(&tables::scenes(results))))
     };
+    section("more", "All of it", &content)
+}
+
+pub(super) fn skipped(results: &Results) -> Markup {
     html! {
-        @if !skipped.is_empty() { (section("left", "What was left out", &table(&skipped))) }
-        @if !results.scenes.is_empty() { (section("more", "All of it", &content)) }
+        @if !results.skipped.is_empty() { (section("left", "What was left out", &table(&tables::skipped(results)))) }
     }
 }
 
@@ -214,10 +167,17 @@ pub(super) fn footer(results: &Results, date: Option<&str>) -> Markup {
     let mut devices: Vec<&str> = results.scenes.iter().map(|scene| scene.device.as_str()).collect();
     devices.dedup();
     let rounded = if results.eight_bit { "pictures rounded to 8 bits" } else { "pictures not rounded" };
-    let mut facts = results.facts();
-    facts.push(rounded.to_owned());
-    facts.extend((!devices.is_empty()).then(|| format!("drawn on {}", devices.join(", "))));
-    facts.extend(date.map(str::to_owned));
+    let devices = devices.join(", ");
+    let facts = [
+        ("lexisplat ", &*results.version),
+        ("pursuit ", &*results.pursuit),
+        ("values as ", &*results.layout),
+        ("", rounded),
+        ("drawn on ", &*devices),
+        ("", date.unwrap_or_default()),
+    ];
+    let facts = facts.iter().filter(|fact| !fact.1.is_empty()).map(|(what, fact)| format!("{what}{fact}"));
+    let facts: Vec<String> = facts.collect();
     html! {
         footer {
             @if !results.command.is_empty() { p { "Make this again:" } pre { (results.command) } }

@@ -5,7 +5,8 @@ use lexisplat_eval::format;
 use maud::{Markup, PreEscaped, html};
 
 use super::atoms::{self, Usage};
-use super::{Report, packed, smaller, text};
+use super::{Report, packed, smaller};
+use crate::numbers;
 use crate::page::{card, section};
 
 /// What several parts need.
@@ -37,7 +38,7 @@ impl<'a> Facts<'a> {
             dl.cards {
                 (card(smaller(self.report.ply_bytes, self.report.exact.bytes), "smaller: the whole file"))
                 @if self.dim > 0 {
-                    (card(text::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
+                    (card(numbers::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
                     (card(
                         html! { (format!("{:.1} ", self.mean_nonzeros)) small { "of " (self.dim) } },
                         "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
@@ -48,7 +49,7 @@ impl<'a> Facts<'a> {
             @if self.dim > 0 {
                 p.note {
                     "Papers often count coefficients alone, without indices and without the rest of the file: "
-                    (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, text::ratio(self.dim as f64, self.mean_nonzeros)))
+                    (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, numbers::ratio(self.dim as f64, self.mean_nonzeros)))
                     " here."
                 }
             }

@@ -8,7 +8,6 @@
 mod atoms;
 mod exact;
 mod packed;
-mod text;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -17,6 +16,7 @@ use lexisplat_eval::{Comparison, Error, Result};
 use lexisplat_render::Image;
 use maud::html;
 
+use crate::numbers;
 use crate::page::document;
 
 const SCRIPT: &str = include_str!("page.js");
@@ -112,7 +112,7 @@ pub fn page(report: &Report<'_>) -> String {
 
 /// Bytes of `before` over bytes of `after`, as `24.50×`.
 fn smaller(before: u64, after: u64) -> String {
-    text::ratio(before as f64, after as f64)
+    numbers::ratio(before as f64, after as f64)
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@ use lexisplat_eval::montage::AMPLIFICATION;
 use lexisplat_eval::{Comparison, Summary, format};
 use maud::{Markup, html};
 
-use super::{CompressedFile, Picture, Report, smaller, text};
+use super::{CompressedFile, Picture, Report, smaller};
+use crate::numbers;
 use crate::page::{card, decibels, image, scores, section};
 
 /// Bytes of a value in a PLY: every known trainer writes floats.
@@ -58,7 +59,7 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
     html! {
         header {
             p.mark { "lexisplat" }
-            h1 { (text::bytes(*ply_bytes)) " became " em { (text::bytes(packed.bytes)) } }
+            h1 { (numbers::bytes(*ply_bytes)) " became " em { (numbers::bytes(packed.bytes)) } }
             p.lede {
                 strong { (report.title) }
                 " is a 3D scene made of " (format::count(gaussians)) " soft coloured blobs, so-called Gaussians, whose \
@@ -144,11 +145,11 @@ pub(super) fn steps() -> Markup {
 /// A bar as long as its share of `longest`, in parts as long as theirs.
 fn bar(name: &str, total: u64, groups: &Groups, longest: f64) -> Markup {
     html! {
-        p.label { (name) ", " (text::bytes(total)) }
+        p.label { (name) ", " (numbers::bytes(total)) }
         .bar role="img" aria-label=(format!("Bytes of {name} by attribute")) {
             @for ((what, class, _), bytes) in GROUPS.iter().zip(groups).filter(|(_, bytes)| **bytes > 0.0) {
                 @let width = bytes / longest * 100.0;
-                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", text::bytes(whole(*bytes)))) {
+                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", numbers::bytes(whole(*bytes)))) {
                     @if width >= LABELLED { (format!("{:.0}%", bytes / total.max(1) as f64 * 100.0)) }
                 }
             }
@@ -186,11 +187,11 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
                             @let before = columns[0][k];
                             tr {
                                 th scope="row" { span class=(format!("key {class}")) {} (what) }
-                                td { (text::bytes(whole(before))) }
+                                td { (numbers::bytes(whole(before))) }
                                 @for after in [columns[1][k], columns[2][k]] {
-                                    td { (text::bytes(whole(after))) }
+                                    td { (numbers::bytes(whole(after))) }
                                     // Headers hold no numbers of the scene, so they have no ratio.
-                                    td { (text::ratio(before, if k == OTHER { 0.0 } else { after })) }
+                                    td { (numbers::ratio(before, if k == OTHER { 0.0 } else { after })) }
                                 }
                             }
                         }
@@ -198,9 +199,9 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
                     tfoot {
                         tr {
                             th scope="row" { "Whole file" }
-                            td { (text::bytes(*ply_bytes)) }
+                            td { (numbers::bytes(*ply_bytes)) }
                             @for file in [packed, exact] {
-                                td { (text::bytes(file.bytes)) }
+                                td { (numbers::bytes(file.bytes)) }
                                 td { (smaller(*ply_bytes, file.bytes)) }
                             }
                         }
@@ -233,7 +234,7 @@ pub(super) fn views(report: &Report<'_>) -> Markup {
                             th scope="row" { (view.name) }
                             td { (view.width) "\u{d7}" (view.height) }
                             @for score in files.iter().filter_map(|file| file.views.get(i)) {
-                                td { @if score.identical { "identical" } @else { (text::number(score.psnr, 2)) } }
+                                td { @if score.identical { "identical" } @else { (numbers::number(score.psnr, 2)) } }
                                 td { (format!("{:.5}", score.ssim)) }
                             }
                         }
@@ -245,8 +246,8 @@ pub(super) fn views(report: &Report<'_>) -> Markup {
                             th scope="row" { (name) }
                             td {}
                             @for file in files {
-                                td { (text::number(part(&file.psnr), 2)) }
-                                td { (text::number(part(&file.ssim), 5)) }
+                                td { (numbers::number(part(&file.psnr), 2)) }
+                                td { (numbers::number(part(&file.ssim), 5)) }
                             }
                         }
                     }
