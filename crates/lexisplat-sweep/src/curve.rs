@@ -3,7 +3,7 @@
 use lexisplat_eval::{FrameRate, Summary};
 
 use super::grid::Grid;
-use super::measure::Measure;
+use super::measure::{Measure, mean};
 use super::{Fps, Method, Point, SceneResult, Setting};
 
 /// Models of one method at one setting: those of all scenes, or that of one.
@@ -26,16 +26,14 @@ impl At<'_> {
 
     /// The mean of a measure over the scenes that have it.
     pub(super) fn mean(&self, measure: Measure) -> Option<f64> {
-        let values = self.models.iter().filter_map(|(scene, point)| measure.value(scene, Some(point)));
-        Summary::of(values.filter(|value| value.is_finite())).mean
+        mean(self.models.iter().filter_map(|(scene, point)| measure.value(scene, Some(point))))
     }
 
     /// The mean of the slowest and of the fastest rounds of a rate over the scenes that have it.
     pub(super) fn rounds(&self, rate: fn(&Fps) -> FrameRate) -> Option<(f64, f64)> {
         let rates: Vec<FrameRate> =
             self.models.iter().filter_map(|(_, point)| point.fps.as_ref().map(rate)).collect();
-        let mean = |of: fn(&FrameRate) -> f64| Summary::of(rates.iter().map(of)).mean;
-        Some((mean(|rate| rate.least)?, mean(|rate| rate.most)?))
+        Some((mean(rates.iter().map(|rate| rate.least))?, mean(rates.iter().map(|rate| rate.most))?))
     }
 
     /// The paper's ratio. `None` where nothing is coded.

@@ -6,8 +6,9 @@ use super::cache::write_whole;
 use super::figures::figures;
 use super::long_csv::long_csv;
 use super::page::sweep_html;
+use super::picture::Part;
 use super::survey::survey;
-use super::{PictureFiles, Results, Setting, SweepPicture, paper, tables};
+use super::{PictureFiles, Results, Setting, paper, tables};
 use lexisplat::output::OutputGroup;
 use lexisplat_eval::{Error, Result};
 
@@ -50,22 +51,20 @@ pub fn write_report(
 
 /// The pictures that fit into a page, in the order of scenes and settings. Those of the paper's main tolerance
 /// are taken before others.
-fn shown(files: &[PictureFiles]) -> Result<Vec<SweepPicture>> {
+fn shown(files: &[PictureFiles]) -> Result<Vec<(&PictureFiles, Vec<Part>)>> {
     let first = Setting::Tolerance(paper::TOLERANCE).label();
     let mut order: Vec<usize> = (0..files.len()).collect();
     order.sort_by_key(|&i| files[i].setting != first);
     let mut bytes = 0;
     let mut shown = Vec::new();
     for i in order {
-        let picture = files[i].read()?;
-        let parts =
-            [&picture.original, &picture.compressed, &picture.difference].into_iter().chain(&picture.photo);
-        bytes += parts.map(Vec::len).sum::<usize>();
+        let parts = files[i].read()?;
+        bytes += parts.iter().map(|part| part.png.len()).sum::<usize>();
         if bytes > PICTURE_BYTES {
             break;
         }
-        shown.push((i, picture));
+        shown.push((i, parts));
     }
     shown.sort_by_key(|(i, _)| *i);
-    Ok(shown.into_iter().map(|(_, picture)| picture).collect())
+    Ok(shown.into_iter().map(|(i, parts)| (&files[i], parts)).collect())
 }

@@ -9,7 +9,6 @@ mod grid;
 mod long_csv;
 mod manifest;
 mod measure;
-mod notes;
 mod numbers;
 mod options;
 mod page;
@@ -28,7 +27,7 @@ mod testing;
 pub use folder::write_report;
 pub use manifest::{Entry, parse_manifest, read_manifest};
 pub use options::{SweepOptions, SweepProgress};
-pub use picture::{Picture, PictureFiles};
+pub use picture::PictureFiles;
 pub use results::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
 pub use scene::shown_path;
 pub use sweep::sweep;
@@ -36,8 +35,6 @@ pub use sweep::sweep;
 use lexisplat_eval::format::csv_cell;
 
 use figures::Figure;
-use notes::NOTES;
-use picture::SweepPicture;
 
 /// `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
 fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {

@@ -51,7 +51,7 @@ impl Measure {
             Self::ToOriginal(metric) | Self::ToPhotos(metric) => metric.title(),
             Self::PhotoChange => "Change, dB",
             Self::MeanNonzeros => "Mean nonzeros",
-            Self::CoefficientRatio => "Comp Ratio (coefficients)",
+            Self::CoefficientRatio => "Comp Ratio",
             Self::FileRatio => "Ratio of whole files",
             Self::BytesEach => "Bytes a Gaussian",
             Self::SparseFps => "From codes",

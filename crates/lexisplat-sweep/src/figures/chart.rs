@@ -8,11 +8,11 @@ const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 500.0;
 /// Edges of the field that data is drawn in. Right of it is the legend.
 const LEFT: f64 = 74.0;
-const RIGHT: f64 = 694.0;
+const RIGHT: f64 = 670.0;
 const TOP: f64 = 50.0;
 const BOTTOM: f64 = 436.0;
 /// Left edge of the legend, width of the samples in it, and height of its lines.
-const LEGEND: f64 = 712.0;
+const LEGEND: f64 = 688.0;
 const SAMPLE: f64 = 26.0;
 const LEGEND_LINE: f64 = 21.0;
 /// Sizes of text.
@@ -37,7 +37,7 @@ const LEAST_RANGE: f64 = 1.0;
 const LARGEST: f64 = 1e9;
 /// Colours of everything but data; the page's style sheet swaps them in its dark theme.
 const INK: &str = "#1d1e22";
-pub(super) const SOFT: &str = "#5c5f68";
+const SOFT: &str = "#5c5f68";
 const GRID: &str = "#e4e2dc";
 
 /// The three colours.
@@ -68,7 +68,8 @@ impl Mark {
         let corner = |k: u8| {
             let (sin, cos) =
                 (self.turn + 360.0 * f64::from(k) / f64::from(self.corners)).to_radians().sin_cos();
-            let radius = if k % 2 == 1 { MARK * self.waist } else { MARK };
+            // Slim marks are larger, so that all look alike in size.
+            let radius = MARK / self.waist.sqrt() * if k % 2 == 1 { self.waist } else { 1.0 };
             [x + radius * cos, y + radius * sin]
         };
         Shape::Area { points: (0..self.corners).map(corner).collect(), colour, opacity: 100 }
@@ -89,20 +90,14 @@ pub(super) struct Dot {
 /// One line of a chart.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
+    /// What the legend calls it.
+    pub(super) name: String,
     pub(super) colour: &'static str,
     pub(super) dash: &'static str,
     pub(super) mark: Option<Mark>,
     /// Whether a band is drawn around the line.
     pub(super) has_band: bool,
     pub(super) dots: Vec<Dot>,
-}
-
-/// One entry of a legend, with a mark or a line, or both.
-pub(super) struct Key {
-    pub(super) label: &'static str,
-    pub(super) colour: &'static str,
-    pub(super) dash: Option<&'static str>,
-    pub(super) mark: Option<Mark>,
 }
 
 /// A chart.
@@ -117,8 +112,6 @@ pub(super) struct Chart {
     /// Whether the range of values starts at 0.
     pub(super) from_zero: bool,
     pub(super) series: Vec<Series>,
-    /// Titles and entries of the groups of the legend.
-    pub(super) legends: Vec<(&'static str, Vec<Key>)>,
 }
 
 impl Chart {
@@ -143,17 +136,22 @@ impl Chart {
             let points = end(0).chain(end(1).rev()).collect();
             canvas.0.push(Shape::Area { points, colour: series.colour, opacity: BAND_OPACITY });
         }
-        for Series { colour, dash, mark, dots, .. } in &all {
-            let points: Vec<[f64; 2]> = dots.iter().map(|dot| axes.place(dot.x.log2(), dot.y)).collect();
+        let mut y = TOP + 10.0;
+        for Series { name, colour, dash, mark, dots, .. } in &all {
+            let mut points: Vec<[f64; 2]> = dots.iter().map(|dot| axes.place(dot.x.log2(), dot.y)).collect();
             for (dot, [x, y]) in dots.iter().zip(&points) {
                 canvas.text([*x, y - 9.0], &dot.label, POINT_SIZE, Anchor::Middle, INK);
             }
-            let marks = mark.iter().flat_map(|mark| points.iter().map(|at| mark.at(*at, colour)));
-            let marks: Vec<Shape> = marks.collect();
-            canvas.0.push(Shape::Line { points, colour, width: LINE, dash });
-            canvas.0.extend(marks);
+            // The legend.
+            canvas.text([LEGEND + SAMPLE + 8.0, y + 4.5], name, TEXT_SIZE, Anchor::Start, INK);
+            let is_line = points.len() > 1 || mark.is_none();
+            let sample = vec![[LEGEND, y], [LEGEND + SAMPLE, y]];
+            canvas.0.extend(is_line.then_some(Shape::Line { points: sample, colour, width: LINE, dash }));
+            canvas.0.push(Shape::Line { points: points.clone(), colour, width: LINE, dash });
+            points.push([LEGEND + SAMPLE / 2.0, y]);
+            canvas.0.extend(points.iter().filter_map(|at| Some(mark.as_ref()?.at(*at, colour))));
+            y += LEGEND_LINE;
         }
-        self.legend(&mut canvas);
         Some(Drawing { size: [WIDTH, HEIGHT], shapes: canvas.0 })
     }
 
@@ -180,27 +178,6 @@ impl Chart {
         canvas.text([22.0, centre], &self.y, LABEL_SIZE, Anchor::Middle, INK);
         if let Some(Shape::Text { upright, .. }) = canvas.0.last_mut() {
             *upright = true;
-        }
-    }
-
-    fn legend(&self, canvas: &mut Canvas) {
-        let mut y = TOP + 8.0;
-        for (title, keys) in self.legends.iter().filter(|legend| !legend.1.is_empty()) {
-            canvas.text([LEGEND, y], title, TEXT_SIZE, Anchor::Start, INK);
-            if let Some(Shape::Text { bold, .. }) = canvas.0.last_mut() {
-                *bold = true;
-            }
-            for Key { label, colour, dash, mark } in keys {
-                y += LEGEND_LINE;
-                let middle = y - 4.5;
-                if let Some(dash) = dash {
-                    let points = vec![[LEGEND, middle], [LEGEND + SAMPLE, middle]];
-                    canvas.0.push(Shape::Line { points, colour, width: LINE, dash });
-                }
-                canvas.0.extend(mark.map(|mark| mark.at([LEGEND + SAMPLE / 2.0, middle], colour)));
-                canvas.text([LEGEND + SAMPLE + 8.0, y], label, TEXT_SIZE, Anchor::Start, INK);
-            }
-            y += 1.7 * LEGEND_LINE;
         }
     }
 }

@@ -8,7 +8,7 @@ use lexisplat_eval::FrameRate;
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::metrics::Metric;
 
-use chart::{Chart, DASHED, DOTTED, Dot, Key, Mark, SOFT, SOLID, Series};
+use chart::{Chart, DASHED, DOTTED, Dot, Mark, SOLID, Series};
 
 use super::curve::{At, Kind, curve};
 use super::grid::Grid;
@@ -42,7 +42,8 @@ impl Figure {
 /// Most characters of a device's name on an axis. Captions have the whole name.
 const LONGEST_DEVICE: usize = 36;
 /// Explains the numbers at points, for captions.
-const TOLERANCES: &str = "Numbers at points are tolerances.";
+const TOLERANCES: &str =
+    "Numbers at points are tolerances. Capped: at most so many nonzeros a Gaussian, without a tolerance.";
 /// Axes of several charts.
 const PSNR: &str = "PSNR against the original, dB";
 const RATIO: &str = "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)";
@@ -67,12 +68,12 @@ const CIRCLE: Mark = Mark::new(24, 0.0);
 const SQUARE: Mark = Mark::new(4, 45.0);
 const TRIANGLE: Mark = Mark::new(3, -90.0);
 
-/// The dashes, mark and name of a kind of settings.
+/// The dashes and mark of a kind of settings, and what follows the method's name in a legend.
 fn kind_look(kind: Kind) -> (&'static str, Mark, &'static str) {
     match kind {
-        Kind::Tolerances => (SOLID, CIRCLE, "tolerances"),
-        Kind::Caps => (DOTTED, TRIANGLE, "capped nonzeros"),
-        Kind::Presets => (DASHED, SQUARE, "packed presets"),
+        Kind::Tolerances => (SOLID, CIRCLE, ""),
+        Kind::Caps => (DOTTED, TRIANGLE, ", capped"),
+        Kind::Presets => (DASHED, SQUARE, ", packed"),
     }
 }
 
@@ -91,6 +92,8 @@ fn line(
     dot: impl Fn(&At<'_>) -> Option<[f64; 4]>,
 ) -> Series {
     let (colour, mark) = look(method);
+    let (dash, _, kind_name) = kind_look(kind);
+    let name = format!("{}{kind_name}", method.title());
     let dots = curve(grid, method, kind, column).into_iter().filter_map(|at| {
         let [x, y, low, high] = dot(&at)?;
         // A tolerance is a number alone.
@@ -101,33 +104,7 @@ fn line(
         Some(Dot { x, y, band: [low, high], label })
     });
     let has_band = kind == Kind::Tolerances;
-    Series { colour, dash: kind_look(kind).0, mark: Some(mark), has_band, dots: dots.collect() }
-}
-
-/// The legend of methods that have a line, with their marks or without.
-fn method_keys(grid: &Grid<'_>, series: &[Series], has_marks: bool) -> (&'static str, Vec<Key>) {
-    let is_drawn =
-        |method: &&Method| series.iter().any(|s| s.colour == look(**method).0 && !s.dots.is_empty());
-    let key = |&method: &Method| {
-        let (colour, mark) = look(method);
-        Key { label: method.title(), colour, dash: Some(SOLID), mark: has_marks.then_some(mark) }
-    };
-    ("Method", grid.methods.iter().filter(is_drawn).map(key).collect())
-}
-
-/// A key for lines of every colour.
-fn dash_key(label: &'static str, dash: &'static str, mark: Option<Mark>) -> Key {
-    Key { label, colour: SOFT, dash: Some(dash), mark }
-}
-
-/// The legend of those `kinds` that have a setting, with their marks or without.
-fn kind_keys(grid: &Grid<'_>, kinds: &[Kind], has_marks: bool) -> Vec<Key> {
-    let is_there = |kind: &&Kind| grid.settings.iter().any(|setting| Kind::of(*setting) == **kind);
-    let key = |&kind: &Kind| {
-        let (dash, mark, name) = kind_look(kind);
-        dash_key(name, dash, has_marks.then_some(mark))
-    };
-    kinds.iter().filter(is_there).map(key).collect()
+    Series { name, colour, dash, mark: Some(mark), has_band, dots: dots.collect() }
 }
 
 /// Every figure that has something to show.
@@ -160,7 +137,6 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
             })
         }));
     }
-    let mut legends = vec![method_keys(grid, &series, true), ("Settings", kind_keys(grid, &kinds, false))];
     let title = "Quality against the paper's compression ratio";
     let (name, title, of) = match column {
         Some(column) => {
@@ -170,7 +146,6 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
         }
         None => {
             let is_empty = series.iter().all(|line| line.dots.is_empty());
-            let mut keys = Vec::new();
             for method in Method::ALL.into_iter().filter(|_| !is_empty) {
                 let mean = |measure| paper::mean(measure, method);
                 let Some((x, y)) =
@@ -180,27 +155,16 @@ fn quality(grid: &Grid<'_>, column: Option<usize>) -> Chart {
                 };
                 let (colour, mark) = (look(method).0, Some(STAR));
                 let dot = Dot { x, y, band: [y; 2], label: paper::TOLERANCE.to_string() };
-                series.push(Series { colour, dash: SOLID, mark, has_band: false, dots: vec![dot] });
-                keys.push(Key { label: method.title(), colour, dash: None, mark });
+                let name = format!("{}, paper", method.title());
+                series.push(Series { name, colour, dash: SOLID, mark, has_band: false, dots: vec![dot] });
             }
-            legends.push(("Paper, tol 0.1", keys));
             let of = "Means over scenes at each setting; bands are from the worst to the best scene. Stars are the paper's \
                       means over its 13 scenes at tol 0.1.";
             ("psnr-ratio".to_owned(), title.to_owned(), of.to_owned())
         }
     };
     let caption = format!("{of} {TOLERANCES}");
-    Chart {
-        name,
-        title,
-        caption,
-        x: RATIO,
-        x_unit: TIMES,
-        y: PSNR.to_owned(),
-        from_zero: false,
-        series,
-        legends,
-    }
+    Chart { name, title, caption, x: RATIO, x_unit: TIMES, y: PSNR.to_owned(), from_zero: false, series }
 }
 
 /// Frames a second over ratio. Those of the original are dashed.
@@ -218,11 +182,9 @@ fn speed(grid: &Grid<'_>) -> Chart {
         series.extend(kinds.map(|kind| of(kind, Measure::SparseFps, |fps| fps.sparse)));
         let mut dense = of(Kind::Tolerances, Measure::DenseFps, |fps| fps.dense);
         dense.dots.iter_mut().for_each(|dot| dot.label.clear());
-        series.push(Series { mark: None, dash: DASHED, ..dense });
+        let name = format!("{}, dense SH", method.title());
+        series.push(Series { name, mark: None, dash: DASHED, ..dense });
     }
-    let mut keys = kind_keys(grid, &kinds, false);
-    keys.push(dash_key("dense SH", DASHED, None));
-    let legends = vec![method_keys(grid, &series, true), ("Drawn from", keys)];
     let device = grid.device();
     let is_short = device.chars().count() <= LONGEST_DEVICE;
     Chart {
@@ -237,7 +199,6 @@ fn speed(grid: &Grid<'_>) -> Chart {
         y: if is_short { format!("Frames a second ({device})") } else { "Frames a second".to_owned() },
         from_zero: true,
         series,
-        legends,
     }
 }
 
@@ -253,7 +214,6 @@ fn bytes(grid: &Grid<'_>) -> Chart {
             series.push(Series { mark: Some(kind_look(kind).1), has_band: false, ..line });
         }
     }
-    let legends = vec![method_keys(grid, &series, false), ("Settings", kind_keys(grid, &Kind::ALL, true))];
     Chart {
         name: "bytes-psnr".to_owned(),
         title: "Quality against real size".to_owned(),
@@ -266,7 +226,6 @@ fn bytes(grid: &Grid<'_>) -> Chart {
         y: PSNR.to_owned(),
         from_zero: false,
         series,
-        legends,
     }
 }
 
@@ -308,8 +267,8 @@ mod tests {
             }
         }
         let has = |figure: usize, text: &str| svgs[figure].contains(&format!(">{text}</text>"));
-        assert!(has(2, "packed presets") && has(2, "capped nonzeros") && has(0, "capped nonzeros"));
-        assert!(has(1, "dense SH") && has(1, "Frames a second (CPU)") && has(0, "Paper, tol 0.1"));
+        assert!(has(2, "3DGS, packed") && has(2, "3DGS, capped") && has(0, "3DGS, capped"));
+        assert!(has(1, "MCMC, dense SH") && has(1, "Frames a second (CPU)") && has(0, "PixelGS, paper"));
         let escaped = maud::html! { (ODD) }.into_string();
         assert!(svgs[4].contains(&escaped), "{}", svgs[4]);
     }

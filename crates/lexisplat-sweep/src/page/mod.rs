@@ -12,7 +12,8 @@ use maud::html;
 pub(crate) use parts::{card, decibels, document, image, scores, section};
 
 use super::grid::Grid;
-use super::{Figure, Results, SweepPicture};
+use super::picture::Part;
+use super::{Figure, PictureFiles, Results};
 
 const STYLE: &str = include_str!("sweep.css");
 const SCRIPT: &str = include_str!("sweep.js");
@@ -21,7 +22,7 @@ const SCRIPT: &str = include_str!("sweep.js");
 pub(crate) fn sweep_html(
     results: &Results,
     figures: &[Figure],
-    pictures: &[SweepPicture],
+    pictures: &[(&PictureFiles, Vec<Part>)],
     date: Option<&str>,
 ) -> String {
     let body = html! {
@@ -35,7 +36,7 @@ pub(crate) fn sweep_html(
             (sections::skipped(results))
             @if !results.scenes.is_empty() { (sections::details(results, figures)) }
         }
-        (sections::footer(results, date))
+        (sections::footer(results))
     };
     document("Sweep", STYLE, &body, SCRIPT)
 }
@@ -52,16 +53,21 @@ mod tests {
         html! { (text) }.into_string()
     }
 
-    fn picture(setting: &str, view: &str, photo: Option<&[u8]>) -> SweepPicture {
-        SweepPicture {
+    fn files(setting: &str, view: &str) -> PictureFiles {
+        PictureFiles {
             scene: 3,
             setting: setting.to_owned(),
             view: view.to_owned(),
-            original: b"one".into(),
-            compressed: b"two".into(),
-            difference: b"three".into(),
-            photo: photo.map(Into::into),
+            original: "".into(),
+            compressed: "".into(),
+            difference: "".into(),
+            photo: None,
         }
+    }
+
+    /// Pictures of these classes, their bytes a text.
+    fn parts(all: &[(&'static str, &str)]) -> Vec<Part> {
+        all.iter().map(|(class, text)| Part { class, what: class, png: (*text).into() }).collect()
     }
 
     /// What every page must be.
@@ -80,11 +86,10 @@ mod tests {
     fn page_holds_everything() {
         let results = results();
         let figures = figures(&results);
-        let pictures = [
-            picture("tol 0.1", "front", Some(b"photo")),
-            picture("tol 0.1", "ba<ck", None),
-            picture("balanced", "front", None),
-        ];
+        let names = [files("tol 0.1", "front"), files("tol 0.1", "ba<ck"), files("balanced", "front")];
+        let three = [("before", "one"), ("after", "two"), ("difference", "three")];
+        let four = [&three[..], &[("photo", "photo")]].concat();
+        let pictures = [(&names[0], parts(&four)), (&names[1], parts(&three)), (&names[2], parts(&three))];
         let page = sweep_html(&results, &figures, &pictures, Some("1 <May> 2026"));
         check(&page);
         // "one", "two" and "three" in base64, three times each; the photo once.
@@ -102,11 +107,11 @@ mod tests {
             assert!(page.contains(&escape(text)), "{text}");
         }
         assert!(!page.contains(ODD) && !page.contains("<May>"));
-        for note in super::super::NOTES.iter() {
-            assert!(page.contains(&escape(note.title)), "{}", note.title);
+        for (title, _) in sections::notes() {
+            assert!(page.contains(&escape(title)), "{title}");
         }
         // 42 dB of bonsai by two methods' means: (42 + 44 + 40) / 3; garden is identical.
-        assert!(page.contains("<dd>42.0 <small>dB</small></dd>"));
+        assert!(page.contains("<dd>42.00<small> dB</small></dd>"));
         assert!(page == sweep_html(&results, &figures, &pictures, Some("1 <May> 2026")));
     }
 

@@ -8,13 +8,20 @@ use super::cards::cards;
 use super::{image, scores, section};
 use crate::grid::Grid;
 use crate::measure::Measure;
+use crate::picture::Part;
 use crate::table::Table;
-use crate::{Figure, NOTES, Results, SweepPicture, tables};
+use crate::{Figure, PictureFiles, Results, tables};
 
 /// Tables with more rows than this scroll by themselves.
 const TALL: usize = 24;
 /// Start of the names of figures of single scenes.
 const SCENE: &str = "scene-";
+
+/// What differs between the paper's way of counting and ours: titles and texts.
+pub(super) fn notes() -> impl Iterator<Item = (&'static str, &'static str)> {
+    let notes = include_str!("../notes.md").split("\n## ").skip(1);
+    notes.filter_map(|note| note.split_once('\n')).map(|(title, text)| (title, text.trim()))
+}
 
 /// `1 scene`, `3 scenes`.
 fn plural(count: usize, one: &str) -> String {
@@ -23,8 +30,8 @@ fn plural(count: usize, one: &str) -> String {
 }
 
 pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
-    let as_trained = grid.settings.is_empty();
-    let methods = grid.methods.iter().filter(|method| as_trained || !method.is_competitor()).count();
+    let scenes = plural(grid.headings.len(), "scene");
+    let methods = plural(grid.methods.len(), "method");
     let photos = if grid.scores(Measure::ToPhotos).is_empty() { "" } else { ", and with photos" };
     html! {
         header {
@@ -32,10 +39,7 @@ pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
             @if grid.headings.is_empty() {
                 h1 { "Nothing was evaluated" }
             } @else {
-                h1 {
-                    (plural(grid.headings.len(), "scene")) " by " (plural(methods, "method")) ", "
-                    @if as_trained { "as trained" } @else { "compressed in " em { (plural(grid.settings.len(), "way")) } }
-                }
+                h1 { (scenes) " by " (methods) ", compressed in " em { (plural(grid.settings.len(), "way")) } }
                 p class="lede" {
                     "Each trained model was compressed, drawn straight from its codes, and compared with the original\u{2019}s \
                      pictures from the same cameras" (photos) ". "
@@ -49,20 +53,16 @@ pub(super) fn header(grid: &Grid<'_>, date: Option<&str>) -> Markup {
 }
 
 /// One view of one model at one setting.
-fn view(results: &Results, picture: &SweepPicture) -> Option<Markup> {
-    let scene = results.scenes.get(picture.scene)?;
+fn view(results: &Results, files: &PictureFiles, parts: &[Part]) -> Option<Markup> {
+    let scene = results.scenes.get(files.scene)?;
     let model = format!("{}, {}", scene.name, scene.method.title());
-    let (setting, name) = (&picture.setting, format!("{model}, {}", picture.view));
+    let (setting, name) = (&files.setting, format!("{model}, {}", files.view));
     let point = scene.points.iter().find(|point| point.setting.label() == *setting);
-    let score = point.map(|point| scores(&point.to_original, &picture.view));
-    let image = |class, alt: &str, png: &[u8]| image("png", class, &format!("{name}: {alt}"), png);
+    let score = point.map(|point| scores(&point.to_original, &files.view));
     Some(html! {
-        figure class="view" data-scene=(model) data-setting=(setting) data-view=(picture.view) {
+        figure class="view" data-scene=(model) data-setting=(setting) data-view=(files.view) {
             div class="stage" {
-                (image("before", "original", &picture.original))
-                @if let Some(photo) = &picture.photo { (image("photo", "photo", photo)) }
-                (image("after", &format!("compressed, {setting}"), &picture.compressed))
-                (image("difference", "amplified difference", &picture.difference))
+                @for Part { class, what, png } in parts { (image("png", class, &format!("{name}: {what}"), png)) }
                 span class="tag left" { "original" }
                 span class="tag right" { (setting) }
             }
@@ -72,7 +72,7 @@ fn view(results: &Results, picture: &SweepPicture) -> Option<Markup> {
     })
 }
 
-pub(super) fn pictures(results: &Results, pictures: &[SweepPicture]) -> Markup {
+pub(super) fn pictures(results: &Results, pictures: &[(&PictureFiles, Vec<Part>)]) -> Markup {
     if pictures.is_empty() {
         return html! {};
     }
@@ -90,7 +90,7 @@ pub(super) fn pictures(results: &Results, pictures: &[SweepPicture]) -> Markup {
                     label { (label) " " select id=(id) {} }
                 }
             }
-            @for view in pictures.iter().filter_map(|picture| view(results, picture)) { (view) }
+            @for view in pictures.iter().filter_map(|(files, parts)| view(results, files, parts)) { (view) }
             div class="controls" {
                 label for="at" { "Line " input id="at" type="range" min="0" max="100" step="0.5" value="50"; }
                 button id="differ" type="button" aria-pressed="false" { "Difference, \u{d7}" (AMPLIFICATION) " brighter" }
@@ -114,10 +114,7 @@ fn figure(figure: &Figure) -> Markup {
 
 /// Figures over all scenes.
 pub(super) fn figures(figures: &[Figure]) -> Markup {
-    let over_all: Vec<&Figure> = figures.iter().filter(|f| !f.name.starts_with(SCENE)).collect();
-    if over_all.is_empty() {
-        return html! {};
-    }
+    let over_all = figures.iter().filter(|f| !f.name.starts_with(SCENE));
     section("figures", "At a glance", &html! { @for f in over_all { (figure(f)) } })
 }
 
@@ -141,7 +138,7 @@ pub(super) fn means(results: &Results) -> Markup {
         (table(&tables::means(results)))
         h3 { "How things are counted" }
         p { "The paper is arXiv 2605.30396v1. Its numbers are as printed, its means recomputed from its columns." }
-        dl class="notes" { @for note in NOTES.iter() { dt { (note.title) } dd { (note.text) } } }
+        dl class="notes" { @for (title, text) in notes() { dt { (title) } dd { (text) } } }
     };
     section("tables", "In numbers", &content)
 }
@@ -163,29 +160,29 @@ pub(super) fn skipped(results: &Results) -> Markup {
     }
 }
 
-pub(super) fn footer(results: &Results, date: Option<&str>) -> Markup {
-    let mut devices: Vec<&str> = results.scenes.iter().map(|scene| scene.device.as_str()).collect();
-    devices.dedup();
-    let rounded = if results.eight_bit { "pictures rounded to 8 bits" } else { "pictures not rounded" };
-    let devices = devices.join(", ");
-    let facts = [
-        ("lexisplat ", &*results.version),
-        ("pursuit ", &*results.pursuit),
-        ("values as ", &*results.layout),
-        ("", rounded),
-        ("drawn on ", &*devices),
-        ("", date.unwrap_or_default()),
-    ];
-    let facts = facts.iter().filter(|fact| !fact.1.is_empty()).map(|(what, fact)| format!("{what}{fact}"));
-    let facts: Vec<String> = facts.collect();
+pub(super) fn footer(results: &Results) -> Markup {
+    let rounded = if results.eight_bit { "rounded to 8 bits" } else { "not rounded" };
     html! {
         footer {
             @if !results.command.is_empty() { p { "Make this again:" } pre { (results.command) } }
             p {
-                (facts.join(" \u{b7} ")) ". A megabyte is 10" sup { "6" }
-                " bytes. This page holds everything it shows and asks nothing of the network."
+                "lexisplat " (results.version) " \u{b7} pictures " (rounded) " before scoring. This page holds everything it \
+                 shows and asks nothing of the network."
             }
         }
         "\n"
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_note_has_a_title_and_one_paragraph() {
+        assert_eq!(notes().count(), 8);
+        for (title, text) in notes() {
+            assert!(title.len() > 10 && text.ends_with('.') && !text.contains('\n'), "{title}: {text}");
+        }
     }
 }

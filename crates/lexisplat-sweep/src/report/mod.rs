@@ -99,10 +99,12 @@ pub fn page(report: &Report<'_>) -> String {
             (packed::steps())
             (packed::sizes(report))
             (exact.summary())
-            (exact.steps())
-            (exact.bound())
-            (exact.nonzeros())
-            (exact.dictionary())
+            @if report.model.degree().rest() > 0 {
+                (exact.steps())
+                (exact.bound())
+                (exact.nonzeros())
+                (exact.dictionary())
+            }
             (packed::views(report))
         }
         (exact.footer())

@@ -8,6 +8,7 @@ use maud::{Markup, html};
 use super::{CompressedFile, Picture, Report, smaller};
 use crate::numbers;
 use crate::page::{card, decibels, image, scores, section};
+use crate::table::{Row, Table};
 
 /// Bytes of a value in a PLY: every known trainer writes floats.
 const PLY_VALUE: u64 = 4;
@@ -69,12 +70,10 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
             dl.cards {
                 (card(smaller(*ply_bytes, packed.bytes), "smaller: the whole file against the whole PLY, everything counted"))
                 (quality(packed.comparison))
-                @if gaussians > 0 {
-                    (card(
-                        html! { (format!("{:.1} ", packed.bytes as f64 / gaussians as f64)) small { "bytes" } },
-                        &format!("for each Gaussian, of {:.0} in the PLY", *ply_bytes as f64 / gaussians as f64),
-                    ))
-                }
+                (card(
+                    html! { (format!("{:.1} ", packed.bytes as f64 / gaussians as f64)) small { "bytes" } },
+                    &format!("for each Gaussian, of {:.0} in the PLY", *ply_bytes as f64 / gaussians as f64),
+                ))
             }
         }
     }
@@ -93,9 +92,6 @@ pub(super) fn quality(comparison: &Comparison) -> Markup {
 }
 
 pub(super) fn pictures(report: &Report<'_>) -> Markup {
-    if report.pictures.is_empty() {
-        return html! {};
-    }
     let content = html! {
         p {
             "Left of the line is the original, right of it the packed file, drawn straight from its codes. Drag \
@@ -164,11 +160,6 @@ fn whole(bytes: f64) -> u64 {
     whole
 }
 
-/// The headings of a table.
-fn head(names: [&str; 6]) -> Markup {
-    html! { thead { tr { @for name in names { th scope="col" { (name) } } } } }
-}
-
 pub(super) fn sizes(report: &Report<'_>) -> Markup {
     let Report { ply_bytes, packed, exact, .. } = report;
     let columns = [ply_groups(report), lexi_groups(packed), lexi_groups(exact)];
@@ -181,7 +172,7 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
             (bar("exact", exact.bytes, &columns[2], longest))
             .scroll {
                 table {
-                    (head(["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"]))
+                    thead { tr { @for name in ["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"] { th scope="col" { (name) } } } }
                     tbody {
                         @for (k, (what, class, _)) in GROUPS.iter().enumerate() {
                             @let before = columns[0][k];
@@ -216,44 +207,30 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
 
 pub(super) fn views(report: &Report<'_>) -> Markup {
     let files = [report.packed.comparison, report.exact.comparison];
-    if files[0].views.is_empty() {
-        return html! {};
-    }
+    let mut table = Table::new("views", "", 2, &["View", "Size"]);
+    table.add_columns(["Packed", "Exact"].into_iter().flat_map(|file| [(file, "PSNR, dB"), (file, "SSIM")]));
+    table.push_block(files[0].views.iter().enumerate().map(|(i, view)| {
+        let scores = files.iter().filter_map(|file| file.views.get(i)).flat_map(|score| {
+            let psnr = if score.identical { "identical".to_owned() } else { numbers::number(score.psnr, 2) };
+            [psnr, format!("{:.5}", score.ssim)]
+        });
+        Row::new(
+            [view.name.clone(), format!("{}\u{d7}{}", view.width, view.height)].into_iter().chain(scores),
+        )
+    }));
+    table.push_block(Summary::PARTS.map(|(name, part)| {
+        let scores = files
+            .iter()
+            .flat_map(|file| [numbers::number(part(&file.psnr), 2), numbers::number(part(&file.ssim), 5)]);
+        Row::new([name.to_owned(), String::new()].into_iter().chain(scores))
+    }));
     let content = html! {
         p {
             "All scenes were drawn by the same renderer from the same cameras. PSNR and SSIM say how close the \
              pictures are to the original\u{2019}s: at 40\u{a0}dB they are off by 1\u{a0}% of the range (root mean \
              square), at 50\u{a0}dB by 0.3\u{a0}%; an SSIM of 1 is a perfect match."
         }
-        .panel.scroll {
-            table {
-                (head(["View", "Size", "Packed: PSNR, dB", "SSIM", "Exact: PSNR, dB", "SSIM"]))
-                tbody {
-                    @for (i, view) in files[0].views.iter().enumerate() {
-                        tr {
-                            th scope="row" { (view.name) }
-                            td { (view.width) "\u{d7}" (view.height) }
-                            @for score in files.iter().filter_map(|file| file.views.get(i)) {
-                                td { @if score.identical { "identical" } @else { (numbers::number(score.psnr, 2)) } }
-                                td { (format!("{:.5}", score.ssim)) }
-                            }
-                        }
-                    }
-                }
-                tfoot {
-                    @for (name, (_, part)) in ["Mean", "Lowest", "Highest"].into_iter().zip(Summary::PARTS) {
-                        tr {
-                            th scope="row" { (name) }
-                            td {}
-                            @for file in files {
-                                td { (numbers::number(part(&file.psnr), 2)) }
-                                td { (numbers::number(part(&file.ssim), 5)) }
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        .panel.scroll { (table.to_html()) }
         @if files.iter().any(|file| file.views.iter().any(|view| view.identical)) {
             p.note { "Identical views have no PSNR; means are over the others." }
         }

@@ -2,18 +2,8 @@
 
 use maud::{Markup, html};
 
-use super::{Row, Table};
+use super::Table;
 use crate::numbers::DASH;
-
-/// The classes of a row in the page's style sheet.
-fn classes(row: &Row) -> Option<&'static str> {
-    match (row.rule, row.is_paper) {
-        (false, false) => None,
-        (true, false) => Some("rule"),
-        (false, true) => Some("paper"),
-        (true, true) => Some("rule paper"),
-    }
-}
 
 pub(super) fn write(table: &Table) -> Markup {
     let all: Vec<usize> = (0..table.columns.len()).collect();
@@ -29,7 +19,7 @@ pub(super) fn write(table: &Table) -> Markup {
             tbody {
                 "\n"
                 @for row in &table.rows {
-                    tr class=[classes(row)] {
+                    tr.rule[row.rule].paper[row.is_paper] {
                         @for (column, cell) in row.cells.iter().enumerate() {
                             @if column < table.labels {
                                 th scope="row" class="name" { (cell) }

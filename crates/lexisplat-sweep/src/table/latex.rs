@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::{Row, Table};
+use crate::numbers::DASH;
 
 /// Width of the text in points: the `article` class at 10 pt in one column.
 const TEXT_WIDTH: f64 = 345.0;
@@ -11,8 +12,6 @@ const TEXT_WIDTH: f64 = 345.0;
 const CHARACTER: f64 = 5.2;
 /// Points between neighbouring columns: `\tabcolsep` is set to half of that.
 const COLUMN_GAP: f64 = 6.0;
-/// Width of a column in points: the `article` class at 10 pt in two columns.
-const COLUMN_WIDTH: f64 = 229.0;
 /// Most rows of a table that is on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, with captions of some lines.
 const MOST_ROWS: usize = 36;
 /// Size of text of long tables, and the width of its characters beside `\\small`. Small letters of Computer Modern are wider
@@ -136,56 +135,61 @@ fn head(table: &Table, columns: &[usize]) -> String {
     out
 }
 
-/// The lines of the rows with some of the columns, blocks separated. `above` is what stands above each block.
+/// The lines of the rows that have anything in some of the columns, blocks separated. `above` is what stands above each block.
 fn lines(table: &Table, columns: &[usize], above: impl Fn(&Row) -> String) -> String {
+    let has_any =
+        |row: &&Row| columns.iter().any(|&column| column >= table.labels && row.cells[column] != DASH);
     let mut out = String::new();
-    for (i, row) in table.rows.iter().enumerate() {
-        if row.rule {
-            out.push_str("    \\midrule\n");
+    for block in table.rows.chunk_by(|_, next| !next.rule) {
+        let mut rows = block.iter().filter(has_any).peekable();
+        if let Some(first) = rows.peek() {
+            out.push_str(if out.is_empty() { "" } else { "    \\midrule\n" });
+            out.push_str(&above(first));
         }
-        if row.rule || i == 0 {
-            out.push_str(&above(row));
+        while let Some(row) = rows.next() {
+            // The paper's row stays below ours.
+            let stays = if rows.peek().is_some_and(|next| next.is_paper) { "*" } else { "" };
+            let cells: Vec<String> = columns.iter().map(|&column| cell(table, row, column)).collect();
+            let _ = writeln!(out, "    {} \\\\{stays}", cells.join(" & "));
         }
-        let cell = |&column: &usize| {
-            let text = match row.cells[column].strip_prefix('-') {
-                Some(digits) if column >= table.labels => format!("$-${}", escape(digits)),
-                _ => escape(&row.cells[column]),
-            };
-            if row.is_paper { format!("\\textit{{{text}}}") } else { text }
-        };
-        let cells: Vec<String> = columns.iter().map(cell).collect();
-        let _ = writeln!(out, "    {} \\\\", cells.join(" & "));
     }
     out
 }
 
-/// A float of one page. It is never wider than its place: that of a column if it fits there, otherwise that of the text.
-fn float(table: &Table) -> String {
-    let labels: Vec<usize> = (0..table.labels).collect();
-    let parts = parts(table, &labels, LEAST_SCALE);
-    let is_narrow = parts.iter().all(|columns| width(table, columns) <= COLUMN_WIDTH);
-    let environment = if is_narrow { "table" } else { "table*" };
-    let tabulars = parts.iter().map(|columns| {
-        let sides: String = columns.iter().map(|&column| side(table, column)).collect();
-        let (head, lines) = (head(table, columns), lines(table, columns, |_| String::new()));
-        // Estimates may be wrong, so the width is that of the table unless there is less room.
-        format!(
-            "  \\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%\n  \\begin{{tabular}}{{{sides}}}\n\
-             {head}{lines}    \\bottomrule\n  \\end{{tabular}}%\n  }}"
-        )
-    });
-    let tabulars = tabulars.collect::<Vec<_>>().join("\n  \\par\\medskip\n");
-    format!(
-        "\\begin{{{environment}}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  \\caption{{{}}}\n  \\label{{tab:{}}}\n  \
-         \\setlength{{\\tabcolsep}}{{{}pt}}\n{tabulars}\n\\end{{{environment}}}\n",
-        caption(table),
-        table.name,
-        COLUMN_GAP / 2.0,
-    )
+/// A cell in LaTeX. What is below zero has a minus sign, not a hyphen.
+fn cell(table: &Table, row: &Row, column: usize) -> String {
+    let text = match row.cells[column].strip_prefix('-') {
+        Some(digits) if column >= table.labels => format!("$-${}", escape(digits)),
+        _ => escape(&row.cells[column]),
+    };
+    if row.is_paper { format!("\\textit{{{text}}}") } else { text }
 }
 
-fn caption(table: &Table) -> String {
-    escape(format!("{}. {}", table.title, table.caption).trim())
+/// The caption of a part of a table, and the label of the whole.
+fn caption(table: &Table, part: usize) -> String {
+    let label = if part == 0 { format!("\\label{{tab:{}}}", table.name) } else { String::new() };
+    format!("\\caption{{{}}}{label}", escape(&format!("{}. {}", table.title, table.caption)))
+}
+
+/// Floats of parts of the columns, each at most as wide as the text, also in a document of two columns.
+fn float(table: &Table) -> String {
+    let labels: Vec<usize> = (0..table.labels).collect();
+    let mut out = String::new();
+    for (part, columns) in parts(table, &labels, LEAST_SCALE).iter().enumerate() {
+        let sides: String = columns.iter().map(|&column| side(table, column)).collect();
+        // Estimates may be wrong, so the width is that of the table unless there is less room.
+        let _ = write!(
+            out,
+            "\\begin{{table*}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  {}\n  \
+             \\setlength{{\\tabcolsep}}{{{}pt}}\n  \\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%\n  \
+             \\begin{{tabular}}{{{sides}}}\n{}{}    \\bottomrule\n  \\end{{tabular}}%\n  }}\n\\end{{table*}}\n",
+            caption(table, part),
+            COLUMN_GAP / 2.0,
+            head(table, columns),
+            lines(table, columns, |_| String::new())
+        );
+    }
+    out
 }
 
 /// Long tables of parts of the columns, over as many pages as they need. In a document of two columns they are set in one, for
@@ -201,7 +205,6 @@ fn long(table: &Table) -> String {
     for (part, columns) in parts(table, &[above], LONG_SCALE).iter().enumerate() {
         let (count, head) = (columns.len(), head(table, columns));
         let sides: String = columns.iter().map(|&column| side(table, column)).collect();
-        let label = if part == 0 { format!("\\label{{tab:{}}}", table.name) } else { String::new() };
         let name = |row: &Row| match row.cells[..above].join(", ") {
             name if name.is_empty() => name,
             // Not wider than the table, whatever names are.
@@ -212,10 +215,10 @@ fn long(table: &Table) -> String {
         };
         let _ = write!(
             out,
-            "{LONG_SIZE}\n\\begin{{longtable}}{{{sides}}}\n  \\caption{{{}}}{label} \\\\\n{head}  \\endfirsthead\n{head}  \
+            "{LONG_SIZE}\n\\begin{{longtable}}{{{sides}}}\n  {} \\\\\n{head}  \\endfirsthead\n{head}  \
              \\endhead\n    \\midrule\n    \\multicolumn{{{count}}}{{r}}{{\\textit{{continued}}}} \\\\\n  \\endfoot\n    \
              \\bottomrule\n  \\endlastfoot\n{}\\end{{longtable}}\n",
-            caption(table),
+            caption(table, part),
             lines(table, columns, name)
         );
     }
