@@ -1,7 +1,7 @@
 //! What is measured of a compressed model, in one description for tables, figures and the page.
 
-use lexisplat_eval::FrameRate;
 use lexisplat_eval::metrics::Metric;
+use lexisplat_eval::{Comparison, FrameRate};
 
 use crate::numbers::{number, signed};
 use crate::{Point, SceneResult};
@@ -78,37 +78,31 @@ impl Measure {
 
     /// The number. Without a point it is that of the model as trained. The PSNR of pictures without any difference is infinite.
     pub(crate) fn value(self, scene: &SceneResult, point: Option<&Point>) -> Option<f64> {
-        let comparison = match self {
-            Self::ToOriginal(metric) => Some((Some(&point?.to_original), metric)),
-            Self::ToPhotos(metric) => {
-                Some((point.map_or(&scene.to_photos, |point| &point.to_photos).as_ref(), metric))
-            }
-            _ => None,
-        };
-        if let Some((comparison, metric)) = comparison {
+        let score = |comparison: Option<&Comparison>, metric: Metric| {
             let comparison = comparison.filter(|comparison| !comparison.views.is_empty())?;
             let is_identical = metric == Metric::Psnr && comparison.identical;
-            return if is_identical { Some(f64::INFINITY) } else { comparison.get(metric)?.mean };
-        }
-        let file_bytes = point.map_or(scene.shipped_bytes, |point| Some(point.file_bytes));
+            if is_identical { Some(f64::INFINITY) } else { comparison.get(metric)?.mean }
+        };
+        let bytes =
+            point.map_or(scene.shipped_bytes, |point| Some(point.file_bytes)).map(|bytes| bytes as f64);
+        let fps = point.and_then(|point| point.fps);
         match self {
-            Self::FileRatio => return quotient(scene.ply_bytes as f64, file_bytes? as f64),
-            Self::BytesEach => return quotient(file_bytes? as f64, scene.gaussians as f64),
-            _ => {}
-        }
-        let point = point?;
-        match self {
-            Self::PhotoChange => {
-                Some(point.to_photos.as_ref()?.psnr.mean? - scene.to_photos.as_ref()?.psnr.mean?)
+            Self::ToOriginal(metric) => score(Some(&point?.to_original), metric),
+            Self::ToPhotos(metric) => {
+                score(point.map_or(&scene.to_photos, |point| &point.to_photos).as_ref(), metric)
             }
-            Self::MeanNonzeros => Some(point.mean_nonzeros),
-            Self::CoefficientRatio => point.coefficient_ratio,
-            Self::SparseFps => Some(point.fps?.sparse.mean),
-            Self::DenseFps => Some(point.fps?.dense.mean),
-            Self::Speedup => quotient(point.fps?.sparse.mean, point.fps?.dense.mean),
-            Self::SparseSpread => spread(point.fps?.sparse),
-            Self::DenseSpread => spread(point.fps?.dense),
-            Self::ToOriginal(_) | Self::ToPhotos(_) | Self::FileRatio | Self::BytesEach => None,
+            Self::PhotoChange => {
+                Some(point?.to_photos.as_ref()?.psnr.mean? - scene.to_photos.as_ref()?.psnr.mean?)
+            }
+            Self::MeanNonzeros => Some(point?.mean_nonzeros),
+            Self::CoefficientRatio => point?.coefficient_ratio,
+            Self::FileRatio => quotient(scene.ply_bytes as f64, bytes?),
+            Self::BytesEach => quotient(bytes?, scene.gaussians as f64),
+            Self::SparseFps => Some(fps?.sparse.mean),
+            Self::DenseFps => Some(fps?.dense.mean),
+            Self::Speedup => quotient(fps?.sparse.mean, fps?.dense.mean),
+            Self::SparseSpread => spread(fps?.sparse),
+            Self::DenseSpread => spread(fps?.dense),
         }
     }
 }

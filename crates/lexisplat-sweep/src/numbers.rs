@@ -3,18 +3,6 @@
 /// What stands for a missing value.
 pub(crate) const DASH: &str = "\u{2013}";
 
-/// Bytes in the unit that gives few digits; a megabyte is 10^6 bytes.
-pub(crate) fn bytes(value: u64) -> String {
-    let v = value as f64;
-    match value {
-        0..1_000 => format!("{value}\u{a0}B"),
-        1_000..100_000 => format!("{:.1}\u{a0}kB", v / 1e3),
-        100_000..10_000_000 => format!("{:.2}\u{a0}MB", v / 1e6),
-        10_000_000..10_000_000_000 => format!("{:.1}\u{a0}MB", v / 1e6),
-        _ => format!("{:.2}\u{a0}GB", v / 1e9),
-    }
-}
-
 /// `value` with `digits` after the point, or a dash if there is none.
 pub(crate) fn number(value: Option<f64>, digits: usize) -> String {
     let text = |value| without_sign_of_zero(format!("{value:.digits$}"));
@@ -45,8 +33,6 @@ mod tests {
 
     #[test]
     fn numbers_read_well() {
-        assert_eq!(bytes(16_200), "16.2\u{a0}kB");
-        assert_eq!(bytes(5_600_000), "5.60\u{a0}MB");
         assert_eq!([None, Some(f64::NAN), Some(f64::INFINITY)].map(|v| number(v, 2)), [DASH; 3]);
         assert_eq!([2.0, -0.001, -0.01].map(|v| number(Some(v), 2)), ["2.00", "0.00", "-0.01"]);
         assert_eq!([0.2, -0.2].map(|v| signed(v, 1)), ["+0.2", "-0.2"]);

@@ -156,7 +156,7 @@ impl Evaluator<'_> {
             sh_degree,
             ply_bytes: source_bytes,
             shipped_bytes,
-            views_from: found.from,
+            views_from: shown_path(Path::new(&found.from)),
             views: count,
             size,
             device: self.renderer.name().to_owned(),

@@ -1,11 +1,8 @@
 //! Charts of lines and points over a logarithmic axis to base 2.
 
-use super::drawing::{Anchor, Drawing, Shape};
+use super::drawing::{Anchor, Figure, SIZE, Shape};
 use crate::numbers::number;
 
-/// Size of the whole chart.
-const WIDTH: f64 = 860.0;
-const HEIGHT: f64 = 500.0;
 /// Edges of the field that data is drawn in. Right of it is the legend.
 const LEFT: f64 = 74.0;
 const RIGHT: f64 = 670.0;
@@ -116,7 +113,7 @@ pub(super) struct Chart {
 
 impl Chart {
     /// Draws the chart. `None` if it has no points.
-    pub(super) fn draw(&self) -> Option<Drawing> {
+    pub(super) fn draw(self) -> Option<Figure> {
         // The axes cannot show other numbers.
         let is_shown = |dot: &Dot| dot.x >= LARGEST.recip() && dot.x <= LARGEST && dot.y.abs() <= LARGEST;
         let mut all = self.series.clone();
@@ -152,7 +149,7 @@ impl Chart {
             canvas.0.extend(points.iter().filter_map(|at| Some(mark.as_ref()?.at(*at, colour))));
             y += LEGEND_LINE;
         }
-        Some(Drawing { size: [WIDTH, HEIGHT], shapes: canvas.0 })
+        Some(Figure { name: self.name, title: self.title, caption: self.caption, shapes: canvas.0 })
     }
 
     /// The title, the axes and the grid.
@@ -173,8 +170,8 @@ impl Chart {
         canvas.line([LEFT, BOTTOM], [RIGHT, BOTTOM], SOFT);
         let title_size = TITLE_SIZE * (LONGEST_TITLE / self.title.chars().count() as f64).min(1.0);
         let (middle, centre) = ((LEFT + RIGHT) / 2.0, (TOP + BOTTOM) / 2.0);
-        canvas.text([WIDTH / 2.0, 28.0], &self.title, title_size, Anchor::Middle, INK);
-        canvas.text([middle, HEIGHT - 18.0], self.x, LABEL_SIZE, Anchor::Middle, INK);
+        canvas.text([SIZE[0] / 2.0, 28.0], &self.title, title_size, Anchor::Middle, INK);
+        canvas.text([middle, SIZE[1] - 18.0], self.x, LABEL_SIZE, Anchor::Middle, INK);
         canvas.text([22.0, centre], &self.y, LABEL_SIZE, Anchor::Middle, INK);
         if let Some(Shape::Text { upright, .. }) = canvas.0.last_mut() {
             *upright = true;
@@ -192,7 +189,7 @@ impl Canvas {
 
     fn text(&mut self, at: [f64; 2], text: &str, size: f64, anchor: Anchor, colour: &'static str) {
         let text = text.replace(char::is_control, " ");
-        self.0.push(Shape::Text { at, text, size, bold: false, anchor, upright: false, colour });
+        self.0.push(Shape::Text { at, text, size, anchor, upright: false, colour });
     }
 }
 

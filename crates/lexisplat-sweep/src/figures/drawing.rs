@@ -2,6 +2,8 @@
 
 use maud::{Markup, html};
 
+use super::pdf::pdf;
+
 /// Where text stands relative to its place: its start, its middle or its end is there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Anchor {
@@ -18,33 +20,39 @@ pub(super) enum Shape {
     /// `opacity` is in percent.
     Area { points: Vec<[f64; 2]>, colour: &'static str, opacity: u8 },
     /// Text on one line. It is `upright` if it runs from below to above.
-    Text {
-        at: [f64; 2],
-        text: String,
-        size: f64,
-        bold: bool,
-        anchor: Anchor,
-        upright: bool,
-        colour: &'static str,
-    },
+    Text { at: [f64; 2], text: String, size: f64, anchor: Anchor, upright: bool, colour: &'static str },
 }
 
-/// Shapes on a page of `size`, in the order of drawing.
+/// Width and height of figures in pixels.
+pub(super) const SIZE: [f64; 2] = [860.0, 500.0];
+
+/// A figure.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Drawing {
-    pub(super) size: [f64; 2],
+pub(crate) struct Figure {
+    /// Name for files, without extension; safe on every system and unique among the figures of a sweep.
+    pub(crate) name: String,
+    /// What the figure shows, in a few words.
+    pub(crate) title: String,
+    /// How to read it.
+    pub(crate) caption: String,
+    /// In the order of drawing.
     pub(super) shapes: Vec<Shape>,
 }
 
-impl Drawing {
-    /// The drawing as an element of a page, which scales with it. `label` says what it shows.
-    pub(crate) fn svg(&self, label: &str) -> Markup {
-        let [width, height] = self.size.map(number);
+impl Figure {
+    /// The figure as an element of a page, which scales with it.
+    pub(crate) fn svg(&self) -> Markup {
+        let [width, height] = SIZE;
         html! {
-            svg class="plot" role="img" aria-label=(label) viewBox={ "0 0 " (width) " " (height) } stroke-linejoin="round" {
+            svg class="plot" role="img" aria-label=(self.title) viewBox={ "0 0 " (width) " " (height) } stroke-linejoin="round" {
                 @for shape in &self.shapes { (shape.svg()) }
             }
         }
+    }
+
+    /// The figure as a PDF of one page.
+    pub(crate) fn pdf(&self) -> Vec<u8> {
+        pdf(&self.shapes)
     }
 }
 
@@ -62,7 +70,7 @@ impl Shape {
             Self::Area { points, colour, opacity } => html! {
                 polygon points=(list(points)) fill=(colour) fill-opacity={ (opacity) "%" } {}
             },
-            Self::Text { at: [x, y], text, size, bold, anchor, upright, colour } => {
+            Self::Text { at: [x, y], text, size, anchor, upright, colour } => {
                 let anchor = match anchor {
                     Anchor::Start => "start",
                     Anchor::Middle => "middle",
@@ -70,7 +78,7 @@ impl Shape {
                 };
                 let (x, y) = (number(*x), number(*y));
                 html! {
-                    text x=(x) y=(y) font-size=(number(*size)) font-weight=[bold.then_some("bold")] text-anchor=(anchor)
+                    text x=(x) y=(y) font-size=(number(*size)) text-anchor=(anchor)
                         transform=[upright.then(|| format!("rotate(-90 {x} {y})"))] fill=(colour) { (text) }
                 }
             }

@@ -10,34 +10,12 @@ use lexisplat_eval::metrics::Metric;
 
 use chart::{Chart, DASHED, DOTTED, Dot, Mark, SOLID, Series};
 
+pub(crate) use drawing::Figure;
+
 use super::curve::{At, Kind, curve};
 use super::grid::Grid;
 use super::measure::Measure;
 use super::{Fps, Method, Results, Setting, paper, unique};
-
-/// A figure.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Figure {
-    /// Name for files, without extension; safe on every system and unique among the figures of a sweep.
-    pub(crate) name: String,
-    /// What the figure shows, in a few words.
-    pub(crate) title: String,
-    /// How to read it.
-    pub(crate) caption: String,
-    drawing: drawing::Drawing,
-}
-
-impl Figure {
-    /// The figure as an element of a page.
-    pub(crate) fn svg(&self) -> maud::Markup {
-        self.drawing.svg(&self.title)
-    }
-
-    /// The figure as a PDF of one page.
-    pub(crate) fn pdf(&self) -> Vec<u8> {
-        pdf::pdf(&self.drawing)
-    }
-}
 
 /// Most characters of a device's name on an axis. Captions have the whole name.
 const LONGEST_DEVICE: usize = 36;
@@ -113,13 +91,13 @@ pub(crate) fn figures(results: &Results) -> Vec<Figure> {
     let scenes = (0..grid.headings.len()).map(|column| quality(&grid, Some(column)));
     let mut figures: Vec<Figure> = Vec::new();
     for chart in [quality(&grid, None), speed(&grid), bytes(&grid)].into_iter().chain(scenes) {
-        let Some(drawing) = chart.draw() else { continue };
+        let Some(mut figure) = chart.draw() else { continue };
+        figure.caption = format!("{} {}", figure.caption, results.how()).trim_end().to_owned();
         // Scenes' names may differ only in letters that file names cannot have.
-        let name = unique(&chart.name, |name| {
+        figure.name = unique(&figure.name, |name| {
             figures.iter().any(|other| other.name.to_lowercase() == name.to_lowercase())
         });
-        let caption = format!("{} {}", chart.caption, results.how()).trim_end().to_owned();
-        figures.push(Figure { name, title: chart.title, caption, drawing });
+        figures.push(figure);
     }
     figures
 }

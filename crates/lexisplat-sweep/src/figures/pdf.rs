@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use super::drawing::{Anchor, Drawing, Shape, number};
+use super::drawing::{Anchor, SIZE, Shape, number};
 
 /// Advance widths of Helvetica from the space to the tilde, in thousandths of the size of the text (Adobe, Core 14 AFM).
 const WIDTHS: [u16; 95] = [
@@ -17,16 +17,13 @@ const WIDTHS: [u16; 95] = [
 ];
 /// Width of all other letters, that of a digit.
 const OTHER_WIDTH: u16 = 556;
-/// Bold letters are about so many times wider.
-const BOLD: f64 = 1.06;
-
-/// `drawing` as a PDF file, one point for each pixel. The same drawing gives the same bytes.
-pub(super) fn pdf(drawing: &Drawing) -> Vec<u8> {
-    let [width, height] = drawing.size.map(number);
+/// `shapes` as a PDF file, one point for each pixel. The same shapes give the same bytes.
+pub(super) fn pdf(shapes: &[Shape]) -> Vec<u8> {
+    let [width, height] = SIZE.map(number);
     // Pixels count from the top, points from the bottom.
     let mut content = format!("1 0 0 -1 0 {height} cm 1 j\n");
     let mut opacities = BTreeSet::new();
-    for shape in &drawing.shapes {
+    for shape in shapes {
         let opacity = if let Shape::Area { opacity, .. } = shape { *opacity } else { 100 };
         opacities.insert(opacity);
         let _ = writeln!(content, "/G{opacity} gs\n{}", operators(shape));
@@ -35,19 +32,14 @@ pub(super) fn pdf(drawing: &Drawing) -> Vec<u8> {
         .iter()
         .map(|percent| format!("/G{percent} << /ca {} >> ", number(f64::from(*percent) / 100.0)))
         .collect();
-    let font = |name: &str| {
-        format!("<< /Type /Font /Subtype /Type1 /BaseFont /{name} /Encoding /WinAnsiEncoding >>")
-    };
     let objects = [
         "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
         format!(
-            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width} {height}] /Contents 4 0 R /Resources << /Font << /F0 5 0 R \
-             /F1 6 0 R >> /ExtGState << {states}>> >> >>"
+            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width} {height}] /Contents 4 0 R /Resources << /Font << /F0 5 0 R >> /ExtGState << {states}>> >> >>"
         ),
         format!("<< /Length {} >>\nstream\n{content}endstream", content.len()),
-        font("Helvetica"),
-        font("Helvetica-Bold"),
+        "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>".to_owned(),
     ];
     let mut file = "%PDF-1.4\n".to_owned();
     let mut table = "0000000000 65535 f \n".to_owned();
@@ -75,34 +67,29 @@ fn operators(shape: &Shape) -> String {
             format!("{} RG {} w [{dash}] 0 d\n{}S", rgb(colour), number(*width), path(points))
         }
         Shape::Area { points, colour, .. } => format!("{} rg\n{}h f", rgb(colour), path(points)),
-        Shape::Text { at: [x, y], text, size, bold, anchor, upright, colour } => {
+        Shape::Text { at: [x, y], text, size, anchor, upright, colour } => {
             let share = match anchor {
                 Anchor::Start => 0.0,
                 Anchor::Middle => 0.5,
                 Anchor::End => 1.0,
             };
-            let back = share * width(text, *size, *bold);
+            let back = share * width(text, *size);
             let place = if *upright {
                 [0.0, -1.0, -1.0, 0.0, *x, y + back]
             } else {
                 [1.0, 0.0, 0.0, -1.0, x - back, *y]
             };
-            let (place, font) = (place.map(number).join(" "), u8::from(*bold));
-            format!(
-                "{} rg BT /F{font} {} Tf {place} Tm ({}) Tj ET",
-                rgb(colour),
-                number(*size),
-                literal(text)
-            )
+            let place = place.map(number).join(" ");
+            format!("{} rg BT /F0 {} Tf {place} Tm ({}) Tj ET", rgb(colour), number(*size), literal(text))
         }
     }
 }
 
 /// Width of `text` in points.
-fn width(text: &str, size: f64, bold: bool) -> f64 {
+fn width(text: &str, size: f64) -> f64 {
     let each = |byte: u8| byte.checked_sub(b' ').and_then(|i| WIDTHS.get(usize::from(i))).copied();
     let all: u32 = text.chars().map(|c| u32::from(each(code(c)).unwrap_or(OTHER_WIDTH))).sum();
-    f64::from(all) / 1000.0 * size * if bold { BOLD } else { 1.0 }
+    f64::from(all) / 1000.0 * size
 }
 
 /// The byte of a letter in Windows code page 1252.
@@ -150,7 +137,7 @@ mod tests {
         assert_eq!(number(-0.0001), "0");
         assert_eq!(literal("a(b)\\\u{d7}\u{2013}\u{6f22}"), "a\\(b\\)\\\\\\327\\226?");
         assert_eq!(rgb("#ff0033"), "1 0 0.2");
-        assert!((width("0.1", 10.0, false) - 13.9).abs() < 1e-9);
+        assert!((width("0.1", 10.0) - 13.9).abs() < 1e-9);
     }
 
     #[test]
@@ -162,13 +149,12 @@ mod tests {
                 at: [100.0, 50.0],
                 text: "00".to_owned(),
                 size: 10.0,
-                bold: false,
                 anchor: Anchor::Middle,
                 upright: true,
                 colour: "#000000",
             },
         ];
-        let file = pdf(&Drawing { size: [200.0, 100.0], shapes });
+        let file = pdf(&shapes);
         let text = String::from_utf8(file).unwrap();
         assert!(text.contains("1 0 0 RG 2 w [6 5] 0 d\n1 2 m\n3 4.5 l\nS\n"), "{text}");
         assert!(text.contains("0 0 1 rg\n1 2 m\n3 4 l\n5 6 l\nh f\n"), "{text}");
@@ -179,7 +165,7 @@ mod tests {
         let start: usize = rest.lines().next().unwrap().parse().unwrap();
         let entries: Vec<&str> =
             text[start..].lines().skip(3).take_while(|line| line.ends_with(" n ")).collect();
-        assert_eq!(entries.len(), 6);
+        assert_eq!(entries.len(), 5);
         for (i, entry) in entries.iter().enumerate() {
             let at: usize = entry[..10].parse().unwrap();
             assert!(text[at..].starts_with(&format!("{} 0 obj\n", i + 1)), "{entry}");

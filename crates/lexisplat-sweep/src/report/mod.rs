@@ -240,7 +240,7 @@ mod tests {
         let page = page(&model(ShDegree::THREE), &scores, "front");
         let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text}"));
         assert!(at("25.00\u{d7}") < at("4.19\u{d7}"), "the packed file's ratio comes first");
-        assert!(page[..at("<main>")].contains("160\u{a0}B"), "the title is about the packed file");
+        assert!(page[..at("<main>")].contains("160 B"), "the title is about the packed file");
         assert!(at("packed.lexi") < at("exact.lexi") && at("data:image") < at("exact.lexi"));
     }
 

@@ -60,7 +60,7 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
     html! {
         header {
             p.mark { "lexisplat" }
-            h1 { (numbers::bytes(*ply_bytes)) " became " em { (numbers::bytes(packed.bytes)) } }
+            h1 { (format::bytes(*ply_bytes)) " became " em { (format::bytes(packed.bytes)) } }
             p.lede {
                 strong { (report.title) }
                 " is a 3D scene made of " (format::count(gaussians)) " soft coloured blobs, so-called Gaussians, whose \
@@ -141,11 +141,11 @@ pub(super) fn steps() -> Markup {
 /// A bar as long as its share of `longest`, in parts as long as theirs.
 fn bar(name: &str, total: u64, groups: &Groups, longest: f64) -> Markup {
     html! {
-        p.label { (name) ", " (numbers::bytes(total)) }
+        p.label { (name) ", " (format::bytes(total)) }
         .bar role="img" aria-label=(format!("Bytes of {name} by attribute")) {
             @for ((what, class, _), bytes) in GROUPS.iter().zip(groups).filter(|(_, bytes)| **bytes > 0.0) {
                 @let width = bytes / longest * 100.0;
-                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", numbers::bytes(whole(*bytes)))) {
+                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", format::bytes(whole(*bytes)))) {
                     @if width >= LABELLED { (format!("{:.0}%", bytes / total.max(1) as f64 * 100.0)) }
                 }
             }
@@ -178,9 +178,9 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
                             @let before = columns[0][k];
                             tr {
                                 th scope="row" { span class=(format!("key {class}")) {} (what) }
-                                td { (numbers::bytes(whole(before))) }
+                                td { (format::bytes(whole(before))) }
                                 @for after in [columns[1][k], columns[2][k]] {
-                                    td { (numbers::bytes(whole(after))) }
+                                    td { (format::bytes(whole(after))) }
                                     // Headers hold no numbers of the scene, so they have no ratio.
                                     td { (numbers::ratio(before, if k == OTHER { 0.0 } else { after })) }
                                 }
@@ -190,9 +190,9 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
                     tfoot {
                         tr {
                             th scope="row" { "Whole file" }
-                            td { (numbers::bytes(*ply_bytes)) }
+                            td { (format::bytes(*ply_bytes)) }
                             @for file in [packed, exact] {
-                                td { (numbers::bytes(file.bytes)) }
+                                td { (format::bytes(file.bytes)) }
                                 td { (smaller(*ply_bytes, file.bytes)) }
                             }
                         }

@@ -97,23 +97,11 @@ fn side(table: &Table, column: usize) -> char {
     if column < table.labels { 'l' } else { 'r' }
 }
 
-/// A heading that breaks between words where it is longer than the column.
+/// A heading with each word on a line of its own.
 fn heading(table: &Table, column: usize) -> String {
-    let most = characters(table, column);
-    let mut lines: Vec<String> = Vec::new();
-    for word in table.columns[column].heading.split(' ') {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
-                let _ = write!(line, " {word}");
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    let lines: Vec<String> = lines.iter().map(|line| format!("\\textbf{{{}}}", escape(line))).collect();
-    match lines.as_slice() {
-        [line] => line.clone(),
-        lines => format!("\\shortstack[{}]{{{}}}", side(table, column), lines.join("\\\\")),
-    }
+    let words = table.columns[column].heading.split(' ');
+    let words: Vec<String> = words.map(|word| format!("\\textbf{{{}}}", escape(word))).collect();
+    format!("\\shortstack[{}]{{{}}}", side(table, column), words.join("\\\\"))
 }
 
 /// The head of a table with some of the columns: groups and headings, with rules above and below.
