@@ -3,7 +3,7 @@
 
     python3 scripts/check_decoder.py LEXISPLAT FILE.lexi ...
 
-LEXISPLAT is the program. Needs NumPy. Of versions 1 and 2 every bit is the same. Of version 3 the integers of every
+LEXISPLAT is the program. Needs NumPy. Of exact layouts every bit is the same. Of packed files the integers of every
 range have the CRC-32 of the index, scales, SH-rest and extras are the same, and all else is within the bounds of
 docs/FORMAT.md. Where FILE.trace lies beside FILE.lexi, `decode_lexi.py --trace 3` prints just that.
 """

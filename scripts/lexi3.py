@@ -1,4 +1,4 @@
-"""Version 3 of layout packed: head, tables, ranges and values. Names are those of docs/FORMAT.md.
+"""Layout packed: head, tables, ranges and values. Names are those of docs/FORMAT.md.
 
 All lanes of all chunks are decoded side by side: every variable of a Gaussian is a vector with one element a lane, and
 the i-th Gaussians of all lanes are decoded together. Lanes are sorted by falling length, so those that still have a

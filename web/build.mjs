@@ -26,8 +26,8 @@ const COMMENTS = /^ *\/\*\*[^]*?\*\/\n/gm;
 const MOST_DECODER = 150_000;
 
 /**
- * The builds, their features of the crate, and what wasm-opt does: `decoder` decodes packed files of version 3, `files` all
- * other .lexi files, and `viewer` is what the viewer is made of.
+ * The builds, their features of the crate, and what wasm-opt does: `decoder` decodes packed files, `files` other
+ * .lexi files, and `viewer` is what the viewer is made of.
  */
 const BUILDS = {
   decoder: { features: ['feed'], optimise: ['-O3', '-Oz'] },

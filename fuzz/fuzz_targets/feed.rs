@@ -1,4 +1,4 @@
-//! Packed .lexi files of version 3 that come in pieces, in any order, twice or damaged: what is decoded is finite and what
+//! Packed .lexi files that come in pieces, in any order, twice or damaged: what is decoded is finite and what
 //! the reader of whole files gives, and no more is held than is allowed.
 #![no_main]
 

@@ -2,14 +2,14 @@
 //! is reached.
 
 use lexisplat::ShDegree;
-use lexisplat::packed::fuzzing::layered;
+use lexisplat::packed::fuzzing;
 use serde_json::{Map, Value, json};
 
 /// Bytes after a file that say how it is fed, in the target `feed`.
 pub const FEED_SCRIPT: usize = 32;
 /// One time in so many the bytes are changed as they lie, and nothing is made to fit.
 const RAW: usize = 8;
-/// Bytes of the checksum of header and head that a packed head of version 3 starts with.
+/// Bytes of the checksum of header and head that a packed head starts with.
 const SEAL: usize = 4;
 /// Most bytes a tensor may grow by in one mutation.
 const GROWTH: usize = 64;
@@ -28,7 +28,7 @@ const DTYPES: [(&str, usize); 11] = [
     ("BOOL", 1),
 ];
 /// Names of tensors, so that one may turn up where it does not belong.
-const NAMES: [&str; 23] = [
+const NAMES: [&str; 20] = [
     "position",
     "dc",
     "opacity",
@@ -45,9 +45,6 @@ const NAMES: [&str; 23] = [
     "extra.a",
     "extra.",
     "x-new",
-    "packed.parameters",
-    "packed.lengths",
-    "packed.tables",
     "packed.data",
     "packed.order",
     "packed.head",
@@ -141,21 +138,21 @@ impl Parts {
         Some(Self { metadata, tensors })
     }
 
-    /// Makes the checksums of the ranges of a packed scene of version 3 fit its data, if its head can be read.
+    /// Makes the checksums of the ranges of a packed scene fit its data, if its head can be read.
     fn fit_ranges(&mut self) {
-        let Some((degree, [head, data])) = self.layered() else { return };
+        let Some((degree, [head, data])) = self.packed() else { return };
         let data = &self.tensors[data].bytes;
         let Some((own, rest)) = self.tensors[head].bytes.split_first_chunk::<SEAL>() else { return };
-        let Some(sealed) = layered::resealed(rest, degree, data) else { return };
+        let Some(sealed) = fuzzing::resealed(rest, degree, data) else { return };
         self.tensors[head].bytes = [own, &sealed[..]].concat();
     }
 
     /// The file, with offsets and checksums that fit, and names that differ.
     fn sealed(&self) -> Vec<u8> {
         let (mut header, mut sums, mut data, mut own) = (Map::new(), Map::new(), Vec::new(), None);
-        // Since version 3 the head has the checksum of header and head, and those of the ranges of the data.
+        // The head of a packed file has the checksum of header and head, and those of the ranges of the data.
         let is_version_3 = self.metadata.get("version").and_then(Value::as_str) == Some("3");
-        let is_layered = is_version_3 && self.tensors.iter().any(|tensor| tensor.name == "packed.head");
+        let is_packed = is_version_3 && self.tensors.iter().any(|tensor| tensor.name == "packed.head");
         let mut sealed = &[][..];
         for tensor in &self.tensors {
             if header.contains_key(&tensor.name) {
@@ -167,14 +164,14 @@ impl Parts {
             let entry =
                 json!({"dtype": tensor.dtype, "shape": tensor.shape, "data_offsets": [start, data.len()]});
             header.insert(tensor.name.clone(), entry);
-            if is_layered && tensor.name == "packed.data" {
+            if is_packed && tensor.name == "packed.data" {
                 continue;
             }
-            if is_layered && tensor.name == "packed.head" {
+            if is_packed && tensor.name == "packed.head" {
                 if let Some((_, rest)) = tensor.bytes.split_first_chunk::<SEAL>() {
                     (own, sealed) = (Some(range.start..range.start + SEAL), rest);
                 }
-            } else if !is_layered && tensor.name == "checksum.header" {
+            } else if !is_packed && tensor.name == "checksum.header" {
                 own = (range.len() == SEAL).then_some(range);
             } else {
                 let sum = format!("{:08x}", crc32fast::hash(&tensor.bytes));
@@ -237,12 +234,12 @@ impl Parts {
         }
     }
 
-    /// Changes what the index of a packed scene of version 3 says of chunks and ranges.
+    /// Changes what the index of a packed scene says of chunks and ranges.
     fn rearrange(&mut self, random: &mut Random) {
-        let Some((degree, [head, data])) = self.layered() else { return };
+        let Some((degree, [head, data])) = self.packed() else { return };
         let Some((own, rest)) = self.tensors[head].bytes.split_first_chunk::<SEAL>() else { return };
         let changed =
-            layered::rearranged(rest, degree, &self.tensors[data].bytes, &mut |bound| random.below(bound));
+            fuzzing::rearranged(rest, degree, &self.tensors[data].bytes, &mut |bound| random.below(bound));
         let Some((rest, bytes, gaussians)) = changed else { return };
         let head_bytes = [own, &rest[..]].concat();
         self.tensors[head].replace(head_bytes);
@@ -250,8 +247,8 @@ impl Parts {
         self.metadata.insert("gaussians".to_owned(), Value::from(gaussians.to_string()));
     }
 
-    /// Degree, and places of head and data of a packed scene of version 3.
-    fn layered(&self) -> Option<(ShDegree, [usize; 2])> {
+    /// Degree, and places of head and data of a packed scene.
+    fn packed(&self) -> Option<(ShDegree, [usize; 2])> {
         let degree = self.metadata.get("degree")?.as_str()?.parse().ok()?;
         let at = |name: &str| self.tensors.iter().position(|tensor| tensor.name == name);
         Some((ShDegree::new(degree).ok()?, [at("packed.head")?, at("packed.data")?]))

@@ -12,8 +12,8 @@ const WORKERS = 2;
 export const ALL_PARTS = 0xffffffff;
 /** Most bytes of the JSON header of a file. */
 const MOST_HEADER = 4 << 20;
-/** The version of files that are decoded in part. */
-export const LAYERED = '3';
+/** The version of packed files, which are decoded in part. */
+export const PACKED = '3';
 
 /**
  * @param {object} env where WebAssembly and workers come from
@@ -28,7 +28,7 @@ export async function openWith(env, source, options) {
   let pool;
   try {
     const start = await readStart(input.source, signal);
-    if (start.version !== LAYERED) {
+    if (start.version !== PACKED) {
       if (start.version === undefined) throw new Error(`${input.source.name}: this is not a .lexi file`);
       pool = await Pool.of(Math.min(workers, 1), await env.files());
       return await wholeScene({ input, settings, pool, start });
@@ -129,7 +129,7 @@ export async function readWhole(source, first, { memory, signal, onProgress }) {
   return bytes;
 }
 
-/** A scene of a file that is decoded whole: an exact layout, or version 2. */
+/** A scene of a file of an exact layout, which is decoded whole. */
 async function wholeScene({ input, settings, pool, start }) {
   const { source } = input;
   const bytes = await readWhole(source, start.bytes, settings);

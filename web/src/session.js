@@ -1,7 +1,7 @@
 /** Brings a scene of any format to the viewer: .lexi files coarse to fine while they come, others whole. */
 
 import * as wasm from '../wasm/viewer.js';
-import { ALL_PARTS, LAYERED, MEMORY, readStart, readWhole, startDecoders, startFeed } from './open.js';
+import { ALL_PARTS, MEMORY, PACKED, readStart, readWhole, startDecoders, startFeed } from './open.js';
 import { Pool } from './pool.js';
 import { streamed } from './scene.js';
 import { sourceOf, watched } from './source.js';
@@ -37,13 +37,13 @@ export async function show(source, { env, onForm, onPart, onProgress, signal, bu
   try {
     signal?.throwIfAborted();
     const start = await readStart(input.source, signal);
-    pool = await Pool.of(start.version === LAYERED ? env.workers : Math.min(env.workers, 1), {
+    pool = await Pool.of(start.version === PACKED ? env.workers : Math.min(env.workers, 1), {
       module: env.wasm,
       worker: env.worker,
       handler: () => viewerHandlerOf(wasm),
     });
     const given = { input, start, pool, options, stats, budget, onForm, onPart };
-    return { info: await (start.version === LAYERED ? layered(given) : whole(given)) };
+    return { info: await (start.version === PACKED ? layered(given) : whole(given)) };
   } finally {
     input.source.close();
     input.feed?.free();
@@ -51,7 +51,7 @@ export async function show(source, { env, onForm, onPart, onProgress, signal, bu
   }
 }
 
-/** Shows a packed file of version 3 while it comes. */
+/** Shows a packed file while it comes. */
 async function layered({ input, start, pool, options, stats, budget, onForm, onPart }) {
   const header = await startFeed(input, wasm, start, options);
   const { name } = input.source;

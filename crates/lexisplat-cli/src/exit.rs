@@ -92,7 +92,7 @@ fn classify(error: &anyhow::Error) -> Blame {
     if let Some(e) = error.downcast_ref::<lexisplat_view::Error>() {
         return view(e);
     }
-    if let Some(e) = error.downcast_ref::<lexisplat_eval::Error>() {
+    if let Some(e) = error.downcast_ref::<lexisplat_compress::Error>() {
         return eval(e);
     }
     if let Some(e) = error.downcast_ref::<lexisplat_render::Error>() {
@@ -124,8 +124,8 @@ fn view(error: &lexisplat_view::Error) -> Blame {
     (Kind::Graphics, Some(advice.into()))
 }
 
-fn eval(error: &lexisplat_eval::Error) -> Blame {
-    use lexisplat_eval::Error;
+fn eval(error: &lexisplat_compress::Error) -> Blame {
+    use lexisplat_compress::Error;
     match error {
         Error::Codec(e) => codec(e),
         Error::Render(e) => render(e),

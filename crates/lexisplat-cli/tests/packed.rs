@@ -250,11 +250,6 @@ fn what_is_left_out_is_reported() {
         assert_eq!((number(&report["removed"]), number(&report["gaussians"])), (0.0, folder::FEW as f64));
         assert!(!folder.run(&["info", "scene.lexi"]).contains("left out"));
     }
-    // An option of before is accepted, and told about.
-    let arguments = [&BY_CAMERAS[..], &["--prune", "--overwrite"]].concat();
-    let told = lexisplat().current_dir(folder.0.path()).args(arguments).output().unwrap();
-    assert!(told.status.success());
-    assert!(String::from_utf8_lossy(&told.stderr).contains("--keep-all"));
 }
 
 #[test]

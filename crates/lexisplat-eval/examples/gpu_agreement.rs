@@ -8,8 +8,9 @@
 use std::error::Error;
 
 use lexisplat::ply::ReadOptions;
+use lexisplat_compress::ORBIT_SIZE;
+use lexisplat_eval::SceneFile;
 use lexisplat_eval::metrics::psnr;
-use lexisplat_eval::{ORBIT_SIZE, SceneFile};
 use lexisplat_render::gpu::{GpuRenderer, GpuScene, ShPath};
 use lexisplat_render::{Camera, Device, Image, RenderOptions, Scene, Split, orbit, read_cameras, render};
 use serde_json::json;

@@ -70,7 +70,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     };
     let path: ShPath = rest.first().map_or(Ok(ShPath::SparseOrdered), |name| name.parse())?;
     let frames: usize = rest.get(1).map_or(Ok(3), |n| n.parse())?;
-    let model = tiled(&lexi::read(file.as_ref(), &Limits::default())?, copies.parse()?)?;
+    let model = tiled(&lexi::read(file, &Limits::default())?, copies.parse()?)?;
     let scene = Scene::from(&model);
     let cameras = orbit(model.geometry(), VIEWS, SIZE.0, SIZE.1);
     let gpu = Device::Gpu.open_gpu()?.ok_or("there is no GPU")?;

@@ -27,7 +27,7 @@ fn read(path: &str) -> Result<Image, Box<dyn Error>> {
 /// What `metric` gives, or the least seconds it took.
 fn run(
     timed: bool,
-    mut metric: impl FnMut() -> lexisplat_eval::Result<Option<f64>>,
+    mut metric: impl FnMut() -> lexisplat_compress::Result<Option<f64>>,
 ) -> Result<Value, Box<dyn Error>> {
     let mut result = metric()?;
     if timed {

@@ -11,7 +11,8 @@ use std::path::Path;
 
 use lexisplat::Geometry;
 use lexisplat::ply::ReadOptions;
-use lexisplat_eval::{SceneFile, SplitFilter, choose_views};
+use lexisplat_compress::{SplitFilter, choose_views};
+use lexisplat_eval::SceneFile;
 use lexisplat_render::{Camera, Image, RenderOptions, Renderer, orbit};
 use serde_json::{Map, Value, json};
 

@@ -11,7 +11,7 @@ use lexisplat_render::gpu::{Gpu, GpuRenderer, GpuScene, ShPath, Speed};
 use lexisplat_render::{Camera, RenderOptions, Scene, render_measured};
 use serde::Serialize;
 
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// How to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -3,10 +3,10 @@
 use lexisplat::{Progress, Stage};
 use lexisplat_render::{Camera, Image, Renderer, Scene};
 
-use crate::drawing::DrawOptions;
-use crate::error::{Error, Result};
 use crate::scorer::Scorer;
 use crate::scores::{Comparison, ViewScore};
+use lexisplat_compress::DrawOptions;
+use lexisplat_compress::{Error, Result};
 
 /// Draws `a` and `b` with `renderer` from every camera and scores `b` against `a` by PSNR and SSIM.
 ///

@@ -9,7 +9,7 @@ use lexisplat_render::{Camera, RenderOptions, Scene, render_measured};
 use serde::{Deserialize, Serialize};
 
 use crate::bench::BenchOptions;
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Frames a second of one scene. A round draws every view once.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

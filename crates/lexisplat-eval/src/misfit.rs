@@ -1,18 +1,13 @@
-//! Signs that cameras do not belong to a scene.
+//! Signs that cameras or photos do not belong to a scene.
 
-use lexisplat::Geometry;
-use lexisplat_render::{Camera, Image, hidden_share};
+use lexisplat_compress::shows_almost_nothing;
+use lexisplat_render::Image;
 
 use crate::scores::Comparison;
 
-/// Share of pixels below which a picture shows almost nothing of a scene.
-const ALMOST_NOTHING: f64 = 0.02;
 /// Largest mean PSNR against photos that warns, in dB. Published models reach 20 dB and more on their hardest
 /// scenes, and a plain grey picture 10 to 14 dB.
 const MISFIT_DB: f64 = 15.0;
-/// Share of the opacity before cameras that their near planes may hide without a warning. In the models of docs/results they
-/// hide nothing.
-const HIDDEN: f64 = 0.03;
 
 /// Returns a warning for each sign that cameras do not belong to the scene `model`: most of its `pictures` show
 /// nothing but `background`, or they are far from the photos.
@@ -23,17 +18,7 @@ pub fn misfit(
     background: [f32; 3],
     to_photos: Option<&Comparison>,
 ) -> Vec<String> {
-    let mut warnings = Vec::new();
-    let is_empty = |picture: &&Image| {
-        let drawn = picture.pixels.iter().filter(|pixel| **pixel != background).count();
-        (drawn as f64) < ALMOST_NOTHING * picture.pixels.len() as f64
-    };
-    let (empty, all) = (pictures.iter().filter(is_empty).count(), pictures.len());
-    if 2 * empty > all {
-        warnings.push(format!(
-            "{empty} of {all} views show almost nothing of {model}; check that the cameras belong to this scene and are in its coordinates"
-        ));
-    }
+    let mut warnings: Vec<String> = shows_almost_nothing(model, pictures, background).into_iter().collect();
     if let Some(mean) = to_photos.and_then(|comparison| comparison.psnr.mean).filter(|&mean| mean < MISFIT_DB)
     {
         warnings.push(format!(
@@ -43,61 +28,16 @@ pub fn misfit(
     warnings
 }
 
-/// Returns a warning if the near planes of `cameras` hide more than 3 % of the opacity before them: a scene in small
-/// units, drawn with the trainer's near plane.
-#[must_use]
-pub(crate) fn near_plane_hides(geometry: &Geometry, cameras: &[Camera]) -> Option<String> {
-    let (share, near) = (hidden_share(geometry, cameras), cameras.first()?.near);
-    (share > HIDDEN).then(|| {
-        format!(
-            "the near plane, {near} units from the cameras, hides {:.0} % of what is before them; if the scene is in small units, a smaller --near shows it",
-            100.0 * share
-        )
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scores::ViewScore;
 
-    fn picture(drawn: usize) -> Image {
-        let pixels = (0..100).map(|i| if i < drawn { [0.5; 3] } else { [1.0; 3] }).collect();
-        Image { width: 10, height: 10, pixels }
-    }
-
-    #[test]
-    fn views_of_nothing_are_told_if_they_are_most() {
-        let white = [1.0; 3];
-        let warnings = misfit("a.ply", &[picture(1), picture(0), picture(50)], white, None);
-        assert!(warnings.len() == 1 && warnings[0].starts_with("2 of 3 views"), "{warnings:?}");
-        assert!(misfit("a.ply", &[picture(1), picture(2)], white, None).is_empty());
-        assert!(misfit("a.ply", &[picture(0)], [0.0; 3], None).is_empty(), "another background");
-    }
-
-    #[test]
-    fn a_near_plane_beyond_the_scene_is_told() {
-        let splats = lexisplat_sample::scene(&lexisplat_sample::SampleOptions::new(300, 1));
-        let mut small = splats.geometry.clone();
-        small.positions.iter_mut().flatten().for_each(|v| *v *= 0.01);
-        small.scales.iter_mut().flatten().for_each(|v| *v += 0.01_f32.ln());
-        let around = |geometry: &Geometry, near: f32| -> Vec<Camera> {
-            let views = lexisplat_render::orbit(geometry, 4, 60, 40);
-            views.into_iter().map(|camera| camera.with_near(near)).collect()
-        };
-        let told = near_plane_hides(&small, &around(&small, 0.2)).unwrap();
-        assert!(
-            told.starts_with("the near plane, 0.2 units from the cameras, hides") && told.contains("--near"),
-            "{told}"
-        );
-        assert!(near_plane_hides(&small, &around(&small, 0.001)).is_none());
-        assert!(near_plane_hides(&splats.geometry, &around(&splats.geometry, 0.2)).is_none());
-    }
-
     #[test]
     fn pictures_far_from_their_photos_are_told() {
+        let picture = Image { width: 10, height: 10, pixels: vec![[0.5; 3]; 100] };
         let score = |psnr| Comparison::of(vec![ViewScore::new("v", [10, 10], psnr, 0.5, Default::default())]);
-        let warnings = |psnr| misfit("a.ply", &[picture(50)], [1.0; 3], Some(&score(psnr)));
+        let warnings = |psnr| misfit("a.ply", std::slice::from_ref(&picture), [1.0; 3], Some(&score(psnr)));
         assert!(warnings(Some(11.2))[0].contains("11.2 dB against the photos"));
         assert!(warnings(Some(19.0)).is_empty() && warnings(None).is_empty());
     }

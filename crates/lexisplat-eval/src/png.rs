@@ -2,7 +2,7 @@
 
 use image::ImageEncoder;
 
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// An 8-bit RGB picture of `width * height` pixels as the bytes of a PNG file.
 ///

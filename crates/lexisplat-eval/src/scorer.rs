@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use lexisplat_render::Image;
 
-use crate::error::Result;
 use crate::metrics::lpips::{Network, Range};
 use crate::metrics::{Lpips, Metric, flip, psnr, ssim};
 use crate::scores::ViewScore;
+use lexisplat_compress::Result;
 
 /// Scores pictures by PSNR and SSIM, and by more if asked to. Clones share the weights of networks.
 #[derive(Debug, Clone, Default)]
@@ -54,7 +54,7 @@ impl Scorer {
     /// Scores picture `b` against `a`. The score's name is `name`.
     ///
     /// # Errors
-    /// [`crate::Error::Parameter`] if their sizes differ or are too small for a network, or if one has NaN.
+    /// [`lexisplat_compress::Error::Parameter`] if their sizes differ or are too small for a network, or if one has NaN.
     pub fn score(&self, name: &str, a: &Image, b: &Image) -> Result<ViewScore> {
         let psnr = psnr(a, b)?;
         let identical = psnr.is_none();

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use lexisplat::Offset;
-use lexisplat_eval::compression::judging_views;
+use lexisplat_compress::judging_views;
 use lexisplat_render::{Camera, Device, Renderer, Split, orbit as orbit_around, read_views};
 use pyo3::prelude::*;
 

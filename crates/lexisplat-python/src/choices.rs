@@ -1,6 +1,6 @@
 //! Compression, with its choices by name.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use lexisplat::packed::{PackOptions, Preset};
@@ -8,11 +8,11 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Dictionary, Layout, Limits, Pursuit, ShDegree, SplatSource, Splats,
     lexi,
 };
-use lexisplat_eval::compression::choose_layout;
-use lexisplat_eval::{
-    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, cameras_beside,
+use lexisplat_compress::choose_layout;
+use lexisplat_compress::{
+    Compression, CompressionReport, Error, Packing, Quality, SceneKind, Target, read_beside,
 };
-use lexisplat_render::{Device, ViewSet, read_views};
+use lexisplat_render::{Device, ViewSet};
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -253,7 +253,7 @@ pub(crate) fn compress(
         let beside = choices.beside.clone();
         let compression = choices.compression(device, dictionary)?;
         let beside =
-            beside.filter(|_| matches!(compression, Compression::Packed(_))).as_deref().and_then(beside_of);
+            beside.filter(|_| matches!(compression, Compression::Packed(_))).as_deref().and_then(read_beside);
         let (bytes, report) = match source {
             Source::Splats(splats) => run(&compression, views, beside.as_ref(), &*splats, watch)?,
             Source::File(given) => {
@@ -264,7 +264,7 @@ pub(crate) fn compress(
             }
         };
         let unused = beside.filter(|_| report.reached.as_ref().is_some_and(|reached| !reached.cameras));
-        Ok((bytes, report, unused.map(|beside| beside.path)))
+        Ok((bytes, report, unused.map(|(path, _)| path)))
     })?;
     told.extend(unused.map(|path| {
         let path = path.display();
@@ -275,24 +275,11 @@ pub(crate) fn compress(
     Ok((scene, told))
 }
 
-/// Cameras that lie beside a scene.
-struct Beside {
-    path: PathBuf,
-    set: ViewSet,
-}
-
-/// The cameras that lie beside the file `scene`, if they can be read.
-fn beside_of(scene: &Path) -> Option<Beside> {
-    let path = cameras_beside(scene)?;
-    let set = read_views(&path, &mut |_| None).ok()?;
-    Some(Beside { path, set })
-}
-
 /// Compresses `source`. The cameras `views`, which `compression` has too, and those beside the scene are in the world.
 fn run(
     compression: &Compression,
     views: Option<Vec<CameraTuple>>,
-    beside: Option<&Beside>,
+    beside: Option<&(PathBuf, ViewSet)>,
     source: &dyn SplatSource,
     watch: &Watch,
 ) -> Result<(Vec<u8>, CompressionReport)> {
@@ -302,8 +289,8 @@ fn run(
     if let (Some(views), offset @ Some(_)) = (views, offset) {
         compression = compression.with_cameras(cameras(views, offset));
     }
-    if let Some(beside) = beside {
-        compression = compression.with_likely_cameras(beside.set.clone().relative_to(offset).cameras);
+    if let Some((_, set)) = beside {
+        compression = compression.with_likely_cameras(set.clone().relative_to(offset).cameras);
     }
     let report = compression.run(source, &mut file, watch)?;
     Ok((file, report))

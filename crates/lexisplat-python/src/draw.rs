@@ -4,8 +4,9 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use lexisplat::{Model, Offset, ShDegree, Splats};
-use lexisplat_eval::compression::judging_views;
-use lexisplat_eval::{Comparison, DEFAULT_MAX_WIDTH, DrawOptions, compare as compare_scenes, draw_views};
+use lexisplat_compress::judging_views;
+use lexisplat_compress::{DEFAULT_MAX_WIDTH, DrawOptions, draw_views};
+use lexisplat_eval::{Comparison, compare as compare_scenes};
 use lexisplat_render::{Device, Image, Renderer, Scene as Drawable};
 use numpy::{PyArray1, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -158,7 +159,7 @@ pub(crate) fn compare<'py>(
         let options = DrawOptions::new(background, eight_bit);
         let (a, b) = (a.scene(), b.scene());
         compare_scenes(&mut renderer, &a, &b, &views, &options, watch, |_, _, _| {
-            Ok::<(), lexisplat_eval::Error>(())
+            Ok::<(), lexisplat_compress::Error>(())
         })
     })?;
     Ok((json(py, &found)?, told))

@@ -3,13 +3,13 @@
 use std::io;
 
 use lexisplat::FormatError;
-use lexisplat_eval::Error;
+use lexisplat_compress::Error;
 use pyo3::exceptions::PyKeyboardInterrupt;
 use pyo3::prelude::*;
 use pyo3::types::PyModule;
 
 /// Result of the crates that the package calls.
-pub(crate) type Result<T> = lexisplat_eval::Result<T>;
+pub(crate) type Result<T> = lexisplat_compress::Result<T>;
 
 /// What the system calls its errors, where the library does not know the number (POSIX `errno.h`).
 const NOT_FOUND: i32 = 2;

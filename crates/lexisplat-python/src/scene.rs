@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use lexisplat::lexi::LexiReader;
 use lexisplat::{Indices, Limits, Model, SplatSource as _, Values, stream};
-use lexisplat_eval::compression::{RecordReport, part_bytes};
+use lexisplat_compress::{RecordReport, part_bytes};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};

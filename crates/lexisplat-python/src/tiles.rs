@@ -9,8 +9,8 @@ use lexisplat::packed::tiles::{
 use lexisplat::packed::{PackOptions, Preset};
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Joined, Silent, SplatSource, Splats};
-use lexisplat_eval::Error;
-use lexisplat_eval::compression::tiles;
+use lexisplat_compress::Error;
+use lexisplat_compress::tiles;
 use lexisplat_render::{Device, Renderer};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;

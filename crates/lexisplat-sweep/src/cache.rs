@@ -6,8 +6,8 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use lexisplat::output::{self, Output, OutputGroup};
+use lexisplat_compress::{Error, Result};
 use lexisplat_eval::format::file_name;
-use lexisplat_eval::{Error, Result};
 
 /// Version of the format. Parts of other versions are made again.
 const VERSION: u32 = 1;

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, Stopwatch, lexi};
-use lexisplat_eval::compression::Looked;
-use lexisplat_eval::{Compression, CompressionReport, Packing, Result, SceneKind};
+use lexisplat_compress::Looked;
+use lexisplat_compress::{Compression, CompressionReport, Packing, Result, SceneKind};
 use lexisplat_render::Renderer;
 
 use super::options::SweepOptions;

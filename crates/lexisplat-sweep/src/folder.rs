@@ -10,7 +10,7 @@ use super::picture::Part;
 use super::survey::survey;
 use super::{PictureFiles, Results, Setting, paper, tables};
 use lexisplat::output::OutputGroup;
-use lexisplat_eval::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Most bytes of pictures on the page; browsers grow slow with more. All pictures stay in their folder.
 const PICTURE_BYTES: usize = 24 << 20;

@@ -8,8 +8,8 @@ use lexisplat::inside;
 use serde::Deserialize;
 
 use super::results::Method;
-use lexisplat_eval::views::SplitFilter;
-use lexisplat_eval::{Error, Result};
+use lexisplat_compress::views::SplitFilter;
+use lexisplat_compress::{Error, Result};
 
 /// Largest manifest, in bytes: 40 times that of the paper's 13 scenes by five methods.
 const MAX_BYTES: u64 = 1 << 20;
@@ -32,9 +32,9 @@ pub struct Entry {
     pub cameras: Option<PathBuf>,
     /// Folder of photos. Without, models are scored against the original only.
     pub images: Option<PathBuf>,
-    /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_eval::views::ViewOptions`].
+    /// Divisor of the photos' size: 1, 2, 4 or 8, as in [`lexisplat_compress::views::ViewOptions`].
     pub resolution: Option<u32>,
-    /// Distance of the near plane, as in [`lexisplat_eval::views::ViewOptions`].
+    /// Distance of the near plane, as in [`lexisplat_compress::views::ViewOptions`].
     pub near: Option<f32>,
     /// Which of the cameras to use. The default is the test split.
     #[serde(default = "test_split")]

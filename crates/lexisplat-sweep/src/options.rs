@@ -6,7 +6,7 @@ use lexisplat_render::gpu::Gpu;
 
 use super::paper;
 use super::results::Setting;
-use lexisplat_eval::{DrawOptions, Error, Result, ViewOptions};
+use lexisplat_compress::{DrawOptions, Error, Result, ViewOptions};
 
 /// Options of a sweep.
 #[derive(Debug, Clone)]

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use lexisplat_eval::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// One view of a model at one setting, as PNG files of one size.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -6,7 +6,8 @@ use std::str::FromStr;
 use lexisplat::packed::Preset;
 use serde::{Deserialize, Serialize};
 
-use lexisplat_eval::{Comparison, Error, FrameRate, Result};
+use lexisplat_compress::{Error, Result};
+use lexisplat_eval::{Comparison, FrameRate};
 
 /// Who trained a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use lexisplat::ply::ReadOptions;
 use lexisplat::{Input, Layout, Splats};
-use lexisplat_eval::compression::Looked;
+use lexisplat_compress::Looked;
+use lexisplat_compress::views::{View, ViewOptions, find_views, photo};
+use lexisplat_compress::{Error, Result, draw_views};
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::montage::difference;
-use lexisplat_eval::views::{View, ViewOptions, find_views, photo};
 use lexisplat_eval::{
-    BenchOptions, Comparison, Error, FrameRate, Result, SceneFile, Scorer, bench_cpu_in_turn,
-    bench_gpu_in_turn, draw_views, png, score_views,
+    BenchOptions, Comparison, FrameRate, SceneFile, Scorer, bench_cpu_in_turn, bench_gpu_in_turn, png,
+    score_views,
 };
 use lexisplat_render::{Camera, Image, Renderer, Scene};
 use serde::de::DeserializeOwned;

@@ -3,7 +3,8 @@
 use std::collections::HashSet;
 use std::path::Path;
 
-use lexisplat_eval::{Error, Result, Scorer};
+use lexisplat_compress::{Error, Result};
+use lexisplat_eval::Scorer;
 use lexisplat_render::Renderer;
 
 use super::cache::Cache;

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use lexisplat_eval::SplitFilter;
+use lexisplat_compress::SplitFilter;
 use serde_json::json;
 
 use crate::Options;

@@ -16,7 +16,7 @@ pub enum Error {
     /// Pictures could not be compared, or no camera is left.
     #[cfg(feature = "window")]
     #[error(transparent)]
-    Eval(#[from] lexisplat_eval::Error),
+    Eval(#[from] lexisplat_compress::Error),
     /// There is no display to open a window on.
     #[error("no display: neither DISPLAY nor WAYLAND_DISPLAY is set")]
     NoDisplay,

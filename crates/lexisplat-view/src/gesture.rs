@@ -12,9 +12,8 @@ const ORBIT: f64 = std::f64::consts::PI;
 const LOOK: f64 = 1.0;
 /// Factor on the distance of the pivot for one point of scrolling.
 const WHEEL: f64 = 0.998;
-/// Most points of one scroll, and the largest factor of one pinch in either direction.
+/// Most points of one scroll.
 const MOST_POINTS: f64 = 1000.0;
-const MOST_PINCH: f64 = 8.0;
 /// Longest step of a flight, in seconds, however long the last frame took.
 const LONGEST_STEP: f64 = 0.1;
 /// Speed of a flight in scene radii a second, and the factor on it of a fast one.
@@ -49,14 +48,6 @@ impl State {
     pub fn scroll(&mut self, points: f64) {
         if let Some(controller) = self.free_camera().filter(|_| points.is_finite()) {
             controller.dolly(WHEEL.powf(points.clamp(-MOST_POINTS, MOST_POINTS)));
-        }
-    }
-
-    /// Moves the free camera so that the pivot appears `factor` times as large: the fingers' distance over what it was
-    /// before. A factor that is not finite and above 0 changes nothing.
-    pub fn pinch(&mut self, factor: f64) {
-        if let Some(controller) = self.free_camera().filter(|_| factor.is_finite() && factor > 0.0) {
-            controller.dolly(1.0 / factor.clamp(1.0 / MOST_PINCH, MOST_PINCH));
         }
     }
 
@@ -125,10 +116,10 @@ mod tests {
         dragged.drag(Drag::Look, 0.2, 0.3);
         assert!((place(&dragged) - DVec3::new(-1.0, 0.0, -5.0)).length() < 1e-5);
         let mut zoomed = state();
-        zoomed.pinch(2.0);
-        assert!((place(&zoomed).z + 2.5).abs() < 1e-5);
-        zoomed.scroll(-10.0);
-        assert!(place(&zoomed).z < -2.5, "farther");
+        zoomed.scroll(100.0);
+        assert!((place(&zoomed).z + 5.0 * WHEEL.powf(100.0)).abs() < 1e-5, "nearer");
+        zoomed.scroll(-200.0);
+        assert!(place(&zoomed).z < -5.0, "farther");
         let mut flown = state();
         flown.fly(DVec3::Z, 10.0, true);
         assert!((place(&flown).z - (LONGEST_STEP * SPEED * FAST * 2.0 - 5.0)).abs() < 1e-5);
@@ -142,8 +133,6 @@ mod tests {
         for value in [f64::NAN, f64::INFINITY] {
             state.drag(Drag::Orbit, value, 0.0);
             state.scroll(value);
-            state.pinch(value);
-            state.pinch(0.0);
             state.fly(DVec3::splat(value), 0.1, false);
             state.fly(DVec3::X, f64::NAN, false);
             state.focus(DVec3::splat(value));

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use lexisplat::{Geometry, Offset};
-use lexisplat_eval::{SplitFilter, ViewOptions, find_views};
+use lexisplat_compress::{SplitFilter, ViewOptions, find_views};
 use lexisplat_render::Camera;
 
 use crate::error::Result;

@@ -8,7 +8,8 @@ use lexisplat::packed::Packed;
 use lexisplat::ply::{Dialect, ReadOptions};
 use lexisplat::simd::Simd;
 use lexisplat::{CodeLayout, CompressOptions, Layout, Limits, Model, Progress, ShDegree, Splats, Stage};
-use lexisplat_eval::{Compression, Loaded, Packing, SceneFile, SplitFilter, choose_views};
+use lexisplat_compress::{Compression, Packing, SplitFilter, choose_views};
+use lexisplat_eval::{Loaded, SceneFile};
 use lexisplat_render::{Camera, bulk, near_plane};
 
 use crate::command::{Quality, Slot};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use lexisplat::Limits;
 use lexisplat::output::OutputGroup;
-use lexisplat_eval::SplitFilter;
+use lexisplat_compress::SplitFilter;
 use lexisplat_render::Device;
 
 /// What to show, and the initial settings.

@@ -6,7 +6,7 @@ use wasm_bindgen::prelude::*;
 use crate::chunk::Chunk;
 use crate::{job, limits, thrown};
 
-/// Decodes the chunks of one packed file of version 3, each from a [job](crate::Feed::job).
+/// Decodes the chunks of one packed file, each from a [job](crate::Feed::job).
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Decoder {

@@ -19,7 +19,7 @@ enum Done {
     Final,
 }
 
-/// Takes a packed file of version 3 as its bytes come. Decodes nothing itself.
+/// Takes a packed file as its bytes come. Decodes nothing itself.
 #[wasm_bindgen]
 #[derive(Debug)]
 pub struct Feed {

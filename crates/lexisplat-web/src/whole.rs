@@ -1,4 +1,4 @@
-//! Files that are decoded whole: .lexi files of exact layouts, and packed ones of version 2.
+//! Files that are decoded whole: .lexi files of exact layouts.
 
 use lexisplat::{Model, lexi};
 use wasm_bindgen::prelude::*;
@@ -23,11 +23,10 @@ impl Whole {
     #[wasm_bindgen(constructor)]
     pub fn new(name: &str, bytes: &[u8]) -> Result<Self, JsError> {
         let reader = lexi::LexiReader::open(name, bytes, &limits()).map_err(thrown)?;
-        let removed = reader.packed_head().map_or(0, |head| head.removed);
         let model = reader.model().map_err(thrown)?;
         let fields = [
             ("gaussians", model.len() as u64),
-            ("sourceGaussians", model.len() as u64 + removed),
+            ("sourceGaussians", model.len() as u64),
             ("degree", model.degree().get() as u64),
             ("bytes", bytes.len() as u64),
             ("atoms", model.dictionary().len() as u64),

@@ -9,7 +9,7 @@ use lexisplat::lexi::{self, LexiReader};
 use lexisplat::{Error, FormatError, Limits, Model, Result, Splats};
 use serde_json::Value;
 
-/// Golden files: scenes of version 1 in each of its layouts, then of version 2.
+/// Golden files: scenes of version 1 in each of its layouts, then of version 3.
 const SCENES: [&str; 9] = [
     "f32",
     "f16",
@@ -17,15 +17,26 @@ const SCENES: [&str; 9] = [
     "degree0",
     "degree4",
     "degree1_u16_escapes",
-    "packed",
-    "packed_degree0",
-    "packed_escapes",
+    "packed3",
+    "packed3_degree0",
+    "packed3_escapes",
 ];
 
 fn golden(name: &str) -> Vec<u8> {
     let path: PathBuf =
         [env!("CARGO_MANIFEST_DIR"), "tests", "golden", &format!("{name}.lexi")].iter().collect();
     std::fs::read(path).unwrap()
+}
+
+/// A golden file as its parts, with checksums of its tensors, which a packed file need not have.
+fn parts_of(name: &str) -> Parts {
+    let mut parts = Parts::of(&golden(name));
+    parts.metadata.entry("checksums").or_insert_with(|| Value::from("{}"));
+    parts
+}
+
+fn is_packed(name: &str) -> bool {
+    name.starts_with("packed")
 }
 
 /// The dense scene of a file, as each of the readers sees it.
@@ -86,7 +97,7 @@ fn golden_files_of_every_version_are_read_alike_whole_and_in_parts() {
         let bytes = golden(name);
         let [whole, in_parts] = read(&bytes).map(Result::unwrap);
         assert_eq!(whole, in_parts, "{name}");
-        let version = if name.starts_with("packed") { "2" } else { "1" };
+        let version = if is_packed(name) { "3" } else { "1" };
         assert_eq!(Parts::of(&bytes).metadata["version"], version, "{name}");
         // Changing nothing changes nothing.
         assert_same(name, &Parts::of(&bytes), &Parts::of(&bytes));
@@ -102,8 +113,8 @@ fn tensors_of_no_gaussians_are_of_their_shape_and_type() {
         let whole = lexi::read_bytes("file.lexi", &bytes, &Limits::default()).map(|model| model.len());
         [whole, common::count_in_parts(&bytes)]
     };
-    for name in SCENES.iter().filter(|name| !name.starts_with("packed")) {
-        let mut none = Parts::of(&golden(name));
+    for name in SCENES.iter().filter(|name| !is_packed(name)) {
+        let mut none = parts_of(name);
         let of_gaussians = |name: &str| !["dictionary", "checksum.header"].contains(&name);
         let mut rows = Vec::new();
         for (name, _, shape, bytes) in none.tensors.iter_mut().filter(|t| of_gaussians(&t.0)) {
@@ -134,7 +145,7 @@ fn tensors_of_no_gaussians_are_of_their_shape_and_type() {
 #[test]
 fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         // A newer file may hold anything else that is not known.
         let layout = parts.with("layout", "holographic").and("codes.more", "F64", &[1], &[0; 8]);
         for newer in [parts.with("version", "4"), layout.with("version", "4000000000000")] {
@@ -165,20 +176,26 @@ fn newer_versions_are_refused_with_both_numbers_and_what_to_do() {
 #[test]
 fn versions_that_never_were_are_damage() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         for version in ["0", "", "-1", "1.0", "two", "99999999999999999999"] {
             assert_refused(&parts.with("version", version), &["metadata 'version' is "]);
         }
         // Each layout belongs to one version.
-        let others: &[&str] = if name.starts_with("packed") { &["1"] } else { &["2", "3"] };
-        for other in others {
-            assert_refused(&parts.with("version", other), &["metadata 'version'", "has no layout"]);
-        }
+        let layout = parts.metadata.get("layout").and_then(Value::as_str).unwrap_or("packed");
+        let other = parts.with("layout", layout).with("version", if is_packed(name) { "1" } else { "3" });
+        let lacks = ["tensor 'checksum.header' is missing"];
+        assert_refused(
+            &other,
+            if is_packed(name) { &lacks } else { &["metadata 'version'", "has no layout"] },
+        );
         assert_refused(&parts.with("layout", "holographic"), &["holographic"]);
         assert_refused(&parts.with("format", "lexi-video"), &["metadata 'format' is 'lexi-video'"]);
-        for key in ["version", "format", "layout"] {
+        assert_refused(&parts.with("version", "2"), &["'version' is 2", "versions 1 and 3"]);
+        // A packed file need not name its layout.
+        let needed = ["version", "format", "layout"];
+        for key in &needed[..if is_packed(name) { 2 } else { 3 }] {
             let mut missing = parts.clone();
-            missing.metadata.remove(key);
+            missing.metadata.remove(*key);
             assert_refused(&missing, &[key, "is missing"]);
         }
     }
@@ -187,14 +204,18 @@ fn versions_that_never_were_are_damage() {
 #[test]
 fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         let more = parts.and("x-thumbnail", "U8", &[2, 3], &[7; 6]).and("x-", "F64", &[0, 4], &[]);
         assert_same(name, &more, &parts);
-        // Wherever they lie, and in whatever order the others are.
+        // Wherever they lie, and in whatever order the others are, but for the properties of packed files.
         let mut turned = more.clone();
         turned.tensors.reverse();
+        if is_packed(name) {
+            turned.tensors.retain(|tensor| !tensor.0.starts_with("extra."));
+            turned.tensors.extend(more.tensors.into_iter().filter(|tensor| tensor.0.starts_with("extra.")));
+        }
         assert_same(name, &turned, &parts);
-        let mut bytes = more.sealed();
+        let mut bytes = turned.sealed();
         let at = bytes.windows(6).position(|w| w == [7; 6]).unwrap();
         bytes[at] ^= 1;
         for error in refusals(&bytes, parts.metadata["degree"].as_str().unwrap()) {
@@ -208,12 +229,12 @@ fn tensors_that_may_be_ignored_are_but_their_checksum_is_not() {
 #[test]
 fn any_other_unknown_tensor_is_refused_by_name() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         // Those of other layouts are not known in this one.
         let mut unknown = vec!["X-thumbnail", "thumbnail", "codes.more", "sh.order", "packed.more", ""];
-        if name.starts_with("packed") {
+        if is_packed(name) {
             assert_refused(&parts.with("reached", r#"{"judged_psnr":38.5}"#), &["reached"]);
-            unknown.extend(["position", "dictionary", "codes.counts", "escapes.rows"]);
+            unknown.extend(["position", "dictionary", "codes.counts", "escapes.rows", "packed.tables"]);
         } else {
             let pointers = if name == "paper" { "codes.counts" } else { "codes.pointers" };
             unknown.extend(["packed.data", "packed.order", pointers]);
@@ -238,31 +259,31 @@ fn any_other_unknown_tensor_is_refused_by_name() {
 #[test]
 fn unknown_metadata_is_ignored() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         let more = parts.with("licence", "none").with("x", "").with("generator", "another program 7");
         assert_same(name, &more, &parts);
     }
     // Of a promise too, and of what was reached.
-    let parts = Parts::of(&golden("packed"));
+    let parts = parts_of("packed3");
     let reached =
         r#"{"judged_psnr":38.5,"mean_psnr":40,"min_psnr":31,"views":12,"cameras":false,"judge":"someone"}"#;
-    assert_same("packed", &parts.with("reached", reached), &parts);
+    assert_same("packed3", &parts.with("reached", reached), &parts);
     let mut promise: Value = serde_json::from_str(parts.metadata["promise"].as_str().unwrap()).unwrap();
     promise["judge"] = Value::from("someone");
-    assert_same("packed", &parts.with("promise", &promise.to_string()), &parts);
+    assert_same("packed3", &parts.with("promise", &promise.to_string()), &parts);
 }
 
 #[test]
 fn values_beyond_those_of_this_version_are_refused_by_name() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         assert_refused(&parts.with("degree", "5"), &["degree"]);
-        assert_refused(&parts.with("pursuit", "lasso"), &["lasso"]);
-        if name.starts_with("packed") {
-            assert_refused(&parts.with("atoms", "1025"), &["dictionary"]);
-            if name != "packed_degree0" {
-                assert_refused(&parts.with("atom_bits", "15"), &["dictionary"]);
-            }
+        let lasso = parts.with("pursuit", "lasso");
+        if is_packed(name) {
+            // No packed file has the key.
+            assert_same(name, &lasso, &parts);
+        } else {
+            assert_refused(&lasso, &["lasso"]);
         }
     }
 }
@@ -272,14 +293,20 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
     let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk().unwrap())).unwrap();
     let text = std::str::from_utf8(&bytes[8..8 + length]).unwrap();
     let entries: Value = serde_json::from_str(text).unwrap();
-    let at = entries["checksum.header"]["data_offsets"][0].as_u64().unwrap();
+    let head = entries.get("packed.head");
+    let place = |i: usize| {
+        let offsets = &head.unwrap_or(&entries["checksum.header"])["data_offsets"];
+        usize::try_from(offsets[i].as_u64().unwrap()).unwrap()
+    };
     let changed = change(text);
     assert_ne!(changed, text);
     let mut header = (changed.len() as u64).to_le_bytes().to_vec();
     header.extend_from_slice(changed.as_bytes());
-    let sum = crc32fast::hash(&header).to_le_bytes();
-    let at = usize::try_from(at).unwrap() + header.len();
-    let mut new = [&header, &bytes[8 + length..]].concat();
+    let data = &bytes[8 + length..];
+    // The checksum of a packed file covers the rest of its tensor too.
+    let sum = crc32fast::hash(&[&header, &data[place(0) + 4..place(1)]].concat()).to_le_bytes();
+    let at = place(0) + header.len();
+    let mut new = [&header, data].concat();
     new[at..at + 4].copy_from_slice(&sum);
     new
 }
@@ -288,17 +315,16 @@ fn with_header(bytes: &[u8], change: impl Fn(&str) -> String) -> Vec<u8> {
 #[test]
 fn members_that_are_there_twice_are_refused() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        // There is at least one checksum.
+        let parts = parts_of(name).and("x-", "U8", &[1], &[0]);
         let degree = parts.metadata["degree"].as_str().unwrap();
         let bytes = parts.sealed();
         assert_eq!(read(&with_header(&bytes, |text| format!("{text} "))).map(|r| r.is_ok()), [true; 2]);
+        let tensor = if is_packed(name) { "packed.head" } else { "checksum.header" };
+        let repeated = format!(r#"{{"{tensor}":{{"dtype":"U32","shape":[1],"data_offsets":[0,4]}},"#);
         let twice = [
             (r#""__metadata__":{"#, r#""__metadata__":{"degree":"0","#, "degree"),
-            (
-                "{",
-                r#"{"checksum.header":{"dtype":"U32","shape":[1],"data_offsets":[0,4]},"#,
-                "checksum.header",
-            ),
+            ("{", &repeated, tensor),
             (r#"{"data_offsets":"#, r#"{"dtype":"F32","data_offsets":"#, "dtype"),
         ];
         for (before, after, member) in twice {
@@ -317,7 +343,7 @@ fn members_that_are_there_twice_are_refused() {
             assert!(error.to_string().contains("metadata 'checksums': member 'a' is there twice"), "{error}");
         }
     }
-    let parts = Parts::of(&golden("packed"));
+    let parts = parts_of("packed3");
     for key in ["promise", "reached"] {
         for said in scene_refusals(&parts.with(key, r#"{"views":1,"views":2}"#).sealed()) {
             assert!(said.contains(&format!("metadata '{key}': member 'views' is there twice")), "{said}");
@@ -328,7 +354,7 @@ fn members_that_are_there_twice_are_refused() {
 #[test]
 fn numbers_of_the_metadata_are_those_of_json() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         for (key, wrong) in [
             ("seed", "+7"),
             ("seed", "017"),
@@ -352,7 +378,7 @@ fn numbers_of_the_metadata_are_those_of_json() {
 #[test]
 fn properties_that_no_ply_could_hold_are_damage() {
     for name in SCENES {
-        let parts = Parts::of(&golden(name));
+        let parts = parts_of(name);
         let gaussians = read(&parts.sealed())[0].as_ref().unwrap().len();
         let with = |tensor: &str| parts.and(tensor, "U8", &[gaussians], &vec![0; gaussians]).sealed();
         for tensor in [
@@ -370,8 +396,15 @@ fn properties_that_no_ply_could_hold_are_damage() {
                 assert!(!said.contains(char::is_control), "{said}");
             }
         }
+        // Columns of packed files are coded.
+        let column = parts.tensors.iter().find(|tensor| tensor.0 == "extra.label").map(|tensor| &tensor.3);
         for tensor in ["extra.mine", "extra.f_rest_07", "extra.nx", "extra.größe"] {
-            assert!(read(&with(tensor)).iter().all(Result::is_ok), "{tensor}");
+            let file = match column {
+                Some(column) if is_packed(name) => parts.and(tensor, "U8", &[column.len()], column).sealed(),
+                _ if is_packed(name) => continue,
+                _ => with(tensor),
+            };
+            assert!(read(&file).iter().all(Result::is_ok), "{tensor}");
         }
     }
 }

@@ -23,7 +23,7 @@ fn regenerate() {
 #[test]
 fn golden_files_read_as_they_were_written() {
     for (name, _, model) in models() {
-        let read = lexi::read(&golden(name), &Limits::default()).unwrap();
+        let read = lexi::read(golden(name), &Limits::default()).unwrap();
         assert_eq!(read, model, "{name}");
     }
 }
@@ -139,7 +139,7 @@ fn the_documented_example_is_true() {
     }
     let trace = std::fs::read_to_string(golden("packed3_degree0").with_extension("trace")).unwrap();
     trace.lines().filter(|line| line.starts_with("0 0 ")).for_each(has);
-    let splats = lexi::read(&golden("packed3_degree0"), &Limits::default()).unwrap().into_splats();
+    let splats = lexi::read(golden("packed3_degree0"), &Limits::default()).unwrap().into_splats();
     let g = &splats.geometry;
     has(&format!("| opacity | {:.5} |", g.opacities[0]));
     has(&format!(

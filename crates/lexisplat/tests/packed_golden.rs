@@ -1,4 +1,4 @@
-//! Packed files of each version decode to the same bits, on every machine.
+//! Packed files decode to the same bits, on every machine.
 //!
 //! Nothing is packed here but by hand, so a better encoder changes nothing.
 
@@ -9,9 +9,8 @@ use lexisplat::packed::{PackOptions, Packed, Packer, TargetRecord};
 use lexisplat::{Extra, ExtraValues, Limits, Model, Sensitivity, ShDegree, Silent, Splats, lexi, ply};
 use lexisplat_sample::{SampleOptions, scene};
 
-/// Files of version 2 and of version 3. Of each there is what it decodes to.
-const NAMES: [&str; 6] =
-    ["packed", "packed_degree0", "packed_escapes", "packed3", "packed3_degree0", "packed3_escapes"];
+/// Of each there is what it decodes to.
+const NAMES: [&str; 3] = ["packed3", "packed3_degree0", "packed3_escapes"];
 /// A file of two layers, and the CRC-32 of the PLY that its first tenths decode to, from 2 to 10 of them.
 const LAYERS: (&str, [u32; 9]) = (
     "packed3_layers",
@@ -31,7 +30,7 @@ fn opened(name: &str) -> Packed {
 }
 
 fn decoded(name: &str) -> Model {
-    lexi::read(&golden(name, "lexi"), &Limits::default()).unwrap()
+    lexi::read(golden(name, "lexi"), &Limits::default()).unwrap()
 }
 
 fn ply_bytes(splats: &Splats) -> Vec<u8> {
@@ -122,38 +121,34 @@ fn golden_files_are_the_same_on_any_number_of_threads() {
 
 #[test]
 fn golden_files_say_how_they_were_made() {
-    for (version, suffix) in [(2, ""), (3, "3")] {
-        let name = |rest: &str| format!("packed{suffix}{rest}");
-        let (packed, model) = (opened(&name("")), decoded(&name("")));
-        assert_eq!((packed.len(), packed.head().degree, model.len()), (300, ShDegree::THREE, 300));
-        assert_eq!(packed.head().target.as_ref(), Some(&promise()));
-        assert_eq!(packed.head().meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
-        assert!(
-            packed.head().meta.antialiased
-                && packed.order().is_some()
-                && packed.head().record.tolerance.is_none()
-        );
-        assert_eq!(model.meta(), &packed.head().meta);
-        // Back in the source's order they count up again.
-        let [label, time, more @ ..] = model.geometry().extras.as_slice() else { panic!("two extras") };
-        assert_eq!((label.name.as_str(), time.name.as_str()), ("label", "time"));
-        assert_eq!(time.values, ExtraValues::F32((0..300_u16).map(f32::from).collect()));
-        assert_eq!(more.len(), version - 2);
-        assert!(more.iter().all(|extra| extra.values == ExtraValues::F64(vec![1.0; 300])));
+    let (packed, model) = (opened("packed3"), decoded("packed3"));
+    assert_eq!((packed.len(), packed.head().degree, model.len()), (300, ShDegree::THREE, 300));
+    assert_eq!(packed.head().target.as_ref(), Some(&promise()));
+    assert_eq!(packed.head().meta.comments, ["lexisplat sample scene, seed 1", "made by \"hand\""]);
+    assert!(
+        packed.head().meta.antialiased
+            && packed.order().is_some()
+            && packed.head().record.tolerance.is_none()
+    );
+    assert_eq!(model.meta(), &packed.head().meta);
+    // Back in the source's order they count up again.
+    let [label, time, one] = model.geometry().extras.as_slice() else { panic!("three extras") };
+    assert_eq!([label, time, one].map(|extra| extra.name.as_str()), ["label", "time", "one"]);
+    assert_eq!(time.values, ExtraValues::F32((0..300_u16).map(f32::from).collect()));
+    assert_eq!(one.values, ExtraValues::F64(vec![1.0; 300]));
 
-        let (packed, model) = (opened(&name("_degree0")), decoded(&name("_degree0")));
-        assert_eq!((packed.len(), packed.head().atoms, packed.head().record.seed), (40, 0, 7));
-        let head = packed.head();
-        assert!(head.target.is_none() && packed.order().is_none() && model.dictionary().is_empty());
+    let (packed, model) = (opened("packed3_degree0"), decoded("packed3_degree0"));
+    assert_eq!((packed.len(), packed.head().atoms, packed.head().record.seed), (40, 0, 7));
+    let head = packed.head();
+    assert!(head.target.is_none() && packed.order().is_none() && model.dictionary().is_empty());
 
-        let (packed, model) = (opened(&name("_escapes")), decoded(&name("_escapes")));
-        assert_eq!((packed.len(), packed.head().degree), (80, ShDegree::ONE));
-        assert_eq!((packed.head().record.tolerance, packed.head().record.over_tolerance), (Some(0.05), 0));
-        assert!((0.01..=0.05).contains(&packed.head().record.max_residual));
-        let escapes = model.codes().escapes();
-        assert!(escapes.gaussians.len() >= 3 && model.codes().nonzeros() > 80);
-        assert!(escapes.rows.chunks_exact(9).filter(|row| **row == [1e6; 9]).count() == 3);
-    }
+    let (packed, model) = (opened("packed3_escapes"), decoded("packed3_escapes"));
+    assert_eq!((packed.len(), packed.head().degree), (80, ShDegree::ONE));
+    assert_eq!((packed.head().record.tolerance, packed.head().record.over_tolerance), (Some(0.05), 0));
+    assert!((0.01..=0.05).contains(&packed.head().record.max_residual));
+    let escapes = model.codes().escapes();
+    assert!(escapes.gaussians.len() >= 3 && model.codes().nonzeros() > 80);
+    assert!(escapes.rows.chunks_exact(9).filter(|row| **row == [1e6; 9]).count() == 3);
 
     for name in NAMES {
         assert_eq!(decoded(name).record().pursuit, None, "{name}");

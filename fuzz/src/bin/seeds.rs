@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use flate2::read::GzDecoder;
 use lexisplat::lexi::{LexiReader, LexiWriter};
-use lexisplat::packed::fuzzing::{flat, layered};
+use lexisplat::packed::fuzzing;
 use lexisplat::packed::{PackOptions, Packer, RangeKind, ReachedRecord, TargetRecord};
 use lexisplat::{
     CompressOptions, Extra, ExtraValues, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress,
@@ -215,15 +215,14 @@ fn packed(root: &Path) -> Done {
             }
             // Tables and data without the container.
             let script: Vec<u8> = (0..64).flat_map(|k: u8| [k % 5, k, k / 3, 1, 0]).collect();
-            let [tables, range] = layered::parts(&packed);
-            let entropy = alone(&[1, 0], &[&tables, &range], &script);
+            let [tables, range] = fuzzing::parts(&packed);
+            let entropy = alone(&[0, 0], &[&tables, &range], &script);
             save(root, "entropy", &format!("decode-{name}"), &entropy)?;
         }
     }
     let script: Vec<u8> = (0..60).flat_map(|k: u8| [k, k % 59, k % 24, k, k, 2, k, k]).collect();
-    save(root, "entropy", "round-trip", &[&[2, 3][..], &script].concat())?;
-    several_layers(root)?;
-    version_2(root)
+    save(root, "entropy", "round-trip", &[&[1, 3][..], &script].concat())?;
+    several_layers(root)
 }
 
 /// Packed files of two layers, with interim changes, two levels of refinement and three parts of nonzeros.
@@ -243,7 +242,7 @@ fn several_layers(root: &Path) -> Done {
             let mut bytes = Vec::new();
             LexiWriter::packed(&packed).write(&mut bytes, &Silent)?;
             let reader = LexiReader::open("layered", &bytes, &Limits::default())?;
-            let outline = reader.outline().ok_or("no packed file of version 3")?;
+            let outline = reader.outline().ok_or("no packed file")?;
             let kinds: HashSet<RangeKind> = outline.ranges.iter().map(|range| range.kind).collect();
             let mut wanted = vec![RangeKind::Base, RangeKind::Refinement(1), RangeKind::Interim];
             wanted.extend((degree != ShDegree::ZERO).then_some(RangeKind::Sh(2)));
@@ -276,21 +275,6 @@ fn fed(root: &Path, name: &str, bytes: &[u8]) -> Done {
 fn alone(kind: &[u8], parts: &[&[u8]], script: &[u8]) -> Vec<u8> {
     let lengths = parts.iter().flat_map(|part| u16::try_from(part.len()).unwrap_or(u16::MAX).to_le_bytes());
     [kind, &lengths.collect::<Vec<u8>>(), &parts.concat(), script].concat()
-}
-
-/// Packed files of version 2, which is no longer written.
-fn version_2(root: &Path) -> Done {
-    for name in ["packed", "packed_degree0", "packed_escapes"] {
-        let golden = concat!(env!("CARGO_MANIFEST_DIR"), "/../crates/lexisplat/tests/golden");
-        let bytes = fs::read(Path::new(golden).join(format!("{name}.lexi")))?;
-        save(root, "packed", &format!("version-2-{name}"), &bytes)?;
-        let reader = LexiReader::open(name, &bytes, &Limits::default())?;
-        let packed = reader.packed()?.ok_or("no packed file")?;
-        let script: Vec<u8> = (0..64).flat_map(|k: u8| [k, k / 3]).collect();
-        let entropy = alone(&[0], &flat::parts(&packed), &script);
-        save(root, "entropy", &format!("decode-version-2-{name}"), &entropy)?;
-    }
-    Ok(())
 }
 
 fn cameras(root: &Path) -> Done {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use lexisplat::packed::Preset;
 use lexisplat::{Layout, Pursuit};
-use lexisplat_eval::SceneKind;
-use lexisplat_eval::compression::choose_layout;
+use lexisplat_compress::SceneKind;
+use lexisplat_compress::choose_layout;
 use lexisplat_render::Device;
 
 use super::part::Part;
@@ -71,14 +71,10 @@ pub(crate) struct Compress {
     /// and opacities make up for them and for errors. --keep-order and --tol leave none out either.
     #[arg(long)]
     pub(crate) keep_all: bool,
-    /// Make the best scene of at most this many Gaussians, 1 or more, for viewers with a limit. --preset is then the
-    /// quality of the file beside that scene, while --psnr and --min-psnr compare it with the original [default: no
-    /// limit].
+    /// Leave out Gaussians that show least until at most N stay, for viewers with a limit. --preset is then the quality of the
+    /// file beside the smaller scene. --psnr and --min-psnr compare it with the original scene [default: no limit].
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=u64::MAX), conflicts_with_all = ["keep_all", "keep_order", "tol", "guess"])]
     pub(crate) max_gaussians: Option<usize>,
-    /// Does nothing of its own: every packed file leaves out what hardly shows.
-    #[arg(long, value_name = "LEVELS", value_parser = real::<f32>("1"), num_args = 0..=1, default_missing_value = "1", require_equals = true, hide = true)]
-    pub(crate) prune: Option<f32>,
     /// Largest error of any Gaussian's SH vector, above 0: the L2 norm of the difference, not squared. The encoder
     /// verifies it for every Gaussian. Without --layout everything else is kept exactly (layout f16). With
     /// --layout packed everything else is quantised [default: 0.1 with exact geometry, otherwise none].
@@ -153,7 +149,7 @@ impl Compress {
     }
 
     /// The options that only packed files have, and whether they are given.
-    fn packed_only(&self) -> [(&'static str, bool); 12] {
+    fn packed_only(&self) -> [(&'static str, bool); 11] {
         [
             ("--guess", self.guess),
             ("--preset", self.preset.is_some()),
@@ -166,7 +162,6 @@ impl Compress {
             ("--keep-order", self.keep_order),
             ("--keep-all", self.keep_all),
             ("--max-gaussians", self.max_gaussians.is_some()),
-            ("--prune", self.prune.is_some()),
         ]
     }
 
@@ -180,7 +175,7 @@ impl Compress {
     ///
     /// # Errors
     /// A layout and an option that do not go together.
-    pub(crate) fn chosen_layout(&self) -> lexisplat_eval::Result<Layout> {
+    pub(crate) fn chosen_layout(&self) -> lexisplat_compress::Result<Layout> {
         let given = |options: &[(&'static str, bool)]| options.iter().find(|o| o.1).map(|o| o.0);
         let (exact, packed) = (given(&self.exact_only()), given(&self.packed_only()));
         choose_layout(self.layout, self.tol.is_some(), exact, packed)

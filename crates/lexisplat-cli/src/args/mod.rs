@@ -149,13 +149,9 @@ pub(crate) struct Completions {
 
 /// Parses the command line of this process.
 pub(crate) fn parse() -> Result<Cli, clap::Error> {
-    Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice)?)
-}
-
-/// Replaces advice of clap's that helps nobody.
-fn with_advice(error: clap::Error) -> clap::Error {
     let words = std::env::args_os().skip(1).map(|word| word.to_string_lossy().into_owned());
-    with_advice_on_outputs(with_advice_on_numbers(error), words)
+    let with_advice = |error| with_advice_on_outputs(error, words);
+    Cli::from_arg_matches(&command().try_get_matches().map_err(with_advice)?)
 }
 
 /// Tells how the command of the command line `words` names its output, where it has one file or `-o` too many.
@@ -173,16 +169,6 @@ fn with_advice_on_outputs(mut error: clap::Error, mut words: impl Iterator<Item 
         _ => return error,
     };
     error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
-    error
-}
-
-/// Replaces the advice that clap gives on an unexpected negative number, which is to use it as the name of a file.
-fn with_advice_on_numbers(mut error: clap::Error) -> clap::Error {
-    let argument = error.get(ContextKind::InvalidArg);
-    if matches!(argument, Some(ContextValue::String(text)) if text.parse::<f64>().is_ok()) {
-        let advice = "the value of an option such as --prune is written behind '=': --prune=2";
-        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![advice.into()]));
-    }
     error
 }
 

@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use lexisplat::packed::Preset;
-use lexisplat_eval::{SceneKind, SplitFilter};
+use lexisplat_compress::{SceneKind, SplitFilter};
 use lexisplat_render::gpu::ShPath;
 
 /// What a size looks like, for messages.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use lexisplat_eval::{SceneKind, SplitFilter, ViewOptions};
+use lexisplat_compress::{SceneKind, SplitFilter, ViewOptions};
 use lexisplat_render::Device;
 
 use super::values::{colour, length, scene_kind, split, whole};
@@ -21,16 +21,16 @@ pub(crate) struct Views {
     pub(crate) split: Option<SplitFilter>,
     /// Where the file marks no split, every N-th camera in order of names is a test camera, starting with the
     /// first; at least 1.
-    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_HOLD, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), requires = "cameras")]
+    #[arg(long, default_value_t = lexisplat_compress::DEFAULT_HOLD, value_name = "N", value_parser = whole::<usize>(0..=u64::MAX), requires = "cameras")]
     pub(crate) hold: usize,
     /// The place of generated views: around an `object`, or inside a `room`. `auto` decides by the scene.
     #[arg(long, value_parser = scene_kind(), default_value = "auto")]
     pub(crate) scene: SceneKind,
     /// Number of generated views, 1 to 65535.
-    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
+    #[arg(long, default_value_t = lexisplat_compress::DEFAULT_ORBIT, value_name = "N", value_parser = whole::<u16>(1..=65_535))]
     pub(crate) orbit: u16,
     /// Largest width of a picture, 1 to 16384 pixels. Wider pictures are drawn smaller.
-    #[arg(long, default_value_t = lexisplat_eval::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
+    #[arg(long, default_value_t = lexisplat_compress::DEFAULT_MAX_WIDTH, value_name = "PIXELS", value_parser = whole::<u32>(1..=16_384))]
     pub(crate) width: u32,
     /// Distance of the near plane, in the scene's units, above 0. Gaussians nearer than it are not drawn [default: the
     /// trainer's 0.2 for --cameras, else by the scene's size].

@@ -45,7 +45,7 @@ pub(crate) fn run(args: &Bench, common: &Common) -> Result<()> {
             match bench_gpu(gpu, &scene, path, &cameras, &options, &bars) {
                 Ok(times) => results.push(times),
                 // A path that has no room for this dictionary does not stop the others from being measured.
-                Err(lexisplat_eval::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
+                Err(lexisplat_compress::Error::Render(error @ lexisplat_render::Error::Parameter { .. }))
                     if args.paths.is_empty() =>
                 {
                     note(&format!("warning: {}: {error}", path.name()));

@@ -4,11 +4,10 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use lexisplat::{Model, Progress};
-use lexisplat_eval::compression::judging_views;
+use lexisplat_compress::judging_views;
+use lexisplat_compress::{DrawOptions, SceneKind};
 use lexisplat_eval::metrics::Metric;
-use lexisplat_eval::{
-    Comparison, DrawOptions, Loaded, SceneFile, SceneKind, Whereabouts, compare, format, montage, png,
-};
+use lexisplat_eval::{Comparison, Loaded, SceneFile, Whereabouts, compare, format, montage, png};
 use lexisplat_render::{Camera, Renderer};
 use serde_json::json;
 

@@ -12,8 +12,9 @@ use lexisplat::{
     CompressOptions, DEFAULT_TOLERANCE, Error, FileKind, FormatError, Joined, Layout, Limits, Record,
     SplatSource, lexi,
 };
-use lexisplat_eval::compression::{SensitivitySource, overshoot, uncertain_by};
-use lexisplat_eval::{Compression, CompressionReport, Packing, Quality, Target, cameras_beside, format};
+use lexisplat_compress::{Compression, CompressionReport, Packing, Quality, Target, read_beside};
+use lexisplat_compress::{SensitivitySource, overshoot, uncertain_by};
+use lexisplat_eval::format;
 use lexisplat_formats::{Opened, open};
 use lexisplat_render::{ViewSet, read_views};
 
@@ -61,11 +62,6 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     }
     warn("cameras", given.as_ref().map_or(&[][..], |set| set.warnings.as_slice()));
     let mut compression = compression(args, given.as_ref(), &limits)?;
-    if args.prune.is_some() && !common.quiet {
-        note(
-            "note: --prune does nothing of its own: packed files leave out what hardly shows (--keep-all keeps it)",
-        );
-    }
 
     let files = args.inputs.iter().map(|path| input(path, common)).collect::<Result<Vec<_>>>()?;
     let read = ReadOptions::default()
@@ -76,7 +72,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let all_bytes = files.iter().map(|(_, bytes)| bytes.len() as u64).sum();
     // Only a scene that is packed whole is drawn from cameras.
     let may_look = args.looks_beside() && compression.holds_whole(all_bytes, true);
-    let beside = if may_look { beside(first) } else { None };
+    let beside = if may_look && !is_pipe(first) { read_beside(first) } else { None };
     let whole = compression.holds_whole(all_bytes, beside.is_some());
     let opened = files.iter().map(|(name, bytes)| open(name, bytes, siblings(name), &read, whole, &bars));
     let opened = opened.collect::<Result<Vec<_>, _>>()?;
@@ -104,7 +100,7 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let open_seconds = start.elapsed().as_secs_f64();
     let mut report = write_output(&output, common.overwrite, |sink| {
         compression.run(source, sink, &bars).map_err(|error| match error {
-            lexisplat_eval::Error::Codec(error) => anyhow::Error::from(error),
+            lexisplat_compress::Error::Codec(error) => anyhow::Error::from(error),
             error => error.into(),
         })
     })?;
@@ -142,13 +138,6 @@ pub(crate) fn run(args: &Compress, common: &Common) -> Result<()> {
     let mut json = serde_json::to_value(&report)?;
     json["output"] = output.display().to_string().into();
     tell(common, json, || text(&report, &output, args.all))
-}
-
-/// The cameras that lie beside `scene` and can be read, and where.
-fn beside(scene: &Path) -> Option<(PathBuf, ViewSet)> {
-    let path = if is_pipe(scene) { None } else { cameras_beside(scene) }?;
-    let set = read_views(&path, &mut |_| None).ok()?;
-    Some((path, set))
 }
 
 /// The error for several inputs without an output, which the last of them may have been meant for.

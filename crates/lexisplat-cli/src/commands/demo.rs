@@ -6,9 +6,8 @@ use std::time::Instant;
 use anyhow::Result;
 use lexisplat::packed::PackOptions;
 use lexisplat::{CompressOptions, Limits, Model, Progress, Splats, lexi, ply};
-use lexisplat_eval::{
-    Comparison, Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing, compare, format, montage,
-};
+use lexisplat_compress::{Compression, CompressionReport, DrawOptions, ORBIT_SIZE, Packing};
+use lexisplat_eval::{Comparison, compare, format, montage};
 use lexisplat_render::{Camera, Image, Renderer, Scene, orbit};
 use lexisplat_sample::{SampleOptions, scene};
 use lexisplat_sweep::report::{CompressedFile, Picture, Report, jpeg, page};

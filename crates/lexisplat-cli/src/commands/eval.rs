@@ -5,11 +5,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat::Progress as _;
-use lexisplat_eval::views::{ChosenViews, View, ViewOptions, find_views, photo};
-use lexisplat_eval::{
-    Comparison, DrawOptions, SceneFile, Scorer, Whereabouts, draw_views, format, misfit, montage, png,
-    score_views,
-};
+use lexisplat_compress::views::{ChosenViews, View, ViewOptions, find_views, photo};
+use lexisplat_compress::{DrawOptions, draw_views};
+use lexisplat_eval::{Comparison, SceneFile, Scorer, Whereabouts, format, misfit, montage, png, score_views};
 use lexisplat_render::{Camera, Image};
 use serde::Serialize;
 

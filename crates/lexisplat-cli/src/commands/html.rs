@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use lexisplat::Error;
-use lexisplat_eval::{ORBIT_SIZE, SceneFile, format};
+use lexisplat_compress::ORBIT_SIZE;
+use lexisplat_eval::{SceneFile, format};
 use lexisplat_formats::{Kind, bundle};
 use lexisplat_render::{Scene, bulk, near_plane, orbit, render};
 use lexisplat_sweep::report::jpeg;

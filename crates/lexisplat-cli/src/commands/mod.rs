@@ -22,7 +22,7 @@ use anyhow::{Context, Result};
 
 use lexisplat::Error;
 use lexisplat::simd::Simd;
-use lexisplat_eval::views::{ViewOptions, find_views};
+use lexisplat_compress::views::{ViewOptions, find_views};
 use lexisplat_render::{Camera, Scene};
 
 use crate::args::{Cli, Command, Views};
@@ -94,7 +94,7 @@ fn allowed_threads(asked: usize) -> usize {
 }
 
 /// Returns the cameras that `views` mean for a scene, and prints what is odd about them.
-fn cameras(views: &Views, scene: &Scene<'_>) -> lexisplat_eval::Result<Vec<Camera>> {
+fn cameras(views: &Views, scene: &Scene<'_>) -> lexisplat_compress::Result<Vec<Camera>> {
     let options = ViewOptions { offset: scene.meta().offset, ..views.options(None) };
     let found = find_views(&options, scene.geometry())?;
     warn("views", &found.warnings);

@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use anyhow::Result;
 use lexisplat::{Progress, Stage};
-use lexisplat_eval::{Comparison, DrawOptions, Error, SplitFilter, format};
+use lexisplat_compress::{DrawOptions, Error, SplitFilter};
+use lexisplat_eval::{Comparison, format};
 use lexisplat_sweep::{
     Entry, Results, Setting, SweepOptions, SweepProgress, read_manifest, shown_path, sweep, write_report,
 };

@@ -68,12 +68,6 @@ impl Metric {
     pub fn digits(self) -> usize {
         if self == Self::Psnr { 2 } else { 4 }
     }
-
-    /// Returns whether larger values are better.
-    #[must_use]
-    pub fn more_is_better(self) -> bool {
-        matches!(self, Self::Psnr | Self::Ssim)
-    }
 }
 
 impl fmt::Display for Metric {

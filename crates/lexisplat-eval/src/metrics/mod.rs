@@ -11,13 +11,12 @@ mod ssim;
 pub use flip::flip;
 pub use lpips::Lpips;
 pub use metric::Metric;
-pub(crate) use psnr::decibels;
 pub use psnr::psnr;
 pub use ssim::{ssim, ssim_inner};
 
 use lexisplat_render::Image;
 
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// The least and largest value of `image`, if one of them is outside of 0..1: metrics clip such values. Pictures of scenes
 /// may have some; values up to 255 mean that the picture should be divided by 255.

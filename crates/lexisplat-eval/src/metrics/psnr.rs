@@ -1,24 +1,19 @@
 //! Peak signal-to-noise ratio.
 
+use lexisplat_compress::decibels;
 use lexisplat_render::{Image, squared_error};
 
 use super::comparable;
-use crate::error::Result;
+use lexisplat_compress::Result;
 
 /// Returns the PSNR in dB: `-10 log10` of the mean squared error over all pixels and channels, for a peak of 1.
 /// Returns `None` if the clipped pictures are identical: their PSNR is infinite.
 ///
 /// # Errors
-/// [`crate::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
+/// [`lexisplat_compress::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
 pub fn psnr(a: &Image, b: &Image) -> Result<Option<f64>> {
     comparable(a, b)?;
     Ok(decibels(squared_error(a, b)?, a.pixels.len() as u64))
-}
-
-/// The PSNR in dB of a sum of squared errors over all channels of so many pixels; `None` if there are no errors.
-pub(crate) fn decibels(squares: f64, pixels: u64) -> Option<f64> {
-    let mean = squares / (pixels * 3) as f64;
-    (mean > 0.0).then(|| -10.0 * libm::log10(mean))
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use lexisplat_render::Image;
 
 use super::rows::{add_across, planes, sum_rows};
 use super::{clip, comparable};
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Side of the Gaussian window in pixels (INRIA `utils/loss_utils.py`, `window_size`).
 const WINDOW: usize = 11;

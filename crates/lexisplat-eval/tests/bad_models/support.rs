@@ -8,7 +8,8 @@ use lexisplat::stats::{Lint, lint};
 use lexisplat::{
     CompressOptions, Geometry, Layout, Limits, Sensitivity, ShDegree, Silent, Splats, compress, lexi, ply,
 };
-use lexisplat_eval::{DrawOptions, Scorer, compare};
+use lexisplat_compress::DrawOptions;
+use lexisplat_eval::{Scorer, compare};
 use lexisplat_render::gpu::Gpu;
 use lexisplat_render::{Camera, Device, RenderOptions, Renderer, Scene, orbit, sensitivity};
 use lexisplat_sample::{SampleOptions, scene};
@@ -143,7 +144,7 @@ fn pictures(original: &Splats, exact: &Splats, packed: Option<&Splats>) -> (Opti
             let Some(other) = other else { continue };
             let on_view = |_: &_, a: &lexisplat_render::Image, b: &lexisplat_render::Image| {
                 assert!(a.pixels.iter().chain(&b.pixels).flatten().all(|v| v.is_finite() && *v >= 0.0));
-                Ok::<_, lexisplat_eval::Error>(())
+                Ok::<_, lexisplat_compress::Error>(())
             };
             let (a, b) = (Scene::from(original), Scene::from(other));
             let options = DrawOptions::default();

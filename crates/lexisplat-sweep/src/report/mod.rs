@@ -12,7 +12,8 @@ mod packed;
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
 use lexisplat::Model;
-use lexisplat_eval::{Comparison, Error, Result};
+use lexisplat_compress::{Error, Result};
+use lexisplat_eval::Comparison;
 use lexisplat_render::Image;
 use maud::html;
 

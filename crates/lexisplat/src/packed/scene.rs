@@ -36,42 +36,10 @@ pub struct PackedHead {
     /// The GPU that measured the sensitivity; `None` for the CPU renderer, whose results are the same
     /// everywhere.
     pub device: Option<String>,
-    /// What it is decoded with, and where its chunks are.
-    pub(crate) coding: Coding,
+    /// What it is decoded with, and where its chunks are, as a file holds it; see `bitstream/head.rs`.
+    pub(crate) bytes: Vec<u8>,
     /// What may be made of it: the limits of the reader, or the default ones.
     pub(crate) limits: Limits,
-}
-
-/// What a packed scene is decoded with.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Coding {
-    Flat(Flat),
-    /// Version 3, written in full; see `layered/head.rs`.
-    Layered(Vec<u8>),
-}
-
-impl Coding {
-    /// Numbers of 4 bytes, and of bytes, that it holds.
-    pub(crate) fn sizes(&self) -> (usize, usize) {
-        match self {
-            Self::Flat(flat) => (flat.parameters.len() + flat.lengths.len(), flat.tables.len()),
-            Self::Layered(head) => (0, head.len()),
-        }
-    }
-}
-
-/// What files of version 2 are decoded with.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Flat {
-    /// Coefficients of atoms are multiples of 2 to the power of minus this.
-    pub(crate) atom_bits: u32,
-    /// Steps and predictors.
-    pub(crate) parameters: Vec<f32>,
-    /// Probabilities of all symbols.
-    pub(crate) tables: Vec<u8>,
-    /// Bytes of each part of the data: modelled symbols and raw bits, of the dictionary first and then of each
-    /// chunk of [`CHUNK`](super::CHUNK) Gaussians.
-    pub(crate) lengths: Vec<u32>,
 }
 
 impl PartialEq for PackedHead {
@@ -81,7 +49,7 @@ impl PartialEq for PackedHead {
             == (other.degree, other.gaussians, other.removed, other.atoms)
             && (&self.record, &self.meta, &self.target, &self.reached, &self.device)
                 == (&other.record, &other.meta, &other.target, &other.reached, &other.device)
-            && self.coding == other.coding
+            && self.bytes == other.bytes
     }
 }
 

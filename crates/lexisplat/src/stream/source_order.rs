@@ -98,12 +98,12 @@ fn by_buckets(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::packed::{CHUNK, PackOptions, Packer};
+    use crate::packed::{MOST_CHUNK, PackOptions, Packer};
     use crate::{Extra, ExtraValues, Limits, Sensitivity, Silent, lexi, ply};
 
     #[test]
     fn small_buckets_undo_the_order_of_a_packed_file() {
-        let n = CHUNK + 1000;
+        let n = MOST_CHUNK + 1000;
         let mut splats = crate::support::testing::scene(n, 2);
         splats = splats.with_degree_cut(crate::ShDegree::new(1).unwrap());
         // A name of one of the normals, which a PLY of ours otherwise has.

@@ -11,7 +11,7 @@ pub const MAX_ATOMS: usize = 1024;
 pub(crate) const MAX_GAUSSIANS: u64 = u32::MAX as u64 - 1;
 /// Most bytes of arrays for each byte of a file. A valid file without extra properties has at most 172: a byte of a packed
 /// file stands for at most 3 Gaussians of 57 bytes each, and an offset is stored for every 64 Gaussians. An extra property
-/// of equal values takes next to no bytes in version 3, and adds up to 24 if the Gaussians are as short as can be.
+/// of equal values takes next to no bytes in a packed file, and adds up to 24 if the Gaussians are as short as can be.
 const EXPANSION: u64 = 256;
 /// Most bytes of a header. The header of a packed scene of 2^32 Gaussians takes some kilobytes.
 const HEADER_BYTES: u64 = 4 << 20;
@@ -57,7 +57,7 @@ pub struct Limits {
     /// such as a pipe. Default `u64::MAX`, no limit.
     pub bytes: u64,
     /// Most bytes of these arrays for each byte of the file. Default 256; a valid file has at most
-    /// 172, and in version 3 up to 24 more for each extra property.
+    /// 172, and in packed files up to 24 more for each extra property.
     pub expansion: u64,
     /// Most bytes of a text header (PLY) or JSON header (.lexi). Default 4 MiB.
     pub header_bytes: u64,

@@ -1,5 +1,4 @@
-//! Functions that give the same bits on every machine, because a file must be decoded with the functions that
-//! encoded it.
+//! Functions that give the same bits on every machine, because a scene makes the same file on every machine.
 //!
 //! IEEE arithmetic and square roots are rounded the same on every machine. The other functions come from `libm`,
 //! which is plain Rust and therefore the same everywhere, unlike the system's library.
@@ -35,12 +34,6 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     rounded(libm::atan2(f64::from(y), f64::from(x)))
 }
 
-/// Sine and cosine.
-pub(crate) fn sin_cos(x: f32) -> (f32, f32) {
-    let (sine, cosine) = libm::sincos(f64::from(x));
-    (rounded(sine), rounded(cosine))
-}
-
 /// ln(sigmoid(x)): the logarithm of an opacity, from what a trainer stores.
 pub(crate) fn log_sigmoid(x: f32) -> f32 {
     let x = f64::from(x);
@@ -74,10 +67,6 @@ pub(crate) fn scaled(a: Vec3, s: f32) -> Vec3 {
     a.map(|v| v * s)
 }
 
-pub(crate) fn normalised(a: Vec3) -> Vec3 {
-    scaled(a, 1.0 / dot(a, a).sqrt().max(f32::MIN_POSITIVE))
-}
-
 /// The axes from longest to shortest. Equally long axes keep their order.
 pub(crate) fn longest_first(scales: Vec3) -> [usize; 3] {
     let mut order = [0, 1, 2];
@@ -99,48 +88,6 @@ pub(crate) fn columns(q: [f32; 4]) -> [Vec3; 3] {
     ]
 }
 
-/// The quaternion (w, x, y, z) with w >= 0 of the rotation with these columns.
-pub(crate) fn quaternion([a, b, c]: [Vec3; 3]) -> [f32; 4] {
-    let trace = [
-        1.0 + a[0] + b[1] + c[2],
-        1.0 + a[0] - b[1] - c[2],
-        1.0 - a[0] + b[1] - c[2],
-        1.0 - a[0] - b[1] + c[2],
-    ];
-    let mut most = 0;
-    for k in 1..4 {
-        if trace[k] > trace[most] {
-            most = k;
-        }
-    }
-    let twice = trace[most].max(f32::MIN_POSITIVE).sqrt();
-    let (half, inverse) = (0.5 * twice, 0.5 / twice);
-    let (x, y, z) = ((b[2] - c[1]) * inverse, (c[0] - a[2]) * inverse, (a[1] - b[0]) * inverse);
-    let (xy, xz, yz) = ((a[1] + b[0]) * inverse, (a[2] + c[0]) * inverse, (b[2] + c[1]) * inverse);
-    let q = match most {
-        0 => [half, x, y, z],
-        1 => [x, half, xy, xz],
-        2 => [y, xy, half, yz],
-        _ => [z, xz, yz, half],
-    };
-    if q[0] < 0.0 { q.map(|v| -v) } else { q }
-}
-
-/// Two unit vectors that make a right-handed frame with the unit vector `u`.
-pub(crate) fn frame(u: Vec3) -> [Vec3; 2] {
-    // The coordinate axis that is most perpendicular to u.
-    let mut least = 0;
-    for k in 1..3 {
-        if u[k].abs() < u[least].abs() {
-            least = k;
-        }
-    }
-    let mut axis = [0.0; 3];
-    axis[least] = 1.0;
-    let first = normalised(cross(axis, u));
-    [first, cross(u, first)]
-}
-
 /// Maps a unit vector and its opposite to one point of the square from -1 to 1: the upper half of an octahedron,
 /// flattened and turned by 45 degrees.
 pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
@@ -148,12 +95,6 @@ pub(crate) fn square_of_axis(u: Vec3) -> [f32; 2] {
     let sum = u[0].abs() + u[1].abs() + u[2];
     let (x, y) = (u[0] / sum, u[1] / sum);
     [x + y, x - y]
-}
-
-/// Inverse of [`square_of_axis`] up to the sign.
-pub(crate) fn axis_of_square([s, t]: [f32; 2]) -> Vec3 {
-    let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
-    normalised([x, y, (1.0 - x.abs() - y.abs()).max(0.0)])
 }
 
 /// What a number is called that is not finite. Where only such numbers are told, nothing that writes others is needed.
@@ -175,37 +116,42 @@ mod tests {
     }
 
     #[test]
-    fn rotations_and_axes_come_back() {
+    fn rotations_and_axes_are_those_of_quaternions() {
         let mut rng = SplitMix64::new(1);
         for _ in 0..10_000 {
             let q: [f32; 4] = std::array::from_fn(|_| random(&mut rng));
             let r = columns(q);
-            let back = columns(quaternion(r));
-            for (a, b) in r.as_flattened().iter().zip(back.as_flattened()) {
-                assert!((a - b).abs() < 1e-5, "{r:?} {back:?}");
+            // Columns make a right-handed frame; their trace and what is not symmetric say which.
+            for k in 0..3 {
+                let across = cross(r[k], r[(k + 1) % 3]);
+                assert!(dot(across, r[(k + 2) % 3]) > 0.9999 && dot(r[k], r[(k + 1) % 3]).abs() < 1e-5);
             }
-            let u = axis_of_square(square_of_axis(r[0]));
-            assert!((dot(u, r[0]).abs() - 1.0).abs() < 1e-5, "{u:?} {r:?}");
-            let [s, t] = frame(u);
-            assert!(dot(cross(u, s), t) > 0.999 && dot(u, s).abs() < 1e-5);
+            let over = 4.0 * q[0] / q.iter().map(|v| v * v).sum::<f32>();
+            assert!((1.0 + r[0][0] + r[1][1] + r[2][2] - over * q[0]).abs() < 1e-5, "{q:?} {r:?}");
+            for k in 0..3 {
+                let twice = r[(k + 1) % 3][(k + 2) % 3] - r[(k + 2) % 3][(k + 1) % 3];
+                assert!((twice - over * q[k + 1]).abs() < 1e-5, "{q:?} {r:?}");
+            }
+            let [s, t] = square_of_axis(r[0]);
+            let (x, y) = (0.5 * (s + t), 0.5 * (s - t));
+            let u = [x, y, 1.0 - x.abs() - y.abs()];
+            assert!((dot(u, r[0]).abs() - dot(u, u).sqrt()).abs() < 1e-5, "{u:?} {r:?}");
         }
     }
 
-    /// Files are decoded with these functions. A new release of `libm` must not change a bit, or old files would
-    /// decode differently.
+    /// Files are made with these functions. A new release of `libm` must not change a bit, or a scene would make another
+    /// file.
     #[test]
     fn values_are_frozen() {
         let mut hash = crc32fast::Hasher::new();
         let mut rng = SplitMix64::new(7);
         for _ in 0..100_000 {
             let x = 20.0 * random(&mut rng);
-            let (sine, cosine) = sin_cos(x);
-            for value in [exp2(x), exp(x), ln(x.abs()), sine, cosine, log_sigmoid(x), logit_of_log(-x.abs())]
-            {
+            for value in [exp2(x), exp(x), ln(x.abs()), log_sigmoid(x), logit_of_log(-x.abs())] {
                 hash.update(&value.to_le_bytes());
             }
         }
-        assert_eq!(hash.finalize(), 2_287_769_419);
+        assert_eq!(hash.finalize(), 4_032_334_024);
     }
 
     #[test]

@@ -135,7 +135,7 @@ pub fn reseal(header: &mut Value, data: &mut [u8]) -> Vec<u8> {
     };
     let mut sums = serde_json::Map::new();
     let mut own = None;
-    // In files of version 3 the checksum of the header is in the first four bytes of the head, which it covers too.
+    // In packed files the checksum of the header is in the first four bytes of the head, which it covers too.
     let sealed = header.get("packed.head").and_then(range);
     for (name, entry) in header.as_object().unwrap() {
         if name == "checksum.header" {

@@ -59,12 +59,10 @@ impl Parts {
         self.tensors.iter_mut().find(|t| t.0 == name).map(|t| &mut t.3)
     }
 
-    /// Shapes of lists that were cut or extended.
+    /// Shapes of lists of bytes that were cut or extended.
     pub(crate) fn fit_shapes(&mut self) {
-        for (_, dtype, shape, bytes) in &mut self.tensors {
-            let size = if matches!(dtype.as_str(), Some("F32" | "U32")) { 4 } else { 1 };
-            bytes.truncate(bytes.len() / size * size);
-            *shape = json!([bytes.len() / size]);
+        for (_, _, shape, bytes) in &mut self.tensors {
+            *shape = json!([bytes.len()]);
         }
     }
 }

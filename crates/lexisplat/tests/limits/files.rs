@@ -1,13 +1,15 @@
 //! Files of every kind, and what a scene made of each takes in memory.
 
 use lexisplat::lexi::LexiWriter;
-use lexisplat::packed::{CHUNK, PackOptions, Packer};
+use lexisplat::packed::{PackOptions, Packer};
 use lexisplat::{
     CompressOptions, Escapes, Extra, ExtraValues, Geometry, Indices, Layout, Model, Sensitivity, ShDegree,
     Silent, Splats, Values, compress, ply,
 };
 use lexisplat_sample::{SampleOptions, scene};
 
+/// Most Gaussians of a chunk as scenes are packed.
+const CHUNK: usize = 32_768;
 /// No code of a packed file reaches it.
 pub(crate) const LARGE: f32 = 1e6;
 /// No code of an exact one does.

@@ -1,4 +1,4 @@
-//! Small packed files of every kind and version.
+//! Small packed files of every kind.
 
 use lexisplat::lexi::LexiWriter;
 use lexisplat::packed::{PackOptions, Packer, ReachedRecord, TargetRecord};
@@ -47,15 +47,6 @@ pub(crate) fn files() -> Vec<(&'static str, Vec<u8>)> {
         ("pair", packed(&scene(&SampleOptions::new(2, 3)), 1e-3, |_| (), None)),
         ("one", packed(&one, 1e-3, |_| (), None)),
     ]
-}
-
-/// Of version 2, which is no longer written.
-pub(crate) fn golden() -> Vec<(&'static str, Vec<u8>)> {
-    let read = |name: &'static str| {
-        let path = format!("{}/tests/golden/{name}.lexi", env!("CARGO_MANIFEST_DIR"));
-        (name, std::fs::read(path).unwrap())
-    };
-    ["packed", "packed_degree0", "packed_escapes"].map(read).to_vec()
 }
 
 /// Of two layers.

@@ -1,4 +1,4 @@
-//! Tables and a dictionary of version 3 that take few bytes and stand for as much as they can.
+//! Tables and a dictionary that take few bytes and stand for as much as they can.
 
 /// Sets of contexts, and contexts of each.
 const SETS: usize = 61;

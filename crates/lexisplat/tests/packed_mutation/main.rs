@@ -2,22 +2,20 @@
 //! panic, within memory.
 
 mod files;
+mod index;
 mod made_up;
 mod mutations;
-mod version_2;
-mod version_3;
 
 use crate::allocator::{alone, counted, total};
 use crate::common::count_in_parts;
 use crate::parts::Parts;
-use files::{copies, files, golden, layered, rows};
+use files::{copies, files, layered, rows};
+use index::{FORMS, Form, Index, TENSORS};
 use lexisplat::lexi::LexiReader;
 use lexisplat::{Limits, MAX_ATOMS, Model, Splats, lexi};
 use lexisplat_testing::Random;
 use mutations::{change_metadata, change_tensor};
 use serde_json::Value;
-use version_2::{change_parameters, make_up};
-use version_3::{FORMS, Form, Index};
 
 /// A reader may hold this many bytes per byte of input. A byte is at most 3 Gaussians, each 57 bytes as it is
 /// decoded and again in the source's order, with 16 to sort by: 390. Or it is 8 nonzeros of 4 bytes, once in
@@ -35,13 +33,11 @@ const ALLOWED_BLOCK: usize = 64 * 16 * 72 * 16;
 /// A reader may allocate this many times what it may hold, what it gives back included: lists that grow are allocated
 /// about twice, and parts one after another. A reader that goes over the same bytes again and again allocates more.
 const ALLOWED_TIMES: usize = 4;
-/// Structured mutations tried: of small files, of a larger one of two layers, and of version 2. They are 10,000 in all.
-const MUTATIONS: usize = 7600;
+/// Structured mutations tried: of small files, and of a larger one of two layers. They are 10,000 in all.
+const MUTATIONS: usize = 9600;
 const LAYERED: usize = 400;
-const FLAT: usize = 2000;
-/// Of a file that takes long only every so many bytes and bits are tried. They are primes, so that bits of all kinds are.
+/// Of a file that takes long only every so many bytes and bits are tried. It is a prime, so that bits of all kinds are.
 const PRIME: usize = 1999;
-const STRIDE: usize = 11;
 
 /// Reads `bytes`; asserts the bounds. Whether they were accepted.
 fn accepted(bytes: &[u8]) -> bool {
@@ -123,7 +119,7 @@ fn damage_is_refused_within_bounds() {
             let index = Index::of(parts);
             match random.below(8) {
                 0 => change_metadata(parts, random),
-                1 => change_tensor(parts, &version_3::TENSORS, random),
+                1 => change_tensor(parts, &TENSORS, random),
                 2 | 3 => index.change_head(parts, random),
                 4 | 5 => index.change_index(parts, random),
                 _ => Index::change_data(parts, random),
@@ -131,21 +127,6 @@ fn damage_is_refused_within_bounds() {
             Index::seal(parts);
         });
     }
-}
-
-#[test]
-fn damage_of_version_2_is_refused_within_bounds() {
-    let _alone = alone();
-    let files = golden();
-    for (name, bytes) in &files {
-        damaged(name, bytes, STRIDE);
-    }
-    mutated(2, &files, FLAT, |parts, random| match random.below(8) {
-        0 | 1 => change_metadata(parts, random),
-        2 | 3 => make_up(parts, random),
-        4 => change_parameters(parts, random),
-        _ => (0..1 + random.below(2)).for_each(|_| change_tensor(parts, &version_2::TENSORS, random)),
-    });
 }
 
 /// The most that can be made of bytes: Gaussians of which nothing is said but the bits of a rotation.

@@ -350,6 +350,6 @@ fn a_scene_of_the_other_kind_is_named() {
 
 #[test]
 fn a_missing_file_is_named() {
-    let error = ply::read("no/such.ply".as_ref(), &ReadOptions::default()).expect_err("not there");
+    let error = ply::read("no/such.ply", &ReadOptions::default()).expect_err("not there");
     assert!(matches!(&error, Error::Io { .. }) && error.to_string().starts_with("no/such.ply: "), "{error}");
 }

@@ -8,7 +8,7 @@ use lexisplat::Record;
 use lexisplat::lexi::LexiReader;
 use lexisplat::packed::{ReachedRecord, StreamBits, TargetRecord};
 use lexisplat::stream::Survey;
-use lexisplat_eval::compression::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use lexisplat_compress::{ByteCount, RecordReport, part_bytes, sh_bytes};
 use lexisplat_eval::format;
 use serde::Serialize;
 

@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Info, common: &Common) -> Result<()> {
             .print(args.all, common);
     }
     if args.verify {
-        return Err(Error::parameter("verify", true, "only for packed .lexi files of version 3").into());
+        return Err(Error::parameter("verify", true, "only for packed .lexi files").into());
     }
     let read = ReadOptions::default().with_drop_invalid(args.drop_invalid).with_limits(limits);
     let opened = open(&name, &bytes, siblings(&name), &read, false, &bars)?;

@@ -13,7 +13,7 @@ use self::colour::{LIGHTNESS_SCALE, hyab, rgb_to_hunt_lab, srgb_to_ycxcz, ycxcz_
 use self::filters::{Blur, Features, pixels_per_degree};
 use super::rows::{add_across, add_rows, planes, sum_rows};
 use super::{clip, comparable};
-use crate::error::Result;
+use lexisplat_compress::Result;
 
 /// Exponent that compresses colour differences (`gqc`).
 const COLOUR_EXPONENT: f64 = 0.7;
@@ -27,7 +27,7 @@ const COLOUR_KNEE_TO: f64 = 0.95;
 /// FLIP's default.
 ///
 /// # Errors
-/// [`crate::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
+/// [`lexisplat_compress::Error::Parameter`] if the sizes differ, or a picture is empty or has NaN.
 pub fn flip(reference: &Image, test: &Image) -> Result<f64> {
     comparable(reference, test)?;
     let (width, height) = (reference.width as usize, reference.height as usize);

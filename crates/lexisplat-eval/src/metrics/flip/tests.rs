@@ -4,8 +4,8 @@ use std::f64::consts::PI;
 
 use super::colour::{hyab, rgb_to_hunt_lab, srgb_to_ycxcz, ycxcz_to_rgb};
 use super::*;
-use crate::error::Error;
 use crate::metrics::testing::{golden, picture};
+use lexisplat_compress::Error;
 
 /// A weight for every offset of a square window.
 type Kernel = Vec<((i64, i64), f64)>;

@@ -17,7 +17,7 @@ pub use self::network::Network;
 use self::network::{COLOURS, Pool, STAGES};
 use super::rows::sum_rows;
 use super::{clip, comparable};
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Term added to the length of a pixel's features before the division by it (`lpips.normalize_tensor`).
 const EPSILON: f64 = 1e-10;
@@ -51,16 +51,6 @@ struct Layers {
     linear: Vec<f32>,
     /// Border of the output that the next layer needs, in pixels.
     padding_after: usize,
-}
-
-/// Features of a picture that several others are compared with. VGG16 has 122 floats a pixel: 52 MB for 400 x 266
-/// pixels, 0.83 GB for 1600 x 1066.
-#[derive(Clone)]
-pub struct Features {
-    network: Network,
-    range: Range,
-    size: (u32, u32),
-    maps: Vec<Map>,
 }
 
 impl Lpips {
@@ -106,49 +96,6 @@ impl Lpips {
         for layers in &self.stages {
             (a, b) = (self.run(layers, a)?, self.run(layers, b)?);
             total += difference(&a, &b, &layers.linear);
-        }
-        self.finite(total)
-    }
-
-    /// Returns the features of `image`.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] if the picture's pixels do not fill it, it has NaN or it is smaller than
-    /// [`Network::min_size`].
-    pub fn features(&self, image: &Image, range: Range) -> Result<Features> {
-        comparable(image, image)?;
-        let mut map = self.input(image, range)?;
-        let mut maps = Vec::with_capacity(STAGES);
-        for layers in &self.stages {
-            map = self.run(layers, map)?;
-            maps.push(map.clone());
-        }
-        Ok(Features { network: self.network, range, size: (image.width, image.height), maps })
-    }
-
-    /// Returns the [`Self::distance`] of `image` to the picture of `reference`, for half the work.
-    ///
-    /// # Errors
-    /// [`Error::Parameter`] as [`Self::distance`], and if `reference` is of another network.
-    pub fn distance_to(&self, reference: &Features, image: &Image) -> Result<f64> {
-        comparable(image, image)?;
-        if reference.network != self.network {
-            return Err(Error::parameter("features", reference.network, format!("of {}", self.network)));
-        }
-        if (image.width, image.height) != reference.size {
-            let (width, height) = reference.size;
-            let found = format!("{} x {}", image.width, image.height);
-            return Err(Error::parameter(
-                "picture",
-                found,
-                format!("the reference's size, {width} x {height}"),
-            ));
-        }
-        let mut map = self.input(image, reference.range)?;
-        let mut total = 0.0;
-        for (layers, reference) in self.stages.iter().zip(&reference.maps) {
-            map = self.run(layers, map)?;
-            total += difference(reference, &map, &layers.linear);
         }
         self.finite(total)
     }
@@ -212,17 +159,6 @@ impl Lpips {
 impl fmt::Debug for Lpips {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Lpips").field("network", &self.network).finish_non_exhaustive()
-    }
-}
-
-impl fmt::Debug for Features {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { network, range, size, .. } = self;
-        f.debug_struct("Features")
-            .field("network", network)
-            .field("range", range)
-            .field("size", size)
-            .finish_non_exhaustive()
     }
 }
 

@@ -12,7 +12,7 @@ use safetensors::{Dtype, SafeTensors};
 
 use super::Lpips;
 use super::network::Network;
-use crate::error::{Error, Result};
+use lexisplat_compress::{Error, Result};
 
 /// Largest file that is read, in bytes. VGG16 with all its layers has 0.55 GB.
 const MAX_BYTES: u64 = 1 << 30;

@@ -6,7 +6,7 @@ use safetensors::Dtype;
 
 use super::header::{Header, TensorInfo};
 use super::json::{self, Json};
-use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, key, tensor};
+use super::schema::{IGNORED_PREFIX, LENGTH_BYTES, MAX_VERSION, PACKED_VERSION, VERSION, key, tensor};
 use crate::formats::kind::FileKind;
 use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
@@ -33,7 +33,7 @@ pub(super) struct Checked<'a> {
 pub(super) enum Extent {
     /// All of it.
     Whole,
-    /// Its first bytes, if it is of the newest version.
+    /// Its first bytes, if it is packed.
     First,
 }
 
@@ -88,8 +88,12 @@ impl<'a> Checked<'a> {
         if version > MAX_VERSION {
             return Err(format(FormatError::Version { found: version, supported: MAX_VERSION }));
         }
-        if version == 0 {
-            return Err(malformed("metadata 'version' is 0".to_owned()));
+        if ![VERSION, PACKED_VERSION].contains(&version) {
+            let text = format!(
+                "metadata 'version' is {version}, which this build does not read: versions {VERSION} and \
+                 {PACKED_VERSION} are supported"
+            );
+            return Err(malformed(text));
         }
         if extent == Extent::First && version != PACKED_VERSION {
             let text = format!(
@@ -116,11 +120,11 @@ impl<'a> Checked<'a> {
 
     fn verify_tensors(&self) -> Result<()> {
         // The ranges of packed data have checksums of their own, so that a part of it can be checked.
-        let (layered, elsewhere): (bool, &[&str]) = match self.is_layered() && self.has(tensor::HEAD) {
+        let (packed, elsewhere): (bool, &[&str]) = match self.is_packed() && self.has(tensor::HEAD) {
             true => (true, &[tensor::HEAD, tensor::DATA]),
             false => (false, &[tensor::HEADER_CHECKSUM]),
         };
-        let sums = match layered && !self.has_text(key::CHECKSUMS) {
+        let sums = match packed && !self.has_text(key::CHECKSUMS) {
             true => Json::Object(Vec::new()),
             false => self.json(key::CHECKSUMS, |sums| {
                 sums.members()?.iter().all(|(_, sum)| sum.text().is_some()).then(|| sums.clone())
@@ -152,7 +156,7 @@ impl<'a> Checked<'a> {
         Ok(())
     }
 
-    /// The checksum of the header and of the head of a file of the newest version, and the bytes of the head.
+    /// The checksum of the header and of the head of a packed file, and the bytes of the head.
     pub(super) fn sealed_head(&self) -> Result<(u32, &[u8])> {
         let len = self.list_len(tensor::HEAD)?;
         let bytes = self.data(tensor::HEAD, Dtype::U8, &[len])?;
@@ -211,14 +215,14 @@ impl<'a> Checked<'a> {
         self.has_text(key).then(|| self.number(key)).transpose()
     }
 
-    /// Whether the file is of the newest version, in which many metadata entries may be missing.
-    pub(super) fn is_layered(&self) -> bool {
+    /// Whether the file is a packed one, in which many metadata entries may be missing.
+    pub(super) fn is_packed(&self) -> bool {
         self.number::<u64>(key::VERSION).is_ok_and(|version| version == PACKED_VERSION)
     }
 
     /// The metadata entry `key` as a number, or as `true` or `false`; its default if it is missing and may be.
     pub(super) fn number_or_default<T: std::str::FromStr + Default>(&self, key: &str) -> Result<T> {
-        match self.is_layered() {
+        match self.is_packed() {
             true => Ok(self.optional(key)?.unwrap_or_default()),
             false => self.number(key),
         }
@@ -252,7 +256,7 @@ impl<'a> Checked<'a> {
         (*self.bytes).as_ref()
     }
 
-    pub(super) fn view(&self, name: &str) -> Result<View<'_>> {
+    pub(super) fn view(&self, name: &str) -> Result<TensorView<'_>> {
         let missing = || self.malformed(format!("tensor '{name}' is missing"));
         let TensorInfo { dtype, shape, data_offsets: (start, end) } =
             self.header.info(name).ok_or_else(missing)?;
@@ -261,7 +265,7 @@ impl<'a> Checked<'a> {
             let (what, found) = (format!("tensor '{name}'"), self.bytes().len() as u64);
             Error::format(&self.file, FormatError::Truncated { what, expected: end as u64, found })
         })?;
-        Ok(View { dtype: *dtype, shape, data })
+        Ok(TensorView { dtype: *dtype, shape, data })
     }
 
     /// The length of the tensor `name`, which must have one dimension.
@@ -274,7 +278,7 @@ impl<'a> Checked<'a> {
 
     /// Refuses tensors that are neither `known` nor to be ignored. `whose` ends the message.
     pub(super) fn refuse_unknown(&self, known: impl Fn(&str) -> bool, whose: &str) -> Result<()> {
-        let summed = !self.is_layered();
+        let summed = !self.is_packed();
         let ignored =
             |name: &str| (summed && name == tensor::HEADER_CHECKSUM) || name.starts_with(IGNORED_PREFIX);
         match self.names().find(|name| !ignored(name) && !known(name)) {
@@ -350,7 +354,7 @@ fn read_header(file: &str, bytes: &[u8]) -> Result<Header> {
 
 /// One tensor of a file.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct View<'a> {
+pub(super) struct TensorView<'a> {
     pub(super) dtype: Dtype,
     pub(super) shape: &'a [usize],
     pub(super) data: &'a [u8],

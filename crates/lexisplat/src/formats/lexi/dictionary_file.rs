@@ -45,7 +45,8 @@ pub fn read_dictionary_bytes(file: &str, bytes: &[u8], limits: &Limits) -> Resul
         if layout == Layout::Packed {
             let head = super::packed::head(&checked, limits)?;
             super::packed::check_columns(&checked, head.gaussians)?;
-            return Ok(Decoder::new(&head, super::packed::data(&checked)?)?.dictionary().clone());
+            let data = super::packed::data(&checked)?;
+            return Ok(Decoder::new(&head, data.len() as u64)?.dictionary().clone());
         }
         refuse_unknown(&checked, layout, degree)?;
     } else {

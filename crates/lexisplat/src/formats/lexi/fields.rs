@@ -7,19 +7,19 @@ use safetensors::Dtype;
 use super::checked::Checked;
 use super::extra_column::{Column, ColumnError};
 use super::layout::Layout;
-use super::schema::{EXTRA_PREFIX, FLAT_VERSION, PACKED_VERSION, key, tensor};
+use super::schema::{EXTRA_PREFIX, PACKED_VERSION, key, tensor};
 use crate::formats::ply::is_extra_name;
 use crate::scene::extra::{Extra, ScalarType, with_scalar};
 use crate::scene::offset::Offset;
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
 use crate::sparse::dictionary::Dictionary;
-use crate::sparse::model::{Pursuit, Record};
+use crate::sparse::model::Record;
 use crate::support::error::{Error, Result};
 use crate::support::limits::{Limits, MAX_ATOMS};
 
 fn file_layout(checked: &Checked<'_>) -> Result<Layout> {
-    if checked.is_layered() && !checked.has_text(key::LAYOUT) {
+    if checked.is_packed() && !checked.has_text(key::LAYOUT) {
         return Ok(Layout::Packed);
     }
     checked.text(key::LAYOUT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))
@@ -30,7 +30,7 @@ pub(super) fn layout(checked: &Checked<'_>) -> Result<Layout> {
     record(checked)?;
     let layout = file_layout(checked)?;
     let version: u64 = checked.number(key::VERSION)?;
-    if (layout == Layout::Packed) != (FLAT_VERSION..=PACKED_VERSION).contains(&version) {
+    if (layout == Layout::Packed) != (version == PACKED_VERSION) {
         let text = format!("metadata 'version' is {version}, which has no layout '{layout}'");
         return Err(checked.malformed(text));
     }
@@ -43,7 +43,7 @@ pub(super) fn degree(checked: &Checked<'_>) -> Result<ShDegree> {
 }
 
 pub(super) fn meta(checked: &Checked<'_>) -> Result<SceneMeta> {
-    let comments = match checked.is_layered() && !checked.has_text(key::COMMENTS) {
+    let comments = match checked.is_packed() && !checked.has_text(key::COMMENTS) {
         true => Vec::new(),
         false => checked.json(key::COMMENTS, |comments| {
             comments.items()?.iter().map(|comment| comment.text().map(str::to_owned)).collect()
@@ -84,17 +84,12 @@ pub(super) fn dictionary(checked: &Checked<'_>, degree: ShDegree, limits: &Limit
 }
 
 pub(super) fn record(checked: &Checked<'_>) -> Result<Record> {
-    let pursuit = match checked.is_layered() {
-        true => Pursuit::Omp,
-        false => {
-            checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")))?
-        }
-    };
-    let packed = file_layout(checked)? == Layout::Packed;
+    let pursuit =
+        || checked.text(key::PURSUIT)?.parse().map_err(|e| checked.malformed(format!("metadata: {e}")));
     let record = Record {
         tolerance: checked.optional(key::TOLERANCE)?,
         max_nonzeros: checked.optional(key::MAX_NONZEROS)?,
-        pursuit: (!packed).then_some(pursuit),
+        pursuit: (!checked.is_packed()).then(pursuit).transpose()?,
         seed: checked.number_or_default(key::SEED)?,
         max_residual: checked.number_or_default(key::MAX_RESIDUAL)?,
         rms_residual: checked.number_or_default(key::RMS_RESIDUAL)?,
@@ -138,17 +133,17 @@ pub(super) fn check_extra_names(checked: &Checked<'_>) -> Result<()> {
 }
 
 /// Properties that 3DGS does not define, of Gaussians `range` of `n`; none if only a first part of the file is there. In
-/// version 3 they lie in the order of the source, in files of other versions by their sizes.
+/// packed files they lie in the order of the source, in exact ones by their sizes.
 pub(super) fn extras(checked: &Checked<'_>, n: usize, range: &Range<usize>) -> Result<Vec<Extra>> {
     check_extra_names(checked)?;
     let mut out = Vec::new();
-    let names = if checked.is_layered() { checked.names_by_place() } else { checked.names().collect() };
+    let names = if checked.is_packed() { checked.names_by_place() } else { checked.names().collect() };
     for full in names {
         let Some(name) = full.strip_prefix(EXTRA_PREFIX) else { continue };
         if !checked.is_whole() {
             continue;
         }
-        if checked.is_layered() {
+        if checked.is_packed() {
             let column = column(checked, full, n)?;
             let values = column.values(range.clone()).map_err(|e| wrong(checked, full, e))?;
             out.push(Extra { name: name.to_owned(), values });

@@ -2,7 +2,7 @@
 //! [`Packed`](crate::packed::Packed) scene.
 //!
 //! docs/FORMAT.md is the specification. Every byte is covered by a CRC-32: each tensor by an entry of the
-//! metadata key `checksums`, the header by the tensor `checksum.header`. In packed files of version 3 one CRC-32 covers the
+//! metadata key `checksums`, the header by the tensor `checksum.header`. In packed files one CRC-32 covers the
 //! header and the tensor `packed.head`, which holds one for each range of `packed.data`.
 
 mod checked;

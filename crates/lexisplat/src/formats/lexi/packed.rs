@@ -8,7 +8,7 @@ use super::checked::Checked;
 use super::fields::{check_extra_names, column, degree, extras, meta, record};
 use super::json::Json;
 use super::schema::{EXTRA_PREFIX, PACKED, key, tensor};
-use crate::packed::{CHUNK, Coding, Flat, Packed, PackedHead, ReachedRecord, TargetRecord, layered_atoms};
+use crate::packed::{Packed, PackedHead, ReachedRecord, TargetRecord, atoms_of_head};
 use crate::scene::extra::ExtraValues;
 use crate::support::error::Result;
 use crate::support::limits::Limits;
@@ -22,9 +22,8 @@ const GAUSSIANS_PER_BYTE: u64 = 3;
 pub(super) fn packed(checked: &Checked<'_>, head: PackedHead, limits: &Limits) -> Result<Packed> {
     let n = head.gaussians;
     let budget = MemoryBudget::new(limits, &checked.file, checked.bytes().len() as u64);
-    let (words, bytes) = head.coding.sizes();
-    for (count, each) in [(words, size_of::<u32>()), (bytes, 1), (data(checked)?.len(), 1)] {
-        budget.take(count, each)?;
+    for bytes in [head.bytes.len(), data(checked)?.len()] {
+        budget.take(bytes, 1)?;
     }
     for extra in extras(checked, n, &(0..0))? {
         budget.take(n, extra.values.width())?;
@@ -73,21 +72,11 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
         let what = format!("Gaussians in {}, for its {file_bytes} bytes", checked.file);
         Limits::check(&what, gaussians, file_bytes.saturating_mul(GAUSSIANS_PER_BYTE))?;
     }
-    let coding = coding(checked, gaussians)?;
-    let atoms = match &coding {
-        Coding::Flat(_) => checked.number(key::ATOMS)?,
-        Coding::Layered(head) => {
-            layered_atoms(head).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?
-        }
-    };
+    let (_, bytes) = checked.sealed_head()?;
+    let atoms = atoms_of_head(bytes).ok_or_else(|| checked.malformed("tensor 'packed.head' is too short"))?;
     limits.check_atoms(&checked.file, atoms)?;
     let gaussians = usize::try_from(gaussians).map_err(|_| checked.malformed("too many Gaussians"))?;
-    let others: &[&str] = match &coding {
-        Coding::Flat(_) => &[tensor::HEAD],
-        Coding::Layered(_) => &[tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES],
-    };
-    let known =
-        |name: &str| name.starts_with(EXTRA_PREFIX) || (PACKED.contains(&name) && !others.contains(&name));
+    let known = |name: &str| name.starts_with(EXTRA_PREFIX) || PACKED.contains(&name);
     checked.refuse_unknown(known, "for layout 'packed'")?;
     let target = checked.has_text(key::PROMISE).then(|| checked.json(key::PROMISE, target)).transpose()?;
     let reached = checked.has_text(key::REACHED).then(|| checked.json(key::REACHED, reached)).transpose()?;
@@ -108,7 +97,7 @@ pub(super) fn head(checked: &Checked<'_>, limits: &Limits) -> Result<PackedHead>
             .then(|| checked.text(key::DRAWN_ON))
             .transpose()?
             .map(str::to_owned),
-        coding,
+        bytes: bytes.to_vec(),
         limits: *limits,
     })
 }
@@ -142,28 +131,10 @@ pub(super) fn check_columns(checked: &Checked<'_>, n: usize) -> Result<()> {
     extras(checked, n, &(0..0)).map(drop)
 }
 
-/// What the scene is decoded with, by the version of the file.
-fn coding(checked: &Checked<'_>, gaussians: u64) -> Result<Coding> {
-    if checked.is_layered() {
-        let (_, head) = checked.sealed_head()?;
-        return Ok(Coding::Layered(head.to_vec()));
-    }
-    let chunks = usize::try_from(gaussians.div_ceil(CHUNK as u64)).unwrap_or(usize::MAX - 1);
-    Ok(Coding::Flat(Flat {
-        atom_bits: checked.number(key::ATOM_BITS)?,
-        parameters: list(checked, tensor::PARAMETERS, Dtype::F32)?,
-        lengths: checked.values(tensor::LENGTHS, Dtype::U32, &[2_usize.saturating_mul(chunks + 1)])?,
-        tables: list(checked, tensor::TABLES, Dtype::U8)?,
-    }))
-}
-
 /// Places in the source of Gaussians `range` of `n`.
 pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Result<Vec<u32>> {
     if !checked.is_whole() {
         return Err(checked.malformed("only a first part is there, without the order of the source"));
-    }
-    if !checked.is_layered() {
-        return checked.part(tensor::ORDER, Dtype::U32, &[n], &range);
     }
     let values = column(checked, tensor::ORDER, n)?.values(range);
     match values {
@@ -171,15 +142,6 @@ pub(super) fn order(checked: &Checked<'_>, n: usize, range: Range<usize>) -> Res
         Ok(_) => Err(checked.malformed("tensor 'packed.order' is not of u32")),
         Err(error) => Err(checked.malformed(format!("tensor 'packed.order': {error}"))),
     }
-}
-
-/// A tensor that is a list of any length.
-fn list<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(
-    checked: &Checked<'_>,
-    name: &str,
-    dtype: Dtype,
-) -> Result<Vec<T>> {
-    checked.values(name, dtype, &length(checked, name, dtype)?)
 }
 
 /// Gaussians whose places are looked at together.

@@ -8,10 +8,8 @@ use super::checked::{Checked, Extent, FileBytes};
 use super::exact::Exact;
 use super::fields::{extras, layout};
 use super::layout::Layout;
-use super::schema::{
-    EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor,
-};
-use crate::packed::{Data, Decoder, Outline, Packed, PackedHead, StreamBits, Wish};
+use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, LENGTH_BYTES, PACKED, PACKED_VERSION, VERSION, tensor};
+use crate::packed::{Data, DecodeOptions, Decoder, Outline, Packed, PackedHead, StreamBits};
 use crate::scene::extra::Extra;
 use crate::scene::sh::ShDegree;
 use crate::scene::source::{SplatSource, check_range};
@@ -34,7 +32,8 @@ const CHUNKS_AT_ONCE: usize = 16;
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be opened, [`crate::Error::Format`] if it is damaged,
 /// [`crate::Error::Limit`] if it asks for more than `limits` allow.
-pub fn read(path: &Path, limits: &Limits) -> Result<Model> {
+pub fn read(path: impl AsRef<Path>, limits: &Limits) -> Result<Model> {
+    let path = path.as_ref();
     let bytes = Input::open_within(path, limits)?;
     read_bytes(&path.display().to_string(), &bytes, limits)
 }
@@ -76,7 +75,7 @@ struct PackedFile<'a> {
     decoder: Decoder,
     /// Number of Gaussians of the whole file.
     whole: usize,
-    outline: Option<Outline>,
+    outline: Outline,
 }
 
 impl<'a> LexiReader<'a> {
@@ -93,7 +92,7 @@ impl<'a> LexiReader<'a> {
         Self::with_extent(file.into(), Box::new(bytes), Extent::Whole, limits)
     }
 
-    /// Checks the first bytes of a packed .lexi file of version 3, as many as there are. Errors call it `file`.
+    /// Checks the first bytes of a packed .lexi file, as many as there are. Errors call it `file`.
     ///
     /// It then reads the Gaussians whose base is whole there, as fine as the bytes that are there make them. Where the next
     /// layer is missing they look as the file says to fill its place. Extras and the order of the source are left
@@ -101,7 +100,7 @@ impl<'a> LexiReader<'a> {
     ///
     /// # Errors
     /// As [`Self::open`]. [`crate::FormatError::Truncated`] says how many bytes are needed at least.
-    /// [`crate::FormatError::Malformed`] for files that are only read whole, those of other layouts or versions.
+    /// [`crate::FormatError::Malformed`] for files that are only read whole, those of other layouts.
     pub fn open_first(
         file: impl Into<String>,
         bytes: impl AsRef<[u8]> + Send + Sync + 'a,
@@ -119,8 +118,7 @@ impl<'a> LexiReader<'a> {
             super::packed::check_columns(&checked, head.gaussians)?;
             let data = super::packed::data(&checked)?;
             let (start, length) = super::packed::data_place(&checked);
-            let first = if checked.is_whole() { None } else { Decoder::of_prefix(&head, data, length)? };
-            let decoder = first.map_or_else(|| Decoder::new(&head, data), Ok)?;
+            let decoder = Decoder::of_prefix(&head, data.len() as u64, length)?;
             let there = decoder.spans().last().map_or(0, |span| span.end);
             let whole = std::mem::replace(&mut head.gaussians, there);
             let extras = extras(&checked, there, &(0..0))?;
@@ -138,7 +136,7 @@ impl<'a> LexiReader<'a> {
     /// there is no SH-rest. Base colours are then those that are seen on average.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a file that is not a packed one of version 3, whose nonzeros have no parts.
+    /// [`Error::Parameter`] for a file that is not packed, whose nonzeros have no parts.
     pub fn with_sh_parts(mut self, parts: usize) -> Result<Self> {
         self.wish("sh_parts", parts)?.sh_parts = parts;
         Ok(self)
@@ -148,26 +146,24 @@ impl<'a> LexiReader<'a> {
     /// Where one is wrong although that of the bytes holds, a decoder is at fault.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for a file that is not a packed one of version 3, which has none.
+    /// [`Error::Parameter`] for a file that is not packed, which has none.
     pub fn with_integers_verified(mut self) -> Result<Self> {
         self.wish("verify", true)?.verify = true;
         Ok(self)
     }
 
-    /// What is made of chunks of a packed file of version 3. `name` and `value` are what is asked of it.
-    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut Wish> {
-        let wish = match &mut self.kind {
-            Kind::Packed(packed) => packed.decoder.wish(),
-            Kind::Exact(_) => None,
-        };
-        wish.ok_or_else(|| Error::parameter(name, value, "only for packed .lexi files of version 3"))
+    /// What is made of chunks of a packed file. `name` and `value` are what is asked of it.
+    fn wish(&mut self, name: &'static str, value: impl ToString) -> Result<&mut DecodeOptions> {
+        match &mut self.kind {
+            Kind::Packed(packed) => Ok(&mut packed.decoder.wish),
+            Kind::Exact(_) => Err(Error::parameter(name, value, "only for packed .lexi files")),
+        }
     }
 
-    /// The layers, chunks and ranges of a packed file of version 3, of the whole file also if only a first part of it is
-    /// there.
+    /// The layers, chunks and ranges of a packed file, of the whole file also if only a first part of it is there.
     #[must_use]
     pub fn outline(&self) -> Option<&Outline> {
-        self.packed_file().and_then(|packed| packed.outline.as_ref())
+        self.packed_file().map(|packed| &packed.outline)
     }
 
     /// Number of Gaussians of the whole file. There are [fewer](Self::len) if only a first part of it is there.
@@ -202,8 +198,7 @@ impl<'a> LexiReader<'a> {
     pub fn version(&self) -> u64 {
         match &self.kind {
             Kind::Exact(_) => VERSION,
-            Kind::Packed(packed) if packed.outline.is_some() => PACKED_VERSION,
-            Kind::Packed(_) => FLAT_VERSION,
+            Kind::Packed(_) => PACKED_VERSION,
         }
     }
 
@@ -349,7 +344,7 @@ impl<'a> LexiReader<'a> {
                     let at_once = first..chunks.min(first + CHUNKS_AT_ONCE);
                     bit_counts.add(&packed.chunks(at_once, &self.extras, &self.limits, count_bits, take)?);
                 }
-                Ok(packed.decoder.named(&bit_counts))
+                Ok(bit_counts.named())
             }
         }
     }

@@ -2,8 +2,6 @@
 
 /// Version of files in the layouts `f32`, `f16` and `paper`.
 pub const VERSION: u64 = 1;
-/// Version of files in the layout `packed` before there were layers.
-pub(super) const FLAT_VERSION: u64 = 2;
 /// Version of files in the layout `packed`.
 pub const PACKED_VERSION: u64 = 3;
 /// Newest version of the format that is read.
@@ -36,8 +34,7 @@ pub(super) const GEOMETRY: [(&str, usize); 6] = [
 ];
 
 /// Names of the tensors of a packed file, in the order in which sizes are listed.
-pub(super) const PACKED: [&str; 6] =
-    [tensor::HEAD, tensor::PARAMETERS, tensor::LENGTHS, tensor::TABLES, tensor::DATA, tensor::ORDER];
+pub(super) const PACKED: [&str; 3] = [tensor::HEAD, tensor::DATA, tensor::ORDER];
 
 /// The shape of a tensor of geometry of `n` Gaussians.
 pub(super) fn geometry_shape(n: usize, width: usize) -> Vec<usize> {
@@ -60,9 +57,6 @@ pub(super) mod tensor {
     pub(crate) const ESCAPED: &str = "escapes.gaussians";
     pub(crate) const ESCAPE_ROWS: &str = "escapes.rows";
     pub(crate) const HEAD: &str = "packed.head";
-    pub(crate) const PARAMETERS: &str = "packed.parameters";
-    pub(crate) const LENGTHS: &str = "packed.lengths";
-    pub(crate) const TABLES: &str = "packed.tables";
     pub(crate) const DATA: &str = "packed.data";
     pub(crate) const ORDER: &str = "packed.order";
     pub(crate) const HEADER_CHECKSUM: &str = "checksum.header";
@@ -87,8 +81,6 @@ pub(super) mod key {
     pub(crate) const OFFSET: &str = "offset";
     pub(crate) const GAUSSIANS: &str = "gaussians";
     pub(crate) const REMOVED: &str = "removed";
-    pub(crate) const ATOMS: &str = "atoms";
-    pub(crate) const ATOM_BITS: &str = "atom_bits";
     pub(crate) const PROMISE: &str = "promise";
     pub(crate) const REACHED: &str = "reached";
     pub(crate) const DRAWN_ON: &str = "drawn_on";

@@ -4,12 +4,10 @@ use safetensors::Dtype;
 
 use super::extra_column::ColumnEncoder;
 use super::layout::{CodeLayout, Layout};
-use super::schema::{
-    EXTRA_PREFIX, FLAT_VERSION, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor,
-};
+use super::schema::{EXTRA_PREFIX, FORMAT, GEOMETRY, PACKED_VERSION, VERSION, geometry_shape, key, tensor};
 use super::spilled::SpilledModel;
 use super::tensors::{Draft, Metadata, Source, Tensor, json, preamble};
-use crate::packed::{Coding, Packed, PackedHead, SpilledPacked};
+use crate::packed::{Packed, PackedHead, SpilledPacked};
 use crate::scene::extra::{Extra, ExtraValues, ScalarType, for_extra, with_scalar};
 use crate::scene::sh::ShDegree;
 use crate::scene::splats::SceneMeta;
@@ -17,7 +15,7 @@ use crate::sparse::codes::{Indices, Values};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::{Model, Pursuit, Record};
 use crate::sparse::pursuit::ValueType;
-use crate::support::error::{Error, Result};
+use crate::support::error::Result;
 use crate::support::limits::Limits;
 use crate::support::progress::{Progress, Silent};
 use crate::support::sink::Sink;
@@ -49,46 +47,18 @@ impl<'a> LexiWriter<'a> {
         }
         let layout = Layout::of(codes, model.codes().values().value_type());
         let tensors = ExactTensors::of_model(model, codes).list(model.dictionary(), layout);
-        let metadata = scene_metadata(VERSION, layout, model.degree(), model.record(), model.meta());
+        let metadata = scene_metadata(layout, model.degree(), model.record(), model.meta());
         Ok(Self::new(metadata, tensors))
     }
 
-    /// The file of `packed`, of the version that it was read from or that is written today.
+    /// The file of `packed`.
     #[must_use]
     pub fn packed(packed: &'a Packed) -> Self {
         let head = packed.head();
         let data = Source::Bytes(packed.data());
-        match &head.coding {
-            Coding::Flat(flat) => {
-                let n = packed.len();
-                let extras = packed.extras().iter().map(|extra| extra_tensor(extra, n, bytes_of(extra)));
-                let order = packed.order().map(|order| list(tensor::ORDER, Dtype::U32, n, Source::of(order)));
-                let mut metadata =
-                    scene_metadata(FLAT_VERSION, Layout::Packed, head.degree, &head.record, &head.meta);
-                metadata.extend([
-                    (key::ATOMS, head.atoms.to_string()),
-                    (key::ATOM_BITS, flat.atom_bits.to_string()),
-                ]);
-                let words =
-                    |name, values: &'a [u32]| list(name, Dtype::U32, values.len(), Source::of(values));
-                let parameters = Source::of(&flat.parameters);
-                let mut tensors = vec![
-                    list(tensor::PARAMETERS, Dtype::F32, flat.parameters.len(), parameters),
-                    words(tensor::LENGTHS, &flat.lengths),
-                    list(tensor::TABLES, Dtype::U8, flat.tables.len(), Source::of(&flat.tables)),
-                    list(tensor::DATA, Dtype::U8, packed.data().len(), data),
-                ];
-                tensors.extend(order);
-                tensors.extend(extras);
-                metadata.extend(packed_metadata(head));
-                Self::new(metadata, tensors)
-            }
-            Coding::Layered(bytes) => {
-                let order = packed.order().map(|order| coded(&ExtraValues::U32(order.to_vec())));
-                let extras = packed.extras().iter().map(|extra| (extra.name.as_str(), coded(&extra.values)));
-                Self::layered(head, bytes, packed.data().len(), data, order, extras.collect())
-            }
-        }
+        let order = packed.order().map(|order| coded(&ExtraValues::U32(order.to_vec())));
+        let extras = packed.extras().iter().map(|extra| (extra.name.as_str(), coded(&extra.values)));
+        Self::of_columns(head, packed.data().len(), data, order, extras.collect())
     }
 
     /// The exact file of a scene that was spilled.
@@ -100,7 +70,7 @@ impl<'a> LexiWriter<'a> {
     ) -> Result<Self> {
         let layout = spilled.layout;
         let tensors = spilled.finish()?.list(dictionary, layout);
-        Ok(Self::new(scene_metadata(VERSION, layout, dictionary.degree(), record, meta), tensors))
+        Ok(Self::new(scene_metadata(layout, dictionary.degree(), record, meta), tensors))
     }
 
     /// The file of a packed scene that was spilled.
@@ -116,14 +86,12 @@ impl<'a> LexiWriter<'a> {
         };
         let extras = extras.into_iter().map(column).collect::<Result<Vec<(String, Vec<u8>)>>>()?;
         let extras = extras.iter().map(|(name, column)| (name.as_str(), column.clone())).collect();
-        let Coding::Layered(bytes) = &head.coding else { return Err(not_layered()) };
-        Ok(Self::layered(head, bytes, data_bytes, Source::Woven(data), order, extras))
+        Ok(Self::of_columns(head, data_bytes, Source::Woven(data), order, extras))
     }
 
-    /// A file of the newest version. `order` and the values of `extras` are coded columns.
-    fn layered(
+    /// The file of a packed scene. `order` and the values of `extras` are coded columns.
+    fn of_columns(
         head: &'a PackedHead,
-        bytes: &'a [u8],
         data_bytes: usize,
         data: Source<'a>,
         order: Option<Vec<u8>>,
@@ -143,10 +111,14 @@ impl<'a> LexiWriter<'a> {
         metadata.extend((!head.meta.comments.is_empty()).then(|| (key::COMMENTS, json(&head.meta.comments))));
         metadata.extend(head.meta.offset.map(|offset| (key::OFFSET, json(&offset))));
         metadata.extend(tolerance.map(|tolerance| (key::TOLERANCE, tolerance.to_string())));
-        metadata.extend(packed_metadata(head));
+        metadata.extend([(key::GAUSSIANS, head.gaussians.to_string())]);
+        metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
+        metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
+        metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
+        metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
         // What draws the scene comes first.
         let mut tensors = vec![
-            list(tensor::HEAD, Dtype::U8, bytes.len(), Source::Bytes(bytes)).sealed(),
+            list(tensor::HEAD, Dtype::U8, head.bytes.len(), Source::Bytes(&head.bytes)).sealed(),
             list(tensor::DATA, Dtype::U8, data_bytes, data).summed_elsewhere(),
         ];
         let column = |name: &str, bytes: Vec<u8>| list(name, Dtype::U8, bytes.len(), Source::Owned(bytes));
@@ -196,16 +168,6 @@ fn list<'a>(name: &str, dtype: Dtype, len: usize, source: Source<'a>) -> Tensor<
     Tensor::new(name, dtype, &[len], source)
 }
 
-/// Metadata of packed files of all versions.
-fn packed_metadata(head: &PackedHead) -> Vec<(&'static str, String)> {
-    let mut metadata = vec![(key::GAUSSIANS, head.gaussians.to_string())];
-    metadata.extend((head.removed > 0).then(|| (key::REMOVED, head.removed.to_string())));
-    metadata.extend(head.target.as_ref().map(|target| (key::PROMISE, json(target))));
-    metadata.extend(head.reached.as_ref().map(|reached| (key::REACHED, json(reached))));
-    metadata.extend(head.device.clone().map(|device| (key::DRAWN_ON, device)));
-    metadata
-}
-
 /// Values as a coded column.
 fn coded(values: &ExtraValues) -> Vec<u8> {
     let mut encoder = ColumnEncoder::new(values.scalar_type());
@@ -233,10 +195,6 @@ fn coded_layers(ty: ScalarType, layers: Vec<(usize, Spilled)>) -> Result<Vec<u8>
     Ok(out)
 }
 
-fn not_layered() -> Error {
-    Error::parameter("packed scene", "of version 2", "of version 3 to be spilled")
-}
-
 /// Bytes of the tensors that stand for SH-rest in an exact file.
 pub(crate) fn sh_bytes(attribute_bytes: &[(String, u64)]) -> u64 {
     let is_sh =
@@ -244,19 +202,13 @@ pub(crate) fn sh_bytes(attribute_bytes: &[(String, u64)]) -> u64 {
     attribute_bytes.iter().filter(|a| is_sh(&a.0)).map(|a| a.1).sum()
 }
 
-/// The metadata that all layouts share.
-fn scene_metadata(
-    version: u64,
-    layout: Layout,
-    degree: ShDegree,
-    record: &Record,
-    meta: &SceneMeta,
-) -> Metadata {
-    let mut metadata = preamble(FORMAT, version);
+/// The metadata of an exact file.
+fn scene_metadata(layout: Layout, degree: ShDegree, record: &Record, meta: &SceneMeta) -> Metadata {
+    let mut metadata = preamble(FORMAT, VERSION);
     metadata.extend([
         (key::DEGREE, degree.to_string()),
         (key::LAYOUT, layout.to_string()),
-        // The key is mandatory. In packed files its value means nothing.
+        // The key is mandatory. The record of a packed scene has no value for it.
         (key::PURSUIT, record.pursuit.unwrap_or(Pursuit::Omp).to_string()),
         (key::SEED, record.seed.to_string()),
         (key::MAX_RESIDUAL, record.max_residual.to_string()),

@@ -46,7 +46,8 @@ pub struct PlyRead {
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, and those of [`read_bytes`].
-pub fn read(path: &Path, options: &ReadOptions) -> Result<PlyRead> {
+pub fn read(path: impl AsRef<Path>, options: &ReadOptions) -> Result<PlyRead> {
+    let path = path.as_ref();
     let input = Input::open_within(path, &options.limits)?;
     read_bytes(&path.display().to_string(), &input, options)
 }

@@ -1,7 +1,7 @@
 //! Packing of scenes that are read a part at a time, with buckets of any size.
 
 use super::*;
-use crate::packed::{Appearance, CHUNK};
+use crate::packed::{Appearance, MOST_CHUNK};
 use crate::{Extra, ExtraValues, Model, Silent, Splats, lexi, ply};
 
 fn scene(count: usize) -> Splats {
@@ -80,7 +80,7 @@ fn streamed_with(
 /// Everything fits in one bucket and is of the sample: then nothing is left to differ.
 #[test]
 fn a_scene_that_is_its_own_sample_gives_the_bytes_of_the_packer() {
-    for count in [CHUNK + 500, 700, 0] {
+    for count in [MOST_CHUNK + 500, 700, 0] {
         let splats = scene(count);
         let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
         let sensitivity = Sensitivity::heuristic_part(&splats.geometry, total);
@@ -118,7 +118,7 @@ fn shown(part: &Splats, total: f64) -> Sensitivity {
 #[test]
 fn what_is_not_worth_its_bits_is_left_out() {
     let options = PackOptions { keep_order: false, ..options() };
-    let splats = scene(CHUNK + 9000);
+    let splats = scene(MOST_CHUNK + 9000);
     let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
     let packer = Packer::new(&splats, &shown(&splats, total), &options).unwrap();
     let (packed, _) = packer.pack(packer.step_for(38.0), &Silent).unwrap();
@@ -147,7 +147,7 @@ fn what_is_not_worth_its_bits_is_left_out() {
 #[test]
 fn appearances_are_fitted_part_by_part() {
     let options = PackOptions { keep_order: false, ..options() };
-    let splats = scene(CHUNK + 9000);
+    let splats = scene(MOST_CHUNK + 9000);
     let total = heuristic_total(0.0, &splats.geometry) / SHOWN;
     let others = |model: &Model| -> Vec<Appearance> {
         let moved = |i| {
@@ -206,8 +206,8 @@ fn one_gaussian_stays() {
 
 #[test]
 fn buckets_make_a_file_that_is_as_good() {
-    let splats = scene(4 * CHUNK + 2000);
-    let small = CHUNK;
+    let splats = scene(4 * MOST_CHUNK + 2000);
+    let small = MOST_CHUNK;
     let (found, done) = streamed(&splats, None, small).unwrap();
     let (whole, _) = streamed(&splats, None, BUCKET).unwrap();
     let ratio = found.len() as f64 / whole.len() as f64;

@@ -13,7 +13,7 @@ use super::fields::layout;
 use super::layout::Layout;
 use super::schema::{FORMAT, LENGTH_BYTES};
 use crate::formats::kind::FileKind;
-use crate::packed::{Coding, Data, LayeredChunks, Outline, PackedHead};
+use crate::packed::{Data, Decoder, Outline, PackedHead};
 use crate::sparse::dictionary::Dictionary;
 use crate::sparse::model::Model;
 use crate::support::builder::builder_methods;
@@ -65,7 +65,7 @@ impl FeedOptions {
     );
 }
 
-/// A reader of a packed .lexi file of version 3 that is fed bytes as they come.
+/// A reader of a packed .lexi file that is fed bytes as they come.
 ///
 /// [`Self::wants`] says which bytes to fetch next. What comes is given to [`Self::feed`] in pieces of any size and in any order,
 /// also more than was asked for, such as the first 64 KiB of the file instead of its first 9 bytes. Every range
@@ -253,9 +253,7 @@ impl LexiFeed {
         }
         let head = super::packed::head(&checked, &self.limits)?;
         let (data_start, data_bytes) = super::packed::data_place(&checked);
-        let not_layered = || checked.malformed("the file is not of version 3");
-        let Coding::Layered(bytes) = &head.coding else { return Err(not_layered()) };
-        let mut decoder = LayeredChunks::new(&head, bytes, data_bytes)?;
+        let mut decoder = Decoder::new(&head, data_bytes)?;
         decoder.wish.sh_parts = self.options.sh_parts;
         decoder.wish.verify = self.options.verify_integers;
         let outline = decoder.outline(data_start);
@@ -315,7 +313,7 @@ impl LexiFeed {
         let bytes = self.start.len() as u64 + ranges.bytes_of(chunk);
         let budget = MemoryBudget::new(&self.limits, &self.file, bytes);
         budget.take(gaussians, GEOMETRY_BYTES + COUNT_BYTES)?;
-        let (geometry, codes) = ranges.decoder.chunk(Data::Ranges(ranges), chunk, &budget)?;
+        let (geometry, codes, _) = ranges.decoder.chunk(Data::Ranges(ranges), chunk, &budget, false)?;
         let (meta, record) = (ranges.head.meta.clone(), ranges.head.record.clone());
         let dictionary: Dictionary = ranges.decoder.dictionary().clone();
         Model::new(geometry, meta, dictionary, codes, record).map(Some)

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::FeedOptions;
 use super::run::Run;
-use crate::packed::{Held, LayeredChunks, Outline, PackedHead, RangeKind, RangeOutline};
+use crate::packed::{AvailableRanges, Decoder, Outline, PackedHead, RangeKind, RangeOutline};
 use crate::support::crc32;
 use crate::support::error::{Error, FormatError, Result};
 
@@ -12,7 +12,7 @@ use crate::support::error::{Error, FormatError, Result};
 #[derive(Debug)]
 pub(super) struct Ranges {
     pub(super) head: PackedHead,
-    pub(super) decoder: LayeredChunks,
+    pub(super) decoder: Decoder,
     pub(super) outline: Outline,
     /// Where the data start in the file.
     data_start: u64,
@@ -41,7 +41,7 @@ enum State {
 impl Ranges {
     pub(super) fn new(
         head: PackedHead,
-        decoder: LayeredChunks,
+        decoder: Decoder,
         outline: Outline,
         data_start: u64,
         options: &FeedOptions,
@@ -236,7 +236,7 @@ impl Ranges {
     }
 }
 
-impl Held for Ranges {
+impl AvailableRanges for Ranges {
     fn bytes(&self, start: u64) -> Option<&[u8]> {
         match self.state_at(start) {
             Some(State::Whole(run)) => run.whole(),

@@ -1,0 +1,71 @@
+//! Pictures of a scene that are scored.
+
+use lexisplat::{Progress, ShDegree, Stage};
+use lexisplat_render::{Camera, Image, Prepared, RenderOptions, Renderer, Scene};
+
+use crate::error::Result;
+
+/// How to draw pictures that are scored. The default is black behind the scene, and no rounding.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[non_exhaustive]
+pub struct DrawOptions {
+    /// Colour behind the scene, 0 to 1 a channel.
+    pub background: [f32; 3],
+    /// Whether pictures are rounded to 8 bits, as when they are saved and read back.
+    pub eight_bit: bool,
+    /// Highest SH degree to draw with; `None` draws all that a scene has.
+    pub max_degree: Option<ShDegree>,
+}
+
+impl DrawOptions {
+    /// Options with the given background and rounding.
+    #[must_use]
+    pub fn new(background: [f32; 3], eight_bit: bool) -> Self {
+        Self { background, eight_bit, max_degree: None }
+    }
+
+    /// These options with another highest SH degree.
+    #[must_use]
+    pub fn with_max_degree(self, max_degree: Option<ShDegree>) -> Self {
+        Self { max_degree, ..self }
+    }
+
+    /// Draws a view of `scene`, which `renderer` prepared.
+    ///
+    /// # Errors
+    /// [`crate::Error::Render`] as [`Renderer::render`].
+    pub fn draw(&self, renderer: &mut Renderer, scene: &Prepared<'_>, camera: &Camera) -> Result<Image> {
+        let drawing =
+            RenderOptions::default().with_background(self.background).with_max_degree(self.max_degree);
+        let image = renderer.render(scene, camera, &drawing)?;
+        if !self.eight_bit {
+            return Ok(image);
+        }
+        Ok(Image::from_8bit(image.width, image.height, &image.to_8bit())?)
+    }
+}
+
+/// Draws `scene` as every camera sees it. Reports [`Stage::Draw`] to `progress`, in views.
+///
+/// # Errors
+/// [`crate::Error::Render`] as [`Renderer::prepare`] and [`Renderer::render`]. [`crate::Error::Codec`] if
+/// `progress` cancels.
+pub fn draw_views(
+    renderer: &mut Renderer,
+    scene: &Scene<'_>,
+    cameras: &[Camera],
+    options: &DrawOptions,
+    progress: &dyn Progress,
+) -> Result<Vec<Image>> {
+    let prepared = renderer.prepare(*scene)?;
+    progress.begin(Stage::Draw, cameras.len() as u64);
+    let mut draw = |camera| {
+        progress.check()?;
+        let image = options.draw(renderer, &prepared, camera);
+        progress.advance(1);
+        image
+    };
+    let images = cameras.iter().map(&mut draw).collect();
+    progress.end();
+    images
+}

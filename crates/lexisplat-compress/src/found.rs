@@ -1,0 +1,233 @@
+//! Finds views of a scene that are like photographs of it.
+//!
+//! Photographs show more detail than nearly all views from random places: they are taken of what has detail, through
+//! clear space, and training put detail where they looked. So many small pictures are drawn, and those with the most
+//! detail win.
+
+use lexisplat::packed::curve_order;
+use lexisplat::{Progress, ShDegree, Splats, Stage};
+use lexisplat_render::{Camera, Image, RenderOptions, Renderer, Scene, natural_views, object};
+
+use crate::error::Result;
+use crate::natural_width::natural_width;
+use crate::observed_directions::ObservedDirections;
+use crate::packing_views::GENERATED_SIZE as SIZE;
+use crate::photo_views::{likelihood, turned};
+use crate::size_spread::{Sizes, SizesSeen};
+
+/// Number of natural views that are tried. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have fewer.
+const TRIED: std::ops::RangeInclusive<usize> = 320..=640;
+/// Natural views made for each that is tried.
+const CHOICE: usize = 4;
+/// One of this many tried views is from where photographs were likely taken. The others cover the rest of the scene.
+const PHOTO_SHARE: usize = 2;
+/// Gaussians drawn in all tried views together, about.
+const GAUSSIANS_DRAWN: usize = 128_000_000;
+/// Width and height of the small pictures, in pixels.
+const SMALL: [u32; 2] = [96, 64];
+/// Gaussians of less opacity than this, 5 %, before the sigmoid, are not in the small pictures.
+const FAINT: f32 = -3.0;
+/// A pixel shows something if a channel is above this.
+const LIT: f32 = 0.02;
+/// A view with less than this share of the median of lit pixels looks past the scene.
+const LEAST_LIT: f64 = 0.9;
+/// If the median of lit pixels is below this share, the scene is an object before nothing. Pictures of such an object
+/// show all of it. The median is 0.9 to 1 for six captures with a background, and 0.45 for lego.
+const BARE: f64 = 0.7;
+
+/// Views that are like photographs, those with most detail first.
+#[derive(Debug)]
+pub(crate) struct Found {
+    /// Views to measure by.
+    pub(crate) best: Vec<Camera>,
+    /// Views to judge by. None of them measures.
+    pub(crate) judges: Vec<Camera>,
+}
+
+/// Finds as many views to measure and to judge by as `counts` says, or fewer in a scene of few Gaussians, among `more`
+/// and natural ones. Reports [`Stage::Draw`], in views, to `progress`, which can cancel.
+///
+/// # Errors
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the scene or a
+/// view does not fit.
+pub(crate) fn find(
+    renderer: &mut Renderer,
+    splats: &Splats,
+    more: Vec<Camera>,
+    [measuring, judging]: [usize; 2],
+    progress: &dyn Progress,
+) -> Result<Found> {
+    let tried = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(*TRIED.start(), *TRIED.end());
+    let (photo, mut others) = likely(splats, tried);
+    others.extend(more);
+    let sketch = sketch(splats);
+    let scene = renderer.prepare(Scene::from(&sketch))?;
+    let mut seen = Vec::with_capacity(photo.len() + others.len());
+    progress.begin(Stage::Draw, (photo.len() + others.len()) as u64);
+    for views in [photo, others] {
+        let mut of_kind = Vec::with_capacity(views.len());
+        for camera in views {
+            progress.check()?;
+            let small = camera.resized(SMALL[0], SMALL[1]);
+            let picture = renderer.render(&scene, &small, &RenderOptions::default())?;
+            of_kind.push((detail(&picture), lit(&picture), camera));
+            progress.advance(1);
+        }
+        // The sort is stable, so that equal views stay in their order.
+        of_kind.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let count = of_kind.len() as f64;
+        let ranked = of_kind.into_iter().enumerate();
+        // Views through clutter have the most detail, so each kind is ranked on its own.
+        seen.extend(ranked.map(|(rank, (_, lit, camera))| Seen {
+            rank: (rank as f64 + 0.5) / count,
+            lit,
+            camera,
+        }));
+    }
+    progress.end();
+    let mut shares: Vec<f64> = seen.iter().map(|view| view.lit).collect();
+    shares.sort_by(f64::total_cmp);
+    let median = shares.get(shares.len() / 2).copied().unwrap_or(0.0);
+    let clear = |view: &Seen| view.lit >= LEAST_LIT * median;
+    // Views past the scene come last.
+    seen.sort_by(|a, b| clear(b).cmp(&clear(a)).then(a.rank.total_cmp(&b.rank)));
+    // The best take turns to judge and to measure, as long as judges are needed.
+    let (mut best, mut judges) = (Vec::new(), Vec::new());
+    for (rank, Seen { camera, .. }) in seen.into_iter().enumerate() {
+        if rank.is_multiple_of(2) && judges.len() < judging {
+            judges.push(camera);
+        } else if best.len() < measuring {
+            best.push(camera);
+        }
+    }
+    if median < BARE {
+        judges = object(&splats.geometry, judging, SIZE[0], SIZE[1]);
+    }
+    let width = natural_width(&splats.geometry, &judges);
+    let height = (width * SIZE[1] / SIZE[0]).max(1);
+    for camera in best.iter_mut().chain(&mut judges) {
+        *camera = camera.resized(width, height);
+    }
+    Ok(Found { best, judges })
+}
+
+/// A view that was tried.
+struct Seen {
+    /// Its rank by detail among those of its kind, as a share of their number.
+    rank: f64,
+    /// The share of pixels that show something.
+    lit: f64,
+    camera: Camera,
+}
+
+/// `count` natural views of `splats` to try: some from where photographs were likely taken, and others from where Gaussians look
+/// most alike in size. The former are none if no colour depends on the view.
+fn likely(splats: &Splats, count: usize) -> (Vec<Camera>, Vec<Camera>) {
+    let views = natural_views(&splats.geometry, CHOICE * count, SIZE);
+    let sizes = Sizes::of(&splats.geometry);
+    let sizes: Vec<SizesSeen> = views.iter().map(|view| sizes.seen_from(view.position)).collect();
+    let best = |cost: &dyn Fn(usize) -> f64, count: usize| {
+        let mut order: Vec<usize> = (0..views.len()).collect();
+        order.sort_by(|&a, &b| cost(a).total_cmp(&cost(b)));
+        order.truncate(count);
+        order
+    };
+    let mut others = best(&|k| sizes[k].spread, count);
+    others.sort_unstable();
+    let observed = ObservedDirections::of(splats);
+    let mut photo = Vec::new();
+    if !observed.is_empty() {
+        let likelihoods: Vec<f64> =
+            (0..views.len()).map(|k| likelihood(&observed, views[k].position, &sizes[k])).collect();
+        let chosen = best(&|k| -likelihoods[k], count / PHOTO_SHARE);
+        photo = chosen.iter().map(|&k| turned(&views[k], k, &observed)).collect();
+        // As many fewer, evenly spread.
+        others = others.into_iter().step_by(PHOTO_SHARE).collect();
+    }
+    (photo, others.into_iter().map(|k| views[k].clone()).collect())
+}
+
+/// A copy of `splats` that is faster to draw: without view-dependent colour, without what is hardly visible, and with
+/// neighbours side by side.
+pub(crate) fn sketch(splats: &Splats) -> Splats {
+    let mut sketch = splats.with_degree_cut(ShDegree::ZERO);
+    let keep: Vec<bool> = splats.geometry.opacities.iter().map(|&opacity| opacity > FAINT).collect();
+    sketch.retain(&keep);
+    sketch.gathered(&curve_order(&sketch.geometry))
+}
+
+/// The share of pixels that show something.
+fn lit(picture: &Image) -> f64 {
+    let lit = picture.pixels.iter().filter(|pixel| pixel.iter().any(|value| *value > LIT)).count();
+    lit as f64 / picture.pixels.len().max(1) as f64
+}
+
+/// Mean difference of neighbouring pixels.
+pub(crate) fn detail(picture: &Image) -> f64 {
+    let width = picture.width as usize;
+    let difference = |a: &[f32; 3], b: &[f32; 3]| -> f64 {
+        let channel = |k: usize| f64::from((a[k].clamp(0.0, 1.0) - b[k].clamp(0.0, 1.0)).abs());
+        channel(0) + channel(1) + channel(2)
+    };
+    let rows = picture.pixels.chunks_exact(width.max(1));
+    let across: f64 = rows.flat_map(|row| row.windows(2)).map(|pair| difference(&pair[0], &pair[1])).sum();
+    let below = picture.pixels.iter().skip(width);
+    let down: f64 = picture.pixels.iter().zip(below).map(|(a, b)| difference(a, b)).sum();
+    (across + down) / picture.pixels.len().max(1) as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat_render::{render, surround};
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+
+    fn found(splats: &Splats, counts: [usize; 2]) -> Found {
+        let more = surround(&splats.geometry, 8, SIZE, [2.0, 12.0]);
+        find(&mut Renderer::cpu(), splats, more, counts, &Silent).unwrap()
+    }
+
+    #[test]
+    fn views_of_detail_measure_and_others_of_it_judge() {
+        let splats = scene(&SampleOptions::new(1500, 3));
+        let Found { best, judges } = found(&splats, [10, 6]);
+        assert_eq!((best.len(), judges.len()), (10, 6));
+        assert!(judges.iter().all(|judge| !best.contains(judge)));
+        let again = found(&splats, [10, 6]);
+        assert!(again.best == best && again.judges == judges);
+        let mean_detail = |views: &[Camera]| {
+            let draw = |view: &Camera| {
+                let small = view.resized(SMALL[0], SMALL[1]);
+                render(&Scene::from(&splats), &small, &RenderOptions::default()).unwrap()
+            };
+            views.iter().map(|view| detail(&draw(view))).sum::<f64>() / views.len() as f64
+        };
+        let others = natural_views(&splats.geometry, 60, SIZE);
+        assert!(mean_detail(&best) > 1.2 * mean_detail(&others));
+        assert!(mean_detail(&judges) > 1.2 * mean_detail(&others));
+    }
+
+    #[test]
+    fn an_object_before_nothing_is_judged_from_a_ring() {
+        let mut splats = scene(&SampleOptions::new(1500, 3));
+        // A flat piece of the scene, of which most natural views show little.
+        let near: Vec<bool> = splats.geometry.positions.iter().map(|p| p[1].abs() < 0.02).collect();
+        splats.retain(&near);
+        splats.geometry.scales.iter_mut().for_each(|scales| *scales = scales.map(|s| s.min(-4.5)));
+        let Found { judges, .. } = found(&splats, [10, 6]);
+        let [width, height] = [judges[0].width, judges[0].height];
+        let ring = object(&splats.geometry, 6, SIZE[0], SIZE[1]);
+        let ring: Vec<Camera> = ring.iter().map(|camera| camera.resized(width, height)).collect();
+        assert_eq!(judges, ring);
+    }
+
+    #[test]
+    fn scenes_without_anything_have_views() {
+        let mut splats = scene(&SampleOptions::new(10, 3));
+        splats.retain(&[false; 10]);
+        let Found { best, judges } = found(&splats, [10, 6]);
+        assert!(best.len() + judges.len() > 0);
+    }
+}

@@ -1,0 +1,92 @@
+//! Compresses a 3D Gaussian Splatting scene to a quality that views of it are judged by, or to a size.
+//!
+//! [`compress`] does what the program `lexisplat compress` does, with the same bytes:
+//!
+//! ```
+//! # use lexisplat_sample::{SampleOptions, scene};
+//! # let folder = tempfile::tempdir()?;
+//! # std::env::set_current_dir(&folder)?;
+//! # lexisplat::ply::write("scene.ply", &scene(&SampleOptions::new(2000, 0)))?;
+//! let report = lexisplat_compress::compress("scene.ply").psnr(42.0).write("scene.lexi")?;
+//! println!("{} bytes of {}", report.file_bytes, report.source_bytes);
+//! let decoded = lexisplat::lexi::read("scene.lexi", &lexisplat::Limits::default())?.into_splats();
+//! # assert_eq!(std::fs::metadata("scene.lexi")?.len(), report.file_bytes);
+//! # assert_eq!(decoded.len() as u64 + report.removed, 2000);
+//! # assert!(report.file_bytes * 8 < std::fs::metadata("scene.ply")?.len(), "{}", report.file_bytes);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Below it, [`Compression`] holds all choices, of packed files ([`Packing`]) and of exact ones, and [`Compression::run`] takes
+//! any source and sink. A scene goes through these steps:
+//!
+//! 1. [`PackingViews`]: cameras that are given or lie beside the scene, or views like photographs that are found.
+//! 2. [`Looked`]: how pictures from these views depend on each value of each Gaussian.
+//! 3. [`lexisplat::packed::Packer`]: a file at one overall step.
+//! 4. Refitting: base colours and opacities make up for what the file lost.
+//! 5. [`Judge`]: the score of the file. A [`Target`] searches for the step, from 3 on.
+//!
+//! Scenes in parts go through 1 to 4 part by part ([`tiles`]). docs/METHOD.md has the reasons, and the figures.
+
+mod alone;
+mod beginning;
+mod belonging;
+mod decibels;
+mod drawing;
+mod error;
+mod facts;
+mod fewer;
+mod found;
+mod judge;
+mod layout;
+mod memo;
+mod natural_width;
+mod observed_directions;
+mod only_cancels;
+mod packing;
+mod packing_views;
+mod part_step;
+mod parts;
+mod photo_views;
+mod refit;
+mod report;
+mod run;
+mod sharp_views;
+mod signs;
+mod size_spread;
+mod solve;
+mod target;
+pub mod tiles;
+pub mod views;
+
+pub use beginning::{Compress, Source, compress};
+pub use decibels::decibels;
+pub use drawing::{DrawOptions, draw_views};
+pub use error::{Error, Result};
+pub use facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+pub use judge::{Judge, Score};
+pub use layout::choose_layout;
+pub use packing::{Compression, Packing, Quality};
+pub use packing_views::{Looked, PackingViews, judging_views};
+pub use report::{CompressionReport, SensitivitySource, overshoot, uncertain_by};
+pub use signs::shows_almost_nothing;
+pub use target::Target;
+pub use views::{
+    ChosenViews, DEFAULT_HOLD, DEFAULT_MAX_WIDTH, DEFAULT_ORBIT, ORBIT_SIZE, SceneKind, SplitFilter, View,
+    ViewOptions, cameras_beside, choose_views, find_views, photo, read_beside,
+};
+
+#[cfg(test)]
+mod tests {
+    /// The README's example in Rust is the one above, which is compiled and run.
+    #[test]
+    fn the_example_of_the_readme_is_tested() {
+        let Some(readme) = lexisplat_testing::repository_file("README.md") else { return };
+        let readme = std::fs::read_to_string(readme).unwrap();
+        let (_, example) = readme.split_once("```rust\n").unwrap();
+        let (example, _) = example.split_once("```").unwrap();
+        assert!(example.lines().count() >= 3 && example.contains("compress("), "{example}");
+        for line in example.lines() {
+            assert!(include_str!("lib.rs").contains(&format!("//! {line}\n")), "{line}");
+        }
+    }
+}

@@ -1,0 +1,376 @@
+//! The views that packing draws: some measure the sensitivity, some judge the result.
+
+use lexisplat::packed::curve_order;
+use lexisplat::{Geometry, Progress, Sensitivity, Splats};
+use lexisplat_render::{Camera, Renderer, Scene, Split, aside, interior_views, object, surround};
+
+use crate::error::{Error, Result};
+use crate::found::{Found, find};
+use crate::sharp_views::sampled;
+use crate::views::{DEFAULT_MAX_WIDTH, SceneKind};
+
+/// Number of generated views that measure. Scenes of more than [`GAUSSIANS_DRAWN`] over the larger number have
+/// fewer, for a view of so many Gaussians takes long.
+const GENERATED_VIEWS: std::ops::RangeInclusive<usize> = 24..=96;
+/// Gaussians drawn in all generated views together, about.
+const GAUSSIANS_DRAWN: usize = 48_000_000;
+/// Number of views that are found and measure: one for [`GAUSSIANS_OF_A_VIEW`], within these, and in scenes of many Gaussians
+/// one for [`GAUSSIANS_OF_A_LARGE_VIEW`], up to the last.
+const FOUND_VIEWS: std::ops::RangeInclusive<usize> = 48..=192;
+const GAUSSIANS_OF_A_VIEW: usize = 256;
+const GAUSSIANS_OF_A_LARGE_VIEW: usize = 2048;
+const MOST_FOUND_VIEWS: usize = 256;
+/// Number of views that are found and judge: one of this many that measure, within these.
+const FOUND_JUDGES: std::ops::RangeInclusive<usize> = 24..=48;
+const FOUND_JUDGE_SHARE: usize = 4;
+/// Width and height of generated views, in pixels.
+pub(crate) const GENERATED_SIZE: [u32; 2] = [384, 256];
+/// Distances of generated views that measure, in radii of the scene's detail.
+const GENERATED_DISTANCES: [f64; 2] = [2.0, 12.0];
+/// Number of generated views that judge.
+const JUDGES: usize = 24;
+/// Pixels that measure, in all views together: so many, and so many more for each Gaussian, but no more than the last. Of
+/// sharper pictures some squares are drawn ([`sampled`]). Half as many gave files that were 16 % larger at equal quality on the
+/// large room, and about the same on scenes of up to 90,000 Gaussians (docs/METHOD.md, "How sharp").
+const MEASURED_PIXELS: Pixels = Pixels { always: 8_000_000, each: 30, most: 40_000_000 };
+/// Those that judge a whole scene, and a part of a large one.
+const JUDGED_PIXELS: u64 = 8_000_000;
+const PART_JUDGED_PIXELS: u64 = 2_000_000;
+/// Number of views that judge a part.
+const PART_JUDGES: usize = 24;
+/// Those that base colours and opacities are fitted to.
+const FITTED_PIXELS: Pixels = Pixels { always: 12_000_000, each: 6, most: 24_000_000 };
+/// Share of them that a part of a large scene is fitted to. With twice as many, three copies of room-large have 0.14 dB more, in
+/// 1.2 times the time.
+const PART_FITTED_SHARE: u64 = 4;
+/// One of this many views that measure is drawn at half its size too, and one of this many that are fitted to is at half its
+/// size. Otherwise errors that are even over many pixels count for too little, and show when pictures are drawn smaller
+/// (docs/METHOD.md, "How sharp").
+const MEASURED_HALVED: usize = 2;
+const FITTED_HALVED: usize = 3;
+/// Number of given cameras that are used at most, evenly spread.
+const MAX_VIEWS: usize = 150;
+/// One of this many given cameras judges. All of them measure, so the judging views score up to 0.1 dB better
+/// than views that did not measure (docs/METHOD.md).
+const JUDGE_SHARE: usize = 2;
+/// Views from beside given cameras that measure too. Without them Gaussians that only such views show have coarse steps
+/// (docs/METHOD.md).
+const ASIDE: usize = 20;
+/// Most views that base colours and opacities are fitted to, of views that were found.
+const FITTED_FOUND: usize = 64;
+/// Most given cameras that base colours and opacities are fitted to.
+const FITTED_GIVEN: usize = 40;
+/// Views from all around that they are fitted to beside given cameras.
+const FITTED_AROUND: usize = 8;
+/// Share of the views whose positions are nearest to the one in their middle, which viewpoints are chosen from.
+const USUAL_VIEWS: f32 = 0.67;
+/// Weight of the heuristic in [`Sensitivity::blend_with_prior`]: the best on held-out views (docs/METHOD.md).
+const PRIOR_SHARE: f32 = 0.3;
+
+/// A number of pixels that grows with a scene.
+struct Pixels {
+    always: u64,
+    /// For each Gaussian.
+    each: u64,
+    most: u64,
+}
+
+impl Pixels {
+    fn of(&self, splats: &Splats) -> u64 {
+        (self.always + self.each * splats.len() as u64).min(self.most)
+    }
+}
+
+/// What looking at a scene gave, for several files of it.
+#[derive(Debug, Clone)]
+pub struct Looked {
+    /// The views.
+    pub views: PackingViews,
+    /// What they measured.
+    pub sensitivity: Sensitivity,
+}
+
+impl Looked {
+    /// Looks at `splats` from `cameras`, or from where its `kind` says. `progress` can cancel.
+    ///
+    /// # Errors
+    /// As [`PackingViews::given`], [`PackingViews::of_kind`] and [`PackingViews::sensitivity`].
+    pub fn at(
+        renderer: &mut Renderer,
+        splats: &Splats,
+        cameras: Option<&[Camera]>,
+        kind: SceneKind,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let views = match cameras {
+            Some(cameras) => PackingViews::given(cameras)?,
+            None => PackingViews::of_kind(kind, renderer, splats, progress)?,
+        };
+        let sensitivity = views.sensitivity(renderer, splats, progress)?;
+        Ok(Self { views, sensitivity })
+    }
+}
+
+/// Finds at most `count` views of `splats` that are like photographs, as those that judge a packed file without cameras.
+///
+/// # Errors
+/// As [`PackingViews::found`].
+pub fn judging_views(
+    renderer: &mut Renderer,
+    splats: &Splats,
+    count: usize,
+    progress: &dyn Progress,
+) -> Result<Vec<Camera>> {
+    let more = around(splats).into_iter().skip(1).step_by(2).collect();
+    Ok(find(renderer, splats, more, [count, count], progress)?.judges)
+}
+
+/// Views from all around `splats`.
+fn around(splats: &Splats) -> Vec<Camera> {
+    let (least, most) = (*GENERATED_VIEWS.start(), *GENERATED_VIEWS.end());
+    let views = (GAUSSIANS_DRAWN / splats.len().max(1)).clamp(least, most);
+    surround(&splats.geometry, views, GENERATED_SIZE, GENERATED_DISTANCES)
+}
+
+/// The numbers of found views of `splats` that measure and that judge.
+fn found_views(splats: &Splats) -> [usize; 2] {
+    let views = (splats.len() / GAUSSIANS_OF_A_VIEW).clamp(*FOUND_VIEWS.start(), *FOUND_VIEWS.end());
+    let measuring = views.max(splats.len() / GAUSSIANS_OF_A_LARGE_VIEW).min(MOST_FOUND_VIEWS);
+    [measuring, (measuring / FOUND_JUDGE_SHARE).clamp(*FOUND_JUDGES.start(), *FOUND_JUDGES.end())]
+}
+
+/// The views that packing draws.
+#[derive(Debug, Clone)]
+pub struct PackingViews {
+    measuring: Vec<Camera>,
+    judging: Vec<Camera>,
+    given: bool,
+}
+
+impl PackingViews {
+    /// Finds views of `splats` that are like photographs, with `renderer`. Half of those that measure are views from
+    /// all around, so that nothing is left out.
+    ///
+    /// # Errors
+    /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn found(renderer: &mut Renderer, splats: &Splats, progress: &dyn Progress) -> Result<Self> {
+        let around = around(splats);
+        let every_second = |first| around.iter().skip(first).step_by(2).cloned();
+        let counts = found_views(splats);
+        let Found { best, judges } = find(renderer, splats, every_second(1).collect(), counts, progress)?;
+        let measuring = every_second(0).chain(best).collect();
+        Ok(Self { measuring, judging: judges, given: false })
+    }
+
+    /// Views of `splats` where its `kind` says that photographs were taken: half of those that measure and all that
+    /// judge are around an object, or inside a room. The other half is from all around.
+    ///
+    /// # Errors
+    /// As [`Self::found`], which finds the views if the kind is [`SceneKind::Auto`].
+    pub fn of_kind(
+        kind: SceneKind,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let [width, height] = GENERATED_SIZE;
+        let views: fn(&Geometry, usize, u32, u32) -> Vec<Camera> = match kind {
+            SceneKind::Auto => return Self::found(renderer, splats, progress),
+            SceneKind::Object => object,
+            SceneKind::Room => interior_views,
+        };
+        let mut measuring: Vec<Camera> = around(splats).into_iter().step_by(2).collect();
+        measuring.extend(views(&splats.geometry, measuring.len(), width, height));
+        // A number of its own, so that most of these are not among those that measure.
+        let judging = views(&splats.geometry, JUDGES - 1, width, height);
+        Ok(Self { measuring, judging, given: false })
+    }
+
+    /// Views that were found before.
+    pub(crate) fn of_found(measuring: Vec<Camera>, judging: Vec<Camera>) -> Self {
+        Self { measuring, judging, given: false }
+    }
+
+    /// Takes the given cameras. If some are marked as training cameras, takes only those.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are fewer than two.
+    pub fn given(cameras: &[Camera]) -> Result<Self> {
+        let marked = cameras.iter().any(|c| c.split == Some(Split::Train));
+        let used: Vec<&Camera> =
+            cameras.iter().filter(|c| !marked || c.split == Some(Split::Train)).collect();
+        if used.len() < 2 {
+            return Err(Error::parameter("cameras", used.len(), "at least two training cameras"));
+        }
+        let stride = used.len().div_ceil(MAX_VIEWS);
+        let sharp = |camera: &Camera| camera.with_max_width(DEFAULT_MAX_WIDTH);
+        let measuring: Vec<Camera> = used.into_iter().step_by(stride).map(sharp).collect();
+        let judging = measuring.iter().skip(1).step_by(JUDGE_SHARE).cloned().collect();
+        Ok(Self { measuring, judging, given: true })
+    }
+
+    /// Whether the cameras were given. Otherwise they were generated.
+    #[must_use]
+    pub fn are_given(&self) -> bool {
+        self.given
+    }
+
+    /// The views that measure the sensitivity. If they were given, [`Self::sensitivity`] adds some from beside them.
+    #[must_use]
+    pub fn measuring(&self) -> &[Camera] {
+        &self.measuring
+    }
+
+    /// The views that judge.
+    #[must_use]
+    pub fn judging(&self) -> &[Camera] {
+        &self.judging
+    }
+
+    /// At most `most` of the views that judge, evenly spread. Of sharp pictures they draw some squares.
+    #[must_use]
+    pub fn some_judging(&self, most: usize) -> Vec<Camera> {
+        self.judging_by(most, JUDGED_PIXELS)
+    }
+
+    /// [`Self::some_judging`] of a part of a scene, which draw fewer pixels.
+    pub(crate) fn judging_part(&self) -> Vec<Camera> {
+        self.judging_by(PART_JUDGES, PART_JUDGED_PIXELS)
+    }
+
+    fn judging_by(&self, most: usize, pixels: u64) -> Vec<Camera> {
+        let some = self.judging.iter().step_by(self.judging.len().div_ceil(most.max(1)).max(1));
+        sampled(some.cloned().collect(), pixels)
+    }
+
+    /// Up to `most` points that stand for the positions of the views like photographs: first points far from each other, and
+    /// of the positions nearest to each of them the one in the middle.
+    pub(crate) fn viewpoints(&self, most: usize) -> Vec<[f32; 3]> {
+        let mut positions: Vec<[f32; 3]> = self.judging.iter().map(|camera| camera.position).collect();
+        let squared = |a: [f32; 3], b: [f32; 3]| (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f32>();
+        let to_nearest = |of: [f32; 3], points: &[[f32; 3]]| {
+            points.iter().map(|&point| squared(of, point)).fold(f32::INFINITY, f32::min)
+        };
+        let least = |cost: &dyn Fn([f32; 3]) -> f32, among: &[[f32; 3]]| {
+            among.iter().copied().min_by(|&a, &b| cost(a).total_cmp(&cost(b)))
+        };
+        let to_all =
+            |of: [f32; 3], all: &[[f32; 3]]| all.iter().map(|&other| squared(of, other).sqrt()).sum::<f32>();
+        let mut points: Vec<[f32; 3]> = least(&|p| to_all(p, &positions), &positions).into_iter().collect();
+        // Found views may be far away, where few photographs are taken.
+        positions.sort_by(|&a, &b| to_nearest(a, &points).total_cmp(&to_nearest(b, &points)));
+        #[expect(clippy::cast_possible_truncation, reason = "a share of a count")]
+        let usual = (positions.len() as f32 * USUAL_VIEWS).ceil() as usize;
+        positions.truncate(usual);
+        while points.len() < most.min(positions.len()) {
+            let farthest = least(&|p| -to_nearest(p, &points), &positions);
+            points.extend(farthest);
+        }
+        let groups = (0..points.len()).map(|k| {
+            let own = |&&p: &&[f32; 3]| squared(p, points[k]) <= to_nearest(p, &points);
+            let group: Vec<[f32; 3]> = positions.iter().filter(own).copied().collect();
+            least(&|p| to_all(p, &group), &group).unwrap_or(points[k])
+        });
+        groups.collect()
+    }
+
+    /// The views of `splats` that base colours and opacities are fitted to: some of those that measure and do not judge, evenly
+    /// spread. Beside given cameras there are some from all around, so that colours do not suit those alone.
+    #[must_use]
+    pub fn fitting(&self, splats: &Splats) -> Vec<Camera> {
+        self.fitting_to(splats, FITTED_PIXELS.of(splats))
+    }
+
+    /// [`Self::fitting`] of a part of a scene, which is fitted to fewer pixels.
+    pub(crate) fn fitting_part(&self, part: &Splats) -> Vec<Camera> {
+        self.fitting_to(part, FITTED_PIXELS.of(part) / PART_FITTED_SHARE)
+    }
+
+    fn fitting_to(&self, splats: &Splats, pixels: u64) -> Vec<Camera> {
+        let free: Vec<&Camera> =
+            self.measuring.iter().filter(|camera| !self.judging.contains(camera)).collect();
+        let [most, around] = if self.given { [FITTED_GIVEN, FITTED_AROUND] } else { [FITTED_FOUND, 0] };
+        let stride = free.len().div_ceil(most).max(1);
+        let mut views: Vec<Camera> = free.into_iter().step_by(stride).cloned().collect();
+        views.extend(surround(&splats.geometry, around, GENERATED_SIZE, GENERATED_DISTANCES));
+        views.iter_mut().skip(1).step_by(FITTED_HALVED).for_each(|camera| *camera = camera.halved());
+        sampled(views, pixels)
+    }
+
+    /// Measures how much the pictures drawn with `renderer` depend on each value of each Gaussian. The result
+    /// is blended with the heuristic, which stands for all views that are not among these. Reports
+    /// [`Stage::Draw`](lexisplat::Stage::Draw) to `progress`, in views.
+    ///
+    /// # Errors
+    /// [`Error::Codec`] if `progress` cancels. On a GPU [`Error::Render`] if the scene or a view does not fit.
+    pub fn sensitivity(
+        &self,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Sensitivity> {
+        let mut cameras = self.measuring.clone();
+        if self.given {
+            cameras.extend(aside(&splats.geometry, &self.measuring, ASIDE));
+        }
+        let smaller: Vec<Camera> = cameras.iter().step_by(MEASURED_HALVED).map(Camera::halved).collect();
+        cameras.extend(smaller);
+        let cameras = sampled(cameras, MEASURED_PIXELS.of(splats));
+        let mut measured = match renderer.is_gpu() {
+            true => renderer.sensitivity(&Scene::from(splats), &cameras, progress)?,
+            false => {
+                let order = curve_order(&splats.geometry);
+                let ordered = splats.gathered(&order);
+                renderer.sensitivity(&Scene::from(&ordered), &cameras, progress)?.scattered(&order)
+            }
+        };
+        measured.blend_with_prior(&splats.geometry, PRIOR_SHARE);
+        Ok(measured)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+
+    /// `splats` in units that are `factor` times as small, moved by `shift` of the old units.
+    fn in_other_units(splats: &Splats, factor: f32, shift: f32) -> Splats {
+        let mut out = splats.clone();
+        for position in &mut out.geometry.positions {
+            *position = position.map(|v| (v + shift) * factor);
+        }
+        for scales in &mut out.geometry.scales {
+            *scales = scales.map(|v| v + factor.ln());
+        }
+        out
+    }
+
+    #[test]
+    fn a_scene_is_looked_at_in_its_own_size() {
+        let splats = scene(&SampleOptions::new(1500, 3));
+        let looked = |splats: &Splats| {
+            Looked::at(&mut Renderer::cpu(), splats, None, SceneKind::Auto, &Silent).unwrap()
+        };
+        let whole = looked(&splats);
+        for (factor, shift) in [(1e-4, 0.0), (0.03, 0.0), (1e4, 0.0), (0.5, 64.0)] {
+            let other = looked(&in_other_units(&splats, factor, shift));
+            let others = other.views.measuring();
+            for (view, other) in whole.views.measuring().iter().zip(others) {
+                let off = (0..3).map(|k| (view.position[k] + shift) * factor - other.position[k]);
+                assert!(
+                    off.map(f32::abs).fold(0.0, f32::max) < 1e-3 * factor,
+                    "{factor} {shift}: {view:?} {other:?}"
+                );
+                assert!((view.near * factor / other.near - 1.0).abs() < 1e-3, "{} {}", view.near, other.near);
+            }
+            let off = |(a, b): (&f32, &f32)| (a / b - 1.0).abs();
+            let pairs = whole.sensitivity.colour.iter().zip(&other.sensitivity.colour);
+            let mut off: Vec<f32> = pairs.filter(|(a, _)| **a > 0.0).map(off).collect();
+            off.sort_by(f32::total_cmp);
+            assert!(off[off.len() * 99 / 100] < 1e-3, "{factor} {shift}: {off:?}");
+        }
+    }
+}

@@ -1,0 +1,111 @@
+//! Packing of a scene part by part, each drawn as if it were the whole scene.
+
+use lexisplat::packed::{Appearance, PackOptions};
+use lexisplat::stream::{self, Observed, Observer};
+use lexisplat::{Model, Progress, Sensitivity, Sink, SplatSource, Splats, Stopwatch};
+use lexisplat_render::{Renderer, Scene};
+
+use crate::error::{Error, Result};
+use crate::memo::{memo_of, views_of};
+use crate::only_cancels::OnlyCancels;
+use crate::packing_views::PackingViews;
+use crate::part_step::step_factor;
+use crate::refit::Fit;
+use crate::report::CompressionReport;
+use crate::tiles;
+
+/// Packs to about `decibels` part by part, or as a whole a scene that is one part. `renderer` draws the parts. Without one, the
+/// weights of Gaussians are guessed.
+///
+/// # Errors
+/// As [`stream::pack`], and errors of drawing.
+pub fn in_parts(
+    options: &PackOptions,
+    decibels: f64,
+    renderer: Option<Renderer>,
+    source: &dyn SplatSource,
+    sink: Sink<'_>,
+    progress: &dyn Progress,
+) -> Result<CompressionReport> {
+    let clock = Stopwatch::start();
+    let mut parts =
+        renderer.map(|renderer| Parts { renderer, options, decibels, progress, look_seconds: 0.0 });
+    let guessed = parts.is_none();
+    let observer = parts.as_mut().map(|parts| parts as &mut dyn Observer<Error>);
+    let done = stream::pack(source, observer, options, decibels, sink, progress)?;
+    let look_seconds = parts.map_or(0.0, |parts| parts.look_seconds);
+    let pack_seconds = clock.seconds() - look_seconds;
+    Ok(CompressionReport { look_seconds, pack_seconds, ..tiles::report(&done, guessed) })
+}
+
+/// Draws the parts of a scene.
+struct Parts<'a> {
+    renderer: Renderer,
+    options: &'a PackOptions,
+    decibels: f64,
+    progress: &'a dyn Progress,
+    look_seconds: f64,
+}
+
+impl Observer<Error> for Parts<'_> {
+    fn observe(&mut self, part: &Splats) -> Result<Observed> {
+        let clock = Stopwatch::start();
+        let observed = observe(&mut self.renderer, part, self.options, self.decibels, self.progress);
+        self.look_seconds += clock.seconds();
+        observed
+    }
+
+    fn refit(
+        &mut self,
+        part: &Splats,
+        model: &Model,
+        weights: &[[f32; 2]],
+        memo: &[u8],
+    ) -> Result<Option<Vec<Appearance>>> {
+        refit(part, model, weights, memo, self.progress).map(Some)
+    }
+
+    fn device(&self) -> Option<String> {
+        self.renderer.is_gpu().then(|| self.renderer.name().to_owned())
+    }
+}
+
+/// The sensitivity of pictures of a part of a scene and the step with which it has about `decibels`, from views like photographs of it and from all around. With the latter alone
+/// files of the same size were 1.7 dB worse (docs/results/scale.md). The memo is the views. A part without Gaussians has neither.
+///
+/// # Errors
+/// [`lexisplat::Error::Cancelled`] within [`Error::Codec`]; on a GPU [`Error::Render`] if the part does not fit.
+pub(crate) fn observe(
+    renderer: &mut Renderer,
+    part: &Splats,
+    options: &PackOptions,
+    decibels: f64,
+    progress: &dyn Progress,
+) -> Result<Observed> {
+    if part.is_empty() {
+        return Ok(Sensitivity::default().into());
+    }
+    // The work around it counts Gaussians.
+    let progress = &OnlyCancels(progress);
+    let views = PackingViews::found(renderer, part, progress)?;
+    let sensitivity = views.sensitivity(renderer, part, progress)?;
+    let step_factor = step_factor(part, &views, &sensitivity, options, decibels, progress)?;
+    Ok(Observed { sensitivity, step_factor, memo: memo_of(&views) })
+}
+
+/// Base colours and opacities of `model`, which is what a file has of `part`, fitted to pictures of the part alone. `memo` is that
+/// of [`observe`].
+///
+/// # Errors
+/// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`Error::Codec`].
+pub(crate) fn refit(
+    part: &Splats,
+    model: &Model,
+    weights: &[[f32; 2]],
+    memo: &[u8],
+    progress: &dyn Progress,
+) -> Result<Vec<Appearance>> {
+    let progress = &OnlyCancels(progress);
+    let fit = Fit::to(part, views_of(memo)?.fitting_part(part), false, progress)?;
+    fit.appearances(Scene::from(model), weights, progress)
+}

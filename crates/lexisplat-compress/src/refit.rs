@@ -1,0 +1,270 @@
+//! Fits the base colours and opacities of a packed scene to the pictures of the original.
+//!
+//! Pictures are linear in base colours, and nearly so in small changes of opacities. So what removal and quantisation do
+//! to pictures is made up for by a linear least-squares problem, which the method of conjugate gradients solves through
+//! the renderer and its adjoint (docs/METHOD.md, "Refitting").
+
+use std::borrow::Borrow;
+
+use lexisplat::packed::{Appearance, Packed, Packer, Quantised};
+use lexisplat::sh::C0;
+use lexisplat::{CompressReport, Geometry, Progress, Splats, Stage};
+use lexisplat_render::{Camera, GaussianChange, Image, PictureAdjoint, PictureErrors, Renderer, Scene};
+
+use crate::alone::alone;
+use crate::drawing::{DrawOptions, draw_views};
+use crate::error::Result;
+use crate::only_cancels::OneStep;
+use crate::solve::{ROW, kinds, solve};
+
+/// Steps of the method of conjugate gradients, with given cameras and with views that were found. Each takes about as
+/// long as drawing all views. More steps gain less where other views than the fitted ones count (docs/METHOD.md).
+const STEPS_GIVEN: usize = 5;
+const STEPS_FOUND: usize = 3;
+/// Weight of the distance to the colours and opacities before, as a share of a Gaussian's weight in pictures. Other views
+/// than those that are fitted to depend on them too.
+const RIDGE: f32 = 0.5;
+/// Multiple of the diagonal of the matrix in the preconditioner of opacities.
+const OPACITY_DIAGONAL: f32 = 4.0;
+/// Largest change of the logarithm of an opacity. Pictures are nearly linear only in small ones.
+const MOST_LOG_OPACITY: f32 = 0.5;
+/// By how much refitting raises the judged quality, in dB, about: with given cameras and with views that were found.
+const GAIN_GIVEN: f64 = 4.0;
+pub(crate) const GAIN_FOUND: f64 = 0.8;
+
+/// A packer whose files are refitted, if that is allowed.
+pub(crate) struct Refitting<S> {
+    packer: Packer<S>,
+    fit: Option<Fit>,
+}
+
+/// What base colours and opacities are fitted to.
+pub(crate) struct Fit {
+    cameras: Vec<Camera>,
+    /// The original's pictures.
+    targets: Vec<Image>,
+    /// Whether cameras were given.
+    given: bool,
+}
+
+impl<S: Borrow<Splats>> Refitting<S> {
+    /// Files of `packer`, with base colours and opacities as `fit` says or as `packer` makes them.
+    pub(crate) fn new(packer: Packer<S>, fit: Option<Fit>) -> Self {
+        Self { packer, fit }
+    }
+
+    /// Number of Gaussians of the scene.
+    pub(crate) fn len(&self) -> usize {
+        self.packer.len()
+    }
+
+    /// Whether files are refitted.
+    pub(crate) fn refits(&self) -> bool {
+        self.fit.is_some()
+    }
+
+    /// By how much files are expected to be better than they are before they are refitted, in dB.
+    pub(crate) fn gain(&self) -> f64 {
+        self.fit.as_ref().map_or(0.0, |fit| if fit.given { GAIN_GIVEN } else { GAIN_FOUND })
+    }
+
+    /// The overall step for pictures of about this PSNR, in dB.
+    pub(crate) fn step_for(&self, decibels: f64) -> f64 {
+        self.packer.step_for(decibels - self.gain())
+    }
+
+    /// Packs with an overall step, with or without a `floor` under what is visible, and does not refit.
+    ///
+    /// # Errors
+    /// Errors of packing.
+    pub(crate) fn quantise(
+        &self,
+        step: f64,
+        floor: bool,
+        progress: &dyn Progress,
+    ) -> Result<(Quantised<'_>, (Packed, CompressReport))> {
+        let quantised = self.packer.quantise(step, floor, progress)?;
+        let first = quantised.finish(None, None, progress)?;
+        Ok((quantised, first))
+    }
+
+    /// Refits a file of `quantised`, if that is allowed. Its first layer alone is not fitted yet.
+    ///
+    /// # Errors
+    /// Errors of packing and drawing.
+    pub(crate) fn refit(
+        &self,
+        quantised: &Quantised<'_>,
+        file: (Packed, CompressReport),
+        progress: &dyn Progress,
+    ) -> Result<Refitted> {
+        let Some(fit) = &self.fit else { return Ok(Refitted { shown: None, file }) };
+        let model = file.0.unpack()?;
+        drop(file);
+        let shown = fit.appearances(Scene::from(&model), quantised.weights(), progress)?;
+        drop(model);
+        let file = quantised.finish(Some(&shown), None, progress)?;
+        Ok(Refitted { shown: Some(shown), file })
+    }
+
+    /// Fits the first layer alone of a file of `quantised`, if there is one. The whole scene stays as it is.
+    ///
+    /// # Errors
+    /// Errors of packing and drawing.
+    pub(crate) fn complete(
+        &self,
+        quantised: &Quantised<'_>,
+        refitted: Refitted,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
+        let Refitted { shown, file } = refitted;
+        let (Some(fit), Some(shown)) = (&self.fit, shown) else { return Ok(file) };
+        let Some(first) = file.0.first_layer()? else { return Ok(file) };
+        drop(file);
+        let changes = alone(first.into_splats(), &fit.cameras, &fit.targets, progress)?;
+        Ok(quantised.finish(Some(&shown), Some(&changes), progress)?)
+    }
+
+    /// Packs with an overall step: [`Self::quantise`], [`Self::refit`] and [`Self::complete`].
+    ///
+    /// # Errors
+    /// Errors of packing and drawing.
+    pub(crate) fn pack(
+        &self,
+        step: f64,
+        floor: bool,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
+        let (quantised, first) = self.quantise(step, floor, progress)?;
+        let refitted = self.refit(&quantised, first, progress)?;
+        self.complete(&quantised, refitted, progress)
+    }
+}
+
+/// A file with refitted base colours and opacities.
+pub(crate) struct Refitted {
+    /// Those colours and opacities; `None` if nothing is left to fit.
+    shown: Option<Vec<Appearance>>,
+    pub(crate) file: (Packed, CompressReport),
+}
+
+impl Refitted {
+    /// A file of which nothing is left to fit.
+    pub(crate) fn complete(file: (Packed, CompressReport)) -> Self {
+        Self { shown: None, file }
+    }
+}
+
+impl Fit {
+    /// Pictures of `splats` from `cameras` to fit to. The cameras were `given`, or else found. The processor draws them, for it fits
+    /// too.
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(crate) fn to(
+        splats: &Splats,
+        cameras: Vec<Camera>,
+        given: bool,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let (mut cpu, options) = (Renderer::cpu(), DrawOptions::default());
+        let targets = draw_views(&mut cpu, &Scene::from(splats), &cameras, &options, progress)?;
+        Ok(Self { cameras, targets, given })
+    }
+
+    /// Base colours and opacities of `scene` with which its pictures are nearest to the targets. `weights` are the
+    /// sensitivities of its Gaussians to the colour and to the logarithm of the opacity.
+    ///
+    /// # Errors
+    /// Errors of drawing; [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`].
+    pub(crate) fn appearances(
+        &self,
+        scene: Scene<'_>,
+        weights: &[[f32; 2]],
+        progress: &dyn Progress,
+    ) -> Result<Vec<Appearance>> {
+        let mut adjoint = PictureAdjoint::new(scene, &self.cameras)?;
+        let steps = if self.given { STEPS_GIVEN } else { STEPS_FOUND };
+        // The views are drawn once for the errors and once in each step.
+        progress.begin(Stage::Draw, ((1 + steps) * self.cameras.len()) as u64);
+        let parts = &OneStep(progress);
+        let PictureErrors { errors, row_sums, opacity_squares, .. } =
+            adjoint.of_errors(&self.targets, parts)?;
+        // Sensitivities are averaged over three channels, and products with the adjoint are not.
+        let ridge: Vec<GaussianChange<4>> =
+            weights.iter().map(|w| kinds(w.map(|w| RIDGE * 3.0 * w))).collect();
+        let mut diagonal = Vec::with_capacity(ridge.len());
+        for (i, [colour, _, _, opacity]) in ridge.iter().enumerate() {
+            let own = [ROW * row_sums[i] + colour, OPACITY_DIAGONAL * opacity_squares[i] + opacity];
+            diagonal.push(kinds(own));
+        }
+        let found = solve(&mut adjoint, errors, &ridge, &diagonal, steps, parts)?;
+        progress.end();
+        let geometry = scene.geometry();
+        Ok(found.iter().enumerate().map(|(i, change)| changed(geometry, i, change)).collect())
+    }
+}
+
+/// What Gaussian `i` shows after a change.
+fn changed(geometry: &Geometry, i: usize, change: &GaussianChange<4>) -> Appearance {
+    let Appearance { dc, log_opacity } = Appearance::of(geometry, i);
+    let more = change[3].clamp(-MOST_LOG_OPACITY, MOST_LOG_OPACITY);
+    Appearance {
+        dc: std::array::from_fn(|c| dc[c] + change[c] / C0),
+        log_opacity: (log_opacity + more).min(0.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat::packed::PackOptions;
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+    use crate::views::SceneKind;
+    use crate::{Judge, Looked};
+
+    /// The judged quality of a file of `splats` at one step, and its scene.
+    fn made(splats: &Splats, options: &PackOptions) -> (f64, Splats) {
+        let mut cpu = Renderer::cpu();
+        let Looked { views, sensitivity } =
+            Looked::at(&mut cpu, splats, None, SceneKind::Auto, &Silent).unwrap();
+        let packer = Packer::new(splats.clone(), &sensitivity, options).unwrap();
+        let fit =
+            options.may_change().then(|| Fit::to(splats, views.fitting(splats), false, &Silent).unwrap());
+        let refitting = Refitting::new(packer, fit);
+        let step = refitting.packer.step_for(34.0);
+        let (packed, _) = refitting.pack(step, true, &Silent).unwrap();
+        let model = packed.unpack().unwrap();
+        // None of the views that judge is fitted to.
+        assert!(views.fitting(splats).iter().all(|camera| !views.judging().contains(camera)));
+        let mut judge = Judge::new(cpu, splats, views.judging(), false, &Silent).unwrap();
+        (judge.score(&model, &Silent).unwrap().mean, model.into_splats())
+    }
+
+    #[test]
+    fn base_colours_and_opacities_make_up_for_errors() {
+        let splats = scene(&SampleOptions::new(1200, 1));
+        let (kept, all) = made(&splats, &PackOptions::default().with_keep_all(true));
+        let (refitted, some) = made(&splats, &PackOptions::default());
+        assert_eq!(all.len(), 1200);
+        assert!(some.len() < all.len() && some.len() > all.len() / 4, "{}", some.len());
+        assert!(refitted > kept + 0.5, "{refitted} {kept}");
+        let Geometry { dc, opacities, .. } = &some.geometry;
+        assert!(dc.as_flattened().iter().chain(opacities).all(|v| v.is_finite() && v.abs() < 20.0));
+    }
+
+    #[test]
+    fn opacities_move_little() {
+        let mut geometry = scene(&SampleOptions::new(3, 1)).geometry;
+        for (opacity, change) in [(-1.0, 9.0), (-1.0, -9.0), (9.0, 0.4), (-200.0, 0.1)] {
+            geometry.opacities[1] = opacity;
+            let before = Appearance::of(&geometry, 1);
+            let after = changed(&geometry, 1, &[C0, 0.0, -C0, change]);
+            assert!((after.dc[0] - before.dc[0] - 1.0).abs() < 1e-5, "{after:?} {before:?}");
+            let moved = after.log_opacity - before.log_opacity;
+            assert!(moved.abs() <= MOST_LOG_OPACITY && after.log_opacity <= 0.0, "{after:?} {before:?}");
+        }
+    }
+}

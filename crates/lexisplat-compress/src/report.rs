@@ -1,0 +1,242 @@
+//! What a compression did: the facts that programs print as text and as JSON.
+
+use lexisplat::packed::{PackedHead, ReachedRecord, TargetRecord};
+use lexisplat::stream::Compressed;
+use lexisplat::{CompressReport, Dictionary, Layout, Record, ShDegree};
+use serde::{Serialize, Serializer};
+
+use crate::facts::{ByteCount, RecordReport, part_bytes, sh_bytes};
+use crate::judge::{Judge, Score};
+use crate::target::MIN_PSNR;
+
+/// A view worse than the judged quality by more than this, in dB, is a sign of views unlike photographs. Ten models had
+/// at most 4.2 at the default preset (docs/results/promise.md), and a courtyard whose views stood outside its walls 11.
+const WIDE_SPREAD: f64 = 8.0;
+/// A mean above the worst view by more than this, in dB, means a file much larger than one of the same mean. At
+/// `--min-psnr 38` six models without cameras have 1.1 to 5.5, with cameras 0.4 to 2.6; flowers has 6.6 and fruit-drops
+/// 8.2 without.
+const MUCH_ABOVE: f64 = 6.0;
+
+/// What a compression did.
+///
+/// Serialized, it is the JSON report of `lexisplat compress`. The keys are the names of the fields, but for the
+/// fields that are renamed.
+#[derive(Debug, Clone, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct CompressionReport {
+    /// Number of Gaussians in the file.
+    pub gaussians: usize,
+    /// SH degree, 0 to 4.
+    pub sh_degree: u8,
+    /// Number of atoms.
+    pub atoms: usize,
+    /// Layout of the file.
+    #[serde(serialize_with = "name")]
+    pub layout: Layout,
+    /// How the file was made, and its errors. The keys are those of [`RecordReport`].
+    #[serde(flatten, serialize_with = "record")]
+    pub record: Record,
+    /// Mean number of nonzeros of a Gaussian. An escape counts as a full vector.
+    pub mean_nonzeros: f64,
+    /// The paper's ratio: SH-rest coefficients over mean nonzeros. `None` if there are no nonzeros.
+    pub coefficient_ratio: Option<f64>,
+    /// Number of Gaussians by number of nonzeros, from 0 to the dimension, without escapes.
+    pub nonzero_histogram: Vec<u64>,
+    /// Number of Gaussians whose SH are stored exactly.
+    pub escapes: u64,
+    /// Size of the source, in bytes.
+    #[serde(rename = "ply_bytes")]
+    pub source_bytes: u64,
+    /// Size of the file, in bytes.
+    pub file_bytes: u64,
+    /// Bytes of the file that stand for SH-rest.
+    #[serde(serialize_with = "eighths")]
+    pub sh_bytes: f64,
+    /// Bytes of the same SH-rest as dense f32.
+    pub dense_sh_bytes: u64,
+    /// Bytes of each part of the file by name, as [`part_bytes`] gives them.
+    #[serde(serialize_with = "map")]
+    pub attribute_bytes: Vec<(String, f64)>,
+    /// What was asked and reached, if the quality was a target.
+    #[serde(rename = "promise")]
+    pub target: Option<TargetRecord>,
+    /// What the file shows of the scene, if views judged it.
+    pub reached: Option<ReachedRecord>,
+    /// What the sensitivity comes from. `None` if the geometry is exact, which needs none.
+    pub importance: Option<SensitivitySource>,
+    /// The GPU that measured the sensitivity, or `cpu`. `None` if the geometry is exact.
+    pub device: Option<String>,
+    /// Number of Gaussians of the source that were left out.
+    pub removed: u64,
+    /// Whether a packed scene was measured and packed part by part.
+    pub in_parts: bool,
+    /// Rounds of learning. `None` if the dictionary was given or the file is packed, as the next two.
+    pub learn_rounds: Option<usize>,
+    /// Number of Gaussians that the dictionary was learned from.
+    pub learn_sample: Option<usize>,
+    /// Mean nonzeros of Gaussians that were not learned from.
+    pub held_out_nonzeros: Option<f64>,
+    /// Seconds spent reading the source.
+    pub read_seconds: f64,
+    /// Seconds spent measuring the sensitivity.
+    pub look_seconds: f64,
+    /// Seconds spent learning the dictionary.
+    pub learn_seconds: f64,
+    /// Seconds spent coding and verifying.
+    pub code_seconds: f64,
+    /// Seconds spent on learning, coding and all else that makes a file of a scene.
+    pub pack_seconds: f64,
+    /// Seconds spent writing the file.
+    pub write_seconds: f64,
+    /// Seconds spent in all.
+    pub total_seconds: f64,
+    /// What is odd about the source, one sentence each.
+    pub warnings: Vec<String>,
+    /// The dictionary of a file with exact geometry.
+    #[serde(skip)]
+    pub dictionary: Option<Dictionary>,
+}
+
+/// By how much the worst view falls short of the judged quality, in dB, if that is so much that photographs may be as
+/// hard as that view. `None` if the views were given, for then they are what counts.
+#[must_use]
+pub fn uncertain_by(reached: &ReachedRecord) -> Option<f64> {
+    let below = reached.judged_psnr - reached.min_psnr;
+    (!reached.cameras && below > WIDE_SPREAD).then_some(below)
+}
+
+/// By how much the mean of all views exceeds the worst one, in dB, if a file whose every view shall have a quality spends
+/// much on few of them. `None` if it does not, or was made for another target.
+#[must_use]
+pub fn overshoot(target: &TargetRecord) -> Option<f64> {
+    let above = target.mean_psnr - target.min_psnr;
+    (target.target == MIN_PSNR && above > MUCH_ABOVE).then_some(above)
+}
+
+/// What `judge` says of a file.
+pub(crate) fn reached(score: Score, judge: &Judge) -> ReachedRecord {
+    let views = u32::try_from(judge.views()).unwrap_or(u32::MAX);
+    let psnr = [score.judged, score.mean, score.least].map(rounded_decibels);
+    ReachedRecord::new(psnr, views, judge.views_are_given())
+}
+
+/// Rounds decibels to the thousandths that are reported.
+fn rounded_decibels(decibels: f64) -> f64 {
+    (decibels * 1000.0).round() / 1000.0
+}
+
+/// What the sensitivity of a scene comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum SensitivitySource {
+    /// Views of the scene were drawn.
+    Views,
+    /// Each Gaussian was judged alone.
+    #[serde(rename = "guess")]
+    Heuristic,
+}
+
+impl CompressionReport {
+    /// Returns what the reports of all layouts have in common.
+    fn new(
+        layout: Layout,
+        gaussians: usize,
+        degree: ShDegree,
+        record: &Record,
+        report: &CompressReport,
+        tensors: &[(String, u64)],
+    ) -> Self {
+        let parts = part_bytes(tensors, &report.stream_bits);
+        Self {
+            gaussians,
+            sh_degree: degree.get(),
+            layout,
+            record: record.clone(),
+            mean_nonzeros: report.mean_nonzeros,
+            coefficient_ratio: report.coefficient_ratio(),
+            nonzero_histogram: report.nonzero_histogram.clone(),
+            escapes: report.escapes,
+            file_bytes: tensors.iter().map(|t| t.1).sum(),
+            sh_bytes: sh_bytes(&parts),
+            dense_sh_bytes: (gaussians * degree.rest() * size_of::<f32>()) as u64,
+            attribute_bytes: parts,
+            learn_rounds: report.learned.as_ref().map(|l| l.rounds),
+            learn_sample: report.learned.as_ref().map(|l| l.sample),
+            held_out_nonzeros: report.learned.as_ref().map(|l| l.held_out_nonzeros),
+            learn_seconds: report.learn_seconds,
+            code_seconds: report.code_seconds,
+            pack_seconds: report.learn_seconds + report.code_seconds,
+            ..Self::default()
+        }
+    }
+
+    /// Returns the report of a file with exact geometry.
+    pub(crate) fn exact(done: Compressed, layout: Layout) -> Self {
+        let Compressed { gaussians, dictionary, record, report, attribute_bytes, write_seconds, .. } = done;
+        let shared = Self::new(layout, gaussians, dictionary.degree(), &record, &report, &attribute_bytes);
+        Self { atoms: dictionary.len(), write_seconds, dictionary: Some(dictionary), ..shared }
+    }
+
+    /// Returns the report of a packed file, whose tensors take the bytes in `tensors`.
+    pub(crate) fn packed(
+        head: &PackedHead,
+        report: &CompressReport,
+        tensors: &[(String, u64)],
+        importance: SensitivitySource,
+    ) -> Self {
+        let (gaussians, degree, record) = (head.gaussians, head.degree, &head.record);
+        Self {
+            atoms: head.atoms,
+            removed: head.removed,
+            target: head.target.clone(),
+            reached: head.reached,
+            importance: Some(importance),
+            device: Some(head.device.as_deref().unwrap_or("cpu").to_owned()),
+            ..Self::new(Layout::Packed, gaussians, degree, record, report, tensors)
+        }
+    }
+}
+
+fn name<S: Serializer>(layout: &Layout, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(layout.name())
+}
+
+fn record<S: Serializer>(record: &Record, serializer: S) -> Result<S::Ok, S::Error> {
+    RecordReport::from(record).serialize(serializer)
+}
+
+/// Streams are not whole bytes; sums of their bits are exact to an eighth of one.
+fn rounded(bytes: f64) -> ByteCount {
+    ByteCount::from((bytes * 8.0).round() / 8.0)
+}
+
+fn eighths<S: Serializer>(bytes: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+    rounded(*bytes).serialize(serializer)
+}
+
+fn map<S: Serializer>(parts: &[(String, f64)], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_map(parts.iter().map(|(name, bytes)| (name, rounded(*bytes))))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn views_that_differ_much_make_a_result_uncertain() {
+        let reached =
+            |min_psnr, cameras| uncertain_by(&ReachedRecord::new([40.0, 42.0, min_psnr], 12, cameras));
+        assert_eq!(reached(33.0, false), None);
+        assert_eq!(reached(28.0, false), Some(12.0));
+        assert_eq!(reached(28.0, true), None);
+    }
+
+    #[test]
+    fn one_hard_view_makes_a_file_overshoot() {
+        let overshoot =
+            |target: &str, mean, least| overshoot(&TargetRecord::new(target, 38.0, [mean, least], 24, false));
+        assert_eq!(overshoot("min-psnr", 48.5, 38.5), Some(10.0));
+        assert_eq!(overshoot("min-psnr", 42.5, 38.5), None);
+        assert_eq!(overshoot("psnr", 48.5, 38.5), None);
+    }
+}

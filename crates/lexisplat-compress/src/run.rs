@@ -1,0 +1,223 @@
+//! The steps from a source of splats to a written file and its report.
+
+use lexisplat::lexi::LexiWriter;
+use lexisplat::packed::Packer;
+use lexisplat::{Layout, Progress, Sink, SplatSource, Splats, Stopwatch, stream};
+use lexisplat_render::{Camera, Renderer};
+
+use crate::belonging::belong;
+use crate::error::{Error, Result};
+use crate::fewer::at_most;
+use crate::judge::Judge;
+use crate::packing::{Compression, Packing, Quality};
+use crate::packing_views::Looked;
+use crate::parts::in_parts;
+use crate::refit::{Fit, Refitting};
+use crate::report::{CompressionReport, SensitivitySource, reached};
+use crate::signs::near_plane_hides;
+use crate::target::{pack_to_preset, pack_to_target};
+use crate::views::SceneKind;
+
+/// Bytes of a Gaussian in a PLY at SH degree 3.
+const PLY_ROW: u64 = 248;
+/// Views that judge a preset, at most.
+const PRESET_JUDGES: usize = 48;
+
+impl Compression {
+    /// Whether [`Self::run`] holds all Gaussians of a PLY of `bytes` bytes and SH degree 3 at once, with or without
+    /// [likely cameras](Self::with_likely_cameras). Such a source is best opened with
+    /// [`PlySource::open_whole`](lexisplat::ply::PlySource::open_whole).
+    #[must_use]
+    pub fn holds_whole(&self, bytes: u64, likely_cameras: bool) -> bool {
+        let is_whole = |packing: &Packing| packing.is_whole(bytes / PLY_ROW, bytes, likely_cameras);
+        matches!(self, Self::Packed(packing) if is_whole(packing).is_ok_and(|whole| whole))
+    }
+
+    /// Compresses `source` into `sink`: a file that appears when it is whole, or any writer. `progress` is told
+    /// of every step and may cancel. Nothing is left of a file that was cancelled.
+    ///
+    /// The result is the same for any number of threads. Of a packed file it depends on the memory only in
+    /// whether the scene is packed whole.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`](crate::Error::Parameter) for choices out of range or that do not go together, for a target
+    /// that cannot be met, and for a source without Gaussians. [`Error::Memory`](crate::Error::Memory) if a choice needs the whole scene
+    /// and memory does not allow it. Errors of the source, of the sink and of a GPU.
+    /// [`Error::Codec`](crate::Error::Codec) with [`lexisplat::Error::Cancelled`] if `progress` cancels.
+    pub fn run<'a>(
+        &self,
+        source: &dyn SplatSource,
+        sink: impl Into<Sink<'a>>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        let clock = Stopwatch::start();
+        let sink = sink.into();
+        if source.is_empty() {
+            return Err(Error::parameter(
+                "scene",
+                "no Gaussians",
+                "one or more, or there is nothing to write",
+            ));
+        }
+        let mut report = match self {
+            Self::Exact(options, codes) => {
+                let done = stream::compress(source, options, *codes, sink, progress)?;
+                CompressionReport::exact(done, Layout::of(*codes, options.values))
+            }
+            Self::Heuristic(preset, options) => {
+                in_parts(options, preset.decibels(), None, source, sink, progress)?
+            }
+            Self::Packed(packing) => packing.run(source, sink, progress)?,
+        };
+        report.source_bytes = source.source_bytes();
+        report.warnings = [source.warnings(), &report.warnings].concat();
+        report.total_seconds = clock.seconds();
+        Ok(report)
+    }
+}
+
+/// Points of view that a file's base colours are seen from. More of them gained nothing (docs/METHOD.md, "Layers").
+const VIEWPOINTS: usize = 8;
+
+impl Packing {
+    fn run(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        self.check()?;
+        match self.holds(source, self.likely_cameras.is_some())? {
+            true => self.whole(source, sink, progress),
+            false => self.in_parts(source, sink, progress),
+        }
+    }
+
+    /// Whether `source` is packed whole, with or without cameras that belong to it. Compressed sources count with the bytes of
+    /// their Gaussians.
+    ///
+    /// # Errors
+    /// As [`Self::is_whole`].
+    fn holds(&self, source: &dyn SplatSource, cameras: bool) -> Result<bool> {
+        let gaussians = source.len() as u64;
+        self.is_whole(
+            gaussians,
+            source.source_bytes().max(gaussians.saturating_mul(source.row_bytes())),
+            cameras,
+        )
+    }
+
+    fn in_parts(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        in_parts(&self.options, self.decibels()?, Some(self.renderer()?), source, sink, progress)
+    }
+
+    /// The cameras that were given, or those that are likely and seem to belong to `splats`.
+    fn cameras_of(
+        &self,
+        renderer: &mut Renderer,
+        splats: &Splats,
+        progress: &dyn Progress,
+    ) -> Result<Option<&[Camera]>> {
+        if let (None, SceneKind::Auto, Some(likely)) = (&self.cameras, self.kind, &self.likely_cameras)
+            && belong(renderer, splats, likely, progress)?
+        {
+            return Ok(Some(likely));
+        }
+        Ok(self.cameras.as_deref())
+    }
+
+    fn whole(
+        &self,
+        source: &dyn SplatSource,
+        sink: Sink<'_>,
+        progress: &dyn Progress,
+    ) -> Result<CompressionReport> {
+        let clock = Stopwatch::start();
+        let splats = source.whole()?;
+        let read_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        let mut renderer = self.renderer()?;
+        let device = gpu(&renderer);
+        let Looked { views, sensitivity } = match &self.looked {
+            Some(looked) => Looked::clone(looked),
+            None => {
+                let cameras = self.cameras_of(&mut renderer, &splats, progress)?;
+                if !self.holds(source, cameras.is_some())? {
+                    drop(splats);
+                    return self.in_parts(source, sink, progress);
+                }
+                Looked::at(&mut renderer, &splats, cameras, self.kind, progress)?
+            }
+        };
+        let look_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        let given = views.are_given();
+        let fit = match self.options.may_change() {
+            true => Some(Fit::to(&splats, views.fitting(&splats), given, progress)?),
+            false => None,
+        };
+        let hidden = given.then(|| near_plane_hides(&splats.geometry, views.measuring())).flatten();
+        let most = self.max_gaussians.filter(|&most| most < splats.len());
+        let (fewer, sensitivity) = match (most, &fit) {
+            (Some(most), Some(fit)) => {
+                let made = at_most(most, &splats, sensitivity, &views, &mut renderer, fit, progress)?;
+                (Some(made.0), made.1)
+            }
+            _ => (None, sensitivity),
+        };
+        let packed_scene = fewer.as_ref().unwrap_or(&splats);
+        let options = match self.options.viewpoints.is_empty() {
+            true => self.options.clone().with_viewpoints(views.viewpoints(VIEWPOINTS)),
+            false => self.options.clone(),
+        };
+        let packer = Packer::new(packed_scene, &sensitivity, &options)?;
+        drop(sensitivity);
+        let refitting = Refitting::new(packer, fit);
+        let (packed, report, judge, score) = match self.quality {
+            Quality::Preset(preset) => {
+                // What is left out to keep a limit is not what a preset can make up for.
+                let judges = views.some_judging(PRESET_JUDGES);
+                let mut judge = Judge::new(renderer, packed_scene, &judges, given, progress)?;
+                let (packed, report, mut score) = pack_to_preset(&refitting, &mut judge, preset, progress)?;
+                if fewer.is_some() {
+                    judge = judge.against(&splats, progress)?;
+                    score = judge.score(&packed.unpack()?, progress)?;
+                }
+                (packed, report, judge, score)
+            }
+            Quality::Target(target) => {
+                let judges = views.some_judging(usize::MAX);
+                let mut judge = Judge::new(renderer, &splats, &judges, given, progress)?;
+                let bytes = source.source_bytes();
+                let (packed, report, score) =
+                    pack_to_target(&refitting, &mut judge, target, bytes, progress)?;
+                (packed, report, judge, score)
+            }
+        };
+        let removed = (splats.len() - packed.len()) as u64;
+        let packed = packed.with_device(device).with_reached(reached(score, &judge)).with_removed(removed);
+        drop(refitting);
+        let pack_seconds = clock.seconds();
+
+        let clock = Stopwatch::start();
+        let writer = LexiWriter::packed(&packed);
+        let tensors = writer.attribute_bytes().to_vec();
+        writer.write(sink, progress)?;
+        let write_seconds = clock.seconds();
+        let report = CompressionReport::packed(packed.head(), &report, &tensors, SensitivitySource::Views);
+        let warnings = hidden.into_iter().collect();
+        Ok(CompressionReport { read_seconds, look_seconds, pack_seconds, write_seconds, warnings, ..report })
+    }
+}
+
+/// Name of the GPU that `renderer` draws on, if it does. The results of a GPU are its own, so files name it.
+fn gpu(renderer: &Renderer) -> Option<String> {
+    renderer.is_gpu().then(|| renderer.name().to_owned())
+}

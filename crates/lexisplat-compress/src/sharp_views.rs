@@ -1,0 +1,83 @@
+//! Parts of sharp pictures, which stand for the whole of them.
+//!
+//! A picture as sharp as people look at has so many pixels that drawing all of every view takes minutes. Whole pictures with
+//! fewer pixels show another scene: small Gaussians blur, and errors of them average out. So some squares of each sharp
+//! picture are drawn. They lie evenly over it, and at other places in the next view. The mean squared error over them is, on
+//! average over all places, that of whole pictures.
+
+use lexisplat_render::conventions::TILE;
+use lexisplat_render::{Camera, PLASTIC, TileSet};
+
+/// Side of a square, in tiles. Half the picture's size has whole tiles too.
+const SQUARE: u32 = 2;
+/// Side of a tile, in pixels.
+#[expect(clippy::cast_possible_truncation, reason = "16")]
+const TILE_PIXELS: u32 = TILE as u32;
+/// The golden ratio less 1: the step from one view's places to those of the next.
+const GOLDEN: f64 = 0.618_033_988_749_894_9;
+
+/// These cameras, which draw about `pixels` pixels in all. If that is all that they have, they draw whole pictures.
+pub(crate) fn sampled(cameras: Vec<Camera>, pixels: u64) -> Vec<Camera> {
+    let all: u64 = cameras.iter().map(Camera::drawn_pixels).sum();
+    if all <= pixels {
+        return cameras;
+    }
+    let share = pixels as f64 / all as f64;
+    cameras.into_iter().enumerate().map(|(k, camera)| squares_of(camera, share, k)).collect()
+}
+
+/// `camera`, the `k`-th, which draws this share of its squares.
+fn squares_of(camera: Camera, share: f64, k: usize) -> Camera {
+    let begin = (k as f64 * GOLDEN).fract();
+    let place = |x: u32, y: u32| (begin + f64::from(x) * PLASTIC[0] + f64::from(y) * PLASTIC[1]).fract();
+    let chosen =
+        |limit: f64| TileSet::new(camera.width, camera.height, |x, y| place(x / SQUARE, y / SQUARE) <= limit);
+    let mut set = chosen(share);
+    if set.tiles().is_empty() {
+        // A small picture has one square at least: the first.
+        let squares = |side: u32| 0..side.div_ceil(SQUARE * TILE_PIXELS);
+        let places = squares(camera.width).flat_map(|x| squares(camera.height).map(move |y| place(x, y)));
+        set = chosen(places.fold(1.0, f64::min));
+    }
+    camera.with_tiles(set)
+}
+
+#[cfg(test)]
+mod tests {
+    use lexisplat::Silent;
+    use lexisplat_render::{Renderer, Scene, orbit};
+    use lexisplat_sample::{SampleOptions, scene};
+
+    use super::*;
+    use crate::Judge;
+
+    #[test]
+    fn squares_are_as_many_as_asked_for() {
+        let splats = scene(&SampleOptions::new(50, 1));
+        let cameras = orbit(&splats.geometry, 20, 640, 400);
+        let all: u64 = 20 * 640 * 400;
+        assert_eq!(sampled(cameras.clone(), all), cameras);
+        for pixels in [all / 2, all / 7, all / 40] {
+            let some = sampled(cameras.clone(), pixels);
+            let found: u64 = some.iter().map(Camera::drawn_pixels).sum();
+            assert!((found as f64 / pixels as f64 - 1.0).abs() < 0.05, "{found} {pixels}");
+            assert!(some.windows(2).all(|pair| pair[0].tiles != pair[1].tiles));
+        }
+        assert!(sampled(cameras, 1).iter().all(|camera| camera.drawn_pixels() > 0));
+    }
+
+    #[test]
+    fn squares_score_as_whole_pictures_do() {
+        let splats = scene(&SampleOptions::new(1500, 3));
+        let mut other = splats.clone();
+        other.geometry.dc.iter_mut().enumerate().for_each(|(i, dc)| dc[i % 3] += 0.2 * (i as f32).sin());
+        let cameras = orbit(&splats.geometry, 12, 640, 400);
+        let score = |cameras: &[Camera]| {
+            let mut judge = Judge::new(Renderer::cpu(), &splats, cameras, true, &Silent).unwrap();
+            judge.score(Scene::from(&other), &Silent).unwrap()
+        };
+        let whole = score(&cameras);
+        let some = score(&sampled(cameras, 12 * 640 * 400 / 5));
+        assert!((some.mean - whole.mean).abs() < 0.3, "{some:?} {whole:?}");
+    }
+}

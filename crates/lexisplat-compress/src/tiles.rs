@@ -1,0 +1,55 @@
+//! The steps of [`lexisplat::packed::tiles`] that draw.
+
+use lexisplat::packed::Preset;
+use lexisplat::packed::tiles::{Bucket, Coded, Coding, Counts, LookStatistics, Looked, Plan};
+use lexisplat::stream::PackedFile;
+use lexisplat::{Model, Progress, Splats};
+use lexisplat_render::Renderer;
+
+use crate::error::Result;
+use crate::parts;
+pub use crate::parts::in_parts;
+use crate::report::{CompressionReport, SensitivitySource};
+
+/// Looks at a bucket with `renderer`, for the quality that `preset` aims at, or guesses what shows from each Gaussian alone.
+///
+/// # Errors
+/// [`lexisplat::Error::Cancelled`] within [`crate::Error::Codec`]; on a GPU [`crate::Error::Render`] if the bucket does not fit.
+pub fn look(
+    plan: &Plan,
+    bucket: &Bucket,
+    renderer: Option<&mut Renderer>,
+    preset: Preset,
+    progress: &dyn Progress,
+) -> Result<(LookStatistics, Looked)> {
+    let (part, options) = (bucket.splats(), plan.options());
+    let observe = |renderer| parts::observe(renderer, part, options, preset.decibels(), progress);
+    let observed = renderer.map(observe).transpose()?;
+    Ok(bucket.look(plan, observed)?)
+}
+
+/// Codes a bucket. What it shows is fitted to pictures if it was looked at and not `guessed`.
+///
+/// # Errors
+/// As [`Coding::code`], and errors of drawing.
+pub fn code(
+    plan: &Plan,
+    coding: &Coding,
+    bucket: &Bucket,
+    looked: &Looked,
+    guessed: bool,
+    progress: &dyn Progress,
+) -> Result<(Counts, Coded)> {
+    let mut refit = |part: &Splats, model: &Model, weights: &[[f32; 2]]| {
+        parts::refit(part, model, weights, looked.memo(), progress).map(Some)
+    };
+    coding.code(plan, bucket, looked, if guessed { None } else { Some(&mut refit) }, progress)
+}
+
+/// The report of a file that was assembled of buckets, which were looked at or `guessed`.
+#[must_use]
+pub fn report(done: &PackedFile, guessed: bool) -> CompressionReport {
+    let origin = if guessed { SensitivitySource::Heuristic } else { SensitivitySource::Views };
+    let report = CompressionReport::packed(&done.head, &done.report, &done.tensor_bytes, origin);
+    CompressionReport { in_parts: true, ..report }
+}

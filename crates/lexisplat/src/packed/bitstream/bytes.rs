@@ -1,0 +1,135 @@
+//! Little-endian numbers in a list of bytes.
+
+/// Takes numbers from the start of bytes. Every method returns `None` where too few bytes are left.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::packed) struct ByteReader<'a>(pub(in crate::packed) &'a [u8]);
+
+impl<'a> ByteReader<'a> {
+    pub(in crate::packed) fn bytes(&mut self, count: usize) -> Option<&'a [u8]> {
+        let (taken, rest) = self.0.split_at_checked(count)?;
+        self.0 = rest;
+        Some(taken)
+    }
+
+    fn array<const N: usize>(&mut self) -> Option<[u8; N]> {
+        let (taken, rest) = self.0.split_first_chunk()?;
+        self.0 = rest;
+        Some(*taken)
+    }
+
+    pub(in crate::packed) fn u8(&mut self) -> Option<u8> {
+        self.array().map(u8::from_le_bytes)
+    }
+
+    pub(in crate::packed) fn u16(&mut self) -> Option<u16> {
+        self.array().map(u16::from_le_bytes)
+    }
+
+    pub(in crate::packed) fn u32(&mut self) -> Option<u32> {
+        self.array().map(u32::from_le_bytes)
+    }
+
+    /// What [`put_number`] wrote.
+    pub(in crate::packed) fn number(&mut self) -> Option<u64> {
+        let mut number = 0_u64;
+        for shift in (0..).step_by(7) {
+            let byte = self.u8()?;
+            let bits = u64::from(byte & 0x7f);
+            let placed = bits.checked_shl(shift).filter(|placed| placed >> shift == bits)?;
+            number |= placed;
+            if byte < 0x80 {
+                // A last byte of zeros would be another way to write the same number.
+                return (byte > 0 || shift == 0).then_some(number);
+            }
+        }
+        None
+    }
+
+    /// A [number](Self::number) of 32 bits.
+    pub(in crate::packed) fn number32(&mut self) -> Option<u32> {
+        self.number().and_then(|number| u32::try_from(number).ok())
+    }
+
+    /// A finite number of the `N` high bytes of an f32.
+    pub(in crate::packed) fn short<const N: usize>(&mut self) -> Option<f32> {
+        let mut bytes = [0; 4];
+        bytes.get_mut(4 - N..)?.copy_from_slice(&self.array::<N>()?);
+        Some(f32::from_le_bytes(bytes)).filter(|x| x.is_finite())
+    }
+
+    /// A finite number.
+    pub(in crate::packed) fn f32(&mut self) -> Option<f32> {
+        self.array().map(f32::from_le_bytes).filter(|x| x.is_finite())
+    }
+
+    /// Whole numbers of 16 bits.
+    pub(in crate::packed) fn i16s<const N: usize>(&mut self) -> Option<[i16; N]> {
+        let mut out = [0; N];
+        for value in &mut out {
+            *value = self.array().map(i16::from_le_bytes)?;
+        }
+        Some(out)
+    }
+
+    /// Finite numbers.
+    pub(in crate::packed) fn f32s<const N: usize>(&mut self) -> Option<[f32; N]> {
+        let mut out = [0.0; N];
+        for value in &mut out {
+            *value = self.f32()?;
+        }
+        Some(out)
+    }
+}
+
+/// Writes a whole number in groups of 7 bits, low ones first. All bytes but the last have their highest bit set.
+pub(in crate::packed) fn put_number(out: &mut Vec<u8>, mut number: u64) {
+    while number >= 0x80 {
+        out.push(number.to_le_bytes()[0] | 0x80);
+        number >>= 7;
+    }
+    out.push(number.to_le_bytes()[0]);
+}
+
+/// Writes the `N` high bytes of `x`, which is a [short](shortened) number.
+pub(in crate::packed) fn put_short<const N: usize>(out: &mut Vec<u8>, x: f32) {
+    out.extend(x.to_le_bytes().iter().skip(4 - N));
+}
+
+/// The number nearest to `x` of which all but the `N` high bytes are zero. It is finite if `x` is.
+pub(in crate::packed) fn shortened<const N: usize>(x: f32) -> f32 {
+    let low = u32::BITS - 8 * N as u32;
+    let cut = |bits: u32| f32::from_bits(bits >> low << low);
+    let near = cut(x.to_bits().wrapping_add(1 << (low - 1)));
+    if near.is_finite() { near } else { cut(x.to_bits()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_come_back_and_have_one_form() {
+        for number in [0, 1, 127, 128, 300, 16_383, 16_384, u64::from(u32::MAX), u64::MAX] {
+            let mut out = Vec::new();
+            put_number(&mut out, number);
+            assert_eq!(ByteReader(&out).number(), Some(number));
+            assert_eq!(ByteReader(&out[..out.len() - 1]).number(), None);
+        }
+        for bytes in [&[0x80, 0][..], &[0xff; 10], &[0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 2]]
+        {
+            assert_eq!(ByteReader(bytes).number(), None, "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn short_numbers_come_back() {
+        for x in [0.0, 1.0, -1.5, 3.25e-3, 1e30, -1e-30, f32::MAX] {
+            let near = shortened::<3>(x);
+            assert!((near - x).abs() <= x.abs() * 1e-4);
+            let mut out = Vec::new();
+            put_short::<3>(&mut out, near);
+            assert_eq!((out.len(), ByteReader(&out).short::<3>()), (3, Some(near)));
+        }
+        assert_eq!(ByteReader(&[0x80, 0x7f]).short::<2>(), None);
+    }
+}

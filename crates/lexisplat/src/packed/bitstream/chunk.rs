@@ -1,0 +1,336 @@
+//! Coding of a chunk: ranges of a base, refinements, nonzeros and interim changes, all in the same lanes.
+
+use super::fill_in::{CHANGES, interim};
+use super::geometry_syntax::{GeometrySyntax, Group};
+use super::integer_model::Steering;
+use super::refinement::refine;
+use super::sh_codes::{BLOCK, Coded, Cursor, Rest, RestForm};
+use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::decode::chunk_unpack::{Drawn, Frame};
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::symbols::{LANES, Lanes, has};
+use crate::packed::entropy::tables::Lookup;
+use crate::support::crc32;
+
+/// Gaussians of a lane, at least. A lane takes about 8 bytes of every range.
+const LEAST_OF_LANE: usize = 1024;
+
+/// Number of lanes of a chunk.
+pub(in crate::packed) fn lanes(gaussians: usize) -> usize {
+    (gaussians / LEAST_OF_LANE).clamp(1, LANES)
+}
+
+/// First Gaussian of each lane of a chunk, and the number of Gaussians. The first lanes have one more than the others
+/// where the number does not divide.
+pub(in crate::packed) fn starts(gaussians: usize, lanes: usize) -> [usize; LANES + 1] {
+    std::array::from_fn(|l| {
+        let l = l.min(lanes);
+        gaussians / lanes * l + (gaussians % lanes).min(l)
+    })
+}
+
+/// The sets of lanes that have a first, second, ... Gaussian.
+pub(in crate::packed) fn sets(gaussians: usize, lanes: usize) -> impl Iterator<Item = u32> {
+    let whole = (1 << lanes) - 1;
+    let last = (1 << (gaussians % lanes)) - 1;
+    std::iter::repeat_n(whole, gaussians / lanes).chain((last > 0).then_some(last))
+}
+
+/// Takes what a chunk decodes to. A trait and not closures, since closures are not inlined into vector code.
+pub(in crate::packed) trait Sink {
+    /// Takes one Gaussian of each lane in `set`: of each lane the one with this number, which is number `in_block` of its
+    /// block. `levels` are those of the chunk, and those that are missing. Returns `None` for what no encoder writes.
+    fn group(
+        &mut self,
+        number: usize,
+        in_block: usize,
+        set: u32,
+        group: &Group,
+        levels: [usize; 2],
+    ) -> Option<()>;
+
+    /// Takes the SH-rest of a block of Gaussians, of each lane those from this number on.
+    fn rest(&mut self, number: usize, rest: &Rest) -> Option<()>;
+}
+
+/// How the chunks of a file are coded.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Form {
+    pub(in crate::packed) steering: Steering,
+    pub(in crate::packed) rest: RestForm,
+}
+
+/// How the chunks of a layer are coded.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in crate::packed) struct LayerForm {
+    /// Levels of refinement.
+    pub(in crate::packed) levels: usize,
+    /// Parts of nonzeros.
+    pub(in crate::packed) parts: usize,
+    /// Whether there are interim changes.
+    pub(in crate::packed) interim: bool,
+}
+
+impl LayerForm {
+    /// Number of ranges of a chunk: a base, the levels of refinement, parts of nonzeros, and interim changes.
+    pub(in crate::packed) fn ranges(self) -> usize {
+        self.interim_range() + usize::from(self.interim)
+    }
+
+    /// The range of interim changes, if there are any.
+    pub(in crate::packed) fn interim_range(self) -> usize {
+        1 + self.levels + self.parts
+    }
+}
+
+impl Form {
+    /// Codes the Gaussians of a chunk with `levels` levels of refinement. `None` if there is something no decoder takes.
+    pub(in crate::packed) fn record(
+        &self,
+        frame: &Frame,
+        layer: LayerForm,
+        targets: &[Target],
+    ) -> Option<CodedChunk> {
+        let levels = layer.levels;
+        let lanes = lanes(targets.len());
+        let starts = starts(targets.len(), lanes);
+        let mut ranges = vec![SymbolRecorder::default(); layer.ranges()];
+        let mut sums = vec![Sums::default(); layer.ranges()];
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
+        let none = Target::default();
+        let mut bounds = Extent([[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]]);
+        let sets: Vec<u32> = sets(targets.len(), lanes).collect();
+        for (block, sets) in sets.chunks(BLOCK).enumerate() {
+            let first = block * BLOCK;
+            rest.clear();
+            let (base, finer) = ranges.split_first_mut()?;
+            let (finer, parts) = finer.split_at_mut_checked(levels)?;
+            let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
+            for (i, &set) in sets.iter().enumerate() {
+                let of =
+                    |l: usize| targets.get(starts[l] + first + i).filter(|_| has(set, l)).unwrap_or(&none);
+                let group: [&Target; LANES] = std::array::from_fn(of);
+                let targets = group;
+                let mut group = Group::default();
+                walk.base(base, set, Some(&targets), &mut group)?;
+                sums[0].base(set, &group);
+                for (k, range) in finer.iter_mut().enumerate() {
+                    refine(range, set, &mut group, levels - k)?;
+                    sums[1 + k].refined(set, &group);
+                }
+                if let Some(range) = changed.first_mut() {
+                    let wanted: [Lanes; CHANGES] =
+                        std::array::from_fn(|k| std::array::from_fn(|l| targets[l].interim[k]));
+                    interim(range, set, &mut group, &wanted);
+                    sums[layer.interim_range()].interim(set, &group);
+                }
+                rest.push(set, group.colour);
+                bounds.add(set, &group, frame, levels)?;
+            }
+            let wanted: Lanes<Vec<&Target>> = std::array::from_fn(|l| {
+                let there = sets.iter().enumerate().filter(|(_, set)| has(**set, l));
+                there.filter_map(|(i, _)| targets.get(starts[l] + first + i)).collect()
+            });
+            for (part, range) in parts.iter_mut().enumerate() {
+                rest.part(range, Some(&wanted), &self.rest, part)?;
+                sums[1 + levels + part].rest(&rest, &self.rest, part);
+            }
+        }
+        let ranges = ranges.into_iter().zip(sums).map(|(range, sum)| (range, sum.finish())).collect();
+        let cell = targets.first().map_or(0, |target| target.cell);
+        let energy = targets.iter().map(|target| f64::from(target.energy)).sum();
+        Some(CodedChunk { gaussians: targets.len(), cell, bounds: bounds.0, energy, ranges })
+    }
+
+    /// Decodes a chunk of `gaussians` Gaussians from as many ranges as are there: refinements and parts that follow one that
+    /// is missing are not looked at. Hands everything to `sink`. `None` if no encoder writes this.
+    #[inline(always)]
+    pub(in crate::packed) fn decode(
+        &self,
+        layer: LayerForm,
+        gaussians: usize,
+        lookup: &Lookup,
+        ranges: &[Option<&[u8]>],
+        want: Want,
+        sink: &mut impl Sink,
+    ) -> Option<Played> {
+        let levels = layer.levels;
+        let lanes = lanes(gaussians);
+        let of = |k: usize| ranges.get(k).copied().flatten();
+        let mut base = SymbolDecoder::new(lookup, of(0)?, lanes, want.bits)?;
+        let mut finer = Vec::new();
+        for bytes in (0..levels).map_while(|k| of(1 + k)) {
+            finer.push(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?);
+        }
+        let mut parts = Vec::new();
+        for bytes in (0..layer.parts).map_while(|k| of(1 + levels + k)) {
+            parts.push(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?);
+        }
+        let changed = of(layer.interim_range()).filter(|_| layer.interim);
+        let mut changed = match changed {
+            Some(bytes) => Some(SymbolDecoder::new(lookup, bytes, lanes, want.bits)?),
+            None => None,
+        };
+        let missing = levels - finer.len();
+        let steps = gaussians.div_ceil(lanes);
+        let mut sums = vec![Sums::default(); if want.sums { layer.ranges() } else { 0 }];
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, levels), Rest::default());
+        // Groups are large, so all are made in one place.
+        let mut group = Group::default();
+        for (step, set) in sets(gaussians, lanes).enumerate() {
+            walk.base(&mut base, set, None, &mut group)?;
+            if want.sums {
+                sums[0].base(set, &group);
+            }
+            for (k, range) in finer.iter_mut().enumerate() {
+                refine(range, set, &mut group, levels - k)?;
+                if want.sums {
+                    sums[1 + k].refined(set, &group);
+                }
+            }
+            if let Some(range) = &mut changed {
+                interim(range, set, &mut group, &[[0; LANES]; CHANGES]);
+                if want.sums {
+                    sums[layer.interim_range()].interim(set, &group);
+                }
+            }
+            sink.group(step, rest.len(), set, &group, [levels, missing])?;
+            rest.push(set, group.colour);
+            if rest.len() == BLOCK || step + 1 == steps {
+                for (part, range) in parts.iter_mut().enumerate() {
+                    rest.part(range, None, &self.rest, part)?;
+                    if want.sums {
+                        sums[1 + levels + part].rest(&rest, &self.rest, part);
+                    }
+                }
+                // Symbols of damaged files may take no bytes, so they are looked after before anything is made of them.
+                let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
+                if !all().all(SymbolDecoder::good) {
+                    return None;
+                }
+                sink.rest(step + 1 - rest.len(), &rest)?;
+                rest.clear();
+            }
+        }
+        let all = || std::iter::once(&base).chain(&finer).chain(&parts).chain(&changed);
+        let mut bits = BitCounts::default();
+        all().filter_map(|player| player.bit_counts.as_ref()).for_each(|counts| bits.add(counts));
+        all()
+            .all(SymbolDecoder::exhausted)
+            .then(|| Played { sums: sums.into_iter().map(Sums::finish).collect(), bits })
+    }
+}
+
+/// A coded chunk.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct CodedChunk {
+    pub(in crate::packed) gaussians: usize,
+    /// The number of the first of its cells.
+    pub(in crate::packed) cell: u64,
+    /// Least and largest coordinates of its positions.
+    pub(in crate::packed) bounds: [[f32; 3]; 2],
+    /// Sum of the changes of pictures without each of its Gaussians.
+    pub(in crate::packed) energy: f64,
+    /// What its ranges hold, and the checksums of their integers.
+    pub(in crate::packed) ranges: Vec<(SymbolRecorder, u32)>,
+}
+
+/// Least and largest coordinates.
+struct Extent([[f32; 3]; 2]);
+
+impl Extent {
+    /// Includes the positions of the lanes in `set`. `None` if there is something no decoder takes.
+    fn add(&mut self, set: u32, group: &Group, frame: &Frame, levels: usize) -> Option<()> {
+        let drawn = Drawn::new(frame, group, [levels, 0], &[false; LANES]);
+        let [least, most] = &mut self.0;
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            for (k, position) in drawn.position.iter().enumerate() {
+                least[k] = least[k].min(position[l]);
+                most[k] = most[k].max(position[l]);
+            }
+        }
+        drawn.can_be(set).then_some(())
+    }
+}
+
+/// What to find out while a chunk is decoded.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::packed) struct Want {
+    /// Checksums of the integers of its ranges.
+    pub(in crate::packed) sums: bool,
+    /// Bits of its streams.
+    pub(in crate::packed) bits: bool,
+}
+
+/// What was found out.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Played {
+    pub(in crate::packed) sums: Vec<u32>,
+    pub(in crate::packed) bits: BitCounts,
+}
+
+/// CRC-32 of the integers of a range, as i32, Gaussian by Gaussian.
+#[derive(Debug, Clone, Default)]
+struct Sums(Lanes<crc32::Hasher>);
+
+impl Sums {
+    #[inline(never)]
+    fn add(&mut self, l: usize, numbers: &[i32]) {
+        for number in numbers {
+            self.0[l].update(&number.to_le_bytes());
+        }
+    }
+
+    /// Cell, classes, coarse steps, codes of the rotation.
+    fn base(&mut self, set: u32, group: &Group) {
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            self.add(l, &group.cell.map(|x| x[l]));
+            self.add(l, &[group.colour[l].cast_signed(), group.shape[l].cast_signed()]);
+            self.refined_of(l, group);
+        }
+    }
+
+    fn refined(&mut self, set: u32, group: &Group) {
+        (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.refined_of(l, group));
+    }
+
+    /// Steps so far, codes of the rotation so far.
+    fn refined_of(&mut self, l: usize, group: &Group) {
+        self.add(l, &group.counts.map(|x| x[l]));
+        self.add(l, &group.rotation.map(|x| x[l].cast_signed()));
+    }
+
+    /// Interim changes.
+    fn interim(&mut self, set: u32, group: &Group) {
+        (0..LANES).filter(|&l| has(set, l)).for_each(|l| self.add(l, &group.interim.map(|x| x[l])));
+    }
+
+    /// Number of nonzeros, atoms with values; -1 and the bits of an exact row.
+    fn rest(&mut self, rest: &Rest, form: &RestForm, part: usize) {
+        for l in 0..LANES {
+            let mut cursor = Cursor::default();
+            for i in (0..rest.len()).filter(|&i| has(rest.of(i).0, l)) {
+                match rest.coded(form, part, i, l, &mut cursor) {
+                    Coded::Exact(row) => {
+                        self.add(l, &[-1]);
+                        row.iter().for_each(|v| self.add(l, &[v.to_bits().cast_signed()]));
+                    }
+                    Coded::Code(from, count) => {
+                        self.add(l, &[count as i32]);
+                        for (atom, value) in rest.nonzeros(part, from, count, l) {
+                            self.add(l, &[atom.into(), value]);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn finish(self) -> u32 {
+        let [mut all, rest @ ..] = self.0;
+        rest.iter().for_each(|lane| all.combine(lane));
+        all.finalize()
+    }
+}

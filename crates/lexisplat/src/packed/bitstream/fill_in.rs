@@ -1,0 +1,70 @@
+//! Changes of Gaussians while those of the next layer around them are not there.
+//!
+//! The Gaussians of a first layer stand apart. Until the next layer fills the space between them they are drawn larger,
+//! more or less opaque, and in the colour of what is missing around them.
+
+use super::geometry_syntax::{DC, Group, OPACITY};
+use super::streams::Stream;
+use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+
+/// Values that change: all scales alike, the opacity, and the coordinates of the base colour.
+pub(in crate::packed) const CHANGES: usize = 5;
+/// Kinds of changes, which have a step each: of scales, opacities and base colours.
+pub(in crate::packed) const KINDS: usize = 3;
+/// Largest step. Values have limits that are less than two of them apart.
+pub(in crate::packed) const MOST_STEP: u32 = 1 << 26;
+/// Classes of a context.
+const CLASS_WIDTH: u32 = 2;
+const CLASSES: u32 = 8;
+/// Changes of scales that contexts of opacities tell apart.
+const SCALES: u32 = 3;
+
+/// The kind of a change.
+#[inline(always)]
+fn kind(change: usize) -> usize {
+    change.min(KINDS - 1)
+}
+
+/// Codes the changes of a group. `wanted` are those that the encoder codes.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+pub(in crate::packed) fn interim<S: Symbols>(
+    s: &mut S,
+    set: u32,
+    group: &mut Group,
+    wanted: &[Lanes; CHANGES],
+) {
+    let (shape, colour) = (&group.shape, &group.colour);
+    let class = |l: usize, classes: &Lanes<u32>| (classes[l] / CLASS_WIDTH).min(CLASSES - 1);
+    let context = each(|l| class(l, shape));
+    group.interim[0] = s.signed(Stream::InterimScale.at(0), context, set, |l| wanted[0][l]);
+    let growth = &group.interim[0];
+    let context = each(|l| CLASSES * growth[l].unsigned_abs().min(SCALES - 1) + class(l, shape));
+    group.interim[1] = s.signed(Stream::InterimOpacity.at(0), context, set, |l| wanted[1][l]);
+    for (axis, k) in (0_u32..).zip(2..CHANGES) {
+        let context = each(|l| CLASSES * axis + class(l, colour));
+        group.interim[k] = s.signed(Stream::InterimDc.at(0), context, set, |l| wanted[k][l]);
+    }
+}
+
+/// Adds the changes to values where `alone`.
+#[inline(always)]
+pub(in crate::packed) fn change(
+    values: &mut [Lanes; TARGETS],
+    interim: &[Lanes; CHANGES],
+    steps: &[u32; KINDS],
+    alone: &Lanes<bool>,
+) {
+    for (t, values) in values.iter_mut().enumerate() {
+        // The three scales change alike.
+        let k = (t + 1).saturating_sub(OPACITY);
+        let step = steps[kind(k)].cast_signed();
+        for l in 0..LANES {
+            let by = if alone[l] { interim[k][l].wrapping_mul(step) } else { 0 };
+            values[l] = values[l].wrapping_add(by);
+        }
+    }
+}
+
+const _: () = assert!(DC == OPACITY + 1 && CLASSES * SCALES <= super::streams::CONTEXTS as u32);

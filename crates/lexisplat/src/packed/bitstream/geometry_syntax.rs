@@ -1,0 +1,293 @@
+//! The walk over the Gaussians of a chunk, all lanes at a time, which encoder and decoder share.
+//!
+//! Every value is coded as the difference from a prediction, in units of a step. Prediction and step are made of coarse
+//! integers alone that the same range holds before, so finer ranges may be missing.
+
+use super::fill_in::CHANGES;
+use super::integer_model::{COEFFICIENTS, FEATURE_BITS, ONE, Steering, feature};
+use super::neighbour_context::{AVERAGED, NeighbourContext};
+use super::streams::Stream;
+use super::values::{MAX_LOG_OPACITY, rotations};
+use crate::packed::bitstream::morton;
+use crate::packed::bitstream::parameters::{LAST_CLASS, TARGETS};
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
+
+/// Streams of the targets of predictions.
+const TARGET_STREAMS: [Stream; TARGETS] =
+    [Stream::Scale0, Stream::Scale1, Stream::Scale2, Stream::Opacity, Stream::Dc0, Stream::Dc1, Stream::Dc2];
+const POSITION_STREAMS: [Stream; 3] = [Stream::Position0, Stream::Position1, Stream::Position2];
+/// Gaps with at least this many bits share a context.
+const GAP_CONTEXTS: u32 = 23;
+/// Places of the opacity and of the first base colour among the targets.
+pub(in crate::packed) const OPACITY: usize = 3;
+pub(in crate::packed) const DC: usize = 4;
+/// Averages that are not predicted: the colour class, and the shape class above it.
+const COLOUR: usize = TARGETS;
+const SHAPE: usize = TARGETS + 1;
+/// Most levels of refinement.
+pub(in crate::packed) const MAX_LEVELS: usize = 2;
+/// Bits that codes of rotations lack where this many levels are missing.
+pub(in crate::packed) const DROPPED: [u32; MAX_LEVELS + 1] = [0, 2, 3];
+/// Values that finer levels refine: those of the targets and three moves.
+pub(in crate::packed) const REFINED: usize = TARGETS + 3;
+/// Coarse steps over fine ones at one level.
+pub(in crate::packed) const FACTOR: i32 = 3;
+
+/// Coarse steps over the finest ones where this many levels are missing.
+pub(in crate::packed) fn factor(levels: usize) -> i32 {
+    FACTOR.pow(levels as u32)
+}
+
+/// One Gaussian of each lane as integers.
+#[derive(Debug, Clone, Default)]
+pub(in crate::packed) struct Group {
+    /// Number of the cell on the Morton curve, and its coordinates.
+    pub(in crate::packed) number: Lanes<u64>,
+    pub(in crate::packed) cell: [Lanes; 3],
+    pub(in crate::packed) colour: Lanes<u32>,
+    pub(in crate::packed) shape: Lanes<u32>,
+    /// Values of the targets by coarse steps.
+    pub(in crate::packed) coarse: [Lanes; TARGETS],
+    /// Steps of the targets.
+    pub(in crate::packed) steps: [Lanes; TARGETS],
+    /// Coarse steps of each value, of the targets and then of the moves, as the base has them.
+    pub(in crate::packed) base: [Lanes; REFINED],
+    /// The same, refined as far as it is known.
+    pub(in crate::packed) counts: [Lanes; REFINED],
+    /// The codes of the rotation as far as they are known, and the bits of their coordinates and of the turn in full.
+    pub(in crate::packed) rotation: [Lanes<u32>; 3],
+    pub(in crate::packed) axis_bits: [Lanes<u32>; 2],
+    pub(in crate::packed) needle: Lanes<bool>,
+    /// Logarithms of the steps of moves.
+    pub(in crate::packed) moves: [Lanes; 3],
+    /// Contexts of moves.
+    pub(in crate::packed) fineness: [Lanes<u32>; 3],
+    /// What the encoder codes in the end: whole numbers of finest steps, and codes of rotations in full.
+    pub(in crate::packed) wanted: [Lanes; REFINED],
+    pub(in crate::packed) wanted_rotation: [Lanes<u32>; 3],
+    /// Steps of the changes while the next layer is not there: of the scales, the opacity and the base colour.
+    pub(in crate::packed) interim: [Lanes; CHANGES],
+}
+
+/// The state of the walk over a chunk.
+#[derive(Debug)]
+pub(in crate::packed) struct GeometrySyntax<'a> {
+    steering: &'a Steering,
+    /// Levels of refinement.
+    levels: usize,
+    around: NeighbourContext,
+    cell: Lanes<u64>,
+    gap_bits: Lanes<u32>,
+}
+
+impl<'a> GeometrySyntax<'a> {
+    pub(in crate::packed) fn new(steering: &'a Steering, levels: usize) -> Self {
+        Self { steering, levels, around: NeighbourContext::default(), cell: [0; LANES], gap_bits: [0; LANES] }
+    }
+
+    /// Codes the base of the next Gaussian of each lane in `set` to `group`, which holds another or is new. Returns `None`
+    /// for impossible values, which only damaged files hold. Decoders pass no targets.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(in crate::packed) fn base<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        set: u32,
+        targets: Option<&[&Target; LANES]>,
+        group: &mut Group,
+    ) -> Option<()> {
+        let p = self.steering;
+        let target = |l: usize| targets.map(|targets| targets[l]);
+        let context = each(|l| self.gap_bits[l].min(GAP_CONTEXTS));
+        let before = self.cell;
+        let slot = |stream: Stream| stream.at(self.levels);
+        let gap = s.wide(slot(Stream::Cell), context, set, |l| {
+            target(l).map_or(0, |t| t.cell.wrapping_sub(before[l]))
+        });
+        let mut cell = [[0; LANES]; 3];
+        let mut beyond = 0;
+        for l in 0..LANES {
+            self.cell[l] = self.cell[l].wrapping_add(gap[l]);
+            beyond |= self.cell[l] | gap[l];
+            self.gap_bits[l] = u64::BITS - gap[l].leading_zeros();
+            let xyz = morton::gathered(self.cell[l]);
+            for k in 0..3 {
+                cell[k][l] = xyz[k].cast_signed();
+            }
+        }
+        if beyond >> (3 * morton::BITS) != 0 {
+            return None;
+        }
+        let known = self.around.is_known();
+        let around: [Lanes; AVERAGED] = if known {
+            self.around.average(&cell)
+        } else {
+            std::array::from_fn(|k| [p.means.get(k).copied().unwrap_or(0); LANES])
+        };
+        let [colour, shape] = classes(s, set, targets, known, &around, self.levels)?;
+
+        let features_of = |class: &Lanes<u32>| each(|l| (class[l] << FEATURE_BITS).cast_signed());
+        let zeros = [0; LANES];
+        let mut features: [Lanes; COEFFICIENTS - 1] =
+            [zeros, features_of(&colour), features_of(&shape), zeros, zeros, zeros];
+        (group.number, group.cell, group.colour, group.shape) = (self.cell, cell, colour, shape);
+        let coarse = factor(self.levels);
+        let mut remembered = [zeros; AVERAGED];
+        // All base colours have the same steps.
+        let colour_step = p.step(DC, &colour);
+        for (t, stream) in TARGET_STREAMS.into_iter().enumerate() {
+            features[0] = around[t];
+            let (class, step) = if t < DC { (&shape, p.step(t, &shape)) } else { (&colour, colour_step) };
+            let predicted = p.predict(t, &features);
+            if targets.is_some() {
+                for l in (0..LANES).filter(|&l| has(set, l)) {
+                    let wanted = target(l).map_or(0, |target| target.values[t]);
+                    let steps =
+                        |value: i32| (f64::from(value) - f64::from(predicted[l])) / f64::from(step[l]);
+                    // What is opaque stays so: values above the largest count as that.
+                    group.wanted[t][l] = match t == OPACITY && wanted >= MAX_LOG_OPACITY {
+                        true => nearest(steps(MAX_LOG_OPACITY).ceil()),
+                        false => nearest(steps(wanted)),
+                    };
+                }
+            }
+            let wanted = group.wanted[t];
+            // The steps of turns and moves, and predictions, depend on scales and opacities.
+            let coarse = if t < DC { 1 } else { coarse };
+            let counts = s.signed(slot(stream), *class, set, |l| coarsened(wanted[l], coarse));
+            for l in 0..LANES {
+                let value = predicted[l].wrapping_add(counts[l].wrapping_mul(coarse).wrapping_mul(step[l]));
+                group.coarse[t][l] = value;
+                remembered[t][l] = feature(value);
+            }
+            if t < 3 {
+                features[3 + t] = remembered[t];
+            }
+            group.steps[t] = step;
+            group.base[t] = counts;
+        }
+        let scales = [features[3], features[4], features[5]];
+        self.turns_and_moves(s, set, targets, scales, group);
+        group.counts = group.base;
+        remembered[COLOUR] = features[1];
+        for l in 0..LANES {
+            remembered[SHAPE][l] = features[2][l] - features[1][l];
+        }
+        self.around.push(cell, remembered);
+        Some(())
+    }
+
+    /// Codes rotations and positions.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn turns_and_moves<S: Symbols>(
+        &self,
+        s: &mut S,
+        set: u32,
+        targets: Option<&[&Target; LANES]>,
+        scales: [Lanes; 3],
+        group: &mut Group,
+    ) {
+        let p = self.steering;
+        let coarse = factor(self.levels);
+        (group.axis_bits, group.needle) = p.axis_bits(&group.shape, &scales);
+        let [directions, turns] = &group.axis_bits;
+        let left = [each(|l| dropped(directions[l], self.levels)), each(|l| dropped(turns[l], self.levels))];
+        group.moves = p.move_logs(&group.shape, &scales);
+        if let Some(targets) = targets {
+            for l in (0..LANES).filter(|&l| has(set, l)) {
+                let bits = group.axis_bits.map(|bits| bits[l]);
+                let codes = targets[l].rotation_codes(bits, group.needle[l]);
+                for (wanted, code) in group.wanted_rotation.iter_mut().zip(codes) {
+                    wanted[l] = code;
+                }
+            }
+            let axes = rotations(&group.wanted_rotation, &group.axis_bits, &group.needle).axes;
+            for l in (0..LANES).filter(|&l| has(set, l)) {
+                for k in 0..3 {
+                    let along: f64 = (0..3).map(|j| f64::from(axes[k][j][l]) * targets[l].offset[j]).sum();
+                    let step = libm::exp2(f64::from(group.moves[k][l]) / f64::from(ONE));
+                    group.wanted[TARGETS + k][l] = nearest(along / step);
+                }
+            }
+        }
+        for k in 0..3 {
+            let (full, left) =
+                if k < 2 { (&group.axis_bits[0], &left[0]) } else { (&group.axis_bits[1], &left[1]) };
+            let count = each(|l| full[l] - left[l]);
+            let wanted = &group.wanted_rotation[k];
+            group.rotation[k] =
+                s.bits(Stream::Rotation.at(self.levels), count, set, |l| wanted[l] >> left[l]);
+        }
+        for (k, stream) in POSITION_STREAMS.into_iter().enumerate() {
+            group.fineness[k] = each(|l| p.fineness(group.moves[k][l]));
+            let wanted = &group.wanted[TARGETS + k];
+            group.base[TARGETS + k] =
+                s.signed(stream.at(self.levels), group.fineness[k], set, |l| coarsened(wanted[l], coarse));
+        }
+    }
+}
+
+/// Bits that a code of `bits` bits lacks where `levels` levels are missing. One bit stays, so that every Gaussian takes
+/// some.
+#[inline(always)]
+pub(in crate::packed) fn dropped(bits: u32, levels: usize) -> u32 {
+    DROPPED[levels].min(bits.saturating_sub(1))
+}
+
+/// Colour and shape classes.
+#[inline(always)]
+fn classes<S: Symbols>(
+    s: &mut S,
+    set: u32,
+    targets: Option<&[&Target; LANES]>,
+    known: bool,
+    around: &[Lanes; AVERAGED],
+    levels: usize,
+) -> Option<[Lanes<u32>; 2]> {
+    const LAST: i32 = LAST_CLASS as i32;
+    let level = |x: i32| ((x + ONE / 2) >> FEATURE_BITS).clamp(0, LAST).cast_unsigned();
+    let class = |k: usize, l: usize| targets.map_or(0, |targets| u32::from(targets[l].classes[k]));
+    let none = [0; LANES];
+    let context = if known { each(|l| 1 + level(around[COLOUR][l])) } else { none };
+    let colour = s.symbols(Stream::ColourClass.at(levels), context, set, |l| class(0, l));
+    let (mut context, mut nearest) = (none, none);
+    for l in 0..LANES {
+        let own = (colour[l] << FEATURE_BITS).cast_signed();
+        let expected = own.wrapping_add(around[SHAPE][l]).clamp(0, LAST << FEATURE_BITS);
+        // In halves, so that the context also says on which side of the rounded value the class may lie.
+        let below = (expected - ONE / 4) >> FEATURE_BITS << FEATURE_BITS;
+        context[l] = if known { 1 + level(2 * (expected - below)) } else { 0 };
+        nearest[l] = level(expected);
+    }
+    let over = s.signed(Stream::ShapeClass.at(levels), context, set, |l| {
+        class(1, l).wrapping_sub(nearest[l]).cast_signed()
+    });
+    let mut shape = none;
+    let mut beyond = false;
+    for l in 0..LANES {
+        shape[l] = nearest[l].wrapping_add(over[l].cast_unsigned());
+        beyond |= colour[l] > u32::from(LAST_CLASS) || shape[l] > u32::from(LAST_CLASS);
+    }
+    (!beyond).then_some([colour, shape])
+}
+
+/// Share of a step by which a difference must exceed the middle between two values to be rounded away from zero. The
+/// value nearer to zero takes fewer bits.
+const DEAD_ZONE: f64 = 0.08;
+/// Largest number of steps.
+const MAX_STEPS: f64 = 1e9;
+
+/// The whole number of steps that stands for `steps`.
+#[expect(clippy::cast_possible_truncation, reason = "clamped")]
+pub(in crate::packed) fn nearest(steps: f64) -> i32 {
+    let whole = (steps.abs().min(MAX_STEPS) + 0.5 - DEAD_ZONE).floor() as i32;
+    if steps < 0.0 { -whole } else { whole }
+}
+
+/// The number of steps `coarse` times as large that is nearest to `whole` steps. `coarse` is odd.
+#[inline(always)]
+pub(in crate::packed) fn coarsened(whole: i32, coarse: i32) -> i32 {
+    (whole + coarse / 2).div_euclid(coarse)
+}

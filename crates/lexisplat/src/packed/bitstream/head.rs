@@ -1,0 +1,237 @@
+//! What the head of a file holds: how chunks are coded, what values are made with, tables, dictionary and index.
+
+use super::atoms::WholeAtoms;
+use super::axes::{axes_of, turn_of};
+use super::bytes::{ByteReader, put_number, put_short};
+use super::chunk::Form;
+use super::fill_in::{KINDS, MOST_STEP};
+use super::index::Index;
+use super::integer_model::{Integers, Steering, Step, VALUE_BITS};
+use super::mean_view::{MAX_POINTS, MeanView};
+use super::sh_codes::RestForm;
+use super::streams::REST_PARTS;
+use crate::packed::bitstream::bits::{BitReader, BitWriter};
+use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters};
+use crate::packed::decode::chunk_unpack::Frame;
+use crate::support::limits::MAX_ATOMS;
+
+/// Largest binary logarithm of the unit of base colours.
+const MAX_DC_EXPONENT: u8 = 100;
+/// Bits of the number of points of view, and where the two marks after the number of parts are.
+const POINTS_BITS: u32 = 4;
+const MARKS: u32 = 6;
+/// Bits of the binary logarithm of the unit of base colours, before the mark of interim changes.
+const EXPONENT_BITS: u32 = 7;
+/// Largest absolute value of a coordinate of a base colour, in units. Targets may be four times as large, since the
+/// largest of a scene may not be in the sample that is known.
+const MOST_DC: f64 = 16.0;
+
+/// The number of atoms of a head.
+pub(crate) fn atoms_of_head(head: &[u8]) -> Option<u64> {
+    ByteReader(head).number()
+}
+
+/// The head of a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct Head {
+    /// Whether atoms that are the same in all files follow the learned ones.
+    pub(in crate::packed) with_axes: bool,
+    /// Binary logarithm of the unit of base colours.
+    pub(in crate::packed) dc_exponent: u8,
+    pub(in crate::packed) rest: RestForm,
+    /// Steps of interim changes, if there are any, of scales, opacities and base colours.
+    pub(in crate::packed) interim: Option<[u32; KINDS]>,
+    pub(in crate::packed) mean_view: MeanView,
+    pub(in crate::packed) integers: Integers,
+    /// Its steps of values and its unit of base colours follow from the other fields.
+    pub(in crate::packed) frame: Frame,
+    /// Step of the values of colour class 0, and of those of all classes if an error was promised. The other one is 0.
+    pub(in crate::packed) value_step: f32,
+    pub(in crate::packed) promised: f32,
+    /// Probabilities of all symbols.
+    pub(in crate::packed) tables: Vec<u8>,
+    /// The learned atoms.
+    pub(in crate::packed) dictionary: Vec<u8>,
+    pub(in crate::packed) index: Index,
+}
+
+impl Head {
+    /// A head without tables and index.
+    pub(in crate::packed) fn new(
+        p: &Parameters,
+        most_dc: f64,
+        rest: RestForm,
+        atoms: &WholeAtoms,
+        mean_view: MeanView,
+    ) -> Self {
+        let mut dc_exponent = 0;
+        while most_dc > MOST_DC * f64::from(dc_exponent).exp2() && dc_exponent < MAX_DC_EXPONENT {
+            dc_exponent += 1;
+        }
+        let mut head = Self {
+            with_axes: atoms.with_axes(),
+            dictionary: atoms.write(),
+            dc_exponent,
+            rest,
+            mean_view,
+            frame: Frame {
+                origin: p.origin,
+                cell: p.cell,
+                dc_mean: p.dc_mean,
+                dc_axes: p.dc_axes,
+                ..Frame::default()
+            },
+            value_step: if p.promised > 0.0 { 0.0 } else { p.free_value_step() },
+            promised: p.promised,
+            ..Self::default()
+        };
+        head.integers = Integers::of(p, head.dc_unit());
+        head.complete();
+        head
+    }
+
+    /// The same with interim changes in these steps.
+    pub(in crate::packed) fn with_interim(mut self, [scale, opacity, colour]: [f64; KINDS]) -> Self {
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let step =
+            |x: f64| libm::rint(x * f64::from(1_u32 << VALUE_BITS)).clamp(1.0, f64::from(MOST_STEP)) as u32;
+        self.interim = Some([step(scale), step(opacity), step(colour / self.dc_unit())]);
+        self.complete();
+        self
+    }
+
+    /// The unit of base colours.
+    pub(in crate::packed) fn dc_unit(&self) -> f64 {
+        f64::from_bits((1023 + u64::from(self.dc_exponent)) << 52)
+    }
+
+    /// Fills the fields that follow from others.
+    fn complete(&mut self) {
+        self.frame.dc_unit = f32::from_bits((127 + u32::from(self.dc_exponent)) << 23);
+        let step = |class: usize| match self.promised > 0.0 {
+            true => self.promised,
+            // 2 to the power of the class, which is at most 15.
+            false => self.value_step * f32::from_bits((127 + class as u32) << 23),
+        };
+        self.frame.interim = self.interim.unwrap_or_default();
+        self.frame.value_steps = std::array::from_fn::<f32, { LAST_CLASS as usize + 1 }, _>(step);
+    }
+
+    /// How chunks are coded.
+    pub(in crate::packed) fn form(&self) -> Form {
+        Form { steering: Steering::new(&self.integers), rest: self.rest.clone() }
+    }
+
+    pub(in crate::packed) fn write(&self) -> Vec<u8> {
+        let mut out = Vec::new();
+        put_number(&mut out, self.rest.atoms as u64);
+        let (points, parts) = (&self.mean_view.points, &self.rest.least);
+        let is_promised = self.promised > 0.0;
+        let marks = u8::from(is_promised) | u8::from(self.with_axes) << 1;
+        out.push(points.len() as u8 | (parts.len() as u8) << POINTS_BITS | marks << MARKS);
+        out.push(self.dc_exponent | u8::from(self.interim.is_some()) << EXPONENT_BITS);
+        // The last part ends with 1.
+        out.extend(parts.iter().rev().skip(1).rev().map(|&least| least as u8));
+        self.interim.iter().flatten().for_each(|&step| put_number(&mut out, step.into()));
+        let f = &self.frame;
+        let step = if is_promised { self.promised } else { self.value_step };
+        out.extend(
+            [&f.origin[..], &[f.cell, step], &f.dc_mean].concat().iter().flat_map(|x| x.to_le_bytes()),
+        );
+        out.extend(turn_of(&f.dc_axes).iter().flat_map(|x| x.to_le_bytes()));
+        let softening = (!points.is_empty()).then_some(&self.mean_view.softening);
+        softening.into_iter().chain(points.as_flattened()).for_each(|&x| put_short::<3>(&mut out, x));
+        for step in self.integers.steps {
+            out.extend(step.mantissa.to_le_bytes());
+            out.extend(step.shift.to_le_bytes());
+        }
+        let mut bits = BitWriter::default();
+        self.integers.write(&mut bits);
+        for part in [&bits.finish(), &self.tables, &self.dictionary] {
+            put_number(&mut out, part.len() as u64);
+            out.extend(part);
+        }
+        self.index.write(&mut out);
+        out
+    }
+
+    /// Reads what [`Self::write`] wrote, for rows of `dim` coefficients; `None` for anything else.
+    pub(in crate::packed) fn read(bytes: &[u8], dim: usize) -> Option<Self> {
+        let mut from = ByteReader(bytes);
+        let atoms = from.number32()? as usize;
+        let [flags, exponent] = [from.u8()?, from.u8()?];
+        let (dc_exponent, interim) = (exponent & ((1 << EXPONENT_BITS) - 1), exponent >> EXPONENT_BITS == 1);
+        let points = usize::from(flags & ((1 << POINTS_BITS) - 1));
+        let parts = usize::from(flags >> POINTS_BITS & ((1 << (MARKS - POINTS_BITS)) - 1));
+        let (is_promised, with_axes) = (flags >> MARKS & 1 == 1, flags >> (MARKS + 1) == 1);
+        if with_axes && (dim == 0 || atoms < dim) {
+            return None;
+        }
+        let atoms_can_be = if dim == 0 { atoms == 0 && parts == 0 } else { (1..=MAX_ATOMS).contains(&atoms) };
+        let parts_can_be = dim == 0 || (1..=REST_PARTS).contains(&parts);
+        let within = dc_exponent <= MAX_DC_EXPONENT && points <= MAX_POINTS;
+        if !(atoms_can_be && parts_can_be && within) {
+            return None;
+        }
+        let mut least: Vec<u32> =
+            from.bytes(parts.saturating_sub(1))?.iter().map(|&least| u32::from(least)).collect();
+        least.extend((parts > 0).then_some(1));
+        if !least.is_sorted_by(|a, b| a > b) {
+            return None;
+        }
+        let interim = match interim {
+            false => None,
+            true => Some([from.number32()?, from.number32()?, from.number32()?]),
+        };
+        if interim.iter().flatten().any(|step| !(1..=MOST_STEP).contains(step)) {
+            return None;
+        }
+        let (origin, cell, step) = (from.f32s()?, from.f32()?, from.f32()?);
+        let (value_step, promised) = if is_promised { (0.0, step) } else { (step, 0.0) };
+        let dc_mean = from.f32s()?;
+        let turn: [i16; 4] = from.i16s()?;
+        let dc_axes = axes_of(turn).filter(|axes| turn_of(axes) == turn)?;
+        let mut mean_view = MeanView::default();
+        if points > 0 {
+            mean_view.softening = from.short::<3>()?;
+        }
+        for _ in 0..points {
+            mean_view.points.push([from.short::<3>()?, from.short::<3>()?, from.short::<3>()?]);
+        }
+        // Directions are divided by the softening where there is no distance.
+        if cell <= 0.0 || step <= 0.0 || (points > 0 && mean_view.softening <= 0.0) {
+            return None;
+        }
+        let mut integers = Integers::default();
+        for step in &mut integers.steps {
+            *step = Step { mantissa: from.u16()?, shift: from.u8()?.cast_signed() };
+            if !Step::SHIFTS.contains(&step.shift) {
+                return None;
+            }
+        }
+        let mut part = || {
+            let length = from.number32()? as usize;
+            from.bytes(length)
+        };
+        let mut bits = BitReader::new(part()?);
+        integers.read(&mut bits).filter(|()| bits.exhausted())?;
+        let (tables, dictionary) = (part()?.to_vec(), part()?.to_vec());
+        let mut head = Self {
+            with_axes,
+            dc_exponent,
+            rest: RestForm { dim, atoms, least },
+            interim,
+            mean_view,
+            integers,
+            frame: Frame { origin, cell, dc_mean, dc_axes, ..Frame::default() },
+            value_step,
+            promised,
+            tables,
+            dictionary,
+            index: Index::default(),
+        };
+        head.index = Index::read(&mut from, head.rest.least.len(), interim.is_some())?;
+        head.complete();
+        from.0.is_empty().then_some(head)
+    }
+}

@@ -1,0 +1,322 @@
+//! The index of a file: its layers and their chunks, and the ranges of all chunks in the order of the data.
+
+use super::bytes::{ByteReader, put_number, put_short};
+use super::chunk::LayerForm;
+use super::geometry_syntax::MAX_LEVELS;
+
+/// Most layers of a file.
+const MAX_LAYERS: usize = 8;
+/// Bits of the number of layers.
+const LAYERS_BITS: u32 = 7;
+/// Most Gaussians of a chunk. A decoder needs memory for as many.
+const MAX_CHUNK: usize = 1 << 16;
+/// A Gaussian takes at least this many bits of the base: one for each code of its rotation.
+const LEAST_BITS: u64 = 3;
+
+/// A range of the data of a file.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::packed) struct Range {
+    /// Where it starts in the data.
+    pub(in crate::packed) start: u64,
+    pub(in crate::packed) length: u32,
+    /// CRC-32 of its bytes.
+    pub(in crate::packed) checksum: u32,
+    /// CRC-32 of the integers that it decodes to.
+    pub(in crate::packed) integers: u32,
+}
+
+impl Range {
+    /// Where it ends in the data.
+    pub(in crate::packed) fn end(&self) -> u64 {
+        self.start.saturating_add(self.length.into())
+    }
+}
+
+/// A chunk of a layer.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct Chunk {
+    pub(in crate::packed) layer: usize,
+    /// Number of its first Gaussian in the file.
+    pub(in crate::packed) first: usize,
+    pub(in crate::packed) gaussians: usize,
+    /// The number of the first of its cells. Those of the other Gaussians are not below it, and not above that of the next
+    /// chunk of the layer.
+    pub(in crate::packed) cell: u64,
+    /// Least and largest coordinates of its positions, or some beyond; zeros if it is the only chunk. No decoder needs
+    /// them.
+    pub(in crate::packed) bounds: [[f32; 3]; 2],
+    /// A base, levels of refinement, parts of nonzeros, and interim changes.
+    pub(in crate::packed) ranges: Vec<Range>,
+}
+
+/// A range by the numbers of its chunk and of its kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::packed) struct Place {
+    pub(in crate::packed) chunk: u32,
+    pub(in crate::packed) kind: u8,
+}
+
+/// The layers, chunks and ranges of a file.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct Index {
+    pub(in crate::packed) layers: Vec<LayerForm>,
+    /// Layer by layer.
+    pub(in crate::packed) chunks: Vec<Chunk>,
+    /// All ranges in the order of the data.
+    pub(in crate::packed) order: Vec<Place>,
+}
+
+/// The layers with these levels of refinement.
+pub(in crate::packed) fn layer_forms(levels: &[u8], parts: usize, interim: bool) -> Vec<LayerForm> {
+    let last = levels.len().saturating_sub(1);
+    let form =
+        |(k, &levels): (usize, &u8)| LayerForm { levels: levels.into(), parts, interim: interim && k < last };
+    levels.iter().enumerate().map(form).collect()
+}
+
+impl Index {
+    /// Numbers the Gaussians, places the ranges of all chunks, and widens bounds of chunks to those that are written. `None` if
+    /// there are more Gaussians or bytes than memory counts, or if the order names a range that is not there.
+    pub(in crate::packed) fn place(&mut self) -> Option<()> {
+        let mut first = 0_usize;
+        let is_one = self.chunks.len() == 1;
+        for chunk in &mut self.chunks {
+            chunk.bounds = if is_one { Default::default() } else { widened(chunk.bounds) };
+            chunk.first = first;
+            first = first.checked_add(chunk.gaussians)?;
+        }
+        let mut start = 0_u64;
+        for &place in &self.order {
+            let range = self.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+            range.start = start;
+            start = start.checked_add(range.length.into())?;
+        }
+        Some(())
+    }
+
+    /// Number of Gaussians.
+    pub(in crate::packed) fn gaussians(&self) -> usize {
+        self.chunks.last().map_or(0, |chunk| chunk.first + chunk.gaussians)
+    }
+
+    /// Bytes of all ranges.
+    pub(in crate::packed) fn data_bytes(&self) -> u64 {
+        self.chunks.iter().flat_map(|chunk| &chunk.ranges).map(|range| u64::from(range.length)).sum()
+    }
+
+    /// How the chunks of a layer are coded.
+    pub(in crate::packed) fn layer(&self, layer: usize) -> LayerForm {
+        self.layers.get(layer).copied().unwrap_or_default()
+    }
+
+    /// Where the second layer starts in the data, if there is one.
+    pub(in crate::packed) fn first_layer_end(&self) -> Option<u64> {
+        let second =
+            |place: &&Place| self.chunks.get(place.chunk as usize).is_some_and(|chunk| chunk.layer > 0);
+        let place = self.order.iter().find(second)?;
+        self.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind)).map(|range| range.start)
+    }
+
+    /// The cells of a layer around which the next one is not there, if it has interim changes. `there` says which ranges are.
+    pub(in crate::packed) fn alone(
+        &self,
+        layer: usize,
+        there: impl Fn(&Range) -> bool,
+    ) -> Vec<std::ops::Range<u64>> {
+        let mut alone: Vec<std::ops::Range<u64>> = Vec::new();
+        if !self.layer(layer).interim {
+            return alone;
+        }
+        let mut next = self.chunks.iter().filter(|chunk| chunk.layer == layer + 1).peekable();
+        let mut start = 0;
+        while let Some(chunk) = next.next() {
+            let end = next.peek().map_or(u64::MAX, |chunk| chunk.cell);
+            match alone.last_mut() {
+                _ if chunk.ranges.first().is_some_and(&there) => {}
+                Some(last) if last.end == start => last.end = end,
+                _ => alone.push(start..end),
+            }
+            start = end;
+        }
+        alone
+    }
+
+    /// The chunks of the next layer with cells of chunk `c` or next to them; none if the layer has no interim changes.
+    pub(in crate::packed) fn around(&self, c: usize) -> std::ops::Range<usize> {
+        let Some(chunk) = self.chunks.get(c).filter(|chunk| self.layer(chunk.layer).interim) else {
+            return 0..0;
+        };
+        let end = self.chunks.get(c + 1).filter(|after| after.layer == chunk.layer);
+        let end = end.map_or(u64::MAX, |after| after.cell);
+        let first = self.chunks.partition_point(|other| other.layer <= chunk.layer);
+        let last = self.chunks.partition_point(|other| other.layer <= chunk.layer + 1);
+        let next = self.chunks.get(first..last).unwrap_or_default();
+        // The chunk before the first one that begins beyond the cell may reach it.
+        let from = next.partition_point(|other| other.cell < chunk.cell).saturating_sub(1);
+        let to = next.partition_point(|other| other.cell <= end);
+        first + from..first + to.max(from)
+    }
+
+    /// Whether the ranges lie chunk by chunk in the order of their kinds.
+    fn is_sorted(&self) -> bool {
+        self.order.is_sorted_by_key(|place| (place.chunk, place.kind))
+    }
+
+    pub(in crate::packed) fn write(&self, out: &mut Vec<u8>) {
+        let is_sorted = self.is_sorted();
+        out.push(self.layers.len() as u8 | u8::from(is_sorted) << LAYERS_BITS);
+        out.extend(self.layers.iter().map(|layer| layer.levels as u8));
+        put_number(out, self.chunks.len() as u64);
+        for chunk in &self.chunks {
+            out.push(chunk.layer as u8);
+            put_number(out, chunk.gaussians as u64);
+            put_number(out, chunk.cell);
+            if self.chunks.len() > 1 {
+                chunk.bounds.as_flattened().iter().for_each(|&x| put_short::<2>(out, x));
+            }
+        }
+        for place in &self.order {
+            let chunk = self.chunks.get(place.chunk as usize);
+            let range = chunk.and_then(|chunk| chunk.ranges.get(usize::from(place.kind)));
+            let Range { length, checksum, integers, .. } = range.copied().unwrap_or_default();
+            if !is_sorted {
+                put_number(out, place.chunk.into());
+                out.push(place.kind);
+            }
+            put_number(out, length.into());
+            out.extend([checksum, integers].iter().flat_map(|x| x.to_le_bytes()));
+        }
+    }
+
+    /// Reads what [`Self::write`] wrote for chunks with `parts` parts of nonzeros, and with interim changes in all layers but
+    /// the last if there are any; `None` for anything else.
+    pub(in crate::packed) fn read(from: &mut ByteReader<'_>, parts: usize, interim: bool) -> Option<Self> {
+        let layers = from.u8()?;
+        let (is_sorted, layers) =
+            (layers >> LAYERS_BITS == 1, usize::from(layers & ((1 << LAYERS_BITS) - 1)));
+        let levels = from.bytes(layers)?;
+        if layers > MAX_LAYERS || levels.iter().any(|&levels| usize::from(levels) > MAX_LEVELS) {
+            return None;
+        }
+        let mut index = Self { layers: layer_forms(levels, parts, interim), ..Self::default() };
+        let (mut ranges, mut last) = (0, 0);
+        // Every chunk and every range takes bytes of the index, so their numbers are bounded by its length.
+        let chunks = from.number32()?;
+        for _ in 0..chunks {
+            let (layer, gaussians) = (usize::from(from.u8()?), from.number32()? as usize);
+            let cell = from.number()?;
+            let mut bounds = [[0.0; 3]; 2];
+            if chunks > 1 {
+                for bound in bounds.as_flattened_mut() {
+                    *bound = from.short::<2>()?;
+                }
+            }
+            let form = *index.layers.get(layer)?;
+            // Cells do not fall within a layer, so that those of its chunks do not overlap.
+            let falls = index.chunks.last().is_some_and(|before| before.layer == layer && before.cell > cell);
+            if !(1..=MAX_CHUNK).contains(&gaussians) || layer < last || falls {
+                return None;
+            }
+            let blank = vec![Range::default(); form.ranges()];
+            (ranges, last) = (ranges + blank.len(), layer);
+            index.chunks.push(Chunk { layer, first: 0, gaussians, cell, bounds, ranges: blank });
+        }
+        let mut seen = vec![0_u32; index.chunks.len()];
+        // The places of ranges that are sorted.
+        let mut next = Place { chunk: 0, kind: 0 };
+        for _ in 0..ranges {
+            let place = match is_sorted {
+                true => next,
+                false => Place { chunk: from.number32()?, kind: from.u8()? },
+            };
+            let (length, checksum, integers) = (from.number32()?, from.u32()?, from.u32()?);
+            let last = index.chunks.get(place.chunk as usize)?.ranges.len() - 1;
+            next = match usize::from(place.kind) < last {
+                true => Place { kind: place.kind + 1, ..place },
+                false => Place { chunk: place.chunk + 1, kind: 0 },
+            };
+            let range =
+                index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+            *range = Range { start: 0, length, checksum, integers };
+            // Each range once, and the base of a chunk before its others.
+            let seen = seen.get_mut(place.chunk as usize)?;
+            let bit = 1 << place.kind;
+            if *seen & bit != 0 || (*seen | bit) & 1 == 0 {
+                return None;
+            }
+            *seen |= bit;
+            index.order.push(place);
+        }
+        for chunk in &index.chunks {
+            let bits = u64::from(chunk.ranges.first()?.length) * 8;
+            if chunk.gaussians as u64 * LEAST_BITS > bits {
+                return None;
+            }
+        }
+        if index.is_sorted() != is_sorted {
+            return None;
+        }
+        let bounds: Vec<[[f32; 3]; 2]> = index.chunks.iter().map(|chunk| chunk.bounds).collect();
+        index.place()?;
+        Some(index).filter(|index| index.chunks.iter().map(|chunk| chunk.bounds).eq(bounds))
+    }
+}
+
+/// The bounds of two bytes a number that hold `bounds`.
+fn widened([least, most]: [[f32; 3]; 2]) -> [[f32; 3]; 2] {
+    // The numbers towards zero and away from it.
+    let near = |x: f32| f32::from_bits(x.to_bits() >> 16 << 16);
+    let far = |x: f32| {
+        let wide = f32::from_bits(x.to_bits().wrapping_add(0xffff) >> 16 << 16);
+        if wide.is_finite() { wide } else { near(x) }
+    };
+    [
+        least.map(|x| if x < 0.0 { far(x) } else { near(x) }),
+        most.map(|x| if x < 0.0 { near(x) } else { far(x) }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn index(chunks: usize) -> Index {
+        let chunk = |c: usize| Chunk {
+            gaussians: 100 + c,
+            cell: 1000 * c as u64,
+            bounds: [[-1.01 - c as f32, 0.0, 3.3], [2.2, 1e9, 1e-9]],
+            ranges: vec![Range { length: 300 + c as u32, checksum: 7, integers: 8, start: 0 }; 2],
+            ..Chunk::default()
+        };
+        let place = |chunk: usize, kind| Place { chunk: chunk as u32, kind };
+        let order = (0..2).flat_map(|kind| (0..chunks).map(move |c| place(c, kind))).collect();
+        let mut index =
+            Index { layers: layer_forms(&[0], 1, false), chunks: (0..chunks).map(chunk).collect(), order };
+        index.place().unwrap();
+        index
+    }
+
+    #[test]
+    fn indices_come_back() {
+        for (chunks, bytes) in [(1, 26), (3, 3 + 3 * (1 + 1 + 2 + 12 + 2 * 12) - 1)] {
+            let index = index(chunks);
+            let mut out = Vec::new();
+            index.write(&mut out);
+            assert_eq!(out.len(), bytes);
+            assert_eq!(Index::read(&mut ByteReader(&out), 1, false), Some(index));
+            assert_eq!(Index::read(&mut ByteReader(&out[..bytes - 1]), 1, false), None);
+        }
+    }
+
+    #[test]
+    fn bounds_hold_all_and_have_two_bytes() {
+        let given = [[-1.01, 0.0, 3.3], [2.2, f32::MAX, -1e-9]];
+        let wide = widened(given);
+        assert_eq!(widened(wide), wide);
+        for k in 0..3 {
+            assert!(wide[0][k] <= given[0][k] && given[0][k] - wide[0][k] <= given[0][k].abs() / 128.0);
+            assert!(wide[1][k].is_finite() && wide[1][k] - given[1][k] <= given[1][k].abs() / 128.0);
+        }
+        assert!(wide[1][0] >= given[1][0] && wide[1][2] >= given[1][2]);
+    }
+}

@@ -1,0 +1,350 @@
+//! What steers the decoder: steps, predictions and contexts, in integers that 32 bits hold.
+//!
+//! No product and no sum of these leaves the range of an `i32`, whatever a file holds, so every language computes the same
+//! ones. Floating point only makes values of decoded integers.
+
+use crate::packed::bitstream::bits::{BitReader, BitWriter};
+use crate::packed::bitstream::parameters::{LAST_CLASS, Parameters, TARGETS};
+use crate::packed::entropy::symbols::{LANES, Lanes, each};
+
+/// Logarithms of scales and opacities, and coordinates of base colours, are multiples of 2^-20.
+pub(in crate::packed) const VALUE_BITS: u32 = 20;
+/// Features of predictions are multiples of 2^-9, and so are logarithms of steps, in octaves.
+pub(in crate::packed) const FEATURE_BITS: u32 = 9;
+/// Coefficients are multiples of 2^-12.
+pub(in crate::packed) const COEFFICIENT_BITS: u32 = 12;
+/// Bits by which products of coefficients and features are shifted before they are summed.
+const PRODUCT_SHIFT: u32 = 4;
+/// Largest absolute value of a feature.
+const MOST_FEATURE: i32 = (1 << 14) - 1;
+/// Largest step: 1.5. With larger ones a value is as good as unknown.
+const MOST_STEP: u32 = 3 << (VALUE_BITS - 1);
+/// Bits of the mantissa of a step.
+const MANTISSA_BITS: u32 = 16;
+/// Largest logarithm of a step of a turn: that of 1.2 radians.
+const MOST_TURN: i32 = 135;
+/// Largest absolute value of the sum of a prediction before it is made a value.
+const MOST_SUM: i32 = 1 << 25;
+/// 512 times the binary logarithms of 2.5, the number of coordinates an axis has at a step of one radian, and of pi.
+const DIRECTIONS: i32 = 677;
+const HALF_TURN: i32 = 846;
+/// 512 / ln 2, and 512 times the binary logarithm of 2, the largest step of a position in standard deviations along the
+/// longest axis.
+const OCTAVES_PER_E: i32 = 739;
+const MOST_MOVE: i32 = 512;
+/// Rounds a logarithm of a number of values to bits: 2^n stands for up to 2^n times the root of 2.
+const HALF_BIT: i32 = 255;
+/// Largest number of bits of a coordinate of an axis and of a turn.
+const MOST_AXIS_BITS: i32 = 15;
+/// 2.25 octaves. Cells narrower than 2^-2.25 steps have the first context.
+const FINENESS: i32 = 1152;
+/// The context of the widest cells.
+const LAST_FINENESS: i32 = 23;
+/// A value of 1 as a feature.
+pub(in crate::packed) const ONE: i32 = 1 << FEATURE_BITS;
+
+/// Coefficients of a prediction: a constant, and those of the average, the two classes and the scales.
+pub(in crate::packed) const COEFFICIENTS: usize = 7;
+/// Coefficients of a prediction that are not of scales: of the first scale there are no others.
+const BEFORE_SCALES: usize = 3;
+/// Coefficients of the logarithm of a step: a constant and those of the scales.
+pub(in crate::packed) const SLOPES: usize = 4;
+
+/// A step of class 0: a mantissa below 2^16, times 2 to the power of minus `shift`, as a multiple of 2^-20.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in crate::packed) struct Step {
+    pub(in crate::packed) mantissa: u16,
+    pub(in crate::packed) shift: i8,
+}
+
+/// A mantissa is shifted up by at most as many bits: it is then above the largest step.
+const MOST_SHIFT: i32 = 6;
+
+impl Step {
+    /// Smallest and largest shift.
+    pub(in crate::packed) const SHIFTS: std::ops::RangeInclusive<i8> = -6..=31;
+
+    /// The step nearest to `x`.
+    fn of(x: f64) -> Self {
+        let mut scaled = x * f64::from(1_u32 << (VALUE_BITS - MOST_SHIFT.unsigned_abs()));
+        let mut shift = *Self::SHIFTS.start();
+        while shift < *Self::SHIFTS.end() && scaled < f64::from(1_u32 << (MANTISSA_BITS - 1)) {
+            scaled *= 2.0;
+            shift += 1;
+        }
+        Self { mantissa: rounded(scaled, 1.0, f64::from(u16::MAX)) as u16, shift }
+    }
+
+    /// The step of a class, a multiple of 2^-20.
+    fn at(self, class: u32) -> u32 {
+        let up = class.cast_signed() - i32::from(self.shift);
+        let mantissa = u32::from(self.mantissa);
+        let step = if up >= 0 { mantissa << up.min(MOST_SHIFT) } else { mantissa >> -up };
+        step.clamp(1, MOST_STEP)
+    }
+}
+
+/// The nearest whole number within limits.
+#[expect(clippy::cast_possible_truncation, reason = "clamped")]
+fn rounded(x: f64, least: f64, most: f64) -> i64 {
+    libm::rint(x).clamp(least, most) as i64
+}
+
+/// Low bits of constants, means and logarithms that are zero, and of coefficients. With more precise ones files are no
+/// smaller.
+const CONSTANT_ZEROS: u32 = 2;
+const COEFFICIENT_ZEROS: u32 = 4;
+
+/// The multiple of 2^`zeros` that is nearest to `x`.
+fn round_multiple(x: f64, zeros: u32) -> i16 {
+    let most = f64::from(i16::MAX >> zeros);
+    (rounded(x / f64::from(1_u32 << zeros), -most, most) << zeros) as i16
+}
+
+/// A constant or a mean as a feature.
+fn constant(x: f64) -> i16 {
+    round_multiple(x * f64::from(1_u32 << FEATURE_BITS), CONSTANT_ZEROS)
+}
+
+/// A coefficient as a multiple of 2^-12.
+fn coefficient(x: f64) -> i16 {
+    round_multiple(x * f64::from(1_u32 << COEFFICIENT_BITS), COEFFICIENT_ZEROS)
+}
+
+/// The integers of a file's parameters.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct Integers {
+    /// Logarithm of the side of a cell.
+    pub(in crate::packed) cell: i16,
+    /// Steps of class 0 of the three scales, the opacity and the base colour.
+    pub(in crate::packed) steps: [Step; 5],
+    /// Logarithms of the steps of turns and moves at shape class 0.
+    pub(in crate::packed) turns: [[i16; SLOPES]; 3],
+    pub(in crate::packed) moves: [[i16; SLOPES]; 3],
+    /// Averages where there are no neighbours, as features.
+    pub(in crate::packed) means: [i16; TARGETS],
+    pub(in crate::packed) predictors: [[i16; COEFFICIENTS]; TARGETS],
+}
+
+impl Integers {
+    /// The integers nearest to `p`. Base colours are in units of `dc_unit`.
+    pub(in crate::packed) fn of(p: &Parameters, dc_unit: f64) -> Self {
+        let octaves = |x: f32| libm::log2(f64::from(x));
+        let slopes = |row: [f32; SLOPES]| -> [i16; SLOPES] {
+            std::array::from_fn(|k| match k {
+                0 => constant(f64::from(row[0]) + octaves(p.base[1])),
+                _ => coefficient(f64::from(row[k])),
+            })
+        };
+        let [dc, _, opacity, s0, s1, s2] = p.factors.map(f64::from);
+        let [colour, shape] = p.base.map(f64::from);
+        let steps = [shape * s0, shape * s1, shape * s2, shape * opacity, colour * dc / dc_unit];
+        // A coefficient of features of another unit is divided by it.
+        let unit = |t: usize| if t < 4 { 1.0 } else { dc_unit };
+        let predictors = std::array::from_fn(|t| {
+            std::array::from_fn(|k| {
+                let own = if k == 1 { 1.0 } else { unit(t) };
+                let x = f64::from(p.predictors[t][k]) / own;
+                match k {
+                    0 => constant(x),
+                    // The features of a scale are the scales before it.
+                    _ if k > BEFORE_SCALES + t => 0,
+                    _ => coefficient(x),
+                }
+            })
+        });
+        Self {
+            cell: constant(octaves(p.cell)),
+            steps: steps.map(Step::of),
+            turns: p.rotation.map(slopes),
+            moves: p.position.map(slopes),
+            means: std::array::from_fn(|t| constant(f64::from(p.means[t]) / unit(t))),
+            predictors,
+        }
+    }
+}
+
+/// Bits of the width of a group of numbers.
+const WIDTH_BITS: u32 = 5;
+
+impl Integers {
+    /// The groups of numbers that are written with one width each, with the zeros that all of a group have below.
+    fn groups(&mut self) -> Vec<(Vec<&mut i16>, u32)> {
+        let mut groups = vec![(vec![&mut self.cell], CONSTANT_ZEROS)];
+        for rows in [&mut self.turns, &mut self.moves] {
+            let (mut constants, mut slopes) = (Vec::new(), Vec::new());
+            for [constant, of_scales @ ..] in rows {
+                constants.push(constant);
+                slopes.extend(of_scales);
+            }
+            groups.extend([(constants, CONSTANT_ZEROS), (slopes, COEFFICIENT_ZEROS)]);
+        }
+        groups.push((self.means.iter_mut().collect(), CONSTANT_ZEROS));
+        let mut columns: [Vec<&mut i16>; COEFFICIENTS] = Default::default();
+        for (t, row) in self.predictors.iter_mut().enumerate() {
+            for (k, (column, number)) in columns.iter_mut().zip(row).enumerate() {
+                if k <= BEFORE_SCALES + t {
+                    column.push(number);
+                }
+            }
+        }
+        let zeros = |k: usize| if k == 0 { CONSTANT_ZEROS } else { COEFFICIENT_ZEROS };
+        groups.extend(columns.into_iter().enumerate().map(|(k, column)| (column, zeros(k))));
+        groups
+    }
+
+    /// Writes all but the steps.
+    pub(in crate::packed) fn write(&self, out: &mut BitWriter) {
+        for (group, zeros) in self.clone().groups() {
+            let numbers: Vec<i16> = group.into_iter().map(|number| *number >> zeros).collect();
+            let width = numbers.iter().copied().map(width).max().unwrap_or(0);
+            out.put(WIDTH_BITS, width.into());
+            for number in numbers {
+                out.put(width, u64::from(number.cast_unsigned()) & ((1 << width) - 1));
+            }
+        }
+    }
+
+    /// Reads what [`Self::write`] wrote; `None` for anything else.
+    pub(in crate::packed) fn read(&mut self, from: &mut BitReader<'_>) -> Option<()> {
+        for (group, zeros) in self.groups() {
+            let most = from.take(WIDTH_BITS) as u32;
+            if most + zeros > i16::BITS {
+                return None;
+            }
+            let mut used = 0;
+            for number in group {
+                let unused = i16::BITS - most;
+                let bits = (from.take(most) as u16).checked_shl(unused).unwrap_or(0);
+                let read = bits.cast_signed().checked_shr(unused).unwrap_or(0);
+                used = used.max(width(read));
+                *number = read << zeros;
+            }
+            if used != most {
+                return None;
+            }
+        }
+        Some(())
+    }
+}
+
+/// Bits of a number and its sign; 0 for 0.
+fn width(number: i16) -> u32 {
+    if number == 0 { 0 } else { i16::BITS + 1 - (number ^ (number >> 15)).leading_zeros() }
+}
+
+/// The integers of a file's parameters, prepared for the walk.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Steering {
+    cell: i32,
+    /// Steps of the scales, the opacity and the base colour at each class.
+    steps: [[u32; LAST_CLASS as usize + 1]; 5],
+    turns: [[i32; SLOPES]; 3],
+    moves: [[i32; SLOPES]; 3],
+    pub(in crate::packed) means: [i32; TARGETS],
+    predictors: [[i32; COEFFICIENTS]; TARGETS],
+}
+
+impl Steering {
+    pub(in crate::packed) fn new(p: &Integers) -> Self {
+        Self {
+            cell: p.cell.into(),
+            steps: p.steps.map(|step| std::array::from_fn(|class| step.at(class as u32))),
+            turns: p.turns.map(|row| row.map(i32::from)),
+            moves: p.moves.map(|row| row.map(i32::from)),
+            means: p.means.map(i32::from),
+            predictors: p.predictors.map(|row| row.map(i32::from)),
+        }
+    }
+
+    /// The steps of target `t` at classes from 0 to 15.
+    #[inline(always)]
+    pub(in crate::packed) fn step(&self, t: usize, class: &Lanes<u32>) -> Lanes {
+        let steps = &self.steps[t.min(4)];
+        each(|l| steps[(class[l] & u32::from(LAST_CLASS)) as usize].cast_signed())
+    }
+
+    /// Predictions of target `t`, as values. The features are the average, the two classes and the scales.
+    #[inline(always)]
+    pub(in crate::packed) fn predict(&self, t: usize, features: &[Lanes; COEFFICIENTS - 1]) -> Lanes {
+        let row = &self.predictors[t];
+        let mut sums = [row[0] << (COEFFICIENT_BITS - PRODUCT_SHIFT); LANES];
+        for (p, feature) in row[1..].iter().zip(features) {
+            for l in 0..LANES {
+                sums[l] = sums[l].wrapping_add(p.wrapping_mul(feature[l]) >> PRODUCT_SHIFT);
+            }
+        }
+        const SHIFT: u32 = VALUE_BITS + PRODUCT_SHIFT - FEATURE_BITS - COEFFICIENT_BITS;
+        each(|l| sums[l].clamp(-MOST_SUM, MOST_SUM) << SHIFT)
+    }
+
+    /// Logarithms of steps.
+    #[inline(always)]
+    fn logarithms(row: &[i32; SLOPES], class: &Lanes<u32>, scales: &[Lanes; 3]) -> Lanes {
+        let mut logs = [0; LANES];
+        for l in 0..LANES {
+            let slopes = ((row[1] * scales[0][l]) >> COEFFICIENT_BITS)
+                + ((row[2] * scales[1][l]) >> COEFFICIENT_BITS)
+                + ((row[3] * scales[2][l]) >> COEFFICIENT_BITS);
+            logs[l] = row[0] + (class[l].cast_signed() << FEATURE_BITS) + slopes;
+        }
+        logs
+    }
+
+    /// Bits of a coordinate of the main axis, and of the turn about it, and whether the main axis is the longest.
+    #[inline(always)]
+    pub(in crate::packed) fn axis_bits(
+        &self,
+        class: &Lanes<u32>,
+        scales: &[Lanes; 3],
+    ) -> ([Lanes<u32>; 2], Lanes<bool>) {
+        let [a, b, c] = &self.turns;
+        let log = |row: &[i32; SLOPES]| {
+            let logs = Self::logarithms(row, class, scales);
+            each(|l| logs[l].min(MOST_TURN))
+        };
+        let logs = [log(a), log(b), log(c)];
+        let (mut bits, mut needle) = ([[0; LANES]; 2], [false; LANES]);
+        for l in 0..LANES {
+            needle[l] = scales[0][l] - scales[1][l] >= scales[1][l] - scales[2][l];
+            let (turn, other) = if needle[l] { (logs[0][l], logs[2][l]) } else { (logs[2][l], logs[0][l]) };
+            let pair = (logs[1][l] + other) >> 1;
+            bits[0][l] = bits_for(DIRECTIONS - pair);
+            bits[1][l] = bits_for(HALF_TURN - turn);
+        }
+        (bits, needle)
+    }
+
+    /// Logarithms of the steps of the position along each axis.
+    #[inline(always)]
+    pub(in crate::packed) fn move_logs(&self, class: &Lanes<u32>, scales: &[Lanes; 3]) -> [Lanes; 3] {
+        let most = each(|l| MOST_MOVE + ((scales[0][l] * OCTAVES_PER_E) >> FEATURE_BITS));
+        let log = |row: &[i32; SLOPES]| {
+            let logs = Self::logarithms(row, class, scales);
+            each(|l| logs[l].min(most[l]))
+        };
+        let [a, b, c] = &self.moves;
+        [log(a), log(b), log(c)]
+    }
+
+    /// The context of a step of the position.
+    #[inline(always)]
+    pub(in crate::packed) fn fineness(&self, log: i32) -> u32 {
+        ((self.cell - log + FINENESS) >> (FEATURE_BITS - 1)).clamp(0, LAST_FINENESS).cast_unsigned()
+    }
+}
+
+/// Bits for a number of values whose logarithm this is.
+#[inline(always)]
+fn bits_for(log: i32) -> u32 {
+    ((log + HALF_BIT) >> FEATURE_BITS).clamp(0, MOST_AXIS_BITS).cast_unsigned()
+}
+
+/// A value as a feature.
+#[inline(always)]
+pub(in crate::packed) fn feature(value: i32) -> i32 {
+    (value >> (VALUE_BITS - FEATURE_BITS)).clamp(-MOST_FEATURE, MOST_FEATURE)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,236 @@
+//! Base colours by what is seen on average.
+//!
+//! The base colour of a Gaussian without its SH-rest is the average over all directions. It is seen from few of them, so
+//! files hold the colour that a few points of view see on average. What SH-rest that is there adds to that average is
+//! taken away again. So a Gaussian shows its best colour whether or not its SH-rest is there.
+
+use super::bytes::shortened;
+use super::halves::doubled;
+use crate::packed::decode::chunk_unpack::Nonzero;
+use crate::packed::entropy::symbols::{LANES, Lanes};
+use crate::scene::sh::{C0, CHANNELS, MAX_COEFFICIENTS, ShDegree, rest_basis};
+use crate::scene::splats::Splats;
+use crate::sparse::dictionary::Dictionary;
+use crate::support::maths::{Vec3, at_share};
+use crate::support::parallel::{GAUSSIANS_PER_TASK, map_chunks};
+
+/// Most points of view.
+pub(in crate::packed) const MAX_POINTS: usize = 15;
+/// Longest row of one channel.
+pub(in crate::packed) const MOST: usize = MAX_COEFFICIENTS - 1;
+
+/// The points of view of a file; none if base colours are those of the source.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct MeanView {
+    pub(in crate::packed) points: Vec<Vec3>,
+    /// Distance, in world units, below which directions shrink to nothing.
+    pub(in crate::packed) softening: f32,
+}
+
+/// Softening as a share of the median distance of the points from their middle.
+const SOFTENING: f32 = 0.02;
+/// Least softening, of which the square is a normal number.
+const LEAST_SOFTENING: f32 = 1e-15;
+
+impl MeanView {
+    /// The view from up to [`MAX_POINTS`] points, more of which are left out.
+    pub(in crate::packed) fn new(points: &[Vec3]) -> Self {
+        if points.is_empty() {
+            return Self::default();
+        }
+        let points: Vec<Vec3> =
+            points.iter().take(MAX_POINTS).map(|point| point.map(shortened::<3>)).collect();
+        let middle: Vec3 =
+            std::array::from_fn(|k| points.iter().map(|p| p[k]).sum::<f32>() / points.len() as f32);
+        let far = |p: &Vec3| (0..3).map(|k| (p[k] - middle[k]).powi(2)).sum::<f32>().sqrt();
+        let mut distances: Vec<f32> = points.iter().map(far).collect();
+        distances.sort_by(f32::total_cmp);
+        let softening = shortened::<3>(SOFTENING * at_share(&distances, 0.5));
+        Self { softening: softening.max(shortened::<3>(LEAST_SOFTENING)), points }
+    }
+
+    /// Averages of the basis functions over the directions from all points to `position`, over that of degree 0.
+    #[inline(always)]
+    pub(in crate::packed) fn weights(&self, degree: ShDegree, position: Vec3) -> [f32; MOST] {
+        let mut sums = [0.0; MOST];
+        for point in &self.points {
+            let (x, y, z) = (position[0] - point[0], position[1] - point[1], position[2] - point[2]);
+            let scale = 1.0 / (x * x + y * y + z * z + self.softening * self.softening).sqrt();
+            let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
+            for (sum, b) in sums.iter_mut().zip(basis) {
+                *sum += b;
+            }
+        }
+        let share = 1.0 / (C0 * self.points.len().max(1) as f32);
+        sums.map(|sum| sum * share)
+    }
+
+    /// The base colours of `splats` that files hold.
+    pub(in crate::packed) fn colours(&self, splats: &Splats) -> Vec<Vec3> {
+        if self.points.is_empty() || splats.degree.rest() == 0 {
+            return splats.geometry.dc.clone();
+        }
+        let per_channel = splats.degree.rest_per_channel();
+        let parts = map_chunks(splats.len(), GAUSSIANS_PER_TASK, |range| {
+            let colour = |i: usize| {
+                let weights = self.weights(splats.degree, splats.geometry.positions[i]);
+                let added = seen_row(splats.rest(i), weights.get(..per_channel).unwrap_or_default());
+                std::array::from_fn(|c| splats.geometry.dc[i][c] + added[c])
+            };
+            range.map(colour).collect::<Vec<Vec3>>()
+        });
+        parts.concat()
+    }
+
+    /// Makes `out` [`Self::weights`] of the positions of all lanes, as far as the degree has coefficients.
+    // WebAssembly has few registers, and is slower where it keeps values of several such functions in them.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(in crate::packed) fn lanes(
+        &self,
+        degree: ShDegree,
+        positions: &[Lanes<f32>; 3],
+        out: &mut [Lanes<f32>; MOST],
+    ) {
+        // Where the degree is a constant, all lanes are computed at once.
+        match degree.rest_per_channel() {
+            ..=3 => self.lanes_of::<3>(ShDegree::ONE, positions, out),
+            4..=8 => self.lanes_of::<8>(ShDegree::TWO, positions, out),
+            9..=15 => self.lanes_of::<15>(ShDegree::THREE, positions, out),
+            _ => self.lanes_of::<24>(ShDegree::FOUR, positions, out),
+        }
+    }
+
+    /// [`Self::lanes`] of a degree with `PER_CHANNEL` coefficients a channel.
+    #[inline(always)]
+    fn lanes_of<const PER_CHANNEL: usize>(
+        &self,
+        degree: ShDegree,
+        positions: &[Lanes<f32>; 3],
+        out: &mut [Lanes<f32>; MOST],
+    ) {
+        let mut sums = [[0.0; LANES]; PER_CHANNEL];
+        let softening = self.softening * self.softening;
+        for point in &self.points {
+            for l in 0..LANES {
+                let (x, y, z) =
+                    (positions[0][l] - point[0], positions[1][l] - point[1], positions[2][l] - point[2]);
+                let scale = 1.0 / (x * x + y * y + z * z + softening).sqrt();
+                let basis = rest_basis(degree, [x * scale, y * scale, z * scale]);
+                for k in 0..PER_CHANNEL {
+                    sums[k][l] += basis[k];
+                }
+            }
+        }
+        let share = 1.0 / (C0 * self.points.len().max(1) as f32);
+        for (out, sums) in out.iter_mut().zip(&sums) {
+            for l in 0..LANES {
+                out[l] = sums[l] * share;
+            }
+        }
+    }
+}
+
+/// The atoms of a dictionary with the values of all channels beside each other, to be weighed at once.
+#[derive(Debug, Clone, Default)]
+pub(in crate::packed) struct SeenAtoms {
+    per_channel: usize,
+    /// Of each atom its coefficients, and of these the channels and a zero.
+    rows: Vec<[f32; CHANNELS + 1]>,
+}
+
+impl SeenAtoms {
+    /// Nothing if there are no points of view.
+    pub(in crate::packed) fn new(view: &MeanView, dictionary: &Dictionary) -> Self {
+        let per_channel = dictionary.degree().rest_per_channel();
+        if view.points.is_empty() || per_channel == 0 {
+            return Self::default();
+        }
+        let row = |atom: &[f32]| -> Vec<[f32; CHANNELS + 1]> {
+            let channel = |c: usize, k: usize| atom.get(c * per_channel + k).copied().unwrap_or(0.0);
+            (0..per_channel)
+                .map(|k| std::array::from_fn(|c| if c < CHANNELS { channel(c, k) } else { 0.0 }))
+                .collect()
+        };
+        let rows = dictionary.as_slice().chunks_exact(dictionary.dim()).flat_map(row).collect();
+        Self { per_channel, rows }
+    }
+
+    /// What a code adds to a base colour by the weights of lane `l`. The last number means nothing.
+    ///
+    /// It is called and not inlined: where the last number is known to be unused, three are computed one by one.
+    #[inline(never)]
+    pub(in crate::packed) fn seen(
+        &self,
+        code: &[Nonzero],
+        weights: &[Lanes<f32>; MOST],
+        l: usize,
+    ) -> [f32; CHANNELS + 1] {
+        let l = l % LANES;
+        let mut sums = [0.0; CHANNELS + 1];
+        for nonzero in code {
+            let start = usize::from(nonzero.atom) * self.per_channel;
+            let row = self.rows.get(start..start + self.per_channel).unwrap_or_default();
+            let mut dots = [0.0; CHANNELS + 1];
+            for (channels, weights) in row.iter().zip(weights) {
+                for c in 0..CHANNELS + 1 {
+                    dots[c] += channels[c] * weights[l];
+                }
+            }
+            let value = doubled(nonzero.value);
+            for c in 0..CHANNELS + 1 {
+                sums[c] += value * dots[c];
+            }
+        }
+        sums
+    }
+}
+
+/// What a row adds to a base colour by these weights, of which there are as many as a channel has coefficients.
+#[inline(always)]
+pub(in crate::packed) fn seen_row(row: &[f32], weights: &[f32]) -> [f32; CHANNELS] {
+    let mut sums = [0.0; CHANNELS];
+    for (sum, channel) in sums.iter_mut().zip(row.chunks_exact(weights.len().max(1))) {
+        *sum = channel.iter().zip(weights).fold(0.0, |sum, (a, w)| sum + a * w);
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A point may be where a Gaussian is, and be the only one.
+    #[test]
+    fn weights_are_finite_wherever_points_are() {
+        let degree = ShDegree::THREE;
+        for points in [vec![[1.0, 2.0, 3.0]], vec![[1.0, 2.0, 3.0]; 8], vec![[0.0; 3], [1.0, 2.0, 3.0]]] {
+            let view = MeanView::new(&points);
+            for position in
+                [[1.0, 2.0, 3.0], [0.0; 3], [1e30; 3], [f32::MAX, 0.0, f32::MIN], [1.0, 2.0, 3.000_001]]
+            {
+                assert!(
+                    view.weights(degree, position).iter().all(|w| w.is_finite()),
+                    "{points:?} {position:?}"
+                );
+            }
+        }
+        assert_eq!(MeanView::new(&[]), MeanView::default());
+    }
+
+    /// From far away a point weighs as the basis does in its direction.
+    #[test]
+    fn weights_are_those_of_directions() {
+        let degree = ShDegree::new(2).unwrap();
+        let view = MeanView::new(&[[3.0, 0.0, 0.0], [0.0, -4.0, 0.0]]);
+        let found = view.weights(degree, [0.0; 3]);
+        let (a, b) = (rest_basis(degree, [-1.0, 0.0, 0.0]), rest_basis(degree, [0.0, 1.0, 0.0]));
+        for ((found, a), b) in found.iter().zip(a).zip(b) {
+            assert!((found * C0 - 0.5 * (a + b)).abs() < 1e-3, "{found} {a} {b}");
+        }
+        assert!(
+            seen_row(&[1.0, 0.0, 0.0, 0.0, 2.0, 0.0, 0.0, 0.0, -1.0], &[0.5, 0.25, 0.125])
+                == [0.5, 0.5, -0.125]
+        );
+    }
+}

@@ -1,0 +1,155 @@
+//! What coarse steps leave: for each value one of three finer steps, and the low bits of rotations.
+
+use super::geometry_syntax::{DC, FACTOR, Group, REFINED, coarsened, dropped, factor};
+use super::streams::Stream;
+use crate::packed::bitstream::parameters::TARGETS;
+use crate::packed::entropy::shifts::power;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+
+/// Contexts by the number of coarse steps: none, one, more.
+const BY_COUNT: u32 = 3;
+/// Classes, or finenesses, that contexts are told apart by.
+const CLASSES: u32 = 8;
+/// Classes, and finenesses, of a context.
+const CLASS_WIDTH: u32 = 2;
+const FINENESS_WIDTH: u32 = 3;
+
+/// Codes the refinement of a group from `level` missing levels to one less. Returns `None` for impossible values.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+pub(in crate::packed) fn refine<S: Symbols>(
+    s: &mut S,
+    set: u32,
+    group: &mut Group,
+    level: usize,
+) -> Option<()> {
+    let mut beyond = false;
+    let finer = factor(level - 1);
+    for k in DC..REFINED {
+        // Divisors are constants in each branch: vector registers divide by nothing else.
+        let (stream, class): (_, Lanes<u32>) = match k {
+            DC..TARGETS => (Stream::FineDc, each(|l| group.colour[l] / CLASS_WIDTH)),
+            _ => {
+                let fineness = &group.fineness[k - TARGETS];
+                (Stream::FinePosition, each(|l| fineness[l] / FINENESS_WIDTH))
+            }
+        };
+        let counts = group.counts[k];
+        let wanted = &group.wanted[k];
+        let context: Lanes<u32> =
+            each(|l| BY_COUNT * class[l].min(CLASSES - 1) + counts[l].unsigned_abs().min(BY_COUNT - 1));
+        // Zero is the step towards zero, which is the one that occurs most.
+        let symbols = s.symbols(stream.at(level), context, set, |l| {
+            let rest = coarsened(wanted[l], finer) - FACTOR * counts[l];
+            (if counts[l] < 0 { 1 - rest } else { 1 + rest }).cast_unsigned()
+        });
+        for l in 0..LANES {
+            beyond |= symbols[l] >= FACTOR.cast_unsigned();
+            let rest = symbols[l].cast_signed().wrapping_sub(1);
+            let rest = if counts[l] < 0 { rest.wrapping_neg() } else { rest };
+            group.counts[k][l] = counts[l].wrapping_mul(FACTOR).wrapping_add(rest);
+        }
+    }
+    for k in 0..3 {
+        let full = &group.axis_bits[usize::from(k == 2)];
+        let count = each(|l| dropped(full[l], level) - dropped(full[l], level - 1));
+        let wanted = &group.wanted_rotation[k];
+        let low = s.bits(Stream::Rotation.at(level), count, set, |l| {
+            wanted[l] >> dropped(full[l], level - 1) & ((1 << count[l]) - 1)
+        });
+        for l in 0..LANES {
+            group.rotation[k][l] = group.rotation[k][l].wrapping_mul(power(count[l])) | low[l];
+        }
+    }
+    (!beyond).then_some(())
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::packed::entropy::rans_decoder::SymbolDecoder;
+    use crate::packed::entropy::rans_encoder::SymbolRecorder;
+    use crate::packed::entropy::script::tables_of;
+    use crate::packed::entropy::symbols::has;
+    use crate::packed::entropy::tables::Lookup;
+
+    fn of<const N: usize, T: Copy>(values: &[T], first: usize) -> [Lanes<T>; N] {
+        std::array::from_fn(|k| each_of(values, first + 7 * k))
+    }
+
+    fn each_of<T: Copy>(values: &[T], first: usize) -> Lanes<T> {
+        std::array::from_fn(|l| values[(first + 5 * l) % values.len()])
+    }
+
+    /// A group with the base of what it wants.
+    fn group(levels: usize, wanted: &[i32], codes: &[u32]) -> Group {
+        let axis_bits: [Lanes<u32>; 2] = of(codes, 3);
+        let axis_bits = axis_bits.map(|bits| bits.map(|b| 1 + b % 15));
+        let full = |k: usize| &axis_bits[usize::from(k == 2)];
+        let code: [Lanes<u32>; 3] = of(codes, 11);
+        let wanted_rotation = std::array::from_fn(|k| each(|l| code[k][l] & ((1 << full(k)[l]) - 1)));
+        let wanted: [Lanes; REFINED] = of(wanted, 0);
+        let counts = wanted.map(|lanes| lanes.map(|w| coarsened(w, factor(levels))));
+        let zeros = [0; LANES];
+        Group {
+            number: [0; LANES],
+            cell: [zeros; 3],
+            colour: each_of(codes, 1).map(|c| c % 16),
+            shape: [0; LANES],
+            coarse: [zeros; TARGETS],
+            steps: [zeros; TARGETS],
+            base: counts,
+            counts,
+            rotation: std::array::from_fn(|k| each(|l| wanted_rotation[k][l] >> dropped(full(k)[l], levels))),
+            axis_bits,
+            needle: [false; LANES],
+            moves: [zeros; 3],
+            fineness: of(codes, 2).map(|f: Lanes<u32>| f.map(|f| f % 24)),
+            wanted,
+            wanted_rotation,
+            interim: Default::default(),
+        }
+    }
+
+    fn assert_refined(group: &Group, wants: &Group, set: u32, level: usize) {
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            for k in DC..REFINED {
+                assert_eq!(group.counts[k][l], coarsened(wants.wanted[k][l], factor(level)));
+            }
+            for k in 0..3 {
+                let full = wants.axis_bits[usize::from(k == 2)][l];
+                assert_eq!(group.rotation[k][l], wants.wanted_rotation[k][l] >> dropped(full, level));
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn refinements_lead_to_what_is_wanted(
+            wanted in prop::collection::vec(prop_oneof![-20..20_i32, -1_000_000_000..=1_000_000_000], 20),
+            codes in prop::collection::vec(any::<u32>(), 30),
+            set in 1_u32..1 << LANES,
+            levels in 1..=crate::packed::bitstream::geometry_syntax::MAX_LEVELS,
+        ) {
+            let blank = group(levels, &wanted, &codes);
+            let (mut recorder, mut coded) = (SymbolRecorder::default(), blank.clone());
+            for level in (1..=levels).rev() {
+                refine(&mut recorder, set, &mut coded, level);
+                assert_refined(&coded, &blank, set, level - 1);
+            }
+            recorder.each(|_, symbol| assert!(symbol <= 2), |_, _| ());
+            let (_, tables) = tables_of(&recorder).unwrap();
+            let (range, lookup) = (recorder.finish(&tables, LANES), Lookup::new(&tables));
+            let mut player = SymbolDecoder::new(&lookup, &range, LANES, false).unwrap();
+            let zeros = [0; LANES];
+            let mut decoded = Group { wanted: [zeros; REFINED], wanted_rotation: [[0; LANES]; 3], ..blank.clone() };
+            for level in (1..=levels).rev() {
+                refine(&mut player, set, &mut decoded, level);
+                assert_refined(&decoded, &blank, set, level - 1);
+            }
+            prop_assert!(player.exhausted());
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! SH-rest: the nonzeros of codes, in parts by their size, and exact rows.
+
+use super::streams::{REST_PARTS, Stream};
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each};
+
+/// Colour classes that numbers of nonzeros are told apart by.
+const COUNT_CLASSES: u32 = 12;
+/// Numbers of nonzeros of the part before that contexts are told apart by: none, one, more.
+const BY_BEFORE: u32 = 3;
+/// Colour classes of a context of a later part.
+const CLASS_WIDTH: u32 = 2;
+const LATER_CLASSES: u32 = 8;
+/// Contexts of the size of a first nonzero, by the number of nonzeros, and of later ones, by the size before.
+const FIRST_CONTEXTS: u32 = 8;
+const LATER_CONTEXTS: u32 = 16;
+/// Atoms that a symbol tells apart.
+pub(in crate::packed) const PAGE: u32 = 256;
+/// Gaussians of each lane of which the numbers of nonzeros come first, and then the nonzeros. Lanes have numbers of their
+/// own, which differ less over many Gaussians, so that nearly all lanes are busy.
+pub(in crate::packed) const BLOCK: usize = 64;
+/// Signs that are coded at once.
+const SIGNS: usize = 16;
+/// Marks a nonzero that is not the first one of its Gaussian and part.
+const LATER: u8 = u8::MAX;
+/// Largest size of a nonzero.
+const MAX_SIZE: u32 = 1 << 30;
+
+/// How SH-rest is coded.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::packed) struct RestForm {
+    /// Length of a row; 0 for degree 0.
+    pub(in crate::packed) dim: usize,
+    pub(in crate::packed) atoms: usize,
+    /// Smallest size of each part, falling, at most [`REST_PARTS`]. That of the last part is 1.
+    pub(in crate::packed) least: Vec<u32>,
+}
+
+/// The SH-rest of up to [`BLOCK`] Gaussians of each lane.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Rest {
+    /// Of each Gaussian: the lanes that have one, and their colour classes.
+    sets: Vec<u32>,
+    colours: Vec<Lanes<u32>>,
+    parts: [Part; REST_PARTS],
+    /// Exact rows of each lane, one after the other.
+    rows: Lanes<Vec<f32>>,
+    /// Nonzeros of the first part of the Gaussian before.
+    last: Lanes<u32>,
+    /// Of each nonzero of each lane the context of its size, or [`LATER`].
+    plan: Vec<[u8; LANES]>,
+}
+
+/// One part of the nonzeros of a block.
+#[derive(Debug, Default)]
+struct Part {
+    /// Of each Gaussian the number of nonzeros of each lane.
+    counts: Vec<Lanes<u32>>,
+    /// Of each nonzero of each lane the atom, and the value in steps.
+    atoms: Vec<Lanes<u32>>,
+    values: Vec<Lanes>,
+    /// Number of nonzeros of each lane.
+    totals: Lanes<u32>,
+}
+
+/// Places in the nonzeros of a lane.
+#[derive(Debug, Default, Clone, Copy)]
+pub(in crate::packed) struct Cursor {
+    next: [usize; REST_PARTS],
+    row: usize,
+}
+
+/// The SH-rest of one Gaussian of a part of a block.
+#[derive(Debug)]
+pub(in crate::packed) enum Coded<'r> {
+    Exact(&'r [f32]),
+    /// First nonzero and number of nonzeros.
+    Code(usize, usize),
+}
+
+impl Rest {
+    /// Number of Gaussians of each lane so far.
+    pub(in crate::packed) fn len(&self) -> usize {
+        self.sets.len()
+    }
+
+    /// The lanes that have Gaussian `i` of the block, and their colour classes.
+    #[inline(always)]
+    pub(in crate::packed) fn of(&self, i: usize) -> (u32, &Lanes<u32>) {
+        (self.sets[i], &self.colours[i])
+    }
+
+    /// Adds a Gaussian of each lane in `set`, of these colour classes.
+    #[inline(always)]
+    pub(in crate::packed) fn push(&mut self, set: u32, colours: Lanes<u32>) {
+        self.sets.push(set);
+        self.colours.push(colours);
+    }
+
+    /// Begins the next block.
+    pub(in crate::packed) fn clear(&mut self) {
+        self.sets.clear();
+        self.colours.clear();
+        for part in &mut self.parts {
+            part.counts.clear();
+            part.atoms.clear();
+            part.values.clear();
+            part.totals = [0; LANES];
+        }
+        self.rows.iter_mut().for_each(Vec::clear);
+    }
+
+    /// Numbers of nonzeros and of exact rows of the block.
+    pub(in crate::packed) fn sizes(&self, form: &RestForm) -> (usize, usize) {
+        let nonzeros =
+            self.parts.iter().map(|part| part.totals.iter().map(|&n| n as usize).sum::<usize>()).sum();
+        let rows = self.rows.iter().map(Vec::len).sum::<usize>() / form.dim.max(1);
+        (nonzeros, rows)
+    }
+
+    /// What part `part` holds of Gaussian `i` of lane `l`, in order. Parts that were not coded hold nothing.
+    #[inline(always)]
+    pub(in crate::packed) fn coded(
+        &self,
+        form: &RestForm,
+        part: usize,
+        i: usize,
+        l: usize,
+        cursor: &mut Cursor,
+    ) -> Coded<'_> {
+        let count = self.parts[part].counts.get(i).map_or(0, |counts| counts[l] as usize);
+        if count == form.dim + 1 {
+            let from = cursor.row;
+            cursor.row += form.dim;
+            return Coded::Exact(self.rows[l].get(from..cursor.row).unwrap_or_default());
+        }
+        let from = cursor.next[part];
+        cursor.next[part] += count;
+        Coded::Code(from, count)
+    }
+
+    /// The `count` nonzeros of lane `l` of a part from the one with number `from` on: atoms and values in steps.
+    #[inline(always)]
+    pub(in crate::packed) fn nonzeros(
+        &self,
+        part: usize,
+        from: usize,
+        count: usize,
+        l: usize,
+    ) -> impl Iterator<Item = (u16, i32)> {
+        let part = &self.parts[part];
+        let atoms = part.atoms.get(from..from + count).unwrap_or_default();
+        let values = part.values.get(from..from + count).unwrap_or_default();
+        atoms.iter().zip(values).map(move |(atoms, values)| (atoms[l] as u16, values[l]))
+    }
+
+    /// Number of nonzeros of lane `l`.
+    pub(in crate::packed) fn total(&self, l: usize) -> usize {
+        self.parts.iter().map(|part| part.totals[l] as usize).sum()
+    }
+
+    /// Codes one part of the nonzeros of the block. `targets` holds the Gaussians of each lane. Returns `None` for
+    /// impossible values.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(in crate::packed) fn part<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        targets: Option<&Lanes<Vec<&Target>>>,
+        form: &RestForm,
+        part: usize,
+    ) -> Option<()> {
+        let least = *form.least.get(part)?;
+        let most =
+            part.checked_sub(1).and_then(|before| form.least.get(before)).map_or(MAX_SIZE, |&most| most);
+        // Of each lane the nonzeros that belong to this part.
+        let mut wanted: Lanes<Vec<(u16, i32)>> = Lanes::default();
+        if let Some(targets) = targets {
+            for (wanted, lane) in wanted.iter_mut().zip(targets) {
+                let all = lane.iter().flat_map(|target| &target.code);
+                wanted.extend(all.filter(|(_, value)| (least..most).contains(&value.unsigned_abs())));
+            }
+        }
+        self.counts(s, targets, form, part, least..most)?;
+        let totals = self.totals(form, part);
+        self.parts[part].totals = totals;
+        let count = totals.iter().copied().max().unwrap_or(0) as usize;
+        let pages = form.atoms as u32 > PAGE;
+        let of = |l: usize, j: usize| wanted[l].get(j).copied().unwrap_or_default();
+        let mut last = [0; LANES];
+        let mut beyond = false;
+        for j in 0..count {
+            let set = longer(&totals, j);
+            let plan = self.plan[j];
+            let later: Lanes<u32> = each(|l| u32::from(plan[l] == LATER));
+            let page = match pages {
+                true => s.symbols(Stream::AtomPage.at(0), [part as u32; LANES], set, |l| {
+                    u32::from(of(l, j).0) / PAGE
+                }),
+                false => [0; LANES],
+            };
+            let context = each(|l| 2 * page[l].min(3) + later[l]);
+            let atom = s.symbols(Stream::ATOMS[part].at(0), context, set, |l| u32::from(of(l, j).0) % PAGE);
+            let context = each(|l| match later[l] {
+                0 => u32::from(plan[l]),
+                _ => FIRST_CONTEXTS + last[l].min(LATER_CONTEXTS - 1),
+            });
+            let size = s.integers(Stream::VALUES[part].at(0), context, set, |l| {
+                of(l, j).1.unsigned_abs().wrapping_sub(least)
+            });
+            last = size;
+            let atom = each(|l| PAGE * page[l] + atom[l]);
+            for l in 0..LANES {
+                beyond |= atom[l] >= form.atoms as u32 || size[l] >= most - least;
+            }
+            self.parts[part].atoms.push(atom);
+            self.parts[part].values.push(each(|l| size[l].wrapping_add(least).cast_signed()));
+        }
+        if beyond {
+            return None;
+        }
+        for from in (0..count).step_by(SIGNS) {
+            let taken = each(|l| (totals[l]).saturating_sub(from as u32).min(SIGNS as u32));
+            let signs = s.bits(Stream::VALUES[part].at(0), taken, longer(&totals, from), |l| {
+                (0..taken[l]).fold(0, |bits, k| bits | u32::from(of(l, from + k as usize).1 < 0) << k)
+            });
+            for (k, values) in self.parts[part].values[from..].iter_mut().take(SIGNS).enumerate() {
+                for l in 0..LANES {
+                    let negative = (signs[l] >> k & 1).cast_signed().wrapping_neg();
+                    values[l] = (values[l] ^ negative).wrapping_sub(negative);
+                }
+            }
+        }
+        if part == 0 { self.exact(s, targets, form) } else { Some(()) }
+    }
+
+    /// Codes the numbers of nonzeros.
+    #[cfg_attr(target_arch = "wasm32", inline(never))]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    fn counts<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        targets: Option<&Lanes<Vec<&Target>>>,
+        form: &RestForm,
+        part: usize,
+        sizes: std::ops::Range<u32>,
+    ) -> Option<()> {
+        let escape = form.dim as u32 + 1;
+        let mut beyond = false;
+        for i in 0..self.len() {
+            let (mut set, colour) = (self.sets[i], &self.colours[i]);
+            let context = if part == 0 {
+                each(|l| 2 * colour[l].min(COUNT_CLASSES - 1) + u32::from(self.last[l] > 1))
+            } else {
+                let before = &self.parts[part - 1].counts[i];
+                // Rows that are stored exactly have no later parts.
+                let exact = &self.parts[0].counts[i];
+                for l in 0..LANES {
+                    set &= !(u32::from(exact[l] == escape) << l);
+                }
+                each(|l| {
+                    BY_BEFORE * (colour[l] / CLASS_WIDTH).min(LATER_CLASSES - 1)
+                        + before[l].min(BY_BEFORE - 1)
+                })
+            };
+            let counts = s.integers(Stream::COUNTS[part].at(0), context, set, |l| {
+                let Some(target) = targets.and_then(|targets| targets[l].get(i)) else { return 0 };
+                if part == 0 && !target.exact.is_empty() {
+                    return escape;
+                }
+                target.code.iter().filter(|(_, value)| sizes.contains(&value.unsigned_abs())).count() as u32
+            });
+            for l in 0..LANES {
+                beyond |= counts[l] > escape || (counts[l] == escape && part > 0);
+            }
+            if part == 0 {
+                self.last = each(|l| if counts[l] == escape { 0 } else { counts[l] });
+            }
+            self.parts[part].counts.push(counts);
+        }
+        (!beyond).then_some(())
+    }
+
+    /// Plans the nonzeros of a part, and returns their number in each lane.
+    #[inline(always)]
+    fn totals(&mut self, form: &RestForm, part: usize) -> Lanes<u32> {
+        let escape = form.dim as u32 + 1;
+        let number = |count: u32| if count == escape { 0 } else { count };
+        let mut totals = [0; LANES];
+        for counts in &self.parts[part].counts {
+            for l in 0..LANES {
+                totals[l] += number(counts[l]);
+            }
+        }
+        let most = totals.iter().copied().max().unwrap_or(0) as usize;
+        self.plan.clear();
+        self.plan.resize(most + 1, [LATER; LANES]);
+        let mut next = [0_u32; LANES];
+        for counts in &self.parts[part].counts {
+            for l in 0..LANES {
+                let count = number(counts[l]);
+                // What a Gaussian without nonzeros writes the next one overwrites, or no one reads.
+                self.plan[next[l] as usize][l] = count.wrapping_sub(1).min(FIRST_CONTEXTS - 1) as u8;
+                next[l] += count;
+            }
+        }
+        totals
+    }
+
+    /// Codes the exact rows of the block.
+    fn exact<S: Symbols>(
+        &mut self,
+        s: &mut S,
+        targets: Option<&Lanes<Vec<&Target>>>,
+        form: &RestForm,
+    ) -> Option<()> {
+        let escape = form.dim as u32 + 1;
+        let mut finite = true;
+        for i in 0..self.len() {
+            for l in (0..LANES).filter(|&l| self.parts[0].counts[i][l] == escape) {
+                for k in 0..form.dim {
+                    let own = |_: usize| {
+                        let target = targets.and_then(|targets| targets[l].get(i));
+                        target.and_then(|target| target.exact.get(k)).map_or(0, |v| v.to_bits())
+                    };
+                    let value = f32::from_bits(s.bits(Stream::Value0.at(0), [32; LANES], 1 << l, own)[l]);
+                    finite &= value.is_finite();
+                    self.rows[l].push(value);
+                }
+            }
+        }
+        finite.then_some(())
+    }
+}
+
+/// The lanes whose total is above `j`.
+#[inline(always)]
+fn longer(totals: &Lanes<u32>, j: usize) -> u32 {
+    let mut set = 0;
+    for l in 0..LANES {
+        set |= u32::from(totals[l] as usize > j) << l;
+    }
+    set
+}
+
+const _: () = assert!(COUNT_CLASSES as usize * 2 <= super::streams::CONTEXTS);
+const _: () = assert!((FIRST_CONTEXTS + LATER_CONTEXTS) as usize <= super::streams::CONTEXTS);
+const _: () = assert!(REST_PARTS <= super::streams::CONTEXTS);
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,183 @@
+//! Codes and exact rows come back, odd ones too.
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::script::tables_of;
+use crate::packed::entropy::tables::{Lookup, Tables};
+
+/// The Gaussians of each lane, none more than the first lane has.
+type Scene = Lanes<Vec<Target>>;
+
+fn forms() -> impl Strategy<Value = RestForm> {
+    let least = prop_oneof![Just(vec![1]), Just(vec![6, 1]), Just(vec![12, 6, 1])];
+    let atoms = prop_oneof![Just(1_usize), 2..256_usize, Just(256), Just(257), Just(1024)];
+    (prop_oneof![Just(9_usize), Just(24), Just(72)], atoms, least).prop_map(|(dim, atoms, least)| RestForm {
+        dim,
+        atoms,
+        least,
+    })
+}
+
+/// Codes of up to `dim` nonzeros, some exact rows.
+fn target(form: &RestForm) -> impl Strategy<Value = Target> + use<> {
+    let size = prop_oneof![6 => 1..20_u32, 1 => 1..MAX_SIZE, 1 => Just(MAX_SIZE - 1)];
+    let value = (size, any::<bool>())
+        .prop_map(|(size, negative)| if negative { -size.cast_signed() } else { size.cast_signed() });
+    let (dim, last) = (form.dim, u16::try_from(form.atoms - 1).unwrap());
+    let count = prop_oneof![4 => 0..4_usize, 1 => 0..=dim, 1 => Just(dim)];
+    let pairs = prop::collection::vec((0..=last, value), dim);
+    let finite = prop::num::f32::NORMAL | prop::num::f32::SUBNORMAL | prop::num::f32::ZERO;
+    let exact = prop::option::weighted(0.1, prop::collection::vec(finite, dim));
+    let parts = (count, pairs, exact, prop::array::uniform2(0_u8..16));
+    parts.prop_map(|(count, mut code, exact, classes)| {
+        code.truncate(if exact.is_some() { 0 } else { count });
+        let mut target = Target::default();
+        (target.classes, target.code, target.exact) = (classes, code, exact.unwrap_or_default());
+        target
+    })
+}
+
+fn scenes() -> impl Strategy<Value = (RestForm, Scene)> {
+    let scene = |form: RestForm| {
+        let lane = prop::collection::vec(target(&form), 0..10);
+        (Just(form), prop::collection::vec(lane, LANES))
+    };
+    forms().prop_flat_map(scene).prop_map(|(form, mut lanes)| {
+        lanes.sort_by_key(|lane| std::cmp::Reverse(lane.len()));
+        (form, std::array::from_fn(|l| std::mem::take(&mut lanes[l])))
+    })
+}
+
+/// The lanes that have Gaussian `i`.
+fn set(scene: &Scene, i: usize) -> u32 {
+    scene.iter().enumerate().fold(0, |set, (l, lane)| set | u32::from(i < lane.len()) << l)
+}
+
+/// Gaussians of a block. More than one block is coded.
+const FEW: usize = 4;
+
+/// Codes the scene, block after block, or decodes as many Gaussians and hands each to `see`.
+fn code<S: Symbols>(
+    parts: &mut [S],
+    form: &RestForm,
+    scene: &Scene,
+    encoder: bool,
+    mut see: impl FnMut(&Rest, usize),
+) -> Option<()> {
+    let mut rest = Rest::default();
+    let count = scene[0].len();
+    for first in (0..count).step_by(FEW) {
+        rest.clear();
+        let block = first..count.min(first + FEW);
+        for i in block.clone() {
+            let colours = each(|l| scene[l].get(i).map_or(0, |target| target.classes[0].into()));
+            rest.push(set(scene, i), colours);
+        }
+        let of = |l: usize| scene[l].iter().skip(first).take(block.len()).collect();
+        let wanted: Lanes<Vec<&Target>> = std::array::from_fn(of);
+        for (part, s) in parts.iter_mut().enumerate() {
+            rest.part(s, encoder.then_some(&wanted), form, part)?;
+        }
+        see(&rest, first);
+    }
+    Some(())
+}
+
+/// The ranges of all parts, and their tables.
+fn recorded(form: &RestForm, scene: &Scene) -> (Vec<Vec<u8>>, Tables) {
+    let mut parts = vec![SymbolRecorder::default(); form.least.len()];
+    code(&mut parts, form, scene, true, |_, _| ()).unwrap();
+    let all = parts.iter().fold(SymbolRecorder::default(), |all, part| {
+        let lanes = all.entries().iter().zip(part.entries());
+        SymbolRecorder::restore(lanes.map(|(a, b)| [a.as_slice(), b].concat()).collect())
+    });
+    let (_, tables) = tables_of(&all).unwrap();
+    (parts.iter().map(|part| part.finish(&tables, LANES)).collect(), tables)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
+
+    #[test]
+    fn codes_and_rows_come_back((form, scene) in scenes()) {
+        let (ranges, tables) = recorded(&form, &scene);
+        let lookup = Lookup::new(&tables);
+        // Parts that are not there say nothing, and change nothing of those before them.
+        for there in 1..=form.least.len() {
+            let player = |k: usize| SymbolDecoder::new(&lookup, &ranges[k], LANES, false).unwrap();
+            let mut players: Vec<SymbolDecoder<'_>> = (0..there).map(player).collect();
+            let mut seen = 0;
+            code(&mut players, &form, &scene, false, |rest, first| {
+                for (l, lane) in scene.iter().enumerate() {
+                    let mut cursor = Cursor::default();
+                    for (i, target) in lane.iter().skip(first).take(rest.len()).enumerate() {
+                        seen += 1;
+                        for part in 0..form.least.len() {
+                            let most = if part == 0 { MAX_SIZE } else { form.least[part - 1] };
+                            let sizes = form.least[part]..most;
+                            let own = target.code.iter().filter(|(_, v)| sizes.contains(&v.unsigned_abs()));
+                            let expected: Vec<(u16, i32)> = if part < there { own.copied().collect() } else { vec![] };
+                            match rest.coded(&form, part, i, l, &mut cursor) {
+                                Coded::Exact(row) => {
+                                    assert!(part == 0 && !target.exact.is_empty());
+                                    let bits = |row: &[f32]| row.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+                                    assert_eq!(bits(row), bits(&target.exact));
+                                }
+                                Coded::Code(from, count) => {
+                                    assert!(part > 0 || target.exact.is_empty());
+                                    let found: Vec<(u16, i32)> =
+                                        rest.nonzeros(part, from, count, l).collect();
+                                    assert_eq!(found, expected, "part {part} of {there}");
+                                }
+                            }
+                        }
+                    }
+                }
+            })
+            .unwrap();
+            prop_assert_eq!(seen, scene.iter().map(Vec::len).sum::<usize>());
+            prop_assert!(players.iter().all(SymbolDecoder::exhausted));
+        }
+    }
+
+    /// A decoder with fewer atoms, or shorter rows, refuses what it cannot have.
+    #[test]
+    fn what_cannot_be_is_refused((form, scene) in scenes()) {
+        let atoms = scene.iter().flatten().flat_map(|t| &t.code).map(|c| usize::from(c.0)).max();
+        let longest = scene.iter().flatten().map(|t| t.code.len()).max().unwrap_or(0);
+        let (ranges, tables) = recorded(&form, &scene);
+        let lookup = Lookup::new(&tables);
+        let play = |form: &RestForm| {
+            let mut players: Vec<SymbolDecoder<'_>> =
+                ranges.iter().map(|range| SymbolDecoder::new(&lookup, range, LANES, false).unwrap()).collect();
+            code(&mut players, form, &scene, false, |_, _| ())
+        };
+        prop_assert!(play(&form).is_some());
+        if let Some(largest) = atoms.filter(|&a| a > 0 && (form.atoms <= 256 || a > 256)) {
+            let fewer = RestForm { atoms: largest, ..form.clone() };
+            prop_assert!(play(&fewer).is_none());
+        }
+        if form.least.len() == 1 && longest > 2 {
+            let shorter = RestForm { dim: longest - 2, ..form };
+            prop_assert!(play(&shorter).is_none());
+        }
+    }
+}
+
+#[test]
+fn rows_that_are_not_finite_are_refused() {
+    let form = RestForm { dim: 9, atoms: 4, least: vec![6, 1] };
+    for wild in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        let mut scene = Scene::default();
+        let mut exact = vec![1.0; 9];
+        exact[8] = wild;
+        let mut target = Target::default();
+        target.exact = exact;
+        scene[0].push(target);
+        let mut parts = vec![SymbolRecorder::default(); 2];
+        assert!(code(&mut parts, &form, &scene, true, |_, _| ()).is_none(), "{wild}");
+    }
+}

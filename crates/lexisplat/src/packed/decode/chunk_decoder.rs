@@ -1,0 +1,164 @@
+//! Decoding the chunks of a file.
+
+use crate::packed::bitstream::atoms::WholeAtoms;
+use crate::packed::bitstream::chunk::Want;
+use crate::packed::bitstream::head::Head;
+use crate::packed::bitstream::index::{Chunk, Index};
+use crate::packed::bitstream::mean_view::SeenAtoms;
+use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::bitstream::streams::Stream;
+use crate::packed::decode::available_ranges::{Data, DecodeOptions};
+use crate::packed::decode::chunk_unpack::{Refusal, Unpacker};
+use crate::packed::decode::outline::RangeKind;
+use crate::packed::decode::place::{Piece, Place};
+use crate::packed::entropy::tables::{Lookup, Tables};
+use crate::packed::scene::PackedHead;
+use crate::scene::sh::ShDegree;
+use crate::sparse::dictionary::Dictionary;
+use crate::support::crc32;
+use crate::support::error::{Error, FormatError, Result};
+use crate::support::limits::Limits;
+use crate::support::memory_budget::MemoryBudget;
+
+/// What all chunks are decoded with, and where they are.
+#[derive(Debug)]
+pub(in crate::packed) struct BitstreamDecoder {
+    file: String,
+    limits: Limits,
+    head: Head,
+    unpacker: Unpacker,
+    pub(in crate::packed) dictionary_bits: BitCounts,
+}
+
+impl BitstreamDecoder {
+    /// Reads the head.
+    pub(in crate::packed) fn new(packed: &PackedHead) -> Result<Self> {
+        let file = packed.file.clone();
+        let bad = |what: &str| Error::malformed(&file, format!("packed {what}: no encoder writes it"));
+        let head = Head::read(&packed.bytes, packed.degree.rest()).ok_or_else(|| bad("head is damaged"))?;
+        if head.index.gaussians() != packed.gaussians || head.rest.atoms != packed.atoms {
+            return Err(bad("head does not fit the metadata"));
+        }
+        let tables = Tables::read(&head.tables).ok_or_else(|| bad("tables are damaged"))?;
+        let lookup = Lookup::new(&tables);
+        let (dictionary, dictionary_bits) =
+            dictionary(&head, packed.degree).ok_or_else(|| bad("dictionary is damaged"))?;
+        let unpacker = Unpacker {
+            seen_atoms: SeenAtoms::new(&head.mean_view, &dictionary),
+            form: head.form(),
+            frame: head.frame.clone(),
+            mean_view: head.mean_view.clone(),
+            lookup,
+            dictionary,
+        };
+        Ok(Self { file, limits: packed.limits, head, unpacker, dictionary_bits })
+    }
+
+    pub(in crate::packed) fn dictionary(&self) -> &Dictionary {
+        &self.unpacker.dictionary
+    }
+
+    /// Makes no interim changes but of scales from here on.
+    pub(in crate::packed) fn grow_only(&mut self) {
+        let [growth, ..] = self.unpacker.frame.interim;
+        self.unpacker.frame.interim = [growth, 0, 0];
+    }
+
+    /// Layers, chunks and ranges.
+    pub(in crate::packed) fn index(&self) -> &Index {
+        &self.head.index
+    }
+
+    /// Decodes chunk `c` to `place` from the ranges that are in `data`. Escapes are numbered from `first`.
+    #[expect(clippy::too_many_arguments, reason = "what is decoded, from what and where to")]
+    pub(in crate::packed) fn piece(
+        &self,
+        data: Data<'_>,
+        c: usize,
+        first: usize,
+        wish: DecodeOptions,
+        place: &mut Place<'_>,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
+        let damaged =
+            || Error::malformed(&self.file, format!("packed chunk {c} is damaged: no encoder writes it"));
+        let index = &self.head.index;
+        let chunk = index.chunks.get(c).ok_or_else(damaged)?;
+        let form = index.layer(chunk.layer);
+        let alone = index.alone(chunk.layer, |range| data.came(range.start, range.length));
+        let is_wanted = |k| !matches!(RangeKind::of(form, k), RangeKind::Sh(part) if part >= wish.sh_parts);
+        let mut ranges = self.checked(data, c, chunk, is_wanted)?;
+        if alone.is_empty()
+            && !count_bits
+            && !wish.verify
+            && let Some(interim) = ranges.get_mut(form.interim_range())
+        {
+            *interim = None;
+        }
+        let want = Want { sums: wish.verify, bits: count_bits };
+        let piece = self.unpacker.chunk(form, chunk.cell, &alone, &ranges, want, place, budget);
+        let (mut piece, sums) = piece.map_err(|refusal| match refusal {
+            Refusal::Damaged => damaged(),
+            Refusal::Full => budget.full(),
+        })?;
+        for (k, (sum, _)) in sums.iter().zip(&ranges).enumerate().filter(|(_, (_, range))| range.is_some()) {
+            if chunk.ranges.get(k).is_none_or(|range| range.integers != *sum) {
+                let part = format!("the integers of range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+            }
+        }
+        for escape in &mut piece.escapes.gaussians {
+            *escape = u32::try_from(first + *escape as usize).map_err(|_| damaged())?;
+        }
+        let most = place.counts.iter().copied().max().unwrap_or(0);
+        if u64::from(most) > self.limits.nonzeros {
+            let i = place.counts.iter().position(|&count| count == most).unwrap_or(0);
+            self.limits.check_nonzeros(&self.file, chunk.first + i, most.into())?;
+        }
+        if piece.atoms.iter().max().is_some_and(|&atom| usize::from(atom) >= self.dictionary().len()) {
+            return Err(damaged());
+        }
+        Ok(piece)
+    }
+
+    /// The ranges of a chunk that are wanted by their numbers and there, if their checksums hold. Those that follow a missing one
+    /// of their kind are left out.
+    fn checked<'d>(
+        &self,
+        data: Data<'d>,
+        c: usize,
+        chunk: &Chunk,
+        is_wanted: impl Fn(usize) -> bool,
+    ) -> Result<Vec<Option<&'d [u8]>>> {
+        let form = self.head.index.layer(chunk.layer);
+        let mut ranges: Vec<Option<&[u8]>> = Vec::with_capacity(chunk.ranges.len());
+        for (k, range) in chunk.ranges.iter().enumerate() {
+            let is_needed = match RangeKind::of(form, k) {
+                RangeKind::Refinement(1..) | RangeKind::Sh(1..) => ranges.last().is_some_and(Option::is_some),
+                _ => true,
+            };
+            let wanted = data.range(range.start, range.length).filter(|_| is_needed && is_wanted(k));
+            if wanted.is_some_and(|bytes| !data.is_verified() && crc32::hash(bytes) != range.checksum) {
+                let part = format!("range {k} of chunk {c}");
+                return Err(Error::format(&self.file, FormatError::Checksum { part }));
+            }
+            ranges.push(wanted);
+        }
+        Ok(ranges)
+    }
+}
+
+fn dictionary(head: &Head, degree: ShDegree) -> Option<(Dictionary, BitCounts)> {
+    if degree.rest() == 0 {
+        return head.dictionary.is_empty().then(|| (Dictionary::empty(), BitCounts::default()));
+    }
+    let learned = head.rest.atoms.checked_sub(if head.with_axes { degree.rest() } else { 0 })?;
+    let atoms = WholeAtoms::read(&head.dictionary, degree, learned, head.with_axes)?;
+    let mut bits = BitCounts::zeros();
+    bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
+    Some((Dictionary::decoded(degree, atoms.rows())?, bits))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,125 @@
+//! Decoding the chunks of a packed scene, each without the others.
+
+use std::ops::Range;
+
+use super::available_ranges::{Data, DecodeOptions};
+use super::outline::Outline;
+use super::place::{Piece, Place, indices, places};
+use crate::packed::bitstream::Index;
+use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::decode::chunk_decoder::BitstreamDecoder;
+use crate::packed::scene::PackedHead;
+use crate::scene::splats::Geometry;
+use crate::sparse::codes::{SparseCodes, Values};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::error::{Error, Result};
+use crate::support::memory_budget::MemoryBudget;
+
+/// What all chunks of a packed scene are decoded with, and where they are.
+#[derive(Debug)]
+pub(crate) struct Decoder {
+    file: String,
+    /// The chunks that are there, and the Gaussians of each.
+    chunks: Vec<usize>,
+    spans: Vec<Range<usize>>,
+    /// What is made of chunks.
+    pub(crate) wish: DecodeOptions,
+    decoder: Box<BitstreamDecoder>,
+}
+
+impl Decoder {
+    /// Reads what all chunks need from `head`, for data of `whole` bytes of which any ranges will be there.
+    pub(crate) fn new(head: &PackedHead, whole: u64) -> Result<Self> {
+        Self::of_prefix(head, whole, whole)
+    }
+
+    /// The same for data of which only the first `there` bytes are there. Chunks whose base is not are left out.
+    pub(crate) fn of_prefix(head: &PackedHead, there: u64, whole: u64) -> Result<Self> {
+        let decoder = BitstreamDecoder::new(head)?;
+        if decoder.index().data_bytes() != whole {
+            let text = "packed ranges do not cover the data: no encoder writes it";
+            return Err(Error::malformed(&head.file, text));
+        }
+        let (mut chunks, mut spans, mut first) = (Vec::new(), Vec::new(), 0);
+        for (c, chunk) in decoder.index().chunks.iter().enumerate() {
+            if chunk.ranges.first().is_some_and(|range| range.end() <= there) {
+                chunks.push(c);
+                spans.push(first..first + chunk.gaussians);
+                first += chunk.gaussians;
+            }
+        }
+        head.limits.check_gaussians(&head.file, first as u64)?;
+        head.limits.check_atoms(&head.file, head.atoms as u64)?;
+        let (file, wish) = (head.file.clone(), DecodeOptions::default());
+        Ok(Self { file, chunks, spans, wish, decoder: Box::new(decoder) })
+    }
+
+    /// Layers, chunks and ranges of a scene whose data start at `data_start` of the file.
+    pub(crate) fn outline(&self, data_start: u64) -> Outline {
+        Outline::new(self.index(), data_start)
+    }
+
+    /// The same without interim changes but of scales.
+    pub(in crate::packed) fn growing_only(mut self) -> Self {
+        self.decoder.grow_only();
+        self
+    }
+
+    /// The layers, chunks and ranges of the whole scene.
+    pub(in crate::packed) fn index(&self) -> &Index {
+        self.decoder.index()
+    }
+
+    /// The chunks of the next layer around chunk `c` that change what is made of it while they are missing.
+    pub(crate) fn around(&self, c: usize) -> Range<usize> {
+        self.index().around(c)
+    }
+
+    /// The Gaussians of each chunk.
+    pub(crate) fn spans(&self) -> &[Range<usize>] {
+        &self.spans
+    }
+
+    pub(crate) fn dictionary(&self) -> &Dictionary {
+        self.decoder.dictionary()
+    }
+
+    /// Bits that the dictionary took.
+    pub(crate) fn dictionary_bits(&self) -> &BitCounts {
+        &self.decoder.dictionary_bits
+    }
+
+    /// Decodes chunk `c` of those that are there without extras. Escapes are numbered from its start. `budget` already holds
+    /// everything except its codes. Its bits are counted if `count_bits`.
+    pub(crate) fn chunk(
+        &self,
+        data: Data<'_>,
+        c: usize,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<(Geometry, SparseCodes, BitCounts)> {
+        let span = self.spans.get(c).cloned().unwrap_or_default();
+        let (mut g, mut counts) = (Geometry::zeros(span.len()), vec![0; span.len()]);
+        let own = 0..span.len();
+        let mut place = places(&mut g, &mut counts, std::slice::from_ref(&own)).pop().unwrap_or_default();
+        let piece = self.piece(data, c, 0, &mut place, budget, count_bits)?;
+        let (indices, values) = (indices(self.dictionary(), piece.atoms), Values::F16(piece.values));
+        let codes = SparseCodes::part(self.dictionary(), span.start, counts, indices, values, piece.escapes)
+            .map_err(|e| Error::malformed(&self.file, e.to_string()))?;
+        Ok((g, codes, piece.bit_counts))
+    }
+
+    /// Decodes chunk `c` of those that are there to `place`. Escapes are numbered from `first`.
+    pub(in crate::packed) fn piece(
+        &self,
+        data: Data<'_>,
+        c: usize,
+        first: usize,
+        place: &mut Place<'_>,
+        budget: &MemoryBudget<'_>,
+        count_bits: bool,
+    ) -> Result<Piece> {
+        let c = self.chunks.get(c).copied().unwrap_or(usize::MAX);
+        self.decoder.piece(data, c, first, self.wish, place, budget, count_bits)
+    }
+}

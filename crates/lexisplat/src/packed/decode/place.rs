@@ -1,0 +1,70 @@
+//! What a chunk decodes to.
+
+use std::ops::Range;
+
+use half::f16;
+
+use crate::packed::bitstream::stream::BitCounts;
+use crate::scene::splats::Geometry;
+use crate::sparse::codes::{Escapes, Indices};
+use crate::sparse::dictionary::Dictionary;
+use crate::support::maths::Vec3;
+
+/// Where a chunk's geometry goes.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Place<'a> {
+    pub(in crate::packed) positions: &'a mut [Vec3],
+    pub(in crate::packed) dc: &'a mut [Vec3],
+    pub(in crate::packed) opacities: &'a mut [f32],
+    pub(in crate::packed) scales: &'a mut [Vec3],
+    pub(in crate::packed) rotations: &'a mut [[f32; 4]],
+    /// Nonzeros of each Gaussian.
+    pub(in crate::packed) counts: &'a mut [u8],
+}
+
+/// What a chunk holds beside geometry and counts.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Piece {
+    pub(in crate::packed) atoms: Vec<u16>,
+    pub(in crate::packed) values: Vec<f16>,
+    pub(in crate::packed) escapes: Escapes,
+    pub(in crate::packed) bit_counts: BitCounts,
+}
+
+/// Takes the first `count` entries from `values`.
+fn take<'a, T>(values: &mut &'a mut [T], count: usize) -> &'a mut [T] {
+    values.split_off_mut(..count).unwrap_or_default()
+}
+
+/// The places of all chunks, which hold these Gaussians one after the other.
+pub(in crate::packed) fn places<'a>(
+    g: &'a mut Geometry,
+    counts: &'a mut [u8],
+    spans: &[Range<usize>],
+) -> Vec<Place<'a>> {
+    let mut rest = Place {
+        positions: &mut g.positions,
+        dc: &mut g.dc,
+        opacities: &mut g.opacities,
+        scales: &mut g.scales,
+        rotations: &mut g.rotations,
+        counts,
+    };
+    let place = |span: &Range<usize>| Place {
+        positions: take(&mut rest.positions, span.len()),
+        dc: take(&mut rest.dc, span.len()),
+        opacities: take(&mut rest.opacities, span.len()),
+        scales: take(&mut rest.scales, span.len()),
+        rotations: take(&mut rest.rotations, span.len()),
+        counts: take(&mut rest.counts, span.len()),
+    };
+    spans.iter().map(place).collect()
+}
+
+pub(in crate::packed) fn indices(dictionary: &Dictionary, atoms: Vec<u16>) -> Indices {
+    if dictionary.len() <= 256 {
+        Indices::U8(atoms.into_iter().map(|a| a.to_le_bytes()[0]).collect())
+    } else {
+        Indices::U16(atoms)
+    }
+}

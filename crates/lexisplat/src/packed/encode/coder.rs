@@ -1,0 +1,307 @@
+//! Coding of one chunk, and everything that all chunks of a file are coded with.
+
+use half::f16;
+
+use super::appearance::{Appearance, AppearanceChange};
+use super::canonical::{MortonKey, canonical};
+use super::codebook::{Choice, Codebook, Codes, Costs, StopRule, choose, first_atoms, learn};
+use super::pack::PackOptions;
+use crate::packed::bitstream::morton;
+use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::{MeanView, WholeAtoms, seen_row};
+use crate::packed::encode::target::Target;
+use crate::scene::sh::ShDegree;
+use crate::scene::splats::Splats;
+use crate::sparse::codes::reconstruct;
+use crate::sparse::dictionary::Dictionary;
+use crate::sparse::learn::unit_axis;
+use crate::sparse::tally::Tally;
+use crate::support::error::{Error, Result};
+use crate::support::progress::Progress;
+use crate::support::rng::SplitMix64;
+
+/// Largest number of rows to learn a dictionary from.
+pub(in crate::packed) const SAMPLE: usize = 24_576;
+/// Most rows that decide how finely atoms are rounded.
+const ATOM_BITS_SAMPLE: usize = 2048;
+/// Gaussians that pay for one more atom.
+const GAUSSIANS_PER_ATOM: usize = 64;
+/// Largest number of atoms that are learned by default: as many as one byte counts. Files without the fixed atoms have at least
+/// as many learned atoms as a row has coefficients, since fewer do not span the rows.
+const MAX_LEARNED: usize = 256;
+/// Scenes that pay for fewer atoms than this many times the coefficients of a row choose among several numbers of them.
+const CHOICE: usize = 2;
+/// Place of the step of values among the factors of parameters.
+pub(in crate::packed) const VALUES: usize = 1;
+/// Steps of atoms' coefficients are 2^-k for k up to this.
+const MAX_ATOM_BITS: u32 = 14;
+/// Rounding steps of a coefficient of an atom, for each step of an average value.
+const ATOM_STEPS_PER_VALUE: f64 = 10.0;
+/// Step of SH values as a share of a promised tolerance.
+const VALUE_STEP_PER_TOLERANCE: f64 = 0.35;
+/// Share of the squared tolerance that the pursuit may use. The rest is for rounding to f16.
+const TOLERANCE_SHARE: f32 = 0.995;
+/// A row whose code has a larger error than this, the largest f16, is stored exactly, with or without a
+/// promised tolerance.
+const MAX_ERROR: f64 = 65_504.0;
+/// Mixed into the seed of the sample.
+pub(in crate::packed) const SAMPLE_STREAM: u64 = 0x70_61_63_6b;
+
+/// Gaussians in the order of a packed file.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::packed) struct OrderedGaussians<'a> {
+    pub(in crate::packed) splats: &'a Splats,
+    /// For each Gaussian its index in `splats` and its cell.
+    pub(in crate::packed) scene: &'a [MortonKey],
+    /// Colour and shape class of each, in this order.
+    pub(in crate::packed) classes: &'a [[u8; 2]],
+    /// What each shows, in this order, instead of the base colours and opacities of `splats`.
+    pub(in crate::packed) appearances: Option<&'a [Appearance]>,
+    /// By how much each of the first layer is to change while the second is not there, beside its growth.
+    pub(in crate::packed) changes: Option<&'a [AppearanceChange]>,
+}
+
+impl<'a> OrderedGaussians<'a> {
+    /// Gaussians that show what they are.
+    pub(in crate::packed) fn new(splats: &'a Splats, scene: &'a [MortonKey], classes: &'a [[u8; 2]]) -> Self {
+        Self { splats, scene, classes, appearances: None, changes: None }
+    }
+
+    /// Gaussians `range`.
+    pub(in crate::packed) fn part(self, range: std::ops::Range<usize>) -> Self {
+        Self {
+            splats: self.splats,
+            scene: &self.scene[range.clone()],
+            classes: &self.classes[range.clone()],
+            appearances: self.appearances.map(|all| &all[range.clone()]),
+            changes: self.changes,
+        }
+    }
+
+    pub(in crate::packed) fn len(self) -> usize {
+        self.scene.len()
+    }
+
+    fn row(self, i: usize) -> &'a [f32] {
+        self.splats.rest(self.scene[i].index())
+    }
+
+    /// The rows of Gaussians `indices` in units of their value steps, and their colour classes.
+    pub(in crate::packed) fn scaled(
+        self,
+        indices: impl Iterator<Item = usize>,
+        parameters: &Parameters,
+    ) -> (Vec<f32>, Vec<u8>) {
+        let mut rows = Vec::new();
+        let mut classes = Vec::new();
+        for i in indices {
+            let class = self.classes[i][0];
+            let inverse = 1.0 / parameters.value_step(class);
+            rows.extend(self.row(i).iter().map(|x| x * inverse));
+            classes.push(class);
+        }
+        (rows, classes)
+    }
+}
+
+/// Everything that all chunks are coded with.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct ChunkCoder {
+    pub(in crate::packed) parameters: Parameters,
+    pub(in crate::packed) dictionary: Dictionary,
+    pub(in crate::packed) mean_view: MeanView,
+    book: Option<Codebook>,
+    stop: StopRule,
+    tolerance: Option<f64>,
+}
+
+impl ChunkCoder {
+    /// Learns from the Gaussians of `view`, a whole scene, how to code them. Returns also the atoms.
+    pub(in crate::packed) fn new(
+        view: OrderedGaussians<'_>,
+        mut parameters: Parameters,
+        mean_view: MeanView,
+        options: &PackOptions,
+        progress: &dyn Progress,
+    ) -> Result<(Self, WholeAtoms)> {
+        let stop = promise(&mut parameters, options.tolerance);
+        if !parameters.are_usable() {
+            return Err(too_large());
+        }
+        let sample = SplitMix64::new(options.seed ^ SAMPLE_STREAM).shuffled(view.len()).take(SAMPLE);
+        let (rows, classes) = view.scaled(sample, &parameters.for_learning());
+        let learning = Learning { degree: view.splats.degree, total: view.len(), stop, options };
+        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
+        parameters.factors[VALUES] *= step;
+        let coder = Self::learned(parameters, mean_view, &atoms, costs, stop, options.tolerance)?;
+        Ok((coder, atoms))
+    }
+
+    /// A coder that has learned these atoms, and what symbols cost.
+    pub(in crate::packed) fn learned(
+        parameters: Parameters,
+        mean_view: MeanView,
+        atoms: &WholeAtoms,
+        costs: Costs,
+        stop: StopRule,
+        tolerance: Option<f64>,
+    ) -> Result<Self> {
+        let degree = atoms.degree();
+        let dim = degree.rest();
+        let rows = atoms.rows();
+        let book = (dim > 0).then(|| Codebook::new(dim, rows.clone(), costs));
+        let dictionary = if dim > 0 { Dictionary::new(degree, rows)? } else { Dictionary::empty() };
+        Ok(Self { parameters, dictionary, mean_view, book, stop, tolerance })
+    }
+
+    /// The codes of all of `view`; none for scenes without SH-rest.
+    pub(in crate::packed) fn codes(&self, view: OrderedGaussians<'_>) -> Codes {
+        let Some(book) = &self.book else { return Codes::default() };
+        let (rows, classes) = view.scaled(0..view.len(), &self.parameters);
+        book.encode(&rows, &classes, self.stop)
+    }
+
+    /// What is to be coded of all of `view`, and its counts. Base colours are in units of `dc_unit`.
+    pub(in crate::packed) fn targets(
+        &self,
+        view: OrderedGaussians<'_>,
+        codes: &Codes,
+        dc_unit: f64,
+    ) -> Result<(Tally, Vec<Target>)> {
+        let (parameters, dictionary) = (&self.parameters, &self.dictionary);
+        let dim = dictionary.dim();
+        let mut tally = Tally::new(dim);
+        let mut values: Vec<(u16, f16)> = Vec::new();
+        let mut rebuilt = vec![0.0_f32; dim];
+        let mut targets = Vec::with_capacity(view.len());
+        for i in 0..view.len() {
+            let placed = view.scene[i];
+            let mut form = canonical(&view.splats.geometry, placed.index());
+            if let Some(appearances) = view.appearances {
+                let Appearance { dc, log_opacity } = appearances[i];
+                (form.dc, form.log_opacity) = (dc, log_opacity);
+            }
+            let classes = view.classes[i];
+            let centre = parameters.centre(morton::decode(placed.cell).unwrap_or_default());
+            let mut shown = [0.0; 3];
+            let (mut code, mut exact) = (Vec::new(), Vec::new());
+            if dim > 0 {
+                resident(codes.row(i), parameters.value_step(classes[0]), &mut values);
+                let pairs = values.iter().map(|&(atom, value)| (usize::from(atom), value.to_f32()));
+                reconstruct(dictionary, pairs, &mut rebuilt);
+                let row = view.row(i);
+                let squares = row.iter().zip(&rebuilt).map(|(a, b)| (f64::from(*a) - f64::from(*b)).powi(2));
+                let error = squares.sum::<f64>().sqrt();
+                let storable = values.iter().all(|v| v.1.is_finite());
+                if storable && error <= self.tolerance.unwrap_or(MAX_ERROR).min(MAX_ERROR) {
+                    code = codes.row(i).to_vec();
+                    tally.code(values.len(), error, None);
+                } else {
+                    exact = row.to_vec();
+                    tally.escapes += 1;
+                }
+                if !self.mean_view.points.is_empty() {
+                    let weights = self.mean_view.weights(dictionary.degree(), form.position);
+                    let weights = weights.get(..dictionary.degree().rest_per_channel()).unwrap_or_default();
+                    shown = seen_row(if exact.is_empty() { &rebuilt } else { &exact }, weights);
+                }
+            }
+            form.dc = std::array::from_fn(|c| form.dc[c] + shown[c]);
+            let mut target = Target::new(&form, placed.cell, centre, classes, parameters, dc_unit);
+            (target.code, target.exact) = (code, exact);
+            targets.push(target);
+        }
+        Ok((tally, targets))
+    }
+}
+
+/// What a dictionary is learned for.
+pub(in crate::packed) struct Learning<'a> {
+    pub(in crate::packed) degree: ShDegree,
+    /// Number of Gaussians that will be coded.
+    pub(in crate::packed) total: usize,
+    pub(in crate::packed) stop: StopRule,
+    pub(in crate::packed) options: &'a PackOptions,
+}
+
+impl Learning<'_> {
+    /// Learns from a sample of rows, in units of their value steps and in random order, and their colour classes.
+    ///
+    /// # Errors
+    /// [`Error::Cancelled`] if `progress` cancels.
+    pub(in crate::packed) fn dictionary(
+        &self,
+        rows: &[f32],
+        classes: &[u8],
+        progress: &dyn Progress,
+    ) -> Result<Choice> {
+        let Self { degree, total, stop, options } = *self;
+        let dim = degree.rest();
+        if dim == 0 || rows.is_empty() {
+            // A file has at least one atom.
+            let first: Vec<f32> = unit_axis(dim, 0).collect();
+            let atoms = WholeAtoms::new(degree, &first, 0, false);
+            return Ok(Choice { atoms, costs: Costs::initial(1, dim), step: 1.0 });
+        }
+        let pays = (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED);
+        if options.atoms.is_none() && stop == StopRule::Balanced && pays < CHOICE * dim {
+            let bits_of =
+                |rows: &[f32], atoms: &[f32], costs: &Costs| self.atom_bits(rows, classes, atoms, costs);
+            return choose(degree, rows, classes, pays, bits_of, progress);
+        }
+        let first = first_atoms(dim, atoms_to_learn(total, dim, options), rows);
+        let (learned, costs) = learn(dim, rows, classes, first, 0, stop, progress)?;
+        let some = classes.len().min(ATOM_BITS_SAMPLE);
+        let bits = self.atom_bits(&rows[..some * dim], &classes[..some], &learned, &costs);
+        Ok(Choice { atoms: WholeAtoms::new(degree, &learned, bits, false), costs, step: 1.0 })
+    }
+
+    /// How finely atoms are rounded that code these rows. Errors of atoms show more with larger values.
+    fn atom_bits(&self, rows: &[f32], classes: &[u8], atoms: &[f32], costs: &Costs) -> u32 {
+        let book = Codebook::new(self.degree.rest(), atoms.to_vec(), costs.clone());
+        let codes = book.encode(rows, classes, self.stop);
+        let (mut sum, mut count) = (0.0_f64, 1.0_f64);
+        for i in 0..classes.len() {
+            for &(_, value) in codes.row(i) {
+                sum += f64::from(value) * f64::from(value);
+                count += 1.0;
+            }
+        }
+        let wanted = libm::log2(ATOM_STEPS_PER_VALUE * (1.0 + sum / count).sqrt());
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+        let bits = wanted.round().clamp(4.0, f64::from(MAX_ATOM_BITS)) as u32;
+        bits
+    }
+}
+
+/// Sets the step of values that keeps a promised `tolerance`. Returns when a code is good enough.
+pub(in crate::packed) fn promise(parameters: &mut Parameters, tolerance: Option<f64>) -> StopRule {
+    let Some(tol) = tolerance else { return StopRule::Balanced };
+    let step = tol * VALUE_STEP_PER_TOLERANCE;
+    #[expect(clippy::cast_possible_truncation, reason = "a step is f32, and so is a share of the tolerance")]
+    let (step, share) = (
+        step.clamp(f64::from(f32::MIN_POSITIVE), f64::from(f32::MAX)) as f32,
+        (1.0 / VALUE_STEP_PER_TOLERANCE).powi(2) as f32,
+    );
+    parameters.promised = step;
+    StopRule::Error(share * TOLERANCE_SHARE)
+}
+
+/// Number of atoms that a scene of `total` Gaussians learns, if it does not choose among several.
+fn atoms_to_learn(total: usize, dim: usize, options: &PackOptions) -> usize {
+    // More atoms take fewer bits than exact rows to keep a promised tolerance.
+    let fewest = if options.tolerance.is_some() { 2 * dim } else { dim };
+    options.atoms.unwrap_or_else(|| (total / GAUSSIANS_PER_ATOM).min(MAX_LEARNED).max(fewest))
+}
+
+/// A code as it is kept in memory: by ascending atom, values in f16.
+fn resident(code: &[(u16, i32)], step: f32, out: &mut Vec<(u16, f16)>) {
+    out.clear();
+    #[expect(clippy::cast_precision_loss, reason = "f16 keeps less")]
+    out.extend(code.iter().map(|&(atom, value)| (atom, f16::from_f32(value as f32 * step))));
+    out.sort_by_key(|p| p.0);
+}
+
+pub(in crate::packed) fn too_large() -> Error {
+    Error::parameter("values", "too large", "positions and colours whose sums f32 can hold")
+}

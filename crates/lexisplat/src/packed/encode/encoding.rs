@@ -1,0 +1,267 @@
+//! The encoder of packed scenes: chunks are counted, tables made of the counts, and chunks coded with them.
+
+use serde::{Deserialize, Serialize};
+
+use super::alone;
+use super::coder::ChunkCoder;
+use super::layering::Layering;
+use super::pack::PackOptions;
+use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::bitstream::{
+    Chunk, CodedChunk, Form, Head, Index, LayerForm, Place, Range, Stream, WholeAtoms, lanes, stream_of,
+};
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::tables::{ALL_CONTEXTS, Histogram, Lookup, Tables};
+use crate::packed::scene::{PackedHead, UNNAMED};
+use crate::scene::splats::SceneMeta;
+use crate::sparse::model::Record;
+use crate::sparse::tally::{CompressReport, Tally};
+use crate::support::crc32;
+use crate::support::error::{Error, Result};
+use crate::support::limits::Limits;
+use crate::support::spill::{Spill, SpillTo, Woven};
+use crate::support::stopwatch::Stopwatch;
+
+/// What is counted over chunks before any is coded.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(crate) struct Counts {
+    tally: Tally,
+    histograms: Vec<Histogram>,
+    raw_bits: BitCounts,
+}
+
+impl Counts {
+    /// The counts of one chunk or of the dictionary.
+    pub(in crate::packed) fn of<'r>(
+        tally: Tally,
+        ranges: impl IntoIterator<Item = &'r SymbolRecorder>,
+    ) -> Self {
+        let mut histograms = vec![Histogram::default(); ALL_CONTEXTS];
+        let mut raw_bits = BitCounts::zeros();
+        for range in ranges {
+            range.each(
+                |context, symbol| histograms[context].add(symbol),
+                |stream, bits| raw_bits.0[stream] += f64::from(bits),
+            );
+        }
+        Self { tally, histograms, raw_bits }
+    }
+
+    /// Adds the counts of other chunks.
+    pub(in crate::packed) fn add(&mut self, other: &Self) {
+        self.tally.add(&other.tally);
+        self.histograms.iter_mut().zip(&other.histograms).for_each(|(sum, more)| sum.merge(more));
+        self.raw_bits.add(&other.raw_bits);
+    }
+
+    /// Bits of all streams.
+    fn bits(&self, tables: &Tables) -> BitCounts {
+        let mut bit_counts = self.raw_bits.clone();
+        for (context, histogram) in self.histograms.iter().enumerate() {
+            bit_counts.0[stream_of(context) as usize] += tables.bits(context, histogram);
+        }
+        bit_counts
+    }
+}
+
+/// A chunk whose ranges are coded.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::packed) struct Written {
+    pub(in crate::packed) layer: usize,
+    pub(in crate::packed) gaussians: usize,
+    cell: u64,
+    bounds: [[f32; 3]; 2],
+    energy: f64,
+    /// The bytes of each range, and the checksum of its integers.
+    pub(in crate::packed) ranges: Vec<(Vec<u8>, u32)>,
+}
+
+impl Written {
+    pub(in crate::packed) fn new(layer: usize, chunk: &CodedChunk, tables: &Tables) -> Self {
+        let lanes = lanes(chunk.gaussians);
+        let ranges = chunk.ranges.iter().map(|(range, sum)| (range.finish(tables, lanes), *sum));
+        Self {
+            layer,
+            gaussians: chunk.gaussians,
+            cell: chunk.cell,
+            bounds: chunk.bounds,
+            energy: chunk.energy,
+            ranges: ranges.collect(),
+        }
+    }
+
+    /// The same chunk coded with `tables`. Its ranges are coded with those of `lookup`. `None` if no encoder writes them.
+    pub(in crate::packed) fn recoded(
+        &self,
+        form: &Form,
+        layer: LayerForm,
+        lookup: &Lookup,
+        tables: &Tables,
+    ) -> Option<Self> {
+        let own: Vec<&[u8]> = self.ranges.iter().map(|(bytes, _)| bytes.as_slice()).collect();
+        let symbols = form.transcribe(layer, self.gaussians, lookup, &own)?;
+        if !symbols.iter().all(|range| range.is_within(tables)) {
+            return None;
+        }
+        let lanes = lanes(self.gaussians);
+        let coded = symbols.iter().map(|range| range.finish(tables, lanes));
+        let ranges = coded.zip(&self.ranges).map(|(bytes, (_, sum))| (bytes, *sum)).collect();
+        Some(Self { ranges, ..self.clone() })
+    }
+}
+
+/// Takes the next chunk of a layer.
+pub(in crate::packed) type WriteChunk<'a> = dyn FnMut(Written) -> Result<()> + 'a;
+/// Codes all chunks with the tables.
+type CodeChunks<'a> = dyn FnMut(&Tables, &mut WriteChunk<'_>) -> Result<()> + 'a;
+
+/// A scene that is being packed.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Encoding {
+    pub(in crate::packed) coder: ChunkCoder,
+    pub(in crate::packed) layering: Layering,
+    /// The head without tables, dictionary and index.
+    pub(in crate::packed) head: Head,
+    pub(in crate::packed) form: Form,
+    pub(in crate::packed) counts: Counts,
+    learn_seconds: f64,
+    /// Runs since learning began.
+    clock: Stopwatch,
+}
+
+/// A packed scene, its bulk spilled.
+pub(in crate::packed) struct Finished {
+    pub(in crate::packed) head: PackedHead,
+    pub(in crate::packed) data: Woven,
+    pub(in crate::packed) report: CompressReport,
+}
+
+impl Encoding {
+    /// Begins with a coder that has learned since the start of `clock`, and its atoms. `most_dc` is the
+    /// largest coordinate of a base colour.
+    pub(in crate::packed) fn new(
+        (coder, atoms): (ChunkCoder, WholeAtoms),
+        layering: Layering,
+        most_dc: f64,
+        clock: Stopwatch,
+    ) -> Self {
+        let mut counts = Counts::of(Tally::new(coder.dictionary.dim()), []);
+        let rest = layering.rest(coder.dictionary.dim(), coder.dictionary.len());
+        let mean_view = coder.mean_view.clone();
+        let mut head = Head::new(&coder.parameters, most_dc, rest, &atoms, mean_view);
+        if layering.layers() > 1 {
+            head = head.with_interim(alone::STEPS);
+        }
+        counts.raw_bits.0[Stream::Dictionary as usize] = 8.0 * head.dictionary.len() as f64;
+        let form = head.form();
+        Self { coder, layering, head, form, counts, learn_seconds: clock.seconds(), clock }
+    }
+
+    /// Counts all time so far as time spent on learning.
+    pub(in crate::packed) fn end_learning(&mut self) {
+        self.learn_seconds = self.clock.seconds();
+    }
+
+    /// Codes everything, when all chunks of the `gaussians` Gaussians are counted.
+    pub(in crate::packed) fn finish(
+        self,
+        gaussians: usize,
+        options: &PackOptions,
+        meta: SceneMeta,
+        to: SpillTo<'_>,
+        code_chunks: &mut CodeChunks<'_>,
+    ) -> Result<Finished> {
+        let tables = Tables::of(&self.counts)?;
+        let mut ranges = Ranges::new(to)?;
+        code_chunks(&tables, &mut |written| ranges.push(written))?;
+        self.assemble(gaussians, options, meta, &tables, ranges)
+    }
+
+    /// Makes the head of the file, when all chunks of the `gaussians` Gaussians are counted and coded with `tables`.
+    pub(in crate::packed) fn assemble(
+        self,
+        gaussians: usize,
+        options: &PackOptions,
+        meta: SceneMeta,
+        tables: &Tables,
+        ranges: Ranges,
+    ) -> Result<Finished> {
+        let Self { coder, layering, mut head, counts, learn_seconds, clock, .. } = self;
+        let stream_bits = counts.bits(tables).named();
+        let parts = head.rest.least.len();
+        let forms = layering.forms(parts);
+        let Ranges { spill, mut chunks, .. } = ranges;
+        chunks.sort_by_key(|(chunk, _): &(Chunk, f64)| chunk.layer);
+        let (chunks, energies): (Vec<Chunk>, Vec<f64>) = chunks.into_iter().unzip();
+        let order = layering.order(&chunks, &energies, parts);
+        let piece = |place: &Place| {
+            let range = &chunks[place.chunk as usize].ranges[usize::from(place.kind)];
+            (range.start, range.length as usize)
+        };
+        let pieces = order.iter().map(piece).collect();
+        head.index = Index { layers: forms, chunks, order };
+        let too_long = || Error::parameter("data", "too long", "as many bytes as memory counts");
+        head.index.place().ok_or_else(too_long)?;
+        let data = Woven::new(spill.finish()?, pieces);
+        head.tables = tables.write();
+        let record = Record { tolerance: options.tolerance, seed: options.seed, ..Record::default() };
+        let seconds = [learn_seconds, clock.seconds() - learn_seconds];
+        let (record, mut report) = counts.tally.into_report(record, gaussians, None, seconds);
+        report.stream_bits = stream_bits;
+        let head = PackedHead {
+            file: UNNAMED.to_owned(),
+            degree: coder.dictionary.degree(),
+            gaussians,
+            removed: 0,
+            atoms: coder.dictionary.len(),
+            record: record.shortened(),
+            meta,
+            target: None,
+            reached: None,
+            device: None,
+            bytes: head.write(),
+            limits: Limits::default(),
+        };
+        Ok(Finished { head, data, report })
+    }
+}
+
+impl Tables {
+    /// The tables of what was counted.
+    pub(in crate::packed) fn of(counts: &Counts) -> Result<Self> {
+        Self::new(&counts.histograms).ok_or_else(|| Error::parameter("tables", "none", "fewer symbols"))
+    }
+}
+
+/// The coded ranges of chunks, in the order in which they come.
+#[derive(Debug)]
+pub(in crate::packed) struct Ranges {
+    spill: Spill,
+    /// Where the next range starts.
+    at: u64,
+    /// The chunks, with what pictures change by without each. Their ranges say where they start in the spill.
+    chunks: Vec<(Chunk, f64)>,
+}
+
+impl Ranges {
+    /// None yet.
+    pub(in crate::packed) fn new(to: SpillTo<'_>) -> Result<Self> {
+        Ok(Self { spill: Spill::new(to)?, at: 0, chunks: Vec::new() })
+    }
+
+    /// Adds the next chunk of its layer.
+    pub(in crate::packed) fn push(&mut self, written: Written) -> Result<()> {
+        let Written { layer, gaussians, cell, bounds, energy, ranges } = written;
+        let mut chunk = Chunk { layer, gaussians, cell, bounds, ..Chunk::default() };
+        for (bytes, integers) in &ranges {
+            let too_long = |_| Error::parameter("range", bytes.len(), "ranges of less than 4 GiB");
+            let length = u32::try_from(bytes.len()).map_err(too_long)?;
+            let checksum = crc32::hash(bytes);
+            chunk.ranges.push(Range { start: self.at, length, checksum, integers: *integers });
+            self.at += u64::from(length);
+            self.spill.push(bytes)?;
+        }
+        self.chunks.push((chunk, energy));
+        Ok(())
+    }
+}

@@ -1,0 +1,495 @@
+//! Steps and predictors fitted to a scene.
+
+use serde::{Deserialize, Serialize};
+
+use super::canonical::{Canonical, Grid, MortonKey, canonical};
+use super::neighbours::Neighbours;
+use super::octaves::Histogram;
+use crate::packed::bitstream::parameters::{FEATURES, LAST_CLASS, Parameters, TARGETS};
+use crate::packed::bitstream::rounded_axes;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::sh::C0;
+use crate::scene::splats::Geometry;
+use crate::support::maths::{Vec3, at_share};
+
+/// Smallest weight, as a share of the 90th percentile of weights. Other views may show Gaussians that the measured
+/// ones did not.
+const WEIGHT_FLOOR: f64 = 1e-3;
+const FLOOR_QUANTILE: f64 = 0.9;
+/// Weights above this quantile do not make the finest class finer.
+const TOP_QUANTILE: f64 = 0.9995;
+/// Gaussians with weights below this quantile are left out when the dependence of steps on shape is fitted.
+const FIT_QUANTILE: f64 = 0.05;
+/// Added to squared derivatives before their logarithm is taken, as a share of the one by opacity.
+const DERIVATIVE_FLOOR: f64 = 1e-4;
+/// Factors on the steps of colour, SH values, opacity, scale, rotation and position, found by trial. Derivatives
+/// hold for small errors, and the errors of packing are not small (docs/METHOD.md).
+const DC_FACTOR: f32 = 1.6;
+const VALUE_FACTOR: f32 = 1.1;
+const OPACITY_FACTOR: f32 = 1.8;
+const SCALE_FACTOR: f64 = 1.1;
+const ROTATION_FACTOR: f64 = 0.8;
+const POSITION_FACTOR: f64 = 1.12;
+/// Smallest and largest step of class 0. Values around 1 have no finer digits in f32, and with the largest step
+/// a value is as good as unknown.
+const STEPS: [f64; 2] = [1.0 / 16_777_216.0, 1e6];
+/// Keeps the normal equations solvable.
+const RIDGE: f64 = 1e-6;
+/// Growth of the ridge while coefficients are too large.
+const RIDGE_GROWTH: f64 = 4.0;
+/// Largest slope of the logarithm of a step. Files hold slopes below 8.
+const MOST_SLOPE: f64 = 7.9;
+
+/// Everything but the overall step.
+#[derive(Debug, Clone)]
+pub(in crate::packed) struct Fit {
+    pub(in crate::packed) steps: Steps,
+    /// Colour and shape class of each Gaussian before they are rounded.
+    pub(in crate::packed) classes: Vec<[f32; 2]>,
+}
+
+/// Steps and predictors of a scene, but for the overall step.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::packed) struct Steps {
+    pub(in crate::packed) parameters: Parameters,
+    /// How weights become classes of colour and of shape.
+    kinds: [Classes; 2],
+}
+
+impl Fit {
+    /// `scene` is the order of the Gaussians of `geometry`.
+    pub(in crate::packed) fn new(
+        geometry: &Geometry,
+        dc: &[Vec3],
+        sensitivity: &Sensitivity,
+        scene: &[MortonKey],
+        grid: &Grid,
+    ) -> Self {
+        let weights: Vec<[f32; 2]> = scene.iter().map(|g| sensitivity.appearance(g.index())).collect();
+        let kinds = [0, 1].map(|kind| Classes::fit(weights.iter().map(|w| w[kind])));
+        let mut derivatives = Derivatives::default();
+        derivatives.add(geometry, sensitivity, scene);
+        let mut steps = Steps::new(grid, kinds, colour_axes(dc, scene), &derivatives);
+        let classes = steps.classes_of(&weights);
+        let mut predictors = Predictors::default();
+        predictors.add(geometry, dc, scene, &classes, &steps.parameters);
+        predictors.solve(&mut steps.parameters);
+        Self { steps, classes }
+    }
+}
+
+impl Steps {
+    /// Steps without predictors.
+    pub(in crate::packed) fn new(
+        grid: &Grid,
+        kinds: [Classes; 2],
+        (dc_mean, dc_axes): (Vec3, [Vec3; 3]),
+        derivatives: &Derivatives,
+    ) -> Self {
+        let [scale_rows, rotation, position] = derivatives.rows();
+        let parameters = Parameters {
+            origin: grid.origin,
+            cell: grid.cell,
+            factors: [
+                DC_FACTOR / C0,
+                VALUE_FACTOR / C0,
+                OPACITY_FACTOR,
+                // The steps of scales depend on nothing: no scale is decoded before them.
+                single(libm::exp2(scale_rows[0][0])),
+                single(libm::exp2(scale_rows[1][0])),
+                single(libm::exp2(scale_rows[2][0])),
+            ],
+            rotation: rotation.map(|row| row.map(single)),
+            position: position.map(|row| row.map(single)),
+            dc_mean,
+            dc_axes,
+            ..Parameters::default()
+        };
+        Self { parameters, kinds }
+    }
+
+    /// Colour and shape class, before they are rounded, of Gaussians of these sensitivities to colour and opacity.
+    pub(in crate::packed) fn classes_of(&self, weights: &[[f32; 2]]) -> Vec<[f32; 2]> {
+        weights.iter().map(|w| [self.kinds[0].of(w[0]), self.kinds[1].of(w[1])]).collect()
+    }
+
+    /// The parameters for an overall step: about the square root of the mean squared error of pictures
+    /// that one value of one Gaussian may make.
+    pub(in crate::packed) fn with_step(&self, step: f64) -> Parameters {
+        let base = |unit: f64| single((unit * step).clamp(STEPS[0], STEPS[1]));
+        Parameters { base: self.kinds.map(|k| base(k.unit())), ..self.parameters.clone() }
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "parameters are f32 by design")]
+fn single(x: f64) -> f32 {
+    x as f32
+}
+
+fn quantile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    at_share(&sorted, share)
+}
+
+/// Classes of steps: halving from one to the next, in proportion to 1 / sqrt(weight).
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+pub(in crate::packed) struct Classes {
+    /// Added to every weight.
+    floor: f64,
+    /// Half the binary logarithm of the weight of class 0.
+    top: f64,
+}
+
+impl Classes {
+    /// The classes for a scene whose weights are like these.
+    fn fit(weights: impl Iterator<Item = f32>) -> Self {
+        let mut weights: Vec<f64> = weights.map(f64::from).collect();
+        weights.sort_by(f64::total_cmp);
+        Self::of_quantiles(|share| at_share(&weights, share))
+    }
+
+    /// The classes for a scene of which these are the weights.
+    pub(in crate::packed) fn of_histogram(weights: &Histogram) -> Self {
+        Self::of_quantiles(|share| weights.quantile(share).into())
+    }
+
+    /// The classes for weights with these quantiles.
+    fn of_quantiles(quantile: impl Fn(f64) -> f64) -> Self {
+        let floor = (quantile(FLOOR_QUANTILE) * WEIGHT_FLOOR).max(1e-30);
+        let top = 0.5 * libm::log2(quantile(TOP_QUANTILE) + floor);
+        Self { floor, top: top.round() }
+    }
+
+    /// The class of a weight, before it is rounded.
+    fn of(self, weight: f32) -> f32 {
+        single(self.top - 0.5 * libm::log2(f64::from(weight) + self.floor))
+    }
+
+    /// The step of class 0 for an overall step of 1.
+    fn unit(self) -> f64 {
+        libm::exp2(-self.top)
+    }
+}
+
+/// The nearest class.
+pub(in crate::packed) fn rounded(class: f32) -> u8 {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
+    let class = class.round().clamp(0.0, f32::from(LAST_CLASS)) as u8;
+    class
+}
+
+/// Mean base colour and its principal axes, strongest first.
+fn colour_axes(dc: &[Vec3], scene: &[MortonKey]) -> (Vec3, [Vec3; 3]) {
+    let dc = || scene.iter().map(|g| dc[g.index()]);
+    let n = scene.len().max(1) as f64;
+    let mean: Vec3 = std::array::from_fn(|c| single(dc().map(|dc| f64::from(dc[c])).sum::<f64>() / n));
+    let deviations: Vec<f32> =
+        dc().flat_map(|dc| std::array::from_fn::<f32, 3, _>(|c| dc[c] - mean[c])).collect();
+    (mean, rounded_of(&crate::sparse::learn::principal_axes(3, &deviations)))
+}
+
+/// Axes as a file holds them.
+fn rounded_of(axes: &[Vec<f64>]) -> [Vec3; 3] {
+    let mut out = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    for (row, axis) in out.iter_mut().zip(axes) {
+        *row = std::array::from_fn(|c| single(axis[c]));
+    }
+    rounded_axes(&out)
+}
+
+/// Sums of base colours and of their products.
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
+pub(in crate::packed) struct ColourMoments {
+    count: u64,
+    sums: [f64; 3],
+    products: [[f64; 3]; 3],
+}
+
+impl ColourMoments {
+    pub(in crate::packed) fn add(&mut self, dc: &[Vec3]) {
+        self.count += dc.len() as u64;
+        for dc in dc.iter().map(|dc| dc.map(f64::from)) {
+            for i in 0..3 {
+                self.sums[i] += dc[i];
+                for j in 0..3 {
+                    self.products[i][j] += dc[i] * dc[j];
+                }
+            }
+        }
+    }
+
+    /// Adds the sums of other Gaussians.
+    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        for i in 0..3 {
+            self.sums[i] += other.sums[i];
+            for j in 0..3 {
+                self.products[i][j] += other.products[i][j];
+            }
+        }
+    }
+
+    /// Mean base colour and its principal axes, strongest first.
+    pub(in crate::packed) fn axes(&self) -> (Vec3, [Vec3; 3]) {
+        let n = self.count.max(1) as f64;
+        let mean = self.sums.map(|sum| sum / n);
+        let about = |i: usize, j: usize| self.products[i][j] - self.sums[i] * mean[j];
+        let moments = (0..3).map(|i| (0..3).map(|j| about(i, j)).collect()).collect();
+        (mean.map(single), rounded_of(&crate::sparse::learn::axes_of_moments(moments)))
+    }
+}
+
+/// What the binary logarithm of the steps of scaling, turning and moving along each axis, relative to the step of the
+/// opacity, is as a linear function of 1 and the scales. The steps of scaling are constant.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::packed) struct Derivatives([[Equations<4>; 3]; 3]);
+
+impl Default for Derivatives {
+    fn default() -> Self {
+        Self([[Equations::NONE; 3]; 3])
+    }
+}
+
+impl Derivatives {
+    /// Adds the Gaussians of `scene`, but those of the smallest weights.
+    pub(in crate::packed) fn add(
+        &mut self,
+        geometry: &Geometry,
+        sensitivity: &Sensitivity,
+        scene: &[MortonKey],
+    ) {
+        let weights: Vec<f64> = sensitivity.opacity.iter().map(|&w| f64::from(w)).collect();
+        let least = quantile(&weights, FIT_QUANTILE).max(1e-30);
+        for placed in scene.iter().filter(|g| weights[g.index()] > least) {
+            let by_opacity = weights[placed.index()];
+            let g = canonical(geometry, placed.index());
+            let by_axis = by_axis(sensitivity, placed.index(), &g);
+            let scales = g.scales.map(f64::from);
+            for (kind, equations) in self.0.iter_mut().enumerate() {
+                // Positions are measured in standard deviations for the floor.
+                let unit = if kind == POSITION { libm::exp(-2.0 * scales[0]) } else { 1.0 };
+                let features = match kind {
+                    SCALE => [1.0, 0.0, 0.0, 0.0],
+                    _ => [1.0, scales[0], scales[1], scales[2]],
+                };
+                for (by_axis, equations) in by_axis[kind].iter().zip(equations) {
+                    let by_axis = f64::from(by_axis.max(0.0)) + DERIVATIVE_FLOOR * by_opacity * unit;
+                    equations.add(features, -0.5 * libm::log2(by_axis / by_opacity));
+                }
+            }
+        }
+    }
+
+    /// Adds the sums of other Gaussians.
+    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+        let own = self.0.as_flattened_mut().iter_mut();
+        own.zip(other.0.as_flattened()).for_each(|(sum, more)| sum.merge(more));
+    }
+
+    fn rows(&self) -> [[[f64; 4]; 3]; 3] {
+        let rows = |kind: usize, factor: f64| {
+            std::array::from_fn(|axis| {
+                let mut row = self.0[kind][axis].solve_within(MOST_SLOPE);
+                row[0] += libm::log2(factor);
+                row
+            })
+        };
+        [rows(SCALE, SCALE_FACTOR), rows(ROTATION, ROTATION_FACTOR), rows(POSITION, POSITION_FACTOR)]
+    }
+}
+
+/// Indices of the derivatives by an axis.
+const SCALE: usize = 0;
+const ROTATION: usize = 1;
+const POSITION: usize = 2;
+
+/// Sensitivity of Gaussian `i` to scaling, turning and moving along each of its axes in canonical order.
+fn by_axis(sensitivity: &Sensitivity, i: usize, g: &Canonical) -> [Vec3; 3] {
+    let p = sensitivity.position[i];
+    let along = |a: Vec3| {
+        p[0] * a[0] * a[0]
+            + p[3] * a[1] * a[1]
+            + p[5] * a[2] * a[2]
+            + 2.0 * (p[1] * a[0] * a[1] + p[2] * a[0] * a[2] + p[4] * a[1] * a[2])
+    };
+    [g.order.map(|k| sensitivity.scale[i][k]), g.order.map(|k| sensitivity.rotation[i][k]), g.axes.map(along)]
+}
+
+/// The predictions of the values of a scene before they are rounded.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in crate::packed) struct Predictors {
+    count: u64,
+    sums: [f64; TARGETS],
+    equations: [Equations<FEATURES>; TARGETS],
+}
+
+impl Default for Predictors {
+    fn default() -> Self {
+        Self { count: 0, sums: [0.0; TARGETS], equations: [Equations::NONE; TARGETS] }
+    }
+}
+
+impl Predictors {
+    /// Adds the Gaussians of `scene`, each beside those before it, with their classes before they are rounded.
+    pub(in crate::packed) fn add(
+        &mut self,
+        geometry: &Geometry,
+        dc: &[Vec3],
+        scene: &[MortonKey],
+        classes: &[[f32; 2]],
+        parameters: &Parameters,
+    ) {
+        self.count += scene.len() as u64;
+        let mut neighbours = Neighbours::default();
+        for (placed, class) in scene.iter().zip(classes) {
+            let mut g = canonical(geometry, placed.index());
+            g.dc = dc[placed.index()];
+            let coordinates = parameters.dc_coordinates(g.dc);
+            let values: [f32; TARGETS] = [
+                g.scales[0],
+                g.scales[1],
+                g.scales[2],
+                g.log_opacity,
+                coordinates[0],
+                coordinates[1],
+                coordinates[2],
+            ];
+            for (sum, value) in self.sums.iter_mut().zip(values) {
+                *sum += f64::from(value);
+            }
+            if let Some(around) = neighbours.average(g.position, 0.5 * parameters.cell) {
+                for (t, equations) in self.equations.iter_mut().enumerate() {
+                    let [colour, shape] = class.map(|class| f32::from(rounded(class)));
+                    let known = |k: usize| if t > k { values[k] } else { 0.0 };
+                    let features = [1.0, around[t], colour, shape, known(0), known(1), known(2)];
+                    equations.add(features.map(f64::from), f64::from(values[t]));
+                }
+            }
+            neighbours.push(g.position, values);
+        }
+    }
+
+    /// Adds the sums of other Gaussians.
+    pub(in crate::packed) fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.sums.iter_mut().zip(other.sums).for_each(|(sum, more)| *sum += more);
+        self.equations.iter_mut().zip(&other.equations).for_each(|(sum, more)| sum.merge(more));
+    }
+
+    /// Puts the predictions into `parameters`.
+    pub(in crate::packed) fn solve(&self, parameters: &mut Parameters) {
+        let n = self.count.max(1) as f64;
+        parameters.means = self.sums.map(|sum| single(sum / n));
+        for (row, equations) in parameters.predictors.iter_mut().zip(&self.equations) {
+            *row = equations.solve().map(single);
+        }
+    }
+}
+
+/// Least squares by normal equations.
+#[derive(Debug, Clone, Copy)]
+struct Equations<const N: usize> {
+    matrix: [[f64; N]; N],
+    right: [f64; N],
+}
+
+impl<const N: usize> Serialize for Equations<N> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        (self.matrix.as_flattened(), self.right.as_slice()).serialize(serializer)
+    }
+}
+
+impl<'de, const N: usize> Deserialize<'de> for Equations<N> {
+    fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let (matrix, right) = <(Vec<f64>, Vec<f64>)>::deserialize(deserializer)?;
+        let (rows, rest) = matrix.as_chunks::<N>();
+        match (rows.try_into(), right.try_into(), rest) {
+            (Ok(matrix), Ok(right), []) => Ok(Self { matrix, right }),
+            _ => Err(serde::de::Error::custom("equations of another number of unknowns")),
+        }
+    }
+}
+
+impl<const N: usize> Equations<N> {
+    const NONE: Self = Self { matrix: [[0.0; N]; N], right: [0.0; N] };
+
+    fn add(&mut self, features: [f64; N], value: f64) {
+        for i in 0..N {
+            for j in 0..N {
+                self.matrix[i][j] += features[i] * features[j];
+            }
+            self.right[i] += features[i] * value;
+        }
+    }
+
+    /// Adds the sums of other equations.
+    fn merge(&mut self, other: &Self) {
+        let own = self.matrix.as_flattened_mut().iter_mut().chain(&mut self.right);
+        own.zip(other.matrix.as_flattened().iter().chain(&other.right)).for_each(|(sum, more)| *sum += more);
+    }
+
+    /// The coefficients, those but the first at most `most` in size. Features that hardly vary, or together, have large ones
+    /// that a file cannot hold; with them cut off, what they are to cancel would stay.
+    fn solve_within(&self, most: f64) -> [f64; N] {
+        let mut ridge = RIDGE;
+        loop {
+            let found = self.solve_with(ridge);
+            if found.iter().skip(1).all(|x| x.abs() <= most) || ridge >= 1.0 {
+                return found;
+            }
+            ridge *= RIDGE_GROWTH;
+        }
+    }
+
+    /// The coefficients; 0 for features that are always 0.
+    fn solve(&self) -> [f64; N] {
+        self.solve_with(RIDGE)
+    }
+
+    fn solve_with(&self, ridge: f64) -> [f64; N] {
+        let (mut m, mut r) = (self.matrix, self.right);
+        let scale = (0..N).map(|i| m[i][i]).fold(1e-30, f64::max);
+        for (i, row) in m.iter_mut().enumerate() {
+            row[i] += ridge * (row[i] + 1e-6 * scale);
+        }
+        for c in 0..N {
+            let pivot = m[c];
+            if pivot[c] <= 0.0 {
+                continue;
+            }
+            let right = r[c];
+            for i in c + 1..N {
+                let factor = m[i][c] / pivot[c];
+                for (value, p) in m[i].iter_mut().zip(&pivot) {
+                    *value -= factor * p;
+                }
+                r[i] -= factor * right;
+            }
+        }
+        let mut x = [0.0; N];
+        for c in (0..N).rev() {
+            let known: f64 = (c + 1..N).map(|j| m[c][j] * x[j]).sum();
+            x[c] = if m[c][c] > 0.0 { (r[c] - known) / m[c][c] } else { 0.0 };
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scales of few kinds, which differ together but for a little.
+    #[test]
+    fn coefficients_of_features_that_vary_together_are_small() {
+        let mut equations = Equations::<4>::NONE;
+        for i in 0..60 {
+            let (x, noise) = (f64::from(i % 3), 1e-2 * f64::from(i * 7 % 5));
+            equations.add([1.0, x, x + noise, 2.0 * x - noise], x + 50.0 * noise);
+        }
+        assert!(equations.solve().iter().any(|x| x.abs() > MOST_SLOPE));
+        let found = equations.solve_within(MOST_SLOPE);
+        assert!(found.iter().skip(1).all(|x| x.abs() <= MOST_SLOPE), "{found:?}");
+    }
+}

@@ -1,0 +1,251 @@
+//! From a scene to a packed file.
+
+use std::borrow::Borrow;
+
+use serde::{Deserialize, Serialize};
+
+use super::canonical::{Grid, MortonKey};
+use super::fit::Fit;
+use super::floor::Floor;
+use super::layering::LEAST_LAYERED;
+use super::quantised::{Fitted, Gaussians, Quantised};
+use super::removal::Weights;
+use crate::packed::bitstream::MeanView;
+use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::scene::Packed;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::{Splats, all_finite};
+use crate::sparse::tally::CompressReport;
+use crate::support::builder::builder_methods;
+use crate::support::error::{Error, Result};
+use crate::support::limits::{Limits, MAX_ATOMS, MAX_GAUSSIANS};
+use crate::support::maths::at_share;
+use crate::support::progress::Progress;
+
+/// Expected PSNR at an overall step of [`EXPECTED_STEP`] over the root of the number of Gaussians. This and the
+/// next three constants are fitted to held-out views of the models in docs/METHOD.md, which they miss by up to
+/// 3 dB.
+const EXPECTED_DB: f64 = 40.0;
+const EXPECTED_STEP: f64 = 2.3e-3;
+/// Growth of the PSNR when the step halves, and the growth of that growth.
+const DB_PER_OCTAVE: f64 = 4.5;
+const DB_PER_OCTAVE_2: f64 = 0.15;
+/// Largest PSNR that is expected, in dB.
+const MOST_DB: f64 = 100.0;
+
+/// How to pack.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct PackOptions {
+    /// Un-squared L2 norm that no Gaussian's SH-rest error may exceed. Default none: SH are then as exact as
+    /// pictures need.
+    pub tolerance: Option<f64>,
+    /// Atoms to learn, 1 to 1024; `None` for as many as the scene pays for.
+    pub atoms: Option<usize>,
+    /// Store each Gaussian's place in the source. Then none is left out.
+    pub keep_order: bool,
+    /// Leave no Gaussian out, and keep base colours and opacities. A tolerance does so too.
+    pub keep_all: bool,
+    /// Seed of the learning sample.
+    pub seed: u64,
+    /// Up to 15 points that the scene is seen from. Base colours are then those that are seen from there on average, so
+    /// that they are right without SH-rest too.
+    pub viewpoints: Vec<[f32; 3]>,
+    /// Scenes of at least so many Gaussians have two layers, of which the first draws the whole scene, and others have one.
+    /// Default 8,000; `usize::MAX` for one layer always.
+    pub layers_from: usize,
+}
+
+impl Default for PackOptions {
+    fn default() -> Self {
+        Self {
+            tolerance: None,
+            atoms: None,
+            keep_order: false,
+            keep_all: false,
+            seed: 0,
+            viewpoints: Vec::new(),
+            layers_from: LEAST_LAYERED,
+        }
+    }
+}
+
+impl PackOptions {
+    builder_methods!(
+        with_tolerance(tolerance: impl Into<Option<f64>>),
+        with_atoms(atoms: impl Into<Option<usize>>),
+        with_keep_order(keep_order: bool),
+        with_keep_all(keep_all: bool),
+        with_seed(seed: u64),
+        with_viewpoints(viewpoints: Vec<[f32; 3]>),
+        with_layers_from(layers_from: usize),
+    );
+
+    /// Whether Gaussians may be left out, and base colours and opacities changed to make up for errors.
+    #[must_use]
+    pub fn may_change(&self) -> bool {
+        !self.keep_all && !self.keep_order && self.tolerance.is_none()
+    }
+
+    /// Refuses options out of range.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names the option.
+    pub fn check(&self) -> Result<()> {
+        if let Some(atoms) = self.atoms
+            && !(1..=MAX_ATOMS).contains(&atoms)
+        {
+            return Err(Error::parameter("atoms", atoms, format!("1 to {MAX_ATOMS}")));
+        }
+        all_finite([("viewpoints", self.viewpoints.as_flattened())])?;
+        if let Some(tol) = self.tolerance
+            && (!tol.is_finite() || tol <= 0.0)
+        {
+            return Err(Error::parameter("tolerance", tol, "a finite number above 0"));
+        }
+        Ok(())
+    }
+}
+
+/// A scene prepared for packing at any quality. `S` owns or borrows the scene.
+#[derive(Debug)]
+pub struct Packer<S> {
+    splats: S,
+    options: PackOptions,
+    scene: Vec<MortonKey>,
+    fit: Fit,
+    mean_view: MeanView,
+    /// Base colours that files hold.
+    dc: Vec<[f32; 3]>,
+    weights: Weights,
+}
+
+impl<S: Borrow<Splats>> Packer<S> {
+    /// Prepares `splats`. `sensitivity` says how much pictures depend on each of its values.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for options out of range, arrays of different lengths, or values or weights that
+    /// are not finite.
+    pub fn new(splats: S, sensitivity: &Sensitivity, options: &PackOptions) -> Result<Self> {
+        check(splats.borrow(), sensitivity)?;
+        options.check()?;
+        let g = &splats.borrow().geometry;
+        let grid = Grid::fit(&g.positions);
+        let mut scene = grid.keys(g);
+        scene.sort_unstable();
+        let mean_view = MeanView::new(&options.viewpoints);
+        let dc = mean_view.colours(splats.borrow());
+        let fit = Fit::new(g, &dc, sensitivity, &scene, &grid);
+        let weights = Weights::new(g, sensitivity, &scene, options.may_change());
+        Ok(Self { splats, options: options.clone(), scene, fit, mean_view, dc, weights })
+    }
+
+    /// Number of Gaussians.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.scene.len()
+    }
+
+    /// Whether there are no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.scene.is_empty()
+    }
+
+    /// The overall step for pictures of about this PSNR, in dB. Errors of all Gaussians add up, so the step
+    /// falls with the root of their number.
+    #[must_use]
+    pub fn step_for(&self, decibels: f64) -> f64 {
+        expected_step(self.len(), decibels)
+    }
+
+    /// Packs with an overall step: about the root of the mean squared error of pictures that each value of
+    /// each Gaussian may make on its own. Half the step gives about 5 dB more. However large the step is, visible
+    /// Gaussians keep a share of their own size, turn, opacity and colour (docs/METHOD.md, "The floor").
+    ///
+    /// # Errors
+    /// As [`Self::quantise`] and [`Quantised::finish`].
+    pub fn pack(&self, step: f64, progress: &dyn Progress) -> Result<(Packed, CompressReport)> {
+        self.quantise(step, true, progress)?.finish(None, None, progress)
+    }
+
+    /// Settles everything that does not depend on base colours and opacities, with an overall step as in [`Self::pack`]. Without a
+    /// `floor` under what is visible the file can be smaller than the floor allows.
+    ///
+    /// Gaussians that show less than their bits are worth are left out, unless the options or the sensitivity keep
+    /// them: those whose largest change of a picture is not known, or that no picture showed.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `step` is not finite and above 0, or values are so large that sums of them
+    /// leave f32; [`Error::Cancelled`].
+    pub fn quantise(&self, step: f64, floor: bool, progress: &dyn Progress) -> Result<Quantised<'_>> {
+        if !step.is_finite() || step <= 0.0 {
+            return Err(Error::parameter("step", step, "a finite number above 0"));
+        }
+        let parameters = self.fit.steps.with_step(step);
+        let kept = self.weights.kept(step);
+        let scene: Vec<MortonKey> = kept.iter().map(|&i| self.scene[i]).collect();
+        let classes: Vec<[f32; 2]> = kept.iter().map(|&i| self.fit.classes[i]).collect();
+        let weights = kept.iter().map(|&i| self.weights.shown[i]).collect();
+        let geometry = &self.splats.borrow().geometry;
+        let floor = match floor {
+            true => Floor::new(parameters, geometry, &scene),
+            false => Floor::none(parameters),
+        };
+        let classes = floor.classes(&classes, geometry, &scene);
+        let gaussians = Gaussians { scene, classes, weights };
+        let fitted =
+            Fitted { most_dc: most_dc(&floor.parameters, &self.dc), mean_view: self.mean_view.clone() };
+        Quantised::new(self.splats.borrow(), &self.options, gaussians, floor.parameters, fitted, progress)
+    }
+}
+
+/// Share of the Gaussians whose base colours the unit of base colours is for. A few wild ones must not make all others coarse.
+pub(in crate::packed) const USUAL_DC: f64 = 0.999;
+
+/// The largest coordinate of usual base colours.
+pub(in crate::packed) fn most_dc(parameters: &Parameters, dc: &[[f32; 3]]) -> f64 {
+    let largest =
+        |&dc: &[f32; 3]| parameters.dc_coordinates(dc).into_iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+    let mut all: Vec<f32> = dc.iter().map(largest).collect();
+    all.sort_by(f32::total_cmp);
+    f64::from(at_share(&all, USUAL_DC))
+}
+
+/// [`Packer::step_for`] of a scene of `gaussians` Gaussians.
+pub(crate) fn expected_step(gaussians: usize, decibels: f64) -> f64 {
+    // decibels = EXPECTED_DB + DB_PER_OCTAVE x + DB_PER_OCTAVE_2 x^2, with x the octaves below.
+    let over = decibels.clamp(0.0, MOST_DB) - EXPECTED_DB;
+    let root = (DB_PER_OCTAVE * DB_PER_OCTAVE + 4.0 * DB_PER_OCTAVE_2 * over).max(0.0).sqrt();
+    let octaves = (root - DB_PER_OCTAVE) / (2.0 * DB_PER_OCTAVE_2);
+    EXPECTED_STEP * libm::exp2(-octaves) / (gaussians.max(1) as f64).sqrt()
+}
+
+/// Refuses scenes and sensitivities that do not fit one another or are not finite.
+pub(crate) fn check(splats: &Splats, sensitivity: &Sensitivity) -> Result<()> {
+    splats.validate()?;
+    Limits::check("Gaussians", splats.len() as u64, MAX_GAUSSIANS)?;
+    let weights = [
+        (sensitivity.colour.len(), sensitivity.colour.as_slice()),
+        (sensitivity.opacity.len(), &sensitivity.opacity),
+        (sensitivity.position.len(), sensitivity.position.as_flattened()),
+        (sensitivity.scale.len(), sensitivity.scale.as_flattened()),
+        (sensitivity.rotation.len(), sensitivity.rotation.as_flattened()),
+    ];
+    for (len, values) in weights {
+        if len != splats.len() {
+            let expected = format!("{} entries, one a Gaussian", splats.len());
+            return Err(Error::parameter("sensitivity", len, expected));
+        }
+        all_finite([("sensitivity", values)])?;
+    }
+    let g = &splats.geometry;
+    all_finite([
+        ("positions", g.positions.as_flattened()),
+        ("dc", g.dc.as_flattened()),
+        ("opacities", &g.opacities),
+        ("scales", g.scales.as_flattened()),
+        ("rotations", g.rotations.as_flattened()),
+        ("sh_rest", splats.sh_rest.as_slice()),
+    ])
+}

@@ -1,0 +1,360 @@
+//! A scene at one overall step, ready to be written with any base colours and opacities.
+
+use std::ops::Range;
+
+use super::alone::Alone;
+use super::appearance::{Appearance, AppearanceChange};
+use super::canonical::MortonKey;
+use super::codebook::Codes;
+use super::coder::{ChunkCoder, OrderedGaussians, too_large};
+use super::encoding::{Counts, Encoding, Finished, WriteChunk, Written};
+use super::layering::Layering;
+use super::pack::PackOptions;
+use crate::packed::bitstream::parameters::Parameters;
+use crate::packed::bitstream::{CodedChunk, MeanView};
+use crate::packed::decode::reorder::gather;
+use crate::packed::encode::target::Target;
+use crate::packed::entropy::tables::Tables;
+use crate::packed::scene::Packed;
+use crate::scene::extra::{Extra, for_extra};
+use crate::scene::splats::Splats;
+use crate::sparse::model::Model;
+use crate::sparse::tally::{CompressReport, Tally};
+use crate::support::error::{Error, Result};
+use crate::support::parallel::map_vec;
+use crate::support::progress::{Progress, Stage};
+use crate::support::spill::SpillTo;
+use crate::support::stopwatch::Stopwatch;
+
+/// Fits base colours and opacities of a part of a scene to pictures of it.
+///
+/// The arguments are the part, the model that a file has of it, and for each Gaussian of the model how pictures depend on its
+/// colour and on the logarithm of its opacity. The result has one appearance for each Gaussian of the model, or is `None` if
+/// nothing is fitted.
+pub type Refit<'a, E = Error> =
+    dyn FnMut(&Splats, &Model, &[[f32; 2]]) -> Result<Option<Vec<Appearance>>, E> + 'a;
+
+/// Gaussians that a file has, all in the same order.
+#[derive(Debug, Default)]
+pub(in crate::packed) struct Gaussians {
+    /// Cells and places in the source.
+    pub(in crate::packed) scene: Vec<MortonKey>,
+    /// Colour and shape class of each.
+    pub(in crate::packed) classes: Vec<[u8; 2]>,
+    /// Sensitivities of each to its colour and to the logarithm of its opacity.
+    pub(in crate::packed) weights: Vec<[f32; 2]>,
+}
+
+impl Gaussians {
+    /// Puts Gaussians in the order of cells in the order of layers. Returns the number of Gaussians of each layer.
+    pub(in crate::packed) fn in_layers(&mut self, layering: &mut Layering) -> Vec<usize> {
+        let layers: Vec<usize> = self.weights.iter().map(|w| layering.layer(w[1])).collect();
+        let layers = &layers;
+        let of = |layer: usize| (0..layers.len()).filter(move |&i| layers[i] == layer);
+        let count = layering.layers();
+        let order: Vec<usize> = (0..count).flat_map(&of).collect();
+        gather(&mut self.scene, order.iter().copied());
+        gather(&mut self.classes, order.iter().copied());
+        gather(&mut self.weights, order.iter().copied());
+        (0..count).map(|layer| of(layer).count()).collect()
+    }
+}
+
+/// What is known of a scene's base colours before it is coded.
+#[derive(Debug)]
+pub(in crate::packed) struct Fitted {
+    /// The largest coordinate.
+    pub(in crate::packed) most_dc: f64,
+    pub(in crate::packed) mean_view: MeanView,
+}
+
+/// A scene at one overall step: which Gaussians stay, steps, dictionary and codes are settled. [`Self::finish`] makes the
+/// file with the scene's own base colours and opacities or with others, which change nothing else.
+#[derive(Debug)]
+pub struct Quantised<'a> {
+    splats: &'a Splats,
+    options: &'a PackOptions,
+    gaussians: Gaussians,
+    /// The layer and the Gaussians of each chunk.
+    chunks: Vec<(usize, Range<usize>)>,
+    /// Of each chunk.
+    codes: Vec<Codes>,
+    /// What the first layer looks like alone.
+    alone: Alone,
+    encoding: Encoding,
+}
+
+impl<'a> Quantised<'a> {
+    pub(in crate::packed) fn new(
+        splats: &'a Splats,
+        options: &'a PackOptions,
+        gaussians: Gaussians,
+        parameters: Parameters,
+        Fitted { most_dc, mean_view }: Fitted,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let n = gaussians.scene.len();
+        let layering = Layering::new(n, options.layers_from, gaussians.weights.iter().map(|w| (w[1], 1)));
+        let view = OrderedGaussians::new(splats, &gaussians.scene, &gaussians.classes);
+        let clock = Stopwatch::start();
+        let coder = ChunkCoder::new(view, parameters, mean_view, options, progress)?;
+        let encoding = Encoding::new(coder, layering, most_dc, clock);
+        progress.check()?;
+        progress.begin(Stage::Code, n as u64);
+        let mut whole = Self::of_part(splats, options, gaussians, encoding, progress)?;
+        progress.end();
+        whole.encoding.end_learning();
+        Ok(whole)
+    }
+
+    /// A part of a scene, with what all parts are coded with.
+    pub(in crate::packed) fn of_part(
+        splats: &'a Splats,
+        options: &'a PackOptions,
+        mut gaussians: Gaussians,
+        mut encoding: Encoding,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        let counts = gaussians.in_layers(&mut encoding.layering);
+        let mut chunks = Vec::new();
+        let mut start = 0;
+        for (layer, &count) in counts.iter().enumerate() {
+            let end = start + count;
+            while start < end {
+                let next = start + encoding.layering.next_chunk(layer, end - start);
+                chunks.push((layer, start..next));
+                start = next;
+            }
+        }
+        let probability =
+            |layer: usize, i: usize| encoding.layering.probability(layer, gaussians.weights[i][1]);
+        let alone = Alone::new(&splats.geometry, &gaussians.scene, &counts, probability);
+        let mut part = Self { splats, options, gaussians, chunks, codes: Vec::new(), alone, encoding };
+        let view = part.view(None)?;
+        let codes = part.chunks.iter().map(|(_, range)| {
+            progress.check()?;
+            let codes = part.encoding.coder.codes(view.part(range.clone()));
+            progress.advance(range.len() as u64);
+            Ok(codes)
+        });
+        part.codes = codes.collect::<Result<_>>()?;
+        Ok(part)
+    }
+
+    /// Number of Gaussians of the file.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.gaussians.scene.len()
+    }
+
+    /// Whether the file has no Gaussians.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.gaussians.scene.is_empty()
+    }
+
+    /// Sensitivities of each Gaussian to its colour and to the logarithm of its opacity, in the order of the file.
+    #[must_use]
+    pub fn weights(&self) -> &[[f32; 2]] {
+        &self.gaussians.weights
+    }
+
+    /// Makes the file, with the scene's own base colours and opacities or with these, one entry for each Gaussian in the
+    /// order of the file. `changes` are what Gaussians of the first layer change by while the second is not there, from what
+    /// [`Packed::first_layer`] shows.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are more or fewer entries than Gaussians, if values are not finite, if an opacity is
+    /// above 1, or if sums of values leave f32; [`Error::Cancelled`].
+    pub fn finish(
+        &self,
+        appearances: Option<&[Appearance]>,
+        changes: Option<&[AppearanceChange]>,
+        progress: &dyn Progress,
+    ) -> Result<(Packed, CompressReport)> {
+        let n = self.len();
+        let view = OrderedGaussians { changes, ..self.view(appearances)? };
+        changes.unwrap_or_default().iter().try_for_each(AppearanceChange::check)?;
+        let mut encoding = self.encoding.clone();
+        // The counting pass runs first because the tables must be known before any symbol is coded. Keeping all
+        // symbols in memory would take more than the scene's geometry.
+        let counted = self.each_chunk(view, progress, |_, tally, coded| {
+            Counts::of(tally, coded.ranges.iter().map(|(range, _)| range))
+        });
+        for chunk in counted {
+            encoding.counts.add(&chunk?);
+        }
+        let mut code_chunks = |tables: &Tables, write: &mut WriteChunk<'_>| {
+            let parts =
+                self.each_chunk(view, progress, |layer, _, coded| Written::new(layer, &coded, tables));
+            parts.into_iter().try_for_each(|part| write(part?))
+        };
+        let meta = self.splats.meta.clone();
+        let Finished { mut head, data, report } =
+            encoding.finish(n, self.options, meta, SpillTo::Memory, &mut code_chunks)?;
+        head.removed = (self.splats.len() - n) as u64;
+        let order = self.options.keep_order.then(|| self.gaussians.scene.iter().map(|g| g.source).collect());
+        Ok((Packed::new(head, self.extras(0..n), order, data.into_bytes()?), report))
+    }
+
+    /// The layer and the symbols of each chunk with these appearances, or with the scene's own, and how often each symbol occurs.
+    pub(in crate::packed) fn counted(
+        &self,
+        appearances: Option<&[Appearance]>,
+        progress: &dyn Progress,
+    ) -> Result<(Counts, Vec<(usize, CodedChunk)>)> {
+        let mut counts = Counts::of(Tally::new(self.encoding.coder.dictionary.dim()), []);
+        let mut chunks = Vec::with_capacity(self.chunks.len());
+        let all = self.each_chunk(self.view(appearances)?, progress, |layer, tally, coded| {
+            let counts = Counts::of(tally, coded.ranges.iter().map(|(range, _)| range));
+            (counts, (layer, coded))
+        });
+        for chunk in all {
+            let (own, chunk) = chunk?;
+            counts.add(&own);
+            chunks.push(chunk);
+        }
+        Ok((counts, chunks))
+    }
+
+    /// The Gaussians as they are or with these appearances, which are refused as [`Self::finish`] says.
+    pub(in crate::packed) fn view<'v>(
+        &'v self,
+        appearances: Option<&'v [Appearance]>,
+    ) -> Result<OrderedGaussians<'v>> {
+        let n = self.len();
+        if let Some(all) = appearances {
+            if all.len() != n {
+                return Err(Error::parameter("appearances", all.len(), format!("{n} entries")));
+            }
+            all.iter().try_for_each(Appearance::check)?;
+        }
+        let Gaussians { scene, classes, .. } = &self.gaussians;
+        Ok(OrderedGaussians { appearances, ..OrderedGaussians::new(self.splats, scene, classes) })
+    }
+
+    /// What `with` makes of the layer, the counts and the symbols of each chunk of `view`.
+    fn each_chunk<T: Send>(
+        &self,
+        view: OrderedGaussians<'_>,
+        progress: &dyn Progress,
+        with: impl Fn(usize, Tally, CodedChunk) -> T + Sync,
+    ) -> Vec<Result<T>> {
+        let Encoding { form, head, .. } = &self.encoding;
+        let forms = self.encoding.layering.forms(head.rest.least.len());
+        self.each_target(view, progress, |layer, tally, targets| {
+            let layer_form = forms.get(layer).copied().unwrap_or_default();
+            let coded = form.record(&head.frame, layer_form, &targets).ok_or_else(too_large)?;
+            Ok(with(layer, tally, coded))
+        })
+    }
+
+    /// What `with` makes of the layer, the counts and the targets of each chunk of `view`.
+    pub(in crate::packed) fn each_target<T: Send>(
+        &self,
+        view: OrderedGaussians<'_>,
+        progress: &dyn Progress,
+        with: impl Fn(usize, Tally, Vec<Target>) -> Result<T> + Sync,
+    ) -> Vec<Result<T>> {
+        let coder = &self.encoding.coder;
+        let unit = self.encoding.head.dc_unit();
+        map_vec(self.chunks.iter().zip(&self.codes).collect(), |((layer, range), codes)| {
+            progress.check()?;
+            let (tally, mut targets) = coder.targets(view.part(range.clone()), codes, unit)?;
+            for (i, target) in range.clone().zip(&mut targets) {
+                target.energy = self.gaussians.weights[i][1];
+                if !self.alone.has(*layer) {
+                    continue;
+                }
+                let change = view.changes.and_then(|changes| changes.get(i));
+                target.interim = self.alone.steps(i, change, &coder.parameters);
+            }
+            with(*layer, tally, targets)
+        })
+    }
+
+    /// Number of Gaussians of each layer.
+    pub(in crate::packed) fn layer_counts(&self) -> Vec<usize> {
+        let mut counts = vec![0; self.encoding.layering.layers()];
+        self.chunks.iter().for_each(|(layer, range)| counts[*layer] += range.len());
+        counts
+    }
+
+    /// Cells and places in the source, in the order of the file.
+    pub(in crate::packed) fn sources(&self) -> &[MortonKey] {
+        &self.gaussians.scene
+    }
+
+    /// The columns that are not drawn, of the Gaussians `range` in the order of the file.
+    pub(in crate::packed) fn extras(&self, range: Range<usize>) -> Vec<Extra> {
+        let sources = &self.gaussians.scene[range];
+        let mut extras = self.splats.geometry.extras.clone();
+        for extra in &mut extras {
+            for_extra!(&mut extra.values, v => gather(v, sources.iter().map(|g| g.index())));
+        }
+        extras
+    }
+
+    /// What `refit` fits to pictures, if base colours and opacities may change and there is something to fit.
+    pub(crate) fn refitted<E: From<Error>>(
+        &self,
+        refit: Option<&mut Refit<'_, E>>,
+        progress: &dyn Progress,
+    ) -> Result<Option<Vec<Appearance>>, E> {
+        let Some(refit) = refit.filter(|_| self.options.may_change() && !self.is_empty()) else {
+            return Ok(None);
+        };
+        let model = self.finish(None, None, progress)?.0.unpack()?;
+        refit(self.splats, &model, self.weights())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::Packer;
+    use crate::{Sensitivity, Silent};
+
+    #[test]
+    fn other_appearances_change_nothing_else() {
+        let splats = crate::support::testing::scene(700, 5);
+        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let options = PackOptions::default();
+        let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
+        let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
+        let file = |shown| quantised.finish(shown, None, &Silent).unwrap().0.unpack().unwrap();
+        let own = file(None);
+        assert!(own == packer.pack(1e-5, &Silent).unwrap().0.unpack().unwrap());
+        let mut expected = own.clone().into_splats();
+        for i in 0..own.len() {
+            let Appearance { dc, log_opacity } = Appearance::of(own.geometry(), i);
+            Appearance { dc: dc.map(|v| v + 0.5), log_opacity: log_opacity - 0.4 }
+                .give(&mut expected.geometry, i);
+        }
+        let shown: Vec<Appearance> = (0..own.len()).map(|i| Appearance::of(&expected.geometry, i)).collect();
+        let mut other = file(Some(&shown)).into_splats();
+        for (i, wanted) in shown.iter().enumerate() {
+            let found = Appearance::of(&other.geometry, i);
+            assert!((0..3).all(|k| (found.dc[k] - wanted.dc[k]).abs() < 0.1), "{found:?} {wanted:?}");
+            assert!((found.log_opacity - wanted.log_opacity).abs() < 0.2, "{found:?} {wanted:?}");
+        }
+        other.geometry.dc.clone_from(&expected.geometry.dc);
+        other.geometry.opacities.clone_from(&expected.geometry.opacities);
+        assert_eq!(other, expected);
+    }
+
+    #[test]
+    fn appearances_that_do_not_fit_are_refused() {
+        let splats = crate::support::testing::scene(50, 5);
+        let sensitivity = Sensitivity::heuristic(&splats.geometry);
+        let options = PackOptions::default();
+        let packer = Packer::new(&splats, &sensitivity, &options).unwrap();
+        let quantised = packer.quantise(1e-5, true, &Silent).unwrap();
+        assert_eq!((quantised.len(), quantised.weights().len(), quantised.is_empty()), (50, 50, false));
+        let refused =
+            |shown: &[Appearance]| quantised.finish(Some(shown), None, &Silent).unwrap_err().to_string();
+        let good = Appearance { dc: [0.0; 3], log_opacity: -1.0 };
+        assert!(refused(&[good; 49]).contains("50 entries"));
+        assert!(refused(&[Appearance { dc: [f32::NAN; 3], ..good }; 50]).contains("NaN"));
+    }
+}

@@ -1,0 +1,175 @@
+//! Which Gaussians a packed file leaves out.
+
+use super::canonical::MortonKey;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::splats::Geometry;
+use crate::support::maths::log_sigmoid;
+
+/// A Gaussian is left out if the mean squared error of the pictures grows by less than this many squares of the
+/// overall step without it. With a step, a value of a Gaussian is coded to about one such square, so a Gaussian that
+/// changes pictures by less than its values together may do is not worth its bits. Found by trial (docs/METHOD.md).
+const REMOVAL: f64 = 10.0;
+/// Removal of a Gaussian changes pictures by `max(mean, WORST_SHARE / excess * worst)`. `mean` is the mean squared change of all
+/// pictures, `worst` that of the picture that changes most, and `excess` the median of `worst / mean` over Gaussians. Found by
+/// trial (docs/METHOD.md).
+const WORST_SHARE: f32 = 0.8;
+/// Natural logarithm of the opacity below which a Gaussian is drawn in no pixel: 1/255, a rule of 3DGS.
+const NEVER_DRAWN: f32 = -5.541_264;
+
+/// Squared change of the pictures if each Gaussian is left out; infinite if it must stay. On average that change is the
+/// sensitivity to the logarithm of the opacity, since a pixel is linear in the opacity of each Gaussian. No single picture
+/// may change much more.
+pub(in crate::packed) fn changes_without(
+    geometry: &Geometry,
+    sensitivity: &Sensitivity,
+    may_change: bool,
+) -> Vec<f32> {
+    let share = WORST_SHARE / usual_excess(sensitivity);
+    let change = |i: usize| {
+        // What no view showed may show in others. Where nothing was measured it is infinite.
+        let largest = sensitivity.removal[i];
+        match may_change && largest.is_finite() {
+            true if largest > 0.0 => sensitivity.opacity[i].max(share * sensitivity.removal_view[i]),
+            true if log_sigmoid(geometry.opacities[i]) < NEVER_DRAWN => 0.0,
+            _ => f32::INFINITY,
+        }
+    };
+    (0..sensitivity.len()).map(change).collect()
+}
+
+/// How much more the most changed picture changes than pictures do on average, for the median Gaussian of those that
+/// pictures showed; infinite if there are none. The larger a scene, the fewer pictures show a Gaussian.
+fn usual_excess(sensitivity: &Sensitivity) -> f32 {
+    let pairs = sensitivity.opacity.iter().zip(&sensitivity.removal_view);
+    let mut excess: Vec<f32> =
+        pairs.filter(|p| *p.0 > 0.0 && *p.1 > 0.0).map(|(mean, most)| most / mean).collect();
+    if excess.is_empty() {
+        return f32::INFINITY;
+    }
+    let middle = excess.len() / 2;
+    *excess.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+/// Whether a Gaussian without which pictures change by `change` stays at an overall step.
+pub(in crate::packed) fn is_worth_its_bits(change: f32, step: f64) -> bool {
+    f64::from(change) >= REMOVAL * step * step
+}
+
+/// How much pictures depend on each Gaussian as a whole.
+#[derive(Debug)]
+pub(in crate::packed) struct Weights {
+    /// Sensitivities to the colour and to the logarithm of the opacity.
+    pub(in crate::packed) shown: Vec<[f32; 2]>,
+    /// As [`changes_without`].
+    left_out: Vec<f32>,
+}
+
+impl Weights {
+    /// The weights of the Gaussians of `geometry` in the order of `scene`, of which some may be left out if they
+    /// `may_change`.
+    pub(in crate::packed) fn new(
+        geometry: &Geometry,
+        sensitivity: &Sensitivity,
+        scene: &[MortonKey],
+        may_change: bool,
+    ) -> Self {
+        let left_out = changes_without(geometry, sensitivity, may_change);
+        Self {
+            shown: scene.iter().map(|g| sensitivity.appearance(g.index())).collect(),
+            left_out: scene.iter().map(|g| left_out[g.index()]).collect(),
+        }
+    }
+
+    /// The places of the Gaussians that stay at an overall step. At least one stays, if there are any.
+    pub(in crate::packed) fn kept(&self, step: f64) -> Vec<usize> {
+        let kept: Vec<usize> =
+            (0..self.left_out.len()).filter(|&i| is_worth_its_bits(self.left_out[i], step)).collect();
+        match kept.is_empty() {
+            true => (0..self.left_out.len().min(1)).collect(),
+            false => kept,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::packed::{PackOptions, Packer};
+    use crate::scene::extra::{Extra, ExtraValues};
+    use crate::support::testing::scene;
+    use crate::{Silent, Splats};
+
+    /// A scene whose Gaussians have their number, and measured weights: every fifth shows in nothing.
+    fn measured() -> (Splats, Sensitivity) {
+        let mut splats = scene(600, 2);
+        let numbers = ExtraValues::U32((0..600).collect());
+        splats.geometry.extras = vec![Extra { name: "number".into(), values: numbers }];
+        let mut sensitivity = Sensitivity::heuristic(&splats.geometry);
+        sensitivity.removal.fill(0.01);
+        for i in (0..600).step_by(5) {
+            sensitivity.opacity[i] = 1e-20;
+        }
+        (splats, sensitivity)
+    }
+
+    /// The numbers of the Gaussians of a file.
+    fn numbers(splats: &Splats, sensitivity: &Sensitivity, options: &PackOptions) -> Vec<u32> {
+        let packer = Packer::new(splats, sensitivity, options).unwrap();
+        let (packed, _) = packer.pack(1e-7, &Silent).unwrap();
+        let geometry = packed.unpack().unwrap().into_splats().geometry;
+        let ExtraValues::U32(numbers) = &geometry.extras[0].values else { panic!("not u32") };
+        assert_eq!((packed.len(), packed.head().removed), (numbers.len(), 600 - numbers.len() as u64));
+        let mut numbers = numbers.clone();
+        numbers.sort_unstable();
+        numbers
+    }
+
+    #[test]
+    fn what_shows_less_than_its_bits_are_worth_goes() {
+        let (mut splats, mut sensitivity) = measured();
+        let options = PackOptions::default();
+        let rest = |step: u32| (0..600).filter(|k| k % step != 0).collect::<Vec<u32>>();
+        assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
+        // What a single picture shows much more than others do stays.
+        for (most, mean) in sensitivity.removal_view.iter_mut().zip(&sensitivity.opacity) {
+            *most = 3.0 * mean;
+        }
+        sensitivity.removal_view[5] = 1e-3;
+        assert!(
+            numbers(&splats, &sensitivity, &options)
+                .into_iter()
+                .eq((0..600).filter(|k| k % 5 != 0 || *k == 5))
+        );
+        sensitivity.removal_view.fill(0.0);
+        // What no view showed stays, unless no view can show it.
+        for i in (0..600).step_by(10) {
+            sensitivity.removal[i] = 0.0;
+        }
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+        splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.6);
+        assert_eq!(numbers(&splats, &sensitivity, &options), rest(5));
+        splats.geometry.opacities.iter_mut().step_by(10).for_each(|opacity| *opacity = -5.5);
+        assert!(numbers(&splats, &sensitivity, &options).into_iter().eq((0..600).filter(|k| k % 10 != 5)));
+    }
+
+    #[test]
+    fn options_and_guesses_keep_all() {
+        let (splats, mut sensitivity) = measured();
+        for options in [
+            PackOptions::default().with_keep_all(true),
+            PackOptions::default().with_keep_order(true),
+            PackOptions::default().with_tolerance(0.1),
+        ] {
+            assert_eq!(numbers(&splats, &sensitivity, &options).len(), 600, "{options:?}");
+        }
+        sensitivity.removal.fill(f32::INFINITY);
+        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), 600);
+    }
+
+    #[test]
+    fn one_gaussian_stays() {
+        let (splats, mut sensitivity) = measured();
+        sensitivity.opacity.fill(0.0);
+        assert_eq!(numbers(&splats, &sensitivity, &PackOptions::default()).len(), 1);
+    }
+}

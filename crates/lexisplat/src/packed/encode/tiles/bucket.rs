@@ -1,0 +1,152 @@
+//! The Gaussians of a bucket, in the order of the file.
+
+use std::ops::Range;
+
+use super::look::{LookStatistics, Looked, SHOWN};
+use super::plan::{Piece, Plan};
+use crate::packed::decode::reorder::{gather, gather_geometry};
+use crate::packed::encode::canonical::MortonKey;
+use crate::packed::encode::pack::check;
+use crate::scene::sensitivity::Sensitivity;
+use crate::scene::source::SplatSource;
+use crate::scene::splats::Splats;
+use crate::stream::{Observed, RowLayout};
+use crate::support::error::{Error, Result};
+use crate::support::progress::Progress;
+
+/// The Gaussians of a bucket, sorted along the Morton curve.
+#[derive(Debug, Clone)]
+pub struct Bucket {
+    pub(super) number: usize,
+    pub(super) splats: Splats,
+    /// Cell and number in the source of each.
+    pub(super) places: Vec<MortonKey>,
+}
+
+/// Collects the Gaussians of a bucket from blocks of tiles.
+#[derive(Debug)]
+pub struct BucketReader<'p> {
+    plan: &'p Plan,
+    bucket: Bucket,
+}
+
+impl<'p> BucketReader<'p> {
+    /// Collects those of bucket `number`.
+    #[must_use]
+    pub fn new(plan: &'p Plan, number: usize) -> Self {
+        Self { plan, bucket: Bucket { number, splats: plan.empty(), places: Vec::new() } }
+    }
+
+    /// Takes those of `rows` of tile `number` that are of the bucket. Rows come in any order.
+    ///
+    /// # Errors
+    /// As [`Plan::runs`].
+    pub fn add(
+        &mut self,
+        number: usize,
+        tile: &dyn SplatSource,
+        rows: Range<usize>,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let Bucket { number: wanted, splats, places } = &mut self.bucket;
+        let plan = self.plan;
+        let buckets = plan.buckets_of(number);
+        plan.each(number, tile, rows, progress, &mut |part, keys| {
+            let keep: Vec<bool> = keys.iter().map(|key| buckets.of(*key) == *wanted).collect();
+            places.extend(keys.iter().zip(&keep).filter(|(_, keep)| **keep).map(|(key, _)| *key));
+            part.retain(&keep);
+            let mut own = tile.empty();
+            std::mem::swap(&mut own, part);
+            splats.append(own);
+            Ok(())
+        })
+    }
+
+    /// Takes a piece that [`Plan::scatter`] made for the bucket.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for other bytes, and for pieces of other buckets and scenes.
+    pub fn add_piece(&mut self, bytes: &[u8]) -> Result<()> {
+        let Piece { scene, bucket, places, rows } = Piece::from_bytes(bytes)?;
+        self.plan.check("piece", [scene], None)?;
+        if bucket != self.bucket.number {
+            return Err(Error::parameter(
+                "piece",
+                format!("of bucket {bucket}"),
+                self.bucket.number.to_string(),
+            ));
+        }
+        let layout = RowLayout::new(self.plan.empty());
+        if rows.len() != places.len() * layout.bytes() {
+            let expected = format!("{} rows of {} bytes", places.len(), layout.bytes());
+            return Err(Error::parameter("piece", rows.len(), expected));
+        }
+        self.add_rows(&layout, &rows, places);
+        Ok(())
+    }
+
+    /// Takes rows of the bucket, which are at these `places`.
+    pub(crate) fn add_rows(&mut self, layout: &RowLayout, rows: &[u8], mut places: Vec<MortonKey>) {
+        self.bucket.splats.append(layout.unpack(rows));
+        self.bucket.places.append(&mut places);
+    }
+
+    /// The bucket.
+    #[must_use]
+    pub fn finish(self) -> Bucket {
+        let Bucket { number, mut splats, mut places } = self.bucket;
+        let mut order: Vec<usize> = (0..places.len()).collect();
+        order.sort_unstable_by_key(|&i| places[i]);
+        gather(&mut places, order.iter().copied());
+        gather_geometry(&mut splats.geometry, &order);
+        let dim = splats.degree.rest();
+        let mut rest = Vec::with_capacity(splats.sh_rest.len());
+        order.iter().for_each(|&i| rest.extend_from_slice(&splats.sh_rest[i * dim..(i + 1) * dim]));
+        splats.sh_rest = rest;
+        Bucket { number, splats, places }
+    }
+}
+
+impl Bucket {
+    /// The cell of each Gaussian, and its number in the bucket.
+    pub(super) fn scene(&self) -> Vec<MortonKey> {
+        (0..).zip(&self.places).map(|(source, place)| MortonKey { source, ..*place }).collect()
+    }
+
+    /// Its number among all buckets.
+    #[must_use]
+    pub fn number(&self) -> usize {
+        self.number
+    }
+
+    /// Its Gaussians.
+    #[must_use]
+    pub fn splats(&self) -> &Splats {
+        &self.splats
+    }
+
+    /// Sums up what was `observed` of the bucket's Gaussians. Without it, what shows is guessed from each Gaussian alone.
+    ///
+    /// # Errors
+    /// [`crate::Error::Parameter`] for a sensitivity of another length or with values that are not finite.
+    pub fn look(&self, plan: &Plan, observed: Option<Observed>) -> Result<(LookStatistics, Looked)> {
+        let (Observed { sensitivity, memo, .. }, scale) = match observed {
+            None => {
+                let total = plan.heuristic_total / SHOWN;
+                (Sensitivity::heuristic_part(&self.splats.geometry, total).into(), 1.0)
+            }
+            Some(mut observed) => {
+                observed.check()?;
+                let share = self.splats.len() as f64 / plan.len().max(1) as f64;
+                // All parts have one overall step. A part that asks for half of it weighs four times as much.
+                #[expect(clippy::cast_possible_truncation, reason = "rounding is meant")]
+                let scale = (share / observed.step_factor.powi(2)) as f32;
+                observed.sensitivity.scale(scale);
+                (observed, scale)
+            }
+        };
+        check(&self.splats, &sensitivity)?;
+        let (statistics, looked) = LookStatistics::of(self, &sensitivity, plan);
+        Ok((statistics, looked.with_observer(scale, memo)))
+    }
+}

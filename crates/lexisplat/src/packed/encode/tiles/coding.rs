@@ -1,0 +1,274 @@
+//! Coding of buckets, each on its own.
+
+use serde::{Deserialize, Serialize};
+
+use super::bucket::Bucket;
+use super::look::Looked;
+use super::message::messages;
+use super::plan::Plan;
+use super::sample::SampleStatistics;
+use super::steps::Steps;
+use crate::packed::bitstream::{MeanView, WholeAtoms};
+use crate::packed::encode::canonical::MortonKey;
+use crate::packed::encode::codebook::{Choice, Costs};
+use crate::packed::encode::coder::{ChunkCoder, Learning, VALUES, too_large};
+use crate::packed::encode::encoding::{self, Encoding, Written};
+use crate::packed::encode::floor::Floor;
+use crate::packed::encode::pack::USUAL_DC;
+use crate::packed::encode::quantised::{Gaussians, Quantised, Refit};
+use crate::packed::entropy::tables;
+use crate::packed::entropy::tables::Lookup;
+use crate::scene::extra::Extra;
+use crate::scene::splats::Splats;
+use crate::scene::splats::filter;
+use crate::sparse::model::Model;
+use crate::support::error::{Error, Result};
+use crate::support::parallel::map_vec;
+use crate::support::progress::Progress;
+use crate::support::stopwatch::Stopwatch;
+
+/// Everything that buckets are coded with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Coding {
+    scene: u32,
+    pub(super) steps: Steps,
+    floor: Floor,
+    most_dc: f64,
+    atoms: WholeAtoms,
+    /// What symbols cost.
+    costs: Costs,
+    /// The step of values, as a share of the usual one.
+    value_step: f32,
+}
+
+/// The coded Gaussians of a bucket.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Coded {
+    scene: u32,
+    pub(super) bucket: usize,
+    /// The tables it is coded with, its own ones.
+    tables: Vec<u8>,
+    chunks: Vec<Written>,
+    pub(super) layers: Vec<CodedLayer>,
+}
+
+/// What chunks do not hold of one layer.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct CodedLayer {
+    pub(super) gaussians: usize,
+    /// The place of each in the source of its file, if the order is kept.
+    pub(super) order: Option<Vec<u32>>,
+    pub(super) extras: Vec<Extra>,
+}
+
+/// How often each symbol occurs in a bucket.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Counts {
+    scene: u32,
+    pub(super) counts: encoding::Counts,
+}
+
+/// The tables that all buckets are coded with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Tables {
+    scene: u32,
+    pub(super) bytes: Vec<u8>,
+}
+
+messages!(Coding => "coding", Coded => "coded bucket", Counts => "counts", Tables => "tables");
+
+impl Coding {
+    /// Everything that buckets are coded with. `groups` are the statistics of all, in order. Learns the dictionary, and reports it
+    /// to `progress`.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if they are not those of all groups, and if values are so large that sums of them leave f32;
+    /// [`Error::Cancelled`].
+    pub fn new(
+        plan: &Plan,
+        steps: &Steps,
+        groups: &[SampleStatistics],
+        progress: &dyn Progress,
+    ) -> Result<Self> {
+        plan.check("steps", [steps.scene], None)?;
+        let all = SampleStatistics::sum(plan, groups)?;
+        let mut floor = steps.floor.clone().within(all.over);
+        all.predictors.solve(&mut floor.parameters);
+        if !floor.parameters.are_usable() {
+            return Err(too_large());
+        }
+        let (rows, classes) = all.shuffled(plan);
+        let (degree, stop) = (plan.like.degree, steps.stop);
+        let learning = Learning { degree, total: steps.kept(), stop, options: &plan.options };
+        let Choice { atoms, costs, step } = learning.dictionary(&rows, &classes, progress)?;
+        let most_dc = f64::from(all.dc.quantile(USUAL_DC));
+        Ok(Self { scene: plan.scene(), steps: steps.clone(), floor, most_dc, atoms, costs, value_step: step })
+    }
+
+    /// Number of Gaussians that are coded.
+    #[must_use]
+    pub fn kept(&self) -> usize {
+        self.steps.kept()
+    }
+
+    /// The encoder, before anything is coded.
+    pub(super) fn encoding(&self, plan: &Plan) -> Result<Encoding> {
+        plan.check("coding", [self.scene], None)?;
+        let clock = Stopwatch::start();
+        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let (floor, stop) = (&self.floor, self.steps.stop);
+        let mut parameters = floor.parameters.clone();
+        parameters.factors[VALUES] *= self.value_step;
+        let coder = ChunkCoder::learned(
+            parameters,
+            mean_view,
+            &self.atoms,
+            self.costs.clone(),
+            stop,
+            plan.options.tolerance,
+        )?;
+        let layering = self.steps.layering.clone();
+        Ok(Encoding::new((coder, self.atoms.clone()), layering, self.most_dc, clock))
+    }
+
+    /// Codes the Gaussians of `bucket` that stay, with tables of its own. `refit` fits what they show, if that may change. Advances
+    /// `progress` by their number.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `looked` is of another bucket, and for values that no file holds; what `refit` returns;
+    /// [`Error::Cancelled`].
+    pub fn code<E: From<Error>>(
+        &self,
+        plan: &Plan,
+        bucket: &Bucket,
+        looked: &Looked,
+        refit: Option<&mut Refit<'_, E>>,
+        progress: &dyn Progress,
+    ) -> Result<(Counts, Coded), E> {
+        let splats = &bucket.splats;
+        let (mut weights, stays) = looked.of_each(plan, bucket, self.steps.first_stays(bucket.number))?;
+        let mut scene = bucket.scene();
+        filter(&mut scene, &stays);
+        filter(&mut weights, &stays);
+        let free = self.steps.steps.classes_of(&weights);
+        let classes = self.floor.classes(&free, &splats.geometry, &scene);
+        let gaussians = Gaussians { scene, classes, weights };
+        let options = &plan.options;
+        let quantised = Quantised::of_part(splats, options, gaussians, self.encoding(plan)?, progress)?;
+        let mut refit = refit.map(|refit| {
+            |part: &Splats, model: &Model, weights: &[[f32; 2]]| refit(part, model, &looked.observed(weights))
+        });
+        let appearances =
+            quantised.refitted(refit.as_mut().map(|refit| refit as &mut Refit<'_, E>), progress)?;
+        let (counts, chunks) = quantised.counted(appearances.as_deref(), progress)?;
+        let tables = tables::Tables::of(&counts)?;
+        let chunks = map_vec(chunks, |(layer, chunk)| Written::new(layer, &chunk, &tables));
+        let first = plan.first_of_file(bucket.number);
+        let mut start = 0;
+        let mut layers = Vec::new();
+        for gaussians in quantised.layer_counts() {
+            let own = start..start + gaussians;
+            start = own.end;
+            let place = |g: &MortonKey| {
+                let place = u64::from(bucket.places[g.index()].source).saturating_sub(first);
+                u32::try_from(place).unwrap_or(u32::MAX)
+            };
+            let order =
+                options.keep_order.then(|| quantised.sources()[own.clone()].iter().map(place).collect());
+            layers.push(CodedLayer { gaussians, order, extras: quantised.extras(own) });
+        }
+        let scene = self.scene;
+        let coded = Coded { scene, bucket: bucket.number, tables: tables.write(), chunks, layers };
+        Ok((Counts { scene, counts }, coded))
+    }
+}
+
+impl Tables {
+    /// The tables for all buckets. `counts` are those of all, in order.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if there are more symbols than a file holds.
+    pub fn new(counts: &[Counts]) -> Result<Self> {
+        let wrong = || Error::parameter("counts", counts.len(), "those of all buckets of a scene");
+        let all = Counts::sum(counts).ok_or_else(wrong)?;
+        Ok(Self { scene: all.scene, bytes: tables::Tables::of(&all.counts)?.write() })
+    }
+
+    pub(super) fn read(&self, plan: &Plan) -> Result<tables::Tables> {
+        plan.check("tables", [self.scene], None)?;
+        tables::Tables::read(&self.bytes).ok_or_else(|| Error::parameter("tables", "damaged", "tables"))
+    }
+}
+
+impl Counts {
+    /// The sum of all, one after the other; `None` if there are none, or of several scenes.
+    pub(super) fn sum(all: &[Self]) -> Option<Self> {
+        let (first, rest) = all.split_first()?;
+        let mut sum = first.clone();
+        rest.iter().for_each(|more| sum.counts.add(&more.counts));
+        rest.iter().all(|more| more.scene == sum.scene).then_some(sum)
+    }
+}
+
+impl Coded {
+    /// The same bucket, coded with the tables of all.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if it is not of this coding.
+    pub fn with_tables(self, plan: &Plan, coding: &Coding, tables: &Tables) -> Result<Self> {
+        plan.check("coded bucket", [self.scene], None)?;
+        let wrong =
+            || Error::parameter("coded bucket", self.bucket, "a bucket whose symbols the tables have");
+        let own = tables::Tables::read(&self.tables).ok_or_else(wrong)?;
+        let (lookup, common) = (Lookup::new(&own), tables.read(plan)?);
+        let encoding = coding.encoding(plan)?;
+        let forms = encoding.layering.forms(encoding.head.rest.least.len());
+        let recoded = map_vec(self.chunks.iter().collect(), |chunk: &Written| {
+            let form = forms.get(chunk.layer).copied().unwrap_or_default();
+            chunk.recoded(&encoding.form, form, &lookup, &common)
+        });
+        let chunks = recoded.into_iter().collect::<Option<Vec<Written>>>().ok_or_else(wrong)?;
+        Ok(Self { tables: tables.bytes.clone(), chunks, ..self })
+    }
+
+    /// Flips a bit of a range.
+    #[cfg(test)]
+    pub(super) fn damage(&mut self, at: usize) {
+        let ranges =
+            self.chunks.iter_mut().flat_map(|chunk| chunk.ranges.iter_mut().map(|range| &mut range.0));
+        let mut bytes: Vec<&mut u8> = ranges.flatten().collect();
+        let count = bytes.len();
+        *bytes[at % count] ^= 1 << (at % 8);
+    }
+
+    /// Takes its chunks and layers out, if they are coded with `tables` and belong together.
+    pub(super) fn into_chunks(
+        self,
+        plan: &Plan,
+        tables: &Tables,
+        layers: usize,
+    ) -> Result<(Vec<Written>, Vec<CodedLayer>)> {
+        plan.check("coded bucket", [self.scene], None)?;
+        if self.tables != tables.bytes {
+            return Err(Error::parameter("coded bucket", self.bucket, "one with the tables of the file"));
+        }
+        let gaussians = |layer: usize| -> usize {
+            self.chunks.iter().filter(|chunk| chunk.layer == layer).map(|chunk| chunk.gaussians).sum()
+        };
+        let belongs = |(number, layer): (usize, &CodedLayer)| {
+            layer.gaussians == gaussians(number)
+                && layer.order.as_ref().map(Vec::len) == plan.options.keep_order.then_some(layer.gaussians)
+                && layer.extras.len() == plan.like.extras.len()
+        };
+        if self.layers.len() != layers || !self.layers.iter().enumerate().all(belongs) {
+            return Err(Error::parameter("coded bucket", self.bucket, "layers that hold its chunks"));
+        }
+        Ok((self.chunks, self.layers))
+    }
+
+    /// The bucket's number.
+    #[must_use]
+    pub fn bucket(&self) -> usize {
+        self.bucket
+    }
+}

@@ -1,0 +1,200 @@
+//! The Gaussians of a group of buckets that predictors and dictionary are found from.
+
+use half::f16;
+use serde::{Deserialize, Serialize};
+
+use super::bucket::Bucket;
+use super::look::Looked;
+use super::message::messages;
+use super::plan::Plan;
+use super::steps::Steps;
+use crate::packed::bitstream::MeanView;
+use crate::packed::encode::canonical::MortonKey;
+use crate::packed::encode::coder::{OrderedGaussians, SAMPLE, SAMPLE_STREAM};
+use crate::packed::encode::fit::Predictors;
+use crate::packed::encode::octaves::Histogram;
+use crate::scene::splats::Splats;
+use crate::support::error::{Error, Result};
+use crate::support::rng::SplitMix64;
+
+/// Approximate number of Gaussians that predictors are fitted to.
+const FITTED: usize = 1 << 19;
+/// Gaussians of a run of the sample. They are neighbours in the file.
+const RUN: usize = 2048;
+
+/// Some Gaussians of a group of buckets.
+#[derive(Debug, Default)]
+pub struct Sample {
+    parts: Vec<Part>,
+}
+
+/// Those of one bucket.
+#[derive(Debug)]
+struct Part {
+    bucket: usize,
+    splats: Splats,
+    /// Cells, and numbers among the Gaussians.
+    scene: Vec<MortonKey>,
+    weights: Vec<[f32; 2]>,
+    stays: Vec<bool>,
+}
+
+/// Sums over the sample of a group, and the rows that a dictionary is learned from.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct SampleStatistics {
+    scene: u32,
+    pub(super) predictors: Predictors,
+    /// By how many classes shapes ask for smaller steps.
+    pub(super) over: f32,
+    /// The largest coordinate of each base colour.
+    pub(super) dc: Histogram,
+    /// Rows in units of their value steps, as bytes of 16-bit floats. They differ from the rows by far less than a step.
+    rows: Vec<u8>,
+    /// The colour class of each row.
+    classes: Vec<u8>,
+}
+
+messages!(SampleStatistics => "sample statistics");
+
+impl Sample {
+    /// No Gaussians yet.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Adds the next bucket of the group.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `looked` is of another bucket.
+    pub fn add(&mut self, plan: &Plan, bucket: &Bucket, looked: &Looked) -> Result<()> {
+        let n = bucket.splats.len();
+        let (weights, stays) = looked.of_each(plan, bucket, false)?;
+        // Of so many runs one is taken, in the next bucket the next.
+        let share = plan.sampled() as f64 / plan.buckets().max(1) as f64;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share of a count")]
+        let every = ((plan.len() as f64 * share / FITTED as f64).ceil() as usize).max(1);
+        let is_taken = |i: usize| (i / RUN + bucket.number).is_multiple_of(every);
+        let keep: Vec<bool> = (0..n).map(is_taken).collect();
+        let mut splats = bucket.splats.clone();
+        splats.geometry.extras = Vec::new();
+        splats.retain(&keep);
+        splats.shrink_to_fit();
+        let taken = || (0..n).filter(|&i| keep[i]);
+        let scene = (0..).zip(taken()).map(|(source, i)| MortonKey { source, ..bucket.places[i] }).collect();
+        self.parts.push(Part {
+            bucket: bucket.number,
+            splats,
+            scene,
+            weights: taken().map(|i| weights[i]).collect(),
+            stays: taken().map(|i| stays[i]).collect(),
+        });
+        Ok(())
+    }
+
+    /// Sums over the sample.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if `steps` are of another scene.
+    pub fn statistics(&self, plan: &Plan, steps: &Steps) -> Result<SampleStatistics> {
+        plan.check("steps", [steps.scene], None)?;
+        let mut out = SampleStatistics::none(plan);
+        let mean_view = MeanView::new(&plan.options.viewpoints);
+        let parameters = &steps.floor.parameters;
+        for part in &self.parts {
+            let dc = mean_view.colours(&part.splats);
+            let classes = steps.steps.classes_of(&part.weights);
+            out.predictors.add(&part.splats.geometry, &dc, &part.scene, &classes, parameters);
+            let kept: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
+            out.over = out.over.max(steps.floor.over(&part.splats.geometry, &kept));
+            for dc in &dc {
+                let largest = parameters.dc_coordinates(*dc).into_iter();
+                out.dc.add(largest.fold(0.0_f32, |most, x| most.max(x.abs())));
+            }
+        }
+        self.add_rows(&mut out, plan, steps);
+        Ok(out)
+    }
+
+    /// Adds rows to learn from. Each bucket gives as many as its share of the Gaussians that stay.
+    fn add_rows(&self, out: &mut SampleStatistics, plan: &Plan, steps: &Steps) {
+        let kept = |bucket: usize| steps.kept.get(bucket).copied().unwrap_or(0) as f64;
+        let sampled = (0..plan.groups()).flat_map(|group| plan.group(group));
+        let all_kept = sampled.map(kept).sum::<f64>().max(1.0);
+        let parameters = steps.floor.parameters.for_learning();
+        for part in &self.parts {
+            let scene: Vec<MortonKey> = part.kept().map(|i| part.scene[i]).collect();
+            let weights: Vec<[f32; 2]> = part.kept().map(|i| part.weights[i]).collect();
+            let free = steps.steps.classes_of(&weights);
+            let classes = steps.floor.classes(&free, &part.splats.geometry, &scene);
+            let view = OrderedGaussians::new(&part.splats, &scene, &classes);
+            let share = kept(part.bucket) / all_kept;
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a share")]
+            let wanted = (SAMPLE as f64 * share).round() as usize;
+            let seed = plan.options.seed ^ SAMPLE_STREAM ^ part.bucket as u64;
+            let chosen = SplitMix64::new(seed).shuffled(scene.len()).take(wanted);
+            let (rows, mut classes) = view.scaled(chosen, &parameters);
+            out.rows.extend(rows.into_iter().flat_map(half_bytes));
+            out.classes.append(&mut classes);
+        }
+    }
+}
+
+/// The bytes of `x` as a 16-bit float, the nearest that is finite.
+fn half_bytes(x: f32) -> [u8; 2] {
+    let most = f16::MAX.to_f32();
+    f16::from_f32(x.clamp(-most, most)).to_le_bytes()
+}
+
+impl Part {
+    fn kept(&self) -> impl Iterator<Item = usize> {
+        (0..self.scene.len()).filter(|&i| self.stays[i])
+    }
+}
+
+impl SampleStatistics {
+    fn none(plan: &Plan) -> Self {
+        Self {
+            scene: plan.scene(),
+            predictors: Predictors::default(),
+            over: 0.0,
+            dc: Histogram::default(),
+            rows: Vec::new(),
+            classes: Vec::new(),
+        }
+    }
+
+    /// The sums and the rows of all groups, in order.
+    pub(super) fn sum(plan: &Plan, groups: &[Self]) -> Result<Self> {
+        plan.check("sample statistics", groups.iter().map(|group| group.scene), Some(plan.groups()))?;
+        let mut out = Self::none(plan);
+        for group in groups {
+            out.predictors.merge(&group.predictors);
+            out.over = out.over.max(group.over);
+            out.dc.merge(&group.dc);
+            out.rows.extend_from_slice(&group.rows);
+            out.classes.extend_from_slice(&group.classes);
+        }
+        let expected = out.classes.len() * plan.like.degree.rest() * size_of::<f16>();
+        if out.rows.len() != expected {
+            return Err(Error::parameter(
+                "sample statistics",
+                out.rows.len(),
+                format!("{expected} bytes of rows"),
+            ));
+        }
+        Ok(out)
+    }
+
+    /// The rows in random order, and their classes.
+    pub(super) fn shuffled(&self, plan: &Plan) -> (Vec<f32>, Vec<u8>) {
+        let bytes = plan.like.degree.rest() * size_of::<f16>();
+        let (mut rows, mut classes) = (Vec::new(), Vec::new());
+        for i in SplitMix64::new(plan.options.seed ^ SAMPLE_STREAM).shuffled(self.classes.len()) {
+            let row = self.rows[i * bytes..(i + 1) * bytes].chunks_exact(size_of::<f16>());
+            rows.extend(row.map(|x| f16::from_le_bytes([x[0], x[1]]).to_f32()));
+            classes.push(self.classes[i]);
+        }
+        (rows, classes)
+    }
+}

@@ -1,0 +1,82 @@
+//! The steps of a scene, from what looks at all of its buckets say.
+
+use serde::{Deserialize, Serialize};
+
+use super::look::LookStatistics;
+use super::message::messages;
+use super::plan::Plan;
+use crate::packed::encode::codebook::StopRule;
+use crate::packed::encode::coder::promise;
+use crate::packed::encode::fit::{self, Classes};
+use crate::packed::encode::floor::Floor;
+use crate::packed::encode::layering::Layering;
+use crate::support::error::{Error, Result};
+
+/// The steps of a scene, without predictors and dictionary.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub struct Steps {
+    pub(super) scene: u32,
+    pub(super) steps: fit::Steps,
+    /// The limits of steps before the shapes of Gaussians are known.
+    pub(super) floor: Floor,
+    pub(super) layering: Layering,
+    pub(super) stop: StopRule,
+    /// Of each bucket the number of Gaussians that stay.
+    pub(super) kept: Vec<u64>,
+    /// The buckets of which the first Gaussian stays though it is not worth its bits: the first one of a file of which none
+    /// would stay.
+    first_stays: Vec<usize>,
+}
+messages!(Steps => "steps");
+
+impl Steps {
+    /// The steps of a scene. `buckets` are the statistics of all, in order.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] if they are not those of all buckets.
+    pub fn new(plan: &Plan, buckets: &[LookStatistics]) -> Result<Self> {
+        plan.check("look statistics", buckets.iter().map(|bucket| bucket.scene), Some(plan.buckets()))?;
+        let in_order = buckets.iter().enumerate().all(|(number, bucket)| bucket.bucket == number);
+        let Some((first, rest)) = buckets.split_first().filter(|_| in_order) else {
+            return Err(Error::parameter("look statistics", "in another order", "in the order of buckets"));
+        };
+        let mut all = first.clone();
+        rest.iter().for_each(|next| all.merge(next));
+        let mut kept: Vec<u64> = buckets.iter().map(|bucket| bucket.kept).collect();
+        let mut first_stays = Vec::new();
+        for file in plan.files() {
+            let some = file.clone().find(|&bucket| buckets[bucket].gaussians > 0);
+            if let Some(bucket) = some.filter(|_| kept[file].iter().sum::<u64>() == 0) {
+                first_stays.push(bucket);
+                kept[bucket] = 1;
+            }
+        }
+        let kinds = [0, 1].map(|kind| Classes::of_histogram(&all.weights[kind]));
+        let steps = fit::Steps::new(&plan.grid, kinds, all.colours.axes(), &all.derivatives);
+        let mut parameters = steps.with_step(plan.step);
+        let stop = promise(&mut parameters, plan.options.tolerance);
+        let of_file = kept.iter().sum::<u64>() / plan.files().len().max(1) as u64;
+        let of_file = usize::try_from(of_file).unwrap_or(usize::MAX);
+        let layering = Layering::new(of_file, plan.options.layers_from, all.energies.iter());
+        Ok(Self {
+            scene: plan.scene(),
+            steps,
+            floor: Floor::begin(parameters),
+            layering,
+            stop,
+            kept,
+            first_stays,
+        })
+    }
+
+    /// Number of Gaussians of the scene that stay.
+    #[must_use]
+    pub fn kept(&self) -> usize {
+        usize::try_from(self.kept.iter().sum::<u64>()).unwrap_or(usize::MAX)
+    }
+
+    /// Whether the first Gaussian of a bucket stays in any case.
+    pub(super) fn first_stays(&self, bucket: usize) -> bool {
+        self.first_stays.contains(&bucket)
+    }
+}

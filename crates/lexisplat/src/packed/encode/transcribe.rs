@@ -1,0 +1,91 @@
+//! Ranges of a chunk that are coded anew, with other tables.
+
+use crate::packed::bitstream::chunk::{Form, LayerForm, lanes, sets};
+use crate::packed::bitstream::fill_in::{CHANGES, interim};
+use crate::packed::bitstream::geometry_syntax::{GeometrySyntax, Group};
+use crate::packed::bitstream::refinement::refine;
+use crate::packed::bitstream::sh_codes::{BLOCK, Rest};
+use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols};
+use crate::packed::entropy::tables::Lookup;
+
+/// A decoder that records what it decodes.
+struct Transcriber<'l> {
+    from: SymbolDecoder<'l>,
+    to: SymbolRecorder,
+}
+
+impl<'l> Transcriber<'l> {
+    fn new(lookup: &'l Lookup, bytes: &'l [u8], lanes: usize) -> Option<Self> {
+        Some(Self { from: SymbolDecoder::new(lookup, bytes, lanes, false)?, to: SymbolRecorder::default() })
+    }
+}
+
+impl Symbols for Transcriber<'_> {
+    fn symbols(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32> {
+        let out = self.from.symbols(slot, context, set, value);
+        self.to.symbols(slot, context, set, |l| out[l])
+    }
+
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let out = self.from.bits(slot, count, set, value);
+        self.to.bits(slot, count, set, |l| out[l])
+    }
+}
+
+impl Form {
+    /// The symbols of all ranges of a chunk of `gaussians` Gaussians, which are coded with the tables of `lookup`. `None` if no
+    /// encoder writes this.
+    pub(in crate::packed) fn transcribe(
+        &self,
+        layer: LayerForm,
+        gaussians: usize,
+        lookup: &Lookup,
+        ranges: &[&[u8]],
+    ) -> Option<Vec<SymbolRecorder>> {
+        if ranges.len() != layer.ranges() || gaussians == 0 {
+            return None;
+        }
+        let lanes = lanes(gaussians);
+        let all = ranges.iter().map(|bytes| Transcriber::new(lookup, bytes, lanes));
+        let mut all = all.collect::<Option<Vec<Transcriber<'_>>>>()?;
+        let (base, finer) = all.split_first_mut()?;
+        let (finer, parts) = finer.split_at_mut_checked(layer.levels)?;
+        let (parts, changed) = parts.split_at_mut_checked(layer.parts)?;
+        let steps = gaussians.div_ceil(lanes);
+        let (mut walk, mut rest) = (GeometrySyntax::new(&self.steering, layer.levels), Rest::default());
+        let mut group = Group::default();
+        for (step, set) in sets(gaussians, lanes).enumerate() {
+            walk.base(base, set, None, &mut group)?;
+            for (k, range) in finer.iter_mut().enumerate() {
+                refine(range, set, &mut group, layer.levels - k)?;
+            }
+            if let Some(range) = changed.first_mut() {
+                interim(range, set, &mut group, &[[0; LANES]; CHANGES]);
+            }
+            rest.push(set, group.colour);
+            if rest.len() == BLOCK || step + 1 == steps {
+                for (part, range) in parts.iter_mut().enumerate() {
+                    rest.part(range, None, &self.rest, part)?;
+                }
+                rest.clear();
+            }
+            // Symbols of damaged ranges may take no bytes, so that recording them would not end.
+            let good = |range: &Transcriber<'_>| range.from.good();
+            if !(good(base) && finer.iter().chain(&*parts).chain(&*changed).all(good)) {
+                return None;
+            }
+        }
+        all.iter()
+            .all(|range| range.from.exhausted())
+            .then(|| all.into_iter().map(|range| range.to).collect())
+    }
+}

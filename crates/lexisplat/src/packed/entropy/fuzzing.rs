@@ -1,0 +1,151 @@
+//! The entropy coder by itself, for the fuzz targets. No part of the crate's interface.
+
+use crate::packed::Packed;
+use crate::packed::bitstream::head::Head;
+use crate::packed::bitstream::index::Place;
+use crate::packed::entropy::rans_decoder::SymbolDecoder;
+use crate::packed::entropy::rans_encoder::SymbolRecorder;
+use crate::packed::entropy::script::{Ask, ask, tables_of};
+use crate::packed::entropy::symbols::LANES;
+use crate::packed::entropy::tables::{Lookup, Tables};
+use crate::scene::sh::ShDegree;
+
+/// Bytes of an entry of a script of [`decode`].
+const ENTRY: usize = 5;
+
+/// Reads `tables`, and with them `range`, of up to 16 lanes. Each five bytes of `script` say what is read next, in which
+/// contexts and for which lanes. Returns whether everything was read to its end, and not beyond.
+///
+/// # Panics
+/// If tables that were read are not the same once written and read again, or if the bits that were read cannot be counted.
+#[must_use]
+pub fn decode(tables: &[u8], range: &[u8], lanes: u8, script: &[u8]) -> bool {
+    let Some(tables) = Tables::read(tables) else { return false };
+    let written = tables.write();
+    let again = Tables::read(&written).map(|tables| tables.write());
+    assert_eq!(again.as_deref(), Some(written.as_slice()), "tables change as they are written");
+    let lookup = Lookup::new(&tables);
+    let Some(mut player) = SymbolDecoder::new(&lookup, range, 1 + usize::from(lanes) % LANES, true) else {
+        return false;
+    };
+    for &[kind, slot, context, low, high] in script.as_chunks::<ENTRY>().0 {
+        let set = u16::from_le_bytes([low, high]).into();
+        ask(&mut player, &Ask { kind, slot, context, set, value: 0 });
+    }
+    let counts = player.bit_counts.as_ref();
+    assert!(counts.is_some_and(|counts| counts.0.iter().all(|b| b.is_finite() && *b >= 0.0)));
+    player.exhausted()
+}
+
+/// What [`round_trip`] codes next: kind, set of contexts, context, lanes and value.
+pub type Entry = ([u8; 3], u16, u64);
+
+/// Codes what a script asks for in `lanes` lanes, and decodes it. Returns whether it came back and nothing was left.
+#[must_use]
+pub fn round_trip(lanes: u8, script: &[Entry]) -> bool {
+    let lanes = 1 + usize::from(lanes) % LANES;
+    let used = (1_u32 << lanes) - 1;
+    let asks = script.iter().map(|&([kind, slot, context], set, value)| Ask {
+        kind,
+        slot,
+        context,
+        set: u32::from(set) & used,
+        value,
+    });
+    let asks: Vec<Ask> = asks.collect();
+    let mut recorder = SymbolRecorder::default();
+    let coded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut recorder, a)).collect();
+    let Some((_, tables)) = tables_of(&recorder) else { return false };
+    let range = recorder.finish(&tables, lanes);
+    let Some(read) = Tables::read(&tables.write()) else { return false };
+    let lookup = Lookup::new(&read);
+    let Some(mut player) = SymbolDecoder::new(&lookup, &range, lanes, false) else { return false };
+    // Decodes everything, even after a difference.
+    let decoded: Vec<[u64; LANES]> = asks.iter().map(|a| ask(&mut player, a)).collect();
+    decoded == coded && player.exhausted()
+}
+
+/// The input of [`decode`]: the tables and the first range of a packed scene, empty if there are none.
+#[must_use]
+pub fn parts(packed: &Packed) -> [Vec<u8>; 2] {
+    let Some(head) = Head::read(&packed.head().bytes, packed.head().degree.rest()) else {
+        return Default::default();
+    };
+    let length = head.index.order.first().and_then(|place| {
+        let chunk = head.index.chunks.get(place.chunk as usize)?;
+        Some(chunk.ranges.get(usize::from(place.kind))?.length as usize)
+    });
+    [head.tables, packed.data().get(..length.unwrap_or(0)).unwrap_or_default().to_vec()]
+}
+
+/// `head`, of a scene of this degree, with the checksums of the ranges of `data`; `None` if it cannot be read.
+#[must_use]
+pub fn resealed(head: &[u8], degree: ShDegree, data: &[u8]) -> Option<Vec<u8>> {
+    let mut head = Head::read(head, degree.rest())?;
+    for range in head.index.chunks.iter_mut().flat_map(|chunk| &mut chunk.ranges) {
+        let start = usize::try_from(range.start).ok()?;
+        let bytes = data.get(start..).and_then(|rest| rest.get(..range.length as usize));
+        range.checksum = crc32fast::hash(bytes.unwrap_or_default());
+    }
+    Some(head.write())
+}
+
+/// Gaussians up to which chunks are copied.
+const MOST_COPIED: usize = 1 << 12;
+
+/// `head`, of a scene of this degree, and `data` with a change of chunks or ranges: one more, one fewer, others first, longer
+/// and shorter ones, or elsewhere. Checksums of ranges are not changed. Returns head, data and number of Gaussians, or `None`
+/// if there is nothing to change. `below` gives numbers below another.
+#[must_use]
+pub fn rearranged(
+    head: &[u8],
+    degree: ShDegree,
+    data: &[u8],
+    below: &mut dyn FnMut(usize) -> usize,
+) -> Option<(Vec<u8>, Vec<u8>, usize)> {
+    let mut head = Head::read(head, degree.rest())?;
+    let index = &mut head.index;
+    let bytes = |place: &Place| {
+        let range = index.chunks.get(place.chunk as usize)?.ranges.get(usize::from(place.kind))?;
+        let rest = data.get(usize::try_from(range.start).ok()?..)?;
+        Some((*place, rest.get(..range.length as usize)?.to_vec()))
+    };
+    let mut ranges: Vec<(Place, Vec<u8>)> = index.order.iter().map(bytes).collect::<Option<_>>()?;
+    let c = below(index.chunks.len());
+    let chunk = index.chunks.get(c)?.clone();
+    let c = u32::try_from(c).ok()?;
+    let (a, b) = (below(ranges.len()), below(ranges.len()));
+    match below(8) {
+        0..=2 if index.gaussians() < MOST_COPIED => {
+            let own: Vec<(Place, Vec<u8>)> = ranges.iter().filter(|(p, _)| p.chunk == c).cloned().collect();
+            ranges.iter_mut().filter(|(p, _)| p.chunk > c).for_each(|(p, _)| p.chunk += 1);
+            ranges.extend(own.into_iter().map(|(p, bytes)| (Place { chunk: c + 1, ..p }, bytes)));
+            index.chunks.insert(c as usize + 1, chunk);
+        }
+        3 => {
+            index.chunks.remove(c as usize);
+            ranges.retain(|(p, _)| p.chunk != c);
+            ranges.iter_mut().filter(|(p, _)| p.chunk > c).for_each(|(p, _)| p.chunk -= 1);
+        }
+        4 | 5 => ranges.swap(a, b),
+        6 => {
+            let at = below(ranges.get(a)?.1.len() + 1);
+            let moved = ranges.get_mut(a)?.1.split_off(at);
+            ranges.get_mut(b)?.1.extend(moved);
+        }
+        _ => {
+            let chunk = index.chunks.get_mut(c as usize)?;
+            chunk.cell = chunk.cell.wrapping_add(1 << below(64));
+            chunk.bounds.iter_mut().for_each(|bound| bound.rotate_left(1));
+        }
+    }
+    index.order = ranges.iter().map(|(place, _)| *place).collect();
+    for (place, bytes) in &ranges {
+        let range = index.chunks.get_mut(place.chunk as usize)?.ranges.get_mut(usize::from(place.kind))?;
+        range.length = u32::try_from(bytes.len()).ok()?;
+    }
+    index.place()?;
+    let gaussians = index.gaussians();
+    let data = ranges.into_iter().flat_map(|(_, bytes)| bytes).collect();
+    Some((head.write(), data, gaussians))
+}

@@ -1,0 +1,320 @@
+//! The entropy decoder of a range.
+
+use crate::packed::bitstream::stream::BitCounts;
+use crate::packed::bitstream::streams::{CONTEXTS, Slot};
+use crate::packed::entropy::rans_encoder::{LEAST, MOST_BITS, length_bytes};
+use crate::packed::entropy::shifts::{power, right_unsigned};
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, each, has};
+use crate::packed::entropy::tables::{Entry, IDLE, Lookup, Set, less_share, over, symbol};
+use crate::support::simd::Simd;
+
+/// The decoder of a range.
+#[derive(Debug)]
+pub(in crate::packed) struct SymbolDecoder<'a> {
+    pub(in crate::packed) lookup: &'a Lookup,
+    /// Words of 16 bits, at least two.
+    pub(in crate::packed) words: &'a [[u8; 2]],
+    pub(in crate::packed) states: Lanes<u32>,
+    /// Next word of each lane, and the end of its words.
+    pub(in crate::packed) next: Lanes<u32>,
+    ends: Lanes<u32>,
+    /// Vector instructions of the look-ups.
+    simd: Simd,
+    /// Whether something was asked for that no encoder writes.
+    pub(in crate::packed) damaged: bool,
+    /// Bits of each stream, if they are counted.
+    pub(in crate::packed) bit_counts: Option<BitCounts>,
+}
+
+impl<'a> SymbolDecoder<'a> {
+    /// `None` if `bytes` cannot be a range of this many lanes. Bits of streams are counted if `count_bits`.
+    pub(in crate::packed) fn new(
+        lookup: &'a Lookup,
+        bytes: &'a [u8],
+        lanes: usize,
+        count_bits: bool,
+    ) -> Option<Self> {
+        let width = length_bytes(bytes.len());
+        let (lengths, words) = bytes.split_at_checked(width * lanes.checked_sub(1)?)?;
+        let (words, []) = words.as_chunks::<2>() else { return None };
+        let total = u32::try_from(words.len()).ok().filter(|&total| (2..=MAX_WORDS).contains(&total))?;
+        let mut player = Self {
+            lookup,
+            words,
+            states: [LEAST; LANES],
+            next: [2; LANES],
+            ends: [2; LANES],
+            simd: Simd::current().narrow(),
+            damaged: false,
+            bit_counts: count_bits.then(BitCounts::zeros),
+        };
+        let mut end = 0_u32;
+        for l in 0..lanes {
+            let start = end;
+            end = match lengths.get(l * width..(l + 1) * width) {
+                Some(bytes) => {
+                    let length = bytes.iter().rev().fold(0, |length, &byte| length << 8 | u32::from(byte));
+                    end.checked_add(length).filter(|&end| end <= total)?
+                }
+                None => total,
+            };
+            let [high, low] = *words.get(start as usize..end as usize)?.first_chunk()?;
+            let state = u32::from(u16::from_le_bytes(high)) << 16 | u32::from(u16::from_le_bytes(low));
+            player.states[l] = Some(state).filter(|&state| state >= LEAST)?;
+            player.next[l] = start + 2;
+            player.ends[l] = end;
+        }
+        Some(player)
+    }
+
+    /// Whether nothing was asked for that no encoder writes, and no lane was read beyond its end.
+    pub(in crate::packed) fn good(&self) -> bool {
+        !self.damaged && self.next.iter().zip(&self.ends).all(|(next, end)| next <= end)
+    }
+
+    /// Whether every lane was read to its end and not beyond, and holds what an encoder leaves.
+    pub(in crate::packed) fn exhausted(&self) -> bool {
+        !self.damaged && self.states == [LEAST; LANES] && self.next == self.ends
+    }
+
+    /// The next symbol of each lane that is not [`IDLE`], by the table of its context.
+    ///
+    /// It is called and not inlined: the walk has dozens of places that take symbols, and with this in each of them it
+    /// would not fit into the cache of instructions.
+    #[inline(never)]
+    fn take<const PRECISION: u32>(&mut self, number: usize, context: &Lanes<u32>, set: u32) -> Lanes<u32> {
+        let Some(tables) = self.lookup.set(number) else {
+            self.damaged |= set != 0;
+            return [0; LANES];
+        };
+        if set.count_ones() <= FEW {
+            return self.take_few::<PRECISION>(tables, context, set);
+        }
+        let simd = self.simd;
+        simd.run(Take::<PRECISION> { player: self, tables, context, set })
+    }
+
+    /// [`Self::take`] lane by lane.
+    #[inline(always)]
+    fn take_few<const PRECISION: u32>(
+        &mut self,
+        tables: Set<'_>,
+        context: &Lanes<u32>,
+        mut set: u32,
+    ) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        while set != 0 {
+            let l = set.trailing_zeros() as usize % LANES;
+            let state = self.states[l];
+            let entry = tables.entry(context[l], state & ((1 << PRECISION) - 1));
+            let state = after::<PRECISION>(state, entry);
+            (self.states[l], self.next[l]) = refilled(state, self.next[l], word(self.words, self.next[l]));
+            out[l] = symbol(entry);
+            set &= set - 1;
+        }
+        out
+    }
+
+    /// Adds the bits of the symbols that are taken next.
+    #[cold]
+    #[inline(never)]
+    fn count(&mut self, slot: Slot, context: &Lanes<u32>, set: u32) {
+        let (Some(bit_counts), Some(tables)) = (&mut self.bit_counts, self.lookup.set(slot.number)) else {
+            return;
+        };
+        let precision = slot.stream.precision();
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            let entry = tables.entry(context[l], self.states[l] & ((1 << precision) - 1));
+            let share = less_share(entry) + 1;
+            bit_counts.0[slot.stream as usize] += f64::from(precision) - libm::log2(f64::from(share));
+        }
+    }
+
+    /// The next `count` raw bits of each lane, at most 16. Lanes that are not in use have none.
+    #[inline(never)]
+    fn take_bits(&mut self, count: &Lanes<u32>) -> Lanes<u32> {
+        let simd = self.simd;
+        simd.run(TakeBits { player: self, count })
+    }
+
+    /// Adds raw bits that are taken next.
+    #[cold]
+    #[inline(never)]
+    fn count_raw(&mut self, slot: Slot, count: &Lanes<u32>, set: u32) {
+        let Some(bit_counts) = &mut self.bit_counts else { return };
+        let taken = (0..LANES).filter(|&l| has(set, l)).map(|l| f64::from(count[l]));
+        bit_counts.0[slot.stream as usize] += taken.sum::<f64>();
+    }
+}
+
+/// The work of [`SymbolDecoder::take`]. All but the look-ups is done in vector registers.
+struct Take<'p, 'l, const PRECISION: u32> {
+    player: &'p mut SymbolDecoder<'l>,
+    tables: Set<'l>,
+    context: &'p Lanes<u32>,
+    set: u32,
+}
+
+impl<const PRECISION: u32> pulp::NullaryFnOnce for Take<'_, '_, PRECISION> {
+    type Output = Lanes<u32>;
+
+    #[inline(always)]
+    fn call(mut self) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        self.half::<0>(&mut out);
+        if self.set >> HALF != 0 {
+            self.half::<HALF>(&mut out);
+        }
+        out
+    }
+}
+
+impl<const PRECISION: u32> Take<'_, '_, PRECISION> {
+    /// Takes the symbols of half of the lanes, which fill a vector register, from lane `FIRST` on.
+    #[inline(always)]
+    fn half<const FIRST: usize>(&mut self, out: &mut Lanes<u32>) {
+        let mut entries = [0; HALF];
+        for l in 0..HALF {
+            let low = self.player.states[FIRST + l] & ((1 << PRECISION) - 1);
+            entries[l] = self.tables.entry(self.context[FIRST + l], low);
+        }
+        let words = self.player.next_words::<FIRST>();
+        let (states, next) = self.player.half_mut::<FIRST>();
+        let symbols = advance::<PRECISION>(states, next, &entries, &words);
+        out[FIRST..FIRST + HALF].copy_from_slice(&symbols);
+    }
+}
+
+/// The work of [`SymbolDecoder::take_bits`].
+struct TakeBits<'p, 'l> {
+    player: &'p mut SymbolDecoder<'l>,
+    count: &'p Lanes<u32>,
+}
+
+impl pulp::NullaryFnOnce for TakeBits<'_, '_> {
+    type Output = Lanes<u32>;
+
+    #[inline(always)]
+    fn call(self) -> Lanes<u32> {
+        let Self { player, count } = self;
+        let states = player.states;
+        let out = each(|l| states[l] & (power(count[l]) - 1));
+        player.states = right_unsigned(&states, count);
+        player.refill_half::<0>();
+        player.refill_half::<HALF>();
+        out
+    }
+}
+
+impl SymbolDecoder<'_> {
+    /// Takes words into the states of half of the lanes that have room for one.
+    #[inline(always)]
+    fn refill_half<const FIRST: usize>(&mut self) {
+        let words = self.next_words::<FIRST>();
+        let (states, next) = self.half_mut::<FIRST>();
+        refill(states, next, &words);
+    }
+
+    /// The next word of each lane of a half.
+    #[inline(always)]
+    fn next_words<const FIRST: usize>(&self) -> [u32; HALF] {
+        let mut words = [0; HALF];
+        for l in 0..HALF {
+            words[l] = word(self.words, self.next[FIRST + l]);
+        }
+        words
+    }
+
+    /// The states of a half of the lanes, and the numbers of their next words.
+    #[inline(always)]
+    fn half_mut<const FIRST: usize>(&mut self) -> (&mut [u32; HALF], &mut [u32; HALF]) {
+        let (states, next) = (self.states.as_chunks_mut().0, self.next.as_chunks_mut().0);
+        (&mut states[FIRST / HALF], &mut next[FIRST / HALF])
+    }
+}
+
+/// Takes symbols from states, and words into those that have room for one. Returns the symbols.
+// Inlined between look-ups of single numbers, WebAssembly would not get vectors.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn advance<const PRECISION: u32>(
+    states: &mut [u32; HALF],
+    next: &mut [u32; HALF],
+    entries: &[Entry; HALF],
+    words: &[u32; HALF],
+) -> [u32; HALF] {
+    let mut out = [0; HALF];
+    for l in 0..HALF {
+        let state = after::<PRECISION>(states[l], entries[l]);
+        (states[l], next[l]) = refilled(state, next[l], words[l]);
+        out[l] = symbol(entries[l]);
+    }
+    out
+}
+
+/// Takes words into states that have room for one.
+#[cfg_attr(target_arch = "wasm32", inline(never))]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn refill(states: &mut [u32; HALF], next: &mut [u32; HALF], words: &[u32; HALF]) {
+    for l in 0..HALF {
+        (states[l], next[l]) = refilled(states[l], next[l], words[l]);
+    }
+}
+
+/// The state after a symbol.
+#[inline(always)]
+fn after<const PRECISION: u32>(state: u32, entry: Entry) -> u32 {
+    let rest = state >> PRECISION;
+    rest.wrapping_mul(less_share(entry)).wrapping_add(rest.wrapping_add(over(entry)))
+}
+
+/// A word by its number. Beyond the end of the words there is anything.
+#[inline(always)]
+fn word(words: &[[u8; 2]], number: u32) -> u32 {
+    u16::from_le_bytes(words.get(number as usize).copied().unwrap_or_default()).into()
+}
+
+/// A state and the number of its lane's next word, after that word is taken if there is room for it.
+#[inline(always)]
+fn refilled(state: u32, next: u32, word: u32) -> (u32, u32) {
+    let low = state < LEAST;
+    (if low { state << 16 | word } else { state }, next.wrapping_add(u32::from(low)))
+}
+
+/// Half of the lanes.
+const HALF: usize = LANES / 2;
+/// Of so many lanes symbols are taken one by one. The others are idle.
+const FEW: u32 = 3;
+
+/// Most words of a range.
+const MAX_WORDS: u32 = 1 << 30;
+
+impl Symbols for SymbolDecoder<'_> {
+    #[inline(always)]
+    fn symbols(&mut self, slot: Slot, context: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        const LAST: u32 = CONTEXTS as u32 - 1;
+        let context = each(|l| if has(set, l) { context[l].min(LAST) } else { IDLE });
+        if self.bit_counts.is_some() {
+            self.count(slot, &context, set);
+        }
+        match slot.stream.precision() {
+            12 => self.take::<12>(slot.number, &context, set),
+            _ => self.take::<10>(slot.number, &context, set),
+        }
+    }
+
+    #[inline(always)]
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, _: impl Fn(usize) -> u32) -> Lanes<u32> {
+        if self.bit_counts.is_some() {
+            self.count_raw(slot, &count, set);
+        }
+        let count = each(|l| if has(set, l) { count[l] } else { 0 });
+        let first = each(|l| count[l].min(MOST_BITS));
+        let mut out = self.take_bits(&first);
+        if count.iter().fold(0, |all, count| all | count) > MOST_BITS {
+            let high = self.take_bits(&each(|l| (count[l] - first[l]).min(MOST_BITS)));
+            out = each(|l| out[l] | high[l] << MOST_BITS);
+        }
+        out
+    }
+}

@@ -1,0 +1,152 @@
+//! The entropy encoder of a range: up to 16 lanes of rANS, each with a state of 32 bits and words of 16 bits.
+//!
+//! Raw bits pass through the same states as modelled symbols, so that a lane is one run of words that is read forward.
+
+use crate::packed::bitstream::streams::Slot;
+use crate::packed::entropy::symbols::{LANES, Lanes, Symbols, has};
+use crate::packed::entropy::tables::{Model, Tables};
+
+/// Least state between symbols. A lane begins and, decoded, ends with it.
+pub(in crate::packed) const LEAST: u32 = 1 << 16;
+/// Most raw bits that a state gives at once.
+pub(in crate::packed) const MOST_BITS: u32 = 16;
+/// Ranges of fewer bytes have lanes of which 16 bits count the words.
+const LEAST_LONG: usize = 1 << 17;
+
+/// Bytes of the number of words of a lane in a range of this many bytes. As many or more remain if numbers get longer.
+pub(in crate::packed) fn length_bytes(range: usize) -> usize {
+    if range < LEAST_LONG { 2 } else { 4 }
+}
+
+/// Marks a recorded entry as raw bits.
+const RAW: u32 = 1 << 31;
+
+/// The encoder of a range. It keeps everything until the tables are known.
+#[derive(Debug, Clone, Default)]
+pub(in crate::packed) struct SymbolRecorder {
+    /// Of each lane: symbols with their contexts, or up to 16 raw bits with their number and stream.
+    lanes: [Vec<u32>; LANES],
+}
+
+/// A recorded symbol.
+fn symbol_entry(context: usize, symbol: u32) -> u32 {
+    (context as u32) << 8 | symbol
+}
+
+impl Symbols for SymbolRecorder {
+    fn symbols(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l)) {
+            out[l] = value(l);
+            self.lanes[l].push(symbol_entry(slot.place(context[l]), out[l]));
+        }
+        out
+    }
+
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32> {
+        let mut out = [0; LANES];
+        for l in (0..LANES).filter(|&l| has(set, l) && count[l] > 0) {
+            out[l] = value(l);
+            let mut rest = out[l];
+            for piece in pieces(count[l]) {
+                let bits = rest & ((1 << piece) - 1);
+                self.lanes[l].push(RAW | (slot.stream as u32) << 24 | piece << 16 | bits);
+                rest = rest.checked_shr(piece).unwrap_or(0);
+            }
+        }
+        out
+    }
+}
+
+/// Raw bits are taken in pieces of at most [`MOST_BITS`], low ones first.
+fn pieces(count: u32) -> impl Iterator<Item = u32> {
+    [count.min(MOST_BITS), count.saturating_sub(MOST_BITS)].into_iter().filter(|&piece| piece > 0)
+}
+
+impl SymbolRecorder {
+    /// Hands every symbol and its context to `count`, and every piece of raw bits, its stream and its length to `raw`.
+    pub(in crate::packed) fn each(&self, mut count: impl FnMut(usize, u8), mut raw: impl FnMut(usize, u32)) {
+        for &entry in self.lanes.iter().flatten() {
+            if entry & RAW == 0 {
+                count((entry >> 8) as usize, entry.to_le_bytes()[0]);
+            } else {
+                raw((entry >> 24 & 0x7f) as usize, entry >> 16 & 0xff);
+            }
+        }
+    }
+
+    /// Whether `tables` have all symbols.
+    pub(in crate::packed) fn is_within(&self, tables: &Tables) -> bool {
+        let share = |entry: u32| tables.share((entry >> 8) as usize, entry.to_le_bytes()[0]);
+        let has = |&entry: &u32| entry & RAW != 0 || share(entry).is_some();
+        self.lanes.iter().flatten().all(has)
+    }
+
+    /// All entries, lane by lane, to be [put back](Self::restore) later.
+    #[cfg(test)]
+    pub(in crate::packed) fn entries(&self) -> &[Vec<u32>; LANES] {
+        &self.lanes
+    }
+
+    /// A recorder with the entries of another.
+    #[cfg(test)]
+    pub(in crate::packed) fn restore(entries: Vec<Vec<u32>>) -> Self {
+        let mut lanes: [Vec<u32>; LANES] = Default::default();
+        for (lane, entries) in lanes.iter_mut().zip(entries) {
+            *lane = entries;
+        }
+        Self { lanes }
+    }
+
+    /// The bytes of the range: the numbers of words of all lanes in use but the last, and the words.
+    pub(in crate::packed) fn finish(&self, tables: &Tables, lanes: usize) -> Vec<u8> {
+        let words: Vec<Vec<u16>> = self.lanes.iter().take(lanes).map(|lane| encode(lane, tables)).collect();
+        let lengths = words.iter().take(lanes.saturating_sub(1)).map(Vec::len);
+        let short = 2 * (lengths.len() + words.iter().map(Vec::len).sum::<usize>());
+        let mut out = Vec::new();
+        for length in lengths {
+            out.extend((length as u32).to_le_bytes().iter().take(length_bytes(short)));
+        }
+        out.extend(words.iter().flatten().flat_map(|word| word.to_le_bytes()));
+        out
+    }
+}
+
+/// The words of a lane, in the order in which they are read.
+fn encode(lane: &[u32], tables: &Tables) -> Vec<u16> {
+    let mut words = Vec::new();
+    let mut state = LEAST;
+    let mut make_room = |state: &mut u32, limit: u64| {
+        if u64::from(*state) >= limit {
+            words.push((*state & 0xffff) as u16);
+            *state >>= 16;
+        }
+    };
+    // The coder is a stack: what is coded last is decoded first.
+    for &entry in lane.iter().rev() {
+        if entry & RAW == 0 {
+            let context = (entry >> 8) as usize;
+            let precision = Slot::stream_of(context).precision();
+            let Model { start, share } = tables.model(context, entry.to_le_bytes()[0]);
+            make_room(&mut state, u64::from(share) << (32 - precision));
+            state = ((state / share) << precision) + start + state % share;
+        } else {
+            let count = entry >> 16 & 0xff;
+            make_room(&mut state, 1 << (32 - count));
+            state = state << count | entry & 0xffff;
+        }
+    }
+    words.push((state & 0xffff) as u16);
+    words.push((state >> 16) as u16);
+    words.reverse();
+    words
+}
+
+#[cfg(test)]
+mod tests;

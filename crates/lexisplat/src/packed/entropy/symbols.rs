@@ -1,0 +1,134 @@
+//! Runs of Gaussians that are coded side by side, and what encoder and decoder of a range have in common.
+
+use crate::packed::bitstream::streams::Slot;
+
+/// Runs of Gaussians of a chunk that are coded side by side, each with a state of its own. A symbol of a lane depends on
+/// the one before it, so a CPU is busy only with many lanes. Two vector registers of 256 bits hold one number of each.
+pub(in crate::packed) const LANES: usize = 16;
+
+/// One number of each lane. Numbers of lanes that are not in use mean nothing.
+pub(in crate::packed) type Lanes<T = i32> = [T; LANES];
+
+/// What `of` says of each lane. It is always inlined into vector code, which the methods of arrays are not.
+#[inline(always)]
+pub(in crate::packed) fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> Lanes<T> {
+    let mut out = [T::default(); LANES];
+    for (l, out) in out.iter_mut().enumerate() {
+        *out = of(l);
+    }
+    out
+}
+
+/// Whether `lane` is in `set`.
+#[inline(always)]
+pub(in crate::packed) fn has(set: u32, lane: usize) -> bool {
+    set & 1 << lane != 0
+}
+
+/// The encoder or the decoder of a range. The encoder records what the closures say of each lane, and returns it. The
+/// decoder returns what the range holds and never calls the closures. So one walk serves both.
+///
+/// Only lanes in `set` are coded. The others get 0.
+pub(in crate::packed) trait Symbols {
+    /// Bytes that are modelled in `context`, one for each lane.
+    fn symbols(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32>;
+
+    /// Numbers of `count` bits each, at most 32, that are not modelled.
+    fn bits(&mut self, slot: Slot, count: Lanes<u32>, set: u32, value: impl Fn(usize) -> u32) -> Lanes<u32>;
+
+    /// Whole numbers: a token that is modelled, and for large ones bits that are not.
+    #[inline(always)]
+    fn integers(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u32,
+    ) -> Lanes<u32> {
+        let tokens = self.symbols(slot, context, set, |l| token(u64::from(value(l))));
+        if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
+            return tokens;
+        }
+        let count = each(|l| low_bits(tokens[l]).min(30));
+        let low =
+            self.bits(slot, count, set, |l| value(l) & ((1 << low_bits(token(u64::from(value(l))))) - 1));
+        each(|l| if tokens[l] < DIRECT { tokens[l] } else { (2 + (tokens[l] & 1)) << count[l] | low[l] })
+    }
+
+    /// Whole numbers with a sign.
+    #[inline(always)]
+    fn signed(&mut self, slot: Slot, context: Lanes<u32>, set: u32, value: impl Fn(usize) -> i32) -> Lanes {
+        let coded = self.integers(slot, context, set, |l| zigzag(value(l)));
+        each(|l| unzigzag(coded[l]))
+    }
+
+    /// Whole numbers below 2^63.
+    #[inline(always)]
+    fn wide(
+        &mut self,
+        slot: Slot,
+        context: Lanes<u32>,
+        set: u32,
+        value: impl Fn(usize) -> u64,
+    ) -> Lanes<u64> {
+        let tokens = self.symbols(slot, context, set, |l| token(value(l)));
+        let mut out = each(|l| u64::from(tokens[l]));
+        if tokens.iter().fold(0, |all, t| all | t) < DIRECT {
+            return out;
+        }
+        let count = each(|l| low_bits(tokens[l]).min(61));
+        let rest = |l: usize| value(l) & ((1 << low_bits(token(value(l)))) - 1);
+        let low = self.bits(slot, each(|l| count[l].min(32)), set, |l| low_half(rest(l)));
+        let high = self.bits(slot, each(|l| count[l].saturating_sub(32)), set, |l| low_half(rest(l) >> 32));
+        for l in 0..LANES {
+            if tokens[l] >= DIRECT {
+                out[l] =
+                    u64::from(2 + (tokens[l] & 1)) << count[l] | u64::from(high[l]) << 32 | u64::from(low[l]);
+            }
+        }
+        out
+    }
+}
+
+/// The low 32 bits.
+fn low_half(x: u64) -> u32 {
+    (x & u64::from(u32::MAX)) as u32
+}
+
+/// Whole numbers below this are their own token.
+const DIRECT: u32 = 16;
+/// Bits of the last number that is its own token.
+const DIRECT_BITS: u32 = 4;
+
+/// The token of a whole number: itself, or its bit length and the bit after the leading one.
+pub(in crate::packed) fn token(value: u64) -> u32 {
+    if value < u64::from(DIRECT) {
+        return low_half(value);
+    }
+    let length = u64::BITS - value.leading_zeros();
+    DIRECT + 2 * (length - DIRECT_BITS - 1) + low_half((value >> (length - 2)) & 1)
+}
+
+/// Number of bits that follow `token`.
+#[inline(always)]
+pub(in crate::packed) fn low_bits(token: u32) -> u32 {
+    if token < DIRECT { 0 } else { (token - DIRECT) / 2 + DIRECT_BITS - 1 }
+}
+
+/// Maps signed numbers to unsigned ones by magnitude: 0, -1, 1, -2, ...
+#[inline(always)]
+pub(in crate::packed) fn zigzag(value: i32) -> u32 {
+    ((value << 1) ^ (value >> 31)).cast_unsigned()
+}
+
+/// Inverse of [`zigzag`].
+#[inline(always)]
+pub(in crate::packed) fn unzigzag(value: u32) -> i32 {
+    (value >> 1).cast_signed() ^ (value & 1).cast_signed().wrapping_neg()
+}
