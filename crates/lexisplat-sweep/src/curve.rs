@@ -3,7 +3,7 @@
 use lexisplat_eval::{FrameRate, Summary};
 
 use super::grid::Grid;
-use super::measure::Measure;
+use super::measure::{Measure, mean};
 use super::{Fps, Method, Point, SceneResult, Setting};
 
 /// Models of one method at one setting: those of all scenes, or that of one.
@@ -26,40 +26,20 @@ impl At<'_> {
 
     /// The mean of a measure over the scenes that have it.
     pub(super) fn mean(&self, measure: Measure) -> Option<f64> {
-        let values = self.models.iter().filter_map(|(scene, point)| measure.value(scene, Some(point)));
-        Summary::of(values.filter(|value| value.is_finite())).mean
+        mean(self.models.iter().filter_map(|(scene, point)| measure.value(scene, Some(point))))
     }
 
     /// The mean of the slowest and of the fastest rounds of a rate over the scenes that have it.
     pub(super) fn rounds(&self, rate: fn(&Fps) -> FrameRate) -> Option<(f64, f64)> {
         let rates: Vec<FrameRate> =
             self.models.iter().filter_map(|(_, point)| point.fps.as_ref().map(rate)).collect();
-        let mean = |of: fn(&FrameRate) -> f64| Summary::of(rates.iter().map(of)).mean;
-        Some((mean(|rate| rate.least)?, mean(|rate| rate.most)?))
+        Some((mean(rates.iter().map(|rate| rate.least))?, mean(rates.iter().map(|rate| rate.most))?))
     }
 
     /// The paper's ratio. `None` where nothing is coded.
     pub(super) fn ratio(&self) -> Option<f64> {
         self.mean(Measure::CoefficientRatio)
     }
-}
-
-/// By how much the same drawing of dense SH varied over all rounds beside all of `points`: the range over the mean, of the
-/// model where it is largest. `None` if frames were not timed.
-pub(super) fn dense_noise(points: &[At<'_>]) -> Option<f64> {
-    let rates: Vec<(&SceneResult, FrameRate)> = points
-        .iter()
-        .flat_map(|at| &at.models)
-        .filter_map(|(scene, point)| Some((*scene, point.fps?.dense)))
-        .collect();
-    let noise = rates.iter().filter_map(|(scene, _)| {
-        let own = || rates.iter().filter(|(other, _)| std::ptr::eq(*scene, *other)).map(|(_, rate)| rate);
-        let mean = Summary::of(own().map(|rate| rate.mean)).mean?;
-        let least = own().map(|rate| rate.least).reduce(f64::min)?;
-        let most = own().map(|rate| rate.most).reduce(f64::max)?;
-        (mean > 0.0).then(|| (most - least) / mean)
-    });
-    noise.reduce(f64::max)
 }
 
 /// Kinds of settings. Each makes a line.
@@ -73,7 +53,7 @@ pub(super) enum Kind {
 impl Kind {
     pub(super) const ALL: [Self; 3] = [Self::Tolerances, Self::Caps, Self::Presets];
 
-    fn of(setting: Setting) -> Self {
+    pub(super) fn of(setting: Setting) -> Self {
         match setting {
             Setting::Tolerance(_) => Self::Tolerances,
             Setting::MaxNonzeros(_) => Self::Caps,
@@ -84,11 +64,10 @@ impl Kind {
 
 /// The settings of a kind, closest to the original first. Over all scenes, or for that of one column.
 pub(super) fn curve<'a>(grid: &Grid<'a>, method: Method, kind: Kind, column: Option<usize>) -> Vec<At<'a>> {
+    let scenes = grid.models(method, column);
     let of_setting = |&setting: &Setting| {
-        let models: Vec<_> = match column {
-            Some(column) => grid.point(method, column, setting).into_iter().collect(),
-            None => grid.points(method, setting).collect(),
-        };
+        let models: Vec<_> =
+            scenes.iter().filter_map(|scene| Some((*scene, scene.point(setting)?))).collect();
         (!models.is_empty()).then_some(At { setting, models, one_scene: column.is_some() })
     };
     grid.settings.iter().filter(|&&setting| Kind::of(setting) == kind).filter_map(of_setting).collect()

@@ -1,25 +1,20 @@
-//! Results as a grid: one row for each method, one column for each scene, settings in order.
+//! Results as a grid: methods, scenes and settings in order.
 
 use lexisplat_eval::metrics::Metric;
 
-use super::measure::{IDENTICAL, Measure};
-use super::table::{Cell, Column};
-use super::{Method, Point, Results, SceneResult, Setting, paper};
+use super::measure::Measure;
+use super::{Method, Results, SceneResult, Setting, paper, unique};
 
 /// The methods, scenes and settings of a sweep, in the order of tables.
 pub(super) struct Grid<'a> {
-    /// Headings of the columns of scenes, in the manifest's order.
+    /// Headings of scenes, in the manifest's order. Each scene is a column of the grid.
     pub(super) headings: Vec<String>,
-    /// The scenes' own names, column by column.
-    names: Vec<&'a str>,
     /// Methods that have a model, in the paper's order.
     pub(super) methods: Vec<Method>,
     /// Settings that have a point: tolerances from small to large, then caps from many to few nonzeros, then presets
     /// from large to small files.
     pub(super) settings: Vec<Setting>,
     cells: Vec<(usize, &'a SceneResult)>,
-    /// The pursuit of all points with exact geometry.
-    pursuit: &'a str,
 }
 
 /// A key that sorts settings by kind, then from close to the original to far from it.
@@ -60,12 +55,7 @@ impl<'a> Grid<'a> {
             if headings.contains(&heading) && !scene.dataset.is_empty() {
                 heading = format!("{} ({})", scene.name, scene.dataset);
             }
-            let plain = heading.clone();
-            let mut copy = 2;
-            while headings.contains(&heading) {
-                heading = format!("{plain} ({copy})");
-                copy += 1;
-            }
+            let heading = unique(&heading, |heading| headings.iter().any(|other| other == heading));
             headings.push(heading);
         }
         let points = results.scenes.iter().flat_map(|scene| &scene.points);
@@ -79,19 +69,7 @@ impl<'a> Grid<'a> {
             .into_iter()
             .filter(|method| results.scenes.iter().any(|scene| scene.method == *method))
             .collect();
-        let names = first.iter().map(|scene| scene.name.as_str()).collect();
-        Self { headings, names, methods, settings, cells, pursuit: &results.pursuit }
-    }
-
-    /// The name of a column's scene without what makes its heading unique. Empty beyond the last column.
-    pub(super) fn name(&self, column: usize) -> &'a str {
-        self.names.get(column).copied().unwrap_or_default()
-    }
-
-    /// What rows of the paper's numbers for `name` are called. Beside another pursuit than the paper's its own is named.
-    pub(super) fn paper_label(&self, name: &str) -> String {
-        let pursuit = if self.pursuit == paper::PURSUIT { "" } else { " (OMP)" };
-        format!("{name}, paper{pursuit}")
+        Self { headings, methods, settings, cells }
     }
 
     /// The model of a method in a column.
@@ -99,24 +77,10 @@ impl<'a> Grid<'a> {
         self.cells.iter().find(|(k, scene)| *k == column && scene.method == method).map(|(_, scene)| *scene)
     }
 
-    /// The same model at one setting.
-    pub(super) fn point(
-        &self,
-        method: Method,
-        column: usize,
-        setting: Setting,
-    ) -> Option<(&'a SceneResult, &'a Point)> {
-        let scene = self.scene(method, column)?;
-        Some((scene, scene.point(setting)?))
-    }
-
-    /// All models of a method at one setting, in the order of columns.
-    pub(super) fn points(
-        &self,
-        method: Method,
-        setting: Setting,
-    ) -> impl Iterator<Item = (&'a SceneResult, &'a Point)> {
-        (0..self.headings.len()).filter_map(move |column| self.point(method, column, setting))
+    /// All models of a method, or that in one column.
+    pub(super) fn models(&self, method: Method, column: Option<usize>) -> Vec<&'a SceneResult> {
+        let columns = column.map_or(0..self.headings.len(), |column| column..column + 1);
+        columns.filter_map(|column| self.scene(method, column)).collect()
     }
 
     /// Models column by column with their heading, methods in order within a column.
@@ -125,37 +89,6 @@ impl<'a> Grid<'a> {
             self.methods
                 .iter()
                 .filter_map(move |&method| Some((heading.as_str(), self.scene(method, column)?)))
-        })
-    }
-
-    /// The settings that models of a method were compressed at.
-    pub(super) fn settings_of(&self, method: Method) -> impl Iterator<Item = Setting> {
-        self.settings.iter().copied().filter(move |&setting| self.points(method, setting).next().is_some())
-    }
-
-    /// Columns of a table with `labels`, one cell for each scene, and the mean.
-    pub(super) fn columns(&self, labels: &[&str]) -> Vec<Column> {
-        let labels = labels.iter().copied().map(Column::new);
-        let scenes = self.headings.iter().map(Column::new);
-        labels.chain(scenes).chain([Column::new("Mean")]).collect()
-    }
-
-    /// One cell for each column, then their mean.
-    pub(super) fn across(&self, cell: impl FnMut(usize) -> Cell) -> Vec<Cell> {
-        let mut cells: Vec<Cell> = (0..self.headings.len()).map(cell).collect();
-        cells.push(mean(&cells));
-        cells
-    }
-
-    /// A measure of a method in each column, then the mean. Without a setting it is that of the models as trained.
-    pub(super) fn measured(&self, measure: Measure, method: Method, setting: Option<Setting>) -> Vec<Cell> {
-        self.across(|column| {
-            let Some(scene) = self.scene(method, column) else { return Cell::Missing };
-            match setting.map(|setting| scene.point(setting)) {
-                None => measure.cell(scene, None),
-                Some(Some(point)) => measure.cell(scene, Some(point)),
-                Some(None) => Cell::Missing,
-            }
         })
     }
 
@@ -171,12 +104,11 @@ impl<'a> Grid<'a> {
 
     /// The scores of one kind that any model has, in the order of tables.
     pub(super) fn scores(&self, kind: fn(Metric) -> Measure) -> Vec<Measure> {
-        let any = |measure: &Measure| {
-            self.cells.iter().any(|(_, scene)| {
-                let points = scene.points.iter().map(Some).chain([None]);
-                points.into_iter().any(|point| measure.is_measured(scene, point))
-            })
+        let is_of = |measure: &Measure, scene: &SceneResult| {
+            let mut points = scene.points.iter().map(Some).chain([None]);
+            points.any(|point| measure.value(scene, point).is_some())
         };
+        let any = |measure: &Measure| self.cells.iter().any(|(_, scene)| is_of(measure, scene));
         Metric::ALL.into_iter().map(kind).filter(any).collect()
     }
 
@@ -194,19 +126,6 @@ impl<'a> Grid<'a> {
             [] => "",
             _ => "several devices",
         }
-    }
-}
-
-/// The mean of the numbers among `cells`, with their digits. Words and missing values do not count. Without
-/// numbers it is [`IDENTICAL`] if any cell is.
-pub(super) fn mean(cells: &[Cell]) -> Cell {
-    let values: Vec<f64> = cells.iter().filter_map(Cell::value).collect();
-    let mean = values.iter().sum::<f64>() / values.len() as f64;
-    let number = cells.iter().find(|cell| matches!(cell, Cell::Number { .. }));
-    let identical = || cells.iter().find(|cell| **cell == Cell::text(IDENTICAL));
-    match number.or_else(identical) {
-        Some(&Cell::Number { digits, signed, .. }) => Cell::Number { value: mean, digits, signed },
-        other => other.cloned().unwrap_or(Cell::Missing),
     }
 }
 
@@ -257,14 +176,5 @@ mod tests {
         );
         assert_eq!(grid.main_setting(), Some(Setting::Tolerance(0.1)));
         assert_eq!(grid.methods, [Method::Gs3d, Method::Mcmc, Method::Eagles, Method::EaglesNoSq]);
-    }
-
-    #[test]
-    fn means_skip_what_is_missing() {
-        let number = |v| Cell::number(Some(v), 2);
-        assert_eq!(mean(&[number(1.0), Cell::Missing, number(4.0), Cell::text(IDENTICAL)]), number(2.5));
-        assert_eq!(mean(&[Cell::Missing, Cell::text(IDENTICAL)]), Cell::text(IDENTICAL));
-        assert_eq!(mean(&[Cell::Missing]), Cell::Missing);
-        assert_eq!(mean(&[Cell::change(Some(-1.0), 1)]), Cell::change(Some(-1.0), 1));
     }
 }

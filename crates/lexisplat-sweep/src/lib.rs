@@ -8,16 +8,14 @@ mod folder;
 mod grid;
 mod long_csv;
 mod manifest;
-mod markdown;
 mod measure;
-mod notes;
+mod numbers;
 mod options;
 mod page;
 mod paper;
 mod picture;
 pub mod report;
 mod results;
-mod saturation;
 mod scene;
 mod survey;
 mod sweep;
@@ -29,14 +27,14 @@ mod testing;
 pub use folder::write_report;
 pub use manifest::{Entry, parse_manifest, read_manifest};
 pub use options::{SweepOptions, SweepProgress};
-pub use picture::{Picture, PictureFiles};
+pub use picture::PictureFiles;
 pub use results::{Fps, Method, Point, Results, SceneResult, Setting, Skipped};
 pub use scene::shown_path;
 pub use sweep::sweep;
 
+use lexisplat_eval::format::csv_cell;
+
 use figures::Figure;
-use notes::NOTES;
-use picture::SweepPicture;
 
 /// `name`, or the first of `name-2`, `name-3` and so on that is not `taken`.
 fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
@@ -47,4 +45,14 @@ fn unique(name: &str, taken: impl Fn(&str) -> bool) -> String {
         copy += 1;
     }
     unique
+}
+
+/// Records as CSV (RFC 4180, lines end with a line feed). Text that a spreadsheet would take for a formula begins with `'`.
+fn csv_text(records: impl IntoIterator<Item = Vec<String>>) -> String {
+    let mut writer = csv::WriterBuilder::new().flexible(true).from_writer(Vec::new());
+    for record in records {
+        // Writing to memory cannot fail.
+        let _ = writer.write_record(record.iter().map(|cell| csv_cell(cell).into_owned()));
+    }
+    String::from_utf8_lossy(&writer.into_inner().unwrap_or_default()).into_owned()
 }

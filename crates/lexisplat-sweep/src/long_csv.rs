@@ -3,8 +3,7 @@
 use lexisplat_eval::Comparison;
 use lexisplat_eval::metrics::Metric;
 
-use super::Results;
-use super::table::csv_text;
+use super::{Results, csv_text};
 
 /// Columns of [`long_csv`].
 const HEADER: [&str; 8] = ["dataset", "scene", "method", "setting", "against", "view", "metric", "value"];

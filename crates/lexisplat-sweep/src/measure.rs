@@ -3,16 +3,15 @@
 use lexisplat_eval::metrics::Metric;
 use lexisplat_eval::{Comparison, FrameRate};
 
-use crate::paper::Quantity;
-use crate::table::Cell;
+use crate::numbers::{number, signed};
 use crate::{Point, SceneResult};
 
-/// What stands for the PSNR of pictures that do not differ.
-pub(crate) const IDENTICAL: &str = "identical";
 /// Digits of ratios, nonzeros, bytes a Gaussian and differences in dB, as the paper prints them.
-pub(crate) const DIGITS: usize = 2;
+const DIGITS: usize = 2;
 /// Digits of frames a second, as the paper prints them.
 const FPS_DIGITS: usize = 1;
+/// What stands for the PSNR of pictures that do not differ.
+const IDENTICAL: &str = "identical";
 
 /// A number known of a model at one setting.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,101 +44,76 @@ pub(crate) enum Measure {
 }
 
 impl Measure {
-    /// The heading, with its unit. `device` is what frames were drawn on.
-    pub(crate) fn heading(self, device: &str) -> String {
+    /// The heading, with its unit.
+    pub(crate) fn heading(self) -> &'static str {
         match self {
-            Self::ToOriginal(Metric::Psnr) | Self::ToPhotos(Metric::Psnr) | Self::PhotoChange => {
-                "PSNR, dB".to_owned()
+            Self::ToOriginal(Metric::Psnr) | Self::ToPhotos(Metric::Psnr) => "PSNR, dB",
+            Self::ToOriginal(metric) | Self::ToPhotos(metric) => metric.title(),
+            Self::PhotoChange => "Change, dB",
+            Self::MeanNonzeros => "Mean nonzeros",
+            Self::CoefficientRatio => "Comp Ratio",
+            Self::FileRatio => "Ratio of whole files",
+            Self::BytesEach => "Bytes a Gaussian",
+            Self::SparseFps => "From codes",
+            Self::DenseFps => "Dense SH",
+            Self::Speedup => "Speedup",
+            Self::SparseSpread | Self::DenseSpread => "\u{b1}\u{a0}%",
+        }
+    }
+
+    /// The number as people read it, if there is one.
+    pub(crate) fn shown(self, value: Option<f64>) -> String {
+        match (self, value) {
+            (Self::ToOriginal(Metric::Psnr) | Self::ToPhotos(Metric::Psnr), Some(f64::INFINITY)) => {
+                IDENTICAL.to_owned()
             }
-            Self::ToOriginal(metric) | Self::ToPhotos(metric) => metric.title().to_owned(),
-            Self::MeanNonzeros => "Mean nonzeros".to_owned(),
-            Self::CoefficientRatio => "Comp Ratio (coefficients)".to_owned(),
-            Self::FileRatio => "Ratio of whole files".to_owned(),
-            Self::BytesEach => "Bytes a Gaussian".to_owned(),
-            Self::SparseFps => format!("{device} FPS"),
-            Self::DenseFps => format!("{device} FPS(-Comp)"),
-            Self::Speedup => "Speedup".to_owned(),
-            Self::SparseSpread => format!("{device} FPS, \u{b1}\u{a0}%"),
-            Self::DenseSpread => format!("{device} FPS(-Comp), \u{b1}\u{a0}%"),
-        }
-    }
-
-    /// The paper's quantity that this one is compared with. Its FPS are of another device. Its LPIPS is taken for
-    /// the 3DGS repository's.
-    pub(crate) fn in_paper(self) -> Option<Quantity> {
-        match self {
-            Self::ToOriginal(metric) | Self::ToPhotos(metric) => match metric {
-                Metric::Psnr => Some(Quantity::Psnr),
-                Metric::Ssim => Some(Quantity::Ssim),
-                Metric::LpipsVggInria => Some(Quantity::Lpips),
-                _ => None,
-            },
-            Self::CoefficientRatio => Some(Quantity::Ratio),
-            _ => None,
-        }
-    }
-
-    /// Digits after the point that tables print.
-    pub(crate) fn digits(self) -> usize {
-        match self {
-            Self::ToOriginal(metric) | Self::ToPhotos(metric) => metric.digits(),
-            Self::SparseFps | Self::DenseFps | Self::SparseSpread | Self::DenseSpread => FPS_DIGITS,
-            _ => DIGITS,
-        }
-    }
-
-    /// The comparison that a score is taken from, if it has views. Without a point it is that of the model as
-    /// trained.
-    fn comparison<'a>(
-        self,
-        scene: &'a SceneResult,
-        point: Option<&'a Point>,
-    ) -> Option<(&'a Comparison, Metric)> {
-        let (comparison, metric) = match self {
-            Self::ToOriginal(metric) => (&point?.to_original, metric),
-            Self::ToPhotos(metric) => {
-                (point.map_or(&scene.to_photos, |point| &point.to_photos).as_ref()?, metric)
+            (Self::ToOriginal(metric) | Self::ToPhotos(metric), _) => number(value, metric.digits()),
+            (Self::PhotoChange, Some(value)) => signed(value, DIGITS),
+            (Self::SparseFps | Self::DenseFps | Self::SparseSpread | Self::DenseSpread, _) => {
+                number(value, FPS_DIGITS)
             }
-            _ => return None,
-        };
-        (!comparison.views.is_empty()).then_some((comparison, metric))
+            _ => number(value, DIGITS),
+        }
     }
 
-    /// Whether this score was computed.
-    pub(crate) fn is_measured(self, scene: &SceneResult, point: Option<&Point>) -> bool {
-        self.comparison(scene, point).is_some_and(|(comparison, metric)| comparison.get(metric).is_some())
-    }
-
-    /// The number. Without a point it is that of the model as trained.
+    /// The number. Without a point it is that of the model as trained. The PSNR of pictures without any difference is infinite.
     pub(crate) fn value(self, scene: &SceneResult, point: Option<&Point>) -> Option<f64> {
-        if let Some((comparison, metric)) = self.comparison(scene, point) {
-            return comparison.get(metric)?.mean;
-        }
-        let point = point?;
+        let score = |comparison: Option<&Comparison>, metric: Metric| {
+            let comparison = comparison.filter(|comparison| !comparison.views.is_empty())?;
+            let is_identical = metric == Metric::Psnr && comparison.identical;
+            if is_identical { Some(f64::INFINITY) } else { comparison.get(metric)?.mean }
+        };
+        let bytes =
+            point.map_or(scene.shipped_bytes, |point| Some(point.file_bytes)).map(|bytes| bytes as f64);
+        let fps = point.and_then(|point| point.fps);
         match self {
-            Self::ToOriginal(_) | Self::ToPhotos(_) => None,
-            Self::PhotoChange => {
-                Some(point.to_photos.as_ref()?.psnr.mean? - scene.to_photos.as_ref()?.psnr.mean?)
+            Self::ToOriginal(metric) => score(Some(&point?.to_original), metric),
+            Self::ToPhotos(metric) => {
+                score(point.map_or(&scene.to_photos, |point| &point.to_photos).as_ref(), metric)
             }
-            Self::MeanNonzeros => Some(point.mean_nonzeros),
-            Self::CoefficientRatio => point.coefficient_ratio,
-            Self::FileRatio => quotient(scene.ply_bytes as f64, point.file_bytes as f64),
-            Self::BytesEach => quotient(point.file_bytes as f64, scene.gaussians as f64),
-            Self::SparseFps => Some(point.fps?.sparse.mean),
-            Self::DenseFps => Some(point.fps?.dense.mean),
-            Self::Speedup => quotient(point.fps?.sparse.mean, point.fps?.dense.mean),
-            Self::SparseSpread => spread(point.fps?.sparse),
-            Self::DenseSpread => spread(point.fps?.dense),
+            Self::PhotoChange => {
+                Some(point?.to_photos.as_ref()?.psnr.mean? - scene.to_photos.as_ref()?.psnr.mean?)
+            }
+            Self::MeanNonzeros => Some(point?.mean_nonzeros),
+            Self::CoefficientRatio => point?.coefficient_ratio,
+            Self::FileRatio => quotient(scene.ply_bytes as f64, bytes?),
+            Self::BytesEach => quotient(bytes?, scene.gaussians as f64),
+            Self::SparseFps => Some(fps?.sparse.mean),
+            Self::DenseFps => Some(fps?.dense.mean),
+            Self::Speedup => quotient(fps?.sparse.mean, fps?.dense.mean),
+            Self::SparseSpread => spread(fps?.sparse),
+            Self::DenseSpread => spread(fps?.dense),
         }
     }
+}
 
-    /// The number as a cell. Pictures without any difference have no PSNR and are called identical.
-    pub(crate) fn cell(self, scene: &SceneResult, point: Option<&Point>) -> Cell {
-        match self.comparison(scene, point) {
-            Some((comparison, Metric::Psnr)) if comparison.identical => Cell::text(IDENTICAL),
-            _ if self == Self::PhotoChange => Cell::change(self.value(scene, point), self.digits()),
-            _ => Cell::number(self.value(scene, point), self.digits()),
-        }
+/// The mean of the finite numbers among `values`. Without any it is infinite if one of them is: all pictures are identical.
+pub(crate) fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let values: Vec<f64> = values.collect();
+    let finite: Vec<f64> = values.iter().copied().filter(|value| value.is_finite()).collect();
+    match finite.len() {
+        0 => values.into_iter().find(|value| *value == f64::INFINITY),
+        count => Some(finite.iter().sum::<f64>() / count as f64),
     }
 }
 
@@ -149,6 +123,21 @@ fn spread(rate: FrameRate) -> Option<f64> {
 }
 
 /// `a / b`, or `None` if `b` is not above 0.
-pub(crate) fn quotient(a: f64, b: f64) -> Option<f64> {
+fn quotient(a: f64, b: f64) -> Option<f64> {
     (b > 0.0).then(|| a / b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn means_skip_what_is_missing() {
+        assert_eq!(mean([1.0, f64::NAN, 4.0, f64::INFINITY].into_iter()), Some(2.5));
+        assert_eq!(mean([f64::NAN, f64::INFINITY].into_iter()), Some(f64::INFINITY));
+        assert_eq!(mean([f64::NAN].into_iter()), None);
+        assert_eq!(Measure::ToPhotos(Metric::Psnr).shown(Some(f64::INFINITY)), IDENTICAL);
+        assert_eq!(Measure::PhotoChange.shown(Some(-1.0)), "-1.00");
+        assert_eq!(Measure::PhotoChange.shown(None), "\u{2013}");
+    }
 }

@@ -4,7 +4,10 @@ use std::sync::LazyLock;
 
 use serde::Deserialize;
 
-use super::Method;
+use lexisplat_eval::metrics::Metric;
+
+use super::measure::{self, Measure};
+use super::{Method, Setting};
 
 /// Every printed number of the paper's three tables: main, by tolerance, against photos.
 const PRINTED: &str = include_str!("paper.csv");
@@ -14,8 +17,6 @@ pub(crate) const TOLERANCE: f64 = 0.1;
 pub(crate) const PURSUIT: &str = "omp";
 /// Tolerances of the paper's supplementary table.
 pub(crate) const TOLERANCES: [f64; 4] = [0.03, 0.05, 0.1, 0.2];
-/// SH-rest coefficients of the paper's Gaussians: degree 3.
-pub(crate) const COEFFICIENTS: f64 = 45.0;
 /// Largest difference of two tolerances that count as equal.
 const SAME: f64 = 1e-9;
 
@@ -30,44 +31,17 @@ pub(crate) static SCENES: LazyLock<Vec<&str>> = LazyLock::new(|| {
     header.split(',').skip(LABELS).take(SCENE_COUNT).collect()
 });
 
-/// One of the paper's tables.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Experiment {
-    /// Table 1: compressed at tolerance 0.1 against the original's pictures, with ratio and FPS.
-    Main,
-    /// Supplement: compressed at this tolerance against the original's pictures.
-    Tolerance(f64),
-    /// Supplement: the trained model against photos; EAGLES with and without scalar quantisation too.
-    Base,
-    /// Supplement: the compressed model against photos.
-    Compressed,
-}
-
-/// What the paper measured.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Quantity {
-    /// PSNR in dB.
-    Psnr,
-    /// SSIM.
-    Ssim,
-    /// LPIPS. The paper does not say which network and input range it used.
-    Lpips,
-    /// `Comp Ratio`: 45 over mean nonzeros, by the paper's own numbers. Main table only.
-    Ratio,
-    /// Frames a second of the compressed model. Main table only.
-    Fps,
-    /// `FPS(-Comp)`: frames a second of the original. Main table only.
-    FpsDense,
-}
-
 /// One line of [`PRINTED`].
 #[derive(Debug, Deserialize)]
 struct Line {
-    experiment: String,
+    /// `main`: Table 1, compressed at tolerance 0.1 against the original's pictures, with ratio and FPS. `tolerance`: the same
+    /// at each tolerance, of the supplement. `base` and `compressed`: the trained and the compressed model against photos.
+    table: String,
     method: Method,
     tolerance: Option<f64>,
-    quantity: Quantity,
+    /// `psnr` in dB, `ssim`, `lpips`, of which the paper does not say which network and input range it used, `ratio`, which is 45
+    /// over mean nonzeros by the paper's own numbers, `fps`, and `fps_dense` of the original.
+    quantity: String,
     /// In the order of [`SCENES`].
     scenes: [f64; SCENE_COUNT],
     /// As printed. A few do not follow from their columns.
@@ -81,25 +55,14 @@ static LINES: LazyLock<Vec<Line>> = LazyLock::new(|| {
     reader.deserialize().skip(1).filter_map(Result::ok).collect()
 });
 
-fn find(experiment: Experiment, method: Method, quantity: Quantity) -> Option<&'static Line> {
-    let (name, tolerance) = match experiment {
-        Experiment::Main => ("main", Some(TOLERANCE)),
-        Experiment::Tolerance(tolerance) => ("tolerance", Some(tolerance)),
-        Experiment::Base => ("base", None),
-        Experiment::Compressed => ("compressed", None),
-    };
-    let same = |printed: Option<f64>| match (printed, tolerance) {
-        (Some(a), Some(b)) => same_tolerance(a, b),
-        (a, b) => a == b,
-    };
-    LINES.iter().find(|line| {
-        line.experiment == name && line.method == method && line.quantity == quantity && same(line.tolerance)
-    })
+/// Whether two tolerances are equal up to rounding.
+fn same_tolerance(a: f64, b: f64) -> bool {
+    (a - b).abs() < SAME
 }
 
-/// Whether two tolerances are equal up to rounding.
-pub(crate) fn same_tolerance(a: f64, b: f64) -> bool {
-    (a - b).abs() < SAME
+/// Whether a scene is one of the paper's.
+pub(crate) fn has(name: &str) -> bool {
+    scene(name).is_some()
 }
 
 /// The index of a scene in [`SCENES`]. Case does not matter.
@@ -107,21 +70,51 @@ fn scene(name: &str) -> Option<usize> {
     SCENES.iter().position(|scene| scene.eq_ignore_ascii_case(name.trim()))
 }
 
-/// The printed number. `None` if the paper has none.
-pub(crate) fn value(
-    experiment: Experiment,
-    method: Method,
-    quantity: Quantity,
-    scene_name: &str,
-) -> Option<f64> {
-    find(experiment, method, quantity)?.scenes.get(scene(scene_name)?).copied()
+/// The number printed in a table. `None` if there is none.
+fn printed(table: &str, tolerance: Option<f64>, method: Method, quantity: &str, name: &str) -> Option<f64> {
+    let is_same = |line: &&Line| match (line.tolerance, tolerance) {
+        (Some(a), Some(b)) => same_tolerance(a, b),
+        (a, b) => a == b,
+    };
+    let mut lines = LINES.iter().filter(is_same);
+    let line =
+        lines.find(|line| line.table == table && line.method == method && line.quantity == quantity)?;
+    line.scenes.get(scene(name)?).copied()
 }
 
-/// The mean over the 13 scenes, computed from their columns: a few printed means do not follow from theirs. `None` if
-/// the paper has none.
-pub(crate) fn mean(experiment: Experiment, method: Method, quantity: Quantity) -> Option<f64> {
-    let scenes = &find(experiment, method, quantity)?.scenes;
-    Some(scenes.iter().sum::<f64>() / scenes.len() as f64)
+/// What the paper has of a measure: of models as trained without a setting, or else compressed. Its FPS are of another device,
+/// and its LPIPS is taken for the 3DGS repository's.
+pub(crate) fn value(measure: Measure, method: Method, setting: Option<Setting>, scene: &str) -> Option<f64> {
+    let tolerance = match setting {
+        Some(Setting::Tolerance(tolerance)) => Some(tolerance),
+        Some(_) => return None,
+        None => None,
+    };
+    let is_main = tolerance.is_some_and(|tolerance| same_tolerance(tolerance, TOLERANCE));
+    let (table, tolerance) = match measure {
+        Measure::ToOriginal(_) => ("tolerance", Some(tolerance?)),
+        Measure::CoefficientRatio => ("main", Some(tolerance?)),
+        Measure::ToPhotos(_) if is_main => ("compressed", None),
+        Measure::ToPhotos(_) if setting.is_none() => ("base", None),
+        Measure::PhotoChange if is_main => {
+            let psnr = |setting| value(Measure::ToPhotos(Metric::Psnr), method, setting, scene);
+            return Some(psnr(setting)? - psnr(None)?);
+        }
+        _ => return None,
+    };
+    let quantity = match measure {
+        Measure::ToOriginal(Metric::LpipsVggInria) | Measure::ToPhotos(Metric::LpipsVggInria) => "lpips",
+        Measure::ToOriginal(metric) | Measure::ToPhotos(metric) => metric.name(),
+        _ => "ratio",
+    };
+    printed(table, tolerance, method, quantity, scene)
+}
+
+/// The mean over the 13 scenes at the main tolerance, computed from their columns: a few printed means do not follow from
+/// theirs. `None` if the paper has none.
+pub(crate) fn mean(measure: Measure, method: Method) -> Option<f64> {
+    let setting = Some(Setting::Tolerance(TOLERANCE));
+    measure::mean(SCENES.iter().filter_map(|scene| value(measure, method, setting, scene)))
 }
 
 #[cfg(test)]
@@ -132,7 +125,7 @@ mod tests {
     fn every_line_is_read() {
         assert_eq!(PRINTED.lines().count(), 79);
         // 3 methods x 6 quantities, x 4 tolerances x 3, x 2 against photos x 3, and EAGLES twice x 3.
-        let count = |table: &str| LINES.iter().filter(|line| line.experiment == table).count();
+        let count = |table: &str| LINES.iter().filter(|line| line.table == table).count();
         assert_eq!([count("main"), count("tolerance"), count("base"), count("compressed")], [18, 36, 15, 9]);
         let header = PRINTED.lines().next().unwrap();
         assert_eq!(header, format!("table,method,tolerance,metric,{},mean", SCENES.join(",")));
@@ -141,40 +134,66 @@ mod tests {
     #[test]
     fn spot_values_are_the_papers() {
         use Method::{Eagles, EaglesNoSq, Gs3d, Mcmc, PixelGs};
-        use Quantity::{Fps, FpsDense, Lpips, Psnr, Ratio, Ssim};
+        let (main, fine) = (Some(TOLERANCE), Some(0.03));
         let spots = [
-            (Experiment::Main, Gs3d, Psnr, "bicycle", 38.54),
-            (Experiment::Main, Mcmc, Ratio, "Drjohnson", 3.56),
-            (Experiment::Main, PixelGs, Fps, "treehill", 97.3),
-            (Experiment::Main, Mcmc, FpsDense, "garden", 82.9),
-            (Experiment::Tolerance(0.03), Mcmc, Psnr, "stump", 53.86),
-            (Experiment::Tolerance(0.2), PixelGs, Lpips, "flowers", 0.0284),
-            (Experiment::Tolerance(0.05), Gs3d, Ssim, "truck", 0.9897),
+            ("main", main, Gs3d, "psnr", "bicycle", 38.54),
+            ("main", main, Mcmc, "ratio", "Drjohnson", 3.56),
+            ("main", main, PixelGs, "fps", "treehill", 97.3),
+            ("main", main, Mcmc, "fps_dense", "garden", 82.9),
+            ("tolerance", fine, Mcmc, "psnr", "stump", 53.86),
+            ("tolerance", Some(0.2), PixelGs, "lpips", "flowers", 0.0284),
+            ("tolerance", Some(0.05), Gs3d, "ssim", "truck", 0.9897),
             // The table against photos has its scenes in another order.
-            (Experiment::Base, Gs3d, Psnr, "drjohnson", 29.41),
-            (Experiment::Compressed, PixelGs, Psnr, "truck", 25.38),
-            (Experiment::Compressed, Mcmc, Ssim, "garden", 0.9250),
-            (Experiment::Base, Eagles, Psnr, "bonsai", 31.24),
-            (Experiment::Base, EaglesNoSq, Lpips, "treehill", 0.2663),
+            ("base", None, Gs3d, "psnr", "drjohnson", 29.41),
+            ("compressed", None, PixelGs, "psnr", "truck", 25.38),
+            ("compressed", None, Mcmc, "ssim", "garden", 0.9250),
+            ("base", None, Eagles, "psnr", "bonsai", 31.24),
+            ("base", None, EaglesNoSq, "lpips", "treehill", 0.2663),
         ];
-        for (table, method, quantity, scene, expected) in spots {
-            assert_eq!(value(table, method, quantity, scene), Some(expected), "{table:?} {method} {scene}");
+        for (table, tolerance, method, quantity, scene, expected) in spots {
+            let found = printed(table, tolerance, method, quantity, scene);
+            assert_eq!(found, Some(expected), "{table} {method} {scene}");
         }
-        assert_eq!(value(Experiment::Main, Gs3d, Psnr, "garage"), None);
-        assert_eq!(value(Experiment::Tolerance(0.07), Gs3d, Psnr, "garden"), None);
-        assert_eq!(value(Experiment::Compressed, Eagles, Psnr, "garden"), None);
-        assert_eq!(value(Experiment::Base, Gs3d, Ratio, "garden"), None);
+        assert_eq!(printed("main", main, Gs3d, "psnr", "garage"), None);
+        assert_eq!(printed("tolerance", Some(0.07), Gs3d, "psnr", "garden"), None);
+        assert_eq!(printed("compressed", None, Eagles, "psnr", "garden"), None);
+        assert_eq!(printed("base", None, Gs3d, "ratio", "garden"), None);
+    }
+
+    #[test]
+    fn measures_find_their_tables() {
+        let at = |tolerance: f64| Some(Setting::Tolerance(tolerance));
+        let of = |measure, method, setting| value(measure, method, setting, "bonsai");
+        let (original, photos) = (Measure::ToOriginal(Metric::Psnr), Measure::ToPhotos(Metric::Psnr));
+        assert_eq!(of(original, Method::Gs3d, at(0.05)), Some(44.14));
+        assert_eq!(of(original, Method::Mcmc, at(0.1)), Some(43.09));
+        assert_eq!(of(photos, Method::Eagles, None), Some(31.24));
+        assert_eq!(of(Measure::CoefficientRatio, Method::Gs3d, at(0.1)), Some(4.65));
+        for (measure, setting) in [
+            (original, None),
+            (photos, at(0.2)),
+            (Measure::CoefficientRatio, at(0.2)),
+            (Measure::SparseFps, at(0.1)),
+            (original, Some(Setting::MaxNonzeros(1))),
+            (Measure::ToPhotos(Metric::LpipsVgg), None),
+        ] {
+            assert_eq!(of(measure, Method::Gs3d, setting), None, "{measure:?} {setting:?}");
+        }
+        let means = [Measure::ToOriginal(Metric::Psnr), Measure::CoefficientRatio, Measure::PhotoChange];
+        let rounded = means.map(|measure| (mean(measure, Method::PixelGs).unwrap() * 100.0).round() / 100.0);
+        assert_eq!(rounded, [42.02, 4.55, -0.18]);
+        assert_eq!(mean(Measure::PhotoChange, Method::Eagles), None);
     }
 
     /// The supplement repeats the main table at its tolerance.
     #[test]
     fn both_tables_agree_at_the_main_tolerance() {
         for method in [Method::Gs3d, Method::Mcmc, Method::PixelGs] {
-            for quantity in [Quantity::Psnr, Quantity::Ssim, Quantity::Lpips] {
+            for quantity in ["psnr", "ssim", "lpips"] {
                 for scene in SCENES.iter().copied() {
                     assert_eq!(
-                        value(Experiment::Main, method, quantity, scene),
-                        value(Experiment::Tolerance(TOLERANCE), method, quantity, scene)
+                        printed("main", Some(TOLERANCE), method, quantity, scene),
+                        printed("tolerance", Some(TOLERANCE), method, quantity, scene)
                     );
                 }
             }
@@ -191,23 +210,29 @@ mod tests {
             let unit = 10_f64.powi(-i32::try_from(digits).unwrap());
             let computed = row.scenes.iter().sum::<f64>() / 13.0;
             if (computed - row.mean).abs() > unit {
-                wrong.push((row.experiment.as_str(), row.method.name(), row.quantity, row.mean, computed));
+                wrong.push((
+                    row.table.as_str(),
+                    row.method.name(),
+                    row.quantity.as_str(),
+                    row.mean,
+                    computed,
+                ));
             }
         }
         let rounded: Vec<_> = wrong.iter().map(|w| (w.0, w.1, w.2, w.3, (w.4 * 1e4).round() / 1e4)).collect();
         assert_eq!(
             rounded,
             [
-                ("main", "3dgs", Quantity::FpsDense, 169.3, 176.9615),
-                ("main", "mcmc", Quantity::FpsDense, 113.0, 120.8077),
-                ("compressed", "mcmc", Quantity::Lpips, 0.1677, 0.1667),
-                ("base", "eagles", Quantity::Ssim, 0.8689, 0.8535),
+                ("main", "3dgs", "fps_dense", 169.3, 176.9615),
+                ("main", "mcmc", "fps_dense", 113.0, 120.8077),
+                ("compressed", "mcmc", "lpips", 0.1677, 0.1667),
+                ("base", "eagles", "ssim", 0.8689, 0.8535),
             ]
         );
         // Rounded to its digits a fifth differs by one, which rounding of the columns explains.
-        let fifth = (Experiment::Compressed, Method::PixelGs, Quantity::Ssim);
-        let printed = find(fifth.0, fifth.1, fifth.2).unwrap().mean;
-        let computed = mean(fifth.0, fifth.1, fifth.2).unwrap();
+        let is_fifth = |line: &&Line| line.table == "compressed" && line.method == Method::PixelGs;
+        let fifth = LINES.iter().filter(is_fifth).find(|line| line.quantity == "ssim").unwrap();
+        let (printed, computed) = (fifth.mean, fifth.scenes.iter().sum::<f64>() / 13.0);
         assert_eq!((printed, (computed * 1e4).round() / 1e4), (0.8619, 0.8618));
     }
 }

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use lexisplat_compress::{Error, Result};
 
-/// One view of a model at one setting: PNG pictures of one size, given as `T`.
+/// One view of a model at one setting, as PNG files of one size.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Picture<T> {
+pub struct PictureFiles {
     /// Index of the scene in [`Results::scenes`](super::Results::scenes).
     pub scene: usize,
     /// The label of its [`Setting`](super::Setting).
@@ -14,32 +14,38 @@ pub struct Picture<T> {
     /// The view's name.
     pub view: String,
     /// The original.
-    pub original: T,
+    pub original: PathBuf,
     /// The compressed.
-    pub compressed: T,
+    pub compressed: PathBuf,
     /// Their difference, [`AMPLIFICATION`](lexisplat_eval::montage::AMPLIFICATION) times as bright.
-    pub difference: T,
+    pub difference: PathBuf,
     /// The photo from the same camera, if there is one.
-    pub photo: Option<T>,
+    pub photo: Option<PathBuf>,
 }
 
-/// Pictures as the paths of files.
-pub type PictureFiles = Picture<PathBuf>;
-/// Pictures as the bytes of files.
-pub(crate) type SweepPicture = Picture<Vec<u8>>;
+/// A picture for the page.
+pub(crate) struct Part {
+    /// The class in the page's style sheet.
+    pub(crate) class: &'static str,
+    /// What it shows.
+    pub(crate) what: &'static str,
+    pub(crate) png: Vec<u8>,
+}
 
 impl PictureFiles {
     /// Reads the files.
-    pub(super) fn read(&self) -> Result<SweepPicture> {
-        let read = |path: &PathBuf| std::fs::read(path).map_err(|e| Error::io(path, e));
-        Ok(Picture {
-            scene: self.scene,
-            setting: self.setting.clone(),
-            view: self.view.clone(),
-            original: read(&self.original)?,
-            compressed: read(&self.compressed)?,
-            difference: read(&self.difference)?,
-            photo: self.photo.as_ref().map(read).transpose()?,
-        })
+    pub(super) fn read(&self) -> Result<Vec<Part>> {
+        let files = [
+            ("before", "original", Some(&self.original)),
+            ("photo", "photo", self.photo.as_ref()),
+            ("after", "compressed", Some(&self.compressed)),
+            ("difference", "amplified difference", Some(&self.difference)),
+        ];
+        let read = |(class, what, path): (_, _, Option<&PathBuf>)| {
+            let path = path?;
+            let png = std::fs::read(path).map_err(|e| Error::io(path, e));
+            Some(png.map(|png| Part { class, what, png }))
+        };
+        files.into_iter().filter_map(read).collect()
     }
 }

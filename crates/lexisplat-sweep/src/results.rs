@@ -1,4 +1,4 @@
-//! The results of a sweep, as stored in `results.json`.
+//! The results of a sweep.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,6 @@ use std::str::FromStr;
 use lexisplat::packed::Preset;
 use serde::{Deserialize, Serialize};
 
-use super::paper::same_tolerance;
 use lexisplat_compress::{Error, Result};
 use lexisplat_eval::{Comparison, FrameRate};
 
@@ -102,11 +101,6 @@ impl Setting {
             Self::MaxNonzeros(most) => format!("nnz {most}"),
             Self::Preset(preset) => preset.name().to_owned(),
         }
-    }
-
-    /// Whether this is `tolerance`, up to rounding.
-    pub(crate) fn is_tolerance(self, tolerance: f64) -> bool {
-        matches!(self, Self::Tolerance(t) if same_tolerance(t, tolerance))
     }
 }
 
@@ -251,16 +245,6 @@ impl Results {
             other => other.to_owned(),
         };
         format!("Pursuit: {pursuit}. Layout: {}.", self.layout)
-    }
-
-    /// The version, the pursuit and the layout, for the reports.
-    pub(crate) fn facts(&self) -> Vec<String> {
-        let facts = [
-            (!self.version.is_empty()).then(|| format!("lexisplat {}", self.version)),
-            (!self.pursuit.is_empty()).then(|| format!("{} pursuit", self.pursuit)),
-            (!self.layout.is_empty()).then(|| format!("values as {}", self.layout)),
-        ];
-        facts.into_iter().flatten().collect()
     }
 }
 

@@ -62,12 +62,6 @@ impl From<Error> for Failure {
     }
 }
 
-impl From<lexisplat::Error> for Failure {
-    fn from(error: lexisplat::Error) -> Self {
-        Error::from(error).into()
-    }
-}
-
 /// Results of a model as trained.
 #[derive(Serialize, Deserialize)]
 struct Original {
@@ -110,20 +104,18 @@ pub(super) struct Evaluator<'a> {
 
 impl Evaluator<'_> {
     pub(super) fn scene(&mut self, entry: &Entry, place: usize) -> Part<(SceneResult, Vec<PictureFiles>)> {
-        if entry.model.is_dir() {
-            return Err(Failure::Scene(format!("{} is a folder, not a file", entry.model.display())));
-        }
         if !entry.model.is_file() {
-            return Err(Failure::Scene(format!("{} does not exist", entry.model.display())));
+            let what = if entry.model.is_dir() { "is a folder, not a file" } else { "does not exist" };
+            return Err(Failure::Scene(format!("{} {what}", entry.model.display())));
         }
         let fingerprint = fingerprint(&entry.model)?;
         let options = ReadOptions::default().with_limits(self.options.limits);
-        let read = SceneFile::read(&entry.model, &options)?;
+        let read = SceneFile::read(&entry.model, &options).map_err(Error::from)?;
         for warning in read.warnings() {
             self.progress.warn(&entry.name, warning);
         }
         let source_bytes = read.bytes;
-        let splats = read.into_splats()?;
+        let splats = read.into_splats().map_err(Error::from)?;
         let options = ViewOptions { offset: splats.meta.offset, ..self.view_options(entry) };
         let found = find_views(&options, &splats.geometry)?;
         for warning in &found.warnings {
@@ -165,7 +157,7 @@ impl Evaluator<'_> {
             sh_degree,
             ply_bytes: source_bytes,
             shipped_bytes,
-            views_from: found.from,
+            views_from: shown_path(Path::new(&found.from)),
             views: count,
             size,
             device: self.renderer.name().to_owned(),
@@ -266,7 +258,7 @@ impl Evaluator<'_> {
             for &view in &subject.shown {
                 this.save(subject, view, &label, &drawn[view])?;
                 let apart = difference(&originals[view], &drawn[view]);
-                this.save(subject, view, &difference_of(&label), &apart)?;
+                this.save(subject, view, &format!("{label} difference"), &apart)?;
             }
             let fps = this.fps(&[Scene::from(&subject.splats), scene], &subject.cameras)?;
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a file's bytes")]
@@ -345,7 +337,7 @@ impl Evaluator<'_> {
             view: subject.cameras[view].name.clone(),
             original: picture(ORIGINAL),
             compressed: picture(&label),
-            difference: picture(&difference_of(&label)),
+            difference: picture(&format!("{label} difference")),
             photo: (!subject.photos.is_empty()).then(|| picture(PHOTO)),
             setting: label,
         }
@@ -380,11 +372,6 @@ pub(super) fn without_paths(reason: &str, entry: &Entry) -> String {
         .fold(reason.to_owned(), |reason, path| {
             reason.replace(&path.display().to_string(), &shown_path(path))
         })
-}
-
-/// What names of files call the difference of pictures at the setting `label`.
-fn difference_of(label: &str) -> String {
-    format!("{label} difference")
 }
 
 /// Start of the names of an entry's files. No two entries share one.

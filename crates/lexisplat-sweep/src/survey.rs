@@ -5,8 +5,7 @@ use lexisplat_eval::Comparison;
 use lexisplat_eval::format::file_name;
 use lexisplat_eval::metrics::Metric;
 
-use super::table::csv_text;
-use super::{Results, SceneResult, unique};
+use super::{Results, SceneResult, csv_text, unique};
 
 /// The survey's header.
 const HEADER: [&str; 6] = ["Submethod", "PSNR", "SSIM", "LPIPS", "Size [Bytes]", "#Gaussians"];

@@ -232,6 +232,6 @@ fn summary(folder: &Path, results: &Results, progress: &Shown) -> Result<String>
     }
     let [made, reused] = [&progress.made, &progress.reused].map(|count| count.load(Ordering::Relaxed));
     writeln!(out, "{made} parts made, {reused} kept from before")?;
-    writeln!(out, "wrote {}: report.html, report.md, tables, figures, results.json", folder.display())?;
+    writeln!(out, "wrote {}: report.html, all.csv, tables, figures", folder.display())?;
     Ok(out)
 }

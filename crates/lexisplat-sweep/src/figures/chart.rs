@@ -1,37 +1,32 @@
-//! Charts of lines and points by `kuva`, as SVG, PNG and PDF.
+//! Charts of lines and points over a logarithmic axis to base 2.
 
-use kuva::backend::svg::SvgBackend;
-use kuva::plot::annotations::TextAnnotation;
-use kuva::plot::legend::{LegendEntry, LegendShape};
-use kuva::plot::{BandPlot, LinePlot, MarkerShape, ScatterPlot};
-use kuva::render::layout::{Layout, TickFormat};
-use kuva::render::plots::Plot;
-use kuva::render::render::render_multiple;
-use kuva::{RasterBackend, Theme};
+use super::drawing::{Anchor, Figure, SIZE, Shape};
+use crate::numbers::number;
 
-use super::Figure;
-use super::pdf::pdf;
-use lexisplat_compress::{Error, Result};
-
-/// Size of the whole chart in SVG pixels.
-const WIDTH: f64 = 860.0;
-const HEIGHT: f64 = 500.0;
-/// PNG pixels for each SVG pixel.
-const PNG_SCALE: f32 = 2.0;
-/// Sizes of text in SVG pixels.
-const TITLE_SIZE: u32 = 17;
-const LABEL_SIZE: u32 = 15;
-const TEXT_SIZE: u32 = 13;
-const POINT_SIZE: u32 = 11;
-/// Most characters in a line of a title.
-const TITLE_WRAP: usize = 78;
-/// Width of lines and radius of marks, in SVG pixels.
+/// Edges of the field that data is drawn in. Right of it is the legend.
+const LEFT: f64 = 74.0;
+const RIGHT: f64 = 670.0;
+const TOP: f64 = 50.0;
+const BOTTOM: f64 = 436.0;
+/// Left edge of the legend, width of the samples in it, and height of its lines.
+const LEGEND: f64 = 688.0;
+const SAMPLE: f64 = 26.0;
+const LEGEND_LINE: f64 = 21.0;
+/// Sizes of text.
+const TITLE_SIZE: f64 = 17.0;
+const LABEL_SIZE: f64 = 15.0;
+const TEXT_SIZE: f64 = 13.0;
+const POINT_SIZE: f64 = 11.0;
+/// Most letters of a title in its size. Longer ones are smaller.
+const LONGEST_TITLE: f64 = 86.0;
+/// Width of lines, of lines of the grid, and radius of marks.
 const LINE: f64 = 2.2;
-const MARK: f64 = 4.2;
-const BAND_OPACITY: f64 = 0.14;
+const THIN: f64 = 1.0;
+const MARK: f64 = 4.6;
+const BAND_OPACITY: u8 = 14;
 /// Most steps between the labels of the y axis.
 const STEPS: f64 = 7.0;
-/// Most steps between labelled powers of two. A label has up to eight characters.
+/// Most steps between labelled powers of two. A label has up to eight letters.
 const MOST_POWERS: f64 = 8.0;
 /// Least range of the y axis, for values that do not differ.
 const LEAST_RANGE: f64 = 1.0;
@@ -41,95 +36,202 @@ const LARGEST: f64 = 1e9;
 const INK: &str = "#1d1e22";
 const SOFT: &str = "#5c5f68";
 const GRID: &str = "#e4e2dc";
-const PAPER: &str = "#ffffff";
 
-/// The four colours.
+/// The three colours.
 #[cfg(test)]
-pub(super) const COLOURS: [&str; 4] = [INK, SOFT, GRID, PAPER];
+pub(super) const COLOURS: [&str; 3] = [INK, SOFT, GRID];
 
-/// A dash pattern, in SVG pixels: drawn, not drawn.
+/// Dashes of lines.
 pub(super) const SOLID: &str = "";
 pub(super) const DASHED: &str = "6 5";
 pub(super) const DOTTED: &str = "2 5";
 
-/// The shape drawn at points.
-pub(super) type Mark = MarkerShape;
+/// A mark at points: a regular polygon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mark {
+    pub(super) corners: u8,
+    /// Direction of the first corner in degrees, clockwise from the right.
+    pub(super) turn: f64,
+    /// Distance of every second corner from the middle, in radii.
+    pub(super) waist: f64,
+}
+
+impl Mark {
+    pub(super) const fn new(corners: u8, turn: f64) -> Self {
+        Self { corners, turn, waist: 1.0 }
+    }
+
+    fn at(self, [x, y]: [f64; 2], colour: &'static str) -> Shape {
+        let corner = |k: u8| {
+            let (sin, cos) =
+                (self.turn + 360.0 * f64::from(k) / f64::from(self.corners)).to_radians().sin_cos();
+            // Slim marks are larger, so that all look alike in size.
+            let radius = MARK / self.waist.sqrt() * if k % 2 == 1 { self.waist } else { 1.0 };
+            [x + radius * cos, y + radius * sin]
+        };
+        Shape::Area { points: (0..self.corners).map(corner).collect(), colour, opacity: 100 }
+    }
+}
+
+/// One point of a chart.
+#[derive(Debug, Clone)]
+pub(super) struct Dot {
+    pub(super) x: f64,
+    pub(super) y: f64,
+    /// Ends of the band here.
+    pub(super) band: [f64; 2],
+    /// What is written above the point.
+    pub(super) label: String,
+}
 
 /// One line of a chart.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
+    /// What the legend calls it.
+    pub(super) name: String,
     pub(super) colour: &'static str,
     pub(super) dash: &'static str,
     pub(super) mark: Option<Mark>,
-    /// Whether points are joined.
-    pub(super) joined: bool,
-    /// Pairs of x and y.
-    pub(super) points: Vec<(f64, f64)>,
-    /// Lowest and highest value at each point; empty for none.
-    pub(super) band: Vec<(f64, f64)>,
-    /// What is written above each point; empty for nothing.
-    pub(super) labels: Vec<String>,
+    /// Whether a band is drawn around the line.
+    pub(super) has_band: bool,
+    pub(super) dots: Vec<Dot>,
 }
 
-impl Series {
-    /// Leaves out points for which `keep` is false, with what belongs to them.
-    fn retain(&mut self, keep: impl Fn(&(f64, f64)) -> bool) {
-        let kept: Vec<bool> = self.points.iter().map(keep).collect();
-        retain(&mut self.points, &kept);
-        retain(&mut self.band, &kept);
-        retain(&mut self.labels, &kept);
-    }
-}
-
-/// Leaves out the values that are not `kept`, and all if there is not one for each.
-fn retain<T>(values: &mut Vec<T>, kept: &[bool]) {
-    if values.len() != kept.len() {
-        values.clear();
-    }
-    let mut kept = kept.iter();
-    values.retain(|_| kept.next().is_some_and(|kept| *kept));
-}
-
-/// A group of a legend: title and entries.
-pub(super) type Legend = (&'static str, Vec<LegendEntry>);
-
-/// One entry of a legend, shown with a mark, or else with a line.
-pub(super) fn key(text: &str, colour: &str, dash: &str, mark: Option<Mark>) -> LegendEntry {
-    LegendEntry {
-        label: literal(text),
-        color: colour.to_owned(),
-        shape: mark.map_or(LegendShape::Line, LegendShape::Marker),
-        dasharray: (!dash.is_empty()).then(|| dash.to_owned()),
-    }
-}
-
-/// Colour of entries that explain a dash or mark of every colour.
-pub(super) const NEUTRAL: &str = SOFT;
-
-/// A chart with a logarithmic axis to base 2 along x.
+/// A chart.
 pub(super) struct Chart {
     pub(super) name: String,
     pub(super) title: String,
     pub(super) caption: String,
     pub(super) x: &'static str,
-    /// Written after the numbers along x.
+    /// What is written after the numbers along x.
     pub(super) x_unit: &'static str,
     pub(super) y: String,
     /// Whether the range of values starts at 0.
     pub(super) from_zero: bool,
     pub(super) series: Vec<Series>,
-    pub(super) legends: Vec<Legend>,
 }
 
-/// `text` with what `kuva` takes for mathematics escaped.
-fn literal(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect::<String>().replace('$', "\\$")
+impl Chart {
+    /// Draws the chart. `None` if it has no points.
+    pub(super) fn draw(self) -> Option<Figure> {
+        // The axes cannot show other numbers.
+        let is_shown = |dot: &Dot| dot.x >= LARGEST.recip() && dot.x <= LARGEST && dot.y.abs() <= LARGEST;
+        let mut all = self.series.clone();
+        for series in &mut all {
+            series.dots.retain(is_shown);
+            for dot in &mut series.dots {
+                let shown = |end: f64| if end.is_nan() { dot.y } else { end.clamp(-LARGEST, LARGEST) };
+                dot.band = dot.band.map(shown);
+            }
+        }
+        all.retain(|series| !series.dots.is_empty());
+        let axes = Axes::new(&all, self.from_zero)?;
+        let mut canvas = Canvas(Vec::new());
+        self.frame(&axes, &mut canvas);
+        for series in all.iter().filter(|series| series.has_band) {
+            let end = |k: usize| series.dots.iter().map(move |dot| axes.place(dot.x.log2(), dot.band[k]));
+            let points = end(0).chain(end(1).rev()).collect();
+            canvas.0.push(Shape::Area { points, colour: series.colour, opacity: BAND_OPACITY });
+        }
+        let mut y = TOP + 10.0;
+        for Series { name, colour, dash, mark, dots, .. } in &all {
+            let mut points: Vec<[f64; 2]> = dots.iter().map(|dot| axes.place(dot.x.log2(), dot.y)).collect();
+            for (dot, [x, y]) in dots.iter().zip(&points) {
+                canvas.text([*x, y - 9.0], &dot.label, POINT_SIZE, Anchor::Middle, INK);
+            }
+            // The legend.
+            canvas.text([LEGEND + SAMPLE + 8.0, y + 4.5], name, TEXT_SIZE, Anchor::Start, INK);
+            let is_line = points.len() > 1 || mark.is_none();
+            let sample = vec![[LEGEND, y], [LEGEND + SAMPLE, y]];
+            canvas.0.extend(is_line.then_some(Shape::Line { points: sample, colour, width: LINE, dash }));
+            canvas.0.push(Shape::Line { points: points.clone(), colour, width: LINE, dash });
+            points.push([LEGEND + SAMPLE / 2.0, y]);
+            canvas.0.extend(points.iter().filter_map(|at| Some(mark.as_ref()?.at(*at, colour))));
+            y += LEGEND_LINE;
+        }
+        Some(Figure { name: self.name, title: self.title, caption: self.caption, shapes: canvas.0 })
+    }
+
+    /// The title, the axes and the grid.
+    fn frame(&self, axes: &Axes, canvas: &mut Canvas) {
+        let digits = usize::from(axes.y.2 < 1.0);
+        for value in ticks(axes.y) {
+            let [_, y] = axes.place(axes.x.0, value);
+            canvas.line([LEFT, y], [RIGHT, y], GRID);
+            canvas.text([LEFT - 9.0, y + 4.5], &number(Some(value), digits), TEXT_SIZE, Anchor::End, SOFT);
+        }
+        for power in ticks(axes.x) {
+            let [x, _] = axes.place(power, axes.y.0);
+            canvas.line([x, TOP], [x, BOTTOM], GRID);
+            let text = format!("{}{}", (power.exp2() * LARGEST).round() / LARGEST, self.x_unit);
+            canvas.text([x, BOTTOM + 20.0], &text, TEXT_SIZE, Anchor::Middle, SOFT);
+        }
+        canvas.line([LEFT, TOP], [LEFT, BOTTOM], SOFT);
+        canvas.line([LEFT, BOTTOM], [RIGHT, BOTTOM], SOFT);
+        let title_size = TITLE_SIZE * (LONGEST_TITLE / self.title.chars().count() as f64).min(1.0);
+        let (middle, centre) = ((LEFT + RIGHT) / 2.0, (TOP + BOTTOM) / 2.0);
+        canvas.text([SIZE[0] / 2.0, 28.0], &self.title, title_size, Anchor::Middle, INK);
+        canvas.text([middle, SIZE[1] - 18.0], self.x, LABEL_SIZE, Anchor::Middle, INK);
+        canvas.text([22.0, centre], &self.y, LABEL_SIZE, Anchor::Middle, INK);
+        if let Some(Shape::Text { upright, .. }) = canvas.0.last_mut() {
+            *upright = true;
+        }
+    }
+}
+
+/// Shapes in the order of drawing.
+struct Canvas(Vec<Shape>);
+
+impl Canvas {
+    fn line(&mut self, from: [f64; 2], to: [f64; 2], colour: &'static str) {
+        self.0.push(Shape::Line { points: vec![from, to], colour, width: THIN, dash: SOLID });
+    }
+
+    fn text(&mut self, at: [f64; 2], text: &str, size: f64, anchor: Anchor, colour: &'static str) {
+        let text = text.replace(char::is_control, " ");
+        self.0.push(Shape::Text { at, text, size, anchor, upright: false, colour });
+    }
+}
+
+/// The ranges of the axes: the first and the last label, and the step between two. Along x they are powers of two.
+#[derive(Clone, Copy)]
+struct Axes {
+    x: (f64, f64, f64),
+    y: (f64, f64, f64),
+}
+
+impl Axes {
+    /// Axes that show all of `series`. `None` if there is nothing to show.
+    fn new(series: &[Series], from_zero: bool) -> Option<Self> {
+        let x = range(series.iter().flat_map(|series| &series.dots).map(|dot| dot.x.log2()))?;
+        let y = range(series.iter().flat_map(|series| {
+            let bands = series.dots.iter().filter(|_| series.has_band).flat_map(|dot| dot.band);
+            series.dots.iter().map(|dot| dot.y).chain(bands)
+        }))?;
+        let low = if from_zero { y.0.min(0.0) } else { y.0 };
+        let step = step((y.1 - low).max(LEAST_RANGE));
+        let low = (low / step).floor() * step;
+        let high = ((y.1 / step).ceil() * step).max(low + step);
+        Some(Self { x: powers(x), y: (low, high, step) })
+    }
+
+    /// The place of a point. Its x is a power of two.
+    fn place(&self, x: f64, y: f64) -> [f64; 2] {
+        let share = |value: f64, axis: (f64, f64, f64)| (value - axis.0) / (axis.1 - axis.0);
+        [LEFT + share(x, self.x) * (RIGHT - LEFT), BOTTOM - share(y, self.y) * (BOTTOM - TOP)]
+    }
 }
 
 /// The least and the greatest of `values` that are finite.
 fn range(values: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     let finite = values.filter(|value| value.is_finite());
     Some((finite.clone().reduce(f64::min)?, finite.reduce(f64::max)?))
+}
+
+/// The values that are labelled.
+fn ticks((first, last, step): (f64, f64, f64)) -> impl Iterator<Item = f64> {
+    let all = std::iter::successors(Some(first), move |value| Some(value + step));
+    all.take_while(move |value| *value <= last + step / 2.0)
 }
 
 /// The smallest round step that divides `spread` into at most [`STEPS`] parts.
@@ -147,132 +249,6 @@ fn powers(logarithms: (f64, f64)) -> (f64, f64, f64) {
     let spread = (logarithms.1 - first).ceil().max(1.0);
     let step = (spread / MOST_POWERS).ceil();
     (first, first + (spread / step).ceil() * step, step)
-}
-
-impl Chart {
-    /// A chart without a name over the paper's compression ratio.
-    pub(super) fn over_ratio(y: &str, series: Vec<Series>, legends: Vec<Legend>) -> Self {
-        Self {
-            name: String::new(),
-            title: String::new(),
-            caption: String::new(),
-            x: "Comp Ratio, coefficients: SH-rest / mean nonzeros (log scale)",
-            x_unit: "\u{d7}",
-            y: y.to_owned(),
-            from_zero: false,
-            series,
-            legends,
-        }
-    }
-
-    /// Draws the chart. `None` if it has no points.
-    pub(super) fn draw(mut self) -> Result<Option<Figure>> {
-        for series in &mut self.series {
-            // The axis cannot show other numbers.
-            series.retain(|&(x, y)| x >= LARGEST.recip() && x <= LARGEST && y.abs() <= LARGEST);
-            for band in &mut series.band {
-                *band = (band.0.max(-LARGEST), band.1.min(LARGEST));
-            }
-        }
-        self.series.retain(|series| !series.points.is_empty());
-        let points = || self.series.iter().flat_map(|series| &series.points);
-        let values = self.series.iter().flat_map(|series| {
-            let bands = series.band.iter().flat_map(|band| [band.0, band.1]);
-            series.points.iter().map(|point| point.1).chain(bands)
-        });
-        let (Some(x), Some(y)) = (range(points().map(|point| point.0.log2())), range(values.clone())) else {
-            return Ok(None);
-        };
-        let mut layout = self.layout(x, y);
-        for series in &self.series {
-            for ((x, y), label) in series.points.iter().zip(&series.labels) {
-                let text = TextAnnotation::new(literal(label), x.log2(), *y).with_font_size(POINT_SIZE);
-                layout = layout.with_annotation(text);
-            }
-        }
-        let mut plots: Vec<Plot> = Vec::new();
-        let bands = self.series.iter().filter(|series| !series.band.is_empty());
-        plots.extend(bands.map(|series| {
-            let x = series.points.iter().map(|point| point.0.log2());
-            let (low, high): (Vec<f64>, Vec<f64>) = series.band.iter().copied().unzip();
-            BandPlot::new(x, low, high).with_color(series.colour).with_opacity(BAND_OPACITY).into()
-        }));
-        for series in &self.series {
-            let points: Vec<(f64, f64)> = series.points.iter().map(|&(x, y)| (x.log2(), y)).collect();
-            if series.joined {
-                let mut line = LinePlot::new()
-                    .with_data(points.clone())
-                    .with_color(series.colour)
-                    .with_stroke_width(LINE);
-                if !series.dash.is_empty() {
-                    line = line.with_line_style(kuva::plot::LineStyle::Custom(series.dash.to_owned()));
-                }
-                plots.push(line.into());
-            }
-            if let Some(mark) = series.mark {
-                let marks = ScatterPlot::new().with_data(points).with_color(series.colour);
-                plots.push(marks.with_size(MARK).with_marker(mark).into());
-            }
-        }
-        let scene = render_multiple(plots, layout);
-        let png = RasterBackend::new().with_scale(PNG_SCALE).render_scene(&scene).map_err(|why| {
-            Error::parameter("figure", &self.name, format!("a chart that can be drawn: {why}"))
-        })?;
-        let svg = SvgBackend::new().render_scene(&scene);
-        // With a view box the picture scales to the width of the page.
-        let view_box = format!("<svg viewBox=\"0 0 {} {}\" ", scene.width, scene.height);
-        let svg = svg.replacen("<svg ", &view_box, 1);
-        let pdf = pdf(&scene);
-        Ok(Some(Figure { name: self.name, title: self.title, caption: self.caption, svg, png, pdf }))
-    }
-
-    fn layout(&self, x: (f64, f64), y: (f64, f64)) -> Layout {
-        let theme = Theme {
-            background: PAPER.into(),
-            axis_color: SOFT.into(),
-            grid_color: GRID.into(),
-            tick_color: SOFT.into(),
-            text_color: INK.into(),
-            legend_bg: PAPER.into(),
-            legend_border: GRID.into(),
-            ..Theme::light()
-        };
-        let unit = self.x_unit;
-        let ticks = TickFormat::Custom(std::sync::Arc::new(move |power: f64| {
-            let value = power.exp2();
-            if value < 1.0 { format!("{value}{unit}") } else { format!("{value:.0}{unit}") }
-        }));
-        let low = if self.from_zero { y.0.min(0.0) } else { y.0 };
-        let step = step((y.1 - low).max(LEAST_RANGE));
-        let low = (low / step).floor() * step;
-        let high = ((y.1 / step).ceil() * step).max(low + step);
-        // Both ends are whole powers of two, so that the axis has at least two labels.
-        let (first, last, powers) = powers(x);
-        let mut layout = Layout::new((first, last), (low, high))
-            .with_width(WIDTH)
-            .with_height(HEIGHT)
-            .with_theme(theme)
-            .with_title(literal(&self.title))
-            .with_title_wrap(TITLE_WRAP)
-            .with_title_size(TITLE_SIZE)
-            .with_label_size(LABEL_SIZE)
-            .with_tick_size(TEXT_SIZE)
-            .with_body_size(TEXT_SIZE)
-            .with_x_label(literal(self.x))
-            .with_y_label(literal(&self.y))
-            .with_x_axis_min(first)
-            .with_x_axis_max(last)
-            .with_x_tick_step(powers)
-            .with_y_axis_min(low)
-            .with_y_axis_max(high)
-            .with_y_tick_step(step)
-            .with_x_tick_format(ticks)
-            .with_legend_box(false);
-        for (title, keys) in self.legends.iter().filter(|legend| !legend.1.is_empty()) {
-            layout = layout.with_legend_group(*title, keys.clone());
-        }
-        layout
-    }
 }
 
 #[cfg(test)]

@@ -1,12 +1,11 @@
-//! A drawing by `kuva` as a PDF of one page, for papers.
+//! A drawing as a PDF of one page, for papers.
 //!
-//! Only what `kuva` draws charts with is here: shapes, lines, and text in Helvetica, which every PDF reader has. Letters
-//! beyond Windows code page 1252 become question marks.
+//! Text is in Helvetica, which every PDF reader has. Letters beyond Windows code page 1252 become question marks.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-use kuva::render::color::Color;
-use kuva::render::render::{PathData, Primitive, Scene, TextAnchor};
+use super::drawing::{Anchor, SIZE, Shape, number};
 
 /// Advance widths of Helvetica from the space to the tilde, in thousandths of the size of the text (Adobe, Core 14 AFM).
 const WIDTHS: [u16; 95] = [
@@ -18,43 +17,29 @@ const WIDTHS: [u16; 95] = [
 ];
 /// Width of all other letters, that of a digit.
 const OTHER_WIDTH: u16 = 556;
-/// Bold letters are about so many times wider.
-const BOLD: f64 = 1.06;
-/// Distance of the control points of a quarter of a circle from its ends, in radii.
-const QUARTER: f64 = 0.5523;
-
-/// `scene` as a PDF file, one point for each pixel. The same scene gives the same bytes.
-pub(super) fn pdf(scene: &Scene) -> Vec<u8> {
-    let mut page = Page { ink: rgb(scene.text_color.as_deref()), ..Page::default() };
-    let (width, height) = (scene.width, scene.height);
+/// `shapes` as a PDF file, one point for each pixel. The same shapes give the same bytes.
+pub(super) fn pdf(shapes: &[Shape]) -> Vec<u8> {
+    let [width, height] = SIZE.map(number);
     // Pixels count from the top, points from the bottom.
-    page.line(format_args!("1 0 0 -1 0 {} cm", number(height)));
-    if let Some(paper) = scene.background_color.as_deref().filter(|paper| *paper != "none") {
-        page.fill(rgb(Some(paper)));
-        page.line(format_args!("0 0 {} {} re f", number(width), number(height)));
+    let mut content = format!("1 0 0 -1 0 {height} cm 1 j\n");
+    let mut opacities = BTreeSet::new();
+    for shape in shapes {
+        let opacity = if let Shape::Area { opacity, .. } = shape { *opacity } else { 100 };
+        opacities.insert(opacity);
+        let _ = writeln!(content, "/G{opacity} gs\n{}", operators(shape));
     }
-    scene.elements.iter().for_each(|element| page.element(element));
-    let states: String = page
-        .opacities
+    let states: String = opacities
         .iter()
-        .enumerate()
-        .map(|(i, opacity)| format!("/G{i} << /ca {0} /CA {0} >> ", number(*opacity)))
+        .map(|percent| format!("/G{percent} << /ca {} >> ", number(f64::from(*percent) / 100.0)))
         .collect();
-    let font = |name: &str| {
-        format!("<< /Type /Font /Subtype /Type1 /BaseFont /{name} /Encoding /WinAnsiEncoding >>")
-    };
     let objects = [
         "<< /Type /Catalog /Pages 2 0 R >>".to_owned(),
         "<< /Type /Pages /Kids [3 0 R] /Count 1 >>".to_owned(),
         format!(
-            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {} {}] /Contents 4 0 R /Resources << /Font << /F0 5 0 R /F1 6 0 \
-             R >> /ExtGState << {states}>> >> >>",
-            number(width),
-            number(height)
+            "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {width} {height}] /Contents 4 0 R /Resources << /Font << /F0 5 0 R >> /ExtGState << {states}>> >> >>"
         ),
-        format!("<< /Length {} >>\nstream\n{}endstream", page.content.len(), page.content),
-        font("Helvetica"),
-        font("Helvetica-Bold"),
+        format!("<< /Length {} >>\nstream\n{content}endstream", content.len()),
+        "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica /Encoding /WinAnsiEncoding >>".to_owned(),
     ];
     let mut file = "%PDF-1.4\n".to_owned();
     let mut table = "0000000000 65535 f \n".to_owned();
@@ -70,220 +55,48 @@ pub(super) fn pdf(scene: &Scene) -> Vec<u8> {
     file.into_bytes()
 }
 
-/// The content of a page, in ASCII.
-#[derive(Default)]
-struct Page {
-    content: String,
-    /// Opacities that were used; each is a graphics state of its number.
-    opacities: Vec<f64>,
-    /// Colour of text that has none of its own.
-    ink: [f64; 3],
-}
-
-impl Page {
-    fn line(&mut self, line: std::fmt::Arguments<'_>) {
-        let _ = writeln!(self.content, "{line}");
-    }
-
-    fn fill(&mut self, [r, g, b]: [f64; 3]) {
-        self.line(format_args!("{} {} {} rg", number(r), number(g), number(b)));
-    }
-
-    /// Sets colours, the width and dashes of lines, and opacity. The operator that then paints; `None` if nothing does.
-    fn paint(
-        &mut self,
-        fill: Option<&Color>,
-        stroke: Option<(&Color, f64, Option<&str>)>,
-        opacity: Option<f64>,
-    ) -> Option<&'static str> {
-        let opacity = opacity.unwrap_or(1.0);
-        let known = self.opacities.iter().position(|other| other.to_bits() == opacity.to_bits());
-        let state = known.unwrap_or_else(|| {
-            self.opacities.push(opacity);
-            self.opacities.len() - 1
-        });
-        self.line(format_args!("/G{state} gs"));
-        let fill = fill.and_then(colour);
-        let stroke = stroke.filter(|(_, width, _)| *width > 0.0);
-        let stroke = stroke.and_then(|(of, width, dash)| Some((colour(of)?, width, dash)));
-        if let Some(fill) = fill {
-            self.fill(fill);
+/// The operators that draw `shape`, in ASCII.
+fn operators(shape: &Shape) -> String {
+    let path = |points: &[[f64; 2]]| {
+        let word = |i| if i == 0 { "m" } else { "l" };
+        let lines = points.iter().enumerate();
+        lines.map(|(i, [x, y])| format!("{} {} {}\n", number(*x), number(*y), word(i))).collect::<String>()
+    };
+    match shape {
+        Shape::Line { points, colour, width, dash } => {
+            format!("{} RG {} w [{dash}] 0 d\n{}S", rgb(colour), number(*width), path(points))
         }
-        if let Some(([r, g, b], width, dash)) = stroke {
-            let dash: Vec<String> = dash
-                .unwrap_or_default()
-                .split([' ', ','])
-                .filter_map(|part| part.parse().ok().map(number))
-                .collect();
-            self.line(format_args!(
-                "{} {} {} RG {} w [{}] 0 d",
-                number(r),
-                number(g),
-                number(b),
-                number(width),
-                dash.join(" ")
-            ));
-        }
-        match (fill, stroke) {
-            (Some(_), Some(_)) => Some("B"),
-            (Some(_), None) => Some("f"),
-            (None, Some(_)) => Some("S"),
-            (None, None) => None,
-        }
-    }
-
-    fn element(&mut self, element: &Primitive) {
-        match element {
-            Primitive::Circle { cx, cy, r, fill, fill_opacity, stroke, stroke_width } => {
-                let stroke = stroke.as_ref().map(|of| (of, stroke_width.unwrap_or(1.0), None));
-                self.circles(&[*cx], &[*cy], *r, fill, stroke, *fill_opacity);
-            }
-            Primitive::CircleBatch { cx, cy, r, fill, fill_opacity, stroke, stroke_width } => {
-                let stroke = stroke.as_ref().map(|of| (of, stroke_width.unwrap_or(1.0), None));
-                self.circles(cx, cy, *r, fill, stroke, *fill_opacity);
-            }
-            Primitive::Text { x, y, content, size, anchor, rotate, bold, color } => {
-                self.text([*x, *y], content, (*size, *bold), *anchor, rotate.unwrap_or(0.0), color.as_ref());
-            }
-            Primitive::RichText { x, y, spans, size, anchor, color } => {
-                let text: String = spans.iter().map(|span| span.text.as_str()).collect();
-                self.text([*x, *y], &text, (*size, false), *anchor, 0.0, color.as_ref());
-            }
-            Primitive::Line { x1, y1, x2, y2, stroke, stroke_width, stroke_dasharray } => {
-                let stroke = (stroke, *stroke_width, stroke_dasharray.as_deref());
-                self.lines(&[(*x1, *y1), (*x2, *y2)], stroke);
-            }
-            Primitive::PolyLine { points, stroke, stroke_width, stroke_dasharray } => {
-                self.lines(points, (stroke, *stroke_width, stroke_dasharray.as_deref()));
-            }
-            Primitive::Path(path) => self.path(path),
-            Primitive::Rect { x, y, width, height, fill, stroke, stroke_width, opacity } => {
-                let stroke = stroke.as_ref().map(|of| (of, stroke_width.unwrap_or(1.0), None));
-                let paint = self.paint(Some(fill), stroke, *opacity);
-                self.rectangle([*x, *y, *width, *height], paint);
-            }
-            Primitive::RectBatch { x, y, w, h, fills } => {
-                for (i, fill) in fills.iter().enumerate() {
-                    let paint = self.paint(Some(fill), None, None);
-                    if let (Some(x), Some(y), Some(w), Some(h)) = (x.get(i), y.get(i), w.get(i), h.get(i)) {
-                        self.rectangle([*x, *y, *w, *h], paint);
-                    }
-                }
-            }
-            Primitive::GroupStart { .. } => self.line(format_args!("q")),
-            Primitive::ClipStart { x, y, width, height, .. } => {
-                self.line(format_args!("q"));
-                self.rectangle([*x, *y, *width, *height], Some("W n"));
-            }
-            Primitive::GroupEnd | Primitive::ClipEnd => self.line(format_args!("Q")),
-        }
-    }
-
-    fn rectangle(&mut self, at: [f64; 4], paint: Option<&str>) {
-        let [x, y, width, height] = at.map(number);
-        if let Some(paint) = paint {
-            self.line(format_args!("{x} {y} {width} {height} re {paint}"));
-        }
-    }
-
-    fn circles(
-        &mut self,
-        x: &[f64],
-        y: &[f64],
-        r: f64,
-        fill: &Color,
-        stroke: Option<(&Color, f64, Option<&str>)>,
-        opacity: Option<f64>,
-    ) {
-        let Some(paint) = self.paint(Some(fill), stroke, opacity) else { return };
-        let k = QUARTER * r;
-        for (x, y) in x.iter().zip(y) {
-            let at = |dx: f64, dy: f64| format!("{} {}", number(x + dx), number(y + dy));
-            let quarter = |a: [f64; 2], b: [f64; 2], end: [f64; 2]| {
-                format!("{} {} {} c", at(a[0], a[1]), at(b[0], b[1]), at(end[0], end[1]))
+        Shape::Area { points, colour, .. } => format!("{} rg\n{}h f", rgb(colour), path(points)),
+        Shape::Text { at: [x, y], text, size, anchor, upright, colour } => {
+            let share = match anchor {
+                Anchor::Start => 0.0,
+                Anchor::Middle => 0.5,
+                Anchor::End => 1.0,
             };
-            self.line(format_args!(
-                "{} m {} {} {} {} {paint}",
-                at(r, 0.0),
-                quarter([r, k], [k, r], [0.0, r]),
-                quarter([-k, r], [-r, k], [-r, 0.0]),
-                quarter([-r, -k], [-k, -r], [0.0, -r]),
-                quarter([k, -r], [r, -k], [r, 0.0])
-            ));
+            let back = share * width(text, *size);
+            let place = if *upright {
+                [0.0, -1.0, -1.0, 0.0, *x, y + back]
+            } else {
+                [1.0, 0.0, 0.0, -1.0, x - back, *y]
+            };
+            let place = place.map(number).join(" ");
+            format!("{} rg BT /F0 {} Tf {place} Tm ({}) Tj ET", rgb(colour), number(*size), literal(text))
         }
-    }
-
-    fn lines(&mut self, points: &[(f64, f64)], stroke: (&Color, f64, Option<&str>)) {
-        let Some(paint) = self.paint(None, Some(stroke), None) else { return };
-        for (i, (x, y)) in points.iter().enumerate() {
-            let operator = if i == 0 { "m" } else { "l" };
-            self.line(format_args!("{} {} {operator}", number(*x), number(*y)));
-        }
-        self.line(format_args!("{paint}"));
-    }
-
-    /// A path of straight lines, which is all that charts have.
-    fn path(&mut self, path: &PathData) {
-        let stroke = (&path.stroke, path.stroke_width, path.stroke_dasharray.as_deref());
-        let Some(paint) = self.paint(path.fill.as_ref(), Some(stroke), path.opacity) else { return };
-        let spaced = path.d.replace('M', " M ").replace('L', " L ").replace('Z', " Z ").replace(',', " ");
-        let mut operator = "m";
-        let mut x = None;
-        for word in spaced.split_whitespace() {
-            match (word, word.parse::<f64>(), x) {
-                ("M", ..) => operator = "m",
-                ("L", ..) => operator = "l",
-                ("Z", ..) => self.line(format_args!("h")),
-                (_, Ok(value), None) => x = Some(value),
-                (_, Ok(y), Some(left)) => {
-                    self.line(format_args!("{} {} {operator}", number(left), number(y)));
-                    (x, operator) = (None, "l");
-                }
-                _ => {}
-            }
-        }
-        self.line(format_args!("{paint}"));
-    }
-
-    /// Text whose base line goes through `at`, turned clockwise by so many degrees.
-    fn text(
-        &mut self,
-        at: [f64; 2],
-        text: &str,
-        (size, bold): (u32, bool),
-        anchor: TextAnchor,
-        degrees: f64,
-        colour_of: Option<&Color>,
-    ) {
-        let ink = colour_of.and_then(colour).unwrap_or(self.ink);
-        let _ = self.paint(None, None, None);
-        self.fill(ink);
-        let size = f64::from(size);
-        let share = match anchor {
-            TextAnchor::Start => 0.0,
-            TextAnchor::Middle => 0.5,
-            TextAnchor::End => 1.0,
-        };
-        let back = share * width(text, size, bold);
-        let (sin, cos) = degrees.to_radians().sin_cos();
-        let place = [cos, sin, sin, -cos, at[0] - back * cos, at[1] - back * sin].map(number).join(" ");
-        let font = u8::from(bold);
-        self.line(format_args!("BT /F{font} {} Tf {place} Tm ({}) Tj ET", number(size), literal(text)));
     }
 }
 
 /// Width of `text` in points.
-fn width(text: &str, size: f64, bold: bool) -> f64 {
+fn width(text: &str, size: f64) -> f64 {
     let each = |byte: u8| byte.checked_sub(b' ').and_then(|i| WIDTHS.get(usize::from(i))).copied();
     let all: u32 = text.chars().map(|c| u32::from(each(code(c)).unwrap_or(OTHER_WIDTH))).sum();
-    f64::from(all) / 1000.0 * size * if bold { BOLD } else { 1.0 }
+    f64::from(all) / 1000.0 * size
 }
 
 /// The byte of a letter in Windows code page 1252.
 fn code(letter: char) -> u8 {
     match letter {
-        ' '..='~' | '\u{a1}'..='\u{ff}' => u8::try_from(letter).unwrap_or(b'?'),
         '\u{a0}' => b' ',
+        ' '..='~' | '\u{a1}'..='\u{ff}' => u8::try_from(letter).unwrap_or(b'?'),
         '\u{2026}' => 0x85,
         '\u{2018}' => 0x91,
         '\u{2019}' => 0x92,
@@ -297,36 +110,18 @@ fn code(letter: char) -> u8 {
 
 /// `text` within the parentheses of a PDF.
 fn literal(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for byte in text.chars().map(code) {
-        let _ = match byte {
-            b'(' | b')' | b'\\' => write!(out, "\\{}", char::from(byte)),
-            b' '..=b'~' => write!(out, "{}", char::from(byte)),
-            _ => write!(out, "\\{byte:03o}"),
-        };
-    }
-    out
+    let byte = |byte| match byte {
+        b'(' | b')' | b'\\' => format!("\\{}", char::from(byte)),
+        b' '..=b'~' => char::from(byte).to_string(),
+        _ => format!("\\{byte:03o}"),
+    };
+    text.chars().map(code).map(byte).collect()
 }
 
-/// Red, green and blue from 0 to 1; `None` for no colour.
-fn colour(of: &Color) -> Option<[f64; 3]> {
-    match of {
-        Color::Rgb(r, g, b) => Some([*r, *g, *b].map(|v| f64::from(v) / 255.0)),
-        Color::None => None,
-        // Charts have no colours that `kuva` does not resolve.
-        Color::Css(_) => Some([0.0; 3]),
-    }
-}
-
-fn rgb(name: Option<&str>) -> [f64; 3] {
-    name.map(Color::from).and_then(|of| colour(&of)).unwrap_or_default()
-}
-
-/// A number with at most three digits after the point.
-fn number(value: f64) -> String {
-    let text = format!("{value:.3}");
-    let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" || text.is_empty() { "0".to_owned() } else { text.to_owned() }
+/// The red, green and blue of a colour such as `#0072b2`, each from 0 to 1.
+fn rgb(colour: &str) -> String {
+    let part = |k: usize| colour.get(k..k + 2).and_then(|digits| u8::from_str_radix(digits, 16).ok());
+    [1, 3, 5].map(|k| number(f64::from(part(k).unwrap_or(0)) / 255.0)).join(" ")
 }
 
 #[cfg(test)]
@@ -341,52 +136,36 @@ mod tests {
         );
         assert_eq!(number(-0.0001), "0");
         assert_eq!(literal("a(b)\\\u{d7}\u{2013}\u{6f22}"), "a\\(b\\)\\\\\\327\\226?");
-        assert!((width("0.1", 10.0, false) - 13.9).abs() < 1e-9);
+        assert_eq!(rgb("#ff0033"), "1 0 0.2");
+        assert!((width("0.1", 10.0) - 13.9).abs() < 1e-9);
     }
 
     #[test]
     fn every_reader_finds_all_objects() {
-        let mut scene = Scene::new(200.0, 100.0);
-        let dashed = Some("6 5".to_owned());
-        scene.add(Primitive::Line {
-            x1: 1.0,
-            y1: 2.0,
-            x2: 3.0,
-            y2: 4.5,
-            stroke: "#ff0000".into(),
-            stroke_width: 2.0,
-            stroke_dasharray: dashed,
-        });
-        scene.add(Primitive::Path(Box::new(PathData {
-            d: "M1.0,2.0 L3.0 4.0 L 5 6Z".to_owned(),
-            fill: Some("#0000ff".into()),
-            stroke: Color::None,
-            stroke_width: 0.0,
-            opacity: Some(0.5),
-            stroke_dasharray: None,
-        })));
-        scene.add(Primitive::Text {
-            x: 100.0,
-            y: 50.0,
-            content: "00".to_owned(),
-            size: 10,
-            anchor: TextAnchor::Middle,
-            rotate: Some(-90.0),
-            bold: false,
-            color: None,
-        });
-        let file = pdf(&scene);
+        let shapes = vec![
+            Shape::Line { points: vec![[1.0, 2.0], [3.0, 4.5]], colour: "#ff0000", width: 2.0, dash: "6 5" },
+            Shape::Area { points: vec![[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], colour: "#0000ff", opacity: 50 },
+            Shape::Text {
+                at: [100.0, 50.0],
+                text: "00".to_owned(),
+                size: 10.0,
+                anchor: Anchor::Middle,
+                upright: true,
+                colour: "#000000",
+            },
+        ];
+        let file = pdf(&shapes);
         let text = String::from_utf8(file).unwrap();
         assert!(text.contains("1 0 0 RG 2 w [6 5] 0 d\n1 2 m\n3 4.5 l\nS\n"), "{text}");
-        assert!(text.contains("0 0 1 rg\n1 2 m\n3 4 l\n5 6 l\nh\nf\n"), "{text}");
+        assert!(text.contains("0 0 1 rg\n1 2 m\n3 4 l\n5 6 l\nh f\n"), "{text}");
         // Half of 11.12 points back, that is down.
         assert!(text.contains("BT /F0 10 Tf 0 -1 -1 0 100 55.56 Tm (00) Tj ET"), "{text}");
-        assert!(text.contains("/G0 << /ca 1 /CA 1 >> /G1 << /ca 0.5 /CA 0.5 >>"), "{text}");
+        assert!(text.contains("/G50 << /ca 0.5 >> /G100 << /ca 1 >>"), "{text}");
         let (_, rest) = text.split_once("startxref\n").unwrap();
         let start: usize = rest.lines().next().unwrap().parse().unwrap();
         let entries: Vec<&str> =
             text[start..].lines().skip(3).take_while(|line| line.ends_with(" n ")).collect();
-        assert_eq!(entries.len(), 6);
+        assert_eq!(entries.len(), 5);
         for (i, entry) in entries.iter().enumerate() {
             let at: usize = entry[..10].parse().unwrap();
             assert!(text[at..].starts_with(&format!("{} 0 obj\n", i + 1)), "{entry}");

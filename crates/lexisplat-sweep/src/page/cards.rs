@@ -5,71 +5,70 @@ use lexisplat_eval::Summary;
 use lexisplat_eval::metrics::Metric;
 use maud::{Markup, html};
 
-use super::{card, decibels};
-use crate::curve::{At, Kind, curve, dense_noise};
+use super::card;
 use crate::grid::Grid;
 use crate::measure::Measure;
-use crate::table::signed;
+use crate::numbers::signed;
 use crate::{SceneResult, Setting};
 
 /// The preset that has a card: the default of packed files.
 const PRESET: Preset = Preset::Balanced;
+/// What is written after ratios.
+const TIMES: &str = "\u{d7}";
 
 /// A measure over all models that were compressed at one setting.
 fn over_models(grid: &Grid<'_>, setting: Setting, measure: Measure) -> Summary {
     let value = |(_, scene): (&str, &SceneResult)| measure.value(scene, Some(scene.point(setting)?));
-    Summary::of(grid.scenes().filter_map(value))
+    Summary::of(grid.scenes().filter_map(value).filter(|value| value.is_finite()))
 }
 
-fn times(value: f64) -> Markup {
-    html! { (format!("{value:.2}\u{d7}")) }
+/// By how much the same drawing of dense SH varied over the rounds beside a setting: the range over the mean, of the model
+/// where it is largest. Infinite if frames were not timed.
+fn dense_noise(grid: &Grid<'_>, setting: Setting) -> f64 {
+    let noise = grid.scenes().filter_map(|(_, scene)| {
+        let dense = scene.point(setting)?.fps?.dense;
+        (dense.mean > 0.0).then(|| (dense.most - dense.least) / dense.mean)
+    });
+    noise.reduce(f64::max).unwrap_or(f64::INFINITY)
 }
 
 /// A card for each number of the main setting that there is, and one for packed files.
 pub(super) fn cards(grid: &Grid<'_>) -> Markup {
     let psnr = Measure::ToOriginal(Metric::Psnr);
     let mut cards = Vec::new();
+    let mut add = |setting, measure, unit, what: String| {
+        let mean = over_models(grid, setting, measure).mean;
+        cards.extend(mean.map(|mean| card(html! { (measure.shown(Some(mean))) small { (unit) } }, &what)));
+    };
     if let Some(setting) = grid.main_setting() {
-        let label = setting.label();
-        let over = |measure| over_models(grid, setting, measure);
-        if let Some(psnr) = over(psnr).mean {
-            let what = format!("mean PSNR against the original\u{2019}s pictures at {label}; more is closer");
-            cards.push(card(decibels(&format!("{psnr:.1}")), &what));
-        }
-        if let Some(ratio) = over(Measure::FileRatio).mean {
-            let what = format!("smaller at {label}: whole files, every byte counted, geometry exact");
-            cards.push(card(times(ratio), &what));
-        }
-        if let Some(ratio) = over(Measure::CoefficientRatio).mean {
-            let what = format!("fewer coefficients at {label}: the paper\u{2019}s way of counting");
-            cards.push(card(times(ratio), &what));
-        }
-        if let Summary { mean: Some(mean), min: Some(worst), .. } = over(Measure::PhotoChange) {
-            let what = format!(
-                "change of PSNR against photos at {label}; {} dB where it is worst",
-                signed(worst, 2)
-            );
-            cards.push(card(decibels(&signed(mean, 2)), &what));
-        }
-        if let Some(speedup) = over(Measure::Speedup).mean {
-            let what = format!("the frames a second of dense SH, from codes at {label} on {}", grid.device());
-            let points: Vec<At<'_>> = grid
-                .methods
-                .iter()
-                .flat_map(|&method| curve(grid, method, Kind::Tolerances, None))
-                .filter(|at| at.setting == setting)
-                .collect();
-            let noise = dense_noise(&points).unwrap_or(f64::INFINITY);
-            let within =
-                if (speedup - 1.0).abs() > noise { "" } else { "; no more than that itself varies by" };
-            cards.push(card(times(speedup), &format!("{what}{within}")));
-        }
+        let (label, device) = (setting.label(), grid.device());
+        let worst = over_models(grid, setting, Measure::PhotoChange).min.unwrap_or_default();
+        let worst = format!("{} dB where it is worst", signed(worst, 2));
+        let speedup = over_models(grid, setting, Measure::Speedup).mean.unwrap_or(1.0);
+        let is_told = (speedup - 1.0).abs() > dense_noise(grid, setting);
+        let within = if is_told { "" } else { "; no more than that itself varies by" };
+        add(setting, psnr, " dB", format!("mean PSNR against the original\u{2019}s pictures at {label}"));
+        add(setting, Measure::FileRatio, TIMES, format!("smaller whole files at {label}, geometry exact"));
+        add(
+            setting,
+            Measure::CoefficientRatio,
+            TIMES,
+            format!("fewer coefficients at {label}, the paper\u{2019}s count"),
+        );
+        add(
+            setting,
+            Measure::PhotoChange,
+            " dB",
+            format!("change of PSNR against photos at {label}; {worst}"),
+        );
+        let what = format!("the frames a second of dense SH, from codes at {label} on {device}{within}");
+        add(setting, Measure::Speedup, TIMES, what);
     }
-    let packed = |measure| over_models(grid, Setting::Preset(PRESET), measure).mean;
-    if let (Some(ratio), Some(psnr)) = (packed(Measure::FileRatio), packed(psnr)) {
+    let packed = Setting::Preset(PRESET);
+    if let Some(psnr) = over_models(grid, packed, psnr).mean {
         let what =
             format!("smaller as packed files ({}), everything quantised, at {psnr:.1} dB", PRESET.name());
-        cards.push(card(times(ratio), &what));
+        add(packed, Measure::FileRatio, TIMES, what);
     }
     html! { dl class="cards" { @for card in cards { (card) } } }
 }

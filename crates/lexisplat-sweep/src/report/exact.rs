@@ -5,7 +5,8 @@ use lexisplat_eval::format;
 use maud::{Markup, PreEscaped, html};
 
 use super::atoms::{self, Usage};
-use super::{Report, packed, smaller, text};
+use super::{Report, packed, smaller};
+use crate::numbers;
 use crate::page::{card, section};
 
 /// What several parts need.
@@ -36,21 +37,17 @@ impl<'a> Facts<'a> {
             }
             dl.cards {
                 (card(smaller(self.report.ply_bytes, self.report.exact.bytes), "smaller: the whole file"))
-                @if self.dim > 0 {
-                    (card(text::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
-                    (card(
-                        html! { (format!("{:.1} ", self.mean_nonzeros)) small { "of " (self.dim) } },
-                        "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
-                    ))
-                }
+                (card(numbers::ratio(before, after), "smaller: view-dependent colour alone, dictionary and indices counted"))
+                (card(
+                    html! { (format!("{:.1} ", self.mean_nonzeros)) small { "of " (self.dim) } },
+                    "numbers that remain to describe a Gaussian\u{2019}s view-dependent colour, on average",
+                ))
                 (packed::quality(self.report.exact.comparison))
             }
-            @if self.dim > 0 {
-                p.note {
-                    "Papers often count coefficients alone, without indices and without the rest of the file: "
-                    (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, text::ratio(self.dim as f64, self.mean_nonzeros)))
-                    " here."
-                }
+            p.note {
+                "Papers often count coefficients alone, without indices and without the rest of the file: "
+                (format!("{} / {:.2} = {}", self.dim, self.mean_nonzeros, numbers::ratio(self.dim as f64, self.mean_nonzeros)))
+                " here."
             }
         };
         section("exact", "When geometry must not change: the exact layout", &content)
@@ -58,23 +55,8 @@ impl<'a> Facts<'a> {
 
     pub(super) fn steps(&self) -> Markup {
         let (model, report) = (self.report.model, self.report);
-        if self.dim == 0 {
-            return html! {
-                section {
-                    h2 { "How the exact file is made" }
-                    p { "This scene has SH degree 0: its colour does not depend on the view, so nothing was rewritten. \
-                         Everything is stored as it was." }
-                }
-            };
-        }
-        let stop = match (self.record.tolerance, self.record.max_nonzeros) {
-            (Some(tolerance), None) => format!("until the rest is within {tolerance}"),
-            (Some(tolerance), Some(most)) => {
-                format!("until the rest is within {tolerance} or {most} are used")
-            }
-            (None, Some(most)) => format!("until {most} are used"),
-            (None, None) => "until nothing is left".to_owned(),
-        };
+        let within = |tolerance| format!(" until the rest is within {tolerance}");
+        let stop = self.record.tolerance.map(within).unwrap_or_default();
         let seconds = |s: f64| if s.is_finite() { format!(" It took {s:.1}\u{a0}s.") } else { String::new() };
         let content = html! {
             ol.steps {
@@ -90,7 +72,7 @@ impl<'a> Facts<'a> {
                 li {
                     strong { "Code" }
                     @match self.record.pursuit { Some(Pursuit::Omp) => "Orthogonal matching pursuit", _ => "Orthogonal least squares" }
-                    " picked a few atoms and their amounts for every Gaussian, one by one, " (stop) "."
+                    " picked a few atoms and their amounts for every Gaussian, one by one," (stop) "."
                     (seconds(report.code_seconds))
                 }
                 li {
@@ -98,7 +80,6 @@ impl<'a> Facts<'a> {
                      precision, and measured. "
                     @match model.codes().escapes().gaussians.len() {
                         0 => "All of them are within the bound.",
-                        1 => "One that did not fit is stored exactly.",
                         n => { (format::count(n as u64)) " that did not fit are stored exactly." }
                     }
                 }
@@ -107,29 +88,17 @@ impl<'a> Facts<'a> {
         section("how", "How the exact file is made", &content)
     }
 
-    /// Returns the tolerance if every Gaussian is within it.
-    fn kept(&self) -> Option<f64> {
-        let record = self.record;
-        record.tolerance.filter(|tolerance| record.over_tolerance == 0 && record.max_residual <= *tolerance)
-    }
-
+    /// The bound on the error, if every Gaussian is within it.
     pub(super) fn bound(&self) -> Markup {
-        if self.dim == 0 {
-            return html! {};
-        }
-        let content = html! {
-            @match self.kept() { Some(tolerance) => (self.kept_bound(tolerance)), None => (self.lifted_bound()) }
-        };
-        section("bound", "The bound on the error", &content)
-    }
-
-    fn kept_bound(&self, tolerance: f64) -> Markup {
-        let Record { max_residual: max, rms_residual: rms, .. } = *self.record;
+        let record = self.record;
+        let is_kept = |tolerance: &f64| record.over_tolerance == 0 && record.max_residual <= *tolerance;
+        let Some(tolerance) = record.tolerance.filter(is_kept) else { return html! {} };
+        let Record { max_residual: max, rms_residual: rms, .. } = *record;
         let share = |v: f64| if tolerance > 0.0 { (v / tolerance * 100.0).clamp(0.0, 100.0) } else { 100.0 };
         // An error of length 1 in SH, as the root mean square of the colour over the sphere: docs/METHOD.md.
         let single = 1.0 / (4.0 * std::f64::consts::PI).sqrt();
         let all = 1.0 / (12.0 * std::f64::consts::PI).sqrt();
-        html! {
+        let content = html! {
             .bound {
                 p {
                     b { "Kept for all " (format::count(self.gaussians)) " Gaussians." }
@@ -152,38 +121,11 @@ impl<'a> Facts<'a> {
                  most " (format!("{:.4}", tolerance * single)) " in one channel alone. Blending many Gaussians into a pixel \
                  averages that down further."
             }
-        }
-    }
-
-    fn lifted_bound(&self) -> Markup {
-        let record = self.record;
-        html! {
-            ."bound lifted" {
-                p {
-                    b {
-                        @match record.tolerance {
-                            Some(tolerance) => {
-                                (format::count(record.over_tolerance)) " Gaussians are further than " (tolerance)
-                                " from their original"
-                            }
-                            None => "There is no bound on a Gaussian\u{2019}s error",
-                        }
-                        @if let Some(n) = record.max_nonzeros {
-                            ": at most " (n) " numbers a Gaussian were asked for, whatever the error"
-                        }
-                        "."
-                    }
-                    " The largest error is " (format!("{:.8}", record.max_residual)) ", the root mean square "
-                    (format!("{:.4}", record.rms_residual)) "."
-                }
-            }
-        }
+        };
+        section("bound", "The bound on the error", &content)
     }
 
     pub(super) fn nonzeros(&self) -> Markup {
-        if self.dim == 0 || self.gaussians == 0 {
-            return html! {};
-        }
         let codes = self.report.model.codes();
         let mut counts = vec![0_u64; self.dim + 1];
         for &n in codes.counts() {
@@ -221,9 +163,6 @@ impl<'a> Facts<'a> {
 
     pub(super) fn dictionary(&self) -> Markup {
         let model = self.report.model;
-        if model.dictionary().is_empty() {
-            return html! {};
-        }
         let usage = Usage::of(model);
         let (shown, all) = (usage.shown().len(), usage.ranked.len());
         let which = if shown == all {

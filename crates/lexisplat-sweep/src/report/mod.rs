@@ -8,7 +8,6 @@
 mod atoms;
 mod exact;
 mod packed;
-mod text;
 
 use image::ExtendedColorType;
 use image::codecs::jpeg::JpegEncoder;
@@ -18,6 +17,7 @@ use lexisplat_eval::Comparison;
 use lexisplat_render::Image;
 use maud::html;
 
+use crate::numbers;
 use crate::page::document;
 
 const SCRIPT: &str = include_str!("page.js");
@@ -100,10 +100,12 @@ pub fn page(report: &Report<'_>) -> String {
             (packed::steps())
             (packed::sizes(report))
             (exact.summary())
-            (exact.steps())
-            (exact.bound())
-            (exact.nonzeros())
-            (exact.dictionary())
+            @if report.model.degree().rest() > 0 {
+                (exact.steps())
+                (exact.bound())
+                (exact.nonzeros())
+                (exact.dictionary())
+            }
             (packed::views(report))
         }
         (exact.footer())
@@ -113,7 +115,7 @@ pub fn page(report: &Report<'_>) -> String {
 
 /// Bytes of `before` over bytes of `after`, as `24.50×`.
 fn smaller(before: u64, after: u64) -> String {
-    text::ratio(before as f64, after as f64)
+    numbers::ratio(before as f64, after as f64)
 }
 
 #[cfg(test)]
@@ -239,7 +241,7 @@ mod tests {
         let page = page(&model(ShDegree::THREE), &scores, "front");
         let at = |text: &str| page.find(text).unwrap_or_else(|| panic!("{text}"));
         assert!(at("25.00\u{d7}") < at("4.19\u{d7}"), "the packed file's ratio comes first");
-        assert!(page[..at("<main>")].contains("160\u{a0}B"), "the title is about the packed file");
+        assert!(page[..at("<main>")].contains("160 B"), "the title is about the packed file");
         assert!(at("packed.lexi") < at("exact.lexi") && at("data:image") < at("exact.lexi"));
     }
 

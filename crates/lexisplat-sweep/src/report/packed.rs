@@ -5,8 +5,10 @@ use lexisplat_eval::montage::AMPLIFICATION;
 use lexisplat_eval::{Comparison, Summary, format};
 use maud::{Markup, html};
 
-use super::{CompressedFile, Picture, Report, smaller, text};
+use super::{CompressedFile, Picture, Report, smaller};
+use crate::numbers;
 use crate::page::{card, decibels, image, scores, section};
+use crate::table::{Row, Table};
 
 /// Bytes of a value in a PLY: every known trainer writes floats.
 const PLY_VALUE: u64 = 4;
@@ -58,7 +60,7 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
     html! {
         header {
             p.mark { "lexisplat" }
-            h1 { (text::bytes(*ply_bytes)) " became " em { (text::bytes(packed.bytes)) } }
+            h1 { (format::bytes(*ply_bytes)) " became " em { (format::bytes(packed.bytes)) } }
             p.lede {
                 strong { (report.title) }
                 " is a 3D scene made of " (format::count(gaussians)) " soft coloured blobs, so-called Gaussians, whose \
@@ -68,12 +70,10 @@ pub(super) fn header(report: &Report<'_>) -> Markup {
             dl.cards {
                 (card(smaller(*ply_bytes, packed.bytes), "smaller: the whole file against the whole PLY, everything counted"))
                 (quality(packed.comparison))
-                @if gaussians > 0 {
-                    (card(
-                        html! { (format!("{:.1} ", packed.bytes as f64 / gaussians as f64)) small { "bytes" } },
-                        &format!("for each Gaussian, of {:.0} in the PLY", *ply_bytes as f64 / gaussians as f64),
-                    ))
-                }
+                (card(
+                    html! { (format!("{:.1} ", packed.bytes as f64 / gaussians as f64)) small { "bytes" } },
+                    &format!("for each Gaussian, of {:.0} in the PLY", *ply_bytes as f64 / gaussians as f64),
+                ))
             }
         }
     }
@@ -92,9 +92,6 @@ pub(super) fn quality(comparison: &Comparison) -> Markup {
 }
 
 pub(super) fn pictures(report: &Report<'_>) -> Markup {
-    if report.pictures.is_empty() {
-        return html! {};
-    }
     let content = html! {
         p {
             "Left of the line is the original, right of it the packed file, drawn straight from its codes. Drag \
@@ -144,11 +141,11 @@ pub(super) fn steps() -> Markup {
 /// A bar as long as its share of `longest`, in parts as long as theirs.
 fn bar(name: &str, total: u64, groups: &Groups, longest: f64) -> Markup {
     html! {
-        p.label { (name) ", " (text::bytes(total)) }
+        p.label { (name) ", " (format::bytes(total)) }
         .bar role="img" aria-label=(format!("Bytes of {name} by attribute")) {
             @for ((what, class, _), bytes) in GROUPS.iter().zip(groups).filter(|(_, bytes)| **bytes > 0.0) {
                 @let width = bytes / longest * 100.0;
-                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", text::bytes(whole(*bytes)))) {
+                span class=(class) style=(format!("width:{width:.2}%")) title=(format!("{what}: {}", format::bytes(whole(*bytes)))) {
                     @if width >= LABELLED { (format!("{:.0}%", bytes / total.max(1) as f64 * 100.0)) }
                 }
             }
@@ -163,11 +160,6 @@ fn whole(bytes: f64) -> u64 {
     whole
 }
 
-/// The headings of a table.
-fn head(names: [&str; 6]) -> Markup {
-    html! { thead { tr { @for name in names { th scope="col" { (name) } } } } }
-}
-
 pub(super) fn sizes(report: &Report<'_>) -> Markup {
     let Report { ply_bytes, packed, exact, .. } = report;
     let columns = [ply_groups(report), lexi_groups(packed), lexi_groups(exact)];
@@ -180,17 +172,17 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
             (bar("exact", exact.bytes, &columns[2], longest))
             .scroll {
                 table {
-                    (head(["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"]))
+                    thead { tr { @for name in ["What", "PLY", "Packed", "Ratio", "Exact", "Ratio"] { th scope="col" { (name) } } } }
                     tbody {
                         @for (k, (what, class, _)) in GROUPS.iter().enumerate() {
                             @let before = columns[0][k];
                             tr {
                                 th scope="row" { span class=(format!("key {class}")) {} (what) }
-                                td { (text::bytes(whole(before))) }
+                                td { (format::bytes(whole(before))) }
                                 @for after in [columns[1][k], columns[2][k]] {
-                                    td { (text::bytes(whole(after))) }
+                                    td { (format::bytes(whole(after))) }
                                     // Headers hold no numbers of the scene, so they have no ratio.
-                                    td { (text::ratio(before, if k == OTHER { 0.0 } else { after })) }
+                                    td { (numbers::ratio(before, if k == OTHER { 0.0 } else { after })) }
                                 }
                             }
                         }
@@ -198,9 +190,9 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
                     tfoot {
                         tr {
                             th scope="row" { "Whole file" }
-                            td { (text::bytes(*ply_bytes)) }
+                            td { (format::bytes(*ply_bytes)) }
                             @for file in [packed, exact] {
-                                td { (text::bytes(file.bytes)) }
+                                td { (format::bytes(file.bytes)) }
                                 td { (smaller(*ply_bytes, file.bytes)) }
                             }
                         }
@@ -215,44 +207,30 @@ pub(super) fn sizes(report: &Report<'_>) -> Markup {
 
 pub(super) fn views(report: &Report<'_>) -> Markup {
     let files = [report.packed.comparison, report.exact.comparison];
-    if files[0].views.is_empty() {
-        return html! {};
-    }
+    let mut table = Table::new("views", "", 2, &["View", "Size"]);
+    table.add_columns(["Packed", "Exact"].into_iter().flat_map(|file| [(file, "PSNR, dB"), (file, "SSIM")]));
+    table.push_block(files[0].views.iter().enumerate().map(|(i, view)| {
+        let scores = files.iter().filter_map(|file| file.views.get(i)).flat_map(|score| {
+            let psnr = if score.identical { "identical".to_owned() } else { numbers::number(score.psnr, 2) };
+            [psnr, format!("{:.5}", score.ssim)]
+        });
+        Row::new(
+            [view.name.clone(), format!("{}\u{d7}{}", view.width, view.height)].into_iter().chain(scores),
+        )
+    }));
+    table.push_block(Summary::PARTS.map(|(name, part)| {
+        let scores = files
+            .iter()
+            .flat_map(|file| [numbers::number(part(&file.psnr), 2), numbers::number(part(&file.ssim), 5)]);
+        Row::new([name.to_owned(), String::new()].into_iter().chain(scores))
+    }));
     let content = html! {
         p {
             "All scenes were drawn by the same renderer from the same cameras. PSNR and SSIM say how close the \
              pictures are to the original\u{2019}s: at 40\u{a0}dB they are off by 1\u{a0}% of the range (root mean \
              square), at 50\u{a0}dB by 0.3\u{a0}%; an SSIM of 1 is a perfect match."
         }
-        .panel.scroll {
-            table {
-                (head(["View", "Size", "Packed: PSNR, dB", "SSIM", "Exact: PSNR, dB", "SSIM"]))
-                tbody {
-                    @for (i, view) in files[0].views.iter().enumerate() {
-                        tr {
-                            th scope="row" { (view.name) }
-                            td { (view.width) "\u{d7}" (view.height) }
-                            @for score in files.iter().filter_map(|file| file.views.get(i)) {
-                                td { @if score.identical { "identical" } @else { (text::number(score.psnr, 2)) } }
-                                td { (format!("{:.5}", score.ssim)) }
-                            }
-                        }
-                    }
-                }
-                tfoot {
-                    @for (name, (_, part)) in ["Mean", "Lowest", "Highest"].into_iter().zip(Summary::PARTS) {
-                        tr {
-                            th scope="row" { (name) }
-                            td {}
-                            @for file in files {
-                                td { (text::number(part(&file.psnr), 2)) }
-                                td { (text::number(part(&file.ssim), 5)) }
-                            }
-                        }
-                    }
-                }
-            }
-        }
+        .panel.scroll { (table.to_html()) }
         @if files.iter().any(|file| file.views.iter().any(|view| view.identical)) {
             p.note { "Identical views have no PSNR; means are over the others." }
         }

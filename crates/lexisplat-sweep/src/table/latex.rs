@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 
-use super::{Cell, Row, Style, Table, escaped};
+use super::{Row, Table};
+use crate::numbers::DASH;
 
 /// Width of the text in points: the `article` class at 10 pt in one column.
 const TEXT_WIDTH: f64 = 345.0;
@@ -11,20 +12,24 @@ const TEXT_WIDTH: f64 = 345.0;
 const CHARACTER: f64 = 5.2;
 /// Points between neighbouring columns: `\tabcolsep` is set to half of that.
 const COLUMN_GAP: f64 = 6.0;
-/// Width of a column in points: the `article` class at 10 pt in two columns.
-const COLUMN_WIDTH: f64 = 229.0;
 /// Most rows of a table that is on one page. A row takes 11 pt at 9 pt, and a page has 550 pt, with captions of some lines.
 const MOST_ROWS: usize = 36;
-/// Sizes of text of long tables, and the width of characters beside `\\small`. Small letters of Computer Modern are wider
+/// Size of text of long tables, and the width of its characters beside `\\small`. Small letters of Computer Modern are wider
 /// than in proportion.
-const SIZES: [(&str, f64); 3] = [("\\small", 1.0), ("\\footnotesize", 0.95), ("\\scriptsize", LONG_SCALE)];
-/// [`SIZES`] of the smallest text.
+const LONG_SIZE: &str = "\\scriptsize";
 const LONG_SCALE: f64 = 0.9;
 /// Smallest scale at which text stays readable. A table that needs a smaller one is split.
 const LEAST_SCALE: f64 = 7.0 / 9.0;
 
 /// Characters that LaTeX has words for. What this crate writes beyond ASCII needs no other engine so.
-const WORDS: [(char, &str); 15] = [
+const WORDS: [(char, &str); 22] = [
+    ('&', "\\&"),
+    ('%', "\\%"),
+    ('$', "\\$"),
+    ('#', "\\#"),
+    ('_', "\\_"),
+    ('{', "\\{"),
+    ('}', "\\}"),
     ('\u{2019}', "'"),
     ('\u{b1}', "$\\pm$"),
     ('\\', "\\textbackslash{}"),
@@ -44,21 +49,9 @@ const WORDS: [(char, &str); 15] = [
 
 /// `text` with every character that has a meaning in LaTeX replaced.
 fn escape(text: &str) -> String {
-    escaped(text, "&%$#_{}", &WORDS)
-}
-
-/// A cell in LaTeX.
-fn shown(cell: &Cell, style: Style) -> String {
-    let text = cell.shown();
-    let text = match (cell, text.strip_prefix('-')) {
-        (Cell::Number { .. }, Some(digits)) => format!("$-${digits}"),
-        _ => escape(&text),
-    };
-    match style {
-        Style::Plain => text,
-        Style::Paper => format!("\\textit{{{text}}}"),
-        Style::Total => format!("\\textbf{{{text}}}"),
-    }
+    let shown =
+        |c: char| WORDS.iter().find(|word| word.0 == c).map_or(c.to_string(), |word| word.1.to_owned());
+    text.chars().map(shown).collect()
 }
 
 fn points(characters: usize) -> f64 {
@@ -67,200 +60,155 @@ fn points(characters: usize) -> f64 {
 
 /// The characters that a column takes: those of its longest cell, or of the longest word of its heading.
 fn characters(table: &Table, column: usize) -> usize {
-    let cells = table.rows.iter().map(|row| row.cell(column).shown().chars().count());
+    let cells = table.rows.iter().map(|row| row.cells[column].chars().count());
     let words = table.columns[column].heading.split(' ').map(|word| word.chars().count());
     cells.chain(words).max().unwrap_or(0)
 }
 
-/// The natural width of neighbouring columns under one heading, in points.
+/// The natural width of columns and their headings, in points.
 fn width(table: &Table, columns: &[usize]) -> f64 {
-    let runs = columns.chunk_by(|&a, &b| table.columns[a].group == table.columns[b].group);
-    runs.map(|run| {
+    let run_width = |(group, run): (&str, &[usize])| {
         let cells: f64 = run.iter().map(|&column| points(characters(table, column)) + COLUMN_GAP).sum();
-        cells.max(points(table.columns[run[0]].group.chars().count()) + COLUMN_GAP)
-    })
-    .sum()
+        cells.max(points(group.chars().count()) + COLUMN_GAP)
+    };
+    table.runs(columns).map(run_width).sum()
 }
 
-/// The columns of each part of a table that is too wide for one. Every part begins with the columns that name
-/// the rows. Columns of one group stay together where they can.
-fn parts(table: &Table, scale: f64) -> Vec<Vec<usize>> {
-    let room = TEXT_WIDTH / scale;
-    let labels: Vec<usize> = (0..table.labels.min(table.columns.len())).collect();
-    let fits = |part: &[usize], more: &[usize]| width(table, &[part, more].concat()) <= room;
-    let others: Vec<usize> = (labels.len()..table.columns.len()).collect();
-    let together = |a: &usize, b: &usize| {
-        let group = &table.columns[*a].group;
-        !group.is_empty() && *group == table.columns[*b].group
-    };
-    let mut parts = vec![labels.clone()];
-    let mut add = |columns: &[usize]| match parts.last_mut() {
-        Some(part) if part.len() == labels.len() || fits(part, columns) => part.extend(columns),
-        _ => parts.push([&labels, columns].concat()),
-    };
-    for group in others.chunk_by(together) {
-        if fits(&labels, group) {
-            add(group);
-        } else {
-            group.chunks(1).for_each(&mut add);
+/// The columns of each part of a table that is too wide for one. Every part begins with `labels`, which name the rows. Columns
+/// of one group stay together where they can.
+fn parts(table: &Table, labels: &[usize], scale: f64) -> Vec<Vec<usize>> {
+    let fits = |columns: &[usize]| width(table, columns) <= TEXT_WIDTH / scale;
+    let others: Vec<usize> = (table.labels..table.columns.len()).collect();
+    let mut parts: Vec<Vec<usize>> = Vec::new();
+    for (_, group) in table.runs(&others) {
+        let together = if fits(&[labels, group].concat()) { group.len() } else { 1 };
+        for columns in group.chunks(together) {
+            match parts.last_mut() {
+                Some(part) if fits(&[part, columns].concat()) => part.extend(columns),
+                _ => parts.push([labels, columns].concat()),
+            }
         }
     }
     parts
 }
 
-/// A heading that breaks between words where it is longer than the column.
+/// `l` for a column that names rows, `r` for one of numbers.
+fn side(table: &Table, column: usize) -> char {
+    if column < table.labels { 'l' } else { 'r' }
+}
+
+/// A heading with each word on a line of its own.
 fn heading(table: &Table, column: usize) -> String {
-    let most = characters(table, column);
-    let mut lines: Vec<String> = Vec::new();
-    for word in table.columns[column].heading.split(' ') {
-        match lines.last_mut() {
-            Some(line) if line.chars().count() + 1 + word.chars().count() <= most => {
-                let _ = write!(line, " {word}");
-            }
-            _ => lines.push(word.to_owned()),
-        }
-    }
-    let lines: Vec<String> = lines.iter().map(|line| format!("\\textbf{{{}}}", escape(line))).collect();
-    match lines.as_slice() {
-        [line] => line.clone(),
-        lines => {
-            let side = if column < table.labels { 'l' } else { 'r' };
-            format!("\\shortstack[{side}]{{{}}}", lines.join("\\\\"))
-        }
-    }
+    let words = table.columns[column].heading.split(' ');
+    let words: Vec<String> = words.map(|word| format!("\\textbf{{{}}}", escape(word))).collect();
+    format!("\\shortstack[{}]{{{}}}", side(table, column), words.join("\\\\"))
 }
 
 /// The head of a table with some of the columns: groups and headings, with rules above and below.
 fn head(table: &Table, columns: &[usize]) -> String {
     let mut out = "    \\toprule\n".to_owned();
-    let runs = || columns.chunk_by(|&a, &b| table.columns[a].group == table.columns[b].group);
-    let group = |run: &[usize]| table.columns[run[0]].group.as_str();
-    if runs().any(|run| !group(run).is_empty()) {
-        let heads =
-            runs().map(|run| format!("\\multicolumn{{{}}}{{c}}{{{}}}", run.len(), escape(group(run))));
-        let _ = write!(out, "    {} \\\\\n   ", heads.collect::<Vec<_>>().join(" & "));
-        let mut first = 1;
-        for run in runs() {
-            if !group(run).is_empty() {
-                let _ = write!(out, " \\cmidrule(lr){{{first}-{}}}", first + run.len() - 1);
+    if columns.iter().any(|&column| !table.columns[column].group.is_empty()) {
+        let (mut heads, mut rules, mut first) = (Vec::new(), String::new(), 1);
+        for (group, run) in table.runs(columns) {
+            heads.push(format!("\\multicolumn{{{}}}{{c}}{{{}}}", run.len(), escape(group)));
+            if !group.is_empty() {
+                let _ = write!(rules, " \\cmidrule(lr){{{first}-{}}}", first + run.len() - 1);
             }
             first += run.len();
         }
-        out.push('\n');
+        let _ = write!(out, "    {} \\\\\n   {rules}\n", heads.join(" & "));
     }
     let headings: Vec<String> = columns.iter().map(|&column| heading(table, column)).collect();
     let _ = writeln!(out, "    {} \\\\\n    \\midrule", headings.join(" & "));
     out
 }
 
-/// The sides of columns: what names a row is on the left.
-fn sides(table: &Table, columns: &[usize]) -> String {
-    columns.iter().map(|&column| if column < table.labels { 'l' } else { 'r' }).collect()
-}
-
-/// The line of a row with some of the columns.
-fn line(row: &Row, columns: &[usize]) -> String {
-    let cells: Vec<String> = columns.iter().map(|&column| shown(row.cell(column), row.style)).collect();
-    format!("    {} \\\\\n", cells.join(" & "))
-}
-
-/// The `tabular` with some of the columns.
-fn tabular(table: &Table, columns: &[usize]) -> String {
-    let mut out = format!("  \\begin{{tabular}}{{{}}}\n{}", sides(table, columns), head(table, columns));
-    for (i, row) in table.rows.iter().enumerate() {
-        if row.rule && i > 0 {
-            out.push_str("    \\midrule\n");
+/// The lines of the rows that have anything in some of the columns, blocks separated. `above` is what stands above each block.
+fn lines(table: &Table, columns: &[usize], above: impl Fn(&Row) -> String) -> String {
+    let has_any =
+        |row: &&Row| columns.iter().any(|&column| column >= table.labels && row.cells[column] != DASH);
+    let mut out = String::new();
+    for block in table.rows.chunk_by(|_, next| !next.rule) {
+        let mut rows = block.iter().filter(has_any).peekable();
+        if let Some(first) = rows.peek() {
+            out.push_str(if out.is_empty() { "" } else { "    \\midrule\n" });
+            out.push_str(&above(first));
         }
-        out.push_str(&line(row, columns));
+        while let Some(row) = rows.next() {
+            // The paper's row stays below ours.
+            let stays = if rows.peek().is_some_and(|next| next.is_paper) { "*" } else { "" };
+            let cells: Vec<String> = columns.iter().map(|&column| cell(table, row, column)).collect();
+            let _ = writeln!(out, "    {} \\\\{stays}", cells.join(" & "));
+        }
     }
-    out.push_str("    \\bottomrule\n  \\end{tabular}");
     out
 }
 
-/// A float of one page. It is never wider than its place: that of a column if it fits there, otherwise that of the text.
+/// A cell in LaTeX. What is below zero has a minus sign, not a hyphen.
+fn cell(table: &Table, row: &Row, column: usize) -> String {
+    let text = match row.cells[column].strip_prefix('-') {
+        Some(digits) if column >= table.labels => format!("$-${}", escape(digits)),
+        _ => escape(&row.cells[column]),
+    };
+    if row.is_paper { format!("\\textit{{{text}}}") } else { text }
+}
+
+/// The caption of a part of a table, and the label of the whole.
+fn caption(table: &Table, part: usize) -> String {
+    let label = if part == 0 { format!("\\label{{tab:{}}}", table.name) } else { String::new() };
+    format!("\\caption{{{}}}{label}", escape(&format!("{}. {}", table.title, table.caption)))
+}
+
+/// Floats of parts of the columns, each at most as wide as the text, also in a document of two columns.
 fn float(table: &Table) -> String {
-    let parts = parts(table, LEAST_SCALE);
-    let is_narrow = parts.iter().all(|columns| width(table, columns) <= COLUMN_WIDTH);
-    let environment = if is_narrow { "table" } else { "table*" };
-    let tabulars = parts.iter().map(|columns| {
+    let labels: Vec<usize> = (0..table.labels).collect();
+    let mut out = String::new();
+    for (part, columns) in parts(table, &labels, LEAST_SCALE).iter().enumerate() {
+        let sides: String = columns.iter().map(|&column| side(table, column)).collect();
         // Estimates may be wrong, so the width is that of the table unless there is less room.
-        let fitted = "\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi";
-        format!("  \\resizebox{{{fitted}}}{{!}}{{%\n{}%\n  }}", tabular(table, columns))
-    });
-    format!(
-        "\\begin{{{environment}}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  \\caption{{{}}}\n  \\label{{tab:{}}}\n  \
-         \\setlength{{\\tabcolsep}}{{{}pt}}\n{}\n\\end{{{environment}}}\n",
-        caption(table),
-        table.name,
-        COLUMN_GAP / 2.0,
-        tabulars.collect::<Vec<_>>().join("\n  \\par\\medskip\n")
-    )
-}
-
-fn caption(table: &Table) -> String {
-    escape(format!("{}. {}", table.title, table.caption).trim())
-}
-
-/// How many of the first labels of a long table are the same in every row of each block. They stand above the block.
-fn shared_labels(table: &Table) -> usize {
-    let most = table.labels.saturating_sub(1);
-    let mut blocks = table.rows.chunk_by(|_, next| !next.rule);
-    let is_shared =
-        |block: &[Row], column: usize| block.iter().all(|row| row.cell(column) == block[0].cell(column));
-    let shared = |block: &[Row]| (0..most).take_while(|&column| is_shared(block, column)).count();
-    let first = blocks.next().map_or(0, shared);
-    blocks.fold(first, |least, block| least.min(shared(block)))
+        let _ = write!(
+            out,
+            "\\begin{{table*}}[t]\n  \\centering\n  \\small\n  \\setlength{{\\emergencystretch}}{{3em}}\n  {}\n  \
+             \\setlength{{\\tabcolsep}}{{{}pt}}\n  \\resizebox{{\\ifdim\\width>\\linewidth\\linewidth\\else\\width\\fi}}{{!}}{{%\n  \
+             \\begin{{tabular}}{{{sides}}}\n{}{}    \\bottomrule\n  \\end{{tabular}}%\n  }}\n\\end{{table*}}\n",
+            caption(table, part),
+            COLUMN_GAP / 2.0,
+            head(table, columns),
+            lines(table, columns, |_| String::new())
+        );
+    }
+    out
 }
 
 /// Long tables of parts of the columns, over as many pages as they need. In a document of two columns they are set in one, for
-/// `longtable` cannot do otherwise.
+/// `longtable` cannot do otherwise. All labels but the last stand above their block.
 fn long(table: &Table) -> String {
-    let shared = shared_labels(table);
-    let rest = Table {
-        columns: table.columns[shared..].to_vec(),
-        labels: table.labels - shared,
-        rows: table
-            .rows
-            .iter()
-            .map(|row| Row { cells: row.cells.iter().skip(shared).cloned().collect(), ..row.clone() })
-            .collect(),
-        ..table.clone()
-    };
-    let mut out = "\\makeatletter\n\\let\\lexisplatback\\relax\n\\if@twocolumn\\onecolumn\\let\\lexisplatback\\twocolumn\\fi\n\
-                   \\makeatother\n\\begingroup\n\\setlength{\\LTcapwidth}{\\linewidth}\n\\setlength{\\emergencystretch}{3em}\n"
-        .to_owned();
-    let _ = writeln!(out, "\\setlength{{\\tabcolsep}}{{{}pt}}", COLUMN_GAP / 2.0);
-    for (part, columns) in parts(&rest, LONG_SCALE).iter().enumerate() {
-        let natural = width(&rest, columns);
-        let fits = |scale: &&(&str, f64)| natural * scale.1 <= TEXT_WIDTH;
-        let (size, _) = SIZES.iter().find(fits).copied().unwrap_or(SIZES[SIZES.len() - 1]);
-        let _ = writeln!(out, "{size}\n\\begin{{longtable}}{{{}}}", sides(&rest, columns));
-        let (caption, head) = (caption(&rest), head(&rest, columns));
-        let label = if part == 0 { format!("\\label{{tab:{}}}", rest.name) } else { String::new() };
-        let count = columns.len();
+    let above = table.labels.saturating_sub(1);
+    let mut out = format!(
+        "\\makeatletter\n\\let\\lexisplatback\\relax\n\\if@twocolumn\\onecolumn\\let\\lexisplatback\\twocolumn\\fi\n\
+         \\makeatother\n\\begingroup\n\\setlength{{\\LTcapwidth}}{{\\linewidth}}\n\\setlength{{\\emergencystretch}}{{3em}}\n\
+         \\setlength{{\\tabcolsep}}{{{}pt}}\n",
+        COLUMN_GAP / 2.0
+    );
+    for (part, columns) in parts(table, &[above], LONG_SCALE).iter().enumerate() {
+        let (count, head) = (columns.len(), head(table, columns));
+        let sides: String = columns.iter().map(|&column| side(table, column)).collect();
+        let name = |row: &Row| match row.cells[..above].join(", ") {
+            name if name.is_empty() => name,
+            // Not wider than the table, whatever names are.
+            name => format!(
+                "    \\multicolumn{{{count}}}{{l}}{{\\makebox[0pt][l]{{\\textit{{{}}}}}}} \\\\*\n",
+                escape(&name)
+            ),
+        };
         let _ = write!(
             out,
-            "  \\caption{{{caption}}}{label} \\\\\n{head}  \\endfirsthead\n{head}  \\endhead\n    \\midrule\n    \
-             \\multicolumn{{{count}}}{{r}}{{\\textit{{continued}}}} \\\\\n  \\endfoot\n    \\bottomrule\n  \\endlastfoot\n"
+            "{LONG_SIZE}\n\\begin{{longtable}}{{{sides}}}\n  {} \\\\\n{head}  \\endfirsthead\n{head}  \
+             \\endhead\n    \\midrule\n    \\multicolumn{{{count}}}{{r}}{{\\textit{{continued}}}} \\\\\n  \\endfoot\n    \
+             \\bottomrule\n  \\endlastfoot\n{}\\end{{longtable}}\n",
+            caption(table, part),
+            lines(table, columns, name)
         );
-        for (i, (row, whole)) in rest.rows.iter().zip(&table.rows).enumerate() {
-            let starts = i == 0 || row.rule;
-            if starts && i > 0 {
-                out.push_str("    \\midrule\n");
-            }
-            if starts && shared > 0 {
-                let names: Vec<String> =
-                    (0..shared).map(|column| escape(&whole.cell(column).shown())).collect();
-                // Not wider than the table, whatever names are.
-                let _ = writeln!(
-                    out,
-                    "    \\multicolumn{{{count}}}{{l}}{{\\makebox[0pt][l]{{\\textit{{{}}}}}}} \\\\*",
-                    names.join(", ")
-                );
-            }
-            out.push_str(&line(row, columns));
-        }
-        out.push_str("\\end{longtable}\n");
     }
     out.push_str("\\endgroup\n\\lexisplatback\n");
     out
@@ -294,8 +242,9 @@ mod tests {
         assert!(latex.contains(
             "\\multicolumn{1}{c}{} & \\multicolumn{2}{c}{Size \\& more} \\\\\n    \\cmidrule(lr){2-3}\n"
         ));
-        assert!(latex.contains("    \\midrule\n    \\textit{p,q} & \\textit{+0.12} & \\textit{--} \\\\\n"));
-        assert!(latex.contains("\\textbf{short} & \\textbf{--} & \\textbf{--} \\\\\n    \\bottomrule"));
+        assert!(latex.contains(
+            "    \\midrule\n    \\textit{p,q} & \\textit{$-$0.12} & \\textit{--} \\\\\n    \\bottomrule"
+        ));
         // Every line of cells has as many as the header.
         for line in latex.lines().filter(|line| line.ends_with("\\\\") && !line.contains("multicolumn")) {
             assert_eq!(line.replace("\\&", "").matches('&').count(), 2, "{line}");
@@ -310,17 +259,22 @@ mod tests {
             escape("1\u{2013}2 \u{2212}3 4\u{d7}5 \u{201c}a\u{201d} b\u{a0}c"),
             "1--2 $-$3 4$\\times$5 ``a'' b~c"
         );
-        for table in crate::tables::all(&crate::testing::results()) {
+        for table in both(&crate::testing::results()) {
             assert!(table.to_latex().is_ascii(), "{}", table.name);
+            assert!(long(&table).is_ascii(), "{}", table.name);
         }
     }
 
     #[test]
     fn negative_numbers_have_a_minus_sign() {
-        let text = |cell: Cell| shown(&cell, Style::Plain);
-        assert_eq!(text(Cell::change(Some(-0.14), 2)), "$-$0.14");
-        assert_eq!(text(Cell::number(Some(-3.0), 1)), "$-$3.0");
-        assert_eq!(text(Cell::text("-3")), "-3");
+        let mut table = odd();
+        table.rows[0].cells = ["-3", "-0.14", "-3.0"].map(str::to_owned).into();
+        assert!(table.to_latex().contains("    -3 & $-$0.14 & $-$3.0 \\\\\n"), "names keep their hyphen");
+    }
+
+    /// Both tables of results.
+    fn both(results: &crate::Results) -> [Table; 2] {
+        [crate::tables::means(results), crate::tables::scenes(results)]
     }
 
     /// Columns of each `tabular` of `latex`, and the width of its longest cells in points.
@@ -367,61 +321,40 @@ mod tests {
     #[test]
     fn wide_tables_fit_the_text() {
         let results = with_long_names(|scene| scene.ply_bytes = 123_456_789_012);
-        for table in crate::tables::all(&results) {
-            let latex = table.to_latex();
-            let widths = widths(&latex);
-            assert_eq!(latex.contains("\\begin{longtable}"), table.rows.len() > MOST_ROWS, "{}", table.name);
-            let environment =
-                if widths.iter().all(|width| *width <= COLUMN_WIDTH) { "table" } else { "table*" };
-            assert!(
-                widths.is_empty() || latex.starts_with(&format!("\\begin{{{environment}}}[t]")),
-                "{}: {widths:?}",
-                table.name
-            );
-            // What cannot be split is as wide as its labels and one column.
-            for width in &widths {
-                assert!(
-                    *width <= TEXT_WIDTH / LEAST_SCALE
-                        || ["skipped", "views", "models"].contains(&table.name),
-                    "{}: {width}",
-                    table.name
-                );
-            }
-        }
-        let bytes = crate::tables::bytes(&results);
-        assert!(bytes.to_latex().matches("\\begin{longtable}").count() >= 2, "18 columns do not fit at once");
+        let [means, scenes] = both(&results);
+        assert!(means.rows.len() <= MOST_ROWS && scenes.rows.len() > MOST_ROWS);
+        let widths = widths(&means.to_latex());
+        assert_eq!(widths.len(), 2, "16 columns do not fit at once");
+        assert!(widths.iter().all(|width| *width <= TEXT_WIDTH / LEAST_SCALE), "{widths:?}");
+        assert!(means.to_latex().starts_with("\\begin{table*}[t]"));
+        let latex = scenes.to_latex();
+        assert!(latex.matches("\\begin{longtable}").count() >= 2, "16 columns do not fit at once");
         // Each part has all rows, and each column is in one part.
-        let columns: Vec<usize> =
-            parts(&bytes, LONG_SCALE).iter().flat_map(|part| part[bytes.labels..].to_vec()).collect();
-        assert_eq!(columns, (bytes.labels..bytes.columns.len()).collect::<Vec<_>>());
-        let latex = bytes.to_latex();
+        let parts = parts(&scenes, &[2], LONG_SCALE);
+        let columns: Vec<usize> = parts.iter().flat_map(|part| part[1..].to_vec()).collect();
+        assert_eq!(columns, (scenes.labels..scenes.columns.len()).collect::<Vec<_>>());
         assert_eq!(latex.matches("tol 0.05").count() % latex.matches("\\begin{longtable}").count(), 0);
     }
 
     #[test]
     fn blocks_of_a_long_table_are_named_above_them() {
-        let mut results = crate::testing::results();
-        results.scenes = vec![results.scenes.swap_remove(0); 3];
-        let views = crate::tables::views(&results);
-        assert!(views.rows.len() > MOST_ROWS && shared_labels(&views) == 4);
-        let latex = views.to_latex();
-        assert!(latex.contains("\\makebox[0pt][l]{\\textit{bonsai, 3DGS, tol 0.1, photos}}"), "{latex}");
-        // The view, and its scores.
-        assert_eq!(latex.matches("\\begin{longtable}{lrrr}").count(), 1);
+        let latex = long(&crate::tables::scenes(&crate::testing::results()));
+        assert!(latex.contains("\\makebox[0pt][l]{\\textit{bonsai, 3DGS}}"), "{latex}");
         assert_eq!(latex.matches('{').count(), latex.matches('}').count());
     }
 
     /// Compiles a document with these options and every table; what LaTeX found too wide for its place.
     fn too_wide(results: &crate::Results, options: &str) -> Option<Vec<String>> {
-        use std::fmt::Write as _;
         let folder = tempfile::tempdir().unwrap();
         let mut text = format!(
             "\\documentclass[{options}]{{article}}\n\\usepackage{{booktabs,graphicx,longtable}}\n\\begin{{document}}\nText.\n"
         );
-        for table in crate::tables::all(results) {
-            let name = format!("{}.tex", table.name);
-            std::fs::write(folder.path().join(&name), table.to_latex()).unwrap();
-            let _ = writeln!(text, "\\input{{{name}}}\\clearpage");
+        for table in both(results) {
+            for (form, latex) in [("float", float(&table)), ("long", long(&table))] {
+                let name = format!("{}-{form}.tex", table.name);
+                std::fs::write(folder.path().join(&name), latex).unwrap();
+                let _ = writeln!(text, "\\input{{{name}}}\\clearpage");
+            }
         }
         text.push_str("\\end{document}\n");
         std::fs::write(folder.path().join("paper.tex"), text).unwrap();
